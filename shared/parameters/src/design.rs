@@ -1,0 +1,187 @@
+//! What is the same in every case of a campaign: sections, masses, spacing, load.
+
+use serde::{Deserialize, Serialize};
+
+/// Cross-section and material of a beam.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BeamSection {
+    /// Cross-section area `A` in m2.
+    pub area_m2: f64,
+    /// Second moment of area `I` in m4.
+    pub second_moment_m4: f64,
+    /// Young's modulus `E` in Pa.
+    pub youngs_modulus_pa: f64,
+    /// Density in kg/m3.
+    pub density_kg_m3: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// Timoshenko shear coefficient `kappa`.
+    pub shear_coefficient: f64,
+}
+
+impl BeamSection {
+    /// Bending stiffness `E I` in N m2.
+    pub fn bending_stiffness(&self) -> f64 {
+        self.youngs_modulus_pa * self.second_moment_m4
+    }
+
+    /// Shear stiffness `kappa G A` in N, with `G = E / (2 (1 + nu))`.
+    pub fn shear_stiffness(&self) -> f64 {
+        let shear_modulus = self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson));
+        self.shear_coefficient * shear_modulus * self.area_m2
+    }
+
+    /// Mass per length `rho A` in kg/m.
+    pub fn mass_per_length(&self) -> f64 {
+        self.density_kg_m3 * self.area_m2
+    }
+
+    /// Rotary inertia per length `rho I` in kg m.
+    pub fn rotary_inertia_per_length(&self) -> f64 {
+        self.density_kg_m3 * self.second_moment_m4
+    }
+}
+
+/// The sleepers: half of each, from the track's symmetry plane to its free end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SleeperDesign {
+    /// Distance between neighbouring sleepers in m.
+    pub spacing_m: f64,
+    /// Length of a half sleeper in m.
+    pub half_length_m: f64,
+    /// Distance of the rail seat from the symmetry plane in m; the rotation is held there.
+    pub rail_seat_m: f64,
+    /// Section whose bending stiffness is nominal; the parameter `EI_s` scales bending and shear.
+    pub section: BeamSection,
+}
+
+/// The wheel: a rigid unsprung mass under a constant load.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wheel {
+    /// Unsprung mass in kg.
+    pub mass_kg: f64,
+    /// Vertical load in N, the wheel's own weight included.
+    pub load_n: f64,
+    /// Rolling radius in m.
+    pub radius_m: f64,
+}
+
+/// Everything about wheel and track that is not a [`crate::Parameter`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrackDesign {
+    /// The rail.
+    pub rail: BeamSection,
+    /// Stiffness-proportional damping of the rail in s (`C = beta K`).
+    pub rail_damping_s: f64,
+    /// The sleepers.
+    pub sleeper: SleeperDesign,
+    /// Lateral radius of the railhead in m, for the Hertzian contact (paper, eq. B.5).
+    pub railhead_radius_m: f64,
+    /// The wheel.
+    pub wheel: Wheel,
+}
+
+/// There is no preset of that name.
+#[derive(Debug, thiserror::Error)]
+#[error("no preset is called `{0}`; known are v-track and real-scale")]
+pub struct UnknownPreset(String);
+
+impl TrackDesign {
+    /// The downscaled test rig V-Track (paper, Table D1; rail S7).
+    pub fn v_track() -> Self {
+        let steel = BeamSection {
+            area_m2: 8.65e-4,
+            second_moment_m4: 5.15e-7,
+            youngs_modulus_pa: 210e9,
+            density_kg_m3: 7800.0,
+            poisson: 0.3,
+            shear_coefficient: 0.34,
+        };
+        Self {
+            rail: steel.clone(),
+            rail_damping_s: 1e-7,
+            sleeper: SleeperDesign {
+                spacing_m: 0.125,
+                half_length_m: 0.24,
+                rail_seat_m: 0.0,
+                section: BeamSection {
+                    area_m2: 6e-4,
+                    second_moment_m4: 1.125e-8,
+                    shear_coefficient: 5.0 / 6.0,
+                    ..steel
+                },
+            },
+            railhead_radius_m: 0.06,
+            wheel: Wheel { mass_kg: 44.0, load_n: 4500.0, radius_m: 0.065 },
+        }
+    }
+
+    /// V-Track enlarged to a real track by the paper's scale factors (Table D1): lengths by 5,
+    /// stiffness by 5, damping by 25, masses by 125, hence forces by 25 at equal stress.
+    pub fn real_scale() -> Self {
+        const LENGTH: f64 = 5.0;
+        let enlarge = |section: BeamSection| BeamSection {
+            area_m2: section.area_m2 * LENGTH.powi(2),
+            second_moment_m4: section.second_moment_m4 * LENGTH.powi(4),
+            ..section
+        };
+        let small = Self::v_track();
+        Self {
+            rail: enlarge(small.rail),
+            rail_damping_s: small.rail_damping_s * LENGTH,
+            sleeper: SleeperDesign {
+                spacing_m: small.sleeper.spacing_m * LENGTH,
+                half_length_m: small.sleeper.half_length_m * LENGTH,
+                rail_seat_m: small.sleeper.rail_seat_m * LENGTH,
+                section: enlarge(small.sleeper.section),
+            },
+            railhead_radius_m: small.railhead_radius_m * LENGTH,
+            wheel: Wheel {
+                mass_kg: small.wheel.mass_kg * LENGTH.powi(3),
+                load_n: small.wheel.load_n * LENGTH.powi(2),
+                radius_m: small.wheel.radius_m * LENGTH,
+            },
+        }
+    }
+
+    /// The preset of that name: `v-track` or `real-scale`.
+    ///
+    /// # Errors
+    /// [`UnknownPreset`] names the known ones.
+    pub fn preset(name: &str) -> Result<Self, UnknownPreset> {
+        match name {
+            "v-track" => Ok(Self::v_track()),
+            "real-scale" => Ok(Self::real_scale()),
+            _ => Err(UnknownPreset(name.to_owned())),
+        }
+    }
+
+    /// Mass of one half sleeper in kg.
+    pub fn sleeper_mass(&self) -> f64 {
+        self.sleeper.section.mass_per_length() * self.sleeper.half_length_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_half_sleeper_of_v_track_weighs_what_table_d1_says() {
+        assert!((TrackDesign::v_track().sleeper_mass() - 1.12).abs() < 0.01);
+    }
+
+    #[test]
+    fn real_scale_has_the_scale_factors_of_table_d1() {
+        let (small, large) = (TrackDesign::v_track(), TrackDesign::real_scale());
+        let ratio = |a: f64, b: f64| (b / a).round();
+        assert_eq!(ratio(small.sleeper_mass(), large.sleeper_mass()), 125.0);
+        assert_eq!(ratio(small.sleeper.spacing_m, large.sleeper.spacing_m), 5.0);
+        let stiffness = |d: &TrackDesign| d.rail.bending_stiffness() / d.sleeper.spacing_m.powi(3);
+        assert_eq!(ratio(stiffness(&small), stiffness(&large)), 5.0);
+    }
+}

@@ -1,0 +1,19 @@
+//! Every physical quantity once: its name, symbol, unit, nominal value and range.
+//!
+//! Owns the catalogue of parameters, the space a campaign samples, the points it samples and the
+//! designs (V-Track, real scale) around them. What the quantities do is the track model's.
+//!
+//! Convention: **one rail, half sleepers**. Every stiffness, damping and mass is that of one rail
+//! seat; nothing is doubled anywhere.
+
+mod catalogue;
+mod design;
+mod set;
+mod sobol;
+mod space;
+
+pub use catalogue::Parameter;
+pub use design::{BeamSection, SleeperDesign, TrackDesign, UnknownPreset, Wheel};
+pub use set::ParameterSet;
+pub use sobol::{OWEN_POINTS_MAX, Sequence, SobolError};
+pub use space::{Axis, ParameterSpace, Scale, SpaceError};

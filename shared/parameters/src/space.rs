@@ -1,0 +1,158 @@
+//! The space that a campaign samples: an axis a varied parameter.
+
+use crate::{Parameter, ParameterSet};
+use serde::{Deserialize, Serialize};
+
+/// How the unit interval maps onto an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scale {
+    /// Evenly in the value.
+    #[default]
+    Linear,
+    /// Evenly in the value's logarithm.
+    Logarithmic,
+}
+
+/// One varied parameter and its range, in the parameter's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+    /// How values spread between them.
+    #[serde(default)]
+    pub scale: Scale,
+}
+
+/// Why a space is refused.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub enum SpaceError {
+    /// A bound is NaN or infinite.
+    #[error("{0}: both ends of the range must be finite numbers")]
+    NotFinite(Parameter),
+    /// The range is empty or reversed.
+    #[error(
+        "{parameter}: the range [{low}, {high}] is reversed or empty; write the lower end first"
+    )]
+    Reversed {
+        /// The parameter.
+        parameter: Parameter,
+        /// Its lower end.
+        low: f64,
+        /// Its upper end.
+        high: f64,
+    },
+    /// A physical quantity would be zero or negative.
+    #[error("{0}: values must be positive")]
+    NotPositive(Parameter),
+    /// A parameter has two axes.
+    #[error("{0}: stands twice among the axes")]
+    Twice(Parameter),
+}
+
+/// Axes in catalogue order; parameters without an axis keep a fixed value.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct ParameterSpace {
+    axes: Vec<Axis>,
+}
+
+impl ParameterSpace {
+    /// The space of these axes, put in catalogue order.
+    ///
+    /// # Errors
+    /// [`SpaceError`] names the parameter whose range is not finite, positive, low before high,
+    /// or which stands twice.
+    pub fn new(mut axes: Vec<Axis>) -> Result<Self, SpaceError> {
+        axes.sort_by_key(|axis| axis.parameter);
+        for pair in axes.windows(2) {
+            if pair[0].parameter == pair[1].parameter {
+                return Err(SpaceError::Twice(pair[0].parameter));
+            }
+        }
+        for &Axis { parameter, low, high, .. } in &axes {
+            if !(low.is_finite() && high.is_finite()) {
+                return Err(SpaceError::NotFinite(parameter));
+            }
+            if low >= high {
+                return Err(SpaceError::Reversed { parameter, low, high });
+            }
+            if low <= 0.0 {
+                return Err(SpaceError::NotPositive(parameter));
+            }
+        }
+        Ok(Self { axes })
+    }
+
+    /// All six parameters over the ranges of the paper's Table D1.
+    pub fn table_d1() -> Self {
+        let axis = |parameter: Parameter| {
+            let [low, high] = parameter.range();
+            Axis { parameter, low, high, scale: Scale::Linear }
+        };
+        Self { axes: Parameter::ALL.iter().copied().map(axis).collect() }
+    }
+
+    /// The axes, in catalogue order.
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    /// The values at a point of the unit cube, one coordinate an axis; the rest as in `fixed`.
+    ///
+    /// # Panics
+    /// When the point has not as many coordinates as the space has axes.
+    pub fn values(&self, point: &[f64], fixed: &ParameterSet) -> ParameterSet {
+        assert_eq!(point.len(), self.axes.len(), "a coordinate an axis");
+        self.axes.iter().zip(point).fold(*fixed, |set, (axis, &x)| {
+            let value = match axis.scale {
+                Scale::Linear => axis.low + x * (axis.high - axis.low),
+                Scale::Logarithmic => axis.low * (axis.high / axis.low).powf(x),
+            };
+            set.with(axis.parameter, value)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn axis(parameter: Parameter, low: f64, high: f64) -> Axis {
+        Axis { parameter, low, high, scale: Scale::Linear }
+    }
+
+    #[test]
+    fn a_reversed_range_is_refused_by_name() {
+        let error = ParameterSpace::new(vec![axis(Parameter::BallastStiffness, 2e7, 1e7)]);
+        assert!(error.unwrap_err().to_string().starts_with("ballast_stiffness_N_m: the range"));
+    }
+
+    #[test]
+    fn nonsense_ranges_are_refused() {
+        let p = Parameter::RailpadStiffness;
+        let refused = |axes| ParameterSpace::new(axes).unwrap_err();
+        assert_eq!(refused(vec![axis(p, f64::NAN, 1.0)]), SpaceError::NotFinite(p));
+        assert_eq!(refused(vec![axis(p, -1.0, 1.0)]), SpaceError::NotPositive(p));
+        assert_eq!(refused(vec![axis(p, 1.0, 2.0), axis(p, 1.0, 2.0)]), SpaceError::Twice(p));
+    }
+
+    proptest! {
+        #[test]
+        fn every_point_of_the_cube_lands_inside_the_ranges(
+            point in proptest::collection::vec(0.0..1.0_f64, Parameter::COUNT)
+        ) {
+            let space = ParameterSpace::table_d1();
+            let set = space.values(&point, &ParameterSet::nominal());
+            for axis in space.axes() {
+                prop_assert!((axis.low..=axis.high).contains(&set[axis.parameter]));
+            }
+        }
+    }
+}

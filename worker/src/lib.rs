@@ -1,0 +1,1 @@
+//! A worker: parameter set in, features out.

@@ -1,0 +1,2 @@
+//! Starts a worker.
+fn main() {}
