@@ -10,6 +10,8 @@ struct Row {
     label: &'static str,
     nominal: f64,
     range: [f64; 2],
+    /// The value of a track enlarged by `r` is `r` to this power times as large.
+    length_exponent: i32,
 }
 
 macro_rules! catalogue {
@@ -38,22 +40,22 @@ macro_rules! catalogue {
 catalogue! {
     /// Vertical stiffness of the railpad under one rail seat, `k_p` in N/m (paper, Table D1).
     RailpadStiffness = Row { name: "railpad_stiffness_N_m", symbol: "k_p", unit: "N/m",
-        label: "railpad stiffness", nominal: 1.5e8, range: [10e6, 300e6] };
+        label: "railpad stiffness", nominal: 1.5e8, range: [10e6, 300e6], length_exponent: 1 };
     /// Vertical damping of the railpad under one rail seat, `c_p` in N s/m (paper, Table D1).
     RailpadDamping = Row { name: "railpad_damping_N_s_m", symbol: "c_p", unit: "N s/m",
-        label: "railpad damping", nominal: 6e3, range: [4e3, 9e3] };
+        label: "railpad damping", nominal: 6e3, range: [4e3, 9e3], length_exponent: 2 };
     /// Vertical stiffness of the ballast under one half sleeper, `k_b` in N/m (paper, Table D1).
     BallastStiffness = Row { name: "ballast_stiffness_N_m", symbol: "k_b", unit: "N/m",
-        label: "ballast stiffness", nominal: 1.2e7, range: [4e6, 22e6] };
+        label: "ballast stiffness", nominal: 1.2e7, range: [4e6, 22e6], length_exponent: 1 };
     /// Vertical damping of the ballast under one half sleeper, `c_b` in N s/m (paper, Table D1).
     BallastDamping = Row { name: "ballast_damping_N_s_m", symbol: "c_b", unit: "N s/m",
-        label: "ballast damping", nominal: 900.0, range: [400.0, 1300.0] };
+        label: "ballast damping", nominal: 900.0, range: [400.0, 1300.0], length_exponent: 2 };
     /// Bending stiffness of the sleeper, `EI_s` in N m2 (paper, Table D1).
     SleeperBendingStiffness = Row { name: "sleeper_EI_N_m2", symbol: "EI_s", unit: "N m2",
-        label: "sleeper bending stiffness", nominal: 5000.0, range: [3543.0, 7086.0] };
+        label: "sleeper bending stiffness", nominal: 5000.0, range: [3543.0, 7086.0], length_exponent: 4 };
     /// Level of the track irregularity, `A_irr` in 1e-4 m2 rad/m (paper, eq. B.6 and Table D1).
     IrregularityLevel = Row { name: "irregularity_level", symbol: "A_irr", unit: "1e-4 m2 rad/m",
-        label: "irregularity level", nominal: 3.0, range: [1.0, 5.0] };
+        label: "irregularity level", nominal: 3.0, range: [1.0, 5.0], length_exponent: 0 };
 }
 
 impl Parameter {
@@ -85,6 +87,12 @@ impl Parameter {
     /// Lowest and highest value on V-Track (paper, Table D1).
     pub const fn range(self) -> [f64; 2] {
         self.row().range
+    }
+
+    /// What a `value` on V-Track becomes on a track whose lengths are `ratio` times V-Track's
+    /// (paper, Table D1: stiffness by the ratio, damping by its square).
+    pub fn enlarged(self, value: f64, ratio: f64) -> f64 {
+        value * ratio.powi(self.row().length_exponent)
     }
 
     /// The place in [`Parameter::ALL`].

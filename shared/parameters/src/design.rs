@@ -85,11 +85,6 @@ pub struct TrackDesign {
     pub wheel: Wheel,
 }
 
-/// There is no preset of that name.
-#[derive(Debug, thiserror::Error)]
-#[error("no preset is called `{0}`; known are v-track and real-scale")]
-pub struct UnknownPreset(String);
-
 impl TrackDesign {
     /// The downscaled test rig V-Track (paper, Table D1; rail S7).
     pub fn v_track() -> Self {
@@ -120,43 +115,33 @@ impl TrackDesign {
         }
     }
 
-    /// V-Track enlarged to a real track by the paper's scale factors (Table D1): lengths by 5,
-    /// stiffness by 5, damping by 25, masses by 125, hence forces by 25 at equal stress.
-    pub fn real_scale() -> Self {
-        const LENGTH: f64 = 5.0;
-        let enlarge = |section: BeamSection| BeamSection {
-            area_m2: section.area_m2 * LENGTH.powi(2),
-            second_moment_m4: section.second_moment_m4 * LENGTH.powi(4),
-            ..section
-        };
-        let small = Self::v_track();
-        Self {
-            rail: enlarge(small.rail),
-            rail_damping_s: small.rail_damping_s * LENGTH,
-            sleeper: SleeperDesign {
-                spacing_m: small.sleeper.spacing_m * LENGTH,
-                half_length_m: small.sleeper.half_length_m * LENGTH,
-                rail_seat_m: small.sleeper.rail_seat_m * LENGTH,
-                section: enlarge(small.sleeper.section),
-            },
-            railhead_radius_m: small.railhead_radius_m * LENGTH,
-            wheel: Wheel {
-                mass_kg: small.wheel.mass_kg * LENGTH.powi(3),
-                load_n: small.wheel.load_n * LENGTH.powi(2),
-                radius_m: small.wheel.radius_m * LENGTH,
-            },
-        }
-    }
-
-    /// The preset of that name: `v-track` or `real-scale`.
+    /// The same track with every length multiplied by `ratio`, at equal stress and equal strain.
     ///
-    /// # Errors
-    /// [`UnknownPreset`] names the known ones.
-    pub fn preset(name: &str) -> Result<Self, UnknownPreset> {
-        match name {
-            "v-track" => Ok(Self::v_track()),
-            "real-scale" => Ok(Self::real_scale()),
-            _ => Err(UnknownPreset(name.to_owned())),
+    /// Areas grow with its square (and forces, loads), masses with its cube, second moments of
+    /// area with its fourth power; time, hence stiffness-proportional damping, with itself.
+    /// With `ratio` 5 these are the scale factors of the paper's Table D1.
+    #[must_use]
+    pub fn enlarged(&self, ratio: f64) -> Self {
+        let section = |section: &BeamSection| BeamSection {
+            area_m2: section.area_m2 * ratio.powi(2),
+            second_moment_m4: section.second_moment_m4 * ratio.powi(4),
+            ..section.clone()
+        };
+        Self {
+            rail: section(&self.rail),
+            rail_damping_s: self.rail_damping_s * ratio,
+            sleeper: SleeperDesign {
+                spacing_m: self.sleeper.spacing_m * ratio,
+                half_length_m: self.sleeper.half_length_m * ratio,
+                rail_seat_m: self.sleeper.rail_seat_m * ratio,
+                section: section(&self.sleeper.section),
+            },
+            railhead_radius_m: self.railhead_radius_m * ratio,
+            wheel: Wheel {
+                mass_kg: self.wheel.mass_kg * ratio.powi(3),
+                load_n: self.wheel.load_n * ratio.powi(2),
+                radius_m: self.wheel.radius_m * ratio,
+            },
         }
     }
 
@@ -176,8 +161,9 @@ mod tests {
     }
 
     #[test]
-    fn real_scale_has_the_scale_factors_of_table_d1() {
-        let (small, large) = (TrackDesign::v_track(), TrackDesign::real_scale());
+    fn five_times_v_track_has_the_scale_factors_of_table_d1() {
+        let small = TrackDesign::v_track();
+        let large = small.enlarged(5.0);
         let ratio = |a: f64, b: f64| (b / a).round();
         assert_eq!(ratio(small.sleeper_mass(), large.sleeper_mass()), 125.0);
         assert_eq!(ratio(small.sleeper.spacing_m, large.sleeper.spacing_m), 5.0);

@@ -8,12 +8,14 @@
 
 mod catalogue;
 mod design;
+mod preset;
 mod set;
 mod sobol;
 mod space;
 
 pub use catalogue::Parameter;
-pub use design::{BeamSection, SleeperDesign, TrackDesign, UnknownPreset, Wheel};
+pub use design::{BeamSection, SleeperDesign, TrackDesign, Wheel};
+pub use preset::Preset;
 pub use set::ParameterSet;
 pub use sobol::{OWEN_POINTS_MAX, Sequence, SobolError};
 pub use space::{Axis, ParameterSpace, Scale, SpaceError};

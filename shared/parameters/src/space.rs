@@ -89,15 +89,6 @@ impl ParameterSpace {
         Ok(Self { axes })
     }
 
-    /// All six parameters over the ranges of the paper's Table D1.
-    pub fn table_d1() -> Self {
-        let axis = |parameter: Parameter| {
-            let [low, high] = parameter.range();
-            Axis { parameter, low, high, scale: Scale::Linear }
-        };
-        Self { axes: Parameter::ALL.iter().copied().map(axis).collect() }
-    }
-
     /// The axes, in catalogue order.
     pub fn axes(&self) -> &[Axis] {
         &self.axes
@@ -148,7 +139,7 @@ mod tests {
         fn every_point_of_the_cube_lands_inside_the_ranges(
             point in proptest::collection::vec(0.0..1.0_f64, Parameter::COUNT)
         ) {
-            let space = ParameterSpace::table_d1();
+            let space = crate::Preset::VTrack.space();
             let set = space.values(&point, &ParameterSet::nominal());
             for axis in space.axes() {
                 prop_assert!((axis.low..=axis.high).contains(&set[axis.parameter]));
