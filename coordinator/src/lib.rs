@@ -1,1 +1,13 @@
-//! Coordinator of campaigns.
+//! The coordinator: decides what is simulated, keeps the results and answers with them.
+//!
+//! - [`campaign`]: what is to be simulated; from an index to a case.
+//! - [`dispatch`]: hands cases to workers and takes their results (gRPC).
+//! - [`farm`]: coordinator and workers in one process.
+//! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
+//!
+//! The library, the surrogate, evaluation and reports are crates of their own beside `src`.
+
+pub mod campaign;
+pub mod commands;
+pub mod dispatch;
+pub mod farm;

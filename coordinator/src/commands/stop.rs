@@ -1,0 +1,33 @@
+//! Why a command ends without being done.
+
+/// The end of a command that is not success; each has its exit code.
+#[derive(Debug)]
+pub enum Stop {
+    /// The command's answer is no (exit code 1).
+    Negative,
+    /// What the user gave can't be used (exit code 2).
+    Input(anyhow::Error),
+    /// The machine, the network or the program failed (exit code 3).
+    Failure(anyhow::Error),
+}
+
+impl<E: Into<anyhow::Error>> From<E> for Stop {
+    fn from(error: E) -> Self {
+        Self::Failure(error.into())
+    }
+}
+
+/// Blames an error on what the user gave.
+pub trait OrInput<T> {
+    /// The value, or [`Stop::Input`].
+    ///
+    /// # Errors
+    /// [`Stop::Input`] with the error.
+    fn or_input(self) -> Result<T, Stop>;
+}
+
+impl<T, E: Into<anyhow::Error>> OrInput<T> for Result<T, E> {
+    fn or_input(self) -> Result<T, Stop> {
+        self.map_err(|error| Stop::Input(error.into()))
+    }
+}
