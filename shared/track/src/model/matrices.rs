@@ -1,0 +1,110 @@
+//! Mass, damping and stiffness on one common sparsity pattern.
+
+/// One contribution to the three matrices.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Term {
+    pub(super) row: usize,
+    pub(super) column: usize,
+    pub(super) mass: f64,
+    pub(super) damping: f64,
+    pub(super) stiffness: f64,
+}
+
+/// The symmetric matrices `M`, `C`, `K`, row by row, both triangles stored.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matrices {
+    row_starts: Vec<usize>,
+    columns: Vec<usize>,
+    mass: Vec<f64>,
+    damping: Vec<f64>,
+    stiffness: Vec<f64>,
+}
+
+impl Matrices {
+    /// Sums the terms that meet in one entry, in the order in which they came.
+    pub(super) fn from_terms(size: usize, mut terms: Vec<Term>) -> Self {
+        terms.sort_by_key(|term| (term.row, term.column));
+        let mut matrices = Self {
+            row_starts: vec![0; size + 1],
+            columns: Vec::new(),
+            mass: Vec::new(),
+            damping: Vec::new(),
+            stiffness: Vec::new(),
+        };
+        let mut place = None;
+        for Term { row, column, mass, damping, stiffness } in terms {
+            if place != Some((row, column)) {
+                place = Some((row, column));
+                matrices.columns.push(column);
+                matrices.mass.push(0.0);
+                matrices.damping.push(0.0);
+                matrices.stiffness.push(0.0);
+                matrices.row_starts[row + 1] = matrices.columns.len();
+            }
+            let last = matrices.columns.len() - 1;
+            matrices.mass[last] += mass;
+            matrices.damping[last] += damping;
+            matrices.stiffness[last] += stiffness;
+        }
+        for row in 0..size {
+            matrices.row_starts[row + 1] =
+                matrices.row_starts[row + 1].max(matrices.row_starts[row]);
+        }
+        matrices
+    }
+
+    /// Number of degrees of freedom.
+    pub fn size(&self) -> usize {
+        self.row_starts.len() - 1
+    }
+
+    /// First entry of each row, and the number of entries at the end.
+    pub fn row_starts(&self) -> &[usize] {
+        &self.row_starts
+    }
+
+    /// Column of each entry, ascending within a row.
+    pub fn columns(&self) -> &[usize] {
+        &self.columns
+    }
+
+    /// Mass matrix, an entry a place of the pattern, in kg, kg m and kg m2.
+    pub fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    /// Damping matrix, an entry a place of the pattern, in N s/m, N s and N m s.
+    pub fn damping(&self) -> &[f64] {
+        &self.damping
+    }
+
+    /// Stiffness matrix, an entry a place of the pattern, in N/m, N and N m.
+    pub fn stiffness(&self) -> &[f64] {
+        &self.stiffness
+    }
+
+    /// The values of `m M + c C + k K`, an entry a place of the pattern.
+    pub fn combination(&self, m: f64, c: f64, k: f64) -> Vec<f64> {
+        let damped =
+            self.mass.iter().zip(&self.damping).map(|(mass, damping)| m * mass + c * damping);
+        damped.zip(&self.stiffness).map(|(sum, stiffness)| sum + k * stiffness).collect()
+    }
+
+    /// Row, column and place of every entry.
+    pub fn places(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
+        (0..self.size()).flat_map(move |row| {
+            (self.row_starts[row]..self.row_starts[row + 1])
+                .map(move |place| (row, self.columns[place], place))
+        })
+    }
+
+    /// Product of a matrix on this pattern with a vector.
+    pub fn product(&self, values: &[f64], vector: &[f64]) -> Vec<f64> {
+        (0..self.size())
+            .map(|row| {
+                let places = self.row_starts[row]..self.row_starts[row + 1];
+                places.map(|place| values[place] * vector[self.columns[place]]).sum()
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,21 @@
+//! The track as equations of motion: geometry, supports, contact, assembled matrices.
+//!
+//! Time and frequency are the solvers'; physics beyond the paper is an [`Extension`]'s.
+//!
+//! [`Extension`]: crate::extension::Extension
+
+mod assembly;
+mod contact;
+mod layout;
+mod matrices;
+mod mesh;
+mod support;
+mod track;
+
+pub use assembly::{Assembly, Port};
+pub use contact::HertzContact;
+pub use layout::{Layout, RailPoint, SleeperLayout};
+pub use matrices::Matrices;
+pub use mesh::Mesh;
+pub use support::Support;
+pub use track::{ModelError, TrackModel};

@@ -1,0 +1,194 @@
+//! The assembled track.
+
+use super::{Assembly, Layout, Matrices, Mesh, Support};
+use crate::extension::Extension;
+use tracktwin_parameters::TrackDesign;
+
+/// Rail, sleepers, railpads, ballast and extensions as `M ü + C u̇ + K u = f`.
+///
+/// The rail runs from 0 to `spans × spacing`, its ends held in deflection and free in rotation;
+/// sleeper `i` (from 0) stands at `(i + 1) × spacing`, and none stands at the ends. Source: paper,
+/// 2.4.1, Appendices B and C.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackModel {
+    design: TrackDesign,
+    layout: Layout,
+    matrices: Matrices,
+}
+
+/// Why no track can be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// A track has at least one sleeper, a span at least one element, and a sleeper too.
+    #[error("the mesh needs two spans or more and at least one element in each and in a sleeper")]
+    Mesh,
+    /// There must be a support a sleeper.
+    #[error("{spans} spans have {} sleepers, but {supports} supports are given", spans - 1)]
+    Supports {
+        /// Spans of the mesh.
+        spans: usize,
+        /// Supports given.
+        supports: usize,
+    },
+    /// A stiffness or damping is negative or no number, or a sleeper has no bending stiffness.
+    #[error("the support of sleeper {sleeper} is not physical: {support:?}")]
+    Support {
+        /// The sleeper, from 0.
+        sleeper: usize,
+        /// Its support.
+        support: Support,
+    },
+    /// The rail seat lies beyond the sleeper.
+    #[error("the rail seat at {rail_seat_m} m lies outside the half sleeper of {half_length_m} m")]
+    RailSeat {
+        /// Its distance from the symmetry plane in m.
+        rail_seat_m: f64,
+        /// Length of the half sleeper in m.
+        half_length_m: f64,
+    },
+}
+
+impl TrackModel {
+    /// Assembles the track: a support for every sleeper between the spans, then the extensions in
+    /// their order.
+    ///
+    /// # Errors
+    /// [`ModelError`] says which part of the input makes no track.
+    pub fn build(
+        design: &TrackDesign,
+        mesh: &Mesh,
+        supports: &[Support],
+        extensions: &[Box<dyn Extension>],
+    ) -> Result<Self, ModelError> {
+        check(design, mesh, supports)?;
+        let mut assembly = Assembly::new(design, Layout::new(design, mesh), supports);
+        for extension in extensions {
+            extension.assemble(&mut assembly);
+        }
+        let (layout, matrices) = assembly.finish();
+        Ok(Self { design: design.clone(), layout, matrices })
+    }
+
+    /// What it was built from, supports apart.
+    pub fn design(&self) -> &TrackDesign {
+        &self.design
+    }
+
+    /// Where its degrees of freedom stand.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Its mass, damping and stiffness.
+    pub fn matrices(&self) -> &Matrices {
+        &self.matrices
+    }
+}
+
+fn check(design: &TrackDesign, mesh: &Mesh, supports: &[Support]) -> Result<(), ModelError> {
+    let spans = mesh.spans();
+    if spans < 2 || mesh.sleeper_elements == 0 || mesh.rail_elements.contains(&0) {
+        return Err(ModelError::Mesh);
+    }
+    if supports.len() != spans - 1 {
+        return Err(ModelError::Supports { spans, supports: supports.len() });
+    }
+    if let Some(sleeper) = supports.iter().position(|support| !support.is_physical()) {
+        return Err(ModelError::Support { sleeper, support: supports[sleeper] });
+    }
+    let (rail_seat_m, half_length_m) = (design.sleeper.rail_seat_m, design.sleeper.half_length_m);
+    if !(0.0..=half_length_m).contains(&rail_seat_m) {
+        return Err(ModelError::RailSeat { rail_seat_m, half_length_m });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_parameters::ParameterSet;
+
+    const SPANS: usize = 5;
+
+    fn model(design: &TrackDesign) -> TrackModel {
+        let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
+        TrackModel::build(design, &Mesh::uniform(SPANS, 8, 8), &supports, &[]).unwrap()
+    }
+
+    #[test]
+    fn the_matrices_are_symmetric() {
+        let model = model(&TrackDesign::v_track());
+        let matrices = model.matrices();
+        for values in [matrices.mass(), matrices.damping(), matrices.stiffness()] {
+            let entries: std::collections::HashMap<_, _> = matrices
+                .places()
+                .map(|(row, column, place)| ((row, column), values[place]))
+                .collect();
+            for (row, column, place) in matrices.places() {
+                assert_eq!(values[place], entries[&(column, row)], "entry {row}, {column}");
+            }
+        }
+    }
+
+    #[test]
+    fn lowered_as_a_whole_every_sleeper_weighs_its_mass_and_rests_on_all_its_ballast() {
+        let design = TrackDesign::v_track();
+        let model = model(&design);
+        let mut down = vec![0.0; model.matrices().size()];
+        for sleeper in model.layout().sleepers() {
+            for node in 0..=sleeper.tip_node() {
+                down[sleeper.deflection_dof(node)] = 1.0;
+            }
+        }
+        let work = |values: &[f64]| -> f64 {
+            model.matrices().product(values, &down).iter().zip(&down).map(|(f, u)| f * u).sum()
+        };
+        let sleepers = (SPANS - 1) as f64;
+        let support = Support::from(&ParameterSet::nominal());
+        let mass = sleepers * design.sleeper_mass();
+        let stiffness = sleepers * (support.ballast_stiffness + support.railpad_stiffness);
+        let damping = sleepers * (support.ballast_damping + support.railpad_damping);
+        // Sums of some hundred terms that cancel.
+        assert!((work(model.matrices().mass()) / mass - 1.0).abs() < 1e-9);
+        assert!((work(model.matrices().stiffness()) / stiffness - 1.0).abs() < 1e-9);
+        assert!((work(model.matrices().damping()) / damping - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_node_stands_under_the_rail_seat_wherever_it_is() {
+        for (rail_seat_m, elements) in [(0.0, 8), (0.15, 8), (0.01, 4), (0.24, 8), (0.15, 1)] {
+            let mut design = TrackDesign::v_track();
+            design.sleeper.rail_seat_m = rail_seat_m;
+            let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
+            let mesh = Mesh::uniform(SPANS, 2, elements);
+            let model = TrackModel::build(&design, &mesh, &supports, &[]).unwrap();
+            let sleeper = &model.layout().sleepers()[0];
+            assert_eq!(sleeper.nodes_m[sleeper.seat_node], rail_seat_m);
+            assert_eq!(sleeper.nodes_m[sleeper.tip_node()], design.sleeper.half_length_m);
+            assert!(sleeper.nodes_m.is_sorted_by(|a, b| a < b), "{:?}", sleeper.nodes_m);
+        }
+    }
+
+    #[test]
+    fn a_wrong_number_of_supports_is_refused() {
+        let design = TrackDesign::v_track();
+        let support = Support::from(&ParameterSet::nominal());
+        let error = TrackModel::build(&design, &Mesh::uniform(5, 8, 8), &[support], &[]);
+        assert_eq!(error.unwrap_err(), ModelError::Supports { spans: 5, supports: 1 });
+    }
+
+    #[test]
+    fn a_rail_point_interpolates_between_its_nodes() {
+        let model = model(&TrackDesign::v_track());
+        let layout = model.layout();
+        let sleeper = &layout.sleepers()[1];
+        let mut displacement = vec![0.0; model.matrices().size()];
+        let above = layout.rail_node_dofs(sleeper.rail_node)[0].unwrap();
+        displacement[above] = 1.0;
+        let point = layout.rail_point(sleeper.position_m);
+        assert!((point.deflection(&displacement) - 1.0).abs() < 1e-12);
+        assert_eq!(layout.rail_port(sleeper.position_m).motion(&displacement), 1.0);
+        assert_eq!(layout.railpad_port(1).motion(&displacement), 1.0);
+        assert_eq!(layout.railpad_port(0).motion(&displacement), 0.0);
+    }
+}
