@@ -2,8 +2,7 @@
 
 use super::Campaign;
 use std::ops::Range;
-use tracktwin_parameters::{ParameterSet, SobolError};
-use tracktwin_worker::Case;
+use tracktwin_parameters::{Case, ParameterSet, SobolError};
 
 /// The case with this index.
 ///

@@ -8,13 +8,27 @@ mod simulate;
 mod stop;
 mod train;
 
-pub use stop::{OrInput, Stop};
+use stop::{OrInput, Stop};
 
-use clap::Subcommand;
+use clap::{CommandFactory, Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Digital twin of railway track: how stiff are railpad, sleeper and ballast, sleeper by sleeper,
+/// from the vibration of a passing axle box.
+///
+/// `tracktwin run` simulates a small campaign, trains models on it and evaluates a sample
+/// recording: the shortest way to see everything work.
+#[derive(Parser)]
+#[command(name = "tracktwin", version, propagate_version = true, max_term_width = 100)]
+#[command(after_help = "Exit codes: 0 done, 1 a negative answer, 2 wrong input or usage, 3 failure.")]
+struct Program {
+    #[command(subcommand)]
+    command: Command,
+}
 
 /// The subcommands.
 #[derive(Subcommand)]
-pub enum Command {
+enum Command {
     /// Simulate a campaign, train models on it and evaluate a recording.
     Run(run::Arguments),
     /// Simulate a vehicle's passes over one track and write them as a recording.
@@ -35,11 +49,26 @@ pub enum Command {
     },
 }
 
-/// Runs one command to its end.
-///
-/// # Errors
-/// [`Stop`] tells wrong input from failure.
-pub fn run(command: Command) -> Result<(), Stop> {
+/// Reads the command line, runs one command and turns its end into an exit code.
+pub fn main() -> ExitCode {
+    let program = Program::parse();
+    log_to_stderr();
+    match run(program.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Stop::Negative) => ExitCode::from(1),
+        Err(Stop::Input(error)) => report(&error, 2),
+        Err(Stop::Failure(error)) => report(&error, 3),
+    }
+}
+
+/// One line that says what is wrong.
+fn report(error: &anyhow::Error, code: u8) -> ExitCode {
+    let line = format!("{error:#}").replace('\n', " ");
+    eprintln!("tracktwin: {line}");
+    ExitCode::from(code)
+}
+
+fn run(command: Command) -> Result<(), Stop> {
     match command {
         Command::Run(arguments) => asynchronously(run::run(arguments)),
         Command::Simulate(arguments) => simulate::run(&arguments),
@@ -55,7 +84,7 @@ pub fn run(command: Command) -> Result<(), Stop> {
 }
 
 /// Sends warnings, or what `RUST_LOG` asks for, to standard error.
-pub fn log_to_stderr() {
+fn log_to_stderr() {
     let filter = tracing_subscriber::EnvFilter::builder()
         .with_default_directive(tracing_subscriber::filter::LevelFilter::WARN.into())
         .from_env_lossy();
@@ -67,6 +96,5 @@ fn asynchronously(work: impl Future<Output = Result<(), Stop>>) -> Result<(), St
 }
 
 fn completions(shell: clap_complete::Shell) {
-    let mut program = Command::augment_subcommands(clap::Command::new("tracktwin"));
-    clap_complete::generate(shell, &mut program, "tracktwin", &mut std::io::stdout());
+    clap_complete::generate(shell, &mut Program::command(), "tracktwin", &mut std::io::stdout());
 }

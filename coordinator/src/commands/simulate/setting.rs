@@ -1,0 +1,101 @@
+//! `NAME[@SLEEPERS]=VALUE`: a parameter's value at all sleepers or some.
+
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+use tracktwin_parameters::{Parameter, ParameterSet};
+
+/// A parameter's value, and where it holds.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Setting {
+    pub(super) parameter: Parameter,
+    pub(super) value: f64,
+    /// Numbers of the sleepers; everywhere if there are none.
+    pub(super) sleepers: Option<RangeInclusive<usize>>,
+}
+
+/// Why a setting is refused.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub(super) enum SettingError {
+    #[error("write NAME=VALUE, NAME@SN12=VALUE or NAME@SN12-SN15=VALUE")]
+    Form,
+    #[error("{0}")]
+    Parameter(String),
+    #[error("`{0}` is not a positive number")]
+    Value(String),
+    #[error("`{0}` names no sleepers; write SN12 or SN12-SN15")]
+    Sleepers(String),
+    #[error("the irregularity belongs to the whole surface, not to single sleepers")]
+    Local,
+}
+
+impl FromStr for Setting {
+    type Err = SettingError;
+
+    fn from_str(text: &str) -> Result<Self, SettingError> {
+        let (target, value) = text.split_once('=').ok_or(SettingError::Form)?;
+        let (name, place) = match target.split_once('@') {
+            Some((name, place)) => (name, Some(place)),
+            None => (target, None),
+        };
+        let parameter =
+            Parameter::try_from(name.to_owned()).map_err(SettingError::Parameter)?;
+        let value = match value.parse::<f64>() {
+            Ok(number) if number.is_finite() && number > 0.0 => number,
+            _ => return Err(SettingError::Value(value.to_owned())),
+        };
+        let sleepers = place.map(range).transpose()?;
+        if sleepers.is_some() && parameter == Parameter::IrregularityLevel {
+            return Err(SettingError::Local);
+        }
+        Ok(Self { parameter, value, sleepers })
+    }
+}
+
+fn range(text: &str) -> Result<RangeInclusive<usize>, SettingError> {
+    let wrong = || SettingError::Sleepers(text.to_owned());
+    let number = |id: &str| id.strip_prefix("SN").unwrap_or(id).parse::<usize>().ok();
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let range = number(first).ok_or_else(wrong)?..=number(last).ok_or_else(wrong)?;
+    if range.is_empty() { Err(wrong()) } else { Ok(range) }
+}
+
+impl Setting {
+    /// The set of sleeper `number` with this setting, if it holds there.
+    pub(super) fn apply(&self, set: ParameterSet, number: usize) -> ParameterSet {
+        if self.sleepers.as_ref().is_none_or(|sleepers| sleepers.contains(&number)) {
+            set.with(self.parameter, self.value)
+        } else {
+            set
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_holds_everywhere_or_where_it_says() {
+        let everywhere: Setting = "railpad_stiffness_N_m=9e7".parse().unwrap();
+        let set = everywhere.apply(ParameterSet::nominal(), 3);
+        assert_eq!(set[Parameter::RailpadStiffness], 9e7);
+
+        let some: Setting = "ballast_stiffness_N_m@SN12-SN14=4e6".parse().unwrap();
+        let stiffness =
+            |number| some.apply(ParameterSet::nominal(), number)[Parameter::BallastStiffness];
+        assert_eq!(stiffness(12), 4e6);
+        assert_eq!(stiffness(14), 4e6);
+        assert_eq!(stiffness(15), Parameter::BallastStiffness.nominal());
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_the_reason() {
+        let refused = |text: &str| text.parse::<Setting>().unwrap_err().to_string();
+        assert!(refused("railpad_stiffness_N_m").contains("NAME=VALUE"));
+        assert!(refused("pad=1").contains("railpad_stiffness_N_m"));
+        assert!(refused("railpad_stiffness_N_m=soft").contains("`soft`"));
+        assert!(refused("railpad_stiffness_N_m=-1").contains("positive"));
+        assert!(refused("railpad_stiffness_N_m@SN9-SN3=1").contains("SN9-SN3"));
+        assert!(refused("irregularity_level@SN3=1").contains("whole surface"));
+    }
+}
