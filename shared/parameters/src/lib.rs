@@ -6,6 +6,7 @@
 //! Convention: **one rail, half sleepers**. Every stiffness, damping and mass is that of one rail
 //! seat; nothing is doubled anywhere.
 
+mod case;
 mod catalogue;
 mod design;
 mod preset;
@@ -13,6 +14,7 @@ mod set;
 mod sobol;
 mod space;
 
+pub use case::Case;
 pub use catalogue::Parameter;
 pub use design::{BeamSection, SleeperDesign, TrackDesign, Wheel};
 pub use preset::Preset;

@@ -1,0 +1,125 @@
+//! The table `campaign`.
+
+use crate::writer::Write;
+use crate::{Library, LibraryError};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, SqliteConnection};
+
+/// A campaign as the library keeps it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CampaignRecord {
+    /// Name and hash of the definition.
+    pub id: String,
+    /// What people call it.
+    pub name: String,
+    /// What decides its cases and results, as canonical JSON.
+    pub definition_json: String,
+    /// Hash of that.
+    pub definition_hash: String,
+    /// What is simulated and measured in each case, as canonical JSON.
+    pub experiment_json: String,
+    /// Hash of that.
+    pub experiment_hash: String,
+    /// The speeds of every case, ascending.
+    pub speeds_km_h: Vec<f64>,
+    /// Seed of its cases, below 2^63.
+    pub seed: u64,
+}
+
+impl Library {
+    /// Stores a campaign; repeating it changes nothing.
+    ///
+    /// # Errors
+    /// [`LibraryError::OtherDefinition`] when the id stands for something else already.
+    pub async fn insert_campaign(&self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
+        self.write(Insert(campaign.clone())).await
+    }
+
+    /// All campaigns, oldest first.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn campaigns(&self) -> Result<Vec<CampaignRecord>, LibraryError> {
+        let rows = sqlx::query("select * from campaign order by created_at, id")
+            .fetch_all(self.readers())
+            .await?;
+        rows.iter().map(record).collect()
+    }
+
+    /// One campaign.
+    ///
+    /// # Errors
+    /// [`LibraryError::UnknownCampaign`] when it is not there.
+    pub async fn campaign(&self, id: &str) -> Result<CampaignRecord, LibraryError> {
+        let row = sqlx::query("select * from campaign where id = ?")
+            .bind(id)
+            .fetch_optional(self.readers())
+            .await?;
+        row.as_ref()
+            .map_or_else(|| Err(LibraryError::UnknownCampaign { id: id.to_owned() }), record)
+    }
+}
+
+/// A seed as a signed integer of SQL.
+pub(crate) fn sql_seed(seed: u64) -> Result<i64, LibraryError> {
+    i64::try_from(seed).map_err(|_| LibraryError::SeedTooLarge { seed })
+}
+
+pub(crate) fn seed_from_sql(seed: i64) -> Result<u64, LibraryError> {
+    u64::try_from(seed).map_err(|_| LibraryError::Damaged { what: format!("a seed of {seed}") })
+}
+
+fn record(row: &SqliteRow) -> Result<CampaignRecord, LibraryError> {
+    let id: String = row.try_get("id")?;
+    let speeds: String = row.try_get("speeds_km_h")?;
+    let speeds_km_h = serde_json::from_str(&speeds).map_err(|error| LibraryError::Damaged {
+        what: format!("campaign {id}: speeds_km_h: {error}"),
+    })?;
+    Ok(CampaignRecord {
+        id,
+        name: row.try_get("name")?,
+        definition_json: row.try_get("definition")?,
+        definition_hash: row.try_get("definition_hash")?,
+        experiment_json: row.try_get("experiment")?,
+        experiment_hash: row.try_get("experiment_hash")?,
+        speeds_km_h,
+        seed: seed_from_sql(row.try_get("seed")?)?,
+    })
+}
+
+struct Insert(CampaignRecord);
+
+impl Write for Insert {
+    type Answer = ();
+
+    async fn apply(&self, connection: &mut SqliteConnection) -> Result<(), LibraryError> {
+        let campaign = &self.0;
+        let speeds = serde_json::to_string(&campaign.speeds_km_h).expect("numbers become JSON");
+        sqlx::query(
+            "insert into campaign (id, name, definition, definition_hash, experiment,
+                experiment_hash, speeds_km_h, seed, created_at)
+            values (?, ?, ?, ?, ?, ?, ?, ?, strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
+            on conflict (id) do nothing",
+        )
+        .bind(&campaign.id)
+        .bind(&campaign.name)
+        .bind(&campaign.definition_json)
+        .bind(&campaign.definition_hash)
+        .bind(&campaign.experiment_json)
+        .bind(&campaign.experiment_hash)
+        .bind(speeds)
+        .bind(sql_seed(campaign.seed)?)
+        .execute(&mut *connection)
+        .await?;
+        let stored: String =
+            sqlx::query_scalar("select definition_hash from campaign where id = ?")
+                .bind(&campaign.id)
+                .fetch_one(connection)
+                .await?;
+        if stored == campaign.definition_hash {
+            Ok(())
+        } else {
+            Err(LibraryError::OtherDefinition { id: campaign.id.clone() })
+        }
+    }
+}

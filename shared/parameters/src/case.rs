@@ -1,0 +1,47 @@
+//! One case of a campaign: a parameter set and the seed of the surface it is simulated on.
+
+use crate::ParameterSet;
+
+/// What one simulation is asked for; where it stands in its campaign, and what decides its result.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// Place in the campaign's Sobol sequence.
+    pub index: u32,
+    /// The track's parameters, alike at every sleeper.
+    pub parameters: ParameterSet,
+    /// Seed of the irregularity, below 2^63 so that SQL's signed integers hold it.
+    pub surface_seed: u64,
+}
+
+impl Case {
+    /// Hash of parameter names, values and seed: 32 hexadecimal digits of BLAKE3.
+    ///
+    /// 128 bits tell any two cases apart and leave a database of a million rows small.
+    pub fn parameter_hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new_derive_key("tracktwin case parameters 1");
+        for (parameter, value) in self.parameters.iter() {
+            hasher.update(parameter.name().as_bytes()).update(&value.to_be_bytes());
+        }
+        hasher.update(&self.surface_seed.to_be_bytes());
+        hasher.finalize().to_hex()[..32].to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Parameter;
+
+    #[test]
+    fn the_hash_tells_parameters_and_seeds_apart_but_not_places() {
+        let case = Case { index: 1, parameters: ParameterSet::nominal(), surface_seed: 7 };
+        let hash = case.parameter_hash();
+        assert_eq!(hash, Case { index: 2, ..case.clone() }.parameter_hash());
+        assert_ne!(hash, Case { surface_seed: 8, ..case.clone() }.parameter_hash());
+        for &parameter in Parameter::ALL {
+            let value = case.parameters[parameter].next_up();
+            let nudged = Case { parameters: case.parameters.with(parameter, value), ..case };
+            assert_ne!(hash, nudged.parameter_hash(), "{parameter}");
+        }
+    }
+}
