@@ -1,0 +1,195 @@
+//! What a feature is: the settings on which simulations and recordings must agree.
+
+use super::ThirdOctave;
+use crate::wavelet::Morlet;
+use serde::{Deserialize, Serialize};
+
+/// Everything that decides the value of a feature.
+///
+/// Scales and bins follow from [`reference_rate_hz`](Self::reference_rate_hz), never from the
+/// recording's own sample rate: features of one definition are comparable across sample rates,
+/// features of two definitions never are.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FeatureDefinition {
+    /// Centre `mu` of the Morlet wavelet in rad.
+    pub wavelet_centre_rad: f64,
+    /// Voices per octave `N_v` (paper, eq. A.2).
+    pub voices_per_octave: u32,
+    /// The rate `f_s` in Hz in the base scale `s_0 = 2 / f_s` (paper, eq. A.2).
+    pub reference_rate_hz: f64,
+    /// Lowest frequency in Hz a bin may have (paper, eq. 9).
+    pub lowest_hz: f64,
+    /// Highest frequency in Hz a bin may have (paper, eq. 9).
+    pub highest_hz: f64,
+    /// Instants per second at which the transform is taken in the window, in Hz.
+    ///
+    /// A quarter of 100 kHz: six instants a period at 4 kHz. It is taken on the recording's own
+    /// clock, rounded so that instants divide the transformed stretch evenly (by less than 1e-4).
+    pub instant_rate_hz: f64,
+    /// Real signal used on either side of the window, in s, as far as there is any.
+    ///
+    /// Three standard deviations (19 ms) of the wavelet at 50 Hz.
+    pub margin_s: f64,
+    /// LWPS in (m/s2)^2 below which nothing is told apart: the logarithm is taken of the larger
+    /// of the two, so that an empty bin counts as this much.
+    ///
+    /// The default is an amplitude of 10 um/s2, beneath the noise of any accelerometer.
+    pub floor_m2_s4: f64,
+}
+
+impl Default for FeatureDefinition {
+    fn default() -> Self {
+        Self {
+            wavelet_centre_rad: 6.0,
+            voices_per_octave: 48,
+            reference_rate_hz: 100_000.0,
+            lowest_hz: 50.0,
+            highest_hz: 4000.0,
+            instant_rate_hz: 25_000.0,
+            margin_s: 0.06,
+            floor_m2_s4: 1e-10,
+        }
+    }
+}
+
+/// Why a definition is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DefinitionError {
+    /// A value lies outside what the transform can do.
+    #[error("{name} is {value}, but must lie in {low} .. {high}")]
+    OutOfRange {
+        /// The field of [`FeatureDefinition`].
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Lowest value allowed.
+        low: f64,
+        /// Highest value allowed.
+        high: f64,
+    },
+    /// No bin lies between the lowest and the highest frequency.
+    #[error("no bin lies between {lowest_hz} and {highest_hz} Hz")]
+    NoBins {
+        /// Lowest frequency in Hz.
+        lowest_hz: f64,
+        /// Highest frequency in Hz.
+        highest_hz: f64,
+    },
+}
+
+impl FeatureDefinition {
+    /// Frequencies in Hz of the bins, ascending: `f_l = mu / (2 pi a_l)` in
+    /// `lowest_hz ..= highest_hz`. Empty for a definition that [`check`](Self::check) refuses.
+    pub fn frequencies_hz(&self) -> Vec<f64> {
+        if self.check_ranges().is_err() {
+            return Vec::new();
+        }
+        self.grid_indices(self.lowest_hz, self.highest_hz).map(|j| self.frequency_hz(j)).collect()
+    }
+
+    /// The one-third octaves whose nominal centre lies in `lowest_hz ..= highest_hz`, ascending.
+    pub fn bands(&self) -> impl Iterator<Item = ThirdOctave> {
+        let range = self.lowest_hz..=self.highest_hz;
+        ThirdOctave::all().filter(move |band| range.contains(&f64::from(band.nominal_hz())))
+    }
+
+    /// Lowest and highest frequency in Hz of features and bands together.
+    pub(crate) fn span_hz(&self) -> [f64; 2] {
+        self.bands()
+            .map(ThirdOctave::edges_hz)
+            .fold([self.lowest_hz, self.highest_hz], |[low, high], [band_low, band_high]| {
+                [low.min(band_low), high.max(band_high)]
+            })
+    }
+
+    /// Refuses what cannot be transformed.
+    ///
+    /// # Errors
+    /// [`DefinitionError`] names the first field that is wrong.
+    pub fn check(&self) -> Result<(), DefinitionError> {
+        self.check_ranges()?;
+        if self.frequencies_hz().is_empty() {
+            let Self { lowest_hz, highest_hz, .. } = *self;
+            return Err(DefinitionError::NoBins { lowest_hz, highest_hz });
+        }
+        Ok(())
+    }
+
+    fn check_ranges(&self) -> Result<(), DefinitionError> {
+        let rate = self.reference_rate_hz;
+        let ranges = [
+            // Below 5 the wavelet is no longer analytic to 1e-6; above 50 a voice is a Fourier line.
+            ("wavelet_centre_rad", self.wavelet_centre_rad, 5.0, 50.0),
+            ("voices_per_octave", f64::from(self.voices_per_octave), 4.0, 256.0),
+            ("reference_rate_hz", rate, 1.0, 1e9),
+            ("lowest_hz", self.lowest_hz, rate * 1e-6, rate * 0.4),
+            ("highest_hz", self.highest_hz, self.lowest_hz, rate * 0.4),
+            ("instant_rate_hz", self.instant_rate_hz, self.highest_hz, rate),
+            ("margin_s", self.margin_s, 0.0, 10.0),
+            ("floor_m2_s4", self.floor_m2_s4, 1e-300, 1e300),
+        ];
+        for (name, value, low, high) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(DefinitionError::OutOfRange { name, value, low, high });
+            }
+        }
+        Ok(())
+    }
+
+    /// The wavelet.
+    pub(crate) fn wavelet(&self) -> Morlet {
+        Morlet::new(self.wavelet_centre_rad)
+    }
+
+    /// Frequency in Hz of the grid's point `j`, `mu / (2 pi a_j)` with `a_j = s_0 2^(j / N_v)`
+    /// (paper, eq. 3 and A.2).
+    pub(crate) fn frequency_hz(&self, j: i32) -> f64 {
+        let base_scale = 2.0 / self.reference_rate_hz;
+        let scale = base_scale * (f64::from(j) / f64::from(self.voices_per_octave)).exp2();
+        self.wavelet().frequency_hz(scale)
+    }
+
+    /// Points `j` of the grid with frequencies in `low_hz ..= high_hz`, by ascending frequency.
+    pub(crate) fn grid_indices(&self, low_hz: f64, high_hz: f64) -> impl Iterator<Item = i32> {
+        let place = |frequency_hz: f64| {
+            f64::from(self.voices_per_octave) * (self.frequency_hz(0) / frequency_hz).log2()
+        };
+        // A point that is meant to lie on the border is not lost to rounding.
+        const ROUNDING: f64 = 1e-9;
+        #[expect(clippy::cast_possible_truncation, reason = "checked ranges: at most 1e4 voices")]
+        let (first, last) =
+            ((place(high_hz) - ROUNDING).ceil() as i32, (place(low_hz) + ROUNDING).floor() as i32);
+        (first..=last).rev()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_has_304_bins_from_50_to_4000_hz() {
+        let frequencies = FeatureDefinition::default().frequencies_hz();
+        assert_eq!(frequencies.len(), 304);
+        assert!(frequencies.is_sorted());
+        assert!(frequencies[0] >= 50.0 && frequencies[303] <= 4000.0);
+    }
+
+    #[test]
+    fn a_field_that_is_not_known_is_refused() {
+        let text = r#"{"wavelet_center_rad": 6.0}"#;
+        let error = serde_json::from_str::<FeatureDefinition>(text).unwrap_err();
+        assert!(error.to_string().contains("wavelet_center_rad"), "{error}");
+    }
+
+    #[test]
+    fn a_wrong_value_is_refused_by_name() {
+        let definition = FeatureDefinition { margin_s: f64::NAN, ..Default::default() };
+        let message = definition.check().unwrap_err().to_string();
+        assert!(message.starts_with("margin_s is NaN"), "{message}");
+        let definition =
+            FeatureDefinition { lowest_hz: 60.1, highest_hz: 60.2, ..Default::default() };
+        assert!(matches!(definition.check(), Err(DefinitionError::NoBins { .. })));
+    }
+}

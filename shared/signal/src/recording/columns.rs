@@ -1,0 +1,54 @@
+//! The three columns of a pass, whatever kind of file they come from.
+
+use super::error::{Fault, RecordingError};
+use super::{csv_file, parquet_file};
+use std::path::Path;
+
+/// Names of the columns of a pass, in the order they are written.
+pub(super) const NAMES: [&str; 3] = ["time_s", "position_m", "acceleration_m_s2"];
+
+/// The columns of a pass: finite numbers, equally many, at least two.
+pub(super) struct Columns {
+    /// Times in s.
+    pub time_s: Vec<f64>,
+    /// Positions of the wheel along the track in m.
+    pub position_m: Vec<f64>,
+    /// Vertical accelerations of the axle box in m/s2, positive downwards.
+    pub acceleration_m_s2: Vec<f64>,
+}
+
+impl Columns {
+    /// Reads the columns of a `.parquet` or `.csv` file and checks each by itself.
+    pub(super) fn read(path: &Path) -> Result<Self, RecordingError> {
+        if !path.is_file() {
+            return Err(RecordingError::new(path, "file", Fault::NoSuchFile));
+        }
+        let extension = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        let columns = match extension.to_ascii_lowercase().as_str() {
+            "parquet" => parquet_file::read(path, &NAMES)?,
+            "csv" => csv_file::read(path, &NAMES)?,
+            _ => return Err(RecordingError::new(path, "file", Fault::UnknownKind)),
+        };
+        check(path, &columns)?;
+        let [time_s, position_m, acceleration_m_s2] = columns;
+        Ok(Self { time_s, position_m, acceleration_m_s2 })
+    }
+}
+
+fn check(path: &Path, columns: &[Vec<f64>; 3]) -> Result<(), RecordingError> {
+    let rows = columns[0].len();
+    for (name, column) in NAMES.into_iter().zip(columns) {
+        let fault = if column.len() < 2 {
+            Some(Fault::Empty { rows: column.len() })
+        } else if column.len() != rows {
+            Some(Fault::LengthMismatch { rows: column.len(), others: rows })
+        } else {
+            let odd = column.iter().position(|value| !value.is_finite());
+            odd.map(|index| Fault::NotFinite { row: index + 1, value: column[index].to_string() })
+        };
+        if let Some(fault) = fault {
+            return Err(RecordingError::new(path, name, fault));
+        }
+    }
+    Ok(())
+}

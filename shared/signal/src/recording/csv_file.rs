@@ -1,0 +1,42 @@
+//! Columns of numbers in CSV files with a line of names; knows nothing of what they mean.
+
+use super::error::{Fault, RecordingError};
+use std::path::Path;
+
+/// Reads the named columns; other columns are passed over.
+pub(super) fn read<const N: usize>(
+    path: &Path,
+    names: &[&str; N],
+) -> Result<[Vec<f64>; N], RecordingError> {
+    let unreadable = |error: csv::Error| {
+        RecordingError::new(path, "file", Fault::Unreadable { reason: error.to_string() })
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_path(path)
+        .map_err(unreadable)?;
+    let present: Vec<String> =
+        reader.headers().map_err(unreadable)?.iter().map(str::to_owned).collect();
+    let mut places = [0; N];
+    for (place, name) in places.iter_mut().zip(names) {
+        *place = present.iter().position(|column| column == name).ok_or_else(|| {
+            RecordingError::new(path, *name, Fault::NoColumn { present: present.clone() })
+        })?;
+    }
+    let mut columns = [const { Vec::new() }; N];
+    let mut record = csv::StringRecord::new();
+    let mut row = 0;
+    while reader.read_record(&mut record).map_err(unreadable)? {
+        row += 1;
+        for ((column, place), name) in columns.iter_mut().zip(places).zip(names) {
+            let text = &record[place];
+            let value = text.parse().map_err(|_| {
+                let fault = Fault::NotFinite { row, value: format!("\"{text}\"") };
+                RecordingError::new(path, *name, fault)
+            })?;
+            column.push(value);
+        }
+    }
+    Ok(columns)
+}

@@ -1,0 +1,233 @@
+//! A recording in memory and as a folder: what was measured, where, over which sleepers.
+
+use super::columns::{Columns, NAMES};
+use super::error::{Fault, RecordingError};
+use super::manifest::{FILE_NAME, Manifest, PassEntry};
+use super::{check, parquet_file};
+use crate::Signal;
+use serde_json::{Map, Value};
+use std::ops::Range;
+use std::path::Path;
+
+/// Least part of a sleeper's window that a pass must cover to say something about the sleeper.
+///
+/// The sleepers at a recording's two ends have half a window, give or take the odometer's drift.
+const WINDOW_SHARE_MIN: f64 = 0.4;
+
+/// Axle-box accelerations of one vehicle over one stretch of track, in several passes.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// What the recording is called: the name of its folder.
+    pub name: String,
+    /// Samples per second of every pass, in Hz.
+    pub sample_rate_hz: f64,
+    /// What was measured, in words.
+    pub channel: String,
+    /// The passes, in the order in which they are listed.
+    pub passes: Vec<Pass>,
+    /// The sleepers, along the track.
+    pub sleepers: Vec<Sleeper>,
+    /// What is known of rail, sleeper and wheel, as `recording.json` has it.
+    pub nominal: Map<String, Value>,
+    /// Distance of the sleepers in m: the length of a sleeper's window.
+    pub spacing_m: f64,
+}
+
+/// One run of the wheel along the track.
+#[derive(Clone, Debug)]
+pub struct Pass {
+    /// The file it was read from; empty for a pass that was computed.
+    pub file: String,
+    /// Nominal speed in km/h.
+    pub speed_km_h: f64,
+    /// Vertical axle-box acceleration in m/s2, positive downwards.
+    pub signal: Signal,
+    /// Position of the wheel along the track in m at every sample; does not decrease.
+    pub position_m: Vec<f64>,
+}
+
+/// A sleeper and its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sleeper {
+    /// Its name, such as `SN8`.
+    pub id: String,
+    /// Its place along the track in m, on the scale of the passes' positions.
+    pub x_m: f64,
+}
+
+impl Recording {
+    /// Reads and checks the recording in the folder `path`.
+    ///
+    /// # Errors
+    /// The first thing that is wrong: its file, its field and how to mend it.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
+        let folder = path.as_ref();
+        let manifest_path = folder.join(FILE_NAME);
+        let manifest = Manifest::read(&manifest_path)?;
+        let spacing_m = spacing(&manifest_path, &manifest)?;
+        let mut passes = Vec::with_capacity(manifest.passes.len());
+        for (index, entry) in manifest.passes.iter().enumerate() {
+            let pass = read_pass(folder, &manifest_path, index, entry, manifest.sample_rate_hz)?;
+            check::length(&folder.join(&entry.file), &pass.position_m, spacing_m)?;
+            passes.push(pass);
+        }
+        let recording = Self {
+            name: name_of(folder),
+            sample_rate_hz: manifest.sample_rate_hz,
+            channel: manifest.channel,
+            passes,
+            sleepers: manifest.sleepers,
+            nominal: manifest.nominal,
+            spacing_m,
+        };
+        recording.check_sleepers(&manifest_path)?;
+        Ok(recording)
+    }
+
+    /// Writes the recording as a folder: `recording.json` and one Parquet file a pass.
+    ///
+    /// Accelerations are stored in single precision, times count from zero.
+    ///
+    /// # Errors
+    /// [`Fault::Unwritable`] names the file and the reason.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), RecordingError> {
+        let folder = path.as_ref();
+        let unwritable = |file: &Path, reason: String| {
+            RecordingError::new(file, "file", Fault::Unwritable { reason })
+        };
+        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error.to_string()))?;
+        let files = self.file_names();
+        for (pass, file) in self.passes.iter().zip(&files) {
+            let path = folder.join(file);
+            write_pass(&path, pass).map_err(|error| unwritable(&path, error.to_string()))?;
+        }
+        let path = folder.join(FILE_NAME);
+        std::fs::write(&path, self.manifest(files).to_json())
+            .map_err(|error| unwritable(&path, error.to_string()))
+    }
+
+    /// The samples of pass `pass` while the wheel was within half a spacing of sleeper `sleeper`
+    /// (indices into [`Recording::passes`] and [`Recording::sleepers`]; paper, section 2.3).
+    ///
+    /// None where the pass covers less than two fifths of that window.
+    pub fn window(&self, pass: usize, sleeper: usize) -> Option<Range<usize>> {
+        if self.window_share(pass, sleeper) < WINDOW_SHARE_MIN {
+            return None;
+        }
+        let positions = &self.passes[pass].position_m;
+        let [from, to] = self.window_ends(sleeper);
+        let start = positions.partition_point(|&position| position < from);
+        let end = positions.partition_point(|&position| position <= to);
+        (start < end).then_some(start..end)
+    }
+
+    /// Which part of the sleeper's window the pass covers, 0 to 1.
+    pub fn window_share(&self, pass: usize, sleeper: usize) -> f64 {
+        let positions = &self.passes[pass].position_m;
+        let [from, to] = self.window_ends(sleeper);
+        let covered = to.min(positions[positions.len() - 1]) - from.max(positions[0]);
+        (covered / self.spacing_m).clamp(0.0, 1.0)
+    }
+
+    /// The speeds of the passes in km/h, ascending, each once.
+    pub fn speeds_km_h(&self) -> Vec<f64> {
+        let mut speeds: Vec<f64> = self.passes.iter().map(|pass| pass.speed_km_h).collect();
+        speeds.sort_by(f64::total_cmp);
+        speeds.dedup();
+        speeds
+    }
+
+    /// Begin and end in m of the sleeper's window.
+    fn window_ends(&self, sleeper: usize) -> [f64; 2] {
+        let x = self.sleepers[sleeper].x_m;
+        [x - 0.5 * self.spacing_m, x + 0.5 * self.spacing_m]
+    }
+
+    fn check_sleepers(&self, manifest: &Path) -> Result<(), RecordingError> {
+        let found = |pass| (0..self.sleepers.len()).any(|index| self.window(pass, index).is_some());
+        if (0..self.passes.len()).any(found) {
+            return Ok(());
+        }
+        let firsts = self.passes.iter().map(|pass| pass.position_m[0]);
+        let lasts = self.passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
+        let from_m = firsts.fold(f64::INFINITY, f64::min);
+        let to_m = lasts.fold(f64::NEG_INFINITY, f64::max);
+        let fault = Fault::NoSleeperInside { from_m, to_m };
+        Err(RecordingError::new(manifest, "sleepers", fault))
+    }
+
+    /// Names such as `pass-07kmh-2.parquet`: speed and number among the passes at that speed.
+    fn file_names(&self) -> Vec<String> {
+        let name = |(index, pass): (usize, &Pass)| {
+            let earlier = &self.passes[..index];
+            let number = earlier.iter().filter(|other| other.speed_km_h == pass.speed_km_h).count() + 1;
+            format!("pass-{:02}kmh-{number}.parquet", pass.speed_km_h)
+        };
+        self.passes.iter().enumerate().map(name).collect()
+    }
+
+    fn manifest(&self, files: Vec<String>) -> Manifest {
+        let passes = self.passes.iter().zip(files);
+        Manifest {
+            sample_rate_hz: self.sample_rate_hz,
+            channel: self.channel.clone(),
+            passes: passes
+                .map(|(pass, file)| PassEntry { file, speed_km_h: pass.speed_km_h })
+                .collect(),
+            sleepers: self.sleepers.clone(),
+            nominal: self.nominal.clone(),
+        }
+    }
+}
+
+fn read_pass(
+    folder: &Path,
+    manifest: &Path,
+    index: usize,
+    entry: &PassEntry,
+    sample_rate_hz: f64,
+) -> Result<Pass, RecordingError> {
+    let path = folder.join(&entry.file);
+    let columns = Columns::read(&path)?;
+    check::times(manifest, &path, &columns, sample_rate_hz)?;
+    check::positions(&path, &columns.position_m)?;
+    let field = format!("passes[{index}].speed_km_h");
+    check::speed(manifest, &field, &path, &columns, entry.speed_km_h)?;
+    let signal = Signal::new(sample_rate_hz, columns.acceleration_m_s2)
+        .expect("columns are finite and the rate is positive");
+    let (file, speed_km_h) = (entry.file.clone(), entry.speed_km_h);
+    Ok(Pass { file, speed_km_h, signal, position_m: columns.position_m })
+}
+
+fn write_pass(path: &Path, pass: &Pass) -> Result<(), parquet::errors::ParquetError> {
+    let samples = pass.signal.samples();
+    let rate = pass.signal.sample_rate_hz();
+    let times: Vec<f64> = (0..samples.len()).map(|index| index as f64 / rate).collect();
+    let single: Vec<f32> = samples.iter().map(|&value| value as f32).collect();
+    parquet_file::write(path, &NAMES, &times, &pass.position_m, &single)
+}
+
+/// The nominal spacing of the sleepers in m, or the median of their distances.
+fn spacing(path: &Path, manifest: &Manifest) -> Result<f64, RecordingError> {
+    const FIELD: &str = "nominal.sleeper.spacing_m";
+    let expected = "the distance of the sleepers in m";
+    let stated = manifest.nominal.get("sleeper").and_then(|sleeper| sleeper.get("spacing_m"));
+    if let Some(value) = stated {
+        return value.as_f64().filter(|&spacing| spacing > 0.0).ok_or_else(|| {
+            let fault = Fault::WrongValue { found: value.to_string(), expected };
+            RecordingError::new(path, FIELD, fault)
+        });
+    }
+    let pairs = manifest.sleepers.windows(2);
+    let mut distances: Vec<f64> = pairs.map(|pair| pair[1].x_m - pair[0].x_m).collect();
+    distances.sort_by(f64::total_cmp);
+    let median = distances.get(distances.len() / 2).copied().filter(|&spacing| spacing > 0.0);
+    median.ok_or_else(|| {
+        RecordingError::new(path, FIELD, Fault::NoField { expected: expected.to_owned() })
+    })
+}
+
+fn name_of(folder: &Path) -> String {
+    let full = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    full.file_name().map_or_else(|| "recording".to_owned(), |name| name.to_string_lossy().into())
+}

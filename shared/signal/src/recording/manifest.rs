@@ -1,0 +1,158 @@
+//! `recording.json`: tolerant of fields it does not know, strict about those it needs.
+
+use super::error::{Fault, RecordingError};
+use super::folder::Sleeper;
+use serde_json::{Map, Value, json};
+use std::collections::HashSet;
+use std::path::Path;
+
+/// The name of the file inside a recording's folder.
+pub(super) const FILE_NAME: &str = "recording.json";
+const FORMAT: &str = "aba-recording/1";
+
+/// What `recording.json` says.
+pub(super) struct Manifest {
+    pub sample_rate_hz: f64,
+    pub channel: String,
+    pub passes: Vec<PassEntry>,
+    pub sleepers: Vec<Sleeper>,
+    pub nominal: Map<String, Value>,
+}
+
+/// One pass of `recording.json`.
+pub(super) struct PassEntry {
+    pub file: String,
+    pub speed_km_h: f64,
+}
+
+impl Manifest {
+    /// Reads and checks the file at `path`.
+    pub(super) fn read(path: &Path) -> Result<Self, RecordingError> {
+        let fail = |fault| RecordingError::new(path, "file", fault);
+        let text = std::fs::read_to_string(path).map_err(|error| match error.kind() {
+            std::io::ErrorKind::NotFound => fail(Fault::NoSuchFile),
+            _ => fail(Fault::Unreadable { reason: error.to_string() }),
+        })?;
+        let root: Value = serde_json::from_str(&text)
+            .map_err(|error| fail(Fault::NotJson { reason: error.to_string() }))?;
+        Self::parse(&Fields { path, place: String::new(), value: &root })
+    }
+
+    fn parse(root: &Fields<'_>) -> Result<Self, RecordingError> {
+        let format = root.text("format", "\"aba-recording/1\"")?;
+        if format != FORMAT {
+            let fault = Fault::WrongFormat { found: format!("\"{format}\""), expected: FORMAT };
+            return Err(root.fault("format", fault));
+        }
+        let passes = root.list("passes", "a list of {file, speed_km_h}")?;
+        let sleepers = root.list("sleepers", "a list of {id, x_m}")?;
+        Ok(Self {
+            sample_rate_hz: root.positive("sample_rate_Hz", "the samples per second")?,
+            channel: root.get("channel").and_then(Value::as_str).unwrap_or_default().to_owned(),
+            passes: passes.iter().map(PassEntry::parse).collect::<Result<_, _>>()?,
+            sleepers: sleepers_along_the_track(root, &sleepers)?,
+            nominal: root.get("nominal").and_then(Value::as_object).cloned().unwrap_or_default(),
+        })
+    }
+
+    /// The text of the file.
+    pub(super) fn to_json(&self) -> String {
+        let passes: Vec<_> = self
+            .passes
+            .iter()
+            .map(|pass| json!({"file": pass.file, "speed_km_h": pass.speed_km_h}))
+            .collect();
+        let sleepers: Vec<_> =
+            self.sleepers.iter().map(|sleeper| json!({"id": sleeper.id, "x_m": sleeper.x_m})).collect();
+        let root = json!({
+            "format": FORMAT,
+            "sample_rate_Hz": self.sample_rate_hz,
+            "channel": self.channel,
+            "passes": passes,
+            "sleepers": sleepers,
+            "nominal": self.nominal,
+        });
+        format!("{root:#}\n")
+    }
+}
+
+impl PassEntry {
+    fn parse(fields: &Fields<'_>) -> Result<Self, RecordingError> {
+        let file = fields.text("file", "the name of the pass's file")?.to_owned();
+        Ok(Self { file, speed_km_h: fields.positive("speed_km_h", "the nominal speed in km/h")? })
+    }
+}
+
+fn sleepers_along_the_track(
+    root: &Fields<'_>,
+    entries: &[Fields<'_>],
+) -> Result<Vec<Sleeper>, RecordingError> {
+    let mut sleepers = Vec::with_capacity(entries.len());
+    let mut ids = HashSet::new();
+    for entry in entries {
+        let id = entry.text("id", "the sleeper's name")?.to_owned();
+        if !ids.insert(id.clone()) {
+            return Err(root.fault("sleepers", Fault::SleeperTwice { id }));
+        }
+        sleepers.push(Sleeper { id, x_m: entry.number("x_m", "its place in m")? });
+    }
+    sleepers.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+    Ok(sleepers)
+}
+
+/// An object of the file and the place where it stands, for messages.
+struct Fields<'a> {
+    path: &'a Path,
+    place: String,
+    value: &'a Value,
+}
+
+impl<'a> Fields<'a> {
+    fn get(&self, name: &str) -> Option<&'a Value> {
+        self.value.get(name)
+    }
+
+    fn fault(&self, name: &str, fault: Fault) -> RecordingError {
+        RecordingError::new(self.path, format!("{}{name}", self.place), fault)
+    }
+
+    fn needed(&self, name: &str, expected: &'static str) -> Result<&'a Value, RecordingError> {
+        self.get(name)
+            .ok_or_else(|| self.fault(name, Fault::NoField { expected: expected.to_owned() }))
+    }
+
+    fn wrong(&self, name: &str, found: &Value, expected: &'static str) -> RecordingError {
+        let text: String = found.to_string().chars().take(40).collect();
+        self.fault(name, Fault::WrongValue { found: text, expected })
+    }
+
+    fn text(&self, name: &str, expected: &'static str) -> Result<&'a str, RecordingError> {
+        let value = self.needed(name, expected)?;
+        value.as_str().ok_or_else(|| self.wrong(name, value, expected))
+    }
+
+    fn number(&self, name: &str, expected: &'static str) -> Result<f64, RecordingError> {
+        let value = self.needed(name, expected)?;
+        value.as_f64().ok_or_else(|| self.wrong(name, value, expected))
+    }
+
+    fn positive(&self, name: &str, expected: &'static str) -> Result<f64, RecordingError> {
+        let number = self.number(name, expected)?;
+        if number > 0.0 {
+            return Ok(number);
+        }
+        Err(self.fault(name, Fault::WrongValue { found: number.to_string(), expected }))
+    }
+
+    fn list(&self, name: &str, expected: &'static str) -> Result<Vec<Fields<'a>>, RecordingError> {
+        let value = self.needed(name, expected)?;
+        let entries = value.as_array().filter(|entries| !entries.is_empty());
+        let entries = entries.ok_or_else(|| self.wrong(name, value, expected))?;
+        let field = |(index, value)| Fields {
+            path: self.path,
+            place: format!("{}{name}[{index}].", self.place),
+            value,
+        };
+        Ok(entries.iter().enumerate().map(field).collect())
+    }
+}
