@@ -8,3 +8,4 @@
 pub mod element;
 pub mod extension;
 pub mod model;
+pub mod time;

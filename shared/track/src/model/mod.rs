@@ -6,6 +6,7 @@
 
 mod assembly;
 mod contact;
+mod irregularity;
 mod layout;
 mod matrices;
 mod mesh;
@@ -14,6 +15,7 @@ mod track;
 
 pub use assembly::{Assembly, Port};
 pub use contact::HertzContact;
+pub use irregularity::{Roughness, Surface};
 pub use layout::{Layout, RailPoint, SleeperLayout};
 pub use matrices::Matrices;
 pub use mesh::Mesh;

@@ -1,0 +1,122 @@
+//! What a pass is and what it leaves behind.
+
+use crate::model::{Surface, TrackModel};
+
+/// Time over which the irregularity grows from nothing, so that the wheel meets no step.
+const RAMP_S: f64 = 2e-3;
+
+/// One run of the wheel over the track at constant speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pass {
+    /// Speed in m/s.
+    pub speed_m_s: f64,
+    /// Where the wheel starts, in static equilibrium, in m.
+    pub start_m: f64,
+    /// Where the pass ends in m.
+    pub end_m: f64,
+    /// Time step in s.
+    pub time_step_s: f64,
+    /// Whether the contact gives way by the flexibility inside the loaded rail element too.
+    ///
+    /// Without it the scheme is the paper's, and the mesh is a false roughness of the rail.
+    pub local_flexibility: bool,
+}
+
+/// What a pass records: a sample at the start and one after every time step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassRecord {
+    /// Time between samples in s.
+    pub time_step_s: f64,
+    /// Position of the first sample in m.
+    pub start_m: f64,
+    /// Speed in m/s.
+    pub speed_m_s: f64,
+    /// Axle-box acceleration, that of the wheel, in m/s2, positive downwards.
+    pub acceleration_m_s2: Vec<f64>,
+    /// Contact force in N, positive in compression.
+    pub contact_force_n: Vec<f64>,
+}
+
+/// Why a pass has no result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PassError {
+    /// The pass leaves the track, stands still, runs backwards or has no time step.
+    #[error("the pass {pass:?} makes no way along a track of {length_m} m")]
+    Pass {
+        /// The pass.
+        pass: Pass,
+        /// Length of the track in m.
+        length_m: f64,
+    },
+    /// Something carries nothing: stiffness or inertia is not positive definite.
+    #[error("the track does not carry itself: its stiffness is not positive definite")]
+    Unstable,
+    /// The contact force is not a number any more.
+    #[error("the contact force is not a number at {position_m} m")]
+    NotFinite {
+        /// Where the wheel stood in m.
+        position_m: f64,
+    },
+    /// Cases and surfaces must come in pairs.
+    #[error("{models} tracks need as many surfaces, not {surfaces}")]
+    Surfaces {
+        /// Track models given.
+        models: usize,
+        /// Surfaces given.
+        surfaces: usize,
+    },
+}
+
+impl Pass {
+    /// Number of time steps: as many as fit between start and end.
+    pub fn steps(&self) -> usize {
+        let steps = (self.end_m - self.start_m) / (self.speed_m_s * self.time_step_s);
+        // A millionth of a step may be missing by rounding.
+        (steps + 1e-6).floor() as usize
+    }
+
+    /// Position of the wheel in m after so many steps.
+    pub fn position_m(&self, step: usize) -> f64 {
+        self.start_m + self.speed_m_s * self.time_step_s * step as f64
+    }
+
+    /// Height in m of the surface under the wheel after so many steps, eased in from its height
+    /// at the start.
+    pub(super) fn height_m(&self, surface: &Surface, step: usize) -> f64 {
+        let first = surface.height(self.start_m);
+        let time = (self.time_step_s * step as f64 / RAMP_S).min(1.0);
+        let ramp = time * time * (3.0 - 2.0 * time);
+        first + ramp * (surface.height(self.position_m(step)) - first)
+    }
+
+    /// That the pass lies on the track and goes forward.
+    pub(super) fn check(&self, model: &TrackModel) -> Result<(), PassError> {
+        let length_m = model.layout().length_m();
+        let forward = self.speed_m_s > 0.0 && self.time_step_s > 0.0 && self.speed_m_s.is_finite();
+        if forward && 0.0 <= self.start_m && self.start_m < self.end_m && self.end_m <= length_m {
+            Ok(())
+        } else {
+            Err(PassError::Pass { pass: self.clone(), length_m })
+        }
+    }
+}
+
+impl PassRecord {
+    pub(super) fn start(pass: &Pass, load_n: f64) -> Self {
+        let samples = pass.steps() + 1;
+        let mut record = Self {
+            time_step_s: pass.time_step_s,
+            start_m: pass.start_m,
+            speed_m_s: pass.speed_m_s,
+            acceleration_m_s2: Vec::with_capacity(samples),
+            contact_force_n: Vec::with_capacity(samples),
+        };
+        record.push(0.0, load_n);
+        record
+    }
+
+    pub(super) fn push(&mut self, acceleration_m_s2: f64, contact_force_n: f64) {
+        self.acceleration_m_s2.push(acceleration_m_s2);
+        self.contact_force_n.push(contact_force_n);
+    }
+}
