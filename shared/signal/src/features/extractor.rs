@@ -1,7 +1,7 @@
 //! Features of a window, by the quick way: an octave of voices at a time, reassigned as they come.
 
 use super::{
-    DefinitionError, FeatureDefinition, ThirdOctave,
+    DefinitionError, FeatureDefinition,
     plan::{Buffers, Instants, Plan, in_samples},
     reassignment::{Bins, Squeezed},
     stretch::Stretch,
@@ -130,6 +130,16 @@ impl Extractor {
         &self.definition
     }
 
+    /// Frequencies of the voices in Hz, descending.
+    pub(super) fn voices_hz(&self) -> &[f64] {
+        &self.voices_hz
+    }
+
+    /// Frequencies of all bins in Hz, ascending.
+    pub(super) fn bins_hz(&self) -> &[f64] {
+        &self.bins_hz
+    }
+
     /// The features of a window of samples.
     ///
     /// Of the signal on either side, at most [`FeatureDefinition::margin_s`] is used; what lies
@@ -148,7 +158,7 @@ impl Extractor {
     }
 
     /// The features of the LWPS in (m/s2)^2, one value a bin.
-    fn features(&self, lwps: &[f64]) -> Features {
+    pub(super) fn features(&self, lwps: &[f64]) -> Features {
         let floor = self.definition.floor_m2_s4;
         let log_power = lwps[self.kept.clone()].iter().map(|power| power.max(floor).ln());
         let level = |band: &Range<usize>| {
@@ -182,7 +192,12 @@ impl Extractor {
         Ok(result)
     }
 
-    fn stretch(&self, signal: &Signal, window: &Range<usize>) -> Result<Stretch, FeatureError> {
+    /// The stretch around a window that is inside the signal.
+    pub(super) fn stretch(
+        &self,
+        signal: &Signal,
+        window: &Range<usize>,
+    ) -> Result<Stretch, FeatureError> {
         let Range { start, end } = *window;
         if start >= end || end > signal.len() {
             return Err(FeatureError::Window { start, end, samples: signal.len() });

@@ -6,6 +6,7 @@
 mod band;
 mod definition;
 mod extractor;
+mod literal;
 mod plan;
 mod reassignment;
 mod set;
