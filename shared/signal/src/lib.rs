@@ -6,6 +6,7 @@
 //! comes from, and what its features say about the track, is left to others.
 
 mod features;
+pub mod recording;
 mod signal;
 mod squeeze;
 mod transform;

@@ -77,11 +77,7 @@ pub(super) fn speed(
 }
 
 /// The pass covers a sleeper's window.
-pub(super) fn length(
-    path: &Path,
-    positions: &[f64],
-    spacing_m: f64,
-) -> Result<(), RecordingError> {
+pub(super) fn length(path: &Path, positions: &[f64], spacing_m: f64) -> Result<(), RecordingError> {
     let length_m = positions[positions.len() - 1] - positions[0];
     if length_m >= spacing_m {
         return Ok(());

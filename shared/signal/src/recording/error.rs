@@ -166,7 +166,9 @@ pub enum Fault {
         spacing_m: f64,
     },
     /// No sleeper has its window inside any pass.
-    #[error("none lies inside a pass (passes cover {from_m} to {to_m} m); give them on the scale of `position_m`")]
+    #[error(
+        "none lies inside a pass (passes cover {from_m} to {to_m} m); give them on the scale of `position_m`"
+    )]
     NoSleeperInside {
         /// Where the passes begin, in m.
         from_m: f64,

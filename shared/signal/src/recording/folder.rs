@@ -160,7 +160,8 @@ impl Recording {
     fn file_names(&self) -> Vec<String> {
         let name = |(index, pass): (usize, &Pass)| {
             let earlier = &self.passes[..index];
-            let number = earlier.iter().filter(|other| other.speed_km_h == pass.speed_km_h).count() + 1;
+            let number =
+                earlier.iter().filter(|other| other.speed_km_h == pass.speed_km_h).count() + 1;
             format!("pass-{:02}kmh-{number}.parquet", pass.speed_km_h)
         };
         self.passes.iter().enumerate().map(name).collect()

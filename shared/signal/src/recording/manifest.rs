@@ -62,8 +62,11 @@ impl Manifest {
             .iter()
             .map(|pass| json!({"file": pass.file, "speed_km_h": pass.speed_km_h}))
             .collect();
-        let sleepers: Vec<_> =
-            self.sleepers.iter().map(|sleeper| json!({"id": sleeper.id, "x_m": sleeper.x_m})).collect();
+        let sleepers: Vec<_> = self
+            .sleepers
+            .iter()
+            .map(|sleeper| json!({"id": sleeper.id, "x_m": sleeper.x_m}))
+            .collect();
         let root = json!({
             "format": FORMAT,
             "sample_rate_Hz": self.sample_rate_hz,

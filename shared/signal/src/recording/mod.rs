@@ -10,6 +10,8 @@ mod error;
 mod folder;
 mod manifest;
 mod parquet_file;
+#[cfg(test)]
+mod tests;
 
 pub use error::{Fault, RecordingError};
 pub use folder::{Pass, Recording, Sleeper};

@@ -106,7 +106,7 @@ pub(super) fn write(
     position_m: &[f64],
     acceleration_m_s2: &[f32],
 ) -> Result<(), ParquetError> {
-    let column = |name, kind| {
+    let column = |name, kind| -> Result<Arc<Type>, ParquetError> {
         let column = Type::primitive_type_builder(name, kind);
         Ok(Arc::new(column.with_repetition(Repetition::REQUIRED).build()?))
     };

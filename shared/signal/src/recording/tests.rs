@@ -1,0 +1,287 @@
+//! Recordings written, read back, and broken on purpose, one fault at a time.
+
+use super::{Pass, Recording, Sleeper};
+use crate::Signal;
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const RATE_HZ: f64 = 1e4;
+
+/// Half a metre at 10 km/h over three sleepers, two passes.
+fn recording() -> Recording {
+    let step_m = 10.0 / 3.6 / RATE_HZ;
+    let pass = |number: f64| {
+        let position_m: Vec<f64> = (0..1800).map(|i| f64::from(i) * step_m).collect();
+        let samples = position_m.iter().map(|x| (number * 200.0 * x).sin()).collect();
+        let signal = Signal::new(RATE_HZ, samples).unwrap();
+        Pass { file: String::new(), speed_km_h: 10.0, signal, position_m }
+    };
+    let sleeper = |(id, x_m): (&str, f64)| Sleeper { id: id.to_owned(), x_m };
+    let nominal = json!({"sleeper": {"spacing_m": 0.125}});
+    Recording {
+        name: "short".to_owned(),
+        sample_rate_hz: RATE_HZ,
+        channel: "vertical axle-box acceleration, positive downwards".to_owned(),
+        passes: vec![pass(1.0), pass(2.0)],
+        sleepers: [("SN1", 0.125), ("SN2", 0.25), ("SN3", 0.375)].map(sleeper).to_vec(),
+        nominal: nominal.as_object().unwrap().clone(),
+        spacing_m: 0.125,
+    }
+}
+
+/// A written recording whose `recording.json` was changed by `change`.
+fn folder(change: impl FnOnce(&mut Value)) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    recording().write(folder.path()).unwrap();
+    let path = folder.path().join("recording.json");
+    let mut root: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    change(&mut root);
+    fs::write(path, root.to_string()).unwrap();
+    folder
+}
+
+/// The message that opening gives after `change`, without the folder's name.
+fn message(change: impl FnOnce(&mut Value)) -> String {
+    complaint(folder(change).path())
+}
+
+fn complaint(folder: &Path) -> String {
+    let text = Recording::open(folder).unwrap_err().to_string();
+    assert!(!text.contains('\n'), "one line: {text}");
+    text.replace(&format!("{}/", folder.display()), "")
+}
+
+/// The message for a recording whose single pass is this CSV file.
+fn csv_message(text: &str) -> String {
+    let folder = folder(|root| {
+        root["passes"] = json!([{"file": "pass.csv", "speed_km_h": 10.0}]);
+    });
+    fs::write(folder.path().join("pass.csv"), text).unwrap();
+    complaint(folder.path())
+}
+
+/// A CSV pass of 1800 rows, where `row` may change a row's three values.
+fn csv(row: impl Fn(usize, &mut [f64; 3])) -> String {
+    let mut lines = vec!["time_s,position_m,acceleration_m_s2".to_owned()];
+    for index in 0..1800 {
+        let time = index as f64 / RATE_HZ;
+        let mut values = [time, time * 10.0 / 3.6, 1.0];
+        row(index, &mut values);
+        lines.push(values.map(|value| value.to_string()).join(","));
+    }
+    lines.join("\n")
+}
+
+#[test]
+fn a_written_recording_reads_back_alike() {
+    let (before, folder) = (recording(), folder(|_| ()));
+    let after = Recording::open(folder.path()).unwrap();
+    assert_eq!(after.sleepers, before.sleepers);
+    assert_eq!(after.nominal, before.nominal);
+    assert_eq!(after.channel, before.channel);
+    assert_eq!(after.passes[1].file, "pass-10kmh-2.parquet");
+    for (a, b) in after.passes.iter().zip(&before.passes) {
+        assert_eq!(a.position_m, b.position_m);
+        for (x, y) in a.signal.samples().iter().zip(b.signal.samples()) {
+            assert_eq!(*x, f64::from(*y as f32));
+        }
+    }
+}
+
+#[test]
+fn fields_that_users_add_are_passed_over() {
+    let folder = folder(|root| {
+        root["weather"] = json!("rain");
+        root["passes"][0]["driver"] = json!({"name": "A"});
+    });
+    assert_eq!(Recording::open(folder.path()).unwrap().passes.len(), 2);
+}
+
+#[test]
+fn a_window_holds_the_samples_within_half_a_spacing() {
+    let recording = recording();
+    let window = recording.window(0, 1).unwrap();
+    let positions = &recording.passes[0].position_m;
+    assert!(positions[window.start] >= 0.1875 && positions[window.start - 1] < 0.1875);
+    assert!(positions[window.end - 1] <= 0.3125 && positions[window.end] > 0.3125);
+    // One spacing at 10 km/h is 450 samples, one more or less at the ends.
+    assert!(window.len().abs_diff(450) <= 1, "{}", window.len());
+}
+
+#[test]
+fn a_sleeper_at_the_end_has_half_a_window_and_one_outside_has_none() {
+    let mut recording = recording();
+    recording.sleepers[0].x_m = 0.0;
+    recording.sleepers[2].x_m = 0.6;
+    assert!((recording.window_share(0, 0) - 0.5).abs() < 1e-12);
+    assert!(recording.window(0, 0).unwrap().len().abs_diff(226) <= 1);
+    assert_eq!(recording.window(0, 2), None);
+}
+
+#[test]
+fn spacing_comes_from_the_sleepers_where_none_is_stated() {
+    let folder = folder(|root| root["nominal"] = json!({}));
+    assert_eq!(Recording::open(folder.path()).unwrap().spacing_m, 0.125);
+}
+
+#[test]
+fn csv_passes_are_read() {
+    let folder = folder(|root| root["passes"][0]["file"] = json!("pass.csv"));
+    fs::write(folder.path().join("pass.csv"), csv(|_, _| ())).unwrap();
+    let recording = Recording::open(folder.path()).unwrap();
+    assert_eq!(recording.passes[0].signal.len(), 1800);
+}
+
+#[test]
+fn a_missing_or_broken_manifest_is_named() {
+    let empty = tempfile::tempdir().unwrap();
+    assert_eq!(
+        complaint(empty.path()),
+        "recording.json: file: there is no such file; put it there or correct its name"
+    );
+    fs::write(empty.path().join("recording.json"), "{\"format\": ").unwrap();
+    let text = complaint(empty.path());
+    assert!(text.starts_with("recording.json: file: is not JSON (EOF"), "{text}");
+}
+
+#[test]
+fn every_field_that_is_needed_is_asked_for_by_name() {
+    let without = |field: &str| {
+        message(|root| {
+            root.as_object_mut().unwrap().remove(field);
+        })
+    };
+    for field in ["format", "sample_rate_Hz", "passes", "sleepers"] {
+        let text = without(field);
+        assert!(text.starts_with(&format!("recording.json: {field}: is missing; add ")), "{text}");
+    }
+    assert_eq!(
+        message(|root| root["passes"][1]["speed_km_h"] = json!("10")),
+        "recording.json: passes[1].speed_km_h: is \"10\"; give the nominal speed in km/h"
+    );
+    assert_eq!(
+        message(|root| root["sleepers"][2]["id"] = json!("SN1")),
+        "recording.json: sleepers: the id SN1 stands twice; give every sleeper its own"
+    );
+    let text = message(|root| root["format"] = json!("aba-recording/2"));
+    assert!(text.contains("\"aba-recording/1\""), "{text}");
+    let text = message(|root| root["passes"] = json!([]));
+    assert!(text.starts_with("recording.json: passes: is []; give"), "{text}");
+}
+
+#[test]
+fn a_missing_pass_and_an_unknown_kind_are_named() {
+    let text = message(|root| root["passes"][0]["file"] = json!("gone.parquet"));
+    assert!(text.starts_with("gone.parquet: file: there is no such file"), "{text}");
+    let text = message(|root| root["passes"][0]["file"] = json!("recording.json"));
+    assert!(text.contains("neither .parquet nor .csv"), "{text}");
+}
+
+#[test]
+fn a_missing_column_is_named_with_those_present() {
+    let text = csv_message("time_s,acc\n0,1\n");
+    assert_eq!(
+        text,
+        "pass.csv: position_m: there is no such column; name it so (the file has time_s, acc)"
+    );
+}
+
+#[test]
+fn a_value_that_is_no_number_is_named_by_its_row() {
+    let text = csv_message("time_s,position_m,acceleration_m_s2\n0,0,1\n1e-4,1e-3,oops\n");
+    assert!(text.starts_with("pass.csv: acceleration_m_s2: row 2 is \"oops\""), "{text}");
+    let text = csv_message(&csv(|index, values| {
+        if index == 6 {
+            values[2] = f64::NAN;
+        }
+    }));
+    assert!(text.starts_with("pass.csv: acceleration_m_s2: row 7 is NaN"), "{text}");
+}
+
+#[test]
+fn a_pass_without_rows_is_refused() {
+    let text = csv_message("time_s,position_m,acceleration_m_s2\n");
+    assert!(text.starts_with("pass.csv: time_s: has 0 rows"), "{text}");
+}
+
+#[test]
+fn a_file_that_is_no_parquet_is_refused() {
+    let folder = folder(|root| root["passes"][0]["file"] = json!("text.parquet"));
+    fs::write(folder.path().join("text.parquet"), "time_s").unwrap();
+    let text = complaint(folder.path());
+    assert!(text.starts_with("text.parquet: file: cannot be read ("), "{text}");
+}
+
+#[test]
+fn a_wrong_sample_rate_is_found_by_the_times() {
+    let text = message(|root| root["sample_rate_Hz"] = json!(20000));
+    assert!(
+        text.starts_with("recording.json: sample_rate_Hz: is 20000 Hz but `time_s` of pass-10kmh-1.parquet advances at 10000.000000 Hz"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_gap_in_time_is_named_by_its_row() {
+    let text = csv_message(&csv(|index, values| {
+        if index >= 900 {
+            values[0] += 0.001;
+        }
+    }));
+    assert!(text.starts_with("pass.csv: time_s: steps by 1.1"), "{text}");
+    assert!(text.contains("to row 901"), "{text}");
+}
+
+#[test]
+fn a_position_that_runs_back_is_named_by_its_row() {
+    let text = csv_message(&csv(|index, values| {
+        if index == 100 {
+            values[1] -= 0.01;
+        }
+    }));
+    assert!(text.starts_with("pass.csv: position_m: runs back from"), "{text}");
+    assert!(text.contains("at row 101"), "{text}");
+}
+
+#[test]
+fn a_wrong_speed_a_short_pass_and_a_foreign_place_are_refused() {
+    let text = message(|root| root["passes"][1]["speed_km_h"] = json!(13));
+    assert!(text.starts_with("recording.json: passes[1].speed_km_h: is 13 km/h"), "{text}");
+    let text = message(|root| root["nominal"]["sleeper"]["spacing_m"] = json!(0.6));
+    assert!(text.contains("covers 0.4997 m; one sleeper's window needs 0.6 m"), "{text}");
+    let text = message(|root| {
+        for sleeper in root["sleepers"].as_array_mut().unwrap() {
+            sleeper["x_m"] = json!(sleeper["x_m"].as_f64().unwrap() + 100.0);
+        }
+    });
+    assert!(text.starts_with("recording.json: sleepers: none lies inside a pass"), "{text}");
+}
+
+/// The shared recordings, unless they are absent.
+fn shared_recordings() -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/recordings");
+    if path.is_dir() {
+        return Some(path);
+    }
+    assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "../shared is not there");
+    println!("skipped: ../shared is not there");
+    None
+}
+
+#[test]
+fn an_independent_recording_opens_with_a_window_for_every_sleeper() {
+    let Some(shared) = shared_recordings() else { return };
+    let recording = Recording::open(shared.join("dev-01")).unwrap();
+    assert_eq!(recording.name, "dev-01");
+    assert_eq!((recording.passes.len(), recording.sleepers.len()), (6, 29));
+    assert_eq!(recording.speeds_km_h(), [7.0, 10.0, 13.0]);
+    for pass in 0..6 {
+        let expected = 0.125 / (recording.passes[pass].speed_km_h / 3.6) * 1e5;
+        for sleeper in 1..28 {
+            let length = recording.window(pass, sleeper).unwrap().len() as f64;
+            // The odometer's scale drifts by less than a per cent.
+            assert!((length / expected - 1.0).abs() < 0.01, "{length} against {expected}");
+        }
+    }
+}
