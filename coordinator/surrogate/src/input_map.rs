@@ -1,0 +1,115 @@
+//! From ln-powers to the inputs of a process: centred, then multiplied by a matrix.
+
+use crate::{Error, whitening};
+use faer::{Mat, MatRef};
+use serde::{Deserialize, Serialize};
+
+/// How the inputs of a process are made of a feature vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum InputScaling {
+    /// The feature vector itself (the paper's way).
+    Raw,
+    /// Every bin divided by its standard deviation over the training set.
+    Standardised,
+    /// Projected on the directions that tell parameters apart, in units of the surface's scatter.
+    Whitened {
+        /// How many directions.
+        components: usize,
+    },
+}
+
+/// `z = (x - offset) projection`.
+#[derive(Clone, Debug)]
+pub struct InputMap {
+    /// How the projection was made.
+    pub scaling: InputScaling,
+    /// Mean feature vector of the training set, d values.
+    pub offset: Vec<f64>,
+    /// d x m.
+    pub projection: Mat<f64>,
+}
+
+impl InputMap {
+    /// The map of that kind for training `features` (n x d) of cases with these `parameters`
+    /// (n x p).
+    ///
+    /// # Errors
+    /// [`Error::Constant`] names a bin that never changes; those of the eigenvalue problem.
+    pub fn fit(
+        scaling: InputScaling,
+        features: MatRef<'_, f64>,
+        parameters: MatRef<'_, f64>,
+    ) -> Result<Self, Error> {
+        let (n, d) = (features.nrows(), features.ncols());
+        let offset: Vec<f64> =
+            features.col_iter().map(|column| column.iter().sum::<f64>() / n as f64).collect();
+        let centred = centred(features, &offset);
+        let projection = match scaling {
+            InputScaling::Raw => Mat::identity(d, d),
+            InputScaling::Standardised => {
+                let deviations: Vec<f64> = centred
+                    .col_iter()
+                    .map(|column| (column.squared_norm_l2() / n as f64).sqrt())
+                    .collect();
+                if let Some(bin) = deviations.iter().position(|&deviation| deviation == 0.0) {
+                    return Err(Error::Constant(format!("bin {bin}")));
+                }
+                Mat::from_fn(d, d, |i, j| if i == j { 1.0 / deviations[i] } else { 0.0 })
+            }
+            InputScaling::Whitened { components } => {
+                whitening::directions(centred.as_ref(), parameters, components)?
+            }
+        };
+        Ok(Self { scaling, offset, projection })
+    }
+
+    /// The same map with only its first `components` outputs.
+    #[must_use]
+    pub(crate) fn leading(&self, components: usize) -> Self {
+        let m = components.min(self.projection.ncols());
+        Self {
+            scaling: InputScaling::Whitened { components: m },
+            offset: self.offset.clone(),
+            projection: self.projection.subcols(0, m).to_owned(),
+        }
+    }
+
+    /// Inputs (t x m) of `features` (t x d).
+    pub fn apply(&self, features: MatRef<'_, f64>) -> Mat<f64> {
+        centred(features, &self.offset) * &self.projection
+    }
+}
+
+fn centred(features: MatRef<'_, f64>, offset: &[f64]) -> Mat<f64> {
+    Mat::from_fn(features.nrows(), features.ncols(), |i, j| features[(i, j)] - offset[j])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standardised_inputs_have_mean_zero_and_variance_one() {
+        let features = Mat::from_fn(50, 2, |i, j| 3.0 + ((1 + j) * i) as f64);
+        let map = InputMap::fit(
+            InputScaling::Standardised,
+            features.as_ref(),
+            Mat::zeros(50, 0).as_ref(),
+        );
+        let inputs = map.unwrap().apply(features.as_ref());
+        for column in inputs.col_iter() {
+            // Sums of fifty numbers of size one, rounded.
+            assert!(column.iter().sum::<f64>().abs() < 1e-12);
+            assert!((column.squared_norm_l2() / 50.0 - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_bin_that_never_changes_is_named() {
+        let features = Mat::from_fn(5, 2, |i, j| if j == 1 { 2.0 } else { i as f64 });
+        let map =
+            InputMap::fit(InputScaling::Standardised, features.as_ref(), Mat::zeros(5, 0).as_ref());
+        assert_eq!(map.unwrap_err().to_string(), "bin 1 has the same value in every library entry");
+    }
+}

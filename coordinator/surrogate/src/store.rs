@@ -1,0 +1,282 @@
+//! Trained models, and the folder they are kept in.
+//!
+//! `models.json` says everything but the large tables: format, campaign, digest of the library,
+//! feature definition, hyper-parameters, scores. Beside it stands one safetensors file a group,
+//! with float64 tables, that any program can read. A prediction in Python:
+//!
+//! ```python
+//! import json, numpy as np
+//! from safetensors.numpy import load_file
+//! group = json.load(open("models.json"))["groups"][0]
+//! t = load_file(group["file"])
+//! model, j = group["models"][2], 2
+//! z = (x - t["offset"]) @ t["projection"]     # x: ln-powers of the group's columns, speeds side by side
+//! r = np.linalg.norm(t["inputs"] - z, axis=1)
+//! k = np.exp(-r / model["hyperparameters"]["length"])
+//! h = np.r_[1.0, z] if group["mean"] == "linear" else np.ones(1)
+//! unit = h @ t["coefficients"][:, j] + k @ t["weights"][:, j]
+//! low, high = model["range"]
+//! value = low + np.clip(unit, 0, 1) * (high - low)
+//! ```
+
+use crate::group::different;
+use crate::{
+    Error, GroupKey, InputMap, InputScaling, MeanFunction, ModelGroup, ParameterModel, TrainingSet,
+};
+use faer::{Mat, MatRef};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// The format of `models.json`.
+pub const FORMAT: &str = "tracktwin-models/1";
+const INDEX: &str = "models.json";
+
+/// All models of a library.
+pub struct Trained {
+    about: About,
+    groups: Vec<ModelGroup>,
+}
+
+/// What holds for all groups.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct About {
+    format: String,
+    code_version: String,
+    campaign: String,
+    library_digest: String,
+    feature_definition: serde_json::Value,
+    #[serde(rename = "frequencies_Hz")]
+    frequencies_hz: Vec<f64>,
+    speeds_km_h: Vec<f64>,
+    entries: usize,
+    split_seed: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Index {
+    #[serde(flatten)]
+    about: About,
+    groups: Vec<GroupRow>,
+}
+
+/// A group in the index: all but its tables.
+#[derive(Serialize, Deserialize)]
+struct GroupRow {
+    #[serde(flatten)]
+    key: GroupKey,
+    file: String,
+    blake3: String,
+    scaling: InputScaling,
+    mean: MeanFunction,
+    models: Vec<ParameterModel>,
+}
+
+impl Trained {
+    pub(crate) fn new(set: &TrainingSet, split_seed: u64, groups: Vec<ModelGroup>) -> Self {
+        let about = About {
+            format: FORMAT.to_owned(),
+            code_version: env!("CARGO_PKG_VERSION").to_owned(),
+            campaign: set.campaign.clone(),
+            library_digest: set.library_digest.clone(),
+            feature_definition: set.feature_definition.clone(),
+            frequencies_hz: set.frequencies_hz.clone(),
+            speeds_km_h: set.speeds_km_h.clone(),
+            entries: set.entries(),
+            split_seed,
+        };
+        Self { about, groups }
+    }
+
+    /// Name of the campaign the models were trained on.
+    pub fn campaign(&self) -> &str {
+        &self.about.campaign
+    }
+
+    /// Digest of the library the models were trained on.
+    pub fn library_digest(&self) -> &str {
+        &self.about.library_digest
+    }
+
+    /// How features were made in training; the same must be done to what is predicted from.
+    pub fn feature_definition(&self) -> &serde_json::Value {
+        &self.about.feature_definition
+    }
+
+    /// Frequencies of the bins in Hz.
+    pub fn frequencies_hz(&self) -> &[f64] {
+        &self.about.frequencies_hz
+    }
+
+    /// Speeds of the library in km/h.
+    pub fn speeds_km_h(&self) -> &[f64] {
+        &self.about.speeds_km_h
+    }
+
+    /// Entries of the library, those kept for testing included.
+    pub fn entries(&self) -> usize {
+        self.about.entries
+    }
+
+    /// Decides, with [`Self::entries`], which entries trained ([`crate::Split::halves`]).
+    pub fn split_seed(&self) -> u64 {
+        self.about.split_seed
+    }
+
+    /// All groups: every feature set at every speed, then all speeds together.
+    pub fn groups(&self) -> &[ModelGroup] {
+        &self.groups
+    }
+
+    /// The group that reads `feature` at exactly these speeds, if it was trained.
+    pub fn group(&self, speeds_km_h: &[f64], feature: &str) -> Option<&ModelGroup> {
+        self.groups
+            .iter()
+            .find(|group| group.key.feature == feature && group.key.speeds_km_h == speeds_km_h)
+    }
+
+    /// Refuses a library other than the one the models were trained on.
+    ///
+    /// # Errors
+    /// [`Error::OtherLibrary`] names both.
+    pub fn belongs_to(&self, library_digest: &str) -> Result<(), Error> {
+        if self.about.library_digest == library_digest {
+            return Ok(());
+        }
+        Err(Error::OtherLibrary {
+            trained_on: self.about.library_digest.clone(),
+            offered: library_digest.to_owned(),
+        })
+    }
+
+    /// Writes the models into `folder`, which is made if need be; the index last, so that an
+    /// interrupted save leaves no index to files that are not there.
+    ///
+    /// # Errors
+    /// [`Error::File`] names what cannot be written.
+    pub fn save(&self, folder: &Path) -> Result<(), Error> {
+        std::fs::create_dir_all(folder).map_err(|source| file_error(folder, source))?;
+        let groups =
+            self.groups.iter().map(|group| save_group(group, folder)).collect::<Result<_, _>>()?;
+        let index = Index { about: self.about.clone(), groups };
+        let text = serde_json::to_vec_pretty(&index).expect("an index of numbers and names");
+        write(&folder.join(INDEX), &text)
+    }
+
+    /// Reads models from `folder`.
+    ///
+    /// # Errors
+    /// [`Error::File`], [`Error::Malformed`] or [`Error::Changed`] names the file that cannot be
+    /// read, has another format, or is not the one that was saved.
+    pub fn load(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(INDEX);
+        let malformed = |reason: String| Error::Malformed { path: path.clone(), reason };
+        let json: serde_json::Value =
+            serde_json::from_slice(&read(&path)?).map_err(|error| malformed(error.to_string()))?;
+        match json.get("format").and_then(serde_json::Value::as_str) {
+            Some(FORMAT) => {}
+            Some(other) => {
+                return Err(malformed(format!(
+                    "the format is {other}; this program reads {FORMAT}"
+                )));
+            }
+            None => return Err(malformed(format!("no format; this program reads {FORMAT}"))),
+        }
+        let index: Index =
+            serde_json::from_value(json).map_err(|error| malformed(error.to_string()))?;
+        let bins = index.about.frequencies_hz.len();
+        let groups = index
+            .groups
+            .into_iter()
+            .map(|row| load_group(row, bins, folder))
+            .collect::<Result<_, _>>()?;
+        Ok(Self { about: index.about, groups })
+    }
+}
+
+fn save_group(group: &ModelGroup, folder: &Path) -> Result<GroupRow, Error> {
+    let speeds: Vec<String> = group.key.speeds_km_h.iter().map(ToString::to_string).collect();
+    let file = format!("{}_{}.safetensors", group.key.feature, speeds.join("_"));
+    let path = folder.join(&file);
+    let offset =
+        MatRef::from_row_major_slice(&group.input_map.offset, 1, group.input_map.offset.len());
+    let tables = [
+        ("offset", offset),
+        ("projection", group.input_map.projection.as_ref()),
+        ("inputs", group.inputs.as_ref()),
+        ("weights", group.weights.as_ref()),
+        ("coefficients", group.coefficients.as_ref()),
+    ]
+    .map(|(name, table)| (name, [table.nrows(), table.ncols()], little_endian(table)));
+    let views = tables.iter().map(|(name, shape, bytes)| {
+        let view = TensorView::new(Dtype::F64, shape.to_vec(), bytes);
+        (*name, view.expect("eight bytes a number"))
+    });
+    let bytes = safetensors::serialize(views, None).map_err(|error| malformed(&path, &error))?;
+    write(&path, &bytes)?;
+    Ok(GroupRow {
+        key: group.key.clone(),
+        file,
+        blake3: blake3::hash(&bytes).to_hex().to_string(),
+        scaling: group.input_map.scaling,
+        mean: group.mean,
+        models: group.models.clone(),
+    })
+}
+
+fn load_group(row: GroupRow, bins: usize, folder: &Path) -> Result<ModelGroup, Error> {
+    let path = folder.join(&row.file);
+    let bytes = read(&path)?;
+    if blake3::hash(&bytes).to_hex().as_str() != row.blake3 {
+        return Err(Error::Changed { path });
+    }
+    let tensors = SafeTensors::deserialize(&bytes).map_err(|error| malformed(&path, &error))?;
+    let table = |name: &str| table(&tensors, name).map_err(|reason| malformed(&path, &reason));
+    let offset = table("offset")?.row(0).iter().copied().collect();
+    let at: Vec<_> = row.models.iter().map(|model| model.hyperparameters).collect();
+    Ok(ModelGroup {
+        key: row.key,
+        bins,
+        input_map: InputMap { scaling: row.scaling, offset, projection: table("projection")? },
+        mean: row.mean,
+        inputs: table("inputs")?,
+        weights: table("weights")?,
+        coefficients: table("coefficients")?,
+        models: row.models,
+        factors: different(&at).into_iter().map(|at| (at, OnceLock::new())).collect(),
+    })
+}
+
+/// Numbers row by row, eight little-endian bytes each.
+fn little_endian(table: MatRef<'_, f64>) -> Vec<u8> {
+    table
+        .row_iter()
+        .flat_map(|row| row.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>())
+        .collect()
+}
+
+fn table(tensors: &SafeTensors<'_>, name: &str) -> Result<Mat<f64>, String> {
+    let view = tensors.tensor(name).map_err(|error| error.to_string())?;
+    let (Dtype::F64, &[rows, columns]) = (view.dtype(), view.shape()) else {
+        return Err(format!("{name} is no table of float64"));
+    };
+    let (numbers, _) = view.data().as_chunks::<8>();
+    Ok(Mat::from_fn(rows, columns, |i, j| f64::from_le_bytes(numbers[i * columns + j])))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    std::fs::read(path).map_err(|source| file_error(path, source))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    std::fs::write(path, bytes).map_err(|source| file_error(path, source))
+}
+
+fn file_error(path: &Path, source: std::io::Error) -> Error {
+    Error::File { path: path.to_owned(), source }
+}
+
+fn malformed(path: &Path, reason: &dyn std::fmt::Display) -> Error {
+    Error::Malformed { path: path.to_owned(), reason: reason.to_string() }
+}

@@ -1,0 +1,214 @@
+//! Trains and tests every group of models.
+
+use crate::distance::distances_within;
+use crate::group::different;
+use crate::validate::{coverage, folds, mase};
+use crate::{
+    Error, Factor, FeatureColumns, Fit, GroupKey, InputScaling, ModelGroup, ParameterModel, Score,
+    Split, Spread, Trained, TrainingSet, fit,
+};
+use faer::Mat;
+use std::sync::OnceLock;
+
+/// Standard deviations on either side that hold 90 % of a normal distribution.
+const WIDTH_90: f64 = 1.644_853_626_951_472_7;
+/// Fewest entries worth training on: a hundred to find hyper-parameters, a hundred to test.
+const ENTRIES_MIN: usize = 200;
+
+/// What to train, and how.
+#[derive(Clone, Debug)]
+pub struct TrainOptions {
+    /// Feature sets, each trained at every speed.
+    pub features: Vec<FeatureColumns>,
+    /// The one of them that is also trained on all speeds together.
+    pub all_speeds: Option<String>,
+    /// Scalings of the inputs to choose from.
+    pub scalings: Vec<InputScaling>,
+    /// Entries that decide the scaling.
+    pub subset: usize,
+    /// Folds of the validation.
+    pub folds: usize,
+    /// Decides which half of the entries trains.
+    pub seed: u64,
+}
+
+impl TrainOptions {
+    /// The usual options for these feature sets: five folds (paper, 2.5.5), every scaling.
+    pub fn new(features: Vec<FeatureColumns>) -> Self {
+        let whitened = [8, 16, 32].map(|components| InputScaling::Whitened { components });
+        Self {
+            all_speeds: features.first().map(|feature| feature.name.clone()),
+            features,
+            scalings: [[InputScaling::Raw, InputScaling::Standardised].as_slice(), &whitened]
+                .concat(),
+            subset: 1000,
+            folds: 5,
+            seed: 0,
+        }
+    }
+}
+
+/// What training has reached.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress<'a> {
+    /// Groups finished.
+    pub finished: usize,
+    /// Groups there are.
+    pub groups: usize,
+    /// The group that begins; none at the end.
+    pub next: Option<&'a GroupKey>,
+}
+
+/// Trains on a random half of the entries and tests on the other (paper, 2.5.5 and 3.4).
+///
+/// # Errors
+/// [`Error`] says what of the training set or the options cannot be used.
+pub fn train(
+    set: &TrainingSet,
+    options: &TrainOptions,
+    progress: &dyn Fn(Progress),
+) -> Result<Trained, Error> {
+    set.check()?;
+    if set.entries() < ENTRIES_MIN {
+        return Err(Error::TooFewEntries { found: set.entries(), least: ENTRIES_MIN });
+    }
+    let keys = keys(set, options)?;
+    let split = Split::halves(set.entries(), options.seed);
+    let mut groups = Vec::with_capacity(keys.len());
+    for key in &keys {
+        progress(Progress { finished: groups.len(), groups: keys.len(), next: Some(key) });
+        groups.push(train_group(set, key, options, &split)?);
+    }
+    progress(Progress { finished: keys.len(), groups: keys.len(), next: None });
+    Ok(Trained::new(set, options.seed, groups))
+}
+
+/// The groups to train: every feature set at every speed, then the one on all speeds.
+fn keys(set: &TrainingSet, options: &TrainOptions) -> Result<Vec<GroupKey>, Error> {
+    let key = |speeds_km_h: &[f64], feature: &FeatureColumns| {
+        feature.check(set.frequencies_hz.len())?;
+        let (speeds_km_h, columns) = (speeds_km_h.to_vec(), feature.columns.clone());
+        Ok(GroupKey { speeds_km_h, feature: feature.name.clone(), columns })
+    };
+    let mut keys = Vec::new();
+    for speed in &set.speeds_km_h {
+        for feature in &options.features {
+            keys.push(key(&[*speed], feature)?);
+        }
+    }
+    if let Some(name) = options.all_speeds.as_ref().filter(|_| set.speeds_km_h.len() > 1) {
+        let feature = options
+            .features
+            .iter()
+            .find(|feature| feature.name == *name)
+            .ok_or_else(|| Error::UnknownFeature(name.clone()))?;
+        keys.push(key(&set.speeds_km_h, feature)?);
+    }
+    Ok(keys)
+}
+
+fn train_group(
+    set: &TrainingSet,
+    key: &GroupKey,
+    options: &TrainOptions,
+    split: &Split,
+) -> Result<ModelGroup, Error> {
+    let speeds = speed_indices(set, key);
+    let features = set.features(&split.train, &speeds, &key.columns);
+    let targets = unit_targets(set, &split.train);
+    let fit = fit(features.as_ref(), targets.as_ref(), &options.scalings, options.subset)?;
+    let mut group = weigh(set, key, fit, &targets, options.folds)?;
+    let tested = set.features(&split.test, &speeds, &key.columns);
+    test(&mut group, &tested, &unit_targets(set, &split.test))?;
+    // Factors are as large as all inputs of the training set together: they are made again when
+    // the models are used.
+    for (_, slot) in &mut group.factors {
+        slot.take();
+    }
+    Ok(group)
+}
+
+/// Parameters mapped onto [0, 1] by their ranges in the library.
+fn unit_targets(set: &TrainingSet, entries: &[usize]) -> Mat<f64> {
+    let mut values = set.values(entries);
+    for (j, column) in values.col_iter_mut().enumerate() {
+        let [low, high] = set.range(j);
+        column.iter_mut().for_each(|value| *value = (*value - low) / (high - low));
+    }
+    values
+}
+
+fn speed_indices(set: &TrainingSet, key: &GroupKey) -> Vec<usize> {
+    (0..set.speeds_km_h.len())
+        .filter(|&index| key.speeds_km_h.contains(&set.speeds_km_h[index]))
+        .collect()
+}
+
+/// Final weights, and what the folds say of the errors.
+fn weigh(
+    set: &TrainingSet,
+    key: &GroupKey,
+    fit: Fit,
+    targets: &Mat<f64>,
+    fold_count: usize,
+) -> Result<ModelGroup, Error> {
+    let away = distances_within(fit.inputs.as_ref());
+    let basis = fit.mean.basis(fit.inputs.as_ref());
+    let (n, p) = (targets.nrows(), targets.ncols());
+    let mut weights = Mat::zeros(n, p);
+    let mut coefficients = Mat::zeros(basis.ncols(), p);
+    let mut models: Vec<Option<ParameterModel>> = vec![None; p];
+    let mut factors = Vec::new();
+    for at in different(&fit.hyperparameters) {
+        let factor = Factor::new(away.as_ref(), basis.as_ref(), at)?;
+        let all = factor.weights(targets.as_ref());
+        let held_out = folds(&factor, all.weights.as_ref(), fold_count)?;
+        for j in (0..p).filter(|&j| fit.hyperparameters[j] == at) {
+            weights.col_mut(j).copy_from(all.weights.col(j));
+            coefficients.col_mut(j).copy_from(all.coefficients.col(j));
+            let s2 = all.signal_variances[j];
+            let truth: Vec<f64> = targets.col(j).iter().copied().collect();
+            let predicted: Vec<f64> =
+                (0..n).map(|i| (truth[i] - held_out.errors[(i, j)]).clamp(0.0, 1.0)).collect();
+            let standardised: Vec<f64> = (0..n)
+                .map(|i| (truth[i] - predicted[i]) / (s2 * held_out.variances[i]).sqrt())
+                .collect();
+            let mase_folds = mase(&truth, &predicted, 1.0);
+            models[j] = Some(ParameterModel {
+                parameter: set.varied[j],
+                range: set.range(j),
+                hyperparameters: at,
+                signal_variance: s2,
+                log_likelihood: all.log_likelihoods[j],
+                spread: Spread::fit(&predicted, &standardised),
+                score: Score { mase_folds, mase_test: 0.0, bias_test: 0.0, coverage_90_test: 0.0 },
+            });
+        }
+        factors.push((at, OnceLock::from(factor)));
+    }
+    Ok(ModelGroup {
+        key: key.clone(),
+        bins: set.frequencies_hz.len(),
+        input_map: fit.input_map,
+        mean: fit.mean,
+        inputs: fit.inputs,
+        weights,
+        coefficients,
+        models: models.into_iter().flatten().collect(),
+        factors,
+    })
+}
+
+/// Predictions for entries that no step of the training saw.
+fn test(group: &mut ModelGroup, features: &Mat<f64>, targets: &Mat<f64>) -> Result<(), Error> {
+    let (means, sds) = group.predict_features(features.as_ref())?;
+    let column = |of: &Mat<f64>, j: usize| of.col(j).iter().copied().collect::<Vec<f64>>();
+    for (j, model) in group.models.iter_mut().enumerate() {
+        let (truth, mean) = (column(targets, j), column(&means, j));
+        let difference: f64 = mean.iter().zip(&truth).map(|(m, t)| m - t).sum();
+        model.score.mase_test = mase(&truth, &mean, 1.0);
+        model.score.bias_test = difference / truth.len() as f64;
+        model.score.coverage_90_test = coverage(&truth, &mean, &column(&sds, j), WIDTH_90);
+    }
+    Ok(())
+}
