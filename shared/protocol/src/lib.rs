@@ -1,1 +1,37 @@
-//! Messages between coordinator and workers.
+//! The messages between coordinator and workers.
+//!
+//! Owns the code generated from `proto/farm/v1/farm.proto`, and the checked values that messages
+//! become. Only this crate distrusts a message; who receives a checked value may rely on it.
+
+mod check;
+mod lease;
+mod register;
+mod report;
+
+pub use check::BadMessage;
+pub use lease::{CaseLease, Lease, LeasedCase, held_from_messages, held_to_messages};
+pub use register::Registration;
+pub use report::{CaseReport, Outcome, PassFeatures, Shape};
+
+/// Most bytes of a message: a hundred cases of ten speeds and a thousand bins.
+///
+/// A worker reports a few cases at a time, so this bounds what a stranger may make a coordinator
+/// hold, not what a worker may find.
+pub const MESSAGE_BYTES_MAX: usize = 16 << 20;
+
+/// Window of HTTP/2 flow control in bytes, on both sides.
+///
+/// With the default of 64 KiB a batch of results waits for several round trips.
+pub const WINDOW_BYTES: u32 = 4 << 20;
+
+/// Generated from `proto/farm/v1/farm.proto`.
+pub mod farm {
+    #![allow(
+        missing_docs,
+        unreachable_pub,
+        clippy::pedantic,
+        clippy::allow_attributes,
+        reason = "generated code; its documentation stands in the proto file"
+    )]
+    tonic::include_proto!("farm.v1");
+}

@@ -1,0 +1,115 @@
+//! What is checked in every message.
+
+/// Why a message is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BadMessage {
+    /// A field that must be there is not.
+    #[error("{field} is missing")]
+    Missing {
+        /// The field.
+        field: &'static str,
+    },
+    /// A text is longer than it may be.
+    #[error("{field} has {length} bytes; at most {max} are allowed")]
+    TooLong {
+        /// The field.
+        field: &'static str,
+        /// Its length in bytes.
+        length: usize,
+        /// The longest allowed.
+        max: usize,
+    },
+    /// A number is NaN, infinite or negative where it can't be.
+    #[error("{field} is {value}")]
+    NotANumber {
+        /// The field.
+        field: &'static str,
+        /// What stands there.
+        value: f64,
+    },
+    /// An enum value this program doesn't know.
+    #[error("{field} is {value}, which this program does not know")]
+    UnknownValue {
+        /// The field.
+        field: &'static str,
+        /// What stands there.
+        value: i32,
+    },
+    /// A parameter this program doesn't know, and would ignore.
+    #[error("case {index}: no parameter is called `{name}`; coordinator and worker differ")]
+    UnknownParameter {
+        /// The case.
+        index: u32,
+        /// The parameter's name.
+        name: String,
+    },
+    /// A parameter does not stand exactly once.
+    #[error("case {index}: parameter {name} stands {count} times, not once")]
+    ParameterCount {
+        /// The case.
+        index: u32,
+        /// The parameter's name.
+        name: &'static str,
+        /// How often it stands there.
+        count: usize,
+    },
+    /// A hash does not belong to what it came with.
+    #[error("{what} does not have the hash that came with it")]
+    WrongHash {
+        /// What was hashed.
+        what: String,
+    },
+    /// Not the speeds of the experiment.
+    #[error("case {index}: reported at {found:?} km/h, not at {expected:?}")]
+    WrongSpeeds {
+        /// The case.
+        index: u32,
+        /// The speeds reported.
+        found: Vec<f64>,
+        /// The experiment's.
+        expected: Vec<f64>,
+    },
+    /// Not as many features as the experiment has.
+    #[error("case {index}: {field} has {found} values, not {expected}")]
+    WrongLength {
+        /// The case.
+        index: u32,
+        /// The field.
+        field: &'static str,
+        /// Its length.
+        found: usize,
+        /// The experiment's.
+        expected: usize,
+    },
+}
+
+/// Longest name of a worker, version or hash, in bytes.
+const NAME_BYTES_MAX: usize = 256;
+
+/// A name: not empty, not too long.
+pub(crate) fn name(field: &'static str, text: String) -> Result<String, BadMessage> {
+    match text.len() {
+        0 => Err(BadMessage::Missing { field }),
+        length if length > NAME_BYTES_MAX => {
+            Err(BadMessage::TooLong { field, length, max: NAME_BYTES_MAX })
+        }
+        _ => Ok(text),
+    }
+}
+
+/// A finite number that is not negative.
+pub(crate) fn duration(field: &'static str, value: f64) -> Result<f64, BadMessage> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(BadMessage::NotANumber { field, value })
+    }
+}
+
+/// Finite numbers.
+pub(crate) fn finite(field: &'static str, values: Vec<f64>) -> Result<Vec<f64>, BadMessage> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(&value) => Err(BadMessage::NotANumber { field, value }),
+        None => Ok(values),
+    }
+}

@@ -1,0 +1,211 @@
+//! Cases on their way to a worker.
+
+use crate::check::{BadMessage, duration, name};
+use crate::farm;
+use tracktwin_parameters::{Case, Parameter, ParameterSet};
+
+/// The answer to a worker that asks for cases.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Lease {
+    /// Cases to simulate.
+    Cases(CaseLease),
+    /// None at the moment.
+    NoneNow {
+        /// When to ask again, in s.
+        retry_after_s: f64,
+    },
+}
+
+/// Cases of one campaign, for a while.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CaseLease {
+    /// The campaign.
+    pub campaign: String,
+    /// What is simulated and measured in each case, as canonical JSON.
+    pub experiment_json: String,
+    /// BLAKE3 of that, hexadecimal.
+    pub experiment_hash: String,
+    /// How long the lease lasts without renewal, in s.
+    pub lease_s: f64,
+    /// The cases.
+    pub cases: Vec<LeasedCase>,
+}
+
+/// A case, and which lease of it this is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeasedCase {
+    /// The case.
+    pub case: Case,
+    /// Counts its leases, from 1.
+    pub epoch: u32,
+}
+
+/// Cases under certain leases, as (index, epoch).
+pub fn held_to_messages(held: impl IntoIterator<Item = (u32, u32)>) -> Vec<farm::HeldCase> {
+    held.into_iter().map(|(sobol_index, epoch)| farm::HeldCase { sobol_index, epoch }).collect()
+}
+
+/// The way back: (index, epoch).
+pub fn held_from_messages(messages: &[farm::HeldCase]) -> impl Iterator<Item = (u32, u32)> {
+    messages.iter().map(|held| (held.sobol_index, held.epoch))
+}
+
+impl From<Lease> for farm::LeaseResponse {
+    fn from(lease: Lease) -> Self {
+        match lease {
+            Lease::NoneNow { retry_after_s } => {
+                Self { status: farm::LeaseStatus::NoneNow.into(), retry_after_s, ..Self::default() }
+            }
+            Lease::Cases(lease) => Self {
+                status: farm::LeaseStatus::Cases.into(),
+                campaign_id: lease.campaign,
+                experiment_json: lease.experiment_json,
+                experiment_hash: lease.experiment_hash,
+                cases: lease.cases.into_iter().map(Into::into).collect(),
+                lease_s: lease.lease_s,
+                retry_after_s: 0.0,
+            },
+        }
+    }
+}
+
+impl From<LeasedCase> for farm::LeasedCase {
+    fn from(LeasedCase { case, epoch }: LeasedCase) -> Self {
+        let value = |(parameter, value): (Parameter, f64)| farm::ParameterValue {
+            name: parameter.name().to_owned(),
+            value,
+        };
+        Self {
+            sobol_index: case.index,
+            parameters: case.parameters.iter().map(value).collect(),
+            surface_seed: case.surface_seed,
+            parameter_hash: case.parameter_hash(),
+            epoch,
+        }
+    }
+}
+
+impl TryFrom<farm::LeaseResponse> for Lease {
+    type Error = BadMessage;
+
+    fn try_from(message: farm::LeaseResponse) -> Result<Self, BadMessage> {
+        match message.status() {
+            farm::LeaseStatus::Unspecified => {
+                Err(BadMessage::UnknownValue { field: "status", value: message.status })
+            }
+            farm::LeaseStatus::NoneNow => Ok(Self::NoneNow {
+                retry_after_s: duration("retry_after_s", message.retry_after_s)?,
+            }),
+            farm::LeaseStatus::Cases => message.try_into().map(Self::Cases),
+        }
+    }
+}
+
+impl TryFrom<farm::LeaseResponse> for CaseLease {
+    type Error = BadMessage;
+
+    fn try_from(message: farm::LeaseResponse) -> Result<Self, BadMessage> {
+        Ok(Self {
+            campaign: name("campaign_id", message.campaign_id)?,
+            experiment_json: message.experiment_json,
+            experiment_hash: name("experiment_hash", message.experiment_hash)?,
+            lease_s: duration("lease_s", message.lease_s)?,
+            cases: message.cases.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl TryFrom<farm::LeasedCase> for LeasedCase {
+    type Error = BadMessage;
+
+    fn try_from(message: farm::LeasedCase) -> Result<Self, BadMessage> {
+        let index = message.sobol_index;
+        let parameters = parameter_set(index, &message.parameters)?;
+        let case = Case { index, parameters, surface_seed: message.surface_seed };
+        if case.parameter_hash() != message.parameter_hash {
+            return Err(BadMessage::WrongHash { what: format!("case {index}") });
+        }
+        Ok(Self { case, epoch: message.epoch })
+    }
+}
+
+/// A worker must refuse a parameter it would ignore: silence would poison the library.
+fn parameter_set(index: u32, values: &[farm::ParameterValue]) -> Result<ParameterSet, BadMessage> {
+    let mut set = ParameterSet::nominal();
+    let mut counts = [0; Parameter::COUNT];
+    for farm::ParameterValue { name, value } in values {
+        let parameter = Parameter::from_name(name)
+            .ok_or_else(|| BadMessage::UnknownParameter { index, name: name.clone() })?;
+        if !value.is_finite() {
+            return Err(BadMessage::NotANumber { field: parameter.name(), value: *value });
+        }
+        set[parameter] = *value;
+        counts[parameter.index()] += 1;
+    }
+    match Parameter::ALL.iter().zip(counts).find(|&(_, count)| count != 1) {
+        Some((parameter, count)) => {
+            Err(BadMessage::ParameterCount { index, name: parameter.name(), count })
+        }
+        None => Ok(set),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn leased() -> LeasedCase {
+        let case = Case { index: 3, parameters: ParameterSet::nominal(), surface_seed: 9 };
+        LeasedCase { case, epoch: 2 }
+    }
+
+    fn refusal(change: impl FnOnce(&mut farm::LeasedCase)) -> BadMessage {
+        let mut message = farm::LeasedCase::from(leased());
+        change(&mut message);
+        LeasedCase::try_from(message).unwrap_err()
+    }
+
+    #[test]
+    fn a_case_with_an_unknown_parameter_is_refused() {
+        let extra = farm::ParameterValue { name: "joint_dip_m".to_owned(), value: 1e-5 };
+        let error = refusal(|message| message.parameters.push(extra));
+        assert!(matches!(error, BadMessage::UnknownParameter { index: 3, .. }), "{error}");
+    }
+
+    #[test]
+    fn a_case_that_lacks_or_repeats_a_parameter_is_refused() {
+        let lacking = refusal(|message| message.parameters.truncate(5));
+        assert!(matches!(lacking, BadMessage::ParameterCount { count: 0, .. }), "{lacking}");
+        let twice = refusal(|message| message.parameters.push(message.parameters[0].clone()));
+        assert!(matches!(twice, BadMessage::ParameterCount { count: 2, .. }), "{twice}");
+    }
+
+    #[test]
+    fn a_case_whose_values_changed_on_the_way_is_refused() {
+        let changed = refusal(|message| message.parameters[2].value *= 1.000_001);
+        assert!(matches!(changed, BadMessage::WrongHash { .. }), "{changed}");
+        let seed = refusal(|message| message.surface_seed += 1);
+        assert!(matches!(seed, BadMessage::WrongHash { .. }), "{seed}");
+        let nan = refusal(|message| message.parameters[2].value = f64::NAN);
+        assert!(matches!(nan, BadMessage::NotANumber { .. }), "{nan}");
+    }
+
+    #[test]
+    fn an_answer_without_status_is_refused() {
+        let error = Lease::try_from(farm::LeaseResponse::default()).unwrap_err();
+        assert_eq!(error, BadMessage::UnknownValue { field: "status", value: 0 });
+    }
+
+    proptest! {
+        #[test]
+        fn every_case_survives_the_way_to_the_worker(
+            values in proptest::array::uniform6(1e-3..1e9_f64), index: u32, seed: u64, epoch: u32
+        ) {
+            let case = Case { index, parameters: ParameterSet::new(values), surface_seed: seed };
+            let leased = LeasedCase { case, epoch };
+            let message = farm::LeasedCase::from(leased.clone());
+            prop_assert_eq!(LeasedCase::try_from(message).unwrap(), leased);
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! What is done with every case of a campaign: everything but its parameters that decides results.
+
+use serde::{Deserialize, Serialize};
+use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::{DefinitionError, FeatureDefinition, ThirdOctave};
+
+/// Spans between what is evaluated and the held ends of the rail, at least.
+const END_SPANS: f64 = 8.0;
+
+/// Km/h in a m/s.
+const KM_H: f64 = 3.6;
+
+/// Shortest and longest wavelength of the irregularity in m (paper, App. B).
+const WAVELENGTHS_M: [f64; 2] = [0.5e-3, 1.0];
+
+/// A virtual measurement: a track, a vehicle, its speeds, and what is taken from the signal.
+///
+/// [`Experiment::checked`] says whether it can be done; the fields are open so that a campaign may
+/// change them before.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// Sections, masses, spacing and load.
+    pub design: TrackDesign,
+    /// Sleeper spans of the track.
+    pub spans: usize,
+    /// Rail elements in each.
+    pub rail_elements_per_span: usize,
+    /// Elements of a half sleeper.
+    pub sleeper_elements: usize,
+    /// Whether the contact gives way by the flexibility inside the loaded rail element.
+    pub local_flexibility: bool,
+    /// Time step in s, at the same time the sample interval.
+    pub time_step_s: f64,
+    /// Speeds in km/h, ascending. A case runs at each over one surface.
+    pub speeds_km_h: Vec<f64>,
+    /// Spans that the wheel runs before anything is kept, at least.
+    pub run_in_spans: f64,
+    /// Shortest and longest wavelength of the irregularity in m.
+    pub wavelengths_m: [f64; 2],
+    /// What is taken from the signal.
+    pub features: FeatureDefinition,
+}
+
+/// Why an experiment can't be done; each names the setting.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExperimentError {
+    /// Speeds are missing, not positive, or not in order.
+    #[error("speeds_km_h: {speeds:?} must be one or more positive speeds, ascending, none twice")]
+    Speeds {
+        /// The speeds.
+        speeds: Vec<f64>,
+    },
+    /// A number lies outside what makes sense.
+    #[error("{setting}: {value} must lie in {low} to {high}")]
+    OutOfRange {
+        /// The setting.
+        setting: &'static str,
+        /// Its value.
+        value: f64,
+        /// Lowest value.
+        low: f64,
+        /// Highest value.
+        high: f64,
+    },
+    /// Wavelengths are not positive or not in order.
+    #[error("wavelengths_m: {wavelengths:?} must be two positive lengths, the shorter first")]
+    Wavelengths {
+        /// The wavelengths.
+        wavelengths: [f64; 2],
+    },
+    /// What is kept comes too near to the held ends of the rail.
+    #[error(
+        "spans: {spans} are too few for {speed_km_h} km/h: what is evaluated must stay \
+         {END_SPANS} spans off the ends of the rail; {needed} spans suffice"
+    )]
+    TooShort {
+        /// The spans.
+        spans: usize,
+        /// The speed, in km/h.
+        speed_km_h: f64,
+        /// Spans that suffice.
+        needed: usize,
+    },
+    /// The features can't be extracted.
+    #[error("features: {0}")]
+    Features(#[from] DefinitionError),
+    /// The features lack one-third octaves that the library keeps.
+    #[error("features: the range must hold all one-third octaves from 50 to 4000 Hz")]
+    Bands,
+    /// Not the JSON of an experiment that this program knows.
+    #[error("not an experiment: {message}")]
+    Json {
+        /// What the parser said.
+        message: String,
+    },
+}
+
+/// The way of the wheel at one speed, and what is kept of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stretch {
+    /// Where the wheel starts in m.
+    pub(crate) start_m: f64,
+    /// Where the kept part starts: the window and its margin.
+    pub(crate) kept_m: f64,
+    /// Where the window starts.
+    pub(crate) window_m: f64,
+    /// Where it ends.
+    pub(crate) window_end_m: f64,
+    /// Where the margin behind it, and the pass, ends.
+    pub(crate) end_m: f64,
+}
+
+impl Experiment {
+    /// The paper's simulation on a track of this design: Table D1's speeds, 25 spans.
+    pub fn new(design: TrackDesign) -> Self {
+        Self {
+            design,
+            spans: 25,
+            rail_elements_per_span: 8,
+            sleeper_elements: 8,
+            local_flexibility: true,
+            time_step_s: 1e-5,
+            speeds_km_h: vec![7.0, 10.0, 13.0],
+            run_in_spans: 2.0,
+            wavelengths_m: WAVELENGTHS_M,
+            features: FeatureDefinition::default(),
+        }
+    }
+
+    /// The same experiment, if it can be done.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] names the setting that prevents it, and what would do.
+    pub fn checked(self) -> Result<Self, ExperimentError> {
+        self.check_speeds()?;
+        self.features.check()?;
+        if self.features.bands().count() != ThirdOctave::COUNT {
+            return Err(ExperimentError::Bands);
+        }
+        let [shortest, longest] = self.wavelengths_m;
+        if !(shortest > 0.0 && shortest < longest && longest.is_finite()) {
+            return Err(ExperimentError::Wavelengths { wavelengths: self.wavelengths_m });
+        }
+        let range = |setting, value: f64, [low, high]: [f64; 2]| {
+            let fits = (low..=high).contains(&value);
+            if fits {
+                Ok(())
+            } else {
+                Err(ExperimentError::OutOfRange { setting, value, low, high })
+            }
+        };
+        range("spans", self.spans as f64, [2.0, 1000.0])?;
+        range("rail_elements_per_span", self.rail_elements_per_span as f64, [1.0, 512.0])?;
+        range("sleeper_elements", self.sleeper_elements as f64, [1.0, 512.0])?;
+        // Ten steps a period of the highest feature.
+        range("time_step_s", self.time_step_s, [1e-8, 0.1 / self.features.highest_hz])?;
+        range("run_in_spans", self.run_in_spans, [0.0, 1000.0])?;
+        self.check_room()?;
+        Ok(self)
+    }
+
+    /// Reads the canonical JSON of an experiment and checks it.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Json`] for what this program does not know; else as
+    /// [`Experiment::checked`].
+    pub fn from_json(json: &str) -> Result<Self, ExperimentError> {
+        serde_json::from_str::<Self>(json)
+            .map_err(|error| ExperimentError::Json { message: error.to_string() })?
+            .checked()
+    }
+
+    /// The experiment as canonical JSON: fields in order of declaration, shortest numbers.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("numbers and names become JSON")
+    }
+
+    /// BLAKE3 of [`Experiment::to_json`], hexadecimal.
+    pub fn hash(&self) -> String {
+        blake3::hash(self.to_json().as_bytes()).to_hex().to_string()
+    }
+
+    /// The middle sleeper: the one whose window is evaluated. It stands at the end of as many
+    /// spans.
+    pub const fn sleeper(&self) -> usize {
+        self.spans / 2
+    }
+
+    fn check_speeds(&self) -> Result<(), ExperimentError> {
+        let speeds = &self.speeds_km_h;
+        let positive = speeds.iter().all(|speed| speed.is_finite() && *speed > 0.0);
+        let ascending = speeds.windows(2).all(|pair| pair[0] < pair[1]);
+        if positive && ascending && !speeds.is_empty() {
+            Ok(())
+        } else {
+            Err(ExperimentError::Speeds { speeds: speeds.clone() })
+        }
+    }
+
+    /// The way at one speed: the window is one spacing, centred at the middle sleeper.
+    pub(crate) fn stretch(&self, speed_km_h: f64) -> Stretch {
+        let spacing = self.design.sleeper.spacing_m;
+        let margin = self.features.margin_s * speed_km_h / KM_H;
+        let window_m = (self.sleeper() as f64 - 0.5) * spacing;
+        let kept_m = window_m - margin;
+        Stretch {
+            start_m: kept_m - self.run_in_spans * spacing,
+            kept_m,
+            window_m,
+            window_end_m: window_m + spacing,
+            end_m: window_m + spacing + margin,
+        }
+    }
+
+    /// Everything kept stays [`END_SPANS`] off the ends, and the run-in begins on the track.
+    fn check_room(&self) -> Result<(), ExperimentError> {
+        let spacing = self.design.sleeper.spacing_m;
+        for &speed_km_h in &self.speeds_km_h {
+            let stretch = self.stretch(speed_km_h);
+            let half = (stretch.window_end_m - stretch.kept_m) / spacing - 0.5;
+            let needed = (half + END_SPANS.max(self.run_in_spans)).ceil() * 2.0;
+            if (self.spans as f64) < needed {
+                let needed = needed as usize;
+                return Err(ExperimentError::TooShort { spans: self.spans, speed_km_h, needed });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A speed in m/s.
+pub(crate) fn metres_per_second(speed_km_h: f64) -> f64 {
+    speed_km_h / KM_H
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn experiment() -> Experiment {
+        Experiment::new(TrackDesign::v_track())
+    }
+
+    fn refusal(change: impl FnOnce(&mut Experiment)) -> String {
+        let mut experiment = experiment();
+        change(&mut experiment);
+        experiment.checked().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_paper_s_experiment_can_be_done() {
+        assert_eq!(experiment().checked().unwrap(), experiment());
+        let real_scale = Experiment {
+            speeds_km_h: vec![35.0, 50.0, 65.0],
+            ..Experiment::new(TrackDesign::v_track().enlarged(5.0))
+        };
+        real_scale.checked().unwrap();
+    }
+
+    #[test]
+    fn what_is_kept_stays_eight_spans_off_the_ends() {
+        let spacing = experiment().design.sleeper.spacing_m;
+        for speed in experiment().speeds_km_h {
+            let stretch = experiment().stretch(speed);
+            assert!(stretch.kept_m >= 8.0 * spacing);
+            assert!(stretch.end_m <= 17.0 * spacing);
+            assert!(stretch.start_m > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_track_too_short_is_refused_with_a_length_that_suffices() {
+        let message = refusal(|experiment| experiment.spans = 16);
+        assert!(message.starts_with("spans: 16 are too few for 7 km/h"), "{message}");
+        let mut longer = experiment();
+        longer.speeds_km_h = vec![40.0];
+        let Err(ExperimentError::TooShort { needed, .. }) = longer.clone().checked() else {
+            panic!("40 km/h needs more than 25 spans")
+        };
+        longer.spans = needed;
+        longer.checked().unwrap();
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_name() {
+        assert!(refusal(|e| e.speeds_km_h = vec![]).starts_with("speeds_km_h"));
+        assert!(refusal(|e| e.speeds_km_h = vec![10.0, 7.0]).starts_with("speeds_km_h"));
+        assert!(refusal(|e| e.speeds_km_h = vec![f64::NAN]).starts_with("speeds_km_h"));
+        assert!(refusal(|e| e.time_step_s = 1.0).starts_with("time_step_s"));
+        assert!(refusal(|e| e.sleeper_elements = 0).starts_with("sleeper_elements"));
+        assert!(refusal(|e| e.wavelengths_m = [1.0, 0.1]).starts_with("wavelengths_m"));
+        assert!(refusal(|e| e.features.highest_hz = 2000.0).starts_with("features"));
+    }
+
+    #[test]
+    fn an_experiment_survives_its_json_and_an_unknown_setting_does_not() {
+        let json = experiment().to_json();
+        let back = Experiment::from_json(&json).unwrap();
+        assert_eq!(back.hash(), experiment().hash());
+        let unknown = json.replacen('{', "{\"wheel_flat_m\":1e-5,", 1);
+        let error = Experiment::from_json(&unknown).unwrap_err();
+        assert!(error.to_string().contains("wheel_flat_m"), "{error}");
+    }
+}
