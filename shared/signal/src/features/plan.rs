@@ -8,6 +8,7 @@
 
 use super::{FeatureDefinition, stretch::Stretch};
 use crate::wavelet::Morlet;
+use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner, num_complex::Complex64};
 use std::{f64::consts::TAU, ops::Range, sync::Arc};
 
@@ -83,9 +84,15 @@ struct Octave {
     instants: usize,
     /// Distance of two lines of the spectrum in Hz.
     line_hz: f64,
-    forward: Arc<dyn Fft<f64>>,
+    forward: Arc<dyn RealToComplex<f64>>,
     inverse: Arc<dyn Fft<f64>>,
     voices: Vec<Voice>,
+}
+
+/// What makes the Fourier transforms of a plan.
+struct Planners {
+    real: RealFftPlanner<f64>,
+    complex: FftPlanner<f64>,
 }
 
 /// The lines of the spectrum that a voice takes, and their weights: the wavelet, times all
@@ -98,6 +105,7 @@ struct Voice {
 /// Buffers that outlive a call.
 #[derive(Default)]
 pub(super) struct Buffers {
+    circle: Vec<f64>,
     spectrum: Vec<Complex64>,
     voices: Vec<Complex64>,
     scratch: Vec<Complex64>,
@@ -111,11 +119,11 @@ impl Plan {
         sample_rate_hz: f64,
         instants: Instants,
     ) -> Self {
-        let mut planner = FftPlanner::new();
+        let mut planners = Planners { real: RealFftPlanner::new(), complex: FftPlanner::new() };
         let octaves = voices_hz
             .chunks(definition.voices_per_octave as usize)
             .map(|voices_hz| {
-                Octave::new(&mut planner, definition, voices_hz, sample_rate_hz, instants)
+                Octave::new(&mut planners, definition, voices_hz, sample_rate_hz, instants)
             })
             .collect();
         Self { octaves }
@@ -145,7 +153,7 @@ impl Plan {
 
 impl Octave {
     fn new(
-        planner: &mut FftPlanner<f64>,
+        planners: &mut Planners,
         definition: &FeatureDefinition,
         voices_hz: &[f64],
         sample_rate_hz: f64,
@@ -168,36 +176,30 @@ impl Octave {
             samples,
             instants,
             line_hz,
-            forward: planner.plan_fft_forward(samples),
-            inverse: planner.plan_fft_inverse(instants),
+            forward: planners.real.plan_fft_forward(samples),
+            inverse: planners.complex.plan_fft_inverse(instants),
             voices,
         }
     }
 
     /// The spectrum of the stretch on this octave's circle.
     fn transform(&self, stretch: &Stretch, buffers: &mut Buffers) {
-        let Buffers { spectrum, voices, scratch } = buffers;
-        spectrum.clear();
-        spectrum.resize(self.samples, Complex64::ZERO);
-        stretch.unroll(self.margin, |from_window, before_window| {
-            let start = self.samples - before_window.len();
-            for (value, &sample) in spectrum.iter_mut().zip(from_window) {
-                value.re = sample;
-            }
-            for (value, &sample) in spectrum[start..].iter_mut().zip(before_window) {
-                value.re = sample;
-            }
-        });
-        let needed = self.forward.get_inplace_scratch_len();
-        let needed = needed.max(self.inverse.get_inplace_scratch_len());
-        scratch.resize(needed, Complex64::ZERO);
-        self.forward.process_with_scratch(spectrum, scratch);
+        let Buffers { circle, spectrum, voices, scratch } = buffers;
+        circle.clear();
+        circle.resize(self.samples, 0.0);
+        stretch.unroll(self.margin, circle);
+        spectrum.resize(self.samples / 2 + 1, Complex64::ZERO);
         voices.resize(2 * self.instants, Complex64::ZERO);
+        let needed = self.forward.get_scratch_len().max(self.inverse.get_inplace_scratch_len());
+        scratch.resize(needed, Complex64::ZERO);
+        self.forward
+            .process_with_scratch(circle, spectrum, scratch)
+            .expect("the buffers have the lengths of the plan");
     }
 
     /// A voice and its weighted twin, one after the other.
     fn voice(&self, voice: &Voice, buffers: &mut Buffers) {
-        let Buffers { spectrum, voices, scratch } = buffers;
+        let Buffers { spectrum, voices, scratch, .. } = buffers;
         voices.fill(Complex64::ZERO);
         let (values, weighted) = voices.split_at_mut(self.instants);
         let lines = spectrum[voice.first_line..].iter().zip(&voice.weights);

@@ -33,13 +33,15 @@ impl Stretch {
         Self { samples, window: window.start - start..window.end - start }
     }
 
-    /// Writes the stretch into a circle so that the window starts at 0 and the left margin, at
-    /// most `margin` samples of either, ends at the circle's end.
-    pub(super) fn unroll(&self, margin: usize, circle: impl FnOnce(&[f64], &[f64])) {
+    /// Writes the stretch onto a circle of zeros: the window from 0 on, and at most `margin`
+    /// samples of either margin, the left one ending at the circle's end.
+    pub(super) fn unroll(&self, margin: usize, circle: &mut [f64]) {
         let Range { start, end } = self.window;
         let from = start.saturating_sub(margin);
         let to = (end + margin).min(self.samples.len());
-        circle(&self.samples[start..to], &self.samples[from..start]);
+        circle[..to - start].copy_from_slice(&self.samples[start..to]);
+        let before = circle.len() - (start - from);
+        circle[before..].copy_from_slice(&self.samples[from..start]);
     }
 }
 
