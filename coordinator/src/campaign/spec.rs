@@ -11,7 +11,7 @@ use tracktwin_signal::FeatureDefinition;
 use tracktwin_worker::{Experiment, ExperimentError};
 
 /// The campaign that `tracktwin run` simulates where none is named.
-const DEFAULT: &str = include_str!("default.toml");
+pub const DEFAULT: &str = include_str!("default.toml");
 
 /// A set of cases: where they are sampled and what is done with each.
 ///

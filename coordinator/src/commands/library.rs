@@ -1,6 +1,6 @@
 //! `tracktwin library`: what a library holds.
 
-use super::{OrInput, Stop};
+use super::{OrInput, Stop, say};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use tracktwin_library::{CampaignRecord, Library};
@@ -135,12 +135,11 @@ pub(super) async fn choose(library: &Library, id: Option<&str>) -> Result<Campai
     }
 }
 
-#[expect(clippy::print_stdout, reason = "answers go to standard output")]
 fn answer<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> String) {
     if json {
         let json = serde_json::to_string_pretty(answers).expect("counts and names become JSON");
-        println!("{json}");
+        say(&json);
     } else {
-        answers.iter().for_each(|answer| println!("{}", text(answer)));
+        answers.iter().for_each(|answer| say(&text(answer)));
     }
 }

@@ -2,6 +2,7 @@
 
 mod evaluate;
 mod library;
+mod progress;
 mod receptance;
 mod run;
 mod simulate;
@@ -97,4 +98,10 @@ fn asynchronously(work: impl Future<Output = Result<(), Stop>>) -> Result<(), St
 
 fn completions(shell: clap_complete::Shell) {
     clap_complete::generate(shell, &mut Program::command(), "tracktwin", &mut std::io::stdout());
+}
+
+/// Says a line of the command's answer on standard output.
+#[expect(clippy::print_stdout, reason = "answers go to standard output")]
+fn say(line: &str) {
+    println!("{line}");
 }

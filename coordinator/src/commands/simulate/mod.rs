@@ -1,17 +1,22 @@
 //! `tracktwin simulate`: passes over one track, written as a recording.
 
 mod setting;
+mod track;
 
 use super::{OrInput, Stop};
+use anyhow::anyhow;
 use clap::{Args, ValueEnum};
-use serde_json::json;
-use setting::Setting;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, Normal};
+pub(super) use setting::Setting;
 use std::path::PathBuf;
-use tracktwin_parameters::{Parameter, ParameterSet, Preset, TrackDesign};
-use tracktwin_signal::recording::{NewPass, NewRecording, Sleeper};
-use tracktwin_track::extension::{Extension, SleeperBolt};
-use tracktwin_track::time::{self, Pass};
-use tracktwin_track::{Mesh, Roughness, Support, Surface, TrackModel};
+use track::SimulatedTrack;
+use tracktwin_parameters::Preset;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::{Pass, Recording};
+use tracktwin_track::model::Surface;
+use tracktwin_track::time::{self, PassRecord};
 
 /// Spans at either end of the track that are not recorded: the ends are held.
 const END_SPANS: usize = 6;
@@ -84,4 +89,98 @@ impl From<Track> for Preset {
             Track::RealScale => Self::RealScale,
         }
     }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
+    let track = SimulatedTrack::new(arguments)?;
+    let recording = record(arguments, &track)?;
+    recording.write(&arguments.out)?;
+    std::fs::write(arguments.out.join("truth.json"), track.truth_json())?;
+    super::say(&format!("recording: {}", arguments.out.display()));
+    Ok(())
+}
+
+/// Runs the wheel over the track, so often at each speed.
+fn record(arguments: &Arguments, track: &SimulatedTrack) -> Result<Recording, Stop> {
+    let speeds_km_h = match &arguments.speeds_km_h[..] {
+        [] => Preset::from(arguments.preset).speeds_km_h(),
+        given => given.to_vec(),
+    };
+    let [from_m, to_m] = track.recorded_m();
+    let mut passes = Vec::new();
+    for speed_km_h in speeds_km_h {
+        let drive = time::Pass {
+            speed_m_s: speed_km_h / 3.6,
+            start_m: from_m - RUN_IN_SPANS as f64 * track.design().sleeper.spacing_m,
+            end_m: to_m,
+            time_step_s: arguments.time_step,
+            local_flexibility: !arguments.no_local_flexibility,
+        };
+        let number = 0..arguments.passes;
+        let seeds: Vec<_> = number.map(|pass| pass_seed(arguments.seed, speed_km_h, pass)).collect();
+        let surfaces: Vec<_> =
+            seeds.iter().map(|&seed| surface(arguments, track, seed)).collect();
+        let models = vec![track.model().clone(); surfaces.len()];
+        let driven = time::passes(&models, &drive, &surfaces).or_input()?;
+        for (record, seed) in driven.iter().zip(seeds) {
+            passes.push(measured(record, from_m, speed_km_h, arguments.noise, seed)?);
+        }
+    }
+    Ok(Recording {
+        name: arguments.out.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        sample_rate_hz: 1.0 / arguments.time_step,
+        channel: "vertical axle-box acceleration, positive downwards".to_owned(),
+        passes,
+        sleepers: track.sleepers_between(from_m, to_m),
+        nominal: track.nominal(),
+        spacing_m: track.design().sleeper.spacing_m,
+    })
+}
+
+/// The surface that a pass sees: shared by all passes but for the unrepeated share.
+fn surface(arguments: &Arguments, track: &SimulatedTrack, pass_seed: u64) -> Surface {
+    let (level, length_m) = (track.level(), track.length_m());
+    let shared = Surface::rough(arguments.seed, level, length_m);
+    if arguments.unrepeated > 0.0 {
+        shared.blend(&Surface::rough(pass_seed, level, length_m), arguments.unrepeated)
+    } else {
+        shared
+    }
+}
+
+/// A seed for what differs from pass to pass.
+fn pass_seed(seed: u64, speed_km_h: f64, pass: u32) -> u64 {
+    let mut hasher = blake3::Hasher::new_derive_key("tracktwin simulated pass 1");
+    hasher.update(&seed.to_le_bytes()).update(&speed_km_h.to_le_bytes());
+    hasher.update(&pass.to_le_bytes());
+    let hash = hasher.finalize();
+    u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
+}
+
+/// What the sensor makes of a pass, from `from_m` on.
+fn measured(
+    record: &PassRecord,
+    from_m: f64,
+    speed_km_h: f64,
+    noise_m_s2: f64,
+    seed: u64,
+) -> Result<Pass, Stop> {
+    let step_m = record.speed_m_s * record.time_step_s;
+    let position = |index: usize| record.start_m + (index + 1) as f64 * step_m;
+    let indices = 0..record.acceleration_m_s2.len();
+    let recorded: Vec<_> = indices.filter(|&index| position(index) >= from_m).collect();
+    let noise = Normal::new(0.0, noise_m_s2)
+        .map_err(|_| anyhow!("--noise: {noise_m_s2} is no standard deviation; give m/s2"))
+        .or_input()?;
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let samples = recorded
+        .iter()
+        .map(|&index| record.acceleration_m_s2[index] + noise.sample(&mut random))
+        .collect();
+    Ok(Pass {
+        file: String::new(),
+        speed_km_h,
+        signal: Signal::new(1.0 / record.time_step_s, samples)?,
+        position_m: recorded.into_iter().map(position).collect(),
+    })
 }

@@ -6,16 +6,16 @@ use tracktwin_parameters::{Parameter, ParameterSet};
 
 /// A parameter's value, and where it holds.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Setting {
-    pub(super) parameter: Parameter,
-    pub(super) value: f64,
+pub(in crate::commands) struct Setting {
+    pub(in crate::commands) parameter: Parameter,
+    pub(in crate::commands) value: f64,
     /// Numbers of the sleepers; everywhere if there are none.
-    pub(super) sleepers: Option<RangeInclusive<usize>>,
+    pub(in crate::commands) sleepers: Option<RangeInclusive<usize>>,
 }
 
 /// Why a setting is refused.
 #[derive(Debug, PartialEq, thiserror::Error)]
-pub(super) enum SettingError {
+pub(in crate::commands) enum SettingError {
     #[error("write NAME=VALUE, NAME@SN12=VALUE or NAME@SN12-SN15=VALUE")]
     Form,
     #[error("{0}")]
@@ -61,7 +61,7 @@ fn range(text: &str) -> Result<RangeInclusive<usize>, SettingError> {
 
 impl Setting {
     /// The set of sleeper `number` with this setting, if it holds there.
-    pub(super) fn apply(&self, set: ParameterSet, number: usize) -> ParameterSet {
+    pub(in crate::commands) fn apply(&self, set: ParameterSet, number: usize) -> ParameterSet {
         if self.sleepers.as_ref().is_none_or(|sleepers| sleepers.contains(&number)) {
             set.with(self.parameter, self.value)
         } else {

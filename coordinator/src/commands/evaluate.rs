@@ -1,0 +1,67 @@
+//! `tracktwin evaluate`: the track's parameters under a recording.
+
+use super::{OrInput, Stop, say};
+use crate::training;
+use anyhow::Context;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use tracktwin_evaluation::{Evaluation, Twin};
+use tracktwin_library::Library;
+use tracktwin_signal::Extractor;
+use tracktwin_signal::recording::Recording;
+use tracktwin_surrogate::Trained;
+
+/// What `evaluate` is told.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// The recording: a folder with `recording.json` and a file a pass.
+    recording: PathBuf,
+    /// Folder of the models, as `train` or `run` wrote it.
+    #[arg(long, value_name = "DIR")]
+    models: PathBuf,
+    /// The library the models were trained on: sqlite:PATH.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+    /// Folder for evaluation.json, evaluation.csv and report.html.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    let Arguments { recording, models, library, out } = arguments;
+    // The recording first: it is what most often needs mending, and quickest to check.
+    let recording = Recording::open(&recording).or_input()?;
+    let library = Library::open(&library).await.or_input()?;
+    let models = Trained::load(&models).or_input()?;
+    let evaluation = evaluate(&recording, &library, models, &out).await?;
+    let sleepers = evaluation.sleepers.len();
+    say(&format!("{sleepers} sleepers evaluated; report: {}", out.join("report.html").display()));
+    Ok(())
+}
+
+/// Evaluates a recording with models of this library; writes files and report to `folder`.
+pub(super) async fn evaluate(
+    recording: &Recording,
+    library: &Library,
+    models: Trained,
+    folder: &Path,
+) -> Result<Evaluation, Stop> {
+    let campaign = library
+        .campaign(models.campaign())
+        .await
+        .context("the models belong to another library; train on this one")
+        .or_input()?;
+    let digest = library.digest(&campaign.id).await?;
+    models.belongs_to(&digest).or_input()?;
+    let set = training::set(library, &campaign).await?;
+    let extractor = Extractor::new(&training::feature_definition(&campaign)?).or_input()?;
+    let twin = Twin { extractor: &extractor, models: &models, library: &set };
+    let evaluation = tracktwin_evaluation::evaluate(recording, &twin).or_input()?;
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("{}: the folder cannot be made", folder.display()))
+        .or_input()?;
+    evaluation.write(folder)?;
+    let page = tracktwin_report::evaluation_page(&evaluation, recording, &extractor);
+    std::fs::write(folder.join("report.html"), page)?;
+    Ok(evaluation)
+}

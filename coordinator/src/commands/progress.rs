@@ -1,0 +1,68 @@
+//! How far long work has come: a bar in a terminal, a line now and then elsewhere.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Between two lines where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// The progress of one stage of a command, on standard error.
+pub(super) struct Progress {
+    stage: &'static str,
+    bar: ProgressBar,
+    /// Where there is no terminal: when the last line was written.
+    last_line: Option<Instant>,
+    begun: Instant,
+    begun_at: u64,
+}
+
+impl Progress {
+    /// A stage of `total` steps, `done` of which were done before.
+    pub(super) fn begin(stage: &'static str, done: u64, total: u64) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let target =
+            if terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let style = "{prefix:12} {wide_bar} {pos}/{len}  {per_sec:>8}  {eta:>4} left {msg}";
+        let bar = ProgressBar::with_draw_target(Some(total), target).with_prefix(stage).with_style(
+            ProgressStyle::with_template(style).expect("the template is well formed"),
+        );
+        bar.set_position(done);
+        bar.reset_eta();
+        let begun = Instant::now();
+        let last_line = (!terminal).then_some(begun);
+        Self { stage, bar, last_line, begun, begun_at: done }
+    }
+
+    /// Shows that `done` steps are done, and a remark.
+    pub(super) fn at(&mut self, done: u64, remark: &str) {
+        self.bar.set_position(done);
+        self.bar.set_message(remark.to_owned());
+        if self.last_line.is_some_and(|last| last.elapsed() >= LINE_EVERY) {
+            self.last_line = Some(Instant::now());
+            self.line(done, remark);
+        }
+    }
+
+    /// Ends the stage.
+    pub(super) fn end(self) {
+        self.bar.finish_and_clear();
+        if self.last_line.is_some() {
+            let seconds = self.begun.elapsed().as_secs_f64();
+            eprintln!("{}: done in {seconds:.1} s", self.stage);
+        }
+    }
+
+    fn line(&self, done: u64, remark: &str) {
+        let total = self.bar.length().unwrap_or(done);
+        let fresh = done.saturating_sub(self.begun_at);
+        let left = match fresh {
+            0 => "?".to_owned(),
+            fresh => {
+                let a_step = self.begun.elapsed().as_secs_f64() / fresh as f64;
+                format!("{:.0} s", a_step * total.saturating_sub(done) as f64)
+            }
+        };
+        eprintln!("{}: {done} of {total}, {left} left {remark}", self.stage);
+    }
+}

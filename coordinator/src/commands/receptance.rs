@@ -1,0 +1,149 @@
+//! `tracktwin receptance`: how the track answers a force (hammer test).
+
+use super::simulate::Track;
+use super::{OrInput, Stop, say};
+use anyhow::{Context, anyhow};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use tracktwin_parameters::{ParameterSet, Preset};
+use tracktwin_report::ReceptanceCurve;
+use tracktwin_track::frequency::{self, Place};
+use tracktwin_track::model::{Mesh, Support, TrackModel};
+
+/// What `receptance` is told.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Where the rail is struck and its motion measured, as in a hammer test; may stand several
+    /// times: `sleeper` (above the middle sleeper), `midspan` (half a spacing on), a position in m,
+    /// or `A:B`, struck at A and measured at B.
+    #[arg(long = "at", value_name = "PLACE", required = true)]
+    at: Vec<Test>,
+    /// File for the receptances (CSV); a picture is written beside it (SVG).
+    #[arg(long, value_name = "FILE.csv")]
+    out: PathBuf,
+    /// Sleeper spans; 25 as in the paper have standing waves, 200 are as good as endless.
+    #[arg(long, default_value_t = 200)]
+    spans: usize,
+    /// Lowest frequency in Hz.
+    #[arg(long, default_value_t = 50.0, value_name = "HZ")]
+    from: f64,
+    /// Highest frequency in Hz.
+    #[arg(long, default_value_t = 8000.0, value_name = "HZ")]
+    to: f64,
+    /// Frequencies, evenly spread on a logarithmic axis.
+    #[arg(long, default_value_t = 400)]
+    points: usize,
+    /// A parameter's value: `railpad_stiffness_N_m=9e7`; may stand several times.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    settings: Vec<super::simulate::Setting>,
+    /// Track to start from.
+    #[arg(long, value_enum, default_value_t = Track::VTrack)]
+    preset: Track,
+}
+
+/// A place on the rail, as it is written.
+#[derive(Clone, Copy, Debug)]
+enum Spot {
+    Sleeper,
+    Midspan,
+    At(f64),
+}
+
+/// Where is struck, where is measured, and how that was written.
+#[derive(Clone, Debug)]
+struct Test {
+    struck: Spot,
+    measured: Spot,
+    name: String,
+}
+
+impl FromStr for Test {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (struck, measured) = text.split_once(':').unwrap_or((text, text));
+        Ok(Self { struck: spot(struck)?, measured: spot(measured)?, name: text.to_owned() })
+    }
+}
+
+fn spot(text: &str) -> Result<Spot, String> {
+    match text {
+        "sleeper" => Ok(Spot::Sleeper),
+        "midspan" => Ok(Spot::Midspan),
+        _ => text
+            .parse()
+            .map(Spot::At)
+            .map_err(|_| format!("`{text}` is no place; write sleeper, midspan or a position in m")),
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
+    let frequencies = frequencies(arguments).or_input()?;
+    let preset = Preset::from(arguments.preset);
+    let set = arguments
+        .settings
+        .iter()
+        .fold(preset.nominal(), |set, setting| setting.apply(set, 0));
+    let model = model(arguments.spans, preset, &set)?;
+    let middle = arguments.spans / 2;
+    let spacing = preset.design().sleeper.spacing_m;
+    let place = |spot| match spot {
+        Spot::Sleeper => Place::Rail(middle as f64 * spacing),
+        Spot::Midspan => Place::Rail((middle as f64 + 0.5) * spacing),
+        Spot::At(x_m) => Place::Rail(x_m),
+    };
+    let mut curves = Vec::new();
+    for test in &arguments.at {
+        let (struck, measured) = (place(test.struck), place(test.measured));
+        let values = frequency::receptance(&model, struck, measured, &frequencies).or_input()?;
+        curves.push(ReceptanceCurve { name: test.name.clone(), values });
+    }
+    write_csv(&arguments.out, &frequencies, &curves)
+        .with_context(|| format!("{}: cannot be written", arguments.out.display()))?;
+    let picture = arguments.out.with_extension("svg");
+    std::fs::write(&picture, tracktwin_report::receptance_chart(&frequencies, &curves))?;
+    say(&format!("receptance: {}; picture: {}", arguments.out.display(), picture.display()));
+    Ok(())
+}
+
+fn frequencies(arguments: &Arguments) -> Result<Vec<f64>, anyhow::Error> {
+    let Arguments { from, to, points, .. } = *arguments;
+    if !(from > 0.0 && from < to && to.is_finite()) {
+        return Err(anyhow!("--from {from} --to {to}: give two frequencies in Hz, the lower first"));
+    }
+    if points < 2 {
+        return Err(anyhow!("--points: {points} are too few for a curve; give at least 2"));
+    }
+    let ratio = (to / from).powf(1.0 / (points - 1) as f64);
+    Ok((0..points).map(|point| from * ratio.powf(point as f64)).collect())
+}
+
+fn model(spans: usize, preset: Preset, set: &ParameterSet) -> Result<TrackModel, Stop> {
+    let supports = vec![Support::from(set); spans.saturating_sub(1)];
+    TrackModel::build(&preset.design(), &Mesh::uniform(spans, 8, 8), &supports, &[]).or_input()
+}
+
+fn write_csv(
+    path: &Path,
+    frequencies: &[f64],
+    curves: &[ReceptanceCurve],
+) -> Result<(), anyhow::Error> {
+    let mut file = csv::Writer::from_path(path)?;
+    let mut heads = vec!["frequency_Hz".to_owned()];
+    for curve in curves {
+        heads.push(format!("{}_real_m_N", curve.name));
+        heads.push(format!("{}_imag_m_N", curve.name));
+    }
+    file.write_record(&heads)?;
+    for (row, frequency) in frequencies.iter().enumerate() {
+        let mut record = vec![frequency.to_string()];
+        for curve in curves {
+            record.push(format!("{:e}", curve.values[row].re));
+            record.push(format!("{:e}", curve.values[row].im));
+        }
+        file.write_record(&record)?;
+    }
+    file.flush()?;
+    Ok(())
+}

@@ -1,0 +1,145 @@
+//! The track that is simulated, and what is told of it.
+
+use super::super::{OrInput, Stop};
+use super::{Arguments, END_SPANS, Setting};
+use anyhow::anyhow;
+use serde_json::{Map, Value, json};
+use tracktwin_parameters::{Parameter, ParameterSet, Preset, TrackDesign};
+use tracktwin_signal::recording::Sleeper;
+use tracktwin_track::extension::{Extension, SleeperBolt};
+use tracktwin_track::model::{Mesh, Support, TrackModel};
+
+/// A track with its own parameters at every sleeper.
+pub(super) struct SimulatedTrack {
+    design: TrackDesign,
+    spans: usize,
+    sleepers: Vec<ParameterSet>,
+    sleeper_bolt_n_m: Option<f64>,
+    model: TrackModel,
+}
+
+impl SimulatedTrack {
+    pub(super) fn new(arguments: &Arguments) -> Result<Self, Stop> {
+        let spans = arguments.spans;
+        if spans <= 2 * END_SPANS {
+            return Err(anyhow!("--spans: {spans} are too few; give more than {}", 2 * END_SPANS))
+                .or_input();
+        }
+        let preset = Preset::from(arguments.preset);
+        let sleepers = sleepers(preset, spans - 1, &arguments.settings).or_input()?;
+        let supports: Vec<_> = sleepers.iter().map(Support::from).collect();
+        let mesh = Mesh::uniform(spans, arguments.rail_elements, arguments.sleeper_elements);
+        let design = preset.design();
+        let sleeper_bolt_n_m = arguments.sleeper_bolt;
+        let extensions: Vec<Box<dyn Extension>> = sleeper_bolt_n_m
+            .map(|stiffness| SleeperBolt::new((0..spans - 1).collect(), stiffness))
+            .into_iter()
+            .map(|bolts| Box::new(bolts) as _)
+            .collect();
+        let model = TrackModel::build(&design, &mesh, &supports, &extensions).or_input()?;
+        Ok(Self { design, spans, sleepers, sleeper_bolt_n_m, model })
+    }
+
+    pub(super) fn design(&self) -> &TrackDesign {
+        &self.design
+    }
+
+    pub(super) fn model(&self) -> &TrackModel {
+        &self.model
+    }
+
+    /// Level `A_irr` of the surface.
+    pub(super) fn level(&self) -> f64 {
+        self.sleepers[0][Parameter::IrregularityLevel]
+    }
+
+    pub(super) fn length_m(&self) -> f64 {
+        self.spans as f64 * self.design.sleeper.spacing_m
+    }
+
+    /// Where recording begins and ends, in m.
+    pub(super) fn recorded_m(&self) -> [f64; 2] {
+        [END_SPANS, self.spans - END_SPANS]
+            .map(|spans| spans as f64 * self.design.sleeper.spacing_m)
+    }
+
+    /// The sleepers that stand between two places in m.
+    pub(super) fn sleepers_between(&self, from_m: f64, to_m: f64) -> Vec<Sleeper> {
+        let spacing_m = self.design.sleeper.spacing_m;
+        // Half a spacing: a sleeper at the very end is not lost to rounding.
+        let recorded = from_m - 0.5 * spacing_m..to_m + 0.5 * spacing_m;
+        (0..self.sleepers.len())
+            .map(|number| Sleeper { id: id(number), x_m: (number + 1) as f64 * spacing_m })
+            .filter(|sleeper| recorded.contains(&sleeper.x_m))
+            .collect()
+    }
+
+    /// What a recording says of the track, in the recording format's words.
+    pub(super) fn nominal(&self) -> Map<String, Value> {
+        let TrackDesign { rail, sleeper, railhead_radius_m, wheel, .. } = &self.design;
+        let nominal = json!({
+            "rail": {
+                "area_m2": rail.area_m2, "second_moment_m4": rail.second_moment_m4,
+                "youngs_Pa": rail.youngs_modulus_pa, "density_kg_m3": rail.density_kg_m3,
+                "poisson": rail.poisson, "shear_coefficient": rail.shear_coefficient,
+            },
+            "sleeper": {
+                "spacing_m": sleeper.spacing_m, "half_length_m": sleeper.half_length_m,
+                "area_m2": sleeper.section.area_m2,
+                "density_kg_m3": sleeper.section.density_kg_m3,
+            },
+            "railhead_radius_m": railhead_radius_m,
+            "wheel": {
+                "mass_kg": wheel.mass_kg, "load_N": wheel.load_n, "radius_m": wheel.radius_m,
+            },
+        });
+        match nominal {
+            Value::Object(fields) => fields,
+            _ => Map::new(),
+        }
+    }
+
+    /// What was put in: the parameters of every sleeper, and the physics beyond the paper.
+    pub(super) fn truth_json(&self) -> String {
+        let of = |set: &ParameterSet| -> Map<String, Value> {
+            set.iter().map(|(parameter, value)| (parameter.name().to_owned(), json!(value))).collect()
+        };
+        let sleepers: Map<String, Value> = self
+            .sleepers
+            .iter()
+            .enumerate()
+            .map(|(number, set)| (id(number), Value::Object(of(set))))
+            .collect();
+        let left_out: Vec<Value> = self
+            .sleeper_bolt_n_m
+            .map(|stiffness| json!({"physics": "sleeper_bolt", "stiffness_N_m": stiffness}))
+            .into_iter()
+            .collect();
+        let truth = json!({
+            "left_out": left_out, "irregularity_level": self.level(), "sleepers": sleepers,
+        });
+        format!("{truth:#}\n")
+    }
+}
+
+/// The name of sleeper `number`, counted from the first that isn't at the rail's end.
+fn id(number: usize) -> String {
+    format!("SN{number}")
+}
+
+/// The parameters of every sleeper.
+fn sleepers(
+    preset: Preset,
+    count: usize,
+    settings: &[Setting],
+) -> Result<Vec<ParameterSet>, anyhow::Error> {
+    for Setting { sleepers, .. } in settings {
+        if let Some(last) = sleepers.as_ref().map(|range| *range.end()).filter(|&n| n >= count) {
+            return Err(anyhow!("--set: there is no {}; the last is {}", id(last), id(count - 1)));
+        }
+    }
+    let set_of = |number| {
+        settings.iter().fold(preset.nominal(), |set, setting| setting.apply(set, number))
+    };
+    Ok((0..count).map(set_of).collect())
+}

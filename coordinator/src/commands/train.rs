@@ -1,0 +1,108 @@
+//! `tracktwin train`: Gaussian-process models from a library.
+
+use super::library::choose;
+use super::progress::Progress;
+use super::{OrInput, Stop, say};
+use crate::training;
+use clap::Args;
+use std::cell::RefCell;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use tracktwin_library::{CampaignRecord, Library};
+use tracktwin_surrogate::{ModelGroup, Trained};
+
+/// What `train` is told.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// The library to train on: sqlite:PATH.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+    /// Folder for the models.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The campaign, where the library holds several.
+    #[arg(long, value_name = "ID")]
+    campaign: Option<String>,
+    /// Decides which half of the cases trains; the other tests.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    let library = Library::open(&arguments.library).await.or_input()?;
+    let campaign = choose(&library, arguments.campaign.as_deref()).await?;
+    let trained = train(&library, &campaign, arguments.seed, &arguments.out).await?;
+    say(&table(&trained));
+    say(&format!("models: {}", arguments.out.display()));
+    Ok(())
+}
+
+/// Trains on a campaign and saves models and their errors in `folder`.
+pub(super) async fn train(
+    library: &Library,
+    campaign: &CampaignRecord,
+    seed: u64,
+    folder: &Path,
+) -> Result<Trained, Stop> {
+    let set = training::set(library, campaign).await?;
+    let mut options = training::options(&set);
+    options.seed = seed;
+    let trained = tokio::task::spawn_blocking(move || {
+        let bar = RefCell::new(None::<Progress>);
+        tracktwin_surrogate::train(&set, &options, &|at| {
+            let mut bar = bar.borrow_mut();
+            let bar = bar.get_or_insert_with(|| Progress::begin("training", 0, at.groups as u64));
+            bar.at(at.finished as u64, &at.next.map(ToString::to_string).unwrap_or_default());
+        })
+        .inspect(|_| bar.take().into_iter().for_each(Progress::end))
+    })
+    .await?
+    .or_input()?;
+    trained.save(folder)?;
+    let page = tracktwin_report::models_page(&trained);
+    std::fs::write(folder.join("models.html"), page)?;
+    std::fs::write(folder.join("mase.json"), mase_json(&trained))?;
+    Ok(trained)
+}
+
+/// MASE on the test set in per cent, a row a group of models (paper, eq. 11 and Fig. 14), and how
+/// much of the test set the 90 % intervals hold.
+fn table(trained: &Trained) -> String {
+    let mut text = String::from("Test MASE in % (share of the test set inside its 90 % interval)\n");
+    let name = |group: &ModelGroup| group.key().to_string();
+    let width = trained.groups().iter().map(|group| name(group).len()).max().unwrap_or(0);
+    let Some(first) = trained.groups().first() else { return text };
+    let heads = first.models().iter().map(|model| format!("{:>13}", model.parameter.symbol()));
+    text += &format!("{:width$}{}\n", "", heads.collect::<String>());
+    for group in trained.groups() {
+        text += &format!("{:width$}", name(group));
+        for model in group.models() {
+            let (mase, held) = (100.0 * model.score.mase_test, 100.0 * model.score.coverage_90_test);
+            write!(text, "{mase:>7.1} ({held:>2.0}%)").expect("a string takes everything");
+        }
+        text.push('\n');
+    }
+    text.trim_end().to_owned()
+}
+
+/// The table as JSON: a record a model.
+fn mase_json(trained: &Trained) -> String {
+    let records: Vec<_> = trained
+        .groups()
+        .iter()
+        .flat_map(|group| group.models().iter().map(move |model| (group.key(), model)))
+        .map(|(key, model)| {
+            serde_json::json!({
+                "speeds_km_h": key.speeds_km_h,
+                "feature": key.feature,
+                "parameter": model.parameter,
+                "mase_test": model.score.mase_test,
+                "mase_folds": model.score.mase_folds,
+                "coverage_90_test": model.score.coverage_90_test,
+            })
+        })
+        .collect();
+    let cases = trained.entries();
+    let text = serde_json::json!({ "format": "tracktwin-mase/1", "cases": cases, "models": records });
+    format!("{text:#}\n")
+}

@@ -1,0 +1,175 @@
+//! Bad input gets one line that says what, where and how to mend it, exit code 2, and changes
+//! nothing.
+
+use std::fs;
+use std::path::Path;
+use system_tests::{Answer, run};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+
+/// One line on standard error with all of `words`, nothing on standard output, exit code 2.
+fn assert_refused(answer: &Answer, words: &[&str]) {
+    let Answer { code, out, err } = answer;
+    assert_eq!(*code, Some(2), "{err}");
+    assert_eq!(err.trim_end().lines().count(), 1, "{err}");
+    assert!(out.is_empty(), "{out}");
+    for word in words {
+        assert!(err.contains(word), "`{word}` is missing in: {err}");
+    }
+}
+
+/// Names of everything in a folder.
+fn contents(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+fn refused_campaign(text: &str, words: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("campaign.toml");
+    fs::write(&file, text).unwrap();
+    let out = folder.path().join("out").display().to_string();
+    let answer = run(PROGRAM, &["run", &file.display().to_string(), "--out", &out]);
+    assert_refused(&answer, words);
+    assert_eq!(contents(folder.path()), ["campaign.toml"]);
+}
+
+#[test]
+fn a_campaign_with_an_unknown_key_is_refused() {
+    refused_campaign(
+        "name = \"c\"\nseed = 1\ncases = 8\nspeed = [13]\n",
+        &["campaign.toml:4:", "`speed`", "speeds_km_h"],
+    );
+}
+
+#[test]
+fn a_campaign_with_a_reversed_range_is_refused() {
+    refused_campaign(
+        "name = \"c\"\nseed = 1\ncases = 8\n[parameters]\nrailpad_stiffness_N_m = [3e8, 1e7]\n",
+        &["campaign.toml:", "parameters.railpad_stiffness_N_m", "lower end first"],
+    );
+}
+
+#[test]
+fn a_campaign_with_speeds_in_disorder_is_refused() {
+    refused_campaign(
+        "name = \"c\"\nseed = 1\ncases = 8\nspeeds_km_h = [13, 7]\n",
+        &["campaign.toml:", "speeds_km_h", "ascending"],
+    );
+}
+
+#[test]
+fn a_campaign_that_is_not_there_is_refused() {
+    let answer = run(PROGRAM, &["run", "/nowhere/campaign.toml"]);
+    assert_refused(&answer, &["/nowhere/campaign.toml", "cannot be read"]);
+}
+
+#[test]
+fn a_library_that_is_not_there_or_something_else_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let url = |name: &str| format!("sqlite:{}", folder.path().join(name).display());
+    let status = |url: &str| run(PROGRAM, &["library", "status", "--library", url]);
+    assert_refused(&status(&url("missing.sqlite")), &["missing.sqlite", "no such file"]);
+    fs::write(folder.path().join("text.sqlite"), "not a database, but long enough to be one")
+        .unwrap();
+    assert_refused(&status(&url("text.sqlite")), &["text.sqlite", "not a tracktwin library"]);
+    assert_refused(&status("library.sqlite"), &["sqlite:PATH"]);
+    assert_eq!(contents(folder.path()), ["text.sqlite"]);
+}
+
+/// A small recording, with one file changed before it is evaluated.
+fn refused_recording(change: impl Fn(&Path), words: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("recording");
+    fs::create_dir(&recording).unwrap();
+    let manifest = r#"{"format": "aba-recording/1", "sample_rate_Hz": 10000,
+        "channel": "vertical axle-box acceleration, positive downwards",
+        "passes": [{"file": "pass.csv", "speed_km_h": 13.0}],
+        "sleepers": [{"id": "SN1", "x_m": 0.25}, {"id": "SN2", "x_m": 0.375}],
+        "nominal": {"sleeper": {"spacing_m": 0.125}}}"#;
+    fs::write(recording.join("recording.json"), manifest).unwrap();
+    fs::write(recording.join("pass.csv"), pass_csv(1500)).unwrap();
+    change(&recording);
+    let out = folder.path().join("out").display().to_string();
+    let answer = run(
+        PROGRAM,
+        &[
+            "evaluate",
+            &recording.display().to_string(),
+            "--models",
+            "nowhere",
+            "--library",
+            "sqlite:nowhere.sqlite",
+            "--out",
+            &out,
+        ],
+    );
+    assert_refused(&answer, words);
+    assert_eq!(contents(folder.path()), ["recording"]);
+}
+
+fn pass_csv(rows: usize) -> String {
+    let mut text = String::from("time_s,position_m,acceleration_m_s2\n");
+    for row in 0..rows {
+        let time = row as f64 / 10_000.0;
+        let position = 0.1 + time * 13.0 / 3.6;
+        text += &format!("{time:.5},{position:.7},{:.4}\n", (time * 900.0).sin());
+    }
+    text
+}
+
+fn rewrite(folder: &Path, file: &str, from: &str, to: &str) {
+    let path = folder.join(file);
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{file} has no {from}");
+    fs::write(path, text.replacen(from, to, 1)).unwrap();
+}
+
+#[test]
+fn a_recording_with_a_number_that_is_none_is_refused() {
+    refused_recording(
+        |folder| rewrite(folder, "pass.csv", "\n0.00020,", "\nNaN,"),
+        &["pass.csv", "time_s", "row 3", "NaN"],
+    );
+}
+
+#[test]
+fn a_recording_without_a_column_is_refused() {
+    refused_recording(
+        |folder| rewrite(folder, "pass.csv", "acceleration_m_s2", "acc"),
+        &["pass.csv", "acceleration_m_s2", "no such column", "acc"],
+    );
+}
+
+#[test]
+fn a_recording_with_a_wrong_sample_rate_is_refused() {
+    refused_recording(
+        |folder| rewrite(folder, "recording.json", "10000", "20000"),
+        &["recording.json", "sample_rate_Hz", "20000"],
+    );
+}
+
+#[test]
+fn a_recording_too_short_for_a_sleeper_is_refused() {
+    refused_recording(
+        |folder| fs::write(folder.join("pass.csv"), pass_csv(100)).unwrap(),
+        &["pass.csv", "position_m", "record more"],
+    );
+}
+
+#[test]
+fn a_recording_that_is_not_json_is_refused() {
+    refused_recording(
+        |folder| fs::write(folder.join("recording.json"), "sleepers: []").unwrap(),
+        &["recording.json", "not JSON"],
+    );
+}
+
+#[test]
+fn a_good_recording_is_followed_by_the_library_s_refusal() {
+    refused_recording(|_| {}, &["nowhere.sqlite", "no such file"]);
+}
