@@ -53,6 +53,11 @@ impl Matrices {
         matrices
     }
 
+    /// Whether entries stand in the same places.
+    pub(super) fn has_pattern_of(&self, other: &Self) -> bool {
+        self.row_starts == other.row_starts && self.columns == other.columns
+    }
+
     /// Number of degrees of freedom.
     pub fn size(&self) -> usize {
         self.row_starts.len() - 1

@@ -79,6 +79,13 @@ impl TrackModel {
         &self.layout
     }
 
+    /// Whether both tracks differ in nothing but the values in their matrices.
+    pub(crate) fn has_pattern_of(&self, other: &Self) -> bool {
+        self.design == other.design
+            && self.layout == other.layout
+            && self.matrices.has_pattern_of(&other.matrices)
+    }
+
     /// Its mass, damping and stiffness.
     pub fn matrices(&self) -> &Matrices {
         &self.matrices

@@ -5,8 +5,10 @@
 
 mod cholesky;
 mod equilibrium;
+mod lanes;
 mod newmark;
 mod run;
 
+pub use lanes::passes;
 pub use newmark::pass;
 pub use run::{Pass, PassError, PassRecord};
