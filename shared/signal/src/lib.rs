@@ -11,11 +11,14 @@ mod signal;
 mod squeeze;
 mod transform;
 mod wavelet;
+mod welch;
 
 pub use features::{
     DefinitionError, Extractor, FeatureDefinition, FeatureError, FeatureSet, Features, ThirdOctave,
+    TimeFrequencyMap,
 };
 pub use signal::{Signal, SignalError};
 pub use squeeze::{Conventions, Normalisation, squeeze};
 pub use transform::{Cwt, Padding, TimeFrequency};
 pub use wavelet::Morlet;
+pub use welch::{PowerSpectrum, WelchError};

@@ -88,6 +88,8 @@ fn normalise(
             Normalisation::Sum => 1.0,
             Normalisation::SignalBack => signal_back,
         };
-        squeezed.row_mut(row).iter_mut().for_each(|value| *value *= factor);
+        for value in squeezed.row_mut(row) {
+            *value *= factor;
+        }
     }
 }

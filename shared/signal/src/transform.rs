@@ -157,13 +157,16 @@ fn positive_spectrum(samples: &[f64], forward: &Arc<dyn Fft<f64>>) -> Vec<Comple
     forward.process(&mut spectrum);
     spectrum.truncate(samples.len() / 2 + 1);
     let scale = 1.0 / samples.len() as f64;
-    spectrum.iter_mut().for_each(|value| *value *= scale);
+    for value in &mut spectrum {
+        *value *= scale;
+    }
     spectrum
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     #[test]
     fn a_reflection_repeats_neither_the_first_nor_the_last_sample() {
@@ -181,16 +184,14 @@ mod tests {
         let scale = wavelet.scale(170.0);
         let cwt = Cwt::new(&samples, rate, Padding::Zeros(2048), wavelet, &[scale]);
         for b in [900_u16, 1000, 1075] {
-            let integral: Complex64 = (0..2000)
-                .map(|n| {
+            let integral: Complex64 = (0_u16..)
+                .zip(&samples)
+                .map(|(n, sample)| {
                     let u = (f64::from(n) - f64::from(b)) / rate / scale;
-                    let carrier =
-                        Complex64::new((6.0 * u).cos() - (-18_f64).exp(), -(6.0 * u).sin());
-                    carrier
-                        * std::f64::consts::PI.powf(-0.25)
-                        * (-0.5 * u * u).exp()
-                        * samples[n as usize]
-                        / (rate * scale.sqrt())
+                    let (sine, cosine) = (6.0 * u).sin_cos();
+                    let wave = Complex64::new(cosine - (-18_f64).exp(), -sine);
+                    let envelope = PI.powf(-0.25) * (-0.5 * u * u).exp();
+                    wave * envelope * *sample / (rate * scale.sqrt())
                 })
                 .sum();
             let value = cwt.coefficients.row(0)[usize::from(b)];

@@ -63,6 +63,14 @@ impl Morlet {
             (low..=high).map(|j| self.fourier(self.centre * (j as f64 / voices).exp2())).sum();
         (1.0 - (-1.0 / voices).exp2()) * sum
     }
+
+    /// The factor by which a voice enters when all voices together give the analytic signal back:
+    /// `2 (1 - 2^(-1 / N_v))` over [`sum_over_scales`](Self::sum_over_scales), times the transform
+    /// without the root of its scale.
+    pub fn share_of_a_voice(self, voices_per_octave: u32) -> f64 {
+        let spacing = 1.0 - (-1.0 / f64::from(voices_per_octave)).exp2();
+        2.0 * spacing / self.sum_over_scales(voices_per_octave)
+    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,8 @@
 //! The reference lies beside the project in `../shared/reference/sswt`; `make_reference.py` there
 //! states every convention.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use serde_json::Value;
 use std::{f64::consts::TAU, ops::Range, path::Path};
 use tracktwin_signal::{Conventions, Cwt, Morlet, Normalisation, Padding, squeeze};

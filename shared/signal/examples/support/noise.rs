@@ -3,7 +3,7 @@
 use tracktwin_signal::Signal;
 
 /// A resonance at 115 Hz and another at 900 Hz under white noise, about as an axle box sounds.
-pub fn axle_box(samples: usize) -> Signal {
+pub(crate) fn axle_box(samples: usize) -> Signal {
     let mut state = 1_u64;
     let mut resonators =
         [(115.0, 0.02), (900.0, 0.1)].map(|(hz, damping)| Resonator::new(hz, damping));

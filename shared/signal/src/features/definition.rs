@@ -53,6 +53,10 @@ impl Default for FeatureDefinition {
     }
 }
 
+/// Part of a voice by which a point may lie outside a range: one that is meant to lie on the
+/// border is not lost to rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// Why a definition is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DefinitionError {
@@ -142,6 +146,14 @@ impl FeatureDefinition {
         Morlet::new(self.wavelet_centre_rad)
     }
 
+    /// What a tone of amplitude one adds to the voice at its own frequency, when all voices
+    /// together give the signal back.
+    pub(crate) fn height_of_a_tone(&self) -> f64 {
+        let wavelet = self.wavelet();
+        0.5 * wavelet.share_of_a_voice(self.voices_per_octave)
+            * wavelet.fourier(wavelet.centre_rad())
+    }
+
     /// Frequency in Hz of the grid's point `j`, `mu / (2 pi a_j)` with `a_j = s_0 2^(j / N_v)`
     /// (paper, eq. 3 and A.2).
     pub(crate) fn frequency_hz(&self, j: i32) -> f64 {
@@ -155,8 +167,6 @@ impl FeatureDefinition {
         let place = |frequency_hz: f64| {
             f64::from(self.voices_per_octave) * (self.frequency_hz(0) / frequency_hz).log2()
         };
-        // A point that is meant to lie on the border is not lost to rounding.
-        const ROUNDING: f64 = 1e-9;
         #[expect(clippy::cast_possible_truncation, reason = "checked ranges: at most 1e4 voices")]
         let (first, last) =
             ((place(high_hz) - ROUNDING).ceil() as i32, (place(low_hz) + ROUNDING).floor() as i32);

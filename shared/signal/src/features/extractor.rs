@@ -7,6 +7,7 @@ use super::{
     stretch::Stretch,
 };
 use crate::Signal;
+use rustfft::num_complex::Complex64;
 use std::{
     collections::HashMap,
     ops::Range,
@@ -20,6 +21,9 @@ const VOICE_REACH: f64 = 3.0;
 /// Sample rate that the highest frequency needs, in units of it: two by Nyquist, and room for the
 /// upper half of the highest band and an anti-aliasing filter.
 const SAMPLES_A_PERIOD: f64 = 2.5;
+
+/// Relative difference below which two frequencies are the same point of the grid.
+const GRID_ROUNDING: f64 = 1e-9;
 
 /// Plans kept. A campaign has a handful of speeds, each with one or two lengths of window.
 const PLANS_KEPT: usize = 32;
@@ -37,8 +41,8 @@ pub struct Features {
     /// decimal logarithm of half the sum of the LWPS over the band's bins.
     ///
     /// Half, because a tone of amplitude `A` has the mean square `A^2 / 2`: its level is then
-    /// that of its mean square. Of noise the LWPS holds less than its mean square: voices that
-    /// meet in a bin partly cancel.
+    /// that of its mean square. The level of noise is 10.8 dB below that of its mean square, in
+    /// every band: power adds up along a ridge, and noise has none for longer than a period.
     pub band_levels_db: Vec<f64>,
 }
 
@@ -81,14 +85,8 @@ pub struct Extractor {
     /// The bins of each band.
     bands: Vec<Range<usize>>,
     plans: Mutex<HashMap<(u64, Instants), Arc<Plan>>>,
-    workspaces: Mutex<Vec<Workspace>>,
-}
-
-/// What a thread needs while it extracts.
-#[derive(Default)]
-struct Workspace {
-    buffers: Buffers,
-    squeezed: Squeezed,
+    buffers: Mutex<Vec<Buffers>>,
+    accumulators: Mutex<Vec<Squeezed>>,
 }
 
 impl Extractor {
@@ -121,7 +119,8 @@ impl Extractor {
             voices_hz,
             bins_hz,
             plans: Mutex::default(),
-            workspaces: Mutex::default(),
+            buffers: Mutex::default(),
+            accumulators: Mutex::default(),
         })
     }
 
@@ -138,6 +137,16 @@ impl Extractor {
     /// Frequencies of all bins in Hz, ascending.
     pub(super) fn bins_hz(&self) -> &[f64] {
         &self.bins_hz
+    }
+
+    /// The bins that are features.
+    pub(super) fn kept(&self) -> Range<usize> {
+        self.kept.clone()
+    }
+
+    /// How many voices lie above a frequency of the grid in Hz.
+    pub(super) fn voices_above(&self, frequency_hz: f64) -> usize {
+        self.voices_hz.partition_point(|&f| f > frequency_hz * (1.0 + GRID_ROUNDING))
     }
 
     /// The features of a window of samples.
@@ -172,32 +181,61 @@ impl Extractor {
     }
 
     /// Computes the synchrosqueezed transform of a window and hands it to `read`.
-    fn squeeze<R>(
+    pub(super) fn squeeze<R>(
         &self,
         signal: &Signal,
         window: Range<usize>,
         read: impl FnOnce(&Squeezed) -> R,
     ) -> Result<R, FeatureError> {
-        let stretch = self.stretch(signal, &window)?;
-        let rate = signal.sample_rate_hz();
-        let instants = Instants::new(window.len(), rate, self.definition.instant_rate_hz);
-        let plan = self.plan(rate, instants.planned());
-
-        let mut workspace = lock(&self.workspaces).pop().unwrap_or_default();
-        let Workspace { buffers, squeezed } = &mut workspace;
+        let instants = self.instants(signal, &window)?;
+        let mut squeezed = lock(&self.accumulators).pop().unwrap_or_default();
         squeezed.clear(self.bins.rows(), instants.count);
-        plan.run(&stretch, buffers, |voice, weighted| squeezed.add(&self.bins, voice, weighted));
-        let result = read(squeezed);
-        lock(&self.workspaces).push(workspace);
+        self.voices(signal, window, |voice, weighted| squeezed.add(&self.bins, voice, weighted))?;
+        let result = read(&squeezed);
+        lock(&self.accumulators).push(squeezed);
         Ok(result)
     }
 
-    /// The stretch around a window that is inside the signal.
+    /// Computes every voice of a window, from the highest frequency to the lowest, and hands it to
+    /// `take` as [`Plan::run`] does.
+    pub(super) fn voices(
+        &self,
+        signal: &Signal,
+        window: Range<usize>,
+        take: impl FnMut(&[Complex64], &[Complex64]),
+    ) -> Result<(), FeatureError> {
+        let stretch = self.stretch(signal, &window)?;
+        let instants = self.instants(signal, &window)?;
+        let plan = self.plan(signal.sample_rate_hz(), instants.planned());
+        let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
+        plan.run(&stretch, &mut buffers, take);
+        lock(&self.buffers).push(buffers);
+        Ok(())
+    }
+
+    /// The stretch around a window.
     pub(super) fn stretch(
         &self,
         signal: &Signal,
         window: &Range<usize>,
     ) -> Result<Stretch, FeatureError> {
+        self.check(signal, window)?;
+        let margin = in_samples(self.definition.margin_s, signal.sample_rate_hz());
+        Ok(Stretch::new(signal, window, margin))
+    }
+
+    /// The instants of a window.
+    pub(super) fn instants(
+        &self,
+        signal: &Signal,
+        window: &Range<usize>,
+    ) -> Result<Instants, FeatureError> {
+        self.check(signal, window)?;
+        let rate_hz = self.definition.instant_rate_hz;
+        Ok(Instants::new(window.len(), signal.sample_rate_hz(), rate_hz))
+    }
+
+    fn check(&self, signal: &Signal, window: &Range<usize>) -> Result<(), FeatureError> {
         let Range { start, end } = *window;
         if start >= end || end > signal.len() {
             return Err(FeatureError::Window { start, end, samples: signal.len() });
@@ -207,7 +245,7 @@ impl Extractor {
         if sample_rate_hz < needed_hz {
             return Err(FeatureError::SampleRate { sample_rate_hz, needed_hz });
         }
-        Ok(Stretch::new(signal, window, in_samples(self.definition.margin_s, sample_rate_hz)))
+        Ok(())
     }
 
     fn plan(&self, sample_rate_hz: f64, instants: Instants) -> Arc<Plan> {
@@ -230,4 +268,57 @@ impl Extractor {
 /// Buffers and plans stay good when a thread panics: nothing is half-written that is read later.
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ThirdOctave;
+
+    fn extractor() -> Extractor {
+        Extractor::new(&FeatureDefinition::default()).unwrap()
+    }
+
+    #[test]
+    fn a_window_that_is_not_in_the_signal_is_refused() {
+        let signal = Signal::new(1e5, vec![0.0; 100]).unwrap();
+        let reversed = Range { start: 7, end: 3 };
+        for window in [0..101, 50..50, reversed, 0..usize::MAX] {
+            let error = extractor().extract(&signal, window.clone()).unwrap_err();
+            let Range { start, end } = window;
+            assert_eq!(error, FeatureError::Window { start, end, samples: 100 });
+        }
+    }
+
+    #[test]
+    fn a_sample_rate_below_the_definition_is_refused() {
+        let signal = Signal::new(9_999.0, vec![0.0; 100]).unwrap();
+        let error = extractor().extract(&signal, 0..100).unwrap_err();
+        assert_eq!(
+            error,
+            FeatureError::SampleRate { sample_rate_hz: 9_999.0, needed_hz: 10_000.0 }
+        );
+    }
+
+    #[test]
+    fn silence_has_the_floor_in_every_bin_and_band() {
+        let signal = Signal::new(1e5, vec![9.81; 20_000]).unwrap();
+        let features = extractor().extract(&signal, 8000..12_000).unwrap();
+        assert_eq!(features.log_power, vec![1e-10_f64.ln(); 304]);
+        assert_eq!(features.band_levels_db, vec![-100.0; ThirdOctave::COUNT]);
+    }
+
+    #[test]
+    fn one_extractor_serves_threads_with_the_same_bits() {
+        let samples = (0..12_000).map(|n| (f64::from(n) * 0.05).sin() + f64::from(n % 17));
+        let signal = Signal::new(1e5, samples.collect()).unwrap();
+        let extractor = extractor();
+        let alone = extractor.extract(&signal, 4000..8000).unwrap();
+        let together: Vec<_> = std::thread::scope(|scope| {
+            let extract = || extractor.extract(&signal, 4000..8000).unwrap();
+            let threads: Vec<_> = (0..4).map(|_| scope.spawn(extract)).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        assert!(together.iter().all(|features| *features == alone));
+    }
 }

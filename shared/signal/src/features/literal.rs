@@ -32,7 +32,7 @@ impl Extractor {
         // Voices descend and reach beyond the bins on both sides; bins ascend.
         let power = squeezed.mean_power(stretch.window);
         let highest_hz = self.bins_hz().last().copied().unwrap_or_default();
-        let above = self.voices_hz().partition_point(|&f| f > highest_hz * (1.0 + 1e-9));
+        let above = self.voices_above(highest_hz);
         let mut lwps = power[above..above + self.bins_hz().len()].to_vec();
         lwps.reverse();
         Ok(self.features(&lwps))

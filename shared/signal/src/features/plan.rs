@@ -63,7 +63,8 @@ impl Instants {
 
 /// The smallest product of twos and threes that is not below `length`.
 fn quick_length(length: usize) -> usize {
-    (0..)
+    // 3^30 samples are more than anybody has.
+    (0..=30)
         .map(|threes| 3_usize.pow(threes))
         .take_while(|&odd| odd < 3 * length)
         .map(|odd| odd * length.div_ceil(odd).next_power_of_two())
@@ -166,7 +167,7 @@ impl Octave {
         // Going round the circle from the window, the other margin begins beyond the reach.
         let (instants, samples) = instants.circle(margin + reach);
         let line_hz = sample_rate_hz / samples as f64;
-        let factor = signal_back(wavelet, definition.voices_per_octave) / samples as f64;
+        let factor = wavelet.share_of_a_voice(definition.voices_per_octave) / samples as f64;
         let voices = voices_hz
             .iter()
             .map(|&voice_hz| Voice::new(wavelet, voice_hz, line_hz, samples / 2, factor))
@@ -235,13 +236,6 @@ fn band(wavelet: Morlet, rad_per_line: f64, nyquist_line: usize) -> Range<usize>
     let (first, last) =
         (line(wavelet.centre_rad() - HALF_BAND), line(wavelet.centre_rad() + HALF_BAND));
     first..last.min(nyquist_line + 1)
-}
-
-/// The weight of a voice's sum (the transform without the root of its scale), so that all voices
-/// together give the analytic signal back: `2 a^(-3/2) da sqrt(a)` over the sum of them all.
-fn signal_back(wavelet: Morlet, voices_per_octave: u32) -> f64 {
-    let spacing = 1.0 - (-1.0 / f64::from(voices_per_octave)).exp2();
-    2.0 * spacing / wavelet.sum_over_scales(voices_per_octave)
 }
 
 /// A positive duration in whole samples, rounded up.

@@ -27,7 +27,9 @@ impl Stretch {
         let end = (window.end + margin).min(signal.len());
         let mut samples = signal.samples()[start..end].to_vec();
         let mean = samples.iter().sum::<f64>() / samples.len() as f64;
-        samples.iter_mut().for_each(|sample| *sample -= mean);
+        for sample in &mut samples {
+            *sample -= mean;
+        }
         fade(samples[..window.start - start].iter_mut());
         fade(samples[window.end - start..].iter_mut().rev());
         Self { samples, window: window.start - start..window.end - start }
