@@ -1,0 +1,69 @@
+//! Why a recording cannot be evaluated.
+
+use std::path::PathBuf;
+use tracktwin_signal::FeatureError;
+
+/// What goes wrong between a recording and its evaluation.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The passes have a speed for which there is no model.
+    #[error(
+        "the recording {recording} has passes at {speed_km_h} km/h; the models know {} km/h (within 2 %)",
+        join(known)
+    )]
+    UnknownSpeed {
+        /// The recording's name.
+        recording: String,
+        /// The speed of the passes in km/h.
+        speed_km_h: f64,
+        /// The speeds of the models in km/h.
+        known: Vec<f64>,
+    },
+    /// The features would be made in another way than in training.
+    #[error("the models were trained on other features: {trained_on}, not {offered}")]
+    OtherFeatures {
+        /// The definition of the models, as JSON.
+        trained_on: String,
+        /// The definition at hand, as JSON.
+        offered: String,
+    },
+    /// There is no model for these features.
+    #[error("there is no {feature} model for {} km/h; train it", join(speeds_km_h))]
+    NoModel {
+        /// Speeds in km/h.
+        speeds_km_h: Vec<f64>,
+        /// The feature set.
+        feature: &'static str,
+    },
+    /// A window has no features.
+    #[error("pass {file}, sleeper {sleeper}: {source}")]
+    Features {
+        /// The file of the pass.
+        file: String,
+        /// The sleeper's id.
+        sleeper: String,
+        /// Why not.
+        source: FeatureError,
+    },
+    /// No sleeper has a window at any speed.
+    #[error("no sleeper of the recording {recording} has a window inside a pass")]
+    NothingToEvaluate {
+        /// The recording's name.
+        recording: String,
+    },
+    /// The models or the library refuse.
+    #[error(transparent)]
+    Surrogate(#[from] tracktwin_surrogate::Error),
+    /// A file cannot be written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+fn join(speeds: &[f64]) -> String {
+    speeds.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}

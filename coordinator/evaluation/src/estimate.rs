@@ -1,0 +1,257 @@
+//! One recording through surrogates and model selector.
+
+use crate::evaluation::{
+    Estimate, Estimates, Evaluation, FORMAT, Flag, Measured, Provenance, SleeperEvaluation,
+    Unevaluated,
+};
+use crate::matches::Matcher;
+use crate::{Error, SleeperFeatures, features};
+use std::collections::BTreeMap;
+use tracktwin_signal::Extractor;
+use tracktwin_signal::recording::Recording;
+use tracktwin_surrogate::{Trained, TrainingSet};
+
+/// The feature set whose models speak: the global one (paper, eq. 9).
+pub const METHOD_FEATURE: &str = "GF";
+
+const ALL_SPEEDS: &str = "one model of all speeds together";
+const SINGLE_SPEEDS: &str = "models of single speeds: means weighted by precision; variance their harmonic mean, as if errors were common to all";
+
+/// What stands for the track when a recording is evaluated.
+#[derive(Clone, Copy)]
+pub struct Twin<'a> {
+    /// Takes features as they were taken in training.
+    pub extractor: &'a Extractor,
+    /// The surrogates.
+    pub models: &'a Trained,
+    /// The library they were trained on, searched by the model selector.
+    pub library: &'a TrainingSet,
+}
+
+/// The parameters of the track at every sleeper that a pass covers.
+///
+/// Passes of one speed are averaged in the logarithm of the power. Where a sleeper has all speeds
+/// of the campaign, the model of all speeds speaks; else the single-speed models are combined:
+/// means weighted by precision, variance the harmonic mean of theirs. That treats their errors as
+/// one: all speeds saw the same surface, and independence would claim too much.
+///
+/// # Errors
+/// [`Error::UnknownSpeed`], [`Error::OtherFeatures`], [`Error::NoModel`],
+/// [`Error::NothingToEvaluate`], or what features and models report.
+pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Error> {
+    check_features(twin)?;
+    twin.models.belongs_to(&twin.library.library_digest)?;
+    let known = features(recording, twin.extractor, twin.models.speeds_km_h())?;
+    let (seen, unseen): (Vec<_>, Vec<_>) =
+        known.into_iter().partition(|sleeper| !sleeper.speeds.is_empty());
+    if seen.is_empty() {
+        return Err(Error::NothingToEvaluate { recording: recording.name.clone() });
+    }
+    let estimates = estimates(&seen, twin.models)?;
+    let mut matcher = Matcher::new(twin.library);
+    let sleepers = seen
+        .into_iter()
+        .zip(estimates)
+        .map(|(sleeper, estimates)| evaluated(recording, twin, &mut matcher, sleeper, estimates))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(Evaluation {
+        format: FORMAT,
+        recording: recording.name.clone(),
+        method: "gp",
+        provenance: provenance(twin, &sleepers),
+        sleepers,
+        unevaluated: unseen.iter().map(|sleeper| unevaluated(recording, sleeper)).collect(),
+        frequencies_hz: twin.models.frequencies_hz().to_vec(),
+    })
+}
+
+fn check_features(twin: &Twin<'_>) -> Result<(), Error> {
+    let offered = serde_json::to_value(twin.extractor.definition()).unwrap_or_default();
+    let trained_on = twin.models.feature_definition();
+    if *trained_on == offered {
+        return Ok(());
+    }
+    Err(Error::OtherFeatures { trained_on: trained_on.to_string(), offered: offered.to_string() })
+}
+
+/// Estimates for every one of the sleepers, in their order.
+fn estimates(sleepers: &[SleeperFeatures], models: &Trained) -> Result<Vec<Estimates>, Error> {
+    let speeds = models.speeds_km_h();
+    let mut out: Vec<BTreeMap<_, Vec<Estimate>>> = vec![BTreeMap::new(); sleepers.len()];
+    let complete = |sleeper: &SleeperFeatures| sleeper.speeds.len() == speeds.len();
+    let all: Vec<usize> = (0..speeds.len()).collect();
+    let together = (0..sleepers.len()).filter(|&index| complete(&sleepers[index])).collect();
+    predict(sleepers, models, &all, together, &mut out)?;
+    for &speed in &all {
+        let has = |index: &usize| sleepers[*index].speeds.iter().any(|known| known.speed == speed);
+        let apart = (0..sleepers.len()).filter(|&index| !complete(&sleepers[index])).filter(has);
+        predict(sleepers, models, &[speed], apart.collect(), &mut out)?;
+    }
+    let combined = |of: BTreeMap<_, Vec<Estimate>>| {
+        of.into_iter().map(|(parameter, estimates)| (parameter, combine(&estimates))).collect()
+    };
+    Ok(out.into_iter().map(combined).collect())
+}
+
+/// Adds what the model of these speeds says of the `chosen` sleepers, all in one batch.
+fn predict(
+    sleepers: &[SleeperFeatures],
+    models: &Trained,
+    speeds: &[usize],
+    chosen: Vec<usize>,
+    out: &mut [BTreeMap<tracktwin_parameters::Parameter, Vec<Estimate>>],
+) -> Result<(), Error> {
+    if chosen.is_empty() {
+        return Ok(());
+    }
+    let speeds_km_h: Vec<f64> = speeds.iter().map(|&speed| models.speeds_km_h()[speed]).collect();
+    let group = models
+        .group(&speeds_km_h, METHOD_FEATURE)
+        .ok_or(Error::NoModel { speeds_km_h, feature: METHOD_FEATURE })?;
+    let observed = |&index: &usize| -> Vec<f64> {
+        let known = sleepers[index].speeds.iter().filter(|known| speeds.contains(&known.speed));
+        known.flat_map(|known| known.log_power.iter().copied()).collect()
+    };
+    let observations: Vec<_> = chosen.iter().map(observed).collect();
+    for (index, predictions) in chosen.into_iter().zip(group.predict(&observations)?) {
+        for prediction in predictions {
+            let estimate = Estimate { mean: prediction.mean, sd: prediction.sd };
+            out[index].entry(prediction.parameter).or_default().push(estimate);
+        }
+    }
+    Ok(())
+}
+
+/// One estimate out of several of the same quantity whose errors may be common to them.
+fn combine(estimates: &[Estimate]) -> Estimate {
+    if let [only] = estimates {
+        return *only;
+    }
+    let precision = |estimate: &Estimate| estimate.sd.powi(-2);
+    let total: f64 = estimates.iter().map(precision).sum();
+    let mean = estimates.iter().map(|estimate| estimate.mean * precision(estimate)).sum::<f64>();
+    Estimate { mean: mean / total, sd: (estimates.len() as f64 / total).sqrt() }
+}
+
+fn evaluated(
+    recording: &Recording,
+    twin: &Twin<'_>,
+    matcher: &mut Matcher<'_>,
+    sleeper: SleeperFeatures,
+    estimates: Estimates,
+) -> Result<SleeperEvaluation, Error> {
+    let selector = matcher.select(&sleeper.speeds)?;
+    let place = &recording.sleepers[sleeper.sleeper];
+    let mut flags = sleeper.flags;
+    if sleeper.speeds.len() < twin.models.speeds_km_h().len() {
+        flags.push(Flag::MissingSpeed);
+    }
+    let measured = sleeper.speeds.into_iter().map(|known| Measured {
+        speed_km_h: twin.models.speeds_km_h()[known.speed],
+        passes: known.passes,
+        log_power: known.log_power,
+        matches: matcher.log_powers(known.speed, &selector.entries),
+    });
+    let measured = measured.collect();
+    Ok(SleeperEvaluation {
+        id: place.id.clone(),
+        x_m: place.x_m,
+        estimates,
+        selector,
+        flags,
+        measured,
+    })
+}
+
+fn unevaluated(recording: &Recording, sleeper: &SleeperFeatures) -> Unevaluated {
+    let place = &recording.sleepers[sleeper.sleeper];
+    Unevaluated { id: place.id.clone(), x_m: place.x_m, reason: "no pass covers its window" }
+}
+
+fn provenance(twin: &Twin<'_>, sleepers: &[SleeperEvaluation]) -> Provenance {
+    let models = twin.models;
+    let seen = |speed: &&f64| {
+        sleepers.iter().flat_map(|sleeper| &sleeper.measured).any(|of| of.speed_km_h == **speed)
+    };
+    let speeds_km_h: Vec<f64> = models.speeds_km_h().iter().filter(seen).copied().collect();
+    let together = speeds_km_h.len() == models.speeds_km_h().len();
+    Provenance {
+        code_version: env!("CARGO_PKG_VERSION"),
+        campaign: models.campaign().to_owned(),
+        library_digest: models.library_digest().to_owned(),
+        library_entries: models.entries(),
+        feature: METHOD_FEATURE,
+        feature_definition: models.feature_definition().clone(),
+        combination: if together { ALL_SPEEDS } else { SINGLE_SPEEDS },
+        speeds_km_h,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+    use tracktwin_parameters::Parameter;
+
+    #[test]
+    fn the_level_of_an_unseen_recording_lies_within_three_standard_deviations() {
+        let (extractor, library) = (testing::extractor(), testing::library());
+        let models = testing::models(&library);
+        let twin = Twin { extractor: &extractor, models: &models, library: &library };
+        for speeds in [&[10.0, 13.0][..], &[10.0]] {
+            for truth in [2.0, 4.0] {
+                let recording = testing::recording(truth, speeds);
+                let evaluation = evaluate(&recording, &twin).unwrap();
+                let level = evaluation.sleepers[3].estimates[&Parameter::IrregularityLevel];
+                assert!((level.mean - truth).abs() < 3.0 * level.sd, "{truth}: {level:?}");
+                assert!(level.sd > 0.0 && level.sd < 1.0, "{level:?}");
+                let missing = evaluation.sleepers[3].flags.contains(&Flag::MissingSpeed);
+                assert_eq!(missing, speeds.len() == 1);
+            }
+        }
+    }
+
+    #[test]
+    fn json_and_csv_hold_every_sleeper_under_the_agreed_names() {
+        let (extractor, library) = (testing::extractor(), testing::library());
+        let models = testing::models(&library);
+        let twin = Twin { extractor: &extractor, models: &models, library: &library };
+        let evaluation = evaluate(&testing::recording(3.0, &[10.0, 13.0]), &twin).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        evaluation.write(folder.path()).unwrap();
+        let text = std::fs::read_to_string(folder.path().join("evaluation.json")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(json["format"], "tracktwin-evaluation/1");
+        assert_eq!((&json["recording"], &json["method"]), (&"noise".into(), &"gp".into()));
+        let sleeper = &json["sleepers"][3];
+        assert_eq!((&sleeper["id"], &sleeper["x_m"]), (&"SN3".into(), &0.375.into()));
+        let level = evaluation.sleepers[3].estimates[&Parameter::IrregularityLevel];
+        assert_eq!(sleeper["irregularity_level"]["mean"], level.mean);
+        assert_eq!(sleeper["irregularity_level"]["sd"], level.sd);
+        let csv = std::fs::read_to_string(folder.path().join("evaluation.csv")).unwrap();
+        assert!(csv.starts_with("id,x_m,railpad_stiffness_N_m_mean,"), "{csv}");
+        assert_eq!(csv.lines().count(), 1 + evaluation.sleepers.len());
+        let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
+        assert_eq!(names.len(), 2, "no partial file is left");
+    }
+
+    #[test]
+    fn an_extractor_of_other_features_is_refused() {
+        let library = testing::library();
+        let models = testing::models(&library);
+        let other = Extractor::new(&tracktwin_signal::FeatureDefinition::default()).unwrap();
+        let twin = Twin { extractor: &other, models: &models, library: &library };
+        let result = evaluate(&testing::recording(3.0, &[10.0]), &twin);
+        assert!(matches!(result, Err(Error::OtherFeatures { .. })));
+    }
+
+    #[test]
+    fn equal_estimates_of_one_quantity_grow_no_surer() {
+        let same = Estimate { mean: 2.0, sd: 0.5 };
+        let both = combine(&[same, same]);
+        assert!((both.mean - 2.0).abs() < 1e-12 && (both.sd - 0.5).abs() < 1e-12);
+        let unlike = combine(&[same, Estimate { mean: 4.0, sd: 1.0 }]);
+        // Weights 4 and 1: (4 * 2 + 1 * 4) / 5; variance 2 / 5.
+        assert!((unlike.mean - 2.4).abs() < 1e-12 && (unlike.sd - 0.4f64.sqrt()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,85 @@
+//! `evaluation.json` and `evaluation.csv`, each there whole or not at all.
+
+use crate::{Error, Evaluation, SleeperEvaluation};
+use std::fs::File;
+use std::io::Write as _;
+use std::path::Path;
+use tracktwin_parameters::Parameter;
+
+impl Evaluation {
+    /// The text of `evaluation.json`.
+    pub fn to_json(&self) -> String {
+        let text = serde_json::to_string_pretty(self);
+        let mut text = text.expect("a record of numbers and names is JSON");
+        text.push('\n');
+        text
+    }
+
+    /// The text of `evaluation.csv`: a row a sleeper, units in the heads.
+    pub fn to_csv(&self) -> String {
+        let parameters = self.parameters();
+        let mut rows = vec![head(&parameters)];
+        rows.extend(self.sleepers.iter().map(|sleeper| row(sleeper, &parameters)));
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        for row in rows {
+            writer.write_record(row).expect("rows of one length go into memory");
+        }
+        let bytes = writer.into_inner().expect("memory can be flushed");
+        String::from_utf8(bytes).expect("names and numbers are text")
+    }
+
+    /// Writes `evaluation.json` and `evaluation.csv` into `folder`, which is made if need be.
+    ///
+    /// # Errors
+    /// [`Error::File`] names the file that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), Error> {
+        std::fs::create_dir_all(folder)
+            .map_err(|source| Error::File { path: folder.to_owned(), source })?;
+        write_whole(&folder.join("evaluation.json"), &self.to_json())?;
+        write_whole(&folder.join("evaluation.csv"), &self.to_csv())
+    }
+
+    /// The parameters that were estimated, in catalogue order.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let estimates = self.sleepers.first().map(|sleeper| &sleeper.estimates);
+        estimates.map(|of| of.keys().copied().collect()).unwrap_or_default()
+    }
+}
+
+fn head(parameters: &[Parameter]) -> Vec<String> {
+    let mut head = vec!["id".to_owned(), "x_m".to_owned()];
+    for way in ["", "selector_"] {
+        for parameter in parameters {
+            head.extend(["mean", "sd"].map(|what| format!("{way}{parameter}_{what}")));
+        }
+    }
+    head.extend(["selector_mape_best", "flags"].map(str::to_owned));
+    head
+}
+
+fn row(sleeper: &SleeperEvaluation, parameters: &[Parameter]) -> Vec<String> {
+    let mut row = vec![sleeper.id.clone(), sleeper.x_m.to_string()];
+    for estimates in [&sleeper.estimates, &sleeper.selector.estimates] {
+        for parameter in parameters {
+            let estimate = estimates.get(parameter);
+            row.push(estimate.map(|of| of.mean.to_string()).unwrap_or_default());
+            row.push(estimate.map(|of| of.sd.to_string()).unwrap_or_default());
+        }
+    }
+    row.push(sleeper.selector.mape.first().map(ToString::to_string).unwrap_or_default());
+    row.push(sleeper.flags.iter().map(|flag| flag.label()).collect::<Vec<_>>().join("; "));
+    row
+}
+
+/// Writes beside the file and renames, so that no reader meets half a file.
+fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let write = || -> std::io::Result<()> {
+        let mut file = File::create(&partial)?;
+        file.write_all(text.as_bytes())?;
+        file.sync_all()?;
+        std::fs::rename(&partial, path)
+    };
+    write().map_err(|source| Error::File { path: path.to_owned(), source })
+}

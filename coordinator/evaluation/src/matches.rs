@@ -1,0 +1,75 @@
+//! The library entries nearest to a sleeper's features.
+
+use crate::evaluation::{Estimate, Estimates, Selected};
+use crate::{Error, SpeedFeatures};
+use std::collections::HashMap;
+use tracktwin_surrogate::{Selection, Selector, TrainingSet, mape};
+
+/// How many of the nearest entries are averaged (paper, section 3.1.2).
+pub const MATCHES: usize = 10;
+
+/// Selectors over the library, one for every set of speeds that is asked for.
+pub(crate) struct Matcher<'a> {
+    library: &'a TrainingSet,
+    selectors: HashMap<Vec<usize>, Selector>,
+}
+
+impl<'a> Matcher<'a> {
+    pub(crate) fn new(library: &'a TrainingSet) -> Self {
+        Self { library, selectors: HashMap::new() }
+    }
+
+    /// The best matches of a sleeper's features, all its speeds side by side.
+    pub(crate) fn select(&mut self, speeds: &[SpeedFeatures]) -> Result<Selected, Error> {
+        let key: Vec<usize> = speeds.iter().map(|known| known.speed).collect();
+        let observed: Vec<f64> =
+            speeds.iter().flat_map(|known| known.log_power.iter().copied()).collect();
+        if !self.selectors.contains_key(&key) {
+            let selector = Selector::new(side_by_side(self.library, &key), observed.len())?;
+            self.selectors.insert(key.clone(), selector);
+        }
+        let selector = &self.selectors[&key];
+        let nearest = selector.nearest(&observed, MATCHES)?;
+        let error = |entry| mape(&observed, selector.features(entry));
+        let columns = self.library.varied.len();
+        let estimates: Estimates = self
+            .library
+            .varied
+            .iter()
+            .enumerate()
+            .map(|(column, &parameter)| {
+                let values = self.library.parameters.iter().skip(column).step_by(columns);
+                let values: Vec<f64> = values.copied().collect();
+                let Selection { mean, sd } = Selection::of(&nearest, &values);
+                (parameter, Estimate { mean, sd })
+            })
+            .collect();
+        Ok(Selected {
+            estimates,
+            entries: nearest.iter().map(|neighbour| neighbour.entry).collect(),
+            mape: nearest.iter().map(|neighbour| error(neighbour.entry)).collect(),
+        })
+    }
+
+    /// The ln LWPS of library entries at a speed, a value a bin each.
+    pub(crate) fn log_powers(&self, speed: usize, entries: &[usize]) -> Vec<Vec<f64>> {
+        entries.iter().map(|&entry| row(self.library, speed, entry).to_vec()).collect()
+    }
+}
+
+/// The ln-powers of all entries with these speeds side by side, row-major.
+fn side_by_side(library: &TrainingSet, speeds: &[usize]) -> Vec<f64> {
+    let bins = library.frequencies_hz.len();
+    let mut table = Vec::with_capacity(library.entries() * speeds.len() * bins);
+    for entry in 0..library.entries() {
+        for &speed in speeds {
+            table.extend_from_slice(row(library, speed, entry));
+        }
+    }
+    table
+}
+
+fn row(library: &TrainingSet, speed: usize, entry: usize) -> &[f64] {
+    let bins = library.frequencies_hz.len();
+    &library.log_power[speed][entry * bins..][..bins]
+}

@@ -1,0 +1,156 @@
+//! The features of sleepers: every pass's window, averaged over the passes of one speed.
+
+use crate::{Error, Flag};
+use rayon::prelude::*;
+use tracktwin_signal::Extractor;
+use tracktwin_signal::recording::Recording;
+
+/// Relative difference between a pass's speed and a model's within which they are one speed.
+///
+/// A drive holds its speed about that well; two per cent move a track's features by a third of a
+/// bin at most, as positions stay what they are.
+pub(crate) const SPEED_TOLERANCE: f64 = 0.02;
+/// A window counts as complete from this share on: odometers drift by a few millimetres.
+const COMPLETE_SHARE: f64 = 0.98;
+
+/// What is known of a sleeper from all passes over it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SleeperFeatures {
+    /// Place of the sleeper in [`Recording::sleepers`].
+    pub sleeper: usize,
+    /// Speeds with at least one pass over it, ascending.
+    pub speeds: Vec<SpeedFeatures>,
+    /// What to keep in mind, ascending, each once.
+    pub flags: Vec<Flag>,
+}
+
+/// What is known of a sleeper at one speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpeedFeatures {
+    /// Place of the speed among the models' speeds.
+    pub speed: usize,
+    /// Passes averaged.
+    pub passes: usize,
+    /// Mean over the passes of the natural logarithm of the LWPS, a value a bin.
+    pub log_power: Vec<f64>,
+}
+
+/// Features of every sleeper of the recording; sleepers that no pass covers have no speeds.
+///
+/// # Errors
+/// [`Error::UnknownSpeed`] when a pass has a speed that is none of `speeds_km_h`,
+/// [`Error::Features`] when a window has no features.
+pub fn features(
+    recording: &Recording,
+    extractor: &Extractor,
+    speeds_km_h: &[f64],
+) -> Result<Vec<SleeperFeatures>, Error> {
+    let speed_of_pass = recording
+        .passes
+        .iter()
+        .map(|pass| speed_index(recording, pass.speed_km_h, speeds_km_h))
+        .collect::<Result<Vec<_>, _>>()?;
+    (0..recording.sleepers.len())
+        .into_par_iter()
+        .map(|sleeper| sleeper_features(recording, extractor, &speed_of_pass, sleeper))
+        .collect()
+}
+
+fn speed_index(recording: &Recording, speed_km_h: f64, known: &[f64]) -> Result<usize, Error> {
+    known.iter().position(|speed| (speed_km_h / speed - 1.0).abs() <= SPEED_TOLERANCE).ok_or_else(
+        || Error::UnknownSpeed {
+            recording: recording.name.clone(),
+            speed_km_h,
+            known: known.to_vec(),
+        },
+    )
+}
+
+fn sleeper_features(
+    recording: &Recording,
+    extractor: &Extractor,
+    speed_of_pass: &[usize],
+    sleeper: usize,
+) -> Result<SleeperFeatures, Error> {
+    let mut speeds: Vec<SpeedFeatures> = Vec::new();
+    let mut flags = Vec::new();
+    for (pass, &speed) in speed_of_pass.iter().enumerate() {
+        let Some(window) = recording.window(pass, sleeper) else { continue };
+        let signal = &recording.passes[pass].signal;
+        let margin = (extractor.definition().margin_s * signal.sample_rate_hz()) as usize;
+        if recording.window_share(pass, sleeper) < COMPLETE_SHARE {
+            flags.push(Flag::IncompleteWindow);
+        }
+        if window.start < margin || window.end + margin > signal.len() {
+            flags.push(Flag::ShortMargin);
+        }
+        let log_power = extractor
+            .extract(signal, window)
+            .map_err(|source| Error::Features {
+                file: recording.passes[pass].file.clone(),
+                sleeper: recording.sleepers[sleeper].id.clone(),
+                source,
+            })?
+            .log_power;
+        match speeds.iter_mut().find(|known| known.speed == speed) {
+            Some(known) => known.add(&log_power),
+            None => speeds.push(SpeedFeatures { speed, passes: 1, log_power }),
+        }
+    }
+    speeds.sort_by_key(|known| known.speed);
+    flags.sort_unstable();
+    flags.dedup();
+    Ok(SleeperFeatures { sleeper, speeds, flags })
+}
+
+impl SpeedFeatures {
+    /// Takes one more pass into the mean.
+    fn add(&mut self, log_power: &[f64]) {
+        self.passes += 1;
+        let share = 1.0 / self.passes as f64;
+        for (mean, value) in self.log_power.iter_mut().zip(log_power) {
+            *mean += share * (value - *mean);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+
+    #[test]
+    fn passes_of_one_speed_are_averaged_in_the_logarithm() {
+        let recording = testing::recording(3.0, &[10.0, 10.1, 13.0]);
+        let extractor = testing::extractor();
+        let all = features(&recording, &extractor, &testing::SPEEDS_KM_H).unwrap();
+        let alone = |pass: usize| {
+            let mut single = recording.clone();
+            single.passes = vec![recording.passes[pass].clone()];
+            features(&single, &extractor, &testing::SPEEDS_KM_H).unwrap()[3].speeds[0].clone()
+        };
+        let (first, second) = (alone(0), alone(1));
+        let mean = &all[3].speeds[0];
+        assert_eq!((mean.speed, mean.passes, all[3].speeds.len()), (0, 2, 2));
+        for ((mean, a), b) in mean.log_power.iter().zip(&first.log_power).zip(&second.log_power) {
+            assert!((mean - 0.5 * (a + b)).abs() < 1e-12);
+        }
+        assert_ne!(first.log_power, second.log_power);
+    }
+
+    #[test]
+    fn a_speed_without_a_model_is_named_with_those_known() {
+        let recording = testing::recording(3.0, &[11.0]);
+        let result = features(&recording, &testing::extractor(), &testing::SPEEDS_KM_H);
+        let message = result.unwrap_err().to_string();
+        assert!(message.contains("11 km/h") && message.contains("10, 13 km/h"), "{message}");
+    }
+
+    #[test]
+    fn sleepers_near_the_ends_are_flagged_and_those_inside_are_not() {
+        let recording = testing::recording(3.0, &[10.0]);
+        let all = features(&recording, &testing::extractor(), &testing::SPEEDS_KM_H).unwrap();
+        assert_eq!(all[0].flags, [Flag::IncompleteWindow, Flag::ShortMargin]);
+        assert_eq!(all[3].flags, []);
+    }
+}
