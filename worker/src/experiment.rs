@@ -11,7 +11,7 @@ const END_SPANS: f64 = 8.0;
 const KM_H: f64 = 3.6;
 
 /// Shortest and longest wavelength of the irregularity in m (paper, App. B).
-const WAVELENGTHS_M: [f64; 2] = [0.5e-3, 1.0];
+const WAVELENGTHS_M: [f64; 2] = [0.25e-3, 1.0];
 
 /// A virtual measurement: a track, a vehicle, its speeds, and what is taken from the signal.
 ///

@@ -80,7 +80,7 @@ impl Simulation {
         let surfaces: Vec<_> = cases.iter().map(|case| self.surface(case)).collect();
         let mut passes = vec![Vec::new(); cases.len()];
         for &speed_km_h in &self.experiment.speeds_km_h {
-            let records = passes_of(&models, &self.pass(speed_km_h), &surfaces)
+            let records = time::passes(&models, &self.pass(speed_km_h), &surfaces)
                 .map_err(|source| CaseError::Pass { speed_km_h, source })?;
             for (passes, record) in passes.iter_mut().zip(&records) {
                 let features = self.features(record, speed_km_h)?;
@@ -138,12 +138,4 @@ impl Simulation {
         let window = sample(stretch.window_m)..sample(stretch.window_end_m);
         [sample(stretch.kept_m)..record.acceleration_m_s2.len(), window]
     }
-}
-
-fn passes_of(
-    models: &[TrackModel],
-    pass: &Pass,
-    surfaces: &[Surface],
-) -> Result<Vec<PassRecord>, PassError> {
-    models.iter().zip(surfaces).map(|(model, surface)| time::pass(model, pass, surface)).collect()
 }

@@ -1,0 +1,178 @@
+//! Any history of leases, reports, expiries, repetitions and restarts ends with each case finished
+//! or given up exactly once.
+
+use crate::support::{ATTEMPTS_MAX, CAMPAIGN, failed, finished, held, lease, library, report, url};
+use proptest::prelude::*;
+use tracktwin_library::{Leased, Library, State, Verdict};
+
+const CASES: u32 = 6;
+
+/// Something that happens to a farm.
+#[derive(Clone, Debug)]
+enum Event {
+    Lease {
+        worker: usize,
+        max: u32,
+    },
+    /// One of the leases ever given is reported; it may have expired, or been reported before.
+    Finish {
+        lease: usize,
+    },
+    Fail {
+        lease: usize,
+    },
+    Renew {
+        lease: usize,
+    },
+    Release {
+        lease: usize,
+    },
+    /// Time goes on, by more or less than a lease.
+    Pass {
+        ms: i64,
+    },
+    /// The coordinator is restarted; its workers live on, or died with it.
+    Restart {
+        alone: bool,
+    },
+}
+
+fn event() -> impl Strategy<Value = Event> {
+    prop_oneof![
+        3 => (0..3_usize, 1..4_u32).prop_map(|(worker, max)| Event::Lease { worker, max }),
+        3 => any::<usize>().prop_map(|lease| Event::Finish { lease }),
+        2 => any::<usize>().prop_map(|lease| Event::Fail { lease }),
+        1 => any::<usize>().prop_map(|lease| Event::Renew { lease }),
+        1 => any::<usize>().prop_map(|lease| Event::Release { lease }),
+        2 => (1..1500_i64).prop_map(|ms| Event::Pass { ms }),
+        1 => any::<bool>().prop_map(|alone| Event::Restart { alone }),
+    ]
+}
+
+/// A farm, and what it must have stored if it keeps its promises.
+struct Farm {
+    folder: tempfile::TempDir,
+    library: Option<Library>,
+    now: i64,
+    leases: Vec<(String, Leased)>,
+    stored: [u32; CASES as usize],
+}
+
+impl Farm {
+    async fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let library = Some(library(&folder, CASES).await);
+        Self { folder, library, now: 0, leases: Vec::new(), stored: [0; CASES as usize] }
+    }
+
+    fn library(&self) -> &Library {
+        self.library.as_ref().unwrap()
+    }
+
+    fn earlier(&self, choice: usize) -> Option<(String, Leased)> {
+        (!self.leases.is_empty()).then(|| self.leases[choice % self.leases.len()].clone())
+    }
+
+    async fn lease(&mut self, worker: String, max: u32) {
+        for leased in lease(self.library(), &worker, max, self.now).await {
+            let same = |(_, it): &(String, Leased)| held(it) == held(&leased);
+            assert!(!self.leases.iter().any(same), "a case was leased twice at one epoch");
+            assert_eq!(self.stored[leased.case.index as usize], 0, "a finished case was leased");
+            self.leases.push((worker.clone(), leased));
+        }
+    }
+
+    async fn finish(&mut self, worker: &str, leased: &Leased) {
+        let verdict = report(self.library(), worker, vec![finished(leased)]).await[0];
+        if verdict == Verdict::Stored {
+            self.stored[leased.case.index as usize] += 1;
+        }
+    }
+
+    async fn happen(&mut self, event: Event) {
+        match event {
+            Event::Lease { worker, max } => self.lease(format!("w{worker}"), max).await,
+            Event::Pass { ms } => self.now += ms,
+            Event::Restart { alone } => self.restart(alone).await,
+            Event::Finish { lease } => {
+                if let Some((worker, leased)) = self.earlier(lease) {
+                    self.finish(&worker, &leased).await;
+                }
+            }
+            Event::Fail { lease } => {
+                if let Some((worker, leased)) = self.earlier(lease) {
+                    report(self.library(), &worker, vec![failed(&leased)]).await;
+                }
+            }
+            Event::Renew { lease } => {
+                if let Some((worker, leased)) = self.earlier(lease) {
+                    let until = self.now + 1000;
+                    let library = self.library();
+                    library.renew(CAMPAIGN, &worker, vec![held(&leased)], until).await.unwrap();
+                }
+            }
+            Event::Release { lease } => {
+                if let Some((worker, leased)) = self.earlier(lease) {
+                    let library = self.library();
+                    library.release(CAMPAIGN, &worker, vec![held(&leased)]).await.unwrap();
+                }
+            }
+        }
+    }
+
+    async fn restart(&mut self, alone: bool) {
+        self.library.take().unwrap().close().await;
+        let library = Library::open(&url(&self.folder)).await.unwrap();
+        if alone {
+            library.release_all(CAMPAIGN).await.unwrap();
+        }
+        self.library = Some(library);
+    }
+
+    /// A sound worker does what is left.
+    async fn end(&mut self) {
+        for _ in 0..=ATTEMPTS_MAX * CASES {
+            let before = self.leases.len();
+            self.now += 1000;
+            self.lease("last".to_owned(), CASES).await;
+            for (worker, leased) in self.leases.split_off(before) {
+                self.finish(&worker, &leased).await;
+            }
+        }
+    }
+
+    async fn check(&self) {
+        let status = self.library().status(CAMPAIGN).await.unwrap();
+        assert_eq!((status.total(), status.done()), (CASES, CASES), "{status:?}");
+        let mut entries = Vec::new();
+        self.library()
+            .training_set(CAMPAIGN, |entry| entries.push(entry.case.index))
+            .await
+            .unwrap();
+        for index in 0..CASES {
+            let record = self.library().case(CAMPAIGN, index).await.unwrap().unwrap();
+            let stored = u32::from(record.state == State::Finished);
+            assert_eq!(self.stored[index as usize], stored, "case {index}: {record:?}");
+            assert_eq!(entries.iter().filter(|it| **it == index).count() as u32, stored);
+            assert!(stored == 1 || record.attempts == ATTEMPTS_MAX, "case {index}: {record:?}");
+        }
+    }
+}
+
+proptest! {
+    // Each history works on a real file with durable commits.
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #[test]
+    fn every_history_ends_with_each_case_finished_or_given_up_once(
+        events in proptest::collection::vec(event(), 1..40)
+    ) {
+        tokio::runtime::Runtime::new().unwrap().block_on(async {
+            let mut farm = Farm::new().await;
+            for event in events {
+                farm.happen(event).await;
+            }
+            farm.end().await;
+            farm.check().await;
+        });
+    }
+}

@@ -1,0 +1,7 @@
+//! The library on real files.
+
+mod histories;
+mod opening;
+mod queue;
+mod results;
+mod support;

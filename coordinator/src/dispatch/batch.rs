@@ -1,0 +1,63 @@
+//! How many cases a lease has: one or two seconds of work.
+
+use tracktwin_worker::agent::GROUP;
+
+/// Computing time that a lease is to hold, in s.
+///
+/// Long against the milliseconds that a lease and a report cost, short against what anybody would
+/// mind losing with a worker.
+const LEASE_WORK_S: f64 = 1.5;
+
+/// Most groups in a lease, whatever they take: what a lost worker may hold up.
+const GROUPS_MAX: f64 = 64.0;
+
+/// Weight of the newest measurement in the running mean.
+const NEWEST: f64 = 0.1;
+
+/// Running mean of a case's computing time, and the size of leases that follows from it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pace {
+    case_s: Option<f64>,
+}
+
+impl Pace {
+    /// Takes a measured computing time of a case, in s.
+    pub fn measured(&mut self, case_s: f64) {
+        let mean = self.case_s.unwrap_or(case_s);
+        self.case_s = Some(mean + NEWEST * (case_s - mean));
+    }
+
+    /// Cases of a lease: whole groups, at least one.
+    pub fn cases_per_lease(&self) -> u32 {
+        let groups = self.case_s.map_or(1.0, |case_s| LEASE_WORK_S / (case_s * GROUP as f64));
+        // A case that takes no time at all makes the quotient infinite, and clamped.
+        groups.round().clamp(1.0, GROUPS_MAX) as u32 * GROUP as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lease_at(case_s: f64) -> u32 {
+        let mut pace = Pace::default();
+        pace.measured(case_s);
+        pace.cases_per_lease()
+    }
+
+    #[test]
+    fn a_lease_is_one_or_two_seconds_of_work_in_whole_groups() {
+        assert_eq!(Pace::default().cases_per_lease(), 8);
+        assert_eq!(lease_at(10.0), 8);
+        assert_eq!(lease_at(0.02), 72);
+        assert_eq!(lease_at(0.0), 512);
+    }
+
+    #[test]
+    fn the_pace_follows_a_slower_machine() {
+        let mut pace = Pace::default();
+        pace.measured(0.02);
+        (0..100).for_each(|_| pace.measured(0.1));
+        assert_eq!(pace.cases_per_lease(), 16);
+    }
+}

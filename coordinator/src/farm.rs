@@ -1,0 +1,176 @@
+//! The farm in one process: a coordinator, and workers that talk to it as a cluster's would.
+
+use crate::campaign::{Campaign, cases};
+use crate::dispatch::{Dispatch, DispatchError, Timing};
+use std::net::Ipv4Addr;
+use std::num::NonZeroUsize;
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tonic::transport::server::TcpIncoming;
+use tracktwin_library::{CampaignRecord, Library, LibraryError, Status};
+use tracktwin_parameters::SobolError;
+use tracktwin_protocol::farm::farm_server::FarmServer;
+use tracktwin_protocol::{MESSAGE_BYTES_MAX, WINDOW_BYTES};
+use tracktwin_worker::agent::{self, AgentError};
+use tracktwin_worker::{Prepare, prepare_simulation};
+
+/// Cases stored at a time, so that a million need no more memory than these.
+const CASES_AT_A_TIME: u32 = 4096;
+
+/// How often the counts are looked at: often enough for a progress bar.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
+
+/// How often an idle connection is tested.
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
+
+/// Why the farm stops.
+#[derive(Debug, thiserror::Error)]
+pub enum FarmError {
+    /// The library fails or refuses.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
+    /// The campaign can't be dispatched.
+    #[error(transparent)]
+    Dispatch(#[from] DispatchError),
+    /// The campaign has no such cases.
+    #[error(transparent)]
+    Cases(#[from] SobolError),
+    /// The workers stopped.
+    #[error("the workers stopped: {0}")]
+    Worker(#[from] AgentError),
+    /// There is no port to be had, or it was lost.
+    #[error("the farm's service failed")]
+    Service(#[from] tonic::transport::Error),
+    /// There is no port to be had.
+    #[error("the farm's service has no port")]
+    Port(#[from] std::io::Error),
+}
+
+/// What is to be simulated, and by how many.
+#[derive(Clone, Debug)]
+pub struct Task<'a> {
+    /// The campaign.
+    pub campaign: &'a str,
+    /// Its first cases, so many.
+    pub cases: u32,
+    /// Groups of cases simulated at a time.
+    pub cores: NonZeroUsize,
+    /// How long leases last.
+    pub timing: Timing,
+    /// What simulates: the track model, or a stand-in where the farm is tested.
+    pub prepare: Prepare,
+}
+
+impl<'a> Task<'a> {
+    /// The first `cases` cases of a campaign, by the track model.
+    pub fn new(campaign: &'a str, cases: u32, cores: NonZeroUsize) -> Self {
+        let timing = Timing::default();
+        Self { campaign, cases, cores, timing, prepare: prepare_simulation }
+    }
+}
+
+/// Stores a campaign and those of its cases that the library does not have yet.
+///
+/// # Errors
+/// [`FarmError`] when the library fails or the campaign has not so many cases.
+pub async fn prepare(library: &Library, campaign: &Campaign) -> Result<(), FarmError> {
+    let definition = &campaign.definition;
+    let id = campaign.id();
+    let record = CampaignRecord {
+        id: id.clone(),
+        name: campaign.name.clone(),
+        definition_json: campaign.definition_json(),
+        definition_hash: campaign.definition_hash(),
+        experiment_json: definition.experiment.to_json(),
+        experiment_hash: definition.experiment.hash(),
+        speeds_km_h: definition.experiment.speeds_km_h.clone(),
+        seed: definition.seed,
+    };
+    library.insert_campaign(&record).await?;
+    // Cases are stored in order, so the ones that are there are the first.
+    let mut stored = library.status(&id).await?.total();
+    while stored < campaign.cases {
+        let end = campaign.cases.min(stored.saturating_add(CASES_AT_A_TIME));
+        library.insert_cases(&id, &cases(campaign, stored..end)?).await?;
+        stored = end;
+    }
+    Ok(())
+}
+
+/// Simulates what a library lacks, by workers in this process, until every case is finished or
+/// given up, or until `shutdown`. Either way the library can be gone on with; it loses no finished
+/// case however the process ends.
+///
+/// `progress` sees the counts now and then.
+///
+/// # Errors
+/// [`FarmError`]; [`LibraryError::InUse`] when another process works on the library.
+pub async fn embedded(
+    library: &Library,
+    task: Task<'_>,
+    shutdown: CancellationToken,
+    mut progress: impl FnMut(Status),
+) -> Result<Status, FarmError> {
+    let _claim = library.claim()?;
+    // Whoever held these died with the process that served it.
+    library.release_all(task.campaign).await?;
+    let dispatch = Dispatch::new(library.clone(), task.campaign, task.cases, task.timing).await?;
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
+    let coordinator = format!("http://{}", listener.local_addr()?);
+
+    let stop_working = shutdown.child_token();
+    let stop_serving = CancellationToken::new();
+    // However this ends, nothing goes on behind its back.
+    let _guards = [stop_working.clone().drop_guard(), stop_serving.clone().drop_guard()];
+    let server = tokio::spawn(serve(listener, dispatch, stop_serving.clone()));
+    let config =
+        agent::Config { prepare: task.prepare, ..agent::Config::new(coordinator, task.cores) };
+    let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
+
+    let mut ended = None;
+    loop {
+        let status = library.status_of(task.campaign, task.cases).await?;
+        progress(status);
+        if status.done() == status.total() || shutdown.is_cancelled() {
+            break;
+        }
+        tokio::select! {
+            () = tokio::time::sleep(LOOK_EVERY) => {}
+            () = shutdown.cancelled() => {}
+            end = &mut worker => {
+                ended = Some(end);
+                break;
+            }
+        }
+    }
+    // The worker hands in what it has begun, so it must end before the service.
+    stop_working.cancel();
+    let ended = match ended {
+        Some(ended) => ended,
+        None => worker.await,
+    };
+    stop_serving.cancel();
+    server.await.expect("the service does not panic")?;
+    ended.expect("a worker does not panic: what it computes is caught")?;
+    let status = library.status_of(task.campaign, task.cases).await?;
+    progress(status);
+    Ok(status)
+}
+
+/// Serves workers on a port until told to stop.
+async fn serve(
+    listener: TcpListener,
+    dispatch: Dispatch,
+    stop: CancellationToken,
+) -> Result<(), tonic::transport::Error> {
+    let service = FarmServer::new(dispatch).max_decoding_message_size(MESSAGE_BYTES_MAX);
+    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+    tonic::transport::Server::builder()
+        .http2_keepalive_interval(Some(KEEP_ALIVE))
+        .initial_stream_window_size(WINDOW_BYTES)
+        .initial_connection_window_size(WINDOW_BYTES)
+        .add_service(service)
+        .serve_with_incoming_shutdown(incoming, stop.cancelled_owned())
+        .await
+}
