@@ -22,7 +22,7 @@ pub fn distances(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 }
 
 /// Distances between the rows of `a` (n x d): n x n, symmetric, exact zeros on the diagonal.
-pub(crate) fn distances_within(a: MatRef<'_, f64>) -> Mat<f64> {
+pub fn distances_within(a: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = distances(a, a);
     out.diagonal_mut().fill(0.0);
     out

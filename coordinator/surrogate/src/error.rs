@@ -31,7 +31,7 @@ pub enum Error {
         /// Entries needed.
         least: usize,
     },
-    /// A parameter or a bin never changes.
+    /// A parameter never changes.
     #[error("{0} has the same value in every library entry")]
     Constant(String),
     /// Feature columns outside the bins.

@@ -1,6 +1,6 @@
 //! Finds input scaling, mean and hyper-parameters by the marginal likelihood.
 //!
-//! A subset decides the scaling and where to begin; all entries decide the hyper-parameters.
+//! A subset decides the scaling and where to begin, a larger one the hyper-parameters.
 
 use crate::distance::distances_within;
 use crate::ladder::{Ladder, Rung, Tried};
@@ -10,10 +10,11 @@ use serde::{Deserialize, Serialize};
 
 /// Where the search begins: a length of four typical distances, noise a sixteenth of the signal.
 const START: Rung = [4, -4];
+/// Entries that decide the hyper-parameters. Twice as many move the top of the likelihood by less
+/// than the ladder's step, at eight times the cost.
+const CLIMBERS_MAX: usize = 2500;
 /// Rungs a step of the first, coarse climb takes.
 const COARSE: i32 = 3;
-/// More inputs than this and a linear mean costs more freedom than it explains.
-const LINEAR_MEAN_INPUTS_MAX: usize = 64;
 
 /// The mean around which a process varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,6 +39,15 @@ pub struct Fit {
 }
 
 impl MeanFunction {
+    /// The mean that goes with a scaling: linear in whitened inputs, which are few and
+    /// independent; constant over bins, which are many and nearly collinear.
+    pub fn around(scaling: InputScaling) -> Self {
+        match scaling {
+            InputScaling::Whitened { .. } => Self::Linear,
+            InputScaling::Raw | InputScaling::Standardised => Self::Constant,
+        }
+    }
+
     /// Values of the basis at `inputs` (n x m): n x 1 or n x (1 + m).
     pub fn basis(self, inputs: MatRef<'_, f64>) -> Mat<f64> {
         let columns = match self {
@@ -70,11 +80,13 @@ pub fn fit(
     let (scaling, rungs) = choose(features, targets, scalings, subset)?;
     let input_map = InputMap::fit(scaling, features, targets)?;
     let inputs = input_map.apply(features);
-    let search = Search::new(inputs, targets);
+    let climbers = features.nrows().min(CLIMBERS_MAX);
+    let mean = MeanFunction::around(scaling);
+    let search = Search::new(inputs.subrows(0, climbers), mean, targets.subrows(0, climbers));
     let mut tried = Tried::default();
     tried.climb(&rungs, 1, &mut |rung| search.log_likelihoods(rung))?;
     let hyperparameters = tried.shared().into_iter().map(|rung| search.ladder.at(rung)).collect();
-    Ok(Fit { input_map, mean: search.mean, inputs: search.inputs, hyperparameters })
+    Ok(Fit { input_map, mean, inputs, hyperparameters })
 }
 
 /// The most likely scaling, and the best rungs under it.
@@ -89,7 +101,11 @@ fn choose(
     let maps = candidates(makers, targets.subrows(subset, rest), scalings)?;
     let mut best: Option<(f64, InputScaling, Vec<Rung>)> = None;
     for map in maps {
-        let search = Search::new(map.apply(judges), targets.subrows(0, subset));
+        let search = Search::new(
+            map.apply(judges).as_ref(),
+            MeanFunction::around(map.scaling),
+            targets.subrows(0, subset),
+        );
         let mut tried = Tried::default();
         tried.climb(&[START], COARSE, &mut |rung| search.log_likelihoods(rung))?;
         if best.as_ref().is_none_or(|(score, ..)| tried.score() > *score) {
@@ -125,25 +141,18 @@ fn candidates(
 
 /// Inputs and targets whose likelihood is asked for again and again.
 struct Search<'a> {
-    inputs: Mat<f64>,
     distances: Mat<f64>,
     basis: Mat<f64>,
     targets: MatRef<'a, f64>,
-    mean: MeanFunction,
     ladder: Ladder,
 }
 
 impl<'a> Search<'a> {
-    fn new(inputs: Mat<f64>, targets: MatRef<'a, f64>) -> Self {
-        let distances = distances_within(inputs.as_ref());
-        let mean = if inputs.ncols() <= LINEAR_MEAN_INPUTS_MAX {
-            MeanFunction::Linear
-        } else {
-            MeanFunction::Constant
-        };
-        let basis = mean.basis(inputs.as_ref());
+    fn new(inputs: MatRef<'_, f64>, mean: MeanFunction, targets: MatRef<'a, f64>) -> Self {
+        let distances = distances_within(inputs);
+        let basis = mean.basis(inputs);
         let ladder = Ladder { unit: mean_distance(distances.as_ref()) };
-        Self { inputs, distances, basis, targets, mean, ladder }
+        Self { distances, basis, targets, ladder }
     }
 
     fn log_likelihoods(&self, rung: Rung) -> Result<Vec<f64>, Error> {

@@ -1,5 +1,7 @@
 //! Models that share their inputs: one speed (or all) and one feature set, a model a parameter.
 
+use crate::distance::distances_within;
+use crate::kernel::correlations;
 use crate::{Error, Factor, Hyperparameters, InputMap, MeanFunction, Spread, distances};
 use faer::{Mat, MatRef};
 use serde::{Deserialize, Serialize};
@@ -46,6 +48,8 @@ pub struct ParameterModel {
     pub signal_variance: f64,
     /// Log marginal likelihood in nats.
     pub log_likelihood: f64,
+    /// Its derivatives by the logarithms of length and noise ratio: near zero at the top.
+    pub log_likelihood_gradient: [f64; 2],
     /// Correction of the standard deviation, over the parameter mapped onto [0, 1].
     pub spread: Spread,
     /// How good it is.
@@ -132,11 +136,11 @@ impl ModelGroup {
         let basis = self.mean.basis(inputs.as_ref());
         let mut means = &basis * &self.coefficients;
         let mut sds = Mat::zeros(inputs.nrows(), self.models.len());
-        for (at, _) in &self.factors {
-            let factor = self.factor(*at)?;
+        for factor in self.factors()? {
+            let at = factor.hyperparameters();
             let variances = factor.variances(away.as_ref(), basis.as_ref());
-            let known = crate::kernel::correlations(away.as_ref(), at.length);
-            for (j, model) in self.of(*at) {
+            let known = correlations(away.as_ref(), at.length);
+            for (j, model) in self.of(at) {
                 let change = known.transpose() * self.weights.col(j);
                 for (t, variance) in variances.iter().enumerate() {
                     let mean = (means[(t, j)] + change[t]).clamp(0.0, 1.0);
@@ -153,19 +157,18 @@ impl ModelGroup {
         self.models.iter().enumerate().filter(move |(_, model)| model.hyperparameters == at)
     }
 
-    fn factor(&self, at: Hyperparameters) -> Result<&Factor, Error> {
-        let (_, slot) = self
-            .factors
-            .iter()
-            .find(|(known, _)| *known == at)
-            .expect("there is a factor for every model");
-        if let Some(factor) = slot.get() {
-            return Ok(factor);
+    /// Makes the factors that are not there yet.
+    fn factors(&self) -> Result<Vec<&Factor>, Error> {
+        if self.factors.iter().any(|(_, slot)| slot.get().is_none()) {
+            let away = distances_within(self.inputs.as_ref());
+            let basis = self.mean.basis(self.inputs.as_ref());
+            for (at, slot) in self.factors.iter().filter(|(_, slot)| slot.get().is_none()) {
+                let factor = Factor::new(away.as_ref(), basis.as_ref(), *at)?;
+                // Another thread may have been faster; its factor is the same.
+                let _ = slot.set(factor);
+            }
         }
-        let away = crate::distance::distances_within(self.inputs.as_ref());
-        let basis = self.mean.basis(self.inputs.as_ref());
-        let factor = Factor::new(away.as_ref(), basis.as_ref(), at)?;
-        Ok(slot.get_or_init(|| factor))
+        Ok(self.factors.iter().filter_map(|(_, slot)| slot.get()).collect())
     }
 
     fn in_units(&self, means: &Mat<f64>, sds: &Mat<f64>, t: usize) -> Vec<Prediction> {

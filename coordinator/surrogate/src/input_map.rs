@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 pub enum InputScaling {
     /// The feature vector itself (the paper's way).
     Raw,
-    /// Every bin divided by its standard deviation over the training set.
+    /// Every bin divided by its standard deviation over the training set; one that never changes
+    /// is left out.
     Standardised,
     /// Projected on the directions that tell parameters apart, in units of the surface's scatter.
     Whitened {
@@ -35,7 +36,8 @@ impl InputMap {
     /// (n x p).
     ///
     /// # Errors
-    /// [`Error::Constant`] names a bin that never changes; those of the eigenvalue problem.
+    /// [`Error::NotPositiveDefinite`] when entries are too few to whiten by;
+    /// [`Error::NoEigenvalues`].
     pub fn fit(
         scaling: InputScaling,
         features: MatRef<'_, f64>,
@@ -52,10 +54,8 @@ impl InputMap {
                     .col_iter()
                     .map(|column| (column.squared_norm_l2() / n as f64).sqrt())
                     .collect();
-                if let Some(bin) = deviations.iter().position(|&deviation| deviation == 0.0) {
-                    return Err(Error::Constant(format!("bin {bin}")));
-                }
-                Mat::from_fn(d, d, |i, j| if i == j { 1.0 / deviations[i] } else { 0.0 })
+                let weight = |i: usize| if deviations[i] > 0.0 { 1.0 / deviations[i] } else { 0.0 };
+                Mat::from_fn(d, d, |i, j| if i == j { weight(i) } else { 0.0 })
             }
             InputScaling::Whitened { components } => {
                 whitening::directions(centred.as_ref(), parameters, components)?
@@ -106,10 +106,10 @@ mod tests {
     }
 
     #[test]
-    fn a_bin_that_never_changes_is_named() {
+    fn a_bin_that_never_changes_has_no_say() {
         let features = Mat::from_fn(5, 2, |i, j| if j == 1 { 2.0 } else { i as f64 });
-        let map =
-            InputMap::fit(InputScaling::Standardised, features.as_ref(), Mat::zeros(5, 0).as_ref());
-        assert_eq!(map.unwrap_err().to_string(), "bin 1 has the same value in every library entry");
+        let none = Mat::zeros(5, 0);
+        let map = InputMap::fit(InputScaling::Standardised, features.as_ref(), none.as_ref());
+        assert_eq!(map.unwrap().projection[(1, 1)], 0.0);
     }
 }

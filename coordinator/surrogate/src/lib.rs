@@ -5,6 +5,7 @@
 //! Leaves to others what a bin's power is (signal), where the training cases come from (library)
 //! and how windows of a recording are combined (evaluation).
 
+mod cholesky;
 mod distance;
 mod error;
 mod features;
@@ -22,7 +23,7 @@ mod training_set;
 mod validate;
 mod whitening;
 
-pub use distance::distances;
+pub use distance::{distances, distances_within};
 pub use error::Error;
 pub use features::FeatureColumns;
 pub use fit::{Fit, MeanFunction, fit};

@@ -2,7 +2,7 @@
 
 use crate::distance::distances_within;
 use crate::group::different;
-use crate::validate::{coverage, folds, mase};
+use crate::validate::{coverage, folds_from, mase};
 use crate::{
     Error, Factor, FeatureColumns, Fit, GroupKey, InputScaling, ModelGroup, ParameterModel, Score,
     Split, Spread, Trained, TrainingSet, fit,
@@ -35,7 +35,7 @@ pub struct TrainOptions {
 impl TrainOptions {
     /// The usual options for these feature sets: five folds (paper, 2.5.5), every scaling.
     pub fn new(features: Vec<FeatureColumns>) -> Self {
-        let whitened = [8, 16, 32].map(|components| InputScaling::Whitened { components });
+        let whitened = [8, 12, 16, 24, 32].map(|components| InputScaling::Whitened { components });
         Self {
             all_speeds: features.first().map(|feature| feature.name.clone()),
             features,
@@ -162,7 +162,9 @@ fn weigh(
     for at in different(&fit.hyperparameters) {
         let factor = Factor::new(away.as_ref(), basis.as_ref(), at)?;
         let all = factor.weights(targets.as_ref());
-        let held_out = folds(&factor, all.weights.as_ref(), fold_count)?;
+        let q = factor.projected_inverse();
+        let gradients = factor.gradients_from(away.as_ref(), q.as_ref(), &all);
+        let held_out = folds_from(q.as_ref(), all.weights.as_ref(), fold_count)?;
         for j in (0..p).filter(|&j| fit.hyperparameters[j] == at) {
             weights.col_mut(j).copy_from(all.weights.col(j));
             coefficients.col_mut(j).copy_from(all.coefficients.col(j));
@@ -180,6 +182,7 @@ fn weigh(
                 hyperparameters: at,
                 signal_variance: s2,
                 log_likelihood: all.log_likelihoods[j],
+                log_likelihood_gradient: gradients[j],
                 spread: Spread::fit(&predicted, &standardised),
                 score: Score { mase_folds, mase_test: 0.0, bias_test: 0.0, coverage_90_test: 0.0 },
             });

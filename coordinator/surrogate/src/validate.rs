@@ -1,8 +1,8 @@
 //! How good predictions are: folds, scaled errors, coverage.
 
+use crate::cholesky::Cholesky;
 use crate::{Error, Factor};
-use faer::linalg::solvers::{DenseSolveCore, Solve};
-use faer::{Mat, MatRef, Side};
+use faer::{Mat, MatRef};
 
 /// What every entry's prediction would have been without the entries of its own fold.
 #[derive(Clone, Debug)]
@@ -24,15 +24,25 @@ pub struct Folds {
 /// [`Error::NotPositiveDefinite`] when a fold holds so many entries that the rest cannot carry the
 /// mean.
 pub fn folds(factor: &Factor, weights: MatRef<'_, f64>, count: usize) -> Result<Folds, Error> {
+    folds_from(factor.projected_inverse().as_ref(), weights, count)
+}
+
+/// The same from the lower triangle of `Q`.
+pub(crate) fn folds_from(
+    q: MatRef<'_, f64>,
+    weights: MatRef<'_, f64>,
+    count: usize,
+) -> Result<Folds, Error> {
     let (n, p) = (weights.nrows(), weights.ncols());
-    let q = factor.projected_inverse();
     let mut out = Folds { errors: Mat::zeros(n, p), variances: vec![0.0; n] };
     for fold in 0..count {
+        // Ascending, so that the block's lower triangle lies in the lower triangle of the whole.
         let rows: Vec<usize> = (fold..n).step_by(count).collect();
-        let block = Mat::from_fn(rows.len(), rows.len(), |i, j| q[(rows[i], rows[j])])
-            .llt(Side::Lower)
-            .map_err(|_| Error::NotPositiveDefinite { entries: n - rows.len() })?;
-        let errors = block.solve(Mat::from_fn(rows.len(), p, |i, j| weights[(rows[i], j)]));
+        let size = rows.len();
+        let block =
+            Mat::from_fn(size, size, |i, j| if i >= j { q[(rows[i], rows[j])] } else { 0.0 });
+        let block = Cholesky::new(block)?;
+        let errors = block.solve(Mat::from_fn(size, p, |i, j| weights[(rows[i], j)]).as_ref());
         let covariance = block.inverse();
         for (i, &row) in rows.iter().enumerate() {
             out.errors.row_mut(row).copy_from(errors.row(i));

@@ -7,7 +7,7 @@
 //! analysis with a continuous class).
 
 use crate::Error;
-use faer::linalg::solvers::Solve;
+use crate::cholesky::Cholesky;
 use faer::{Mat, MatRef, Side};
 
 /// Highest total degree of the polynomial that stands for the expected features.
@@ -33,26 +33,21 @@ pub(crate) fn directions(
     components: usize,
 ) -> Result<Mat<f64>, Error> {
     let (n, d) = (features.nrows(), features.ncols());
-    let not_definite = |_| Error::NotPositiveDefinite { entries: n };
     let basis = polynomial(parameters);
-    let normal = (basis.transpose() * &basis).llt(Side::Lower).map_err(not_definite)?;
-    let expected = &basis * normal.solve(basis.transpose() * features);
+    let normal = Cholesky::new(basis.transpose() * &basis)?;
+    let expected = &basis * normal.solve((basis.transpose() * features).as_ref());
     let residual = features - &expected;
     let freedom = (n - basis.ncols()) as f64;
     let mut scatter = residual.transpose() * &residual * faer::Scale(1.0 / freedom);
     let mean_variance = (0..d).map(|i| scatter[(i, i)]).sum::<f64>() / d as f64;
     (0..d).for_each(|i| scatter[(i, i)] += SHRINKAGE * mean_variance);
-    let factor = scatter.llt(Side::Lower).map_err(not_definite)?;
-    let mut telling = expected.transpose() * &expected;
-    factor.L().solve_lower_triangular_in_place(&mut telling);
-    let mut telling = telling.transpose().to_owned();
-    factor.L().solve_lower_triangular_in_place(&mut telling);
+    let factor = Cholesky::new(scatter)?;
+    let telling = factor.half_solve(expected.transpose() * &expected);
+    let telling = factor.half_solve(telling.transpose().to_owned());
     let eigen =
         telling.self_adjoint_eigen(Side::Lower).map_err(|_| Error::NoEigenvalues { size: d })?;
-    let m = components.min(d);
-    let mut out = Mat::from_fn(d, m, |i, j| eigen.U()[(i, d - 1 - j)]);
-    factor.L().transpose().solve_upper_triangular_in_place(&mut out);
-    Ok(out)
+    let leading = Mat::from_fn(d, components.min(d), |i, j| eigen.U()[(i, d - 1 - j)]);
+    Ok(factor.other_half_solve(leading))
 }
 
 /// All monomials up to the degree that the number of entries allows, in parameters mapped to
