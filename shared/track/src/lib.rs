@@ -5,7 +5,10 @@
 //!
 //! Convention: one rail, half sleepers; displacement, load and irregularity positive **downwards**.
 
+#[cfg(test)]
+mod analytical;
 pub mod element;
 pub mod extension;
+pub mod frequency;
 pub mod model;
 pub mod time;

@@ -1,0 +1,9 @@
+//! The track in the frequency domain: what a hammer test measures.
+//!
+//! Works on the matrices that the time domain runs on; draws nothing and names no resonance.
+
+mod peaks;
+mod receptance;
+
+pub use peaks::{Peak, peaks};
+pub use receptance::{FrequencyError, Place, receptance};
