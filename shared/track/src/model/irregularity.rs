@@ -20,9 +20,9 @@ const LEVEL_UNIT: f64 = 1e-4;
 
 /// Grid points on the shortest wave.
 ///
-/// The cubic spline turns `(1/7)^4 + (1/9)^4 = 6e-4` of such a wave into its images beyond the grid;
-/// of longer waves far less.
-const POINTS_PER_SHORTEST_WAVE: f64 = 8.0;
+/// Of a wave with `n` points the cubic spline turns `1/(n-1)^4 + 1/(n+1)^4` into its images beyond
+/// the grid: 1.4 % of the shortest, 0.1 % of one half as long again, far less of all others.
+const POINTS_PER_SHORTEST_WAVE: f64 = 4.0;
 
 /// What a rough surface is drawn from: the paper's spectrum at a level, between two wavelengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,11 +36,12 @@ pub struct Roughness {
 }
 
 impl Roughness {
-    /// The spectrum at a level, with the wavelengths 0.5 mm to 1 m.
+    /// The spectrum at a level, with the wavelengths 0.25 mm to 1 m.
     ///
-    /// At 13 km/h these are 7 kHz and 4 Hz, at 7 km/h 4 kHz and 2 Hz.
+    /// At 7 km/h the shortest wave passes at 7.8 kHz, at 13 km/h the longest at 3.6 Hz. Waves from
+    /// 0.5 mm would end at 3.9 kHz at 7 km/h, inside the one-third octave of 4 kHz.
     pub const fn new(level: f64) -> Self {
-        Self { level, shortest_m: 0.5e-3, longest_m: 1.0 }
+        Self { level, shortest_m: 0.25e-3, longest_m: 1.0 }
     }
 
     /// One-sided power spectral density `S` in m2/(rad/m) at a wave number in rad/m: its integral
@@ -203,8 +204,8 @@ mod tests {
     fn waves_outside_the_band_are_absent() {
         let surface = Surface::rough(1, 3.0, LENGTH_M);
         let period_m = surface.step_m * surface.coefficients.len() as f64;
-        let inside = amplitude(&surface, (period_m / 0.6e-3) as usize).norm();
-        let outside = amplitude(&surface, (period_m / 0.4e-3) as usize).norm();
+        let inside = amplitude(&surface, (period_m / 0.3e-3) as usize).norm();
+        let outside = amplitude(&surface, (period_m / 0.2e-3) as usize).norm();
         assert!(outside < 1e-6 * inside, "{outside} of {inside}");
         assert!(amplitude(&surface, (period_m / 1.5) as usize).norm() < 1e-15);
     }
