@@ -1,1 +1,19 @@
-//! The report.
+//! Self-contained pages and pictures: no file, font or script from elsewhere.
+//!
+//! Owns how results look; every function goes from data to text. What the data mean, and where
+//! the text is written, is left to others.
+
+mod axis;
+mod chart;
+mod evaluation_page;
+mod map_picture;
+mod models_page;
+mod number;
+mod page;
+mod receptance;
+mod spectrum_picture;
+mod track_picture;
+
+pub use evaluation_page::evaluation_page;
+pub use models_page::{mase_chart, models_page, scatter_chart};
+pub use receptance::{ReceptanceCurve, receptance_chart};

@@ -1,0 +1,148 @@
+//! The page of an evaluated recording.
+
+use crate::map_picture::map_charts;
+use crate::number::{Shown, significant};
+use crate::page::{figure, page};
+use crate::spectrum_picture::{chosen, spectrum_chart};
+use crate::track_picture::track_charts;
+use maud::{Markup, html};
+use tracktwin_evaluation::{Estimate, Evaluation, SleeperEvaluation};
+use tracktwin_parameters::Parameter;
+use tracktwin_signal::Extractor;
+use tracktwin_signal::recording::Recording;
+
+/// Sleepers whose LWPS is shown.
+const SLEEPERS_SHOWN: usize = 4;
+
+/// The report of an evaluation: one sentence, pictures, estimates, provenance.
+///
+/// `recording` and `extractor` are those of the evaluation; of them come signal and maps.
+pub fn evaluation_page(
+    evaluation: &Evaluation,
+    recording: &Recording,
+    extractor: &Extractor,
+) -> String {
+    let body = html! {
+        h2 { "Along the track" }
+        (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a band of two standard deviations, and the average over the ten library entries that match best."))
+        h2 { "What was measured" }
+        (figure(&maps(evaluation, recording, extractor), "Five sleeper bays in the middle of the recording (paper, Fig. 2); dashed lines are sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet transform (CWT), sharpened in frequency."))
+        h2 { "Measured and matched spectra" }
+        (figure(&spectra(evaluation), "Local wavelet power spectra (LWPS) of some sleepers, mean over the passes of one speed, and those of the library entries nearest to them (paper, Fig. 11)."))
+        h2 { "Estimates" }
+        p.note { "Mean ± one standard deviation. Match: mean absolute percentage error of the best library entry (paper, eq. 10)." }
+        div.scroll { (table(evaluation)) }
+        h2 { "Provenance" }
+        (provenance(evaluation))
+    };
+    page(&format!("Track under {}", evaluation.recording), &summary(evaluation, recording), &body)
+}
+
+/// What a reader in a hurry needs, in one sentence.
+fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
+    let speeds: Vec<String> =
+        evaluation.provenance.speeds_km_h.iter().map(ToString::to_string).collect();
+    let ranges: Vec<String> = evaluation
+        .parameters()
+        .into_iter()
+        .filter(|parameter| {
+            !matches!(parameter, Parameter::RailpadDamping | Parameter::BallastDamping)
+        })
+        .filter_map(|parameter| range(evaluation, parameter))
+        .collect();
+    let flagged = evaluation.sleepers.iter().filter(|sleeper| !sleeper.flags.is_empty()).count();
+    let remark = match flagged {
+        0 => String::new(),
+        _ => {
+            format!("; {flagged} sleepers are flagged (see the table) and left out of these ranges")
+        }
+    };
+    format!(
+        "{} sleepers evaluated from {} passes at {} km/h: {}{remark}.",
+        evaluation.sleepers.len(),
+        recording.passes.len(),
+        speeds.join(", "),
+        ranges.join(", ")
+    )
+}
+
+/// Lowest to highest mean of a parameter over the sleepers without flags.
+fn range(evaluation: &Evaluation, parameter: Parameter) -> Option<String> {
+    let clean = evaluation.sleepers.iter().filter(|sleeper| sleeper.flags.is_empty());
+    let mut means: Vec<f64> =
+        clean.filter_map(|sleeper| Some(sleeper.estimates.get(&parameter)?.mean)).collect();
+    means.sort_by(f64::total_cmp);
+    let shown = Shown::of(parameter);
+    let text = |value: f64| significant(value / shown.divisor);
+    let (low, high) = (text(*means.first()?), text(*means.last()?));
+    Some(format!("{} {low} to {high} {}", parameter.label(), shown.unit))
+}
+
+fn maps(evaluation: &Evaluation, recording: &Recording, extractor: &Extractor) -> Vec<String> {
+    let middle = evaluation.sleepers.get(evaluation.sleepers.len() / 2);
+    let fastest = (0..recording.passes.len())
+        .max_by(|&a, &b| recording.passes[a].speed_km_h.total_cmp(&recording.passes[b].speed_km_h));
+    match (middle, fastest) {
+        (Some(sleeper), Some(pass)) => map_charts(recording, extractor, pass, sleeper.x_m),
+        _ => Vec::new(),
+    }
+}
+
+fn spectra(evaluation: &Evaluation) -> Vec<String> {
+    let fastest = |sleeper: &&SleeperEvaluation| !sleeper.measured.is_empty();
+    chosen(&evaluation.sleepers, SLEEPERS_SHOWN)
+        .into_iter()
+        .filter(fastest)
+        .filter_map(|sleeper| {
+            let measured = sleeper.measured.last()?;
+            Some(spectrum_chart(sleeper, measured, &evaluation.frequencies_hz))
+        })
+        .collect()
+}
+
+fn table(evaluation: &Evaluation) -> Markup {
+    let parameters = evaluation.parameters();
+    let cell = |parameter: Parameter, estimate: Option<&Estimate>| {
+        estimate.map(|estimate| Shown::of(parameter).estimate(*estimate)).unwrap_or_default()
+    };
+    html! {
+        table {
+            thead { tr {
+                th { "sleeper" } th { "position" small { "m" } }
+                @for &parameter in &parameters {
+                    th { (parameter.label()) small { (parameter.symbol()) " in " (Shown::of(parameter).unit) } }
+                }
+                th { "match" small { "%" } } th.words { "flags" }
+            } }
+            tbody {
+                @for sleeper in &evaluation.sleepers {
+                    tr {
+                        td { (sleeper.id) } td { (format!("{:.3}", sleeper.x_m)) }
+                        @for &parameter in &parameters { td { (cell(parameter, sleeper.estimates.get(&parameter))) } }
+                        td { @if let Some(best) = sleeper.selector.mape.first() { (significant(100.0 * best)) } }
+                        td.words { (sleeper.flags.iter().map(|flag| flag.label()).collect::<Vec<_>>().join(", ")) }
+                    }
+                }
+                @for sleeper in &evaluation.unevaluated {
+                    tr { td { (sleeper.id) } td { (format!("{:.3}", sleeper.x_m)) } td.words colspan=(parameters.len() + 2) { (sleeper.reason) } }
+                }
+            }
+        }
+    }
+}
+
+fn provenance(evaluation: &Evaluation) -> Markup {
+    let of = &evaluation.provenance;
+    html! {
+        dl {
+            dt { "recording" } dd { (evaluation.recording) }
+            dt { "method" } dd { "Gaussian processes on " (of.feature) "; " (of.combination) }
+            dt { "campaign" } dd { (of.campaign) }
+            dt { "library" } dd { code { (of.library_digest) } ", " (of.library_entries) " entries" }
+            dt { "features" } dd { code { (of.feature_definition) } }
+            dt { "program" } dd { "tracktwin " (of.code_version) }
+        }
+        p { "To reproduce, with the library of that digest and the models trained on it:" }
+        pre { "tracktwin evaluate " (evaluation.recording) " --models DIR --library URL --out DIR" }
+    }
+}

@@ -1,0 +1,62 @@
+//! Numbers as a person reads them: three significant digits, units with prefixes.
+
+use tracktwin_evaluation::Estimate;
+use tracktwin_parameters::Parameter;
+
+/// How a parameter is shown: divided by `divisor`, in `unit`.
+pub(crate) struct Shown {
+    /// What the SI value is divided by.
+    pub divisor: f64,
+    /// The unit, with its prefix.
+    pub unit: String,
+}
+
+impl Shown {
+    /// How this parameter is shown: prefixes follow from the upper end of its range.
+    pub(crate) fn of(parameter: Parameter) -> Self {
+        let [_, high] = parameter.range();
+        let (divisor, prefix) = match high {
+            1e6.. => (1e6, "M"),
+            1e3.. => (1e3, "k"),
+            _ => (1.0, ""),
+        };
+        let unit = parameter.unit().replace("1e-4", "10⁻⁴").replace("m2", "m²");
+        Self { divisor, unit: format!("{prefix}{unit}") }
+    }
+
+    /// Mean and standard deviation as `148 ± 12`.
+    pub(crate) fn estimate(&self, estimate: Estimate) -> String {
+        let (mean, sd) = (estimate.mean / self.divisor, estimate.sd / self.divisor);
+        let decimals = decimals(mean, 3);
+        format!("{mean:.decimals$} ± {sd:.decimals$}")
+    }
+}
+
+/// The number with three significant digits.
+pub(crate) fn significant(value: f64) -> String {
+    let decimals = decimals(value, 3);
+    format!("{value:.decimals$}")
+}
+
+/// Decimals that show `digits` significant digits of `value`.
+fn decimals(value: f64, digits: i32) -> usize {
+    if value == 0.0 || !value.is_finite() {
+        return 0;
+    }
+    (digits - 1 - value.abs().log10().floor() as i32).max(0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn estimates_have_three_significant_digits_and_a_prefix() {
+        let shown = Shown::of(Parameter::RailpadStiffness);
+        assert_eq!(shown.unit, "MN/m");
+        assert_eq!(shown.estimate(Estimate { mean: 1.4829e8, sd: 1.27e7 }), "148 ± 13");
+        assert_eq!(Shown::of(Parameter::IrregularityLevel).unit, "10⁻⁴ m² rad/m");
+        assert_eq!(significant(0.012_345), "0.0123");
+        assert_eq!(significant(0.0), "0");
+    }
+}

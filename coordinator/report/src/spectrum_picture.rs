@@ -1,0 +1,45 @@
+//! Measured LWPS of a sleeper against the library's best matches (paper, Fig. 11).
+
+use crate::axis::Axis;
+use crate::chart::Chart;
+use tracktwin_evaluation::{Measured, SleeperEvaluation};
+
+const SIZE: [f64; 2] = [560.0, 300.0];
+
+/// Sleepers evenly chosen among those without flags, or among all if every one has some.
+pub(crate) fn chosen(sleepers: &[SleeperEvaluation], count: usize) -> Vec<&SleeperEvaluation> {
+    let mut clean: Vec<_> = sleepers.iter().filter(|sleeper| sleeper.flags.is_empty()).collect();
+    if clean.is_empty() {
+        clean = sleepers.iter().collect();
+    }
+    let count = count.min(clean.len());
+    (0..count).map(|index| clean[(2 * index + 1) * clean.len() / (2 * count)]).collect()
+}
+
+/// LWPS in dB against frequency, measured and matched, at one speed.
+pub(crate) fn spectrum_chart(
+    sleeper: &SleeperEvaluation,
+    measured: &Measured,
+    frequencies_hz: &[f64],
+) -> String {
+    let (Some(&low), Some(&high)) = (frequencies_hz.first(), frequencies_hz.last()) else {
+        return String::new();
+    };
+    // ln of a power to dB.
+    let decibel = 10.0 / std::f64::consts::LN_10;
+    let points = |values: &[f64]| -> Vec<(f64, f64)> {
+        frequencies_hz.iter().zip(values).map(|(&f, value)| (f, decibel * value)).collect()
+    };
+    let all = measured.matches.iter().chain([&measured.log_power]).flatten();
+    let y = Axis::around("LWPS in dB re 1 (m/s²)²", all.map(|value| decibel * value));
+    let title = format!("{} at {} km/h", sleeper.id, measured.speed_km_h);
+    let x = Axis::logarithmic("frequency in Hz", low, high);
+    let mut chart = Chart::new(&title, SIZE, x, y);
+    for matched in &measured.matches {
+        chart.line("thin b", points(matched));
+    }
+    chart.line("a", points(&measured.log_power));
+    chart.explain("a", "measured");
+    chart.explain("b", &format!("{} best matches", measured.matches.len()));
+    chart.into_svg()
+}
