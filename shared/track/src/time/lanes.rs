@@ -15,6 +15,7 @@ mod elimination;
 mod factor;
 mod inertia;
 mod motion;
+mod runs;
 
 use super::{Pass, PassError, PassRecord};
 use crate::model::{Surface, TrackModel};

@@ -2,45 +2,59 @@
 
 use super::block::Block;
 use super::elimination::Elimination;
+use super::runs::Runs;
 use crate::time::PassError;
 
-/// A sparse matrix row by row: where rows begin, then columns and values.
+/// A sparse triangle row by row.
 #[derive(Clone, Debug)]
-pub(super) struct Rows {
+pub(super) struct Triangle {
+    /// Where each row begins among columns and values.
     starts: Vec<usize>,
-    columns: Vec<u32>,
+    columns: Vec<usize>,
     values: Vec<Block>,
+    runs: Runs,
 }
 
-impl Rows {
-    /// Rows of the given lengths, to be filled.
-    fn of_lengths(lengths: impl Iterator<Item = usize>) -> Self {
+impl Triangle {
+    /// Zero entries in these ascending columns of the rows.
+    fn empty(rows: &[Vec<usize>]) -> Self {
+        let mut runs = Runs::default();
         let mut starts = vec![0];
-        let mut total = 0;
-        for length in lengths {
-            total += length;
-            starts.push(total);
+        for row in rows {
+            runs.push_row(row.iter().copied());
+            starts.push(starts[starts.len() - 1] + row.len());
         }
-        Self { starts, columns: vec![0; total], values: vec![Block::default(); total] }
+        let columns: Vec<_> = rows.iter().flatten().copied().collect();
+        Self { starts, values: vec![Block::default(); columns.len()], columns, runs }
     }
 
-    /// `sum` less the product of a row with a vector.
+    /// `sum` plus the product of a row with a vector, from left to right: in forward elimination
+    /// the youngest number comes last and is waited for least.
     #[inline(always)]
-    pub(super) fn reduce(&self, row: usize, vector: &[Block], sum: Block) -> Block {
-        let (from, to) = (self.starts[row], self.starts[row + 1]);
-        let entries = self.columns[from..to].iter().zip(&self.values[from..to]);
-        entries
-            .fold(sum, |sum, (&column, value)| value.subtracted_from(vector[column as usize], sum))
+    pub(super) fn add_row(&self, row: usize, vector: &[Block], mut sum: Block) -> Block {
+        for run in self.runs.row(row) {
+            sum = run.add(&self.values, vector, sum);
+        }
+        sum
+    }
+
+    /// The same from right to left, for back substitution.
+    #[inline(always)]
+    pub(super) fn add_row_back(&self, row: usize, vector: &[Block], mut sum: Block) -> Block {
+        for run in self.runs.row(row).iter().rev() {
+            sum = run.add_back(&self.values, vector, sum);
+        }
+        sum
     }
 }
 
 /// Factor of one matrix a lane, all on the same pattern.
 #[derive(Clone, Debug)]
 pub(super) struct Factor {
-    /// `L` without its diagonal of ones, by rows: for forward elimination.
-    pub(super) lower: Rows,
-    /// `Lᵀ` without its diagonal, by rows: for back substitution.
-    pub(super) upper: Rows,
+    /// `-L` without its diagonal of ones, by rows: for forward elimination.
+    pub(super) lower: Triangle,
+    /// `-Lᵀ` without its diagonal, by rows: for back substitution.
+    pub(super) upper: Triangle,
     /// `1 / D`.
     pub(super) inverse_pivots: Vec<Block>,
 }
@@ -67,12 +81,14 @@ impl Factor {
             for (offset, &column) in pattern.iter().enumerate() {
                 let value = std::mem::take(&mut work[column]);
                 for place in factor.upper.starts[column]..filled[column] {
-                    let target = factor.upper.columns[place] as usize;
-                    work[target] = factor.upper.values[place].subtracted_from(value, work[target]);
+                    let target = factor.upper.columns[place];
+                    work[target] = factor.upper.values[place].mul_add(value, work[target]);
                 }
-                let multiplier = value * factor.inverse_pivots[column];
-                pivot = multiplier.subtracted_from(value, pivot);
-                factor.set(row, offset, filled[column], column, multiplier);
+                let multiplier = Block::default() - value * factor.inverse_pivots[column];
+                pivot = multiplier.mul_add(value, pivot);
+                let place = factor.lower.starts[row] + offset;
+                factor.lower.values[place] = multiplier;
+                factor.upper.values[filled[column]] = multiplier;
                 filled[column] += 1;
             }
             if !pivot.0.iter().all(|&value| value > 0.0 && value.is_finite()) {
@@ -86,36 +102,26 @@ impl Factor {
     /// Replaces right-hand sides, in elimination order, by the solutions.
     pub(super) fn solve(&self, vector: &mut [Block]) {
         for row in 0..vector.len() {
-            vector[row] = self.lower.reduce(row, vector, vector[row]);
+            vector[row] = self.lower.add_row(row, vector, vector[row]);
         }
         for row in (0..vector.len()).rev() {
-            vector[row] = self.upper.reduce(row, vector, vector[row] * self.inverse_pivots[row]);
+            vector[row] =
+                self.upper.add_row_back(row, vector, vector[row] * self.inverse_pivots[row]);
         }
     }
 
     fn empty(elimination: &Elimination) -> Self {
-        let mut column_lengths = vec![0; elimination.order.len()];
-        for &column in elimination.rows.iter().flatten() {
-            column_lengths[column] += 1;
+        let size = elimination.order.len();
+        let mut columns = vec![Vec::new(); size];
+        for (row, pattern) in elimination.rows.iter().enumerate() {
+            for &column in pattern {
+                columns[column].push(row);
+            }
         }
         Self {
-            lower: Rows::of_lengths(elimination.rows.iter().map(Vec::len)),
-            upper: Rows::of_lengths(column_lengths.into_iter()),
-            inverse_pivots: vec![Block::default(); elimination.order.len()],
+            lower: Triangle::empty(&elimination.rows),
+            upper: Triangle::empty(&columns),
+            inverse_pivots: vec![Block::default(); size],
         }
     }
-
-    /// Stores an entry of `L`, the `offset`-th of its row, in both triangles.
-    fn set(&mut self, row: usize, offset: usize, upper: usize, column: usize, value: Block) {
-        let lower = self.lower.starts[row] + offset;
-        self.lower.columns[lower] = index(column);
-        self.lower.values[lower] = value;
-        self.upper.columns[upper] = index(row);
-        self.upper.values[upper] = value;
-    }
-}
-
-/// A place in the shorter form that the inner loops read.
-pub(super) fn index(place: usize) -> u32 {
-    u32::try_from(place).expect("a track has fewer than four thousand million places")
 }

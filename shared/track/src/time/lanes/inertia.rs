@@ -2,27 +2,26 @@
 
 use super::block::{Block, LANES};
 use super::elimination::Elimination;
-use super::factor::index;
+use super::runs::Runs;
 use crate::model::{Matrices, TrackModel};
+use std::iter;
 
 /// The two combinations of displacement `u`, velocity `v` and acceleration `a` that the next step
 /// needs of a degree of freedom.
-///
-/// With the displacement `u'` after the step, both come anew as `4 u' - 2 q - p` and `2 u' - q`.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct State {
-    /// `u + dt v + dt² a / 4`.
+    /// `p = u + dt v + dt² a / 4`.
     inertial: Block,
-    /// `u + dt v / 2`.
+    /// `q = u + dt v / 2`.
     viscous: Block,
 }
 
 impl State {
-    #[inline(always)]
     pub(super) fn at_rest(displacement: Block) -> Self {
         Self { inertial: displacement, viscous: displacement }
     }
 
+    /// Moves on to a new displacement `u`: `p` becomes `4 u - 2 q - p` and `q` `2 u - q`.
     #[inline(always)]
     pub(super) fn advance(&mut self, displacement: Block) {
         let moved = displacement - self.viscous;
@@ -36,73 +35,93 @@ impl State {
     }
 }
 
-/// One factor of the sum: which half of which state it multiplies.
-#[derive(Clone, Copy, Debug)]
-struct Term<T> {
-    source: u32,
-    factor: T,
+/// The states of all degrees of freedom, part by part.
+#[derive(Clone, Debug)]
+pub(super) struct States {
+    inertial: Vec<Block>,
+    viscous: Vec<Block>,
+}
+
+impl States {
+    pub(super) fn at_rest(displacement: &[Block]) -> Self {
+        Self { inertial: displacement.to_vec(), viscous: displacement.to_vec() }
+    }
+
+    /// [`State::advance`] of one degree of freedom.
+    #[inline(always)]
+    pub(super) fn advance(&mut self, row: usize, displacement: Block) {
+        let mut state = State { inertial: self.inertial[row], viscous: self.viscous[row] };
+        state.advance(displacement);
+        self.inertial[row] = state.inertial;
+        self.viscous[row] = state.viscous;
+    }
 }
 
 /// `4 M / dt² p + 2 C / dt q`, row by row in elimination order.
-///
-/// Rows that are equal in all lanes keep scalars; which ones these are changes no bit, because
-/// the order of the sum stays.
 #[derive(Clone, Debug)]
 pub(super) struct Inertia {
-    /// Where the terms of each row end in the four lists below.
-    ends: Vec<[u32; 4]>,
-    masses: Vec<Term<f64>>,
-    dampings: Vec<Term<f64>>,
-    varied_masses: Vec<Term<Block>>,
-    varied_dampings: Vec<Term<Block>>,
+    masses: Product,
+    dampings: Product,
 }
 
 impl Inertia {
     pub(super) fn new(elimination: &Elimination, models: &[&TrackModel; LANES], dt: f64) -> Self {
-        let mut inertia = Self {
-            ends: vec![[0; 4]],
-            masses: Vec::new(),
-            dampings: Vec::new(),
-            varied_masses: Vec::new(),
-            varied_dampings: Vec::new(),
-        };
         let (m, c) = (4.0 / (dt * dt), 2.0 / dt);
+        let mut inertia = Self { masses: Product::default(), dampings: Product::default() };
         for row in 0..elimination.order.len() {
-            let masses =
-                terms(elimination, models, row, |matrices, place| m * matrices.mass()[place]);
-            let dampings =
-                terms(elimination, models, row, |matrices, place| c * matrices.damping()[place]);
-            store(&masses, &mut inertia.masses, &mut inertia.varied_masses);
-            store(&dampings, &mut inertia.dampings, &mut inertia.varied_dampings);
-            inertia.ends.push([
-                index(inertia.masses.len()),
-                index(inertia.dampings.len()),
-                index(inertia.varied_masses.len()),
-                index(inertia.varied_dampings.len()),
-            ]);
+            inertia.masses.push_row(&terms(elimination, models, row, |matrices, place| {
+                m * matrices.mass()[place]
+            }));
+            inertia.dampings.push_row(&terms(elimination, models, row, |matrices, place| {
+                c * matrices.damping()[place]
+            }));
         }
         inertia
     }
 
     /// One row of the sum.
     #[inline(always)]
-    pub(super) fn row(&self, row: usize, states: &[State]) -> Block {
-        let [from, to] = [self.ends[row], self.ends[row + 1]];
-        let part = |kind: usize| from[kind] as usize..to[kind] as usize;
-        let mut sum = Block::default();
-        for term in &self.masses[part(0)] {
-            let state = &states[term.source as usize];
-            sum = Block::splat(term.factor).mul_add(state.inertial, sum);
+    pub(super) fn row(&self, row: usize, states: &States) -> Block {
+        let inertia = self.masses.add_row(row, &states.inertial, Block::default());
+        self.dampings.add_row(row, &states.viscous, inertia)
+    }
+}
+
+/// A sparse matrix whose rows are kept as scalars where they are equal in all lanes.
+///
+/// Which rows these are changes no bit of a product: the order of the sum stays.
+#[derive(Clone, Debug, Default)]
+struct Product {
+    common_runs: Runs,
+    common: Vec<f64>,
+    varied_runs: Runs,
+    varied: Vec<Block>,
+}
+
+impl Product {
+    /// Appends a row of columns, ascending, and values.
+    fn push_row(&mut self, entries: &[(usize, Block)]) {
+        let columns = entries.iter().map(|&(column, _)| column);
+        let common: Option<Vec<f64>> = entries.iter().map(|(_, value)| value.uniform()).collect();
+        if let Some(values) = common {
+            self.common_runs.push_row(columns);
+            self.common.extend(values);
+            self.varied_runs.push_row(iter::empty());
+        } else {
+            self.common_runs.push_row(iter::empty());
+            self.varied_runs.push_row(columns);
+            self.varied.extend(entries.iter().map(|&(_, value)| value));
         }
-        for term in &self.varied_masses[part(2)] {
-            sum = term.factor.mul_add(states[term.source as usize].inertial, sum);
+    }
+
+    /// `sum` plus the product of a row with a vector.
+    #[inline(always)]
+    fn add_row(&self, row: usize, vector: &[Block], mut sum: Block) -> Block {
+        for run in self.common_runs.row(row) {
+            sum = run.add(&self.common, vector, sum);
         }
-        for term in &self.dampings[part(1)] {
-            let state = &states[term.source as usize];
-            sum = Block::splat(term.factor).mul_add(state.viscous, sum);
-        }
-        for term in &self.varied_dampings[part(3)] {
-            sum = term.factor.mul_add(states[term.source as usize].viscous, sum);
+        for run in self.varied_runs.row(row) {
+            sum = run.add(&self.varied, vector, sum);
         }
         sum
     }
@@ -138,20 +157,4 @@ pub(super) fn row_entries(
         .collect();
     entries.sort_unstable_by_key(|&(column, _)| column);
     entries
-}
-
-/// Stores a row as scalars if it is the same in all lanes, else as it is.
-fn store(
-    entries: &[(usize, Block)],
-    uniform: &mut Vec<Term<f64>>,
-    varied: &mut Vec<Term<Block>>,
-) {
-    let common: Option<Vec<f64>> = entries.iter().map(|(_, block)| block.uniform()).collect();
-    let sources = entries.iter().map(|&(column, _)| index(column));
-    if let Some(factors) = common {
-        uniform.extend(sources.zip(factors).map(|(source, factor)| Term { source, factor }));
-    } else {
-        let blocks = entries.iter().map(|&(_, factor)| factor);
-        varied.extend(sources.zip(blocks).map(|(source, factor)| Term { source, factor }));
-    }
 }

@@ -4,7 +4,7 @@ use super::block::{Block, LANES};
 use super::contact;
 use super::elimination::Elimination;
 use super::factor::Factor;
-use super::inertia::{Inertia, State, row_entries};
+use super::inertia::{Inertia, State, States, row_entries};
 use crate::model::{HertzContact, TrackModel};
 use crate::time::{Pass, PassError};
 use pulp::{Arch, Simd, WithSimd};
@@ -55,7 +55,7 @@ pub(super) struct Motion {
     wheel_compliance: Block,
     factor: Factor,
     inertia: Inertia,
-    track: Vec<State>,
+    track: States,
     wheel: State,
     /// The right-hand side after forward elimination.
     eliminated: Vec<Block>,
@@ -95,7 +95,7 @@ impl Motion {
             wheel_compliance: Block::splat(dt * dt / (4.0 * mass_kg)),
             factor: dynamic_stiffness(elimination, &models, dt)?,
             inertia: Inertia::new(elimination, &models, dt),
-            track: rest.iter().copied().map(State::at_rest).collect(),
+            track: States::at_rest(&rest),
             wheel: State::at_rest(rail + Block::splat(given)),
             eliminated: vec![Block::default(); size],
             unit: vec![Block::default(); size],
@@ -129,7 +129,7 @@ impl Motion {
     fn eliminate_past(&mut self) {
         for row in 0..self.eliminated.len() {
             let past = self.inertia.row(row, &self.track);
-            self.eliminated[row] = self.factor.lower.reduce(row, &self.eliminated, past);
+            self.eliminated[row] = self.factor.lower.add_row(row, &self.eliminated, past);
         }
     }
 
@@ -143,7 +143,7 @@ impl Motion {
         let (mut compliance, mut deflection) = (Block::default(), Block::default());
         for row in station.first..self.unit.len() {
             let load = Block::splat(station.load(row));
-            let unit = self.factor.lower.reduce(row, &self.unit, load);
+            let unit = self.factor.lower.add_row(row, &self.unit, load);
             self.unit[row] = unit;
             let scaled = unit * self.factor.inverse_pivots[row];
             compliance = scaled.mul_add(unit, compliance);
@@ -161,9 +161,9 @@ impl Motion {
                 pushed = self.unit[row].mul_add(force, pushed);
             }
             let scaled = pushed * self.factor.inverse_pivots[row];
-            let displacement = self.factor.upper.reduce(row, &self.displacement, scaled);
+            let displacement = self.factor.upper.add_row_back(row, &self.displacement, scaled);
             self.displacement[row] = displacement;
-            self.track[row].advance(displacement);
+            self.track.advance(row, displacement);
         }
     }
 }
