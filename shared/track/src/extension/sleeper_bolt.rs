@@ -92,7 +92,7 @@ mod tests {
         let (free, bolted) = (track(&[]), track(&all));
         let run = |model: &TrackModel| time::pass(model, &pass, &surface).unwrap();
         let (free, reference) = (run(&free).acceleration_m_s2, run(&bolted).acceleration_m_s2);
-        let fast = &time::passes(&[bolted], &pass, &[surface.clone()]).unwrap()[0];
+        let fast = &time::passes(&[bolted], &pass, std::slice::from_ref(&surface)).unwrap()[0];
         assert!(distance(&free, &reference) > 0.05, "{}", distance(&free, &reference));
         // Two roads to one solution: the rounding of 1e4 steps, as in the fast solver's own test.
         let difference = distance(&fast.acceleration_m_s2, &reference);
