@@ -53,6 +53,7 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
     let flagged = evaluation.sleepers.iter().filter(|sleeper| !sleeper.flags.is_empty()).count();
     let remark = match flagged {
         0 => String::new(),
+        1 => "; 1 sleeper is flagged (see the table) and left out of these ranges".to_owned(),
         _ => {
             format!("; {flagged} sleepers are flagged (see the table) and left out of these ranges")
         }

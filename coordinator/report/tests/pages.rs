@@ -1,0 +1,180 @@
+//! Pages made of small synthetic results: whole, self-contained, and left in the target folder
+//! for a look.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+use tracktwin_evaluation::{
+    Estimate, Estimates, Evaluation, FORMAT, Flag, Measured, Provenance, Selected,
+    SleeperEvaluation,
+};
+use tracktwin_parameters::Parameter;
+use tracktwin_report::{
+    ReceptanceCurve, evaluation_page, models_page, receptance_chart, scatter_chart,
+};
+use tracktwin_signal::recording::{Pass, Recording, Sleeper};
+use tracktwin_signal::{Extractor, FeatureDefinition, Signal};
+use tracktwin_surrogate::{FeatureColumns, TrainOptions, Trained, TrainingSet, train};
+
+const RATE_HZ: f64 = 20_000.0;
+
+/// Twelve sleepers under a wheel that hums at 115 and rings at 600 to 900 Hz at each of them.
+fn recording() -> Recording {
+    let speed_m_s = 13.0 / 3.6;
+    let samples = (1.75 / speed_m_s * RATE_HZ) as usize;
+    let position_m: Vec<f64> = (0..samples).map(|i| i as f64 / RATE_HZ * speed_m_s).collect();
+    let ring = |x: f64| {
+        let since = x.rem_euclid(0.125) / speed_m_s;
+        let pitch_hz = 600.0 + 170.0 * x;
+        8.0 * (-since * 120.0).exp() * (TAU * pitch_hz * since).sin()
+    };
+    let hum = |x: f64| 2.0 * (TAU * 115.0 * x / speed_m_s).sin();
+    let signal = position_m.iter().map(|&x| ring(x) + hum(x)).collect();
+    let signal = Signal::new(RATE_HZ, signal).expect("finite");
+    let sleepers =
+        (1..=12).map(|n| Sleeper { id: format!("SN{n}"), x_m: f64::from(n) * 0.125 }).collect();
+    Recording {
+        name: "ring <1>".to_owned(),
+        sample_rate_hz: RATE_HZ,
+        channel: String::new(),
+        passes: vec![Pass { file: "pass-13kmh-1".into(), speed_km_h: 13.0, signal, position_m }],
+        sleepers,
+        nominal: serde_json::Map::new(),
+        spacing_m: 0.125,
+    }
+}
+
+fn estimates(place: f64, spread: f64) -> Estimates {
+    let estimate = |&parameter: &Parameter| {
+        let mean = parameter.nominal() * (1.0 + 0.1 * (3.0 * place + spread).sin());
+        (parameter, Estimate { mean, sd: 0.06 * mean })
+    };
+    Parameter::ALL.iter().map(estimate).collect()
+}
+
+fn evaluation(recording: &Recording, extractor: &Extractor) -> Evaluation {
+    let sleeper = |index: usize| {
+        let Sleeper { id, x_m } = recording.sleepers[index].clone();
+        let window = recording.window(0, index).expect("every sleeper is covered");
+        let features = extractor.extract(&recording.passes[0].signal, window).expect("features");
+        let near = |shift: i32| {
+            let value = |(bin, v): (usize, &f64)| v + 0.2 * f64::from(shift) * (bin as f64).sin();
+            features.log_power.iter().enumerate().map(value).collect()
+        };
+        let matches = (-5..5).map(near).collect();
+        let log_power = features.log_power.clone();
+        SleeperEvaluation {
+            id,
+            x_m,
+            estimates: estimates(x_m, 0.0),
+            selector: Selected {
+                estimates: estimates(x_m, 0.7),
+                entries: (0..10).collect(),
+                mape: vec![0.05; 10],
+            },
+            flags: if index == 0 { vec![Flag::ShortMargin] } else { Vec::new() },
+            measured: vec![Measured { speed_km_h: 13.0, passes: 1, log_power, matches }],
+        }
+    };
+    Evaluation {
+        format: FORMAT,
+        recording: recording.name.clone(),
+        method: "gp",
+        provenance: Provenance {
+            code_version: "0.1.0",
+            campaign: "synthetic".to_owned(),
+            library_digest: "0123abcd".to_owned(),
+            library_entries: 300,
+            feature: "GF",
+            feature_definition: serde_json::json!({"margin_s": 0.06}),
+            speeds_km_h: vec![13.0],
+            combination: "one model of all speeds together",
+        },
+        sleepers: (0..recording.sleepers.len()).map(sleeper).collect(),
+        unevaluated: Vec::new(),
+        frequencies_hz: extractor.definition().frequencies_hz(),
+    }
+}
+
+/// Models of two parameters at two speeds on a hash of numbers that says little.
+fn models() -> Trained {
+    let random = |index: usize| ((index as f64 + 1.0) * 12.9898).sin() * 43_758.545_3 % 1.0;
+    let (entries, bins) = (300, 6);
+    let parameters: Vec<f64> = (0..entries)
+        .flat_map(|entry| [1e8 * (2.0 + random(entry)), 3.0 + random(7 * entry + 3)])
+        .collect();
+    let table = |speed: usize| {
+        (0..entries * bins)
+            .map(|cell| {
+                let (entry, bin) = (cell / bins, cell % bins);
+                let [pad, level] = [1e-8 * parameters[2 * entry], parameters[2 * entry + 1]];
+                pad * bin as f64 * 0.3
+                    + level
+                    + (0.3 + 0.2 * speed as f64) * random(cell + 999 * speed)
+            })
+            .collect()
+    };
+    let set = TrainingSet {
+        frequencies_hz: vec![100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0],
+        speeds_km_h: vec![10.0, 13.0],
+        log_power: vec![table(0), table(1)],
+        varied: vec![Parameter::RailpadStiffness, Parameter::IrregularityLevel],
+        parameters,
+        campaign: "synthetic".to_owned(),
+        library_digest: "0123abcd".to_owned(),
+        feature_definition: serde_json::json!({}),
+    };
+    let columns = vec![FeatureColumns::new("GF", 0..6), FeatureColumns::new("LF1", 0..3)];
+    train(&set, &TrainOptions::new(columns), &|_| ()).expect("enough entries")
+}
+
+/// Leaves the page for a look, and refuses what would need the network.
+fn keep(name: &str, text: &str) {
+    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name), text).expect("writable");
+    let foreign = text.replace("http://www.w3.org/2000/svg", "");
+    assert!(!foreign.contains("http://") && !foreign.contains("https://"), "{name}");
+    assert!(!foreign.contains("<script") && !foreign.contains("NaN"), "{name}");
+}
+
+#[test]
+fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
+    let recording = recording();
+    let extractor = Extractor::new(&FeatureDefinition::default()).expect("default features");
+    let evaluation = evaluation(&recording, &extractor);
+    let page = evaluation_page(&evaluation, &recording, &extractor);
+    keep("report.html", &page);
+    for sleeper in &evaluation.sleepers {
+        assert!(page.contains(&format!("<td>{}</td>", sleeper.id)), "{}", sleeper.id);
+    }
+    // Six parameters, signal and two maps, four spectra.
+    assert_eq!(page.matches("class=\"chart\"").count(), 6 + 3 + 4);
+    assert_eq!(page.matches("data:image/png;base64,").count(), 2);
+    assert!(page.contains("ring &lt;1&gt;") && !page.contains("ring <1>"));
+    assert!(page.contains("1 sleeper is flagged"), "the summary counts flags");
+}
+
+#[test]
+fn the_page_of_the_models_has_a_bar_for_every_model() {
+    let models = models();
+    let page = models_page(&models);
+    keep("models.html", &page);
+    // Two feature sets at two speeds and one at both together, two parameters each.
+    assert_eq!(page.matches("<rect class=\"bar").count(), 2 * (2 * 2 + 1));
+    assert!(page.contains("10 + 13"));
+}
+
+#[test]
+fn receptances_and_scatter_are_pictures_of_their_own() {
+    let frequencies: Vec<f64> =
+        (0..400).map(|i| 50.0 * 160f64.powf(f64::from(i) / 399.0)).collect();
+    let curve = |name: &str, resonance_hz: f64| {
+        let value = |&f: &f64| {
+            let ratio = f / resonance_hz;
+            1e-8 / num_complex::Complex64::new(1.0 - ratio * ratio, 0.1 * ratio)
+        };
+        ReceptanceCurve { name: name.to_owned(), values: frequencies.iter().map(value).collect() }
+    };
+    let svg = receptance_chart(&frequencies, &[curve("sleeper", 300.0), curve("midspan", 900.0)]);
+    keep("receptance.svg", &svg);
+    let pairs: Vec<_> = (0..500).map(|i| f64::from(i) * 5e5 + 1e7).map(|x| (x, x * 1.1)).collect();
+    keep("scatter.svg", &scatter_chart(Parameter::RailpadStiffness, &pairs));
+}
