@@ -214,6 +214,8 @@ impl Session {
     }
 
     /// Calls until there is an answer, or a refusal, or (then `None`) until `end`.
+    ///
+    /// A call on its way is waited for even then: what it leases must be known to be given back.
     async fn persist<T, F>(
         &self,
         end: &CancellationToken,
@@ -223,10 +225,10 @@ impl Session {
         F: Future<Output = Result<Response<T>, Status>>,
     {
         let mut backoff = Backoff::default();
-        loop {
+        while !end.is_cancelled() {
             let answer = tokio::select! {
                 answer = call(self.client.clone()) => answer,
-                () = end.cancelled() => return Ok(None),
+                () = self.give_up.cancelled() => return Ok(None),
             };
             let status = match answer {
                 Ok(answer) => return Ok(Some(answer.into_inner())),
@@ -241,8 +243,9 @@ impl Session {
             }
             tokio::select! {
                 () = tokio::time::sleep(backoff.next()) => {}
-                () = end.cancelled() => return Ok(None),
+                () = end.cancelled() => {}
             }
         }
+        Ok(None)
     }
 }

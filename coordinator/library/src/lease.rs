@@ -108,7 +108,7 @@ impl Write for LeaseRequest {
             from next
             where campaign_case.campaign_id = next.campaign_id
                 and campaign_case.sobol_index = next.sobol_index
-            returning campaign_case.*",
+            returning *",
         )
         .bind(&self.campaign)
         .bind(self.indices_below)
