@@ -12,6 +12,9 @@ use tracktwin_signal::recording::Recording;
 pub(crate) const SPEED_TOLERANCE: f64 = 0.02;
 /// A window counts as complete from this share on: odometers drift by a few millimetres.
 const COMPLETE_SHARE: f64 = 0.98;
+/// A margin counts as short below this share: its last quarter is where the signal fades out
+/// anyway, so that three quarters of it lose only the outermost part of wavelets below 70 Hz.
+const MARGIN_SHARE: f64 = 0.75;
 
 /// What is known of a sleeper from all passes over it.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +80,8 @@ fn sleeper_features(
     for (pass, &speed) in speed_of_pass.iter().enumerate() {
         let Some(window) = recording.window(pass, sleeper) else { continue };
         let signal = &recording.passes[pass].signal;
-        let margin = (extractor.definition().margin_s * signal.sample_rate_hz()) as usize;
+        let margin_s = MARGIN_SHARE * extractor.definition().margin_s;
+        let margin = (margin_s * signal.sample_rate_hz()) as usize;
         if recording.window_share(pass, sleeper) < COMPLETE_SHARE {
             flags.push(Flag::IncompleteWindow);
         }
@@ -152,5 +156,31 @@ mod tests {
         let all = features(&recording, &testing::extractor(), &testing::SPEEDS_KM_H).unwrap();
         assert_eq!(all[0].flags, [Flag::IncompleteWindow, Flag::ShortMargin]);
         assert_eq!(all[3].flags, []);
+    }
+
+    #[test]
+    fn the_sleepers_of_an_independent_recording_are_clean_but_for_the_outer_ones() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../../shared/recordings/dev-01");
+        if !path.is_dir() {
+            assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "no {path:?}");
+            println!("skipped: ../shared is not there");
+            return;
+        }
+        let recording = Recording::open(path).unwrap();
+        let extractor = Extractor::new(&tracktwin_signal::FeatureDefinition::default()).unwrap();
+        let all = features(&recording, &extractor, &[7.0, 10.0, 13.0]).unwrap();
+        let of = |id: &str| {
+            let place = recording.sleepers.iter().position(|sleeper| sleeper.id == id).unwrap();
+            &all[place]
+        };
+        for number in 8..=31 {
+            let sleeper = of(&format!("SN{number}"));
+            let passes: Vec<_> = sleeper.speeds.iter().map(|known| known.passes).collect();
+            assert_eq!((&passes[..], &sleeper.flags[..]), (&[2, 2, 2][..], &[][..]), "SN{number}");
+        }
+        for id in ["SN5", "SN33"] {
+            assert_eq!(of(id).flags, [Flag::IncompleteWindow, Flag::ShortMargin], "{id}");
+        }
     }
 }

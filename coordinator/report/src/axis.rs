@@ -8,6 +8,8 @@ pub(crate) struct Axis {
     low: f64,
     high: f64,
     logarithmic: bool,
+    /// Distance of the ticks, where it is not to be chosen.
+    step: Option<f64>,
 }
 
 impl Axis {
@@ -20,12 +22,17 @@ impl Axis {
 
     /// A linear axis.
     pub(crate) fn linear(label: &str, low: f64, high: f64) -> Self {
-        Self { label: label.to_owned(), low, high, logarithmic: false }
+        Self { label: label.to_owned(), low, high, logarithmic: false, step: None }
+    }
+
+    /// The same axis with a tick at every multiple of `step`.
+    pub(crate) fn every(self, step: f64) -> Self {
+        Self { step: Some(step), ..self }
     }
 
     /// A logarithmic axis; both ends are positive.
     pub(crate) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
-        Self { label: label.to_owned(), low, high, logarithmic: true }
+        Self { label: label.to_owned(), low, high, logarithmic: true, step: None }
     }
 
     /// Where `value` lies: 0 at the low end, 1 at the high end.
@@ -46,7 +53,8 @@ impl Axis {
         let raw = (self.high - self.low) / at_most as f64;
         let decade = 10f64.powf(raw.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0].map(|round| round * decade);
-        let step = step.into_iter().find(|step| *step >= raw).unwrap_or(10.0 * decade);
+        let chosen = step.into_iter().find(|step| *step >= raw).unwrap_or(10.0 * decade);
+        let step = self.step.unwrap_or(chosen);
         let decimals = (-step.log10().floor()).max(0.0) as usize;
         let first = (self.low / step).ceil() as i64;
         let last = (self.high / step).floor() as i64;

@@ -59,9 +59,13 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
         }
     };
     format!(
-        "{} sleepers evaluated from {} passes at {} km/h: {}{remark}.",
+        "{} sleepers evaluated from {} at {} km/h: {}{remark}.",
         evaluation.sleepers.len(),
-        recording.passes.len(),
+        if recording.passes.len() == 1 {
+            "one pass".to_owned()
+        } else {
+            format!("{} passes", recording.passes.len())
+        },
         speeds.join(", "),
         ranges.join(", ")
     )

@@ -23,8 +23,8 @@ body{margin:0 auto;padding:1.5rem;max-width:72rem;background:var(--paper);color:
 h1{font-size:1.5rem;margin:0 0 .3rem}h2{font-size:1.15rem;margin:2.2rem 0 .4rem;border-top:1px solid var(--faint);padding-top:1.2rem}
 .summary{font-size:1.1rem;max-width:60rem}.note,figcaption,footer{color:var(--dim);font-size:.88rem;max-width:60rem}figure{margin:.6rem 0}
 .pictures{display:flex;flex-wrap:wrap;gap:.6rem}.scroll{overflow-x:auto}
-table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.88rem}th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid var(--faint);white-space:nowrap}
-th{vertical-align:bottom;font-weight:600}th small{display:block;font-weight:400;color:var(--dim)}td:first-child,th:first-child,.words{text-align:left}
+table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.88rem}th,td{padding:.2rem .55rem;text-align:right;border-bottom:1px solid var(--faint);white-space:nowrap}
+th{vertical-align:bottom;font-weight:600;white-space:normal}th small{white-space:nowrap}th small{display:block;font-weight:400;color:var(--dim)}td:first-child,th:first-child,.words{text-align:left}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.15rem 1.2rem;font-size:.9rem}dt{color:var(--dim)}dd{margin:0;overflow-wrap:anywhere}
 code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.85rem}pre{overflow-x:auto;border:1px solid var(--faint);padding:.6rem}
 @media print{body{max-width:none;padding:0;font-size:11pt}figure,tr{break-inside:avoid}}

@@ -32,7 +32,7 @@ pub fn receptance_chart(frequencies_hz: &[f64], curves: &[ReceptanceCurve]) -> S
     let most = positive.iter().copied().fold(0.0, f64::max).max(2.0 * least);
     let axis = Axis::logarithmic("receptance in m/N", least / 1.3, most * 1.3);
     let mut magnitude = Chart::new("Magnitude", [WIDTH, HEIGHTS[0]], frequency(), axis);
-    let axis = Axis::linear("phase in degrees", -190.0, 190.0);
+    let axis = Axis::linear("phase in degrees", -190.0, 190.0).every(90.0);
     let mut phase = Chart::new("Phase", [WIDTH, HEIGHTS[1]], frequency(), axis);
     for (curve, class) in curves.iter().zip(CLASSES.into_iter().cycle()) {
         let points = || frequencies_hz.iter().zip(&curve.values).map(|(f, value)| (*f, *value));
