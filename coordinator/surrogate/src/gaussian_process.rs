@@ -139,16 +139,8 @@ impl Factor {
     /// inverse `Q` projected against the mean (Rasmussen & Williams 2006, eq. 5.9, with `s²`
     /// profiled out). Costs an inverse: three times the likelihood.
     pub fn gradients(&self, distances: MatRef<'_, f64>, weights: &Weights) -> Vec<[f64; 2]> {
-        self.gradients_from(distances, self.projected_inverse().as_ref(), weights)
-    }
-
-    /// The same from the lower triangle of `Q`.
-    pub(crate) fn gradients_from(
-        &self,
-        distances: MatRef<'_, f64>,
-        projected_inverse: MatRef<'_, f64>,
-        weights: &Weights,
-    ) -> Vec<[f64; 2]> {
+        let projected_inverse = self.projected_inverse();
+        let projected_inverse = projected_inverse.as_ref();
         let n = self.entries();
         let columns: Vec<Vec<f64>> = (0..n)
             .into_par_iter()

@@ -21,7 +21,7 @@ pub struct GroupKey {
 }
 
 /// How good one model is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Score {
     /// MASE (paper, eq. 11) over the folds of the training set; 0.05 is 5 %.
     pub mase_folds: f64,
@@ -48,8 +48,6 @@ pub struct ParameterModel {
     pub signal_variance: f64,
     /// Log marginal likelihood in nats.
     pub log_likelihood: f64,
-    /// Its derivatives by the logarithms of length and noise ratio: near zero at the top.
-    pub log_likelihood_gradient: [f64; 2],
     /// Correction of the standard deviation, over the parameter mapped onto [0, 1].
     pub spread: Spread,
     /// How good it is.

@@ -20,6 +20,11 @@ pub struct Spread {
 }
 
 impl Spread {
+    /// No correction.
+    pub fn none() -> Self {
+        Self { at: vec![0.0], factors: vec![1.0] }
+    }
+
     /// Root mean square of the `standardised` errors among entries of similar `predicted` value.
     pub fn fit(predicted: &[f64], standardised: &[f64]) -> Self {
         let mut order: Vec<usize> = (0..predicted.len()).collect();

@@ -2,10 +2,10 @@
 
 use crate::distance::distances_within;
 use crate::group::different;
-use crate::validate::{coverage, folds_from, mase};
+use crate::validate::{coverage, folds, folds_with_own_maps, mase};
 use crate::{
-    Error, Factor, FeatureColumns, Fit, GroupKey, InputScaling, ModelGroup, ParameterModel, Score,
-    Split, Spread, Trained, TrainingSet, fit,
+    Error, Factor, FeatureColumns, Fit, Folds, GroupKey, Hyperparameters, InputScaling, ModelGroup,
+    ParameterModel, Score, Split, Spread, Trained, TrainingSet, fit,
 };
 use faer::Mat;
 use std::sync::OnceLock;
@@ -117,7 +117,12 @@ fn train_group(
     let features = set.features(&split.train, &speeds, &key.columns);
     let targets = unit_targets(set, &split.train);
     let fit = fit(features.as_ref(), targets.as_ref(), &options.scalings, options.subset)?;
-    let mut group = weigh(set, key, fit, &targets, options.folds)?;
+    let different = different(&fit.hyperparameters);
+    let held_out = held_out(&features, &targets, &fit, &different, options.folds)?;
+    let mut group = weigh(set, key, fit, &targets)?;
+    for (at, folds) in different.into_iter().zip(held_out) {
+        calibrate(&mut group, at, &folds, &targets);
+    }
     let tested = set.features(&split.test, &speeds, &key.columns);
     test(&mut group, &tested, &unit_targets(set, &split.test))?;
     // Factors are as large as all inputs of the training set together: they are made again when
@@ -144,47 +149,56 @@ fn speed_indices(set: &TrainingSet, key: &GroupKey) -> Vec<usize> {
         .collect()
 }
 
-/// Final weights, and what the folds say of the errors.
+/// Results of the folds at each of the hyper-parameters.
+fn held_out(
+    features: &Mat<f64>,
+    targets: &Mat<f64>,
+    fit: &Fit,
+    at: &[Hyperparameters],
+    count: usize,
+) -> Result<Vec<Folds>, Error> {
+    let scaling = fit.input_map.scaling;
+    if let InputScaling::Whitened { .. } = scaling {
+        return folds_with_own_maps(features.as_ref(), targets.as_ref(), scaling, at, count);
+    }
+    let away = distances_within(fit.inputs.as_ref());
+    let basis = fit.mean.basis(fit.inputs.as_ref());
+    at.iter()
+        .map(|&at| {
+            let factor = Factor::new(away.as_ref(), basis.as_ref(), at)?;
+            folds(&factor, factor.weights(targets.as_ref()).weights.as_ref(), count)
+        })
+        .collect()
+}
+
+/// The group with its final weights, not yet validated.
 fn weigh(
     set: &TrainingSet,
     key: &GroupKey,
     fit: Fit,
     targets: &Mat<f64>,
-    fold_count: usize,
 ) -> Result<ModelGroup, Error> {
     let away = distances_within(fit.inputs.as_ref());
     let basis = fit.mean.basis(fit.inputs.as_ref());
-    let (n, p) = (targets.nrows(), targets.ncols());
-    let mut weights = Mat::zeros(n, p);
+    let p = targets.ncols();
+    let mut weights = Mat::zeros(targets.nrows(), p);
     let mut coefficients = Mat::zeros(basis.ncols(), p);
     let mut models: Vec<Option<ParameterModel>> = vec![None; p];
     let mut factors = Vec::new();
     for at in different(&fit.hyperparameters) {
         let factor = Factor::new(away.as_ref(), basis.as_ref(), at)?;
         let all = factor.weights(targets.as_ref());
-        let q = factor.projected_inverse();
-        let gradients = factor.gradients_from(away.as_ref(), q.as_ref(), &all);
-        let held_out = folds_from(q.as_ref(), all.weights.as_ref(), fold_count)?;
         for j in (0..p).filter(|&j| fit.hyperparameters[j] == at) {
             weights.col_mut(j).copy_from(all.weights.col(j));
             coefficients.col_mut(j).copy_from(all.coefficients.col(j));
-            let s2 = all.signal_variances[j];
-            let truth: Vec<f64> = targets.col(j).iter().copied().collect();
-            let predicted: Vec<f64> =
-                (0..n).map(|i| (truth[i] - held_out.errors[(i, j)]).clamp(0.0, 1.0)).collect();
-            let standardised: Vec<f64> = (0..n)
-                .map(|i| (truth[i] - predicted[i]) / (s2 * held_out.variances[i]).sqrt())
-                .collect();
-            let mase_folds = mase(&truth, &predicted, 1.0);
             models[j] = Some(ParameterModel {
                 parameter: set.varied[j],
                 range: set.range(j),
                 hyperparameters: at,
-                signal_variance: s2,
+                signal_variance: all.signal_variances[j],
                 log_likelihood: all.log_likelihoods[j],
-                log_likelihood_gradient: gradients[j],
-                spread: Spread::fit(&predicted, &standardised),
-                score: Score { mase_folds, mase_test: 0.0, bias_test: 0.0, coverage_90_test: 0.0 },
+                spread: Spread::none(),
+                score: Score::default(),
             });
         }
         factors.push((at, OnceLock::from(factor)));
@@ -200,6 +214,24 @@ fn weigh(
         models: models.into_iter().flatten().collect(),
         factors,
     })
+}
+
+/// Error and spread over the folds, for the models with these hyper-parameters.
+fn calibrate(group: &mut ModelGroup, at: Hyperparameters, folds: &Folds, targets: &Mat<f64>) {
+    let models = group.models.iter_mut().enumerate();
+    for (j, model) in models.filter(|(_, model)| model.hyperparameters == at) {
+        let truth: Vec<f64> = targets.col(j).iter().copied().collect();
+        let predicted: Vec<f64> = truth
+            .iter()
+            .enumerate()
+            .map(|(i, t)| (t - folds.errors[(i, j)]).clamp(0.0, 1.0))
+            .collect();
+        let sds = folds.variances.iter().map(|variance| (model.signal_variance * variance).sqrt());
+        let standardised: Vec<f64> =
+            truth.iter().zip(&predicted).zip(sds).map(|((t, p), sd)| (t - p) / sd).collect();
+        model.score.mase_folds = mase(&truth, &predicted, 1.0);
+        model.spread = Spread::fit(&predicted, &standardised);
+    }
 }
 
 /// Predictions for entries that no step of the training saw.
