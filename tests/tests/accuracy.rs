@@ -1,10 +1,12 @@
 //! Simulated levels against those of a simulator that shares no code with this project.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
 use system_tests::shared_data;
-use tracktwin_parameters::{ParameterSet, TrackDesign};
+use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
 use tracktwin_signal::{PowerSpectrum, Signal};
 use tracktwin_track::model::{Mesh, Support, Surface, TrackModel};
 use tracktwin_track::time::{Pass, passes};
@@ -57,7 +59,7 @@ impl Reference {
         let file: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
         let mut set = ParameterSet::nominal();
         for (parameter, value) in file["parameters"].as_object().unwrap() {
-            let parameter = tracktwin_parameters::Parameter::from_name(parameter).unwrap();
+            let parameter = Parameter::from_name(parameter).unwrap();
             set[parameter] = value.as_f64().unwrap();
         }
         let speed = |(speed, levels): (&String, &Value)| {
@@ -93,7 +95,7 @@ impl Reference {
             time_step_s: TIME_STEP_S,
             local_flexibility: true,
         };
-        let level = self.set[tracktwin_parameters::Parameter::IrregularityLevel];
+        let level = self.set[Parameter::IrregularityLevel];
         let rough: Vec<Surface> = (0..surfaces)
             .map(|seed| Surface::rough(u64::from(seed), level, model.layout().length_m()))
             .collect();
