@@ -7,7 +7,7 @@ use tracktwin_parameters::TrackDesign;
 
 /// A relative motion `bᵀ u` that something acts on: the entries of the sparse vector `b`.
 ///
-/// An element of stiffness `k` on the port adds `k b bᵀ` (mismatch catalogue, eq. 1a).
+/// An element of stiffness `k` on the port adds `k b bᵀ`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Port {
     entries: Vec<(usize, f64)>,

@@ -169,7 +169,6 @@ mod tests {
             let pairs = plain.acceleration_m_s2.iter().zip(&fast.acceleration_m_s2);
             let difference = rms(pairs.map(|(a, b)| a - b));
             let relative = difference / rms(plain.acceleration_m_s2.iter().copied());
-            println!("relative rms difference {relative:e}");
             // Rounding of two different orders of summation, in differences of 1e-16 of the
             // displacement over dt² / 4.
             assert!(relative < 1e-8, "{relative:e}");

@@ -4,7 +4,6 @@ use super::block::{Block, LANES};
 use super::elimination::Elimination;
 use super::runs::Runs;
 use crate::model::{Matrices, TrackModel};
-use std::iter;
 
 /// The two combinations of displacement `u`, velocity `v` and acceleration `a` that the next step
 /// needs of a degree of freedom.
@@ -67,7 +66,7 @@ pub(super) struct Inertia {
 impl Inertia {
     pub(super) fn new(elimination: &Elimination, models: &[&TrackModel; LANES], dt: f64) -> Self {
         let (m, c) = (4.0 / (dt * dt), 2.0 / dt);
-        let mut inertia = Self { masses: Product::default(), dampings: Product::default() };
+        let mut inertia = Self { masses: Product::new(), dampings: Product::new() };
         for row in 0..elimination.order.len() {
             inertia.masses.push_row(&terms(elimination, models, row, |matrices, place| {
                 m * matrices.mass()[place]
@@ -90,40 +89,33 @@ impl Inertia {
 /// A sparse matrix whose rows are kept as scalars where they are equal in all lanes.
 ///
 /// Which rows these are changes no bit of a product: the order of the sum stays.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Product {
-    common_runs: Runs,
-    common: Vec<f64>,
-    varied_runs: Runs,
-    varied: Vec<Block>,
+    common: Runs<f64>,
+    varied: Runs<Block>,
 }
 
 impl Product {
+    fn new() -> Self {
+        Self { common: Runs::new(), varied: Runs::new() }
+    }
+
     /// Appends a row of columns, ascending, and values.
     fn push_row(&mut self, entries: &[(usize, Block)]) {
-        let columns = entries.iter().map(|&(column, _)| column);
-        let common: Option<Vec<f64>> = entries.iter().map(|(_, value)| value.uniform()).collect();
-        if let Some(values) = common {
-            self.common_runs.push_row(columns);
-            self.common.extend(values);
-            self.varied_runs.push_row(iter::empty());
+        let common = |&(column, value): &(usize, Block)| Some((column, value.uniform()?));
+        if let Some(row) = entries.iter().map(common).collect::<Option<Vec<_>>>() {
+            self.common.push_row(&row);
+            self.varied.push_row(&[]);
         } else {
-            self.common_runs.push_row(iter::empty());
-            self.varied_runs.push_row(columns);
-            self.varied.extend(entries.iter().map(|&(_, value)| value));
+            self.common.push_row(&[]);
+            self.varied.push_row(entries);
         }
     }
 
     /// `sum` plus the product of a row with a vector.
     #[inline(always)]
-    fn add_row(&self, row: usize, vector: &[Block], mut sum: Block) -> Block {
-        for run in self.common_runs.row(row) {
-            sum = run.add(&self.common, vector, sum);
-        }
-        for run in self.varied_runs.row(row) {
-            sum = run.add(&self.varied, vector, sum);
-        }
-        sum
+    fn add_row(&self, row: usize, vector: &[Block], sum: Block) -> Block {
+        self.varied.add_row(row, vector, self.common.add_row(row, vector, sum))
     }
 }
 

@@ -57,12 +57,10 @@ pub(super) struct Motion {
     inertia: Inertia,
     track: States,
     wheel: State,
-    /// The right-hand side after forward elimination.
-    eliminated: Vec<Block>,
+    /// The right-hand side after forward elimination; after back substitution the displacements.
+    solution: Vec<Block>,
     /// A unit contact force after forward elimination; zero before the wheel.
     unit: Vec<Block>,
-    /// Displacements after the step.
-    displacement: Vec<Block>,
 }
 
 impl Motion {
@@ -97,9 +95,8 @@ impl Motion {
             inertia: Inertia::new(elimination, &models, dt),
             track: States::at_rest(&rest),
             wheel: State::at_rest(rail + Block::splat(given)),
-            eliminated: vec![Block::default(); size],
+            solution: rest,
             unit: vec![Block::default(); size],
-            displacement: rest,
         })
     }
 
@@ -127,9 +124,9 @@ impl Motion {
     /// Forward elimination of what the past pushes with.
     #[inline(always)]
     fn eliminate_past(&mut self) {
-        for row in 0..self.eliminated.len() {
+        for row in 0..self.solution.len() {
             let past = self.inertia.row(row, &self.track);
-            self.eliminated[row] = self.factor.lower.add_row(row, &self.eliminated, past);
+            self.solution[row] = self.factor.lower.add_row(row, &self.solution, past);
         }
     }
 
@@ -147,7 +144,7 @@ impl Motion {
             self.unit[row] = unit;
             let scaled = unit * self.factor.inverse_pivots[row];
             compliance = scaled.mul_add(unit, compliance);
-            deflection = scaled.mul_add(self.eliminated[row], deflection);
+            deflection = scaled.mul_add(self.solution[row], deflection);
         }
         (compliance, deflection)
     }
@@ -155,14 +152,14 @@ impl Motion {
     /// Back substitution of the past and the contact force; moves the track on.
     #[inline(always)]
     fn substitute(&mut self, first: usize, force: Block) {
-        for row in (0..self.displacement.len()).rev() {
-            let mut pushed = self.eliminated[row];
+        for row in (0..self.solution.len()).rev() {
+            let mut pushed = self.solution[row];
             if row >= first {
                 pushed = self.unit[row].mul_add(force, pushed);
             }
             let scaled = pushed * self.factor.inverse_pivots[row];
-            let displacement = self.factor.upper.add_row_back(row, &self.displacement, scaled);
-            self.displacement[row] = displacement;
+            let displacement = self.factor.upper.add_row_back(row, &self.solution, scaled);
+            self.solution[row] = displacement;
             self.track.advance(row, displacement);
         }
     }
