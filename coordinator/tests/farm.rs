@@ -1,6 +1,8 @@
 //! The embedded farm over a real socket, with a stand-in for the physics; and what its service
 //! refuses.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::net::Ipv4Addr;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicU32, Ordering};

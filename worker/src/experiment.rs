@@ -98,6 +98,7 @@ pub enum ExperimentError {
 
 /// The way of the wheel at one speed, and what is kept of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "the unit belongs to the name")]
 pub(crate) struct Stretch {
     /// Where the wheel starts in m.
     pub(crate) start_m: f64,

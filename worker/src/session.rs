@@ -141,7 +141,15 @@ impl Session {
             match answer {
                 Err(AgentError::Unknown) => self.register(seen).await?,
                 Err(error) => return Err(error),
-                Ok(_) => break,
+                Ok(answer) => {
+                    let receipts = answer.map_or_else(Vec::new, |answer| answer.receipts);
+                    let refused = |it: &&farm::Receipt| it.verdict() == farm::Verdict::Refused;
+                    let refused = receipts.iter().filter(refused).count();
+                    if refused > 0 {
+                        tracing::warn!("{refused} results refused: not cases of this coordinator");
+                    }
+                    break;
+                }
             }
         }
         self.let_go(&lease.campaign, &held);

@@ -45,6 +45,10 @@ enum CaseError {
     Signal { speed_km_h: f64, source: SignalError },
     #[error("features at {speed_km_h} km/h: {source}")]
     Features { speed_km_h: f64, source: FeatureError },
+    #[error(
+        "features at {speed_km_h} km/h are not finite: the accelerations are beyond all bounds"
+    )]
+    NotFinite { speed_km_h: f64 },
 }
 
 impl Simulate for Simulation {
@@ -124,9 +128,17 @@ impl Simulation {
         let signal = Signal::new(1.0 / record.time_step_s, samples)
             .map_err(|source| CaseError::Signal { speed_km_h, source })?;
         let window = window.start - kept.start..window.end - kept.start;
-        self.extractor
+        let features = self
+            .extractor
             .extract(&signal, window)
-            .map_err(|source| CaseError::Features { speed_km_h, source })
+            .map_err(|source| CaseError::Features { speed_km_h, source })?;
+        // A finite signal may have a power that is not; the coordinator would refuse the message.
+        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        if finite(&features.log_power) && finite(&features.band_levels_db) {
+            Ok(features)
+        } else {
+            Err(CaseError::NotFinite { speed_km_h })
+        }
     }
 
     /// Samples of the kept stretch and of the window: from the first at or behind its beginning, as
@@ -137,5 +149,75 @@ impl Simulation {
         let sample = |x_m: f64| ((x_m - record.start_m) / step_m).ceil().max(0.0) as usize;
         let window = sample(stretch.window_m)..sample(stretch.window_end_m);
         [sample(stretch.kept_m)..record.acceleration_m_s2.len(), window]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_parameters::{ParameterSet, TrackDesign};
+
+    /// One speed on a coarse mesh: what is tested is the way, not the physics.
+    fn simulation() -> Simulation {
+        let experiment = Experiment {
+            rail_elements_per_span: 2,
+            sleeper_elements: 2,
+            speeds_km_h: vec![13.0],
+            ..Experiment::new(TrackDesign::v_track())
+        };
+        Simulation::new(&experiment).unwrap()
+    }
+
+    fn case(index: u32) -> Case {
+        let level = 1.0 + f64::from(index);
+        let parameters = ParameterSet::nominal().with(Parameter::IrregularityLevel, level);
+        Case { index, parameters, surface_seed: u64::from(index) }
+    }
+
+    #[test]
+    fn a_case_s_outcome_does_not_depend_on_its_company() {
+        let simulation = simulation();
+        let cases: Vec<_> = (0..3).map(case).collect();
+        let together = simulation.simulate(&cases);
+        let alone: Vec<_> = cases.chunks(1).flat_map(|case| simulation.simulate(case)).collect();
+        assert_eq!(together, alone);
+        assert!(matches!(&together[0], Outcome::Finished(passes) if passes.len() == 1));
+        assert_ne!(together[0], together[1]);
+    }
+
+    #[test]
+    fn a_case_that_cannot_be_is_a_result_and_spoils_no_other() {
+        let impossible = ParameterSet::nominal().with(Parameter::RailpadStiffness, -1.0);
+        let cases = [case(0), Case { parameters: impossible, ..case(1) }, case(2)];
+        let outcomes = simulation().simulate(&cases);
+        assert!(matches!(&outcomes[0], Outcome::Finished(_)));
+        let Outcome::Failed { reason } = &outcomes[1] else { panic!("{:?}", outcomes[1]) };
+        assert!(reason.starts_with("track model: "), "{reason}");
+        assert_eq!(outcomes[2], simulation().simulate(&[case(2)])[0]);
+    }
+
+    #[test]
+    fn the_window_is_one_spacing_centred_at_the_middle_sleeper() {
+        let simulation = simulation();
+        let pass = simulation.pass(13.0);
+        let length = pass.steps() + 1;
+        let record = PassRecord {
+            time_step_s: pass.time_step_s,
+            start_m: pass.start_m,
+            speed_m_s: pass.speed_m_s,
+            acceleration_m_s2: vec![0.0; length],
+            contact_force_n: vec![0.0; length],
+        };
+        let [kept, window] = simulation.samples(&record, 13.0);
+        let step_m = pass.speed_m_s * pass.time_step_s;
+        let centre = (window.start + window.end) as f64 / 2.0;
+        // Within the half sample that whole samples allow at either end.
+        assert!((pass.position_m(0) + step_m * centre - 1.5).abs() <= step_m);
+        assert!((window.len() as f64 - 0.125 / step_m).abs() <= 1.0);
+        // The margin is real signal: 0.06 s at 100 kHz.
+        assert!((window.start - kept.start).abs_diff(6000) <= 1);
+        assert!((kept.end - window.end).abs_diff(6000) <= 1);
+        // Two spans of run-in.
+        assert!((kept.start as f64 - 0.25 / step_m).abs() <= 1.0);
     }
 }

@@ -16,7 +16,7 @@ use tracktwin_protocol::{
 use tracktwin_worker::{CODE_VERSION, Experiment, ExperimentError, MODEL_HASH};
 
 /// A worker that was not heard of for so long is forgotten; if it comes back, it registers anew.
-const FORGET_AFTER: Duration = Duration::from_secs(600);
+const FORGET_AFTER: Duration = Duration::from_mins(10);
 
 /// How long leases last, and what follows from it.
 #[derive(Clone, Copy, Debug)]
@@ -230,7 +230,9 @@ impl Farm for Dispatch {
                 checked.collect::<Result<Vec<_>, _>>().map_err(|error| malformed(&error))?;
             let durations: Vec<f64> = reports.iter().map(|report| report.duration_s).collect();
             let verdicts = self.store(worker, provenance, reports).await?;
-            durations.into_iter().for_each(|case_s| self.pace().measured(case_s));
+            for case_s in durations {
+                self.pace().measured(case_s);
+            }
             verdicts
         } else {
             vec![Verdict::Refused; indices.len()]
