@@ -9,7 +9,7 @@ use std::cell::RefCell;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use tracktwin_library::{CampaignRecord, Library};
-use tracktwin_surrogate::{ModelGroup, Trained};
+use tracktwin_surrogate::{GroupKey, Trained};
 
 /// What `train` is told.
 #[derive(Args)]
@@ -52,7 +52,7 @@ pub(super) async fn train(
         tracktwin_surrogate::train(&set, &options, &|at| {
             let mut bar = bar.borrow_mut();
             let bar = bar.get_or_insert_with(|| Progress::begin("training", 0, at.groups as u64));
-            bar.at(at.finished as u64, &at.next.map(ToString::to_string).unwrap_or_default());
+            bar.at(at.finished as u64, &at.next.map(name).unwrap_or_default());
         })
         .inspect(|_| bar.take().into_iter().for_each(Progress::end))
     })
@@ -69,13 +69,13 @@ pub(super) async fn train(
 /// much of the test set the 90 % intervals hold.
 fn table(trained: &Trained) -> String {
     let mut text = String::from("Test MASE in % (share of the test set inside its 90 % interval)\n");
-    let name = |group: &ModelGroup| group.key().to_string();
-    let width = trained.groups().iter().map(|group| name(group).len()).max().unwrap_or(0);
+    let names = trained.groups().iter().map(|group| name(group.key()));
+    let width = names.map(|name| name.len()).max().unwrap_or(0);
     let Some(first) = trained.groups().first() else { return text };
     let heads = first.models().iter().map(|model| format!("{:>13}", model.parameter.symbol()));
     text += &format!("{:width$}{}\n", "", heads.collect::<String>());
     for group in trained.groups() {
-        text += &format!("{:width$}", name(group));
+        text += &format!("{:width$}", name(group.key()));
         for model in group.models() {
             let (mase, held) = (100.0 * model.score.mase_test, 100.0 * model.score.coverage_90_test);
             write!(text, "{mase:>7.1} ({held:>2.0}%)").expect("a string takes everything");
@@ -83,6 +83,12 @@ fn table(trained: &Trained) -> String {
         text.push('\n');
     }
     text.trim_end().to_owned()
+}
+
+/// What people call a group: `13 km/h GF`, `7+10+13 km/h GF`.
+fn name(key: &GroupKey) -> String {
+    let speeds: Vec<_> = key.speeds_km_h.iter().map(ToString::to_string).collect();
+    format!("{} km/h {}", speeds.join("+"), key.feature)
 }
 
 /// The table as JSON: a record a model.

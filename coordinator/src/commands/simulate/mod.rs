@@ -128,7 +128,7 @@ fn record(arguments: &Arguments, track: &SimulatedTrack) -> Result<Recording, St
     }
     Ok(Recording {
         name: arguments.out.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        sample_rate_hz: 1.0 / arguments.time_step,
+        sample_rate_hz: sample_rate_hz(arguments.time_step),
         channel: "vertical axle-box acceleration, positive downwards".to_owned(),
         passes,
         sleepers: track.sleepers_between(from_m, to_m),
@@ -157,6 +157,11 @@ fn pass_seed(seed: u64, speed_km_h: f64, pass: u32) -> u64 {
     u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
 }
 
+/// Samples a second, to the nanohertz: 1 / 2e-5 s is 50 kHz, not 49999.99999999999 Hz.
+fn sample_rate_hz(time_step_s: f64) -> f64 {
+    (1e9 / time_step_s).round() / 1e9
+}
+
 /// What the sensor makes of a pass, from `from_m` on.
 fn measured(
     record: &PassRecord,
@@ -180,7 +185,7 @@ fn measured(
     Ok(Pass {
         file: String::new(),
         speed_km_h,
-        signal: Signal::new(1.0 / record.time_step_s, samples)?,
+        signal: Signal::new(sample_rate_hz(record.time_step_s), samples)?,
         position_m: recorded.into_iter().map(position).collect(),
     })
 }

@@ -32,7 +32,7 @@ impl SimulatedTrack {
         let design = preset.design();
         let sleeper_bolt_n_m = arguments.sleeper_bolt;
         let extensions: Vec<Box<dyn Extension>> = sleeper_bolt_n_m
-            .map(|stiffness| SleeperBolt::new((0..spans - 1).collect(), stiffness))
+            .map(|stiffness| SleeperBolt { sleepers: (0..spans - 1).collect(), stiffness })
             .into_iter()
             .map(|bolts| Box::new(bolts) as _)
             .collect();
