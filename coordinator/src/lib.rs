@@ -3,6 +3,7 @@
 //! - [`campaign`]: what is to be simulated; from an index to a case.
 //! - [`dispatch`]: hands cases to workers and takes their results (gRPC).
 //! - [`farm`]: coordinator and workers in one process.
+//! - [`training`]: from a library to a training set.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
 //!
 //! The library, the surrogate, evaluation and reports are crates of their own beside `src`.
@@ -11,3 +12,4 @@ pub mod campaign;
 pub mod commands;
 pub mod dispatch;
 pub mod farm;
+pub mod training;

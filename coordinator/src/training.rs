@@ -30,7 +30,10 @@ pub enum TrainingError {
 ///
 /// # Errors
 /// [`TrainingError`].
-pub async fn set(library: &Library, campaign: &CampaignRecord) -> Result<TrainingSet, TrainingError> {
+pub async fn set(
+    library: &Library,
+    campaign: &CampaignRecord,
+) -> Result<TrainingSet, TrainingError> {
     let features = feature_definition(campaign)?;
     let speeds = campaign.speeds_km_h.len();
     let mut log_power = vec![Vec::new(); speeds];
@@ -76,9 +79,7 @@ pub fn options(set: &TrainingSet) -> TrainOptions {
 /// # Errors
 /// [`TrainingError::Experiment`].
 pub fn feature_definition(campaign: &CampaignRecord) -> Result<FeatureDefinition, TrainingError> {
-    let experiment: Experiment =
-        serde_json::from_str(&campaign.experiment_json).map_err(|source| {
-            TrainingError::Experiment { campaign: campaign.id.clone(), source }
-        })?;
+    let experiment: Experiment = serde_json::from_str(&campaign.experiment_json)
+        .map_err(|source| TrainingError::Experiment { campaign: campaign.id.clone(), source })?;
     Ok(experiment.features)
 }

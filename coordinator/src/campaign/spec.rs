@@ -205,10 +205,9 @@ impl File {
             return Err(SpecError::SequenceExhausted { path: path.to_owned(), cases });
         }
         let (space, fixed) = self.sampled(path)?;
-        let experiment = self.experiment().map_err(|source| SpecError::Experiment {
-            path: path.to_owned(),
-            source,
-        })?;
+        let experiment = self
+            .experiment()
+            .map_err(|source| SpecError::Experiment { path: path.to_owned(), source })?;
         let fixed = *fixed.values();
         let definition = Definition { seed: self.seed, sequence, space, fixed, experiment };
         Ok(Campaign { name: self.name, cases, definition })

@@ -65,18 +65,22 @@ async fn status(which: &Which) -> Result<(), Stop> {
     for campaign in campaigns {
         answers.push(counts(&library, campaign).await?);
     }
-    answer(which.json, &answers, |counts| {
-        let Counts { campaign, cases, finished, waiting, leased, failed, .. } = counts;
-        let mut text = format!(
+    answer(which.json, &answers, Counts::text);
+    Ok(())
+}
+
+impl Counts {
+    fn text(&self) -> String {
+        let Self { campaign, cases, finished, waiting, leased, failed, .. } = self;
+        let counts = format!(
             "{campaign}: {cases} cases, {finished} finished, {waiting} waiting, {leased} in work, \
              {failed} given up"
         );
-        for Failure { sobol_index, error } in &counts.failures {
-            text += &format!("\n  case {sobol_index} was given up: {error}");
-        }
-        text
-    });
-    Ok(())
+        let failures = self.failures.iter().map(|Failure { sobol_index, error }| {
+            format!("\n  case {sobol_index} was given up: {error}")
+        });
+        counts + &failures.collect::<String>()
+    }
 }
 
 async fn counts(library: &Library, campaign: CampaignRecord) -> Result<Counts, Stop> {
@@ -124,8 +128,10 @@ pub(super) async fn choose(library: &Library, id: Option<&str>) -> Result<Campai
     let names: Vec<_> = campaigns.iter().map(|campaign| campaign.id.as_str()).collect();
     let path = library.path().display();
     match campaigns.len() {
-        0 => Err(anyhow::anyhow!("library {path}: it holds no campaign yet; `tracktwin run` adds one"))
-            .or_input(),
+        0 => Err(anyhow::anyhow!(
+            "library {path}: it holds no campaign yet; `tracktwin run` adds one"
+        ))
+        .or_input(),
         1 => Ok(campaigns.remove(0)),
         _ => Err(anyhow::anyhow!(
             "library {path}: it holds several campaigns; choose one with --campaign: {}",
@@ -140,6 +146,8 @@ fn answer<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> String) 
         let json = serde_json::to_string_pretty(answers).expect("counts and names become JSON");
         say(&json);
     } else {
-        answers.iter().for_each(|answer| say(&text(answer)));
+        for answer in answers {
+            say(&text(answer));
+        }
     }
 }

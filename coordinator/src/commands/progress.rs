@@ -24,9 +24,9 @@ impl Progress {
         let target =
             if terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let style = "{prefix:12} {wide_bar} {pos}/{len}  {per_sec:>8}  {eta:>4} left {msg}";
-        let bar = ProgressBar::with_draw_target(Some(total), target).with_prefix(stage).with_style(
-            ProgressStyle::with_template(style).expect("the template is well formed"),
-        );
+        let bar = ProgressBar::with_draw_target(Some(total), target)
+            .with_prefix(stage)
+            .with_style(ProgressStyle::with_template(style).expect("the template is well formed"));
         bar.set_position(done);
         bar.reset_eta();
         let begun = Instant::now();

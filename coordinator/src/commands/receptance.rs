@@ -71,20 +71,17 @@ fn spot(text: &str) -> Result<Spot, String> {
     match text {
         "sleeper" => Ok(Spot::Sleeper),
         "midspan" => Ok(Spot::Midspan),
-        _ => text
-            .parse()
-            .map(Spot::At)
-            .map_err(|_| format!("`{text}` is no place; write sleeper, midspan or a position in m")),
+        _ => text.parse().map(Spot::At).map_err(|_| {
+            format!("`{text}` is no place; write sleeper, midspan or a position in m")
+        }),
     }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let frequencies = frequencies(arguments).or_input()?;
     let preset = Preset::from(arguments.preset);
-    let set = arguments
-        .settings
-        .iter()
-        .fold(preset.nominal(), |set, setting| setting.apply(set, 0));
+    let set =
+        arguments.settings.iter().fold(preset.nominal(), |set, setting| setting.apply(set, 0));
     let model = model(arguments.spans, preset, &set)?;
     let middle = arguments.spans / 2;
     let spacing = preset.design().sleeper.spacing_m;
@@ -110,7 +107,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
 fn frequencies(arguments: &Arguments) -> Result<Vec<f64>, anyhow::Error> {
     let Arguments { from, to, points, .. } = *arguments;
     if !(from > 0.0 && from < to && to.is_finite()) {
-        return Err(anyhow!("--from {from} --to {to}: give two frequencies in Hz, the lower first"));
+        return Err(anyhow!(
+            "--from {from} --to {to}: give two frequencies in Hz, the lower first"
+        ));
     }
     if points < 2 {
         return Err(anyhow!("--points: {points} are too few for a curve; give at least 2"));

@@ -2,9 +2,7 @@
 
 /// The end of a command that is not success; each has its exit code.
 #[derive(Debug)]
-pub enum Stop {
-    /// The command's answer is no (exit code 1).
-    Negative,
+pub(super) enum Stop {
     /// What the user gave can't be used (exit code 2).
     Input(anyhow::Error),
     /// The machine, the network or the program failed (exit code 3).
@@ -18,7 +16,7 @@ impl<E: Into<anyhow::Error>> From<E> for Stop {
 }
 
 /// Blames an error on what the user gave.
-pub trait OrInput<T> {
+pub(super) trait OrInput<T> {
     /// The value, or [`Stop::Input`].
     ///
     /// # Errors

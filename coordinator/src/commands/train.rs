@@ -6,10 +6,9 @@ use super::{OrInput, Stop, say};
 use crate::training;
 use clap::Args;
 use std::cell::RefCell;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use tracktwin_library::{CampaignRecord, Library};
-use tracktwin_surrogate::{GroupKey, Trained};
+use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Trained};
 
 /// What `train` is told.
 #[derive(Args)]
@@ -68,21 +67,20 @@ pub(super) async fn train(
 /// MASE on the test set in per cent, a row a group of models (paper, eq. 11 and Fig. 14), and how
 /// much of the test set the 90 % intervals hold.
 fn table(trained: &Trained) -> String {
-    let mut text = String::from("Test MASE in % (share of the test set inside its 90 % interval)\n");
-    let names = trained.groups().iter().map(|group| name(group.key()));
-    let width = names.map(|name| name.len()).max().unwrap_or(0);
-    let Some(first) = trained.groups().first() else { return text };
-    let heads = first.models().iter().map(|model| format!("{:>13}", model.parameter.symbol()));
-    text += &format!("{:width$}{}\n", "", heads.collect::<String>());
-    for group in trained.groups() {
-        text += &format!("{:width$}", name(group.key()));
-        for model in group.models() {
-            let (mase, held) = (100.0 * model.score.mase_test, 100.0 * model.score.coverage_90_test);
-            write!(text, "{mase:>7.1} ({held:>2.0}%)").expect("a string takes everything");
-        }
-        text.push('\n');
-    }
-    text.trim_end().to_owned()
+    let width = trained.groups().iter().map(|group| name(group.key()).len()).max().unwrap_or(0);
+    let heads = trained.groups().first().map(ModelGroup::models).unwrap_or_default().iter();
+    let heads = heads.map(|model| format!("{:>13}", model.parameter.symbol()));
+    let rows = trained.groups().iter().map(|group| {
+        let cells = group.models().iter().map(|ParameterModel { score, .. }| {
+            let (mase, held) = (100.0 * score.mase_test, 100.0 * score.coverage_90_test);
+            format!("{mase:>7.1} ({held:>3.0}%)")
+        });
+        format!("{:width$}{}", name(group.key()), cells.collect::<Vec<_>>().concat())
+    });
+    let title = "Test MASE in % (share of the test set inside its 90 % interval)";
+    let heads = format!("{:width$}{}", "", heads.collect::<Vec<_>>().concat());
+    let lines: Vec<_> = [title.to_owned(), heads].into_iter().chain(rows).collect();
+    lines.join("\n")
 }
 
 /// What people call a group: `13 km/h GF`, `7+10+13 km/h GF`.
@@ -109,6 +107,7 @@ fn mase_json(trained: &Trained) -> String {
         })
         .collect();
     let cases = trained.entries();
-    let text = serde_json::json!({ "format": "tracktwin-mase/1", "cases": cases, "models": records });
+    let text =
+        serde_json::json!({ "format": "tracktwin-mase/1", "cases": cases, "models": records });
     format!("{text:#}\n")
 }

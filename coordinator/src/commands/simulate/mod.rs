@@ -117,9 +117,9 @@ fn record(arguments: &Arguments, track: &SimulatedTrack) -> Result<Recording, St
             local_flexibility: !arguments.no_local_flexibility,
         };
         let number = 0..arguments.passes;
-        let seeds: Vec<_> = number.map(|pass| pass_seed(arguments.seed, speed_km_h, pass)).collect();
-        let surfaces: Vec<_> =
-            seeds.iter().map(|&seed| surface(arguments, track, seed)).collect();
+        let seeds: Vec<_> =
+            number.map(|pass| pass_seed(arguments.seed, speed_km_h, pass)).collect();
+        let surfaces: Vec<_> = seeds.iter().map(|&seed| surface(arguments, track, seed)).collect();
         let models = vec![track.model().clone(); surfaces.len()];
         let driven = time::passes(&models, &drive, &surfaces).or_input()?;
         for (record, seed) in driven.iter().zip(seeds) {

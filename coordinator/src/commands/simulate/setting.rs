@@ -37,8 +37,7 @@ impl FromStr for Setting {
             Some((name, place)) => (name, Some(place)),
             None => (target, None),
         };
-        let parameter =
-            Parameter::try_from(name.to_owned()).map_err(SettingError::Parameter)?;
+        let parameter = Parameter::try_from(name.to_owned()).map_err(SettingError::Parameter)?;
         let value = match value.parse::<f64>() {
             Ok(number) if number.is_finite() && number > 0.0 => number,
             _ => return Err(SettingError::Value(value.to_owned())),

@@ -102,7 +102,9 @@ impl SimulatedTrack {
     /// What was put in: the parameters of every sleeper, and the physics beyond the paper.
     pub(super) fn truth_json(&self) -> String {
         let of = |set: &ParameterSet| -> Map<String, Value> {
-            set.iter().map(|(parameter, value)| (parameter.name().to_owned(), json!(value))).collect()
+            set.iter()
+                .map(|(parameter, value)| (parameter.name().to_owned(), json!(value)))
+                .collect()
         };
         let sleepers: Map<String, Value> = self
             .sleepers
@@ -138,8 +140,7 @@ fn sleepers(
             return Err(anyhow!("--set: there is no {}; the last is {}", id(last), id(count - 1)));
         }
     }
-    let set_of = |number| {
-        settings.iter().fold(preset.nominal(), |set, setting| setting.apply(set, number))
-    };
+    let set_of =
+        |number| settings.iter().fold(preset.nominal(), |set, setting| setting.apply(set, number));
     Ok((0..count).map(set_of).collect())
 }
