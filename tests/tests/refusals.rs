@@ -1,6 +1,8 @@
 //! Bad input gets one line that says what, where and how to mend it, exit code 2, and changes
 //! nothing.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::fs;
 use std::path::Path;
 use system_tests::{Answer, run};
@@ -113,13 +115,13 @@ fn refused_recording(change: impl Fn(&Path), words: &[&str]) {
 }
 
 fn pass_csv(rows: usize) -> String {
-    let mut text = String::from("time_s,position_m,acceleration_m_s2\n");
-    for row in 0..rows {
+    let row = |row: usize| {
         let time = row as f64 / 10_000.0;
         let position = 0.1 + time * 13.0 / 3.6;
-        text += &format!("{time:.5},{position:.7},{:.4}\n", (time * 900.0).sin());
-    }
-    text
+        format!("{time:.5},{position:.7},{:.4}\n", (time * 900.0).sin())
+    };
+    let heads = "time_s,position_m,acceleration_m_s2\n".to_owned();
+    std::iter::once(heads).chain((0..rows).map(row)).collect()
 }
 
 fn rewrite(folder: &Path, file: &str, from: &str, to: &str) {
