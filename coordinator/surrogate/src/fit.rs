@@ -1,8 +1,9 @@
-//! Finds input scaling, mean and hyper-parameters by the marginal likelihood.
-//!
-//! A subset decides the scaling and where to begin, a larger one the hyper-parameters.
+//! Finds the input scaling by the errors on held-out entries, and the hyper-parameters by the
+//! marginal likelihood.
 
-use crate::distance::distances_within;
+use crate::distance::{distances, distances_within};
+use crate::group::different;
+use crate::kernel::correlations;
 use crate::ladder::{Ladder, Rung, Tried};
 use crate::{Error, Factor, Hyperparameters, InputMap, InputScaling};
 use faer::{Mat, MatRef};
@@ -59,11 +60,11 @@ impl MeanFunction {
 }
 
 /// Fits processes from `features` (n x d) to `targets` (n x p), with the scaling among `scalings`
-/// that `subset` entries find most likely.
+/// that predicts `subset` entries best.
 ///
-/// The entries must be in random order: the first ones are the subset. The likelihoods of the
-/// scalings are comparable because the targets are the same; the scaling is learned from the
-/// entries that the subset leaves, lest it be judged by what it was made of.
+/// The entries must be in random order: the first ones judge the scalings. A scaling is learned
+/// from other entries than those that judge it, because a likelihood of the entries it was made of
+/// would flatter the ones that learn most.
 ///
 /// # Errors
 /// Those of [`InputMap::fit`] and [`Factor::new`].
@@ -76,20 +77,21 @@ pub fn fit(
     scalings: &[InputScaling],
     subset: usize,
 ) -> Result<Fit, Error> {
-    let subset = subset.min(features.nrows() / 2);
+    let subset = subset.min(features.nrows() / 3);
     let (scaling, rungs) = choose(features, targets, scalings, subset)?;
     let input_map = InputMap::fit(scaling, features, targets)?;
     let inputs = input_map.apply(features);
     let climbers = features.nrows().min(CLIMBERS_MAX);
     let mean = MeanFunction::around(scaling);
-    let search = Search::new(inputs.subrows(0, climbers), mean, targets.subrows(0, climbers));
+    let climbing = inputs.subrows(0, climbers);
+    let search = Search::new(climbing, mean, targets.subrows(0, climbers));
     let mut tried = Tried::default();
     tried.climb(&rungs, 1, &mut |rung| search.log_likelihoods(rung))?;
     let hyperparameters = tried.shared().into_iter().map(|rung| search.ladder.at(rung)).collect();
     Ok(Fit { input_map, mean, inputs, hyperparameters })
 }
 
-/// The most likely scaling, and the best rungs under it.
+/// The scaling with the smallest errors, and the most likely rungs under it.
 fn choose(
     features: MatRef<'_, f64>,
     targets: MatRef<'_, f64>,
@@ -97,46 +99,55 @@ fn choose(
     subset: usize,
 ) -> Result<(InputScaling, Vec<Rung>), Error> {
     let rest = features.nrows() - subset;
-    let (judges, makers) = (features.subrows(0, subset), features.subrows(subset, rest));
-    let maps = candidates(makers, targets.subrows(subset, rest), scalings)?;
+    let judges = (features.subrows(0, subset), targets.subrows(0, subset));
+    let makers = (features.subrows(subset, rest), targets.subrows(subset, rest));
     let mut best: Option<(f64, InputScaling, Vec<Rung>)> = None;
-    for map in maps {
-        let search = Search::new(
-            map.apply(judges).as_ref(),
-            MeanFunction::around(map.scaling),
-            targets.subrows(0, subset),
-        );
+    for &scaling in scalings {
+        let map = InputMap::fit(scaling, makers.0, makers.1)?;
+        // Twice the judges: enough to tell scalings apart, and an eighth of the cost of four times.
+        let trained = rest.min(2 * subset);
+        let inputs = map.apply(makers.0.subrows(0, trained));
+        let mean = MeanFunction::around(scaling);
+        let climbers = inputs.subrows(0, subset);
+        let search = Search::new(climbers, mean, makers.1.subrows(0, subset));
         let mut tried = Tried::default();
         tried.climb(&[START], COARSE, &mut |rung| search.log_likelihoods(rung))?;
-        if best.as_ref().is_none_or(|(score, ..)| tried.score() > *score) {
-            best = Some((tried.score(), map.scaling, tried.best()));
+        let at: Vec<_> = tried.shared().into_iter().map(|rung| search.ladder.at(rung)).collect();
+        let trainers = (inputs.as_ref(), makers.1.subrows(0, trained));
+        let judging = map.apply(judges.0);
+        let error = log_errors(mean, &at, trainers, (judging.as_ref(), judges.1))?;
+        if best.as_ref().is_none_or(|(least, ..)| error < *least) {
+            best = Some((error, scaling, tried.best()));
         }
     }
     let (_, scaling, rungs) = best.expect("there is a scaling to choose from");
     Ok((scaling, rungs))
 }
 
-/// A map for every scaling; the whitened ones are cut from one, which is what costs.
-fn candidates(
-    features: MatRef<'_, f64>,
-    targets: MatRef<'_, f64>,
-    scalings: &[InputScaling],
-) -> Result<Vec<InputMap>, Error> {
-    let most = scalings.iter().filter_map(|scaling| match scaling {
-        InputScaling::Whitened { components } => Some(*components),
-        _ => None,
-    });
-    let whitened = most
-        .max()
-        .map(|components| InputMap::fit(InputScaling::Whitened { components }, features, targets))
-        .transpose()?;
-    scalings
-        .iter()
-        .map(|&scaling| match (scaling, &whitened) {
-            (InputScaling::Whitened { components }, Some(map)) => Ok(map.leading(components)),
-            _ => InputMap::fit(scaling, features, targets),
-        })
-        .collect()
+/// Sum over the targets of the logarithm of their mean absolute error, when processes of the
+/// `trained` inputs and targets predict the `judging` ones: every target counts by the share of
+/// its error that is saved.
+fn log_errors(
+    mean: MeanFunction,
+    at: &[Hyperparameters],
+    trained: (MatRef<'_, f64>, MatRef<'_, f64>),
+    judging: (MatRef<'_, f64>, MatRef<'_, f64>),
+) -> Result<f64, Error> {
+    let within = distances_within(trained.0);
+    let away = distances(trained.0, judging.0);
+    let (basis, judging_basis) = (mean.basis(trained.0), mean.basis(judging.0));
+    let mut sum = 0.0;
+    for one in different(at) {
+        let factor = Factor::new(within.as_ref(), basis.as_ref(), one)?;
+        let weights = factor.weights(trained.1);
+        let predicted = &judging_basis * &weights.coefficients
+            + correlations(away.as_ref(), one.length).transpose() * &weights.weights;
+        for j in (0..at.len()).filter(|&j| at[j] == one) {
+            let error = (predicted.col(j) - judging.1.col(j)).norm_l1();
+            sum += (error / judging.1.nrows() as f64).ln();
+        }
+    }
+    Ok(sum)
 }
 
 /// Inputs and targets whose likelihood is asked for again and again.

@@ -5,7 +5,7 @@ use faer::{Mat, MatRef};
 use serde::{Deserialize, Serialize};
 
 /// How the inputs of a process are made of a feature vector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum InputScaling {
     /// The feature vector itself (the paper's way).
@@ -17,6 +17,8 @@ pub enum InputScaling {
     Whitened {
         /// How many directions.
         components: usize,
+        /// What is added to every bin's scatter, as a share of the mean over the bins.
+        shrinkage: f64,
     },
 }
 
@@ -57,22 +59,11 @@ impl InputMap {
                 let weight = |i: usize| if deviations[i] > 0.0 { 1.0 / deviations[i] } else { 0.0 };
                 Mat::from_fn(d, d, |i, j| if i == j { weight(i) } else { 0.0 })
             }
-            InputScaling::Whitened { components } => {
-                whitening::directions(centred.as_ref(), parameters, components)?
+            InputScaling::Whitened { components, shrinkage } => {
+                whitening::directions(centred.as_ref(), parameters, components, shrinkage)?
             }
         };
         Ok(Self { scaling, offset, projection })
-    }
-
-    /// The same map with only its first `components` outputs.
-    #[must_use]
-    pub(crate) fn leading(&self, components: usize) -> Self {
-        let m = components.min(self.projection.ncols());
-        Self {
-            scaling: InputScaling::Whitened { components: m },
-            offset: self.offset.clone(),
-            projection: self.projection.subcols(0, m).to_owned(),
-        }
     }
 
     /// Inputs (t x m) of `features` (t x d).

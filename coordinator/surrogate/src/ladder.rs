@@ -69,11 +69,6 @@ impl Tried {
         (0..self.targets()).map(|target| self.best_of(target).0).collect()
     }
 
-    /// Sum over the targets of their best log-likelihoods.
-    pub(crate) fn score(&self) -> f64 {
-        (0..self.targets()).map(|target| self.best_of(target).1).sum()
-    }
-
     /// Rungs as good as the best of every target, but as few different ones as a greedy choice
     /// finds.
     pub(crate) fn shared(&self) -> Vec<Rung> {

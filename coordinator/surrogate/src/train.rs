@@ -24,7 +24,7 @@ pub struct TrainOptions {
     pub all_speeds: Option<String>,
     /// Scalings of the inputs to choose from.
     pub scalings: Vec<InputScaling>,
-    /// Entries that decide the scaling.
+    /// Entries that judge the scalings.
     pub subset: usize,
     /// Folds of the validation.
     pub folds: usize,
@@ -35,7 +35,8 @@ pub struct TrainOptions {
 impl TrainOptions {
     /// The usual options for these feature sets: five folds (paper, 2.5.5), every scaling.
     pub fn new(features: Vec<FeatureColumns>) -> Self {
-        let whitened = [8, 12, 16, 24, 32].map(|components| InputScaling::Whitened { components });
+        let whitened = [(16, 0.01), (8, 0.1), (16, 0.1), (32, 0.1), (8, 1.0), (16, 1.0), (32, 1.0)]
+            .map(|(components, shrinkage)| InputScaling::Whitened { components, shrinkage });
         Self {
             all_speeds: features.first().map(|feature| feature.name.clone()),
             features,

@@ -17,12 +17,13 @@ const ENTRIES_PER_COEFFICIENT: usize = 8;
 /// A parameter whose range spans more than this ratio enters by its logarithm: what stiffness and
 /// level do to a spectrum saturates or multiplies.
 const LOGARITHMIC_FROM: f64 = 4.0;
-/// Share of the mean variance that is added to every bin's scatter: keeps whitening stable when
-/// there are hardly more entries than bins.
-const SHRINKAGE: f64 = 1e-3;
 
 /// Directions (d x m, m at most `components`), the most telling first, along which the scatter of
 /// the centred `features` (n x d) at fixed `parameters` (n x p) has variance one.
+///
+/// To every bin's scatter `shrinkage` times the mean over the bins is added. Without it the
+/// directions make use of every accident of the entries they are learned from; with much of it
+/// they become the principal components of the expected features.
 ///
 /// # Errors
 /// [`Error::NotPositiveDefinite`] when a parameter is constant or entries are fewer than bins
@@ -31,6 +32,7 @@ pub(crate) fn directions(
     features: MatRef<'_, f64>,
     parameters: MatRef<'_, f64>,
     components: usize,
+    shrinkage: f64,
 ) -> Result<Mat<f64>, Error> {
     let (n, d) = (features.nrows(), features.ncols());
     let basis = polynomial(parameters);
@@ -40,7 +42,7 @@ pub(crate) fn directions(
     let freedom = (n - basis.ncols()) as f64;
     let mut scatter = residual.transpose() * &residual * faer::Scale(1.0 / freedom);
     let mean_variance = (0..d).map(|i| scatter[(i, i)]).sum::<f64>() / d as f64;
-    (0..d).for_each(|i| scatter[(i, i)] += SHRINKAGE * mean_variance);
+    (0..d).for_each(|i| scatter[(i, i)] += shrinkage * mean_variance);
     let factor = Cholesky::new(scatter)?;
     let telling = factor.half_solve(expected.transpose() * &expected);
     let telling = factor.half_solve(telling.transpose().to_owned());
@@ -113,7 +115,7 @@ mod tests {
         let features = Mat::from_fn(400, 3, |i, j| {
             noise(i) + own(i, j) + if j == 1 { parameter[(i, 0)] - 1.5 } else { 0.0 }
         });
-        let v = directions(features.as_ref(), parameter.as_ref(), 1).unwrap();
+        let v = directions(features.as_ref(), parameter.as_ref(), 1, 1e-3).unwrap();
         let z = &features * &v;
         // Noise common to all bins must cancel: the direction is (-1, 2, -1) but for its length.
         assert!((v[(0, 0)] / v[(1, 0)] + 0.5).abs() < 0.1, "{v:?}");
