@@ -1,6 +1,6 @@
 //! From an index to a case: a function of the campaign's seed and the index alone.
 
-use super::Campaign;
+use super::{Campaign, Surfaces};
 use std::ops::Range;
 use tracktwin_parameters::{Case, ParameterSet, SobolError};
 
@@ -27,15 +27,21 @@ pub fn cases(campaign: &Campaign, indices: Range<u32>) -> Result<Vec<Case>, Sobo
         .map(|(index, point)| Case {
             index,
             parameters: definition.space.values(&point, &fixed),
-            surface_seed: surface_seed(definition.seed, index),
+            surface_seed: surface_seed(
+                definition.seed,
+                match definition.surfaces {
+                    Surfaces::PerCase => index,
+                    Surfaces::Shared => 0,
+                },
+            ),
         })
         .collect())
 }
 
-/// The seed of a case's irregularity: 63 bits, so that SQL's signed integers hold it.
-fn surface_seed(campaign_seed: u64, index: u32) -> u64 {
+/// The seed of an irregularity: 63 bits, so that SQL's signed integers hold it.
+fn surface_seed(campaign_seed: u64, number: u32) -> u64 {
     let mut hasher = blake3::Hasher::new_derive_key("tracktwin surface seed 1");
-    hasher.update(&campaign_seed.to_le_bytes()).update(&index.to_le_bytes());
+    hasher.update(&campaign_seed.to_le_bytes()).update(&number.to_le_bytes());
     let hash = hasher.finalize();
     let bytes = hash.as_bytes().first_chunk::<8>().expect("a hash has 32 bytes");
     u64::from_le_bytes(*bytes) >> 1

@@ -7,4 +7,4 @@ mod design;
 mod spec;
 
 pub use design::{case, cases};
-pub use spec::{Campaign, DEFAULT, SpecError};
+pub use spec::{Campaign, DEFAULT, Definition, SpecError, Surfaces};

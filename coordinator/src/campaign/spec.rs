@@ -39,8 +39,29 @@ pub struct Definition {
     pub space: ParameterSpace,
     /// The values of the parameters that don't vary, in catalogue order.
     pub fixed: [f64; Parameter::COUNT],
+    /// Whether every case has an irregularity of its own.
+    #[serde(skip_serializing_if = "Surfaces::is_default")]
+    pub surfaces: Surfaces,
     /// What is simulated and measured in each case.
     pub experiment: Experiment,
+}
+
+/// Which irregularity the cases run over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Surfaces {
+    /// Every case has its own, as every stretch of a real track has.
+    #[default]
+    PerCase,
+    /// All cases share one, scaled by the level: models learn that surface by heart and are of no
+    /// use for a recording, but this may be how the paper's library was made.
+    Shared,
+}
+
+impl Surfaces {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Why a campaign file is refused; one line each.
@@ -119,6 +140,8 @@ struct File {
     #[serde(default)]
     preset: Preset,
     sequence: Option<Sequence>,
+    #[serde(default)]
+    surfaces: Surfaces,
     speeds_km_h: Option<Vec<f64>>,
     #[serde(default)]
     parameters: BTreeMap<Parameter, Range>,
@@ -209,7 +232,8 @@ impl File {
             .experiment()
             .map_err(|source| SpecError::Experiment { path: path.to_owned(), source })?;
         let fixed = *fixed.values();
-        let definition = Definition { seed: self.seed, sequence, space, fixed, experiment };
+        let (seed, surfaces) = (self.seed, self.surfaces);
+        let definition = Definition { seed, sequence, space, fixed, surfaces, experiment };
         Ok(Campaign { name: self.name, cases, definition })
     }
 
