@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 /// Points of the Owen-scrambled sequence: `sobol_burley` repeats itself silently beyond.
 pub const OWEN_POINTS_MAX: u32 = 1 << 16;
 
-/// Coordinates that `sobol_burley` computes at a time.
-const OWEN_DIMENSIONS_MAX: u32 = 256;
+/// Axes a campaign may have: those of the small table of Joe and Kuo's direction numbers.
+const DIMENSIONS_MAX: usize = 100;
 
 /// Which Sobol sequence the points come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,7 +54,7 @@ impl Sequence {
         dimensions: usize,
         seed: u64,
     ) -> Result<Vec<Vec<f64>>, SobolError> {
-        if dimensions > OWEN_DIMENSIONS_MAX as usize {
+        if dimensions > DIMENSIONS_MAX {
             return Err(SobolError::TooManyDimensions { dimensions });
         }
         match self {
@@ -80,7 +80,7 @@ fn owen_point(index: u32, dimensions: usize, seed: u64) -> Vec<f64> {
 }
 
 fn rotated_points(indices: std::ops::Range<u32>, dimensions: usize, seed: u64) -> Vec<Vec<f64>> {
-    let parameters = sobol::params::JoeKuoD6::extended();
+    let parameters = sobol::params::JoeKuoD6::minimal();
     let rotation: Vec<f64> = (0..dimensions).map(|axis| unit(seed, axis as u64)).collect();
     sobol::Sobol::<f64>::new(dimensions, &parameters)
         .skip(indices.start as usize)
