@@ -2,13 +2,17 @@
 
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 use tracktwin_parameters::Parameter;
+use tracktwin_report::Tested;
 use tracktwin_signal::{FeatureDefinition, FeatureSet};
-use tracktwin_surrogate::{FeatureColumns, TrainOptions, TrainingSet};
+use tracktwin_surrogate::{FeatureColumns, Split, TrainOptions, Trained, TrainingSet};
 use tracktwin_worker::Experiment;
 
 /// The feature vectors of the paper, each trained at every speed (paper, eq. 9).
 const PAPER: [FeatureSet; 5] =
     [FeatureSet::Gf, FeatureSet::Lf1, FeatureSet::Lf2, FeatureSet::Lf3, FeatureSet::Lf4];
+
+/// Test cases that a picture can show without becoming a blot.
+const TESTED_SHOWN: usize = 1000;
 
 /// Why a library can't be trained on.
 #[derive(Debug, thiserror::Error)]
@@ -72,6 +76,36 @@ pub fn options(set: &TrainingSet) -> TrainOptions {
         columns: feature.bins(&set.frequencies_hz),
     };
     TrainOptions::new(PAPER.into_iter().map(columns).collect())
+}
+
+/// True and predicted values of cases that no model was trained on, by the models that read most
+/// speeds.
+///
+/// # Errors
+/// [`tracktwin_surrogate::Error`] when set and models don't belong together.
+pub fn tested(
+    set: &TrainingSet,
+    trained: &Trained,
+) -> Result<Vec<Tested>, tracktwin_surrogate::Error> {
+    let Some(group) = trained.groups().last() else { return Ok(Vec::new()) };
+    let mut cases = Split::halves(set.entries(), trained.split_seed()).test;
+    cases.truncate(TESTED_SHOWN);
+    let bins = set.frequencies_hz.len();
+    let speeds: Vec<_> = (0..set.speeds_km_h.len())
+        .filter(|&speed| group.key().speeds_km_h.contains(&set.speeds_km_h[speed]))
+        .collect();
+    let features = |case: usize, speed: usize| &set.log_power[speed][case * bins..][..bins];
+    let observed: Vec<Vec<f64>> = cases
+        .iter()
+        .map(|&case| speeds.iter().flat_map(|&speed| features(case, speed)).copied().collect())
+        .collect();
+    let predicted = group.predict(&observed)?;
+    let pairs = |column: usize| {
+        let truth = |case: usize| set.parameters[case * set.varied.len() + column];
+        let pairs = cases.iter().zip(&predicted);
+        pairs.map(|(&case, of)| (truth(case), of[column].mean)).collect()
+    };
+    Ok(set.varied.iter().enumerate().map(|(column, &of)| (of, pairs(column))).collect())
 }
 
 /// How a campaign's features are made.

@@ -15,5 +15,5 @@ mod spectrum_picture;
 mod track_picture;
 
 pub use evaluation_page::evaluation_page;
-pub use models_page::{mase_chart, models_page, scatter_chart};
+pub use models_page::{Tested, models_page};
 pub use receptance::{ReceptanceCurve, receptance_chart};

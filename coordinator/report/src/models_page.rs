@@ -10,12 +10,19 @@ use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Trained};
 
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
-/// The page of a library's models: errors of every model, as pictures and as a table.
-pub fn models_page(models: &Trained) -> String {
+/// True and predicted values of a parameter, in its unit.
+pub type Tested = (Parameter, Vec<(f64, f64)>);
+
+/// The page of a library's models: errors of every model, as pictures and as a table, and
+/// predictions of the best models for cases they weren't trained on.
+pub fn models_page(models: &Trained, tested: &[Tested]) -> String {
     let charts: Vec<String> =
         parameters(models).into_iter().map(|parameter| mase_chart(models, parameter)).collect();
+    let scatters: Vec<String> =
+        tested.iter().map(|(parameter, pairs)| scatter_chart(*parameter, pairs)).collect();
     let body = html! {
         (figure(&charts, "Mean absolute scaled error on the test half of the library (paper, eq. 11 and Fig. 14), a bar a feature set, a group of bars a speed. Lower is better; 25 % is what a constant achieves."))
+        (figure(&scatters, "True and predicted values of test cases (paper, Fig. 14), by the models that read most speeds."))
         h2 { "Every model" }
         p.note { "Folds: five, within the training half. Held: share of the test half inside its 90 % interval; bias as a share of the range." }
         div.scroll { (table(models)) }
@@ -32,7 +39,7 @@ pub fn models_page(models: &Trained) -> String {
 
 /// MASE of one parameter's models on the test half (paper, Fig. 14, first row): bars by feature
 /// set, grouped by speed, as an inline SVG element.
-pub fn mase_chart(models: &Trained, parameter: Parameter) -> String {
+fn mase_chart(models: &Trained, parameter: Parameter) -> String {
     let bars: Vec<(String, &GroupKey, f64)> = models
         .groups()
         .iter()
@@ -55,7 +62,7 @@ pub fn mase_chart(models: &Trained, parameter: Parameter) -> String {
     let x = Axis::linear("speed in km/h", -0.5, places.len() as f64 - 0.5);
     let title = format!("{} ({})", capital(parameter.label()), parameter.symbol());
     let mut chart =
-        Chart::new(&title, [560.0, 270.0], x, Axis::linear("MASE in %", 0.0, 1.1 * most));
+        Chart::new(&title, [640.0, 270.0], x, Axis::linear("MASE in %", 0.0, 1.1 * most));
     let width = 0.84 / names.len().max(1) as f64;
     let place = |list: &[&str], name: &str| list.iter().position(|known| *known == name);
     for (speeds, key, mase) in &bars {
@@ -74,7 +81,7 @@ pub fn mase_chart(models: &Trained, parameter: Parameter) -> String {
 
 /// True against predicted values of a parameter (paper, Fig. 14, second row), in SI units, as an
 /// inline SVG element.
-pub fn scatter_chart(parameter: Parameter, true_and_predicted: &[(f64, f64)]) -> String {
+fn scatter_chart(parameter: Parameter, true_and_predicted: &[(f64, f64)]) -> String {
     let shown = Shown::of(parameter);
     let points: Vec<_> =
         true_and_predicted.iter().map(|(x, y)| (x / shown.divisor, y / shown.divisor)).collect();

@@ -8,9 +8,7 @@ use tracktwin_evaluation::{
     SleeperEvaluation,
 };
 use tracktwin_parameters::Parameter;
-use tracktwin_report::{
-    ReceptanceCurve, evaluation_page, models_page, receptance_chart, scatter_chart,
-};
+use tracktwin_report::{ReceptanceCurve, evaluation_page, models_page, receptance_chart};
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_signal::{Extractor, FeatureDefinition, Signal};
 use tracktwin_surrogate::{FeatureColumns, TrainOptions, Trained, TrainingSet, train};
@@ -153,17 +151,19 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
 }
 
 #[test]
-fn the_page_of_the_models_has_a_bar_for_every_model() {
+fn the_page_of_the_models_has_a_bar_for_every_model_and_a_dot_for_every_tested_case() {
     let models = models();
-    let page = models_page(&models);
+    let pairs: Vec<_> = (0..500).map(|i| f64::from(i) * 5e5 + 1e7).map(|x| (x, x * 1.1)).collect();
+    let page = models_page(&models, &[(Parameter::RailpadStiffness, pairs)]);
     keep("models.html", &page);
     // Two feature sets at two speeds and one at both together, two parameters each.
     assert_eq!(page.matches("<rect class=\"bar").count(), 2 * (2 * 2 + 1));
     assert!(page.contains("10 + 13"));
+    assert_eq!(page.matches("<circle").count(), 500);
 }
 
 #[test]
-fn receptances_and_scatter_are_pictures_of_their_own() {
+fn receptances_are_a_picture_of_their_own() {
     let frequencies: Vec<f64> =
         (0..400).map(|i| 50.0 * 160f64.powf(f64::from(i) / 399.0)).collect();
     let curve = |name: &str, resonance_hz: f64| {
@@ -175,6 +175,4 @@ fn receptances_and_scatter_are_pictures_of_their_own() {
     };
     let svg = receptance_chart(&frequencies, &[curve("sleeper", 300.0), curve("midspan", 900.0)]);
     keep("receptance.svg", &svg);
-    let pairs: Vec<_> = (0..500).map(|i| f64::from(i) * 5e5 + 1e7).map(|x| (x, x * 1.1)).collect();
-    keep("scatter.svg", &scatter_chart(Parameter::RailpadStiffness, &pairs));
 }

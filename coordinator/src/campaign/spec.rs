@@ -59,6 +59,7 @@ pub enum Surfaces {
 }
 
 impl Surfaces {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
     fn is_default(&self) -> bool {
         *self == Self::default()
     }

@@ -46,19 +46,21 @@ pub(super) async fn train(
     let set = training::set(library, campaign).await?;
     let mut options = training::options(&set);
     options.seed = seed;
-    let trained = tokio::task::spawn_blocking(move || {
+    let (trained, tested) = tokio::task::spawn_blocking(move || {
         let bar = RefCell::new(None::<Progress>);
-        tracktwin_surrogate::train(&set, &options, &|at| {
+        let trained = tracktwin_surrogate::train(&set, &options, &|at| {
             let mut bar = bar.borrow_mut();
             let bar = bar.get_or_insert_with(|| Progress::begin("training", 0, at.groups as u64));
             bar.at(at.finished as u64, &at.next.map(name).unwrap_or_default());
-        })
-        .inspect(|_| bar.take().into_iter().for_each(Progress::end))
+        })?;
+        bar.take().into_iter().for_each(Progress::end);
+        let tested = training::tested(&set, &trained)?;
+        Ok::<_, tracktwin_surrogate::Error>((trained, tested))
     })
     .await?
     .or_input()?;
     trained.save(folder)?;
-    let page = tracktwin_report::models_page(&trained);
+    let page = tracktwin_report::models_page(&trained, &tested);
     std::fs::write(folder.join("models.html"), page)?;
     std::fs::write(folder.join("mase.json"), mase_json(&trained))?;
     Ok(trained)

@@ -64,6 +64,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let library = Library::open_or_create(&url).await.or_input()?;
     simulate(&library, &campaign, arguments.cores.unwrap_or_else(all_cores)).await?;
     if arguments.no_train {
+        library.close().await;
         say(&format!("library: {url}"));
         return Ok(());
     }
@@ -75,6 +76,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None => sample::open(&out.join("sample"))?,
     };
     evaluate::evaluate(&recording, &library, models, out).await?;
+    // What the library holds is then in one file, fit to be copied.
+    library.close().await;
     say(&format!("report: {}", out.join("report.html").display()));
     Ok(())
 }
