@@ -51,8 +51,6 @@ pub(super) async fn evaluate(
         .await
         .context("the models belong to another library; train on this one")
         .or_input()?;
-    let digest = library.digest(&campaign.id).await?;
-    models.belongs_to(&digest).or_input()?;
     let set = training::set(library, &campaign).await?;
     let extractor = Extractor::new(&training::feature_definition(&campaign)?).or_input()?;
     let twin = Twin { extractor: &extractor, models: &models, library: &set };
