@@ -2,16 +2,14 @@
 
 use crate::campaign::{Campaign, cases};
 use crate::dispatch::{Dispatch, DispatchError, Timing};
+use crate::service::{Security, ServeError, serve};
 use std::net::Ipv4Addr;
 use std::num::NonZeroUsize;
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
-use tonic::transport::server::TcpIncoming;
 use tracktwin_library::{CampaignRecord, Library, LibraryError, Status};
 use tracktwin_parameters::SobolError;
-use tracktwin_protocol::farm::farm_server::FarmServer;
-use tracktwin_protocol::{MESSAGE_BYTES_MAX, WINDOW_BYTES};
 use tracktwin_worker::agent::{self, AgentError};
 use tracktwin_worker::{Prepare, prepare_simulation};
 
@@ -20,9 +18,6 @@ const CASES_AT_A_TIME: u32 = 4096;
 
 /// How often the counts are looked at: often enough for a progress bar.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
-
-/// How often an idle connection is tested.
-const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
 /// Why the farm stops.
 #[derive(Debug, thiserror::Error)]
@@ -39,9 +34,9 @@ pub enum FarmError {
     /// The workers stopped.
     #[error("the workers stopped: {0}")]
     Worker(#[from] AgentError),
-    /// There is no port to be had, or it was lost.
-    #[error("the farm's service failed")]
-    Service(#[from] tonic::transport::Error),
+    /// The service failed.
+    #[error(transparent)]
+    Service(#[from] ServeError),
     /// There is no port to be had.
     #[error("the farm's service has no port")]
     Port(#[from] std::io::Error),
@@ -123,7 +118,9 @@ pub async fn embedded(
     let stop_serving = CancellationToken::new();
     // However this ends, nothing goes on behind its back.
     let _guards = [stop_working.clone().drop_guard(), stop_serving.clone().drop_guard()];
-    let server = tokio::spawn(serve(listener, dispatch, stop_serving.clone()));
+    let stop = stop_serving.clone();
+    let server =
+        tokio::spawn(async { serve(listener, dispatch, &Security::default(), stop).await });
     let config =
         agent::Config { prepare: task.prepare, ..agent::Config::new(coordinator, task.cores) };
     let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
@@ -156,21 +153,4 @@ pub async fn embedded(
     let status = library.status_of(task.campaign, task.cases).await?;
     progress(status);
     Ok(status)
-}
-
-/// Serves workers on a port until told to stop.
-async fn serve(
-    listener: TcpListener,
-    dispatch: Dispatch,
-    stop: CancellationToken,
-) -> Result<(), tonic::transport::Error> {
-    let service = FarmServer::new(dispatch).max_decoding_message_size(MESSAGE_BYTES_MAX);
-    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-    tonic::transport::Server::builder()
-        .http2_keepalive_interval(Some(KEEP_ALIVE))
-        .initial_stream_window_size(WINDOW_BYTES)
-        .initial_connection_window_size(WINDOW_BYTES)
-        .add_service(service)
-        .serve_with_incoming_shutdown(incoming, stop.cancelled_owned())
-        .await
 }

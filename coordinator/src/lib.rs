@@ -2,6 +2,7 @@
 //!
 //! - [`campaign`]: what is to be simulated; from an index to a case.
 //! - [`dispatch`]: hands cases to workers and takes their results (gRPC).
+//! - [`service`]: the coordinator on a port: certificates, tokens, starting and stopping.
 //! - [`farm`]: coordinator and workers in one process.
 //! - [`training`]: from a library to a training set.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
@@ -12,4 +13,5 @@ pub mod campaign;
 pub mod commands;
 pub mod dispatch;
 pub mod farm;
+pub mod service;
 pub mod training;

@@ -17,6 +17,7 @@ use tracktwin::campaign::Campaign;
 use tracktwin::dispatch::{Dispatch, Timing};
 use tracktwin::farm::{self, Task};
 use tracktwin_library::{Library, Status};
+use tracktwin_protocol::PROTOCOL_VERSION;
 use tracktwin_protocol::farm::farm_client::FarmClient;
 use tracktwin_protocol::farm::farm_server::FarmServer;
 use tracktwin_protocol::farm::{
@@ -196,6 +197,7 @@ fn registration(worker: &str, model_hash: &str) -> RegisterRequest {
         code_version: "9.9.9".to_owned(),
         model_hash: model_hash.to_owned(),
         cores: 1,
+        protocol_version: PROTOCOL_VERSION,
     }
 }
 

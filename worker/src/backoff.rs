@@ -1,6 +1,6 @@
 //! How long to wait before the next try.
 
-use std::hash::{BuildHasher, RandomState};
+use std::hash::{BuildHasher, DefaultHasher, Hash, Hasher, RandomState};
 use std::time::Duration;
 
 /// The first wait.
@@ -10,24 +10,44 @@ const FIRST: Duration = Duration::from_millis(100);
 const LONGEST: Duration = Duration::from_secs(4);
 
 /// Waits that double, up to a bound, and differ from worker to worker.
-#[derive(Debug, Default)]
+///
+/// They follow from the worker's name alone, so that a simulated network can be run again.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Backoff {
+    seed: u64,
     tries: u32,
 }
 
 impl Backoff {
+    /// The waits of a worker.
+    pub(crate) fn of(worker: &str) -> Self {
+        Self { seed: hash(worker), tries: 0 }
+    }
+
     /// The next wait: between half and all of a bound that doubles with every try.
     pub(crate) fn next(&mut self) -> Duration {
         let bound = FIRST.saturating_mul(2_u32.saturating_pow(self.tries)).min(LONGEST);
+        let jitter = unit(hash((self.seed, self.tries)));
         self.tries = self.tries.saturating_add(1);
-        bound.mul_f64(0.5 + 0.5 * random_unit())
+        bound.mul_f64(0.5 + 0.5 * jitter)
     }
 }
 
-/// A number in [0, 1) from the system's randomness. It spreads waits and names, never results.
+/// The same for the same input, in every process.
+fn hash(input: impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    input.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// A number in [0, 1) from the system's randomness. It makes names, never results.
 pub(crate) fn random_unit() -> f64 {
-    let random = RandomState::new().hash_one(());
-    (random >> 11) as f64 / (1_u64 << 53) as f64
+    unit(RandomState::new().hash_one(()))
+}
+
+/// The upper 53 bits as a number in [0, 1).
+fn unit(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[cfg(test)]
@@ -36,7 +56,7 @@ mod tests {
 
     #[test]
     fn waits_grow_to_the_bound_and_not_beyond() {
-        let mut backoff = Backoff::default();
+        let mut backoff = Backoff::of("w");
         assert!((FIRST / 2..=FIRST).contains(&backoff.next()));
         let waits: Vec<_> = std::iter::repeat_with(|| backoff.next()).take(40).collect();
         assert!(waits.iter().all(|wait| *wait <= LONGEST));
@@ -45,6 +65,6 @@ mod tests {
 
     #[test]
     fn no_two_workers_wait_alike() {
-        assert_ne!(Backoff::default().next(), Backoff::default().next());
+        assert_ne!(Backoff::of("a").next(), Backoff::of("b").next());
     }
 }

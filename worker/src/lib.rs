@@ -6,10 +6,19 @@
 pub mod agent;
 mod backoff;
 mod connection;
+mod coordinators;
+mod core;
+mod counters;
+mod credentials;
 mod experiment;
+mod health;
+mod holdings;
+mod outbox;
 mod session;
 mod simulate;
 
+pub use counters::Counters;
+pub use credentials::{Credentials, CredentialsError, Token};
 pub use experiment::{Experiment, ExperimentError};
 pub use simulate::{Prepare, Simulate, Simulation, prepare_simulation};
 pub use tracktwin_parameters::Case;

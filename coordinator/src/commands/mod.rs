@@ -1,5 +1,6 @@
 //! What the program can be told to do: one file a subcommand, each load, compute, store, report.
 
+mod certs;
 mod evaluate;
 mod library;
 mod progress;
@@ -43,6 +44,8 @@ enum Command {
     /// Ask the model library.
     #[command(subcommand)]
     Library(library::Question),
+    /// Make certificates and a token for a farm of several machines.
+    Certs(certs::Arguments),
     /// Print a shell's completions for this program.
     Completions {
         /// The shell.
@@ -76,6 +79,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Train(arguments) => asynchronously(train::run(arguments)),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
         Command::Library(question) => asynchronously(library::run(question)),
+        Command::Certs(arguments) => certs::run(&arguments),
         Command::Completions { shell } => {
             completions(shell);
             Ok(())

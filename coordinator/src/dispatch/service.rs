@@ -10,8 +10,8 @@ use tracktwin_library::{
 };
 use tracktwin_protocol::farm::farm_server::Farm;
 use tracktwin_protocol::{
-    BadMessage, CaseLease, CaseReport, Lease, LeasedCase, Outcome, Registration, Shape, farm,
-    held_from_messages, held_to_messages,
+    BadMessage, CaseLease, CaseReport, Lease, LeasedCase, Outcome, PROTOCOL_VERSION, Registration,
+    Shape, farm, held_from_messages, held_to_messages,
 };
 use tracktwin_worker::{CODE_VERSION, Experiment, ExperimentError, MODEL_HASH};
 
@@ -148,7 +148,15 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::RegisterResponse>, Status> {
         let registration =
             Registration::try_from(request.into_inner()).map_err(|error| malformed(&error))?;
-        let Registration { worker, code_version, model_hash, .. } = registration;
+        let Registration { worker, code_version, model_hash, protocol_version, .. } = registration;
+        if protocol_version != PROTOCOL_VERSION {
+            tracing::warn!("worker {worker} (version {code_version}) refused: other protocol");
+            return Err(Status::failed_precondition(other_protocol(
+                &worker,
+                &code_version,
+                protocol_version,
+            )));
+        }
         if model_hash != MODEL_HASH {
             tracing::warn!("worker {worker} (version {code_version}) refused: other physics");
             return Err(Status::failed_precondition(format!(
@@ -182,7 +190,7 @@ impl Farm for Dispatch {
         };
         let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
         let lease = if leased.is_empty() {
-            Lease::NoneNow { retry_after_s: self.timing.retry.as_secs_f64() }
+            Lease::NoneNow { retry_after_s: self.timing.retry.as_secs_f64(), reason: None }
         } else {
             let cases = leased.into_iter();
             Lease::Cases(CaseLease {
@@ -207,7 +215,7 @@ impl Farm for Dispatch {
         let until = now_unix_ms().saturating_add(unix_ms(self.timing.lease));
         let lost = self
             .library
-            .renew(&campaign_id, &worker, held(&cases), until)
+            .renew(&campaign_id, &worker, held(cases)?, until)
             .await
             .map_err(|error| unavailable(&error))?;
         let lost = held_to_messages(lost.into_iter().map(|held| (held.index, held.epoch)));
@@ -225,9 +233,8 @@ impl Farm for Dispatch {
         let ours =
             campaign_id == self.campaign.id && experiment_hash == self.campaign.experiment_hash;
         let verdicts = if ours {
-            let checked = cases.into_iter().map(|case| CaseReport::checked(case, &self.shape));
-            let reports =
-                checked.collect::<Result<Vec<_>, _>>().map_err(|error| malformed(&error))?;
+            let reports = CaseReport::all_checked(cases, &self.shape);
+            let reports = reports.map_err(|error| malformed(&error))?;
             let durations: Vec<f64> = reports.iter().map(|report| report.duration_s).collect();
             let verdicts = self.store(worker, provenance, reports).await?;
             for case_s in durations {
@@ -249,15 +256,29 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::ReleaseResponse>, Status> {
         let farm::ReleaseRequest { worker, campaign_id, cases } = request.into_inner();
         self.library
-            .release(&campaign_id, &worker, held(&cases))
+            .release(&campaign_id, &worker, held(cases)?)
             .await
             .map_err(|error| unavailable(&error))?;
         Ok(Response::new(farm::ReleaseResponse {}))
     }
 }
 
-fn held(messages: &[farm::HeldCase]) -> Vec<Held> {
-    held_from_messages(messages).map(|(index, epoch)| Held { index, epoch }).collect()
+/// What a worker is told that speaks another protocol.
+fn other_protocol(worker: &str, version: &str, protocol: u32) -> String {
+    let mend = if protocol < PROTOCOL_VERSION {
+        "update the worker to the coordinator's version"
+    } else {
+        "install the coordinator's version on the worker, or update the coordinator"
+    };
+    format!(
+        "worker {worker} (version {version}) speaks protocol {protocol}, this coordinator (version \
+         {CODE_VERSION}) speaks {PROTOCOL_VERSION}: {mend}"
+    )
+}
+
+fn held(messages: Vec<farm::HeldCase>) -> Result<Vec<Held>, Status> {
+    let held = held_from_messages(messages).map_err(|error| malformed(&error))?;
+    Ok(held.into_iter().map(|(index, epoch)| Held { index, epoch }).collect())
 }
 
 fn library_report(report: CaseReport) -> library::CaseReport {

@@ -1,5 +1,7 @@
 //! What is checked in every message.
 
+use crate::CASES_MAX;
+
 /// Why a message is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BadMessage {
@@ -59,6 +61,16 @@ pub enum BadMessage {
         /// What was hashed.
         what: String,
     },
+    /// More cases than a message may hold.
+    #[error("{field} has {count} cases; at most {max} are allowed")]
+    TooMany {
+        /// The field.
+        field: &'static str,
+        /// How many it has.
+        count: usize,
+        /// The most allowed.
+        max: usize,
+    },
     /// Not the speeds of the experiment.
     #[error("case {index}: reported at {found:?} km/h, not at {expected:?}")]
     WrongSpeeds {
@@ -94,6 +106,14 @@ pub(crate) fn name(field: &'static str, text: String) -> Result<String, BadMessa
             Err(BadMessage::TooLong { field, length, max: NAME_BYTES_MAX })
         }
         _ => Ok(text),
+    }
+}
+
+/// As many cases as a message may hold.
+pub(crate) fn bounded<T>(field: &'static str, cases: Vec<T>) -> Result<Vec<T>, BadMessage> {
+    match cases.len() {
+        count if count > CASES_MAX => Err(BadMessage::TooMany { field, count, max: CASES_MAX }),
+        _ => Ok(cases),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Cases on their way to a worker.
 
-use crate::check::{BadMessage, duration, name};
+use crate::check::{BadMessage, bounded, duration, name};
 use crate::farm;
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 
@@ -13,6 +13,8 @@ pub enum Lease {
     NoneNow {
         /// When to ask again, in s.
         retry_after_s: f64,
+        /// Why, if it is the worker's own fault.
+        reason: Option<String>,
     },
 }
 
@@ -46,16 +48,23 @@ pub fn held_to_messages(held: impl IntoIterator<Item = (u32, u32)>) -> Vec<farm:
 }
 
 /// The way back: (index, epoch).
-pub fn held_from_messages(messages: &[farm::HeldCase]) -> impl Iterator<Item = (u32, u32)> {
-    messages.iter().map(|held| (held.sobol_index, held.epoch))
+///
+/// # Errors
+/// [`BadMessage::TooMany`] when there are more than a message may hold.
+pub fn held_from_messages(messages: Vec<farm::HeldCase>) -> Result<Vec<(u32, u32)>, BadMessage> {
+    let held = bounded("cases", messages)?.into_iter();
+    Ok(held.map(|held| (held.sobol_index, held.epoch)).collect())
 }
 
 impl From<Lease> for farm::LeaseResponse {
     fn from(lease: Lease) -> Self {
         match lease {
-            Lease::NoneNow { retry_after_s } => {
-                Self { status: farm::LeaseStatus::NoneNow.into(), retry_after_s, ..Self::default() }
-            }
+            Lease::NoneNow { retry_after_s, reason } => Self {
+                status: farm::LeaseStatus::NoneNow.into(),
+                retry_after_s,
+                reason: reason.unwrap_or_default(),
+                ..Self::default()
+            },
             Lease::Cases(lease) => Self {
                 status: farm::LeaseStatus::Cases.into(),
                 campaign_id: lease.campaign,
@@ -63,7 +72,7 @@ impl From<Lease> for farm::LeaseResponse {
                 experiment_hash: lease.experiment_hash,
                 cases: lease.cases.into_iter().map(Into::into).collect(),
                 lease_s: lease.lease_s,
-                retry_after_s: 0.0,
+                ..Self::default()
             },
         }
     }
@@ -95,6 +104,7 @@ impl TryFrom<farm::LeaseResponse> for Lease {
             }
             farm::LeaseStatus::NoneNow => Ok(Self::NoneNow {
                 retry_after_s: duration("retry_after_s", message.retry_after_s)?,
+                reason: Some(message.reason).filter(|reason| !reason.is_empty()),
             }),
             farm::LeaseStatus::Cases => message.try_into().map(Self::Cases),
         }
@@ -153,6 +163,7 @@ fn parameter_set(index: u32, values: &[farm::ParameterValue]) -> Result<Paramete
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::CASES_MAX;
     use proptest::prelude::*;
 
     fn leased() -> LeasedCase {
@@ -189,6 +200,14 @@ mod tests {
         assert!(matches!(seed, BadMessage::WrongHash { .. }), "{seed}");
         let nan = refusal(|message| message.parameters[2].value = f64::NAN);
         assert!(matches!(nan, BadMessage::NotANumber { .. }), "{nan}");
+    }
+
+    #[test]
+    fn more_cases_than_a_message_may_hold_are_refused() {
+        let held = |count| vec![farm::HeldCase { sobol_index: 1, epoch: 1 }; count];
+        assert_eq!(held_from_messages(held(CASES_MAX)).unwrap().len(), CASES_MAX);
+        let error = held_from_messages(held(CASES_MAX + 1)).unwrap_err();
+        assert!(matches!(error, BadMessage::TooMany { field: "cases", .. }), "{error}");
     }
 
     #[test]

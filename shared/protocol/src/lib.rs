@@ -13,6 +13,15 @@ pub use lease::{CaseLease, Lease, LeasedCase, held_from_messages, held_to_messag
 pub use register::Registration;
 pub use report::{CaseReport, Outcome, PassFeatures, Shape};
 
+/// Version of the protocol that this program speaks.
+///
+/// Raised whenever an older program would misunderstand a message, rather than merely miss a field
+/// it can do without. 0 is what programs say that don't know of versions.
+pub const PROTOCOL_VERSION: u32 = 1;
+
+/// Most cases that a worker may ask for, hold, renew or report in one message.
+pub const CASES_MAX: usize = 4096;
+
 /// Most bytes of a message: a hundred cases of ten speeds and a thousand bins.
 ///
 /// A worker reports a few cases at a time, so this bounds what a stranger may make a coordinator

@@ -14,12 +14,15 @@ pub struct Registration {
     pub model_hash: String,
     /// Groups of cases it simulates at a time, at least one.
     pub cores: u32,
+    /// Version of the protocol it speaks; 0 from programs before versions were told.
+    pub protocol_version: u32,
 }
 
 impl From<Registration> for farm::RegisterRequest {
     fn from(registration: Registration) -> Self {
-        let Registration { worker, code_version, model_hash, cores } = registration;
-        Self { worker, code_version, model_hash, cores }
+        let Registration { worker, code_version, model_hash, cores, protocol_version } =
+            registration;
+        Self { worker, code_version, model_hash, cores, protocol_version }
     }
 }
 
@@ -35,6 +38,7 @@ impl TryFrom<farm::RegisterRequest> for Registration {
             code_version: name("code_version", message.code_version)?,
             model_hash: name("model_hash", message.model_hash)?,
             cores: message.cores,
+            protocol_version: message.protocol_version,
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Results on their way to the coordinator.
 
-use crate::check::{BadMessage, duration, finite, name};
+use crate::check::{BadMessage, bounded, duration, finite, name};
 use crate::farm;
 use farm::case_report::Outcome as OutcomeMessage;
 use tracktwin_signal::{Features, ThirdOctave};
@@ -79,6 +79,18 @@ impl From<PassFeatures> for farm::PassFeatures {
 }
 
 impl CaseReport {
+    /// The reports of a message; see [`CaseReport::checked`].
+    ///
+    /// # Errors
+    /// [`BadMessage`] when there are too many, or one is wrong.
+    pub fn all_checked(
+        messages: Vec<farm::CaseReport>,
+        shape: &Shape,
+    ) -> Result<Vec<Self>, BadMessage> {
+        let messages = bounded("cases", messages)?;
+        messages.into_iter().map(|message| Self::checked(message, shape)).collect()
+    }
+
     /// The report in a message, which must have the shape of its experiment.
     ///
     /// # Errors

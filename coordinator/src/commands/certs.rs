@@ -1,0 +1,36 @@
+//! `tracktwin certs`: what a farm needs to trust its own.
+
+use super::{OrInput, Stop, say};
+use crate::service::issue;
+use clap::Args;
+use std::path::PathBuf;
+use time::OffsetDateTime;
+
+/// What `certs` is told.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Folder to write to; an authority and a token that are there stay.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Name or address by which workers reach a coordinator; may be repeated.
+    #[arg(long = "host", value_name = "NAME", required = true)]
+    hosts: Vec<String>,
+    /// How long the certificates are valid; the authority is for ten years.
+    #[arg(long, default_value_t = 365, value_name = "N")]
+    days: u32,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
+    let Arguments { folder, hosts, days } = arguments;
+    issue(folder, hosts, *days, OffsetDateTime::now_utc()).or_input()?;
+    let dir = folder.display();
+    say(&format!(
+        "{dir}: certificates for {}, valid for {days} days\n\
+         keep {dir}/ca-key.pem; hand ca.pem, token and, for mutual TLS, worker*.pem to workers\n\
+         coordinator: --tls-cert {dir}/coordinator.pem --tls-key {dir}/coordinator-key.pem \
+         --token-file {dir}/token\n\
+         worker:      --tls-ca {dir}/ca.pem --token-file {dir}/token",
+        hosts.join(", ")
+    ));
+    Ok(())
+}

@@ -1,0 +1,150 @@
+//! A small authority and the certificates of a farm.
+
+use rcgen::{
+    BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa,
+    Issuer, KeyPair, KeyUsagePurpose,
+};
+use std::fs::{File, OpenOptions};
+use std::hash::{BuildHasher, RandomState};
+use std::io::{Read, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use time::{Duration, OffsetDateTime};
+
+/// How long the authority is valid.
+const AUTHORITY_DAYS: i64 = 3650;
+
+/// Clocks of a cluster may differ by this.
+const CLOCKS: Duration = Duration::hours(1);
+
+/// What the authority calls itself.
+const AUTHORITY: &str = "tracktwin farm";
+
+/// Bytes of chance in a token.
+const TOKEN_BYTES: usize = 32;
+
+/// Why no certificates are made.
+#[derive(Debug, thiserror::Error)]
+pub enum CertificatesError {
+    /// The folder, or a file in it, can't be written or read.
+    #[error("{path}: cannot be written or read: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A name that certificates can't hold, or a key that is none.
+    #[error("no certificate can be made of it: {0}")]
+    Certificate(#[from] rcgen::Error),
+}
+
+/// Writes a farm's authority, certificates and token into a folder.
+///
+/// An authority and a token that are there stay, so that certificates can be renewed, or made for
+/// further hosts, without touching the others' machines.
+///
+/// | file | whose |
+/// |---|---|
+/// | `ca.pem` | everybody's |
+/// | `ca-key.pem` | to be kept where certificates are made |
+/// | `coordinator.pem`, `coordinator-key.pem` | the coordinators', valid for `hosts` |
+/// | `worker.pem`, `worker-key.pem` | the workers' |
+/// | `token` | everybody's |
+///
+/// # Errors
+/// [`CertificatesError`] when a file can't be written or a host's name can't be one.
+pub fn issue(
+    folder: &Path,
+    hosts: &[String],
+    days: u32,
+    now: OffsetDateTime,
+) -> Result<(), CertificatesError> {
+    std::fs::create_dir_all(folder).map_err(at(folder))?;
+    let authority = authority(folder, now)?;
+    let end = now + Duration::days(i64::from(days));
+    let coordinator = leaf("tracktwin coordinator", hosts, ExtendedKeyUsagePurpose::ServerAuth);
+    let worker = leaf("tracktwin worker", &[], ExtendedKeyUsagePurpose::ClientAuth);
+    for (name, params) in [("coordinator", coordinator?), ("worker", worker?)] {
+        let mut params = params;
+        (params.not_before, params.not_after) = (now - CLOCKS, end);
+        let key = KeyPair::generate()?;
+        let certificate = params.signed_by(&key, &authority)?;
+        public(&folder.join(format!("{name}.pem")), &certificate.pem())?;
+        secret(&folder.join(format!("{name}-key.pem")), &key.serialize_pem())?;
+    }
+    let token = folder.join("token");
+    if !token.exists() {
+        secret(&token, &format!("{}\n", random_token().map_err(at(&token))?))?;
+    }
+    Ok(())
+}
+
+/// The authority in the folder, or a new one.
+fn authority(
+    folder: &Path,
+    now: OffsetDateTime,
+) -> Result<Issuer<'static, KeyPair>, CertificatesError> {
+    let mut params = CertificateParams::default();
+    params.distinguished_name = named(AUTHORITY);
+    params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
+    params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
+    (params.not_before, params.not_after) = (now - CLOCKS, now + Duration::days(AUTHORITY_DAYS));
+    let key_path = folder.join("ca-key.pem");
+    // The issuer's name and key are all that a certificate takes from its authority.
+    if key_path.exists() {
+        let key = std::fs::read_to_string(&key_path).map_err(at(&key_path))?;
+        return Ok(Issuer::new(params, KeyPair::from_pem(&key)?));
+    }
+    let key = KeyPair::generate()?;
+    let certificate = params.self_signed(&key)?;
+    public(&folder.join("ca.pem"), &certificate.pem())?;
+    secret(&key_path, &key.serialize_pem())?;
+    Ok(Issuer::new(params, key))
+}
+
+fn leaf(
+    name: &str,
+    hosts: &[String],
+    purpose: ExtendedKeyUsagePurpose,
+) -> Result<CertificateParams, rcgen::Error> {
+    let mut params = CertificateParams::new(hosts)?;
+    params.distinguished_name = named(name);
+    params.extended_key_usages = vec![purpose];
+    params.use_authority_key_identifier_extension = true;
+    Ok(params)
+}
+
+fn named(name: &str) -> DistinguishedName {
+    let mut full = DistinguishedName::new();
+    full.push(DnType::CommonName, name);
+    full
+}
+
+/// A token of 256 bits, in hexadecimal.
+fn random_token() -> std::io::Result<blake3::Hash> {
+    let mut chance = [0; TOKEN_BYTES];
+    File::open("/dev/urandom")?.read_exact(&mut chance)?;
+    // A second source costs nothing.
+    let more = RandomState::new().hash_one(()).to_le_bytes();
+    Ok(blake3::Hasher::new().update(&chance).update(&more).finalize())
+}
+
+fn public(path: &Path, text: &str) -> Result<(), CertificatesError> {
+    std::fs::write(path, text).map_err(at(path))
+}
+
+/// Writes a file that only its owner reads.
+fn secret(path: &Path, text: &str) -> Result<(), CertificatesError> {
+    // One that is there may have been readable by others.
+    if path.exists() {
+        std::fs::remove_file(path).map_err(at(path))?;
+    }
+    let file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path);
+    file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(at(path))
+}
+
+fn at(path: &Path) -> impl Fn(std::io::Error) -> CertificatesError {
+    let path = path.to_owned();
+    move |source| CertificatesError::File { path: path.clone(), source }
+}

@@ -1,0 +1,54 @@
+//! Checks the token of every call.
+
+use super::peer::PeerAddress;
+use tonic::service::Interceptor;
+use tonic::{Request, Status};
+
+/// Lets calls pass that show the token.
+#[derive(Clone)]
+pub struct Guard {
+    /// The token's hash: comparing hashes takes the same time wherever they differ.
+    token: Option<blake3::Hash>,
+}
+
+impl Guard {
+    /// A guard that demands this token, or none.
+    pub fn new(token: Option<&str>) -> Self {
+        Self { token: token.map(|token| blake3::hash(token.trim().as_bytes())) }
+    }
+
+    /// Whether an `authorization` header opens the door.
+    pub fn admits(&self, header: Option<&[u8]>) -> bool {
+        let shown = header.and_then(|header| header.strip_prefix(b"Bearer "));
+        self.token.is_none_or(|token| shown.is_some_and(|shown| blake3::hash(shown) == token))
+    }
+}
+
+impl Interceptor for Guard {
+    fn call(&mut self, request: Request<()>) -> Result<Request<()>, Status> {
+        let header = request.metadata().get("authorization");
+        if self.admits(header.map(tonic::metadata::MetadataValue::as_bytes)) {
+            return Ok(request);
+        }
+        let peer = request.extensions().get::<PeerAddress>();
+        let peer = peer.map_or_else(|| "unknown".to_owned(), |peer| peer.0.to_string());
+        let fault = if header.is_some() { "the token is wrong" } else { "no token was shown" };
+        tracing::warn!(peer, "call refused: {fault}");
+        Err(Status::permission_denied(format!("{fault}; give the worker --token-file")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_token_opens_the_door_and_none_where_none_is_demanded() {
+        let guard = Guard::new(Some("s3cret\n"));
+        assert!(guard.admits(Some(b"Bearer s3cret")));
+        for wrong in [None, Some(&b"Bearer s3cre"[..]), Some(b"s3cret"), Some(b"Bearer ")] {
+            assert!(!guard.admits(wrong), "{wrong:?}");
+        }
+        assert!(Guard::new(None).admits(None));
+    }
+}

@@ -1,0 +1,106 @@
+//! Lets connections in, or turns them away and says why in the log.
+
+use super::peer::{Peer, Stream};
+use super::security::HTTP2;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio_rustls::TlsAcceptor;
+use tokio_stream::wrappers::ReceiverStream;
+
+/// Connections at a time: a few thousand nodes. Each costs a file descriptor and some 100 kB.
+const CONNECTIONS_MAX: usize = 4096;
+
+/// Connections that were let in and wait for the service.
+const WAITING_MAX: usize = 64;
+
+/// How long a caller may take to say what it wants; TLS over a slow line takes a second.
+const GREETING: Duration = Duration::from_secs(10);
+
+/// Pause after the system had no connection for us: descriptors come back within moments.
+const SYSTEM_PAUSE: Duration = Duration::from_millis(100);
+
+/// What every HTTP/2 connection begins with (RFC 9113, 3.4).
+const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+
+/// Why a caller is turned away.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error("said nothing for {} s", GREETING.as_secs())]
+    Silent,
+    #[error("spoke neither gRPC nor anything else that is served here")]
+    Stranger,
+    #[error("TLS: {0}")]
+    Tls(std::io::Error),
+    #[error("TLS without HTTP/2")]
+    NoHttp2,
+    #[error("went away: {0}")]
+    Gone(#[from] std::io::Error),
+}
+
+/// The connections of a port, as they are let in. It ends when the stream is dropped.
+///
+/// Each greets in a task of its own, so that a slow or silent caller holds up nobody.
+pub fn accept(
+    listener: TcpListener,
+    tls: Option<TlsAcceptor>,
+) -> ReceiverStream<std::io::Result<Peer>> {
+    let (peers, waiting) = mpsc::channel(WAITING_MAX);
+    let shares = Arc::new(Semaphore::new(CONNECTIONS_MAX));
+    tokio::spawn(async move {
+        loop {
+            let share = shares.clone().acquire_owned().await;
+            let share = share.expect("nobody closes this semaphore");
+            let (stream, address) = tokio::select! {
+                accepted = listener.accept() => match accepted {
+                    Ok(accepted) => accepted,
+                    Err(error) => {
+                        tracing::warn!("a connection could not be taken: {error}");
+                        tokio::time::sleep(SYSTEM_PAUSE).await;
+                        continue;
+                    }
+                },
+                () = peers.closed() => break,
+            };
+            tokio::spawn(let_in(stream, address, tls.clone(), share, peers.clone()));
+        }
+    });
+    ReceiverStream::new(waiting)
+}
+
+async fn let_in(
+    stream: TcpStream,
+    address: SocketAddr,
+    tls: Option<TlsAcceptor>,
+    share: OwnedSemaphorePermit,
+    peers: mpsc::Sender<std::io::Result<Peer>>,
+) {
+    let greeted = tokio::time::timeout(GREETING, greet(stream, tls)).await;
+    match greeted.unwrap_or(Err(Refusal::Silent)) {
+        // Who would take it may be stopping.
+        Ok(stream) => drop(peers.send(Ok(Peer::new(stream, address, share))).await),
+        Err(refusal) => tracing::warn!(peer = %address, "connection refused: {refusal}"),
+    }
+}
+
+async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>) -> Result<Stream, Refusal> {
+    stream.set_nodelay(true)?;
+    let Some(tls) = tls else {
+        let mut first = [0; PREFACE.len()];
+        let length = stream.peek(&mut first).await?;
+        // The rest, if it has not come yet, is HTTP/2's to judge.
+        return if length > 0 && PREFACE.starts_with(&first[..length]) {
+            Ok(Stream::Plain(stream))
+        } else {
+            Err(Refusal::Stranger)
+        };
+    };
+    let stream = tls.accept(stream).await.map_err(Refusal::Tls)?;
+    if stream.get_ref().1.alpn_protocol() == Some(HTTP2) {
+        Ok(Stream::Tls(Box::new(stream)))
+    } else {
+        Err(Refusal::NoHttp2)
+    }
+}

@@ -1,0 +1,157 @@
+//! What a coordinator demands of those who call it.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::pki_types::pem::{self, PemObject};
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use tokio_rustls::rustls::server::{VerifierBuilderError, WebPkiClientVerifier};
+use tokio_rustls::rustls::{self, RootCertStore, ServerConfig};
+
+/// The protocol inside TLS.
+pub(crate) const HTTP2: &[u8] = b"h2";
+
+/// What a coordinator shows and demands; nothing on one machine.
+#[derive(Clone, Debug, Default)]
+pub struct Security {
+    /// Its certificate, with what leads to the authority, and its key (PEM).
+    pub identity_pem: Option<[Vec<u8>; 2]>,
+    /// Certificate of the authority that workers' certificates must be of (PEM).
+    pub client_ca_pem: Option<Vec<u8>>,
+    /// The token that workers must show.
+    pub token: Option<String>,
+    /// Whether strangers may call in plain text: where the network itself is trusted.
+    pub insecure: bool,
+}
+
+/// Why a port is not opened; each says how to mend it.
+#[derive(Debug, thiserror::Error)]
+pub enum SecurityError {
+    /// A port that others can reach, in plain text.
+    #[error(
+        "{address} can be reached by other machines and would speak plain text; give it a \
+         certificate (`tracktwin certs` makes one; --tls-cert, --tls-key), or --insecure where the \
+         network itself is trusted"
+    )]
+    PlainText {
+        /// The address.
+        address: SocketAddr,
+    },
+    /// A port that others can reach, and nothing that they must show.
+    #[error(
+        "{address} can be reached by other machines and would serve anybody; demand a token \
+         (--token-file) or workers' certificates (--tls-client-ca), or --insecure where the \
+         network itself is trusted"
+    )]
+    Anybody {
+        /// The address.
+        address: SocketAddr,
+    },
+    /// A PEM file that holds something else.
+    #[error("{what}: not the PEM file that it should be: {source}")]
+    Pem {
+        /// What it should be.
+        what: &'static str,
+        /// What is wrong.
+        source: pem::Error,
+    },
+    /// Certificate and key don't go together, or can't be used.
+    #[error("the certificate cannot be used: {0}")]
+    Tls(#[from] rustls::Error),
+    /// The authority can't be used.
+    #[error("the authority of workers' certificates cannot be used: {0}")]
+    Authority(#[from] VerifierBuilderError),
+}
+
+impl Security {
+    /// Whether a port at this address is safe.
+    ///
+    /// # Errors
+    /// [`SecurityError`] says what is missing.
+    pub fn check(&self, address: SocketAddr) -> Result<(), SecurityError> {
+        if address.ip().is_loopback() || self.insecure {
+            return Ok(());
+        }
+        if self.identity_pem.is_none() {
+            return Err(SecurityError::PlainText { address });
+        }
+        if self.token.is_none() && self.client_ca_pem.is_none() {
+            return Err(SecurityError::Anybody { address });
+        }
+        Ok(())
+    }
+
+    /// What makes TLS of a connection; none for plain text.
+    ///
+    /// # Errors
+    /// [`SecurityError`] when certificates can't be used.
+    pub fn acceptor(&self) -> Result<Option<TlsAcceptor>, SecurityError> {
+        let Some([certificate, key]) = &self.identity_pem else { return Ok(None) };
+        let key = PrivateKeyDer::from_pem_slice(key)
+            .map_err(|source| SecurityError::Pem { what: "--tls-key", source })?;
+        let provider = Arc::new(ring::default_provider());
+        let config = ServerConfig::builder_with_provider(provider.clone())
+            .with_safe_default_protocol_versions()?;
+        let config = match &self.client_ca_pem {
+            None => config.with_no_client_auth(),
+            Some(ca) => {
+                let mut authorities = RootCertStore::empty();
+                for certificate in certificates("--tls-client-ca", ca)? {
+                    authorities.add(certificate)?;
+                }
+                let verifier =
+                    WebPkiClientVerifier::builder_with_provider(authorities.into(), provider);
+                config.with_client_cert_verifier(verifier.build()?)
+            }
+        };
+        let mut config = config.with_single_cert(certificates("--tls-cert", certificate)?, key)?;
+        config.alpn_protocols = vec![HTTP2.to_vec()];
+        Ok(Some(TlsAcceptor::from(Arc::new(config))))
+    }
+}
+
+fn certificates(
+    what: &'static str,
+    text: &[u8],
+) -> Result<Vec<CertificateDer<'static>>, SecurityError> {
+    let all = CertificateDer::pem_slice_iter(text).collect::<Result<Vec<_>, _>>();
+    let none = Err(pem::Error::NoItemsFound);
+    let all = all.and_then(|all| if all.is_empty() { none } else { Ok(all) });
+    all.map_err(|source| SecurityError::Pem { what, source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reachable() -> SocketAddr {
+        "10.0.0.7:7700".parse().unwrap()
+    }
+
+    #[test]
+    fn a_port_that_others_reach_needs_a_certificate_and_a_demand() {
+        let open = Security::default();
+        assert!(open.check("127.0.0.1:7700".parse().unwrap()).is_ok());
+        assert!(open.check("[::1]:7700".parse().unwrap()).is_ok());
+        let error = open.check(reachable()).unwrap_err().to_string();
+        assert!(error.contains("--tls-cert") && error.contains("--insecure"), "{error}");
+
+        let certified =
+            Security { identity_pem: Some([Vec::new(), Vec::new()]), ..Security::default() };
+        let error = certified.check(reachable()).unwrap_err().to_string();
+        assert!(error.contains("--token-file") && error.contains("--tls-client-ca"), "{error}");
+
+        let token = Security { token: Some("t".to_owned()), ..certified };
+        assert!(token.check(reachable()).is_ok());
+        assert!(Security { insecure: true, ..open }.check(reachable()).is_ok());
+    }
+
+    #[test]
+    fn files_that_hold_no_certificate_are_refused_by_their_argument() {
+        let security =
+            Security { identity_pem: Some([b"x".to_vec(), b"y".to_vec()]), ..Security::default() };
+        let Err(error) = security.acceptor() else { panic!("it takes anything") };
+        assert!(error.to_string().starts_with("--tls-key"), "{error}");
+    }
+}

@@ -1,0 +1,188 @@
+//! The coordinators of a worker: each call goes to one that answers.
+
+use crate::agent::{AgentError, Config};
+use crate::backoff::Backoff;
+use crate::connection::{Client, connect};
+use crate::counters::Counters;
+use std::error::Error;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
+use tonic::{Code, Response, Status};
+
+/// Between two warnings about a coordinator that does not answer.
+const WARN_EVERY: Duration = Duration::from_mins(1);
+
+/// The coordinators a worker may turn to. All serve one library, so any of them will do.
+pub(crate) struct Coordinators {
+    known: Vec<(String, Client)>,
+    /// The one that answered last, or is to be tried next.
+    current: AtomicUsize,
+    contact: Mutex<Contact>,
+    /// How long to try in vain; for ever if none.
+    patience: Option<Duration>,
+    backoff: Backoff,
+    /// No more tries from here on.
+    give_up: CancellationToken,
+    counters: Arc<Counters>,
+}
+
+/// When coordinators were heard of.
+struct Contact {
+    answered: Instant,
+    warned: Option<Instant>,
+}
+
+impl Coordinators {
+    pub(crate) fn new(config: &Config, give_up: CancellationToken) -> Result<Self, AgentError> {
+        let line =
+            |url: &String| Ok((url.clone(), connect(url, &config.credentials, config.dial)?));
+        let known = config.coordinators.iter().map(line).collect::<Result<Vec<_>, AgentError>>()?;
+        if known.is_empty() {
+            return Err(AgentError::NoCoordinator);
+        }
+        Ok(Self {
+            known,
+            current: AtomicUsize::new(0),
+            contact: Mutex::new(Contact { answered: Instant::now(), warned: None }),
+            patience: config.give_up_after,
+            backoff: Backoff::of(&config.worker),
+            give_up,
+            counters: config.counters.clone(),
+        })
+    }
+
+    /// Calls until there is an answer, or a refusal, or (then `None`) until `end`.
+    ///
+    /// A call on its way is waited for even then: what it leases must be known to be given back.
+    pub(crate) async fn ask<T, F>(
+        &self,
+        end: &CancellationToken,
+        call: impl Fn(Client) -> F,
+    ) -> Result<Option<T>, AgentError>
+    where
+        F: Future<Output = Result<Response<T>, Status>>,
+    {
+        let mut backoff = self.backoff;
+        while !end.is_cancelled() {
+            let answer = tokio::select! {
+                answer = self.once(&call) => answer,
+                () = self.give_up.cancelled() => return Ok(None),
+            };
+            let status = match answer {
+                Ok(answer) => return Ok(Some(answer)),
+                Err(status) => status,
+            };
+            match status.code() {
+                Code::Unauthenticated => return Err(AgentError::Unknown),
+                Code::FailedPrecondition
+                | Code::InvalidArgument
+                | Code::OutOfRange
+                | Code::PermissionDenied
+                | Code::Unimplemented => {
+                    return Err(AgentError::Refused { reason: status.message().to_owned() });
+                }
+                _ => self.out_of_patience(&status)?,
+            }
+            tokio::select! {
+                () = tokio::time::sleep(backoff.next()) => {}
+                () = end.cancelled() => {}
+            }
+        }
+        Ok(None)
+    }
+
+    /// One call to the current coordinator. If that one can't be reached, the next becomes current.
+    pub(crate) async fn once<T, F>(&self, call: impl Fn(Client) -> F) -> Result<T, Status>
+    where
+        F: Future<Output = Result<Response<T>, Status>>,
+    {
+        let index = self.current.load(Ordering::Relaxed);
+        let (url, client) = &self.known[index];
+        let answer = call(client.clone()).await;
+        match &answer {
+            Err(status) if is_silence(status.code()) => {
+                self.counters.silent_calls.inc();
+                self.warn(url, status);
+                let next = (index + 1) % self.known.len();
+                // Another task may have moved on already.
+                let _ = self.current.compare_exchange(
+                    index,
+                    next,
+                    Ordering::Relaxed,
+                    Ordering::Relaxed,
+                );
+            }
+            _ => self.heard(url),
+        }
+        answer.map(Response::into_inner)
+    }
+
+    /// For how long no coordinator has answered.
+    pub(crate) fn silent_for(&self) -> Duration {
+        self.contact().answered.elapsed()
+    }
+
+    fn contact(&self) -> std::sync::MutexGuard<'_, Contact> {
+        self.contact.lock().expect("nobody panics while holding it")
+    }
+
+    fn heard(&self, url: &str) {
+        let mut contact = self.contact();
+        contact.answered = Instant::now();
+        if contact.warned.take().is_some() {
+            tracing::warn!(coordinator = url, "the coordinator answers again");
+        }
+        self.counters.answered_calls.inc();
+    }
+
+    fn warn(&self, url: &str, status: &Status) {
+        let mut contact = self.contact();
+        if contact.warned.is_none_or(|warned| warned.elapsed() >= WARN_EVERY) {
+            contact.warned = Some(Instant::now());
+            let reason = chain(status);
+            tracing::warn!(coordinator = url, "the coordinator does not answer: {reason}");
+        }
+    }
+
+    fn out_of_patience(&self, status: &Status) -> Result<(), AgentError> {
+        let silent = self.silent_for();
+        match self.patience {
+            Some(patience) if silent >= patience => {
+                let reason = chain(status);
+                Err(AgentError::GaveUp { silent_s: silent.as_secs(), reason })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether a call failed because nobody answered, rather than because of what was answered.
+const fn is_silence(code: Code) -> bool {
+    matches!(
+        code,
+        Code::Unavailable
+            | Code::Unknown
+            | Code::DeadlineExceeded
+            | Code::Cancelled
+            | Code::Internal
+            | Code::Aborted
+            | Code::DataLoss
+    )
+}
+
+/// What failed and why, in one line: a failed connection hides its reason in its sources.
+fn chain(status: &Status) -> String {
+    let mut text = status.message().to_owned();
+    let mut source = status.source();
+    while let Some(error) = source {
+        let reason = error.to_string();
+        if !text.contains(&reason) {
+            text = format!("{text}: {reason}");
+        }
+        source = error.source();
+    }
+    text
+}

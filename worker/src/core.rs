@@ -1,0 +1,173 @@
+//! What one core of a worker does: a lease at a time, a group of cases at a time.
+
+use crate::agent::{AgentError, GROUP};
+use crate::counters::Counters;
+use crate::outbox::{Finished, Outbox};
+use crate::session::Session;
+use crate::simulate::{Prepare, Simulate};
+use crate::{Case, Experiment, Outcome};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase};
+
+/// One core's share of a worker.
+pub(crate) struct Core {
+    pub(crate) session: Arc<Session>,
+    pub(crate) prepared: Arc<Prepared>,
+    pub(crate) outbox: Outbox,
+    pub(crate) counters: Arc<Counters>,
+    pub(crate) idle_exit: Option<Duration>,
+    pub(crate) inline: bool,
+}
+
+impl Core {
+    /// Leases and works until the worker is told to stop, or was idle for too long.
+    pub(crate) async fn run(self) -> Result<(), AgentError> {
+        let mut told = None;
+        while let Some(lease) = self.session.lease().await? {
+            match lease {
+                Lease::Cases(lease) => self.work(&lease).await?,
+                Lease::NoneNow { retry_after_s, reason } => {
+                    if reason.is_some() && reason != told {
+                        tracing::warn!("no cases: {}", reason.as_deref().unwrap_or_default());
+                    }
+                    told = reason;
+                    self.wait(retry_after_s).await;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for work, or ends the worker where that has lasted too long.
+    async fn wait(&self, retry_after_s: f64) {
+        if self.idle_exit.is_some_and(|limit| self.session.idle_for() >= limit) {
+            tracing::info!("no work for {} s: done", self.session.idle_for().as_secs());
+            self.session.shutdown.cancel();
+        }
+        let wait = Duration::try_from_secs_f64(retry_after_s).unwrap_or(Duration::MAX);
+        tokio::select! {
+            () = tokio::time::sleep(wait) => {}
+            () = self.session.shutdown.cancelled() => {}
+        }
+    }
+
+    /// Simulates and reports what was leased, or gives back what is left at shutdown.
+    async fn work(&self, lease: &CaseLease) -> Result<(), AgentError> {
+        let session = &self.session;
+        let simulation = match self.prepared.of(lease) {
+            Ok(simulation) => simulation,
+            Err(error) => {
+                session.release(lease, held(&lease.cases)).await;
+                return Err(error);
+            }
+        };
+        for (number, group) in lease.cases.chunks(GROUP).enumerate() {
+            let rest = &lease.cases[number * GROUP..];
+            if session.shutdown.is_cancelled() {
+                session.release(lease, held(rest)).await;
+                break;
+            }
+            let ours =
+                |it: &&LeasedCase| session.holdings.has(&lease.campaign, it.case.index, it.epoch);
+            let group: Vec<LeasedCase> = group.iter().filter(ours).cloned().collect();
+            if group.is_empty() {
+                continue;
+            }
+            let begun = Instant::now();
+            let cases: Vec<Case> = group.iter().map(|leased| leased.case.clone()).collect();
+            let outcomes = tokio::select! {
+                outcomes = self.compute(simulation.clone(), cases) => outcomes,
+                () = session.give_up.cancelled() => {
+                    session.release(lease, held(rest)).await;
+                    break;
+                }
+            };
+            let computing_s = begun.elapsed().as_secs_f64();
+            self.counters.computing_s.inc_by(computing_s);
+            let reports = reports(&group, outcomes, computing_s / group.len() as f64);
+            self.put(lease, reports).await;
+        }
+        Ok(())
+    }
+
+    async fn compute(&self, simulation: Arc<dyn Simulate>, cases: Vec<Case>) -> Vec<Outcome> {
+        if self.inline {
+            return guarded(simulation.as_ref(), &cases);
+        }
+        let computed = tokio::task::spawn_blocking(move || guarded(simulation.as_ref(), &cases));
+        computed.await.expect("what is computed is caught when it panics")
+    }
+
+    /// Puts results into the outbox; waits while it is full.
+    async fn put(&self, lease: &CaseLease, reports: Vec<CaseReport>) {
+        self.session.worked();
+        let count = i64::try_from(reports.len()).unwrap_or(i64::MAX);
+        self.counters.unsent.inc_by(count);
+        if self.outbox.send(Finished::new(lease, reports)).await.is_err() {
+            // It ended with an error, which ends the worker; the leases expire.
+            self.counters.unsent.dec_by(count);
+        }
+    }
+}
+
+fn held(cases: &[LeasedCase]) -> Vec<(u32, u32)> {
+    cases.iter().map(|it| (it.case.index, it.epoch)).collect()
+}
+
+fn reports(group: &[LeasedCase], outcomes: Vec<Outcome>, duration_s: f64) -> Vec<CaseReport> {
+    assert_eq!(group.len(), outcomes.len(), "one outcome a case");
+    let report = |(leased, outcome): (&LeasedCase, Outcome)| CaseReport {
+        index: leased.case.index,
+        epoch: leased.epoch,
+        parameter_hash: leased.case.parameter_hash(),
+        duration_s,
+        outcome,
+    };
+    group.iter().zip(outcomes).map(report).collect()
+}
+
+/// Simulates; a case that panics is a case that fails, and leaves its group alone.
+fn guarded(simulation: &dyn Simulate, cases: &[Case]) -> Vec<Outcome> {
+    match catch_unwind(AssertUnwindSafe(|| simulation.simulate(cases))) {
+        Ok(outcomes) => outcomes,
+        Err(_) if cases.len() > 1 => {
+            cases.chunks(1).flat_map(|case| guarded(simulation, case)).collect()
+        }
+        Err(panic) => {
+            let message = panic.downcast_ref::<String>().map(String::as_str);
+            let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
+            let reason = format!("the program panicked: {}", message.unwrap_or("without words"));
+            vec![Outcome::Failed { reason }; cases.len()]
+        }
+    }
+}
+
+/// The simulation of the latest experiment: campaigns seldom change.
+pub(crate) struct Prepared {
+    prepare: Prepare,
+    latest: Mutex<Option<(String, Arc<dyn Simulate>)>>,
+}
+
+impl Prepared {
+    pub(crate) fn new(prepare: Prepare) -> Self {
+        Self { prepare, latest: Mutex::default() }
+    }
+
+    fn of(&self, lease: &CaseLease) -> Result<Arc<dyn Simulate>, AgentError> {
+        let mut latest = self.latest.lock().expect("preparing does not panic");
+        if let Some((hash, simulation)) = latest.as_ref()
+            && *hash == lease.experiment_hash
+        {
+            return Ok(simulation.clone());
+        }
+        let experiment = Experiment::from_json(&lease.experiment_json)?;
+        if experiment.hash() != lease.experiment_hash {
+            return Err(AgentError::ExperimentHash);
+        }
+        let simulation: Arc<dyn Simulate> = (self.prepare)(&experiment)?.into();
+        *latest = Some((lease.experiment_hash.clone(), simulation.clone()));
+        Ok(simulation)
+    }
+}

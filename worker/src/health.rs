@@ -1,0 +1,49 @@
+//! What a worker answers to those who watch over it: `/healthz` and `/metrics`.
+
+use crate::counters::Counters;
+use crate::session::Session;
+use axum::Router;
+use axum::extract::State;
+use axum::routing::get;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::net::TcpListener;
+
+/// A coordinator that has been silent for so long is worth a word.
+const SILENCE: Duration = Duration::from_secs(30);
+
+/// What the answers are made of.
+#[derive(Clone)]
+struct Watched {
+    session: Arc<Session>,
+    counters: Arc<Counters>,
+}
+
+/// Answers until it is dropped.
+pub(crate) async fn answer(port: TcpListener, session: Arc<Session>, counters: Arc<Counters>) {
+    let routes = Router::new()
+        .route("/healthz", get(healthz))
+        .route("/metrics", get(metrics))
+        .with_state(Watched { session, counters });
+    if let Err(error) = axum::serve(port, routes).await {
+        tracing::warn!("health is no longer answered: {error}");
+    }
+}
+
+/// A worker that waits for its coordinator is well: starting it anew would not help.
+async fn healthz(State(watched): State<Watched>) -> String {
+    let silent = watched.session.coordinators.silent_for();
+    if watched.session.shutdown.is_cancelled() {
+        "stopping\n".to_owned()
+    } else if silent >= SILENCE {
+        format!("waiting: no coordinator has answered for {} s\n", silent.as_secs())
+    } else if watched.session.holdings.is_empty() {
+        "idle\n".to_owned()
+    } else {
+        "working\n".to_owned()
+    }
+}
+
+async fn metrics(State(watched): State<Watched>) -> String {
+    watched.counters.text()
+}

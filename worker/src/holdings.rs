@@ -1,0 +1,109 @@
+//! The cases a worker holds.
+
+use crate::counters::Counters;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, MutexGuard};
+use tracktwin_protocol::{CASES_MAX, CaseLease, farm};
+
+/// A case this worker holds: campaign, index, epoch.
+type Held = (String, u32, u32);
+
+/// What a worker has leased and not yet handed in or given back.
+pub(crate) struct Holdings {
+    held: Mutex<BTreeSet<Held>>,
+    counters: Arc<Counters>,
+}
+
+impl Holdings {
+    pub(crate) fn new(counters: Arc<Counters>) -> Self {
+        Self { held: Mutex::default(), counters }
+    }
+
+    /// Takes what was leased.
+    pub(crate) fn take(&self, lease: &CaseLease) {
+        let cases = lease.cases.iter();
+        let held = cases.map(|leased| (lease.campaign.clone(), leased.case.index, leased.epoch));
+        self.change(|all| all.extend(held));
+    }
+
+    /// Lets go of cases, whatever became of them.
+    pub(crate) fn let_go(&self, campaign: &str, cases: impl IntoIterator<Item = (u32, u32)>) {
+        self.change(|all| {
+            for (index, epoch) in cases {
+                all.remove(&(campaign.to_owned(), index, epoch));
+            }
+        });
+    }
+
+    /// Whether a case is still this worker's, as far as it knows.
+    pub(crate) fn has(&self, campaign: &str, index: u32, epoch: u32) -> bool {
+        self.lock().contains(&(campaign.to_owned(), index, epoch))
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.lock().is_empty()
+    }
+
+    /// What to renew, in requests of one campaign and a bounded number of cases.
+    pub(crate) fn renewals(&self, worker: &str) -> Vec<farm::RenewRequest> {
+        let mut requests: Vec<farm::RenewRequest> = Vec::new();
+        for (campaign, index, epoch) in self.lock().iter() {
+            let case = farm::HeldCase { sobol_index: *index, epoch: *epoch };
+            match requests.last_mut() {
+                Some(request)
+                    if request.campaign_id == *campaign && request.cases.len() < CASES_MAX =>
+                {
+                    request.cases.push(case);
+                }
+                _ => requests.push(farm::RenewRequest {
+                    worker: worker.to_owned(),
+                    campaign_id: campaign.clone(),
+                    cases: vec![case],
+                }),
+            }
+        }
+        requests
+    }
+
+    fn change(&self, change: impl FnOnce(&mut BTreeSet<Held>)) {
+        let mut held = self.lock();
+        change(&mut held);
+        self.counters.held.set(i64::try_from(held.len()).unwrap_or(i64::MAX));
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeSet<Held>> {
+        self.held.lock().expect("nobody panics while holding it")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_parameters::{Case, ParameterSet};
+    use tracktwin_protocol::LeasedCase;
+
+    fn lease(campaign: &str, indices: std::ops::Range<u32>) -> CaseLease {
+        let case = |index| Case { index, parameters: ParameterSet::nominal(), surface_seed: 0 };
+        CaseLease {
+            campaign: campaign.to_owned(),
+            experiment_json: String::new(),
+            experiment_hash: String::new(),
+            lease_s: 1.0,
+            cases: indices.map(|index| LeasedCase { case: case(index), epoch: 1 }).collect(),
+        }
+    }
+
+    #[test]
+    fn renewals_are_of_one_campaign_and_no_larger_than_a_message_may_be() {
+        let holdings = Holdings::new(Arc::default());
+        let many = CASES_MAX as u32 + 1;
+        holdings.take(&lease("a", 0..many));
+        holdings.take(&lease("b", 0..3));
+        holdings.let_go("b", [(1, 1), (2, 7)]);
+        let renewals = holdings.renewals("w");
+        let sizes: Vec<_> =
+            renewals.iter().map(|it| (it.campaign_id.as_str(), it.cases.len())).collect();
+        assert_eq!(sizes, [("a", CASES_MAX), ("a", 1), ("b", 2)]);
+        assert!(holdings.has("b", 2, 1) && !holdings.has("b", 1, 1));
+    }
+}

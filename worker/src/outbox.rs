@@ -1,0 +1,105 @@
+//! Finished results on their way to a coordinator.
+//!
+//! Computing goes on while a report is under way, and while no coordinator answers: what is
+//! finished waits here and is sent when one is back. The room is bounded; when it is full, the
+//! cores wait.
+
+use crate::agent::AgentError;
+use crate::session::Session;
+use std::sync::Arc;
+use tokio::sync::mpsc;
+use tracktwin_protocol::{CaseLease, CaseReport};
+
+/// Groups that may wait: some 500 cases, or a few megabytes.
+const GROUPS_WAITING: usize = 64;
+
+/// Cases in one report at most, so that a message stays well below the largest allowed.
+const CASES_A_REPORT: usize = 128;
+
+/// Results of one group of cases.
+pub(crate) struct Finished {
+    pub(crate) campaign: String,
+    pub(crate) experiment_hash: String,
+    pub(crate) reports: Vec<CaseReport>,
+}
+
+impl Finished {
+    pub(crate) fn new(lease: &CaseLease, reports: Vec<CaseReport>) -> Self {
+        let CaseLease { campaign, experiment_hash, .. } = lease;
+        let (campaign, experiment_hash) = (campaign.clone(), experiment_hash.clone());
+        Self { campaign, experiment_hash, reports }
+    }
+
+    /// Takes another group into the same report, if it belongs there and fits.
+    fn join(&mut self, other: Self) -> Option<Self> {
+        let fits = self.reports.len() + other.reports.len() <= CASES_A_REPORT;
+        if fits && self.campaign == other.campaign && self.experiment_hash == other.experiment_hash
+        {
+            self.reports.extend(other.reports);
+            return None;
+        }
+        Some(other)
+    }
+}
+
+/// Where cores put what they have finished.
+pub(crate) type Outbox = mpsc::Sender<Finished>;
+
+/// An empty outbox, and what is to be [`send`]ed.
+pub(crate) fn outbox() -> (Outbox, mpsc::Receiver<Finished>) {
+    mpsc::channel(GROUPS_WAITING)
+}
+
+/// Hands in what is put into the outbox, until every core has let go of it or the worker gives up.
+///
+/// What waits together is sent together.
+pub(crate) async fn send(
+    session: Arc<Session>,
+    mut outbox: mpsc::Receiver<Finished>,
+) -> Result<(), AgentError> {
+    let mut next = None;
+    loop {
+        let first = match next.take() {
+            Some(finished) => Some(finished),
+            None => outbox.recv().await,
+        };
+        let Some(mut together) = first else { return Ok(()) };
+        while let Ok(finished) = outbox.try_recv() {
+            if let Some(other) = together.join(finished) {
+                next = Some(other);
+                break;
+            }
+        }
+        session.report(together).await?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_protocol::Outcome;
+
+    fn finished(campaign: &str, cases: usize) -> Finished {
+        let report = CaseReport {
+            index: 0,
+            epoch: 1,
+            parameter_hash: String::new(),
+            duration_s: 0.0,
+            outcome: Outcome::Finished(Vec::new()),
+        };
+        Finished {
+            campaign: campaign.to_owned(),
+            experiment_hash: String::new(),
+            reports: vec![report; cases],
+        }
+    }
+
+    #[test]
+    fn groups_of_one_campaign_share_a_report_of_bounded_size() {
+        let mut together = finished("a", 8);
+        assert!(together.join(finished("a", 8)).is_none());
+        assert!(together.join(finished("b", 8)).is_some());
+        assert!(together.join(finished("a", CASES_A_REPORT)).is_some());
+        assert_eq!(together.reports.len(), 16);
+    }
+}
