@@ -4,6 +4,20 @@
 //! simulations come in as values, a diagnosis goes out. The catalogue of physics is the track
 //! model's; pages and files are left to others.
 
+mod bands;
+mod baseline;
+mod calibration;
 mod finding;
+mod forward;
+mod null_model;
+mod section;
+mod spectra;
 
+pub use bands::Bands;
+pub use baseline::Unknowns;
+pub use calibration::{Calibration, CalibrationError, Observation, calibrate};
 pub use finding::{Finding, Place};
+pub use forward::{Forward, Linearised};
+pub use null_model::{NullError, NullModel, whitening};
+pub use section::Section;
+pub use spectra::{SpeedSpectra, Spectra};

@@ -2,8 +2,11 @@
 //!
 //! Works on the matrices that the time domain runs on; draws nothing and names no resonance.
 
+mod lane;
 mod peaks;
+mod rail;
 mod receptance;
 
 pub use peaks::{Peak, peaks};
+pub use rail::{RailReceptances, support_stiffness};
 pub use receptance::{FrequencyError, Place, receptance};

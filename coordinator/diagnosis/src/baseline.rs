@@ -1,0 +1,160 @@
+//! The re-tuned baseline: all that may vary before any physics is said to be missing.
+//!
+//! Every sleeper has its own ballast, railpad and irregularity level, the surface its own spectrum,
+//! every speed its own gain. This is the honest opponent of every extension.
+
+use crate::section::Section;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use std::ops::Range;
+use tracktwin_track::model::Support;
+
+/// What is free in a baseline, as logarithms, and where each stands among the unknowns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unknowns {
+    sleepers: usize,
+    speeds: usize,
+    /// Logarithms of the wave numbers in rad/m at which the surface's spectrum is free.
+    knots: Vec<f64>,
+}
+
+/// Distance of the spectrum's knots in the logarithm of the wave number.
+const KNOT_DISTANCE: f64 = 0.35;
+
+/// Prior of logarithms: standard deviations, and lengths in sleepers or of `ln kappa`.
+mod prior {
+    /// Mean over all sleepers of ballast, railpad and level.
+    pub(super) const MEAN: [f64; 3] = [0.7, 0.9, 1.2];
+    /// What varies smoothly along the track (section 4.2 of the mismatch design).
+    pub(super) const SMOOTH: [f64; 3] = [0.35, 0.35, 0.15];
+    /// What varies from sleeper to sleeper.
+    pub(super) const ALONE: [f64; 3] = [0.15, 0.2, 0.2];
+    /// Length of smooth variation in sleepers.
+    pub(super) const LENGTH: f64 = 3.0;
+    /// Bending stiffness of all sleepers, railpad and ballast damping.
+    pub(super) const GLOBAL: [f64; 3] = [0.3, 0.4, 0.6];
+    /// Spectrum of the surface about eq. B.6, and its length in `ln kappa`.
+    pub(super) const SPECTRUM: f64 = 0.5;
+    pub(super) const SPECTRUM_LENGTH: f64 = 0.7;
+    /// Gain of a speed's passes against the others'.
+    pub(super) const GAIN: f64 = 0.05;
+}
+
+/// Typical values about which the logarithms lie: `k_b`, `k_p`, `A_irr`, `EI_s`, `c_p`, `c_b`
+/// (paper, Table D1).
+const TYPICAL: [f64; 6] = [1.0e7, 9.0e7, 2.5, 5.0e3, 6.0e3, 8.0e2];
+
+impl Unknowns {
+    /// For a section, so many speeds, and surfaces whose wave numbers lie in a range in rad/m.
+    pub fn new(section: &Section, speeds: usize, wave_numbers: Range<f64>) -> Self {
+        let (from, to) = (wave_numbers.start.ln(), wave_numbers.end.ln());
+        let count = ((to - from) / KNOT_DISTANCE).ceil() as usize + 1;
+        let knots = (0..count).map(|knot| from + KNOT_DISTANCE * knot as f64).collect();
+        Self { sleepers: section.sleepers, speeds, knots }
+    }
+
+    /// How many unknowns there are.
+    pub fn count(&self) -> usize {
+        self.gains().end
+    }
+
+    /// Ballast stiffness of each sleeper.
+    pub fn ballast(&self) -> Range<usize> {
+        0..self.sleepers
+    }
+
+    /// Railpad stiffness of each sleeper.
+    pub fn railpad(&self) -> Range<usize> {
+        self.sleepers..2 * self.sleepers
+    }
+
+    /// Irregularity level at each sleeper.
+    pub fn level(&self) -> Range<usize> {
+        2 * self.sleepers..3 * self.sleepers
+    }
+
+    /// Sleepers' bending stiffness, railpad and ballast damping, each common to all.
+    pub fn global(&self) -> Range<usize> {
+        3 * self.sleepers..3 * self.sleepers + 3
+    }
+
+    /// The surface's spectrum against eq. B.6, at its knots.
+    pub fn spectrum(&self) -> Range<usize> {
+        self.global().end..self.global().end + self.knots.len()
+    }
+
+    /// The power gain of each speed's passes.
+    pub fn gains(&self) -> Range<usize> {
+        self.spectrum().end..self.spectrum().end + self.speeds
+    }
+
+    /// The prior mean of all unknowns.
+    pub fn typical(&self) -> DVector<f64> {
+        let mut values = DVector::zeros(self.count());
+        let fields = [self.ballast(), self.railpad(), self.level()];
+        for (range, typical) in fields.into_iter().zip(TYPICAL) {
+            range.for_each(|index| values[index] = typical.ln());
+        }
+        for (index, typical) in self.global().zip(&TYPICAL[3..]) {
+            values[index] = typical.ln();
+        }
+        values
+    }
+
+    /// Inverse of the prior covariance.
+    pub fn precision(&self) -> DMatrix<f64> {
+        let mut covariance = DMatrix::zeros(self.count(), self.count());
+        for (field, range) in [self.ballast(), self.railpad(), self.level()].into_iter().enumerate() {
+            for i in range.clone() {
+                for j in range.clone() {
+                    let distance = (i as f64 - j as f64) / prior::LENGTH;
+                    let smooth = prior::SMOOTH[field].powi(2) * (-0.5 * distance.powi(2)).exp();
+                    covariance[(i, j)] = prior::MEAN[field].powi(2) + smooth;
+                }
+                covariance[(i, i)] += prior::ALONE[field].powi(2);
+            }
+        }
+        for (index, deviation) in self.global().zip(prior::GLOBAL) {
+            covariance[(index, index)] = deviation.powi(2);
+        }
+        for i in self.spectrum() {
+            for j in self.spectrum() {
+                let distance = KNOT_DISTANCE * (i as f64 - j as f64) / prior::SPECTRUM_LENGTH;
+                covariance[(i, j)] = prior::SPECTRUM.powi(2) * (-0.5 * distance.powi(2)).exp();
+            }
+            // Keeps the inverse well defined where the knots stand close.
+            covariance[(i, i)] += (0.05 * prior::SPECTRUM).powi(2);
+        }
+        for index in self.gains() {
+            covariance[(index, index)] = prior::GAIN.powi(2);
+        }
+        Cholesky::new(covariance).expect("a prior with a white part is positive definite").inverse()
+    }
+
+    /// Supports of all sleepers of the section's track.
+    pub fn supports(&self, section: &Section, values: &DVector<f64>) -> Vec<Support> {
+        section.compared().map(|sleeper| self.support(values, sleeper)).collect()
+    }
+
+    /// Support of one of the compared sleepers.
+    pub fn support(&self, values: &DVector<f64>, sleeper: usize) -> Support {
+        let global = self.global().start;
+        Support {
+            railpad_stiffness: values[self.railpad().start + sleeper].exp(),
+            railpad_damping: values[global + 1].exp(),
+            ballast_stiffness: values[self.ballast().start + sleeper].exp(),
+            ballast_damping: values[global + 2].exp(),
+            sleeper_bending_stiffness: values[global].exp(),
+        }
+    }
+
+    /// Knots on both sides of a wave number in rad/m, with their shares.
+    pub fn spectrum_shares(&self, wave_number_rad_m: f64) -> [(usize, f64); 2] {
+        let last = self.knots.len() - 1;
+        let place = (wave_number_rad_m.ln() - self.knots[0]) / KNOT_DISTANCE;
+        let place = place.clamp(0.0, last as f64);
+        let left = (place.floor() as usize).min(last - 1);
+        let first = self.spectrum().start;
+        let share = place - left as f64;
+        [(first + left, 1.0 - share), (first + left + 1, share)]
+    }
+}

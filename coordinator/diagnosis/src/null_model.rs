@@ -1,0 +1,217 @@
+//! What recording and prediction differ by when nothing is left out.
+//!
+//! Time simulations of the calibrated track over random surfaces tell by how much one pass's log
+//! powers lie off their expected value (an offset), and how they scatter together: over bands, and
+//! over speeds at equal wave numbers, since all speeds roll over one surface.
+
+use crate::forward::Forward;
+use crate::section::Section;
+use crate::spectra::log_powers;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use tracktwin_signal::Signal;
+use tracktwin_track::model::{Surface, TrackModel};
+use tracktwin_track::time::{self, Pass, PassError};
+
+/// Time step in s, and interval of the samples.
+const TIME_STEP_S: f64 = 1e-5;
+
+/// Spans rolled over before the first window and after the last.
+const RUN_IN_SPANS: f64 = 4.0;
+
+/// Surfaces that are simulated side by side.
+const AT_A_TIME: u64 = 8;
+
+/// How far the covariance is drawn towards its diagonal: the sample is many, but not many times,
+/// the number of log powers.
+const SHRINKAGE: f64 = 0.05;
+
+/// Standard deviation in nats of what the prediction itself is wrong by: a third of a decibel.
+const PREDICTION_ERROR: f64 = 0.04;
+
+/// Bands over which the prediction's error hangs together.
+const PREDICTION_LENGTH: f64 = 1.5;
+
+/// Differences of simulated and predicted log powers when nothing is left out.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct NullModel {
+    /// Log powers of a sleeper.
+    per_sleeper: usize,
+    /// A row a simulation: simulated less predicted log powers, in the order of [`Forward`].
+    pub differences: Vec<Vec<f64>>,
+}
+
+impl NullModel {
+    /// Simulates passes over `surfaces` random surfaces with the values of `values`, levels apart,
+    /// which are all the mean one.
+    ///
+    /// # Errors
+    /// [`PassError`] when the simulation breaks down.
+    pub fn simulate(
+        forward: &Forward,
+        values: &DVector<f64>,
+        surfaces: u64,
+        seed: u64,
+        progress: impl Fn(f64) + Sync,
+    ) -> Result<Self, NullError> {
+        let values = plain(forward, values);
+        let level = values[forward.unknowns.level().start].exp();
+        let mut quiet = forward.clone();
+        quiet.noise_density.fill(0.0);
+        let expected = quiet.log_power(&values, &[])?;
+        let supports = forward.unknowns.supports(&forward.section, &values);
+        let section = &forward.section;
+        let model = TrackModel::build(&section.design, &section.mesh(), &supports, &[])?;
+        let done = std::sync::atomic::AtomicU64::new(0);
+        let groups: Vec<u64> = (0..surfaces).step_by(AT_A_TIME as usize).collect();
+        let differences: Vec<Vec<Vec<f64>>> = groups
+            .into_par_iter()
+            .map(|first| {
+                let seeds = first..(first + AT_A_TIME).min(surfaces);
+                let length_m = model.layout().length_m();
+                let surfaces: Vec<_> =
+                    seeds.map(|s| Surface::rough(seed.wrapping_add(s), level, length_m)).collect();
+                let simulated = simulate(forward, &model, &surfaces)?;
+                let count = done.fetch_add(surfaces.len() as u64, std::sync::atomic::Ordering::Relaxed);
+                progress((count + surfaces.len() as u64) as f64);
+                let difference = |log_power: DVector<f64>| (log_power - &expected).as_slice().to_vec();
+                Ok(simulated.into_iter().map(difference).collect())
+            })
+            .collect::<Result<_, NullError>>()?;
+        let differences = differences.into_iter().flatten().collect();
+        Ok(Self { per_sleeper: forward.per_sleeper(), differences })
+    }
+
+    /// Mean difference of a sleeper's log powers, over all simulations and sleepers.
+    pub fn offset(&self) -> DVector<f64> {
+        let mut sum = DVector::zeros(self.per_sleeper);
+        let mut count = 0.0;
+        for part in self.parts() {
+            sum += DVector::from_column_slice(part);
+            count += 1.0;
+        }
+        sum / count
+    }
+
+    /// Covariance of a sleeper's log powers about the offset, drawn towards its diagonal, with what
+    /// the passes do not share and the prediction's own error.
+    ///
+    /// `pass_variance` is the variance of the mean over the passes, a value a speed and band.
+    pub fn covariance(&self, bands: usize, pass_variance: &DVector<f64>) -> DMatrix<f64> {
+        let offset = self.offset();
+        let size = self.per_sleeper;
+        let mut sum = DMatrix::zeros(size, size);
+        let mut count = 0.0;
+        for part in self.parts() {
+            let difference = DVector::from_column_slice(part) - &offset;
+            sum.ger(1.0, &difference, &difference, 1.0);
+            count += 1.0;
+        }
+        sum /= count - 1.0;
+        let deviation = sum.diagonal().map(f64::sqrt);
+        DMatrix::from_fn(size, size, |i, j| {
+            let mut value = sum[(i, j)];
+            if i == j {
+                value += 1e-6;
+            } else {
+                value *= 1.0 - SHRINKAGE;
+            }
+            if i / bands == j / bands {
+                let correlation = sum[(i, j)] / (deviation[i] * deviation[j]);
+                value += correlation * (pass_variance[i] * pass_variance[j]).sqrt();
+                let distance = (i as f64 - j as f64) / PREDICTION_LENGTH;
+                value += PREDICTION_ERROR.powi(2) * (-0.5 * distance * distance).exp();
+            }
+            value
+        })
+    }
+
+    fn parts(&self) -> impl Iterator<Item = &[f64]> {
+        self.differences.iter().flat_map(|row| row.chunks_exact(self.per_sleeper))
+    }
+}
+
+/// Inverse of the Cholesky factor: whitens vectors of that covariance.
+///
+/// None if the matrix is no covariance.
+pub fn whitening(covariance: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let size = covariance.nrows();
+    let factor = Cholesky::new(covariance)?;
+    factor.l().solve_lower_triangular(&DMatrix::identity(size, size))
+}
+
+/// Why there is no null model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NullError {
+    /// The calibrated track cannot be built.
+    #[error(transparent)]
+    Model(#[from] tracktwin_track::model::ModelError),
+    /// A pass over it breaks down.
+    #[error(transparent)]
+    Pass(#[from] PassError),
+    /// The simulated passes are not numbers.
+    #[error("a simulated pass is no signal: {0}")]
+    Signal(#[from] tracktwin_signal::SignalError),
+}
+
+/// The values with one level, the surface's own spectrum and no gains.
+fn plain(forward: &Forward, values: &DVector<f64>) -> DVector<f64> {
+    let unknowns = &forward.unknowns;
+    let mut plain = values.clone();
+    let level = values.rows(unknowns.level().start, unknowns.level().len()).mean();
+    unknowns.level().for_each(|index| plain[index] = level);
+    unknowns.spectrum().chain(unknowns.gains()).for_each(|index| plain[index] = 0.0);
+    plain
+}
+
+/// Log powers of passes over surfaces at all speeds, in the order of [`Forward`].
+fn simulate(
+    forward: &Forward,
+    model: &TrackModel,
+    surfaces: &[Surface],
+) -> Result<Vec<DVector<f64>>, NullError> {
+    let mut all = vec![DVector::zeros(forward.count()); surfaces.len()];
+    let models = vec![model.clone(); surfaces.len()];
+    for (speed, &speed_m_s) in forward.speeds_m_s.iter().enumerate() {
+        let pass = pass(&forward.section, speed_m_s);
+        let windows = windows(&forward.section, &pass);
+        for (record, all) in time::passes(&models, &pass, surfaces)?.into_iter().zip(&mut all) {
+            let signal = Signal::new(1.0 / TIME_STEP_S, record.acceleration_m_s2)?;
+            let powers = log_powers(&signal, &windows, &forward.bands);
+            for (sleeper, powers) in powers.into_iter().flatten().enumerate() {
+                for (band, power) in powers.into_iter().enumerate() {
+                    let row = sleeper * forward.per_sleeper() + speed * forward.bands.count() + band;
+                    all[row] = power;
+                }
+            }
+        }
+    }
+    Ok(all)
+}
+
+fn pass(section: &Section, speed_m_s: f64) -> Pass {
+    let spacing_m = section.design.sleeper.spacing_m;
+    let first_m = section.model_x_m(section.first_x_m);
+    let last_m = first_m + (section.sleepers - 1) as f64 * spacing_m;
+    Pass {
+        speed_m_s,
+        start_m: first_m - RUN_IN_SPANS * spacing_m,
+        end_m: last_m + RUN_IN_SPANS * spacing_m,
+        time_step_s: TIME_STEP_S,
+        local_flexibility: true,
+    }
+}
+
+fn windows(section: &Section, pass: &Pass) -> Vec<Option<Range<usize>>> {
+    let spacing_m = section.design.sleeper.spacing_m;
+    let first_m = section.model_x_m(section.first_x_m) - pass.start_m;
+    let sample = |x_m: f64| (x_m / (pass.speed_m_s * pass.time_step_s)).round() as usize;
+    (0..section.sleepers)
+        .map(|sleeper| {
+            let middle_m = first_m + sleeper as f64 * spacing_m;
+            Some(sample(middle_m - 0.5 * spacing_m)..sample(middle_m + 0.5 * spacing_m))
+        })
+        .collect()
+}

@@ -1,0 +1,95 @@
+//! The stretch of track that is compared: its geometry, and which part of it a band sees.
+
+use crate::bands::{Bands, CENTRE_RAD};
+use std::f64::consts::{SQRT_2, TAU};
+use tracktwin_parameters::TrackDesign;
+use tracktwin_track::model::Mesh;
+
+/// Spans modelled beyond the first and last sleeper compared, so that the track's ends are not
+/// heard there.
+const SPANS_BEYOND: usize = 10;
+
+/// Elements of the rail in a span and of a half sleeper (docs/accuracy.md).
+const ELEMENTS: usize = 8;
+
+/// A window reaches so many standard deviations of its blur beyond its ends.
+const BLUR_REACH: f64 = 3.5;
+
+/// A stretch of sleepers and the track around it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Section {
+    /// Rail, sleepers, wheel.
+    pub design: TrackDesign,
+    /// Sleepers compared.
+    pub sleepers: usize,
+    /// Place of the first of them on the recording's scale in m.
+    pub first_x_m: f64,
+}
+
+impl Section {
+    /// Mesh of the whole track: the sleepers compared and what lies beyond them.
+    pub fn mesh(&self) -> Mesh {
+        Mesh::uniform(self.spans(), ELEMENTS, ELEMENTS)
+    }
+
+    /// Spans of the whole track.
+    pub fn spans(&self) -> usize {
+        self.sleepers - 1 + 2 * SPANS_BEYOND
+    }
+
+    /// Elements of a half sleeper.
+    pub const fn sleeper_elements() -> usize {
+        ELEMENTS
+    }
+
+    /// For each sleeper of the whole track the compared one whose values it has: itself, or the
+    /// first or last.
+    pub fn compared(&self) -> impl Iterator<Item = usize> + '_ {
+        (1..self.spans()).map(|sleeper| sleeper.clamp(SPANS_BEYOND, self.last()) - SPANS_BEYOND)
+    }
+
+    /// Number in the whole track (from 0) of a compared sleeper.
+    pub const fn in_track(sleeper: usize) -> usize {
+        SPANS_BEYOND + sleeper - 1
+    }
+
+    const fn last(&self) -> usize {
+        SPANS_BEYOND + self.sleepers - 1
+    }
+
+    /// Place on the model's track of a place on the recording's scale, both in m.
+    pub fn model_x_m(&self, x_m: f64) -> f64 {
+        x_m - self.first_x_m + SPANS_BEYOND as f64 * self.design.sleeper.spacing_m
+    }
+
+    /// Rail nodes that a sleeper's window sees at a speed in a band, with weights that sum to one.
+    ///
+    /// The wavelet smears the window: at position `x` it holds power from around `x`, by a
+    /// Gaussian whose deviation is the way rolled in `6 / (2 pi f sqrt 2)`.
+    pub fn weights(&self, sleeper: usize, speed_m_s: f64, centre_hz: f64) -> Vec<(usize, f64)> {
+        let spacing_m = self.design.sleeper.spacing_m;
+        let blur_m = speed_m_s * CENTRE_RAD / (TAU * centre_hz * SQRT_2);
+        let node_m = spacing_m / ELEMENTS as f64;
+        let middle = (SPANS_BEYOND + sleeper) * ELEMENTS;
+        let reach = ((0.5 * spacing_m + BLUR_REACH * blur_m) / node_m).ceil() as usize;
+        let reach = reach.min(middle);
+        let step = |distance_m: f64| 0.5 * libm::erf(distance_m / (SQRT_2 * blur_m));
+        let weight = |node: usize| {
+            let offset_m = (node as f64 - middle as f64) * node_m;
+            step(0.5 * spacing_m - offset_m) - step(-0.5 * spacing_m - offset_m)
+        };
+        let last = self.spans() * ELEMENTS;
+        let nodes = middle - reach..=(middle + reach).min(last);
+        let sum: f64 = nodes.clone().map(weight).sum();
+        nodes.map(|node| (node, weight(node) / sum)).collect()
+    }
+
+    /// The weights for every compared sleeper and band at a speed: `[sleeper][band]`.
+    pub fn all_weights(&self, speed_m_s: f64, bands: &Bands) -> Vec<Vec<Vec<(usize, f64)>>> {
+        let of = |sleeper| {
+            let bands = bands.centres_hz().iter();
+            bands.map(|&hz| self.weights(sleeper, speed_m_s, hz)).collect()
+        };
+        (0..self.sleepers).map(of).collect()
+    }
+}

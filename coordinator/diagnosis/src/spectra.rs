@@ -1,0 +1,249 @@
+//! What was measured, in bands: the wavelet power over every sleeper in every pass.
+
+use crate::bands::{Bands, gain};
+use rayon::prelude::*;
+use realfft::RealFftPlanner;
+use rustfft::{FftPlanner, num_complex::Complex64};
+use std::ops::Range;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::Recording;
+
+/// Instants at which a band's power is taken, per period of its centre: the power of a band
+/// changes no faster than its bandwidth.
+const INSTANTS_PER_PERIOD: f64 = 5.0;
+
+/// Relative difference within which two passes have one speed.
+const SPEED_TOLERANCE: f64 = 0.02;
+
+/// Least share of its window that a pass must cover to count for a sleeper.
+const SHARE_MIN: f64 = 0.98;
+
+/// Part of the spectrum, below half the sample rate, from which the sensor's noise is taken.
+const NOISE_BAND: Range<f64> = 0.6..0.9;
+
+/// The log powers of a recording, by speed, sleeper and band.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spectra {
+    /// Speeds, ascending.
+    pub speeds: Vec<SpeedSpectra>,
+}
+
+/// The log powers at one speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpeedSpectra {
+    /// Nominal speed in km/h.
+    pub speed_km_h: f64,
+    /// Numbers of the passes in the recording.
+    pub passes: Vec<usize>,
+    /// Natural logarithm of the mean power in m2/s4, `[pass][sleeper][band]`; none where the pass
+    /// does not cover the sleeper's window.
+    pub log_power: Vec<Vec<Option<Vec<f64>>>>,
+    /// One-sided power spectral density in m2/s3 of what the sensor adds, as far as the highest
+    /// frequencies tell: an upper bound.
+    pub noise_density: f64,
+}
+
+impl Spectra {
+    /// Works out the powers of all passes over all sleepers.
+    pub fn new(recording: &Recording, bands: &Bands) -> Self {
+        let powers: Vec<_> = (0..recording.passes.len())
+            .into_par_iter()
+            .map(|pass| pass_powers(recording, pass, bands))
+            .collect();
+        let mut speeds: Vec<SpeedSpectra> = Vec::new();
+        for (pass, log_power) in powers.into_iter().enumerate() {
+            let speed_km_h = recording.passes[pass].speed_km_h;
+            let noise_density = noise_density(&recording.passes[pass].signal);
+            let known = speeds
+                .iter_mut()
+                .find(|known| (speed_km_h / known.speed_km_h - 1.0).abs() <= SPEED_TOLERANCE);
+            match known {
+                Some(known) => {
+                    known.passes.push(pass);
+                    known.log_power.push(log_power);
+                    known.noise_density = known.noise_density.min(noise_density);
+                }
+                None => speeds.push(SpeedSpectra {
+                    speed_km_h,
+                    passes: vec![pass],
+                    log_power: vec![log_power],
+                    noise_density,
+                }),
+            }
+        }
+        speeds.sort_by(|a, b| a.speed_km_h.total_cmp(&b.speed_km_h));
+        Self { speeds }
+    }
+}
+
+impl SpeedSpectra {
+    /// Mean over the passes of a sleeper's log powers; none if no pass covers it.
+    pub fn mean(&self, sleeper: usize) -> Option<Vec<f64>> {
+        let covered: Vec<_> =
+            self.log_power.iter().filter_map(|pass| pass[sleeper].as_ref()).collect();
+        let first = covered.first()?;
+        let mean = |band: usize| {
+            covered.iter().map(|power| power[band]).sum::<f64>() / covered.len() as f64
+        };
+        Some((0..first.len()).map(mean).collect())
+    }
+
+    /// Variance of one pass's log power about the mean of the passes, a value a band, over all
+    /// sleepers; none with a single pass.
+    pub fn pass_variance(&self) -> Option<Vec<f64>> {
+        let sleepers = self.log_power[0].len();
+        let bands = self.log_power.iter().flatten().flatten().next()?.len();
+        let (mut sum, mut degrees) = (vec![0.0; bands], 0.0);
+        for sleeper in 0..sleepers {
+            let Some(mean) = self.mean(sleeper) else { continue };
+            let passes = self.log_power.iter().filter_map(|pass| pass[sleeper].as_ref());
+            let mut count = 0.0;
+            for power in passes {
+                count += 1.0;
+                for (sum, (value, mean)) in sum.iter_mut().zip(power.iter().zip(&mean)) {
+                    *sum += (value - mean).powi(2);
+                }
+            }
+            degrees += count - 1.0;
+        }
+        (degrees > 0.0).then(|| sum.into_iter().map(|sum| sum / degrees).collect())
+    }
+}
+
+fn pass_powers(recording: &Recording, pass: usize, bands: &Bands) -> Vec<Option<Vec<f64>>> {
+    let windows: Vec<_> = (0..recording.sleepers.len())
+        .map(|sleeper| {
+            let covered = recording.window_share(pass, sleeper) >= SHARE_MIN;
+            recording.window(pass, sleeper).filter(|_| covered)
+        })
+        .collect();
+    log_powers(&recording.passes[pass].signal, &windows, bands)
+}
+
+/// Natural logarithm of the mean wavelet power in each window and band; none for no window.
+pub(crate) fn log_powers(
+    signal: &Signal,
+    windows: &[Option<Range<usize>>],
+    bands: &Bands,
+) -> Vec<Option<Vec<f64>>> {
+    let transform = Transform::new(signal);
+    let mut all: Vec<_> = windows
+        .iter()
+        .map(|window| window.as_ref().map(|_| Vec::with_capacity(bands.count())))
+        .collect();
+    for &centre_hz in bands.centres_hz() {
+        let power = transform.power(centre_hz);
+        for (window, powers) in windows.iter().zip(&mut all) {
+            if let (Some(window), Some(powers)) = (window, powers) {
+                powers.push(power.mean(window).ln());
+            }
+        }
+    }
+    all
+}
+
+/// A signal's spectrum, from which bands are taken.
+struct Transform {
+    sample_rate_hz: f64,
+    /// Samples with the zeros behind them.
+    samples: usize,
+    spectrum: Vec<Complex64>,
+}
+
+/// Power of the analytic signal in a band, at even instants.
+struct Power {
+    values: Vec<f64>,
+    /// Samples of the signal between two instants.
+    step: f64,
+}
+
+impl Transform {
+    fn new(signal: &Signal) -> Self {
+        let mean = signal.samples().iter().sum::<f64>() / signal.len() as f64;
+        // A power of two can be shortened by powers of two for every band.
+        let samples = signal.len().next_power_of_two();
+        let mut padded: Vec<f64> = signal.samples().iter().map(|value| value - mean).collect();
+        padded.resize(samples, 0.0);
+        let forward = RealFftPlanner::new().plan_fft_forward(samples);
+        let mut spectrum = forward.make_output_vec();
+        forward.process(&mut padded, &mut spectrum).expect("lengths are the plan's own");
+        Self { sample_rate_hz: signal.sample_rate_hz(), samples, spectrum }
+    }
+
+    fn power(&self, centre_hz: f64) -> Power {
+        let line_hz = self.sample_rate_hz / self.samples as f64;
+        let wanted = INSTANTS_PER_PERIOD * centre_hz / line_hz;
+        let instants = (wanted.ceil() as usize).next_power_of_two().min(self.samples);
+        let last = ((2.0 * centre_hz / line_hz) as usize).min(self.spectrum.len() - 1);
+        let mut values = vec![Complex64::ZERO; instants];
+        for line in 1..=last {
+            // Twice: the analytic signal has the power of both signs of frequency.
+            let weight = 2.0 * gain(centre_hz, line as f64 * line_hz) / self.samples as f64;
+            values[line % instants] += weight * self.spectrum[line];
+        }
+        FftPlanner::new().plan_fft_inverse(instants).process(&mut values);
+        Power {
+            values: values.iter().map(Complex64::norm_sqr).collect(),
+            step: self.samples as f64 / instants as f64,
+        }
+    }
+}
+
+impl Power {
+    /// Mean over a window of samples, which holds at least one instant.
+    fn mean(&self, window: &Range<usize>) -> f64 {
+        let first = (window.start as f64 / self.step).ceil() as usize;
+        let end = ((window.end as f64 / self.step).ceil() as usize).max(first + 1);
+        let inside = &self.values[first.min(self.values.len() - 1)..end.min(self.values.len())];
+        inside.iter().sum::<f64>() / inside.len() as f64
+    }
+}
+
+/// Mean density in m2/s3 where hardly anything but the sensor's noise is left.
+fn noise_density(signal: &Signal) -> f64 {
+    let transform = Transform::new(signal);
+    let count = transform.spectrum.len() as f64;
+    let lines = (NOISE_BAND.start * count) as usize..(NOISE_BAND.end * count) as usize;
+    let density = 2.0 / (transform.sample_rate_hz * signal.len() as f64);
+    // The median of an exponential distribution is ln 2 of its mean, and ignores single lines.
+    let mut powers: Vec<f64> =
+        transform.spectrum[lines].iter().map(|line| density * line.norm_sqr()).collect();
+    let middle = powers.len() / 2;
+    *powers.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+
+    #[test]
+    fn a_tone_has_the_square_of_its_amplitude_in_its_own_band() {
+        let bands = Bands::new(200.0, 3200.0);
+        let tone = |n: u32| 3.0 * (std::f64::consts::TAU * 800.0 * f64::from(n) / 5e4).sin();
+        let signal = Signal::new(5e4, (0..30_000).map(tone).collect()).unwrap();
+        let powers = log_powers(&signal, &[Some(10_000..15_000), None], &bands);
+        let band = bands.centres_hz().iter().position(|hz| (hz - 800.0).abs() < 1e-6).unwrap();
+        // The ends of the signal are far away, the window holds eighty periods.
+        assert!((powers[0].as_ref().unwrap()[band].exp() - 9.0).abs() < 1e-3);
+        assert_eq!(powers[1], None);
+    }
+
+    #[test]
+    fn white_noise_has_the_power_that_the_weights_say_and_its_density_is_found() {
+        let bands = Bands::new(200.0, 3200.0);
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let uniform = (0..400_000).map(|_| random.next_u64() as f64 / u64::MAX as f64 - 0.5);
+        let signal = Signal::new(5e4, uniform.collect()).unwrap();
+        // Variance 1/12 over 25 kHz.
+        let density = 1.0 / 12.0 / 25e3;
+        let powers = log_powers(&signal, &[Some(1000..399_000)], &bands)[0].clone().unwrap();
+        for (band, power) in powers.iter().enumerate() {
+            let weight: f64 = bands.weights(band).iter().map(|&(_, weight)| weight).sum();
+            // Eight seconds of the narrowest band, 60 Hz wide, are known to 5 %.
+            assert!((power.exp() / (weight * density) - 1.0).abs() < 0.2, "{band}");
+        }
+        assert!((noise_density(&signal) / density - 1.0).abs() < 0.02);
+    }
+}
