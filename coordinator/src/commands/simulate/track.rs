@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use serde_json::{Map, Value, json};
 use tracktwin_parameters::{Parameter, ParameterSet, Preset, TrackDesign};
 use tracktwin_signal::recording::Sleeper;
-use tracktwin_track::extension::{Extension, SleeperBolt};
+use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
 /// A track with its own parameters at every sleeper.
@@ -31,11 +31,14 @@ impl SimulatedTrack {
         let mesh = Mesh::uniform(spans, arguments.rail_elements, arguments.sleeper_elements);
         let design = preset.design();
         let sleeper_bolt_n_m = arguments.sleeper_bolt;
-        let extensions: Vec<Box<dyn Extension>> = sleeper_bolt_n_m
-            .map(|stiffness| SleeperBolt { sleepers: (0..spans - 1).collect(), stiffness })
-            .into_iter()
-            .map(|bolts| Box::new(bolts) as _)
-            .collect();
+        let bolts = sleeper_bolt_n_m.map(|stiffness| {
+            ExtensionInstance::new("sleeper_bolt").with("stiffness_N_per_m", stiffness)
+        });
+        let extensions: Vec<_> = bolts
+            .iter()
+            .map(|bolts| bolts.build(&design, spans))
+            .collect::<Result<_, _>>()
+            .or_input()?;
         let model = TrackModel::build(&design, &mesh, &supports, &extensions).or_input()?;
         Ok(Self { design, spans, sleepers, sleeper_bolt_n_m, model })
     }

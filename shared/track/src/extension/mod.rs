@@ -1,16 +1,79 @@
-//! Physics beyond the paper's model, joined to the track through ports.
+//! Physics beyond the paper's model: one definition for both solvers, the library and the report.
 //!
-//! Owns the trait and one file a kind; the ports come from [`Layout`](crate::model::Layout), and
-//! what is added stands in the matrices that both solvers use.
+//! Owns the trait, the registry of kinds and one file a kind. An extension adds itself to the
+//! [`TrackModel`](crate::model::TrackModel); solvers read the model and know no kind. Which
+//! extension explains a recording is the diagnosis's business.
 
+mod instance;
+mod kind;
+mod measured;
+mod registry;
+
+mod clipping;
+mod contact_patch_filter;
+mod corrugation;
+mod electrical_hum;
+mod fastening_clamp;
+mod flexible_axle_box;
+mod frequency_dependent_railpad;
+mod gain_error;
+mod hanging_sleeper;
+mod load_dependent_railpad;
+mod missing_railpad;
+mod position_error;
+mod rail_cross_section;
+mod rail_joint;
+mod roughness_spectrum;
+mod second_wheel;
+mod sensor_mount_resonance;
 mod sleeper_bolt;
+mod squat;
+mod subgrade_layer;
+mod support_variation;
+mod wheel_flat;
+mod wheel_out_of_round;
 
-pub use sleeper_bolt::SleeperBolt;
+pub use instance::{ExtensionInstance, InstanceError};
+pub use kind::{Bound, Class, Kind, KindParameter, PlaceKind};
+pub use measured::Measured;
+pub use registry::KINDS;
 
-use crate::model::Assembly;
+use crate::model::{Assembly, Vehicle};
+use rustfft::num_complex::Complex64;
+use std::fmt::Debug;
 
-/// A piece of physics that adds stiffness, damping, mass or degrees of freedom to the track.
-pub trait Extension {
-    /// Adds its terms to the track being assembled.
-    fn assemble(&self, assembly: &mut Assembly);
+/// A piece of physics that the paper's model leaves out, or a fault of the measuring chain.
+///
+/// Every method has a default that changes nothing: a kind overrides what concerns it.
+pub trait Extension: Debug + Send + Sync {
+    /// Adds its linear terms, degrees of freedom and force laws to the track being assembled.
+    fn assemble(&self, _assembly: &mut Assembly) {}
+
+    /// Changes what rolls over the track.
+    fn equip(&self, _vehicle: &mut Vehicle) {}
+
+    /// Height in m that it adds to the surface at `x_m`, positive downwards: a dip is positive.
+    fn profile_m(&self, _x_m: f64) -> f64 {
+        0.0
+    }
+
+    /// Height in m that the wheel's own shape adds after it has rolled `rolled_m` from the
+    /// track's origin, positive downwards: a flat is positive.
+    fn wheel_profile_m(&self, _rolled_m: f64) -> f64 {
+        0.0
+    }
+
+    /// By what it multiplies the spectral density of the irregularity at a wave number in rad/m.
+    fn roughness_gain(&self, _wave_number_rad_m: f64) -> f64 {
+        1.0
+    }
+
+    /// What the measuring chain makes of a harmonic acceleration at a frequency in Hz: recorded
+    /// over true amplitude.
+    fn sensor_transfer(&self, _frequency_hz: f64) -> Complex64 {
+        Complex64::ONE
+    }
+
+    /// Does to a pass what the measuring chain does to it.
+    fn measure(&self, _measured: &mut Measured) {}
 }

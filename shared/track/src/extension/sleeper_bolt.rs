@@ -1,25 +1,38 @@
 //! Bolts that hold the sleepers' ends down on the substructure.
 
-use super::Extension;
+use super::{Class, Extension, Kind, KindParameter, PlaceKind};
 use crate::element::SpringDamper;
 use crate::model::Assembly;
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "sleeper_bolt",
+    summary: "bolts hold the sleepers' ends down on the substructure",
+    classes: &[Class::Frequency, Class::Local],
+    place: PlaceKind::Sleepers,
+    measuring_chain: false,
+    parameters: &[KindParameter::new("stiffness_N_per_m", "N/m", "vertical stiffness of a bolt")
+        .ranges([5e6, 5e7], [2.5e7, 2.5e8], 3e7)],
+    look_alikes: &["support_variation", "subgrade_layer"],
+    would_separate: "a second speed, or a hammer test of the sleeper's end",
+    build: |inputs| {
+        let (sleepers, stiffness) = (inputs.sleepers(), inputs.value("stiffness_N_per_m"));
+        Ok(Arc::new(SleeperBolt { sleepers, stiffness }))
+    },
+};
 
 /// A spring between the free end of a sleeper and the ground, on each of some sleepers.
 ///
 /// V-Track's sleepers are bolted down; the paper leaves the bolts out and widens the range of the
 /// sleeper's bending stiffness instead (Appendix D). As a spring on the port of the sleeper's tip
-/// a bolt adds `k b bᵀ` to the stiffness.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SleeperBolt {
-    /// The bolted sleepers, from 0.
-    pub sleepers: Vec<usize>,
-    /// Vertical stiffness of a bolt in N/m; some 5e6 to 5e7 on V-Track.
-    pub stiffness: f64,
+/// a bolt adds `k b bᵀ` to the stiffness (mismatch catalogue 8).
+#[derive(Debug)]
+struct SleeperBolt {
+    sleepers: Vec<usize>,
+    stiffness: f64,
 }
 
 impl Extension for SleeperBolt {
-    /// # Panics
-    /// When the track lacks one of the sleepers.
     fn assemble(&self, assembly: &mut Assembly) {
         for &index in &self.sleepers {
             let tip = assembly.layout().sleepers()[index].tip_node();
@@ -32,7 +45,7 @@ impl Extension for SleeperBolt {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::extension::ExtensionInstance;
     use crate::frequency::{Place, receptance};
     use crate::model::{Mesh, Support, Surface, TrackModel};
     use crate::time::{self, Pass};
@@ -45,9 +58,13 @@ mod tests {
 
     fn track(bolts: &[usize]) -> TrackModel {
         let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
-        let bolts = SleeperBolt { sleepers: bolts.to_vec(), stiffness: STIFFNESS };
-        let mesh = Mesh::uniform(SPANS, 4, 4);
-        TrackModel::build(&TrackDesign::v_track(), &mesh, &supports, &[Box::new(bolts)]).unwrap()
+        let (design, mesh) = (TrackDesign::v_track(), Mesh::uniform(SPANS, 4, 4));
+        let bolt = ExtensionInstance::new("sleeper_bolt").with("stiffness_N_per_m", STIFFNESS);
+        let extensions: Vec<_> = match bolts {
+            [] => Vec::new(),
+            _ => vec![bolt.on(bolts.iter().copied()).build(&design, SPANS).unwrap()],
+        };
+        TrackModel::build(&design, &mesh, &supports, &extensions).unwrap()
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Puts elements and extensions together into the three matrices.
 
 use super::matrices::{Matrices, Term};
-use super::{Layout, Support};
+use super::{ForceLaw, Layout, Support};
 use crate::element::{BeamElement, ElementMatrix, SpringDamper};
 use tracktwin_parameters::TrackDesign;
 
@@ -41,28 +41,103 @@ impl FromIterator<(usize, f64)> for Port {
 /// A track being assembled.
 #[derive(Debug)]
 pub struct Assembly {
+    design: TrackDesign,
     layout: Layout,
+    supports: Vec<Support>,
     terms: Vec<Term>,
     dofs: usize,
+    force_laws: Vec<ForceLaw>,
+}
+
+/// What an [`Assembly`] ends as.
+pub(super) struct Assembled {
+    pub(super) layout: Layout,
+    pub(super) matrices: Matrices,
+    pub(super) force_laws: Vec<ForceLaw>,
 }
 
 impl Assembly {
     /// The track of the design alone.
     pub(super) fn new(design: &TrackDesign, layout: Layout, supports: &[Support]) -> Self {
         let dofs = layout.structural_dofs();
-        let mut assembly = Self { layout, terms: Vec::new(), dofs };
-        assembly.add_rail(design);
+        let mut assembly = Self {
+            design: design.clone(),
+            layout,
+            supports: supports.to_vec(),
+            terms: Vec::new(),
+            dofs,
+            force_laws: Vec::new(),
+        };
+        assembly.add_rail();
         for (index, support) in supports.iter().enumerate() {
-            assembly.add_sleeper(design, index, support);
-            assembly.add_spring_damper(&assembly.layout.railpad_port(index), support.railpad());
-            assembly.add_ballast(index, support.ballast());
+            assembly.add_sleeper(index, support);
+            assembly.add_support(index, support, 1.0);
         }
         assembly
+    }
+
+    /// What the track is made of, supports apart.
+    pub fn design(&self) -> &TrackDesign {
+        &self.design
     }
 
     /// Where everything stands.
     pub fn layout(&self) -> &Layout {
         &self.layout
+    }
+
+    /// What stands under each rail seat.
+    pub fn supports(&self) -> &[Support] {
+        &self.supports
+    }
+
+    /// Replaces railpad and ballast of sleeper `index` (from 0); the sleeper stays as it is.
+    ///
+    /// # Panics
+    /// When the track has no such sleeper.
+    pub fn set_support(&mut self, index: usize, support: Support) {
+        let before = self.supports[index];
+        self.add_support(index, &before, -1.0);
+        self.add_support(index, &support, 1.0);
+        let sleeper_bending_stiffness = before.sleeper_bending_stiffness;
+        self.supports[index] = Support { sleeper_bending_stiffness, ..support };
+    }
+
+    /// Ports of the ballast under sleeper `index` (from 0), and the spring and damper on each.
+    ///
+    /// # Panics
+    /// When the track has no such sleeper.
+    pub fn ballast(&self, index: usize) -> Vec<(Port, SpringDamper)> {
+        let ballast = self.supports[index].ballast();
+        let shares = self.layout.sleepers()[index].tributary_shares();
+        let port = |node| self.layout.sleeper_port(index, node);
+        let of = |(node, share)| (port(node), ballast.share(share));
+        shares.into_iter().enumerate().map(of).collect()
+    }
+
+    /// Takes part of the rail's bending stiffness away between two places in m: there it keeps
+    /// the `factor`.
+    ///
+    /// An element that is softened on a part of its length gets the bending stiffness whose
+    /// flexibility is the mean of both; its shear stiffness stays.
+    pub fn soften_rail(&mut self, [from_m, to_m]: [f64; 2], factor: f64) {
+        for element in 0..self.layout.rail_elements().len() {
+            let [start, end] = [0, 1].map(|side| self.layout.rail_nodes_m()[element + side]);
+            let share = (end.min(to_m) - start.max(from_m)) / (end - start);
+            if share > 0.0 {
+                let flexibility = 1.0 + share * (1.0 / factor - 1.0);
+                let before = self.layout.rail_elements()[element];
+                self.add_rail_element(element, -1.0);
+                let bending_stiffness = before.bending_stiffness / flexibility;
+                self.layout.set_rail_element(element, BeamElement { bending_stiffness, ..before });
+                self.add_rail_element(element, 1.0);
+            }
+        }
+    }
+
+    /// Adds a force that no matrix holds, in place of the linear terms that it names.
+    pub fn add_force_law(&mut self, law: ForceLaw) {
+        self.force_laws.push(law);
     }
 
     /// Appends a degree of freedom, which nothing holds yet, and returns its port.
@@ -81,9 +156,10 @@ impl Assembly {
         self.add_on_port(port, mass_kg, 0.0, 0.0);
     }
 
-    /// Layout and matrices of what has been put together.
-    pub(super) fn finish(self) -> (Layout, Matrices) {
-        (self.layout, Matrices::from_terms(self.dofs, self.terms))
+    /// What has been put together.
+    pub(super) fn finish(self) -> Assembled {
+        let matrices = Matrices::from_terms(self.dofs, self.terms);
+        Assembled { layout: self.layout, matrices, force_laws: self.force_laws }
     }
 
     fn add_on_port(&mut self, port: &Port, mass: f64, damping: f64, stiffness: f64) {
@@ -101,38 +177,52 @@ impl Assembly {
         }
     }
 
-    fn add_rail(&mut self, design: &TrackDesign) {
+    fn add_rail(&mut self) {
         for element in 0..self.layout.rail_elements().len() {
-            let beam = self.layout.rail_elements()[element];
-            let dofs = self.layout.rail_element_dofs(element);
-            self.add_beam(&beam, dofs, design.rail_damping_s);
+            self.add_rail_element(element, 1.0);
         }
     }
 
-    fn add_sleeper(&mut self, design: &TrackDesign, index: usize, support: &Support) {
+    /// Adds a rail element as it is now, `factor` times.
+    fn add_rail_element(&mut self, element: usize, factor: f64) {
+        let beam = self.layout.rail_elements()[element];
+        let dofs = self.layout.rail_element_dofs(element);
+        self.add_beam(&beam, dofs, self.design.rail_damping_s, factor);
+    }
+
+    fn add_sleeper(&mut self, index: usize, support: &Support) {
         let sleeper = self.layout.sleepers()[index].clone();
         for node in 0..sleeper.tip_node() {
             let length = sleeper.nodes_m[node + 1] - sleeper.nodes_m[node];
-            let beam = sleeper_element(design, support, length);
-            self.add_beam(&beam, Layout::sleeper_element_dofs(&sleeper, node), 0.0);
+            let beam = sleeper_element(&self.design, support, length);
+            self.add_beam(&beam, Layout::sleeper_element_dofs(&sleeper, node), 0.0, 1.0);
         }
     }
 
-    fn add_ballast(&mut self, index: usize, ballast: SpringDamper) {
+    /// Adds railpad and ballast, `factor` times.
+    fn add_support(&mut self, index: usize, support: &Support, factor: f64) {
+        let railpad = support.railpad().share(factor);
+        self.add_spring_damper(&self.layout.railpad_port(index), railpad);
         let shares = self.layout.sleepers()[index].tributary_shares();
         for (node, share) in shares.into_iter().enumerate() {
             let port = self.layout.sleeper_port(index, node);
-            self.add_spring_damper(&port, ballast.share(share));
+            self.add_spring_damper(&port, support.ballast().share(share).share(factor));
         }
     }
 
-    /// Adds a beam whose damping is `damping_s` times its stiffness.
-    fn add_beam(&mut self, beam: &BeamElement, dofs: [Option<usize>; 4], damping_s: f64) {
+    /// Adds a beam whose damping is `damping_s` times its stiffness, `factor` times.
+    fn add_beam(
+        &mut self,
+        beam: &BeamElement,
+        dofs: [Option<usize>; 4],
+        damping_s: f64,
+        factor: f64,
+    ) {
         let (k, m): (ElementMatrix, ElementMatrix) = (beam.stiffness(), beam.mass());
         for (i, row) in dofs.iter().enumerate() {
             for (j, column) in dofs.iter().enumerate() {
                 if let (&Some(row), &Some(column)) = (row, column) {
-                    let (mass, stiffness) = (m[i][j], k[i][j]);
+                    let (mass, stiffness) = (factor * m[i][j], factor * k[i][j]);
                     let damping = damping_s * stiffness;
                     self.terms.push(Term { row, column, mass, damping, stiffness });
                 }

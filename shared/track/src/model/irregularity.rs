@@ -63,6 +63,14 @@ impl Roughness {
     /// of a period that holds `length_m`. Seed, length and wavelengths fix the surface; the level
     /// only scales it.
     pub fn surface(&self, seed: u64, length_m: f64) -> Surface {
+        self.shaped_surface(seed, length_m, |_| 1.0)
+    }
+
+    /// The surface of this seed whose spectral density is `gain` times eq. B.6; `gain` is asked
+    /// at wave numbers in rad/m.
+    ///
+    /// The phases are those of [`Roughness::surface`]: a gain of one gives the same surface.
+    pub fn shaped_surface(&self, seed: u64, length_m: f64, gain: impl Fn(f64) -> f64) -> Surface {
         let step_m = self.shortest_m / POINTS_PER_SHORTEST_WAVE;
         let points = grid_points(length_m / step_m);
         let wave_number_step = TAU / (points as f64 * step_m);
@@ -73,7 +81,8 @@ impl Roughness {
             if wave_number > TAU / self.shortest_m {
                 break;
             }
-            let amplitude = (2.0 * self.density(wave_number) * wave_number_step).sqrt();
+            let density = self.density(wave_number) * gain(wave_number);
+            let amplitude = (2.0 * density * wave_number_step).sqrt();
             let phase = TAU * unit(&mut random);
             *harmonic = Complex64::from_polar(amplitude / spline_gain(wave_number * step_m), phase);
         }

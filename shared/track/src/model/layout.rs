@@ -134,6 +134,10 @@ impl Layout {
         &self.rail_elements
     }
 
+    pub(super) fn set_rail_element(&mut self, element: usize, beam: BeamElement) {
+        self.rail_elements[element] = beam;
+    }
+
     /// The sleepers, from left to right.
     pub fn sleepers(&self) -> &[SleeperLayout] {
         &self.sleepers

@@ -1,7 +1,10 @@
 //! The assembled track.
 
-use super::{Assembly, Layout, Matrices, Mesh, Support};
-use crate::extension::Extension;
+use super::assembly::Assembled;
+use super::{Assembly, ForceLaw, Layout, Matrices, Mesh, Roughness, Support, Surface, Vehicle};
+use crate::extension::{Extension, Measured};
+use rustfft::num_complex::Complex64;
+use std::sync::Arc;
 use tracktwin_parameters::TrackDesign;
 
 /// Rail, sleepers, railpads, ballast and extensions as `M ü + C u̇ + K u = f`.
@@ -9,11 +12,17 @@ use tracktwin_parameters::TrackDesign;
 /// The rail runs from 0 to `spans × spacing`, its ends held in deflection and free in rotation;
 /// sleeper `i` (from 0) stands at `(i + 1) × spacing`, and none stands at the ends. Source: paper,
 /// 2.4.1, Appendices B and C.
-#[derive(Clone, Debug, PartialEq)]
+///
+/// What an extension adds that no matrix holds is asked of the model, not of the extension: force
+/// laws, height of the surface, spectrum of its roughness, vehicle, sensor.
+#[derive(Clone, Debug)]
 pub struct TrackModel {
     design: TrackDesign,
     layout: Layout,
     matrices: Matrices,
+    force_laws: Vec<ForceLaw>,
+    vehicle: Vehicle,
+    extensions: Vec<Arc<dyn Extension>>,
 }
 
 /// Why no track can be built.
@@ -58,15 +67,18 @@ impl TrackModel {
         design: &TrackDesign,
         mesh: &Mesh,
         supports: &[Support],
-        extensions: &[Box<dyn Extension>],
+        extensions: &[Arc<dyn Extension>],
     ) -> Result<Self, ModelError> {
         check(design, mesh, supports)?;
         let mut assembly = Assembly::new(design, Layout::new(design, mesh), supports);
+        let mut vehicle = Vehicle::rigid(&design.wheel);
         for extension in extensions {
             extension.assemble(&mut assembly);
+            extension.equip(&mut vehicle);
         }
-        let (layout, matrices) = assembly.finish();
-        Ok(Self { design: design.clone(), layout, matrices })
+        let Assembled { layout, matrices, force_laws } = assembly.finish();
+        let (design, extensions) = (design.clone(), extensions.to_vec());
+        Ok(Self { design, layout, matrices, force_laws, vehicle, extensions })
     }
 
     /// What it was built from, supports apart.
@@ -83,12 +95,66 @@ impl TrackModel {
     pub(crate) fn has_pattern_of(&self, other: &Self) -> bool {
         self.design == other.design
             && self.layout == other.layout
+            && self.vehicle == other.vehicle
             && self.matrices.has_pattern_of(&other.matrices)
     }
 
-    /// Its mass, damping and stiffness.
+    /// Its mass, damping and stiffness; force laws by their linearisation.
     pub fn matrices(&self) -> &Matrices {
         &self.matrices
+    }
+
+    /// The forces that no matrix holds.
+    pub fn force_laws(&self) -> &[ForceLaw] {
+        &self.force_laws
+    }
+
+    /// What rolls over it.
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
+    /// Whether its matrices, and one rigid wheel, are all that moves.
+    pub fn is_linear(&self) -> bool {
+        self.force_laws.is_empty() && self.vehicle.is_rigid_wheel()
+    }
+
+    /// Height in m, positive downwards, that extensions add to the surface at `x_m`.
+    pub fn profile_m(&self, x_m: f64) -> f64 {
+        self.extensions.iter().map(|extension| extension.profile_m(x_m)).sum()
+    }
+
+    /// Height in m, positive downwards, that the first wheel's own shape adds when it has rolled
+    /// from the track's origin to `x_m`.
+    pub fn wheel_profile_m(&self, x_m: f64) -> f64 {
+        self.extensions.iter().map(|extension| extension.wheel_profile_m(x_m)).sum()
+    }
+
+    /// By what extensions multiply the spectral density of the irregularity at a wave number in
+    /// rad/m.
+    pub fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
+        let gain = |extension: &Arc<dyn Extension>| extension.roughness_gain(wave_number_rad_m);
+        self.extensions.iter().map(gain).product()
+    }
+
+    /// The irregularity of this seed, of the given roughness as extensions change it, along the
+    /// whole track; [`TrackModel::profile_m`] is not in it.
+    pub fn surface(&self, roughness: &Roughness, seed: u64) -> Surface {
+        let gain = |wave_number| self.roughness_gain(wave_number);
+        roughness.shaped_surface(seed, self.layout.length_m(), gain)
+    }
+
+    /// What the measuring chain makes of a harmonic acceleration at a frequency in Hz: recorded
+    /// over true amplitude.
+    pub fn sensor_transfer(&self, frequency_hz: f64) -> Complex64 {
+        self.extensions.iter().map(|extension| extension.sensor_transfer(frequency_hz)).product()
+    }
+
+    /// Makes of true acceleration and position what the measuring chain would have recorded.
+    pub fn measure(&self, measured: &mut Measured) {
+        for extension in &self.extensions {
+            extension.measure(measured);
+        }
     }
 }
 

@@ -32,7 +32,7 @@ use std::array;
 ///
 /// # Errors
 /// [`PassError`] of the first case that has one.
-pub fn passes(
+pub(super) fn passes(
     models: &[TrackModel],
     pass: &Pass,
     surfaces: &[Surface],
@@ -88,7 +88,7 @@ fn run(
     surfaces: [&Surface; LANES],
 ) -> Result<Vec<Block>, PassError> {
     let heights: Vec<Block> = (0..stations.len())
-        .map(|step| Block::from_fn(|lane| pass.height_m(surfaces[lane], step)))
+        .map(|step| Block::from_fn(|lane| pass.height_m(models[lane], surfaces[lane], step)))
         .collect();
     let motion = Motion::start(elimination, &stations[0], models, pass, heights[0])?;
     Ok(motion.run(&stations[1..], &heights[1..]))

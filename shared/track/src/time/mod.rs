@@ -4,11 +4,15 @@
 //! `tracktwin-signal`'s.
 
 mod cholesky;
+mod coupled;
 mod equilibrium;
+mod kinematics;
 mod lanes;
 mod newmark;
+mod passes;
+mod rolling;
 mod run;
 
-pub use lanes::passes;
 pub use newmark::pass;
+pub use passes::passes;
 pub use run::{Pass, PassError, PassRecord};

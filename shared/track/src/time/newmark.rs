@@ -1,15 +1,19 @@
 //! The plain solver: one case, one step after the other, as the equations say it.
 
 use super::cholesky::Cholesky;
+use super::coupled::{self, Resistance};
 use super::equilibrium::Equilibrium;
+use super::kinematics::Kinematics;
+use super::rolling::Rolling;
 use super::{Pass, PassError, PassRecord};
-use crate::model::{HertzContact, RailPoint, Surface, TrackModel};
+use crate::model::{ForceLaw, HertzContact, RailPoint, Surface, TrackModel};
+use nalgebra::{DMatrix, DVector};
 
-/// Runs the wheel over the track.
+/// Runs the vehicle over the track.
 ///
-/// Average acceleration (Newmark, `β = 1/4`, `γ = 1/2`) for track and wheel; the contact force of
-/// each step is found by Newton's method on the contact point alone, to which track and wheel are
-/// condensed. Source: paper, Appendix B.
+/// Average acceleration (Newmark, `β = 1/4`, `γ = 1/2`) for track and vehicle; contact forces, and
+/// the forces of laws that no matrix holds, are found by Newton's method on their own motions
+/// alone, to which track and vehicle are condensed. Source: paper, Appendix B.
 ///
 /// # Errors
 /// [`PassError`] if the pass leaves the track, or the track or its surface makes no sense.
@@ -18,42 +22,28 @@ pub fn pass(model: &TrackModel, pass: &Pass, surface: &Surface) -> Result<PassRe
     let mut motion = Motion::start(model, pass, surface)?;
     let mut record = PassRecord::start(pass, motion.force_n);
     for step in 1..=pass.steps() {
-        motion.advance(pass.position_m(step), pass.height_m(surface, step))?;
-        record.push(motion.wheel.acceleration, motion.force_n);
+        motion.advance(pass.position_m(step), &heights_m(model, pass, surface, step))?;
+        record.push(motion.wheels[0].acceleration(), motion.force_n);
     }
     Ok(record)
 }
 
-/// Displacement, velocity and acceleration of one degree of freedom.
-#[derive(Clone, Copy, Default)]
-struct Kinematics {
-    displacement: f64,
-    velocity: f64,
-    acceleration: f64,
+/// Heights of the surface under all wheels after so many steps.
+fn heights_m(model: &TrackModel, pass: &Pass, surface: &Surface, step: usize) -> Vec<f64> {
+    let further = model.vehicle().further_wheels_m.iter();
+    let further = further.map(|&ahead_m| pass.further_height_m(model, surface, step, ahead_m));
+    [pass.height_m(model, surface, step)].into_iter().chain(further).collect()
 }
 
-impl Kinematics {
-    /// Moves on to a new displacement under constant average acceleration.
-    fn advance(&mut self, displacement: f64, dt: f64) {
-        let moved = displacement - self.displacement;
-        let velocity = 2.0 / dt * moved - self.velocity;
-        self.acceleration = 2.0 / dt * (velocity - self.velocity) - self.acceleration;
-        self.velocity = velocity;
-        self.displacement = displacement;
-    }
-
-    /// What the mass would have to be pushed with to stay at displacement zero, per mass.
-    fn inertia(&self, dt: f64) -> f64 {
-        4.0 / (dt * dt) * self.displacement + 4.0 / dt * self.velocity + self.acceleration
-    }
-
-    /// The same for a damper, per damping.
-    fn resistance(&self, dt: f64) -> f64 {
-        2.0 / dt * self.displacement + self.velocity
-    }
+/// A force law on its way.
+struct Resisting<'a> {
+    law: &'a ForceLaw,
+    motion: Kinematics,
+    /// Displacements of the track per unit force on its port, in a step.
+    unit: Vec<f64>,
 }
 
-/// Wheel and track on their way.
+/// Vehicle and track on their way.
 struct Motion<'a> {
     model: &'a TrackModel,
     contact: HertzContact,
@@ -62,8 +52,23 @@ struct Motion<'a> {
     /// Factor of `4 M / dt² + 2 C / dt + K`.
     dynamic_stiffness: Cholesky,
     track: Vec<Kinematics>,
-    wheel: Kinematics,
+    wheels: Vec<Rolling>,
+    laws: Vec<Resisting<'a>>,
+    /// Motions of all contacts and laws in the last step: where Newton's method starts.
+    motions: DVector<f64>,
+    /// Contact force of the first wheel.
     force_n: f64,
+}
+
+/// What stands on the rail in one step, and what it would do there alone.
+struct Standing {
+    points: Vec<RailPoint>,
+    /// Displacements of the track per unit contact force of each wheel.
+    units: Vec<Vec<f64>>,
+    /// Approaches without any contact force.
+    overlaps: Vec<f64>,
+    /// Displacements of the track without any contact force or law.
+    free: Vec<f64>,
 }
 
 impl<'a> Motion<'a> {
@@ -71,38 +76,131 @@ impl<'a> Motion<'a> {
         let dt = pass.time_step_s;
         let matrices = model.matrices();
         let values = matrices.combination(4.0 / (dt * dt), 2.0 / dt, 1.0);
-        let rest = Equilibrium::new(model, pass, pass.height_m(surface, 0))?;
-        let at_rest = |displacement| Kinematics { displacement, ..Kinematics::default() };
+        let rest = Equilibrium::new(model, pass, &heights_m(model, pass, surface, 0))?;
+        let dynamic_stiffness = Cholesky::new(matrices, &values)?;
+        let resisting = |law: &'a ForceLaw| Resisting {
+            law,
+            motion: Kinematics::at_rest(law.port.motion(&rest.track)),
+            unit: dynamic_stiffness.solve_port(&law.port),
+        };
+        let laws: Vec<_> = model.force_laws().iter().map(resisting).collect();
+        let contact = HertzContact::new(model.design());
+        let wheels = Rolling::at_rest(model.vehicle(), &rest.contacts_m, dt);
+        let force_n = model.vehicle().wheel.load_n;
+        let approaches = wheels.iter().map(|_| contact.approach(force_n));
+        let motions = approaches.chain(laws.iter().map(|law| law.motion.displacement));
         Ok(Self {
             model,
-            contact: HertzContact::new(model.design()),
+            contact,
             local_flexibility: pass.local_flexibility,
             dt,
-            dynamic_stiffness: Cholesky::new(matrices, &values)?,
-            track: rest.track.into_iter().map(at_rest).collect(),
-            wheel: at_rest(rest.wheel_m),
-            force_n: model.design().wheel.load_n,
+            motions: DVector::from_vec(motions.collect()),
+            dynamic_stiffness,
+            track: rest.track.into_iter().map(Kinematics::at_rest).collect(),
+            wheels,
+            laws,
+            force_n,
         })
     }
 
-    /// One time step, at whose end the wheel stands at `x_m` over a surface of height `height_m`.
-    fn advance(&mut self, x_m: f64, height_m: f64) -> Result<(), PassError> {
-        let point = self.model.layout().rail_point(x_m);
-        let free = self.track_without_contact();
-        let unit = self.track_under_unit_force(&point);
-        let (wheel_free, wheel_compliance) = self.wheel_without_contact();
-        let local = if self.local_flexibility { point.local_flexibility } else { 0.0 };
-        let compliance = point.deflection(&unit) + wheel_compliance + local;
-        let overlap = wheel_free - point.deflection(&free) - height_m;
-        self.force_n = self
-            .contact
-            .solve(overlap, compliance)
-            .ok_or(PassError::NotFinite { position_m: x_m })?;
-        for (dof, (free, unit)) in self.track.iter_mut().zip(free.iter().zip(&unit)) {
-            dof.advance(free + self.force_n * unit, self.dt);
+    /// One time step, at whose end the first wheel stands at `x_m` and each over its height.
+    fn advance(&mut self, x_m: f64, heights_m: &[f64]) -> Result<(), PassError> {
+        let standing = self.stand(x_m, heights_m);
+        let forces = match self.forces_of_one_contact(&standing) {
+            Some(force_n) => vec![force_n],
+            None => self.forces_of_all(&standing).unwrap_or(vec![f64::NAN]),
+        };
+        self.force_n = forces[0];
+        if !self.force_n.is_finite() {
+            return Err(PassError::NotFinite { position_m: x_m });
         }
-        self.wheel.advance(wheel_free - self.force_n * wheel_compliance, self.dt);
+        self.push(standing, &forces);
         Ok(())
+    }
+
+    fn stand(&mut self, x_m: f64, heights_m: &[f64]) -> Standing {
+        let free = self.track_without_contact();
+        let layout = self.model.layout();
+        let points: Vec<_> =
+            self.wheels.iter().map(|wheel| layout.rail_point(x_m + wheel.ahead_m)).collect();
+        let units = points.iter().map(|point| self.track_under_unit_force(point)).collect();
+        let overlap = |((wheel, point), height_m): ((&mut Rolling, &RailPoint), &f64)| {
+            wheel.lift_off(self.dt) - point.deflection(&free) - height_m
+        };
+        let overlaps = self.wheels.iter_mut().zip(&points).zip(heights_m).map(overlap).collect();
+        Standing { points, units, overlaps, free }
+    }
+
+    /// The contact force if there is one wheel and all laws are at rest; not a number if the
+    /// input is not.
+    fn forces_of_one_contact(&self, standing: &Standing) -> Option<f64> {
+        let ([overlap], [unit]) = (&standing.overlaps[..], &standing.units[..]) else {
+            return None;
+        };
+        let force = self.contact.solve(*overlap, self.compliance(standing, 0));
+        let force = force.unwrap_or(f64::NAN);
+        let at_rest = |law: &Resisting| {
+            let motion = law.law.port.motion(&standing.free) + force * law.law.port.motion(unit);
+            Resistance::Law(law.law, law.motion, Some(self.dt)).rests_at(motion)
+        };
+        self.laws.iter().all(at_rest).then_some(force)
+    }
+
+    /// How far one wheel and the track below it give way to each other's unit force.
+    fn compliance(&self, standing: &Standing, wheel: usize) -> f64 {
+        let point = &standing.points[wheel];
+        let local = if self.local_flexibility { point.local_flexibility } else { 0.0 };
+        point.deflection(&standing.units[wheel]) + self.wheels[wheel].compliance() + local
+    }
+
+    /// Forces of all contacts, then of all laws.
+    fn forces_of_all(&mut self, standing: &Standing) -> Option<Vec<f64>> {
+        let wheels = self.wheels.len();
+        let count = wheels + self.laws.len();
+        let port = |index: usize, displacement: &[f64]| match index.checked_sub(wheels) {
+            None => -standing.points[index].deflection(displacement),
+            Some(law) => self.laws[law].law.port.motion(displacement),
+        };
+        let compliance =
+            DMatrix::from_fn(count, count, |row, column| match column.checked_sub(wheels) {
+                None if row == column => self.compliance(standing, row),
+                None => -port(row, &standing.units[column]),
+                Some(law) => port(row, &self.laws[law].unit),
+            });
+        let law_motions = self.laws.iter().map(|law| law.law.port.motion(&standing.free));
+        let free = standing.overlaps.iter().copied().chain(law_motions);
+        let free = DVector::from_vec(free.collect());
+        let contacts = (0..wheels).map(|_| Resistance::Contact(self.contact));
+        let laws = self.laws.iter();
+        let laws = laws.map(|law| Resistance::Law(law.law, law.motion, Some(self.dt)));
+        let resistances: Vec<_> = contacts.chain(laws).collect();
+        let (motions, forces) =
+            coupled::solve(&resistances, &compliance, &free, self.motions.clone())?;
+        self.motions = motions;
+        Some(forces.iter().copied().collect())
+    }
+
+    /// Moves everything on under contact forces and, behind them, forces of laws.
+    fn push(&mut self, standing: Standing, forces: &[f64]) {
+        let mut displacement = standing.free;
+        let mut add = |factor: f64, unit: &[f64]| {
+            displacement.iter_mut().zip(unit).for_each(|(sum, unit)| *sum += factor * unit);
+        };
+        for (unit, force) in standing.units.iter().zip(forces) {
+            add(*force, unit);
+        }
+        for (law, force) in self.laws.iter().zip(&forces[self.wheels.len()..]) {
+            add(-force, &law.unit);
+        }
+        for law in &mut self.laws {
+            law.motion.advance(law.law.port.motion(&displacement), self.dt);
+        }
+        for (dof, displacement) in self.track.iter_mut().zip(displacement) {
+            dof.advance(displacement, self.dt);
+        }
+        for (wheel, force) in self.wheels.iter_mut().zip(forces) {
+            wheel.advance(*force, self.dt);
+        }
     }
 
     /// Displacements at the end of the step if the wheel lifted off.
@@ -125,15 +223,6 @@ impl<'a> Motion<'a> {
         }
         self.dynamic_stiffness.solve(&mut displacement);
         displacement
-    }
-
-    /// The wheel's displacement at the end of the step without contact, and what a unit contact
-    /// force takes from it.
-    fn wheel_without_contact(&self) -> (f64, f64) {
-        let wheel = &self.model.design().wheel;
-        let compliance = self.dt * self.dt / (4.0 * wheel.mass_kg);
-        let force = wheel.mass_kg * self.wheel.inertia(self.dt) + wheel.load_n;
-        (compliance * force, compliance)
     }
 }
 
@@ -216,7 +305,7 @@ mod tests {
             let before = part(&motion, |dof| dof.displacement);
             let (x0, x1) = (pass.position_m(step - 1), pass.position_m(step));
             let force_before = motion.force_n;
-            motion.advance(x1, pass.height_m(&surface, step)).unwrap();
+            motion.advance(x1, &[pass.height_m(&model, &surface, step)]).unwrap();
             let after = part(&motion, |dof| dof.displacement);
             let moved: Vec<_> = after.iter().zip(&before).map(|(a, b)| a - b).collect();
             // Under the trapezoidal rule the mean of the forces at both ends does the work.
@@ -235,7 +324,7 @@ mod tests {
     #[test]
     fn the_wheel_at_rest_hangs_between_its_load_and_a_dense_solution() {
         let (model, pass) = (track(5, 4), over_spans(2.3, 3.0));
-        let rest = Equilibrium::new(&model, &pass, 1e-5).unwrap();
+        let rest = Equilibrium::new(&model, &pass, &[1e-5]).unwrap();
         let matrices = model.matrices();
         let size = matrices.size();
         let mut stiffness = nalgebra::DMatrix::zeros(size, size);
@@ -251,8 +340,10 @@ mod tests {
             // Condition number 1e6 at most, times rounding.
             assert!((sparse - dense).abs() < 1e-9 * scale, "{sparse} {dense}");
         }
-        let approach =
-            rest.wheel_m - 1e-5 - point.deflection(&rest.track) - 4500.0 * point.local_flexibility;
+        let approach = rest.contacts_m[0]
+            - 1e-5
+            - point.deflection(&rest.track)
+            - 4500.0 * point.local_flexibility;
         let force = HertzContact::new(model.design()).force(approach);
         assert!((force / 4500.0 - 1.0).abs() < 1e-9, "{force}");
     }

@@ -40,7 +40,7 @@ pub struct PassRecord {
 /// Why a pass has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PassError {
-    /// The pass leaves the track, stands still, runs backwards or has no time step.
+    /// A wheel leaves the track, stands still, runs backwards or has no time step.
     #[error("the pass {pass:?} makes no way along a track of {length_m} m")]
     Pass {
         /// The pass.
@@ -80,20 +80,40 @@ impl Pass {
         self.start_m + self.speed_m_s * self.time_step_s * step as f64
     }
 
-    /// Height in m of the surface under the wheel after so many steps, eased in from its height
-    /// at the start.
-    pub(super) fn height_m(&self, surface: &Surface, step: usize) -> f64 {
-        let first = surface.height(self.start_m);
+    /// Height in m of the surface under the wheel after so many steps, with what extensions add
+    /// to it, eased in from its height at the start.
+    pub(super) fn height_m(&self, model: &TrackModel, surface: &Surface, step: usize) -> f64 {
+        let height =
+            |x_m: f64| surface.height(x_m) + model.profile_m(x_m) + model.wheel_profile_m(x_m);
+        self.eased_in(step, height)
+    }
+
+    /// The same under a further wheel, `ahead_m` before the first and round.
+    pub(super) fn further_height_m(
+        &self,
+        model: &TrackModel,
+        surface: &Surface,
+        step: usize,
+        ahead_m: f64,
+    ) -> f64 {
+        let height = |x_m: f64| surface.height(x_m + ahead_m) + model.profile_m(x_m + ahead_m);
+        self.eased_in(step, height)
+    }
+
+    fn eased_in(&self, step: usize, height: impl Fn(f64) -> f64) -> f64 {
+        let first = height(self.start_m);
         let time = (self.time_step_s * step as f64 / RAMP_S).min(1.0);
         let ramp = time * time * (3.0 - 2.0 * time);
-        first + ramp * (surface.height(self.position_m(step)) - first)
+        first + ramp * (height(self.position_m(step)) - first)
     }
 
     /// That the pass lies on the track and goes forward.
     pub(super) fn check(&self, model: &TrackModel) -> Result<(), PassError> {
         let length_m = model.layout().length_m();
+        let wheels = [0.0].into_iter().chain(model.vehicle().further_wheels_m.iter().copied());
+        let on_track = |ahead: f64| 0.0 <= self.start_m + ahead && self.end_m + ahead <= length_m;
         let forward = self.speed_m_s > 0.0 && self.time_step_s > 0.0 && self.speed_m_s.is_finite();
-        if forward && 0.0 <= self.start_m && self.start_m < self.end_m && self.end_m <= length_m {
+        if forward && self.start_m < self.end_m && wheels.into_iter().all(on_track) {
             Ok(())
         } else {
             Err(PassError::Pass { pass: self.clone(), length_m })

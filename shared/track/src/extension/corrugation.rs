@@ -1,0 +1,91 @@
+//! Corrugation: waves of one length on the railhead.
+
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "corrugation",
+    summary: "waves of nearly one length on the railhead",
+    classes: &[Class::Wavelength, Class::Global],
+    place: PlaceKind::Stretch,
+    measuring_chain: false,
+    parameters: &[
+        KindParameter::new("wavelength_m", "m", "length of the waves").ranges(
+            [2e-3, 1.2e-2],
+            [2e-2, 0.1],
+            5.7e-3,
+        ),
+        KindParameter::new("amplitude_m", "m", "amplitude, half of crest to trough").ranges(
+            [2e-7, 5e-6],
+            [5e-6, 1e-4],
+            8e-7,
+        ),
+        KindParameter::new("bandwidth", "1", "width of the band of wave numbers over its middle")
+            .ranges([0.0, 0.3], [0.0, 0.3], 0.0)
+            .bound(Bound::Share)
+            .or(0.0),
+    ],
+    look_alikes: &["roughness_spectrum", "wheel_out_of_round"],
+    would_separate: "passes at another speed: the peak stays at one wavelength",
+    build: |inputs| {
+        let middle = TAU / inputs.value("wavelength_m");
+        let width = inputs.value("bandwidth") * middle;
+        Ok(Arc::new(Corrugation {
+            stretch_m: inputs.stretch_m(),
+            amplitude_m: inputs.value("amplitude_m"),
+            wave_numbers: wave_numbers(middle, width),
+        }))
+    },
+};
+
+/// Waves that a band is made of.
+const WAVES: usize = 16;
+
+/// Irrational share of a turn: phases spread evenly and repeat nowhere (golden section).
+const PHASE_STEP: f64 = 0.618_033_988_749_894_9;
+
+/// Length in wavelengths over which the waves grow and fade at the ends of the stretch.
+const FADE_WAVES: f64 = 2.0;
+
+/// `A sin(2 pi x / L)` on a stretch, or a band of such waves with the same mean square
+/// (mismatch catalogue 19).
+#[derive(Debug)]
+struct Corrugation {
+    stretch_m: [f64; 2],
+    amplitude_m: f64,
+    /// Wave numbers in rad/m.
+    wave_numbers: Vec<f64>,
+}
+
+fn wave_numbers(middle: f64, width: f64) -> Vec<f64> {
+    if width == 0.0 {
+        return vec![middle];
+    }
+    let share = |wave: usize| (wave as f64 + 0.5) / WAVES as f64 - 0.5;
+    (0..WAVES).map(|wave| middle + share(wave) * width).collect()
+}
+
+impl Corrugation {
+    /// From 0 outside the stretch to 1 inside.
+    fn fade(&self, x_m: f64) -> f64 {
+        let [from_m, to_m] = self.stretch_m;
+        let fade_m = FADE_WAVES * TAU / self.wave_numbers[0];
+        let inside = ((x_m - from_m).min(to_m - x_m) / fade_m).clamp(0.0, 1.0);
+        0.5 * (1.0 - (PI * inside).cos())
+    }
+}
+
+impl Extension for Corrugation {
+    fn profile_m(&self, x_m: f64) -> f64 {
+        let wave = |(index, wave_number): (usize, &f64)| {
+            (wave_number * x_m + TAU * PHASE_STEP * index as f64).sin()
+        };
+        let fade = self.fade(x_m);
+        if fade == 0.0 {
+            return 0.0;
+        }
+        let sum: f64 = self.wave_numbers.iter().enumerate().map(wave).sum();
+        fade * self.amplitude_m * sum / (self.wave_numbers.len() as f64).sqrt()
+    }
+}

@@ -1,0 +1,54 @@
+//! The mains in the signal.
+
+use super::{Bound, Class, Extension, Kind, KindParameter, Measured, PlaceKind};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "electrical_hum",
+    summary: "a tone of the electrical supply is added to the signal",
+    classes: &[Class::Noise, Class::Frequency],
+    place: PlaceKind::Nowhere,
+    measuring_chain: true,
+    parameters: &[
+        KindParameter::new("frequency_Hz", "Hz", "frequency of the tone")
+            .ranges([50.0, 1000.0], [16.7, 1000.0], 50.0)
+            .or(50.0),
+        KindParameter::new("amplitude_m_s2", "m/s2", "amplitude of the tone").ranges(
+            [0.05, 5.0],
+            [0.05, 20.0],
+            0.5,
+        ),
+        KindParameter::new("phase_rad", "rad", "phase at the first sample")
+            .ranges([0.0, TAU], [0.0, TAU], 0.0)
+            .bound(Bound::Any)
+            .or(0.0),
+    ],
+    look_alikes: &["wheel_out_of_round"],
+    would_separate: "a recording at standstill",
+    build: |inputs| {
+        Ok(Arc::new(ElectricalHum {
+            omega: TAU * inputs.value("frequency_Hz"),
+            amplitude_m_s2: inputs.value("amplitude_m_s2"),
+            phase_rad: inputs.value("phase_rad"),
+        }))
+    },
+};
+
+/// `a sin(w t + phi)`, with `t` from the first sample.
+#[derive(Debug)]
+struct ElectricalHum {
+    /// Angular frequency in rad/s.
+    omega: f64,
+    amplitude_m_s2: f64,
+    phase_rad: f64,
+}
+
+impl Extension for ElectricalHum {
+    fn measure(&self, measured: &mut Measured) {
+        let per_sample = self.omega * measured.time_step_s;
+        for (index, value) in measured.acceleration_m_s2.iter_mut().enumerate() {
+            *value += self.amplitude_m_s2 * (per_sample * index as f64 + self.phase_rad).sin();
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Railpads that are stiffer the faster they are loaded.
+
+use super::{Class, Extension, Kind, KindParameter, PlaceKind};
+use crate::element::SpringDamper;
+use crate::model::Assembly;
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "frequency_dependent_railpad",
+    summary: "railpads that relax: stiffer at high than at low frequency",
+    classes: &[Class::Frequency, Class::Global],
+    place: PlaceKind::Sleepers,
+    measuring_chain: false,
+    parameters: &[
+        KindParameter::new("stiffness_ratio", "1", "what relaxes, over the railpad's stiffness")
+            .ranges([0.2, 3.0], [0.2, 3.0], 1.0),
+        KindParameter::new("relaxation_time_s", "s", "time in which it relaxes").ranges(
+            [2e-5, 1e-3],
+            [1e-4, 5e-3],
+            1e-4,
+        ),
+    ],
+    look_alikes: &["rail_cross_section", "load_dependent_railpad"],
+    would_separate: "a hundred spans, or recordings at two temperatures",
+    build: |inputs| {
+        Ok(Arc::new(FrequencyDependentRailpad {
+            sleepers: inputs.sleepers(),
+            stiffness_ratio: inputs.value("stiffness_ratio"),
+            relaxation_time_s: inputs.value("relaxation_time_s"),
+        }))
+    },
+};
+
+/// A Maxwell branch beside spring and damper of the railpad: `k_0 + k_1 i w tau / (1 + i w tau)`
+/// with `k_1` a multiple of `k_0` (standard linear solid; mismatch catalogue 12).
+#[derive(Debug)]
+struct FrequencyDependentRailpad {
+    sleepers: Vec<usize>,
+    stiffness_ratio: f64,
+    relaxation_time_s: f64,
+}
+
+impl Extension for FrequencyDependentRailpad {
+    fn assemble(&self, assembly: &mut Assembly) {
+        for &index in &self.sleepers {
+            let stiffness = self.stiffness_ratio * assembly.supports()[index].railpad_stiffness;
+            let damping = self.relaxation_time_s * stiffness;
+            // How far the damper of the branch is pressed together; the spring takes the rest.
+            let dashpot = assembly.append_dof();
+            let spring = assembly.layout().railpad_port(index).minus(&dashpot);
+            assembly.add_spring_damper(&spring, SpringDamper { stiffness, damping: 0.0 });
+            assembly.add_spring_damper(&dashpot, SpringDamper { stiffness: 0.0, damping });
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! One extension with its place and values, as files have it.
+
+use super::{Extension, Kind, PlaceKind};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tracktwin_parameters::TrackDesign;
+
+/// An extension by the name of its kind, where it is, and what its parameters are.
+///
+/// In JSON and TOML the parameters stand beside the name:
+/// `{"physics": "sleeper_bolt", "sleepers": [8, 9], "stiffness_N_per_m": 3e7}`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ExtensionInstance {
+    /// Name of the kind.
+    pub physics: String,
+    /// From where to where it is along the track in m; twice the same for a point.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x_m: Option<[f64; 2]>,
+    /// Numbers of its sleepers, from 0; sleeper `i` stands at `(i + 1) * spacing`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sleepers: Option<Vec<usize>>,
+    /// Values of its parameters, in the units that stand in their names.
+    #[serde(flatten)]
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// Why something is no extension of a track.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InstanceError {
+    /// No kind has the name.
+    #[error("no extension is called `{physics}`; known are {}", known_kinds())]
+    Unknown {
+        /// The name.
+        physics: String,
+    },
+    /// The kind has no such parameter.
+    #[error("{physics}: has no parameter `{parameter}`; it has {}", known_parameters(.physics))]
+    UnknownParameter {
+        /// Name of the kind.
+        physics: String,
+        /// Name of the parameter.
+        parameter: String,
+    },
+    /// A parameter without a default was not given.
+    #[error("{physics}: needs {parameter}, {meaning}; for example {parameter} = {typical:e}")]
+    MissingParameter {
+        /// Name of the kind.
+        physics: String,
+        /// Name of the parameter.
+        parameter: &'static str,
+        /// What it is.
+        meaning: &'static str,
+        /// A value on V-Track.
+        typical: f64,
+    },
+    /// A value can't be.
+    #[error("{physics}: {parameter} is {value} but must be {form}")]
+    Value {
+        /// Name of the kind.
+        physics: String,
+        /// Name of the parameter.
+        parameter: String,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        form: &'static str,
+    },
+    /// The place is missing, of another kind or not on the track.
+    #[error(
+        "{physics}: its place must be {form}, on the track of {length_m} m and {sleepers} sleepers"
+    )]
+    Place {
+        /// Name of the kind.
+        physics: String,
+        /// What place it must have.
+        form: &'static str,
+        /// Length of the track in m.
+        length_m: f64,
+        /// How many sleepers it has.
+        sleepers: usize,
+    },
+}
+
+/// What a kind is built from: all checked.
+pub(super) struct Inputs<'a> {
+    kind: &'static Kind,
+    instance: &'a ExtensionInstance,
+    /// What the track and the wheel are.
+    pub(super) design: &'a TrackDesign,
+    spans: usize,
+}
+
+impl ExtensionInstance {
+    /// An extension of this kind without place and values.
+    pub fn new(physics: &str) -> Self {
+        Self { physics: physics.to_owned(), ..Self::default() }
+    }
+
+    /// At a point of the rail, or on a stretch of it.
+    #[must_use]
+    pub fn at(mut self, x_m: [f64; 2]) -> Self {
+        self.x_m = Some(x_m);
+        self
+    }
+
+    /// At sleepers of these numbers.
+    #[must_use]
+    pub fn on(mut self, sleepers: impl IntoIterator<Item = usize>) -> Self {
+        self.sleepers = Some(sleepers.into_iter().collect());
+        self
+    }
+
+    /// With a parameter's value.
+    #[must_use]
+    pub fn with(mut self, parameter: &str, value: f64) -> Self {
+        self.parameters.insert(parameter.to_owned(), value);
+        self
+    }
+
+    /// The row of the registry that it names.
+    ///
+    /// # Errors
+    /// [`InstanceError::Unknown`] lists the names that there are.
+    pub fn kind(&self) -> Result<&'static Kind, InstanceError> {
+        Kind::from_name(&self.physics)
+            .ok_or_else(|| InstanceError::Unknown { physics: self.physics.clone() })
+    }
+
+    /// Makes the extension for a track of this design and so many spans.
+    ///
+    /// # Errors
+    /// [`InstanceError`] names the parameter or the place that can't be.
+    pub fn build(
+        &self,
+        design: &TrackDesign,
+        spans: usize,
+    ) -> Result<Arc<dyn Extension>, InstanceError> {
+        let inputs = Inputs { kind: self.kind()?, instance: self, design, spans };
+        inputs.check_parameters()?;
+        inputs.check_place()?;
+        (inputs.kind.build)(&inputs)
+    }
+}
+
+impl Inputs<'_> {
+    /// The value of a parameter of the kind: given, or else its default.
+    pub(super) fn value(&self, name: &str) -> f64 {
+        let default = self.kind.parameter(name).and_then(|parameter| parameter.default);
+        let given = self.instance.parameters.get(name).copied();
+        given.or(default).expect("parameters were checked against the registry")
+    }
+
+    /// The point of the rail in m.
+    pub(super) fn point_m(&self) -> f64 {
+        self.stretch_m()[0]
+    }
+
+    /// The stretch of the rail in m.
+    pub(super) fn stretch_m(&self) -> [f64; 2] {
+        self.instance.x_m.unwrap_or([0.0, self.length_m()])
+    }
+
+    /// Numbers of the sleepers.
+    pub(super) fn sleepers(&self) -> Vec<usize> {
+        let all = || (0..self.sleeper_count()).collect();
+        self.instance.sleepers.clone().unwrap_or_else(all)
+    }
+
+    /// Refuses the value of a parameter.
+    pub(super) fn refuse(&self, parameter: &str, form: &'static str) -> InstanceError {
+        InstanceError::Value {
+            physics: self.kind.physics.to_owned(),
+            parameter: parameter.to_owned(),
+            value: self.value(parameter),
+            form,
+        }
+    }
+
+    fn length_m(&self) -> f64 {
+        self.spans as f64 * self.design.sleeper.spacing_m
+    }
+
+    fn sleeper_count(&self) -> usize {
+        self.spans.saturating_sub(1)
+    }
+
+    fn check_parameters(&self) -> Result<(), InstanceError> {
+        let physics = || self.kind.physics.to_owned();
+        for (name, &value) in &self.instance.parameters {
+            let Some(parameter) = self.kind.parameter(name) else {
+                let parameter = name.clone();
+                return Err(InstanceError::UnknownParameter { physics: physics(), parameter });
+            };
+            if !parameter.bound.holds(value) {
+                return Err(self.refuse(name, parameter.bound.form()));
+            }
+        }
+        for parameter in self.kind.parameters {
+            if parameter.default.is_none() && !self.instance.parameters.contains_key(parameter.name)
+            {
+                let (parameter, meaning, typical) =
+                    (parameter.name, parameter.meaning, parameter.typical);
+                let physics = physics();
+                return Err(InstanceError::MissingParameter {
+                    physics,
+                    parameter,
+                    meaning,
+                    typical,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_place(&self) -> Result<(), InstanceError> {
+        let (x_m, sleepers) = (self.instance.x_m, self.instance.sleepers.as_deref());
+        let on_track = |[from, to]: [f64; 2]| 0.0 <= from && from <= to && to <= self.length_m();
+        let standing = |numbers: &[usize]| {
+            !numbers.is_empty() && numbers.iter().all(|&number| number < self.sleeper_count())
+        };
+        let fits = match self.kind.place {
+            PlaceKind::Nowhere => x_m.is_none() && sleepers.is_none(),
+            // A diagnosis may say beside the point which sleepers are near it.
+            PlaceKind::Point => x_m.is_some_and(|[from, to]| from == to && on_track([from, to])),
+            PlaceKind::Stretch => x_m.is_none_or(on_track),
+            PlaceKind::Sleepers => sleepers.is_none_or(standing),
+        };
+        if fits {
+            return Ok(());
+        }
+        Err(InstanceError::Place {
+            physics: self.kind.physics.to_owned(),
+            form: self.kind.place.form(),
+            length_m: self.length_m(),
+            sleepers: self.sleeper_count(),
+        })
+    }
+}
+
+fn known_kinds() -> String {
+    let names: Vec<_> = super::KINDS.iter().map(|kind| kind.physics).collect();
+    names.join(", ")
+}
+
+fn known_parameters(physics: &str) -> String {
+    let parameters = Kind::from_name(physics).map_or(&[][..], |kind| kind.parameters);
+    let names: Vec<_> = parameters.iter().map(|parameter| parameter.name).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}

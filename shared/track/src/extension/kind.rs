@@ -1,0 +1,200 @@
+//! What a kind of extension is: name, class, place, parameters, how to build it.
+
+use super::instance::Inputs;
+use super::{Extension, InstanceError};
+use std::sync::Arc;
+
+/// A row of the registry.
+#[derive(Debug)]
+pub struct Kind {
+    /// Its name at every border.
+    pub physics: &'static str,
+    /// What it is, in a sentence without a full stop.
+    pub summary: &'static str,
+    /// What stays and what moves when speed, place or load change.
+    pub classes: &'static [Class],
+    /// Where it is.
+    pub place: PlaceKind,
+    /// Whether it is a fault of the measuring chain, and not physics of vehicle or track.
+    pub measuring_chain: bool,
+    /// Its parameters.
+    pub parameters: &'static [KindParameter],
+    /// Kinds that look alike in a recording.
+    pub look_alikes: &'static [&'static str],
+    /// What would tell it from them.
+    pub would_separate: &'static str,
+    /// Makes it, once the registry has checked what it is made of.
+    pub(super) build: fn(&Inputs<'_>) -> Result<Arc<dyn Extension>, InstanceError>,
+}
+
+/// How the trace of an effect behaves over passes: a letter of its bar-code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// Fixed in frequency when the speed changes.
+    Frequency,
+    /// Fixed in wavelength: moves in frequency with the speed.
+    Wavelength,
+    /// Tied to a place of the track.
+    Local,
+    /// The same everywhere.
+    Global,
+    /// Tied to the wheel's angle.
+    WheelAngle,
+    /// Changes with the wheel load.
+    Load,
+    /// Concentrated inside a span.
+    Concentrated,
+    /// Not the same from pass to pass.
+    Noise,
+}
+
+impl Class {
+    /// Its code: F, L, X, G, PHI, W, C or N.
+    pub const fn code(self) -> &'static str {
+        match self {
+            Self::Frequency => "F",
+            Self::Wavelength => "L",
+            Self::Local => "X",
+            Self::Global => "G",
+            Self::WheelAngle => "PHI",
+            Self::Load => "W",
+            Self::Concentrated => "C",
+            Self::Noise => "N",
+        }
+    }
+}
+
+/// What place a kind has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlaceKind {
+    /// None: it is everywhere, on the vehicle or in the measuring chain.
+    Nowhere,
+    /// A point of the rail, `x_m = [x, x]`.
+    Point,
+    /// A stretch of the rail, `x_m = [from, to]`; the whole track where none is given.
+    Stretch,
+    /// Sleepers by their numbers; all where none are given.
+    Sleepers,
+}
+
+impl PlaceKind {
+    /// How it is written.
+    pub const fn form(self) -> &'static str {
+        match self {
+            Self::Nowhere => "no place",
+            Self::Point => "a point of the rail, x_m = [x, x]",
+            Self::Stretch => "a stretch of the rail, x_m = [from, to], or none for all of it",
+            Self::Sleepers => "sleepers = [numbers], or none for all of them",
+        }
+    }
+}
+
+/// Which numbers a parameter may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// Any finite number.
+    Any,
+    /// Zero or more.
+    NotNegative,
+    /// More than zero.
+    Positive,
+    /// From zero up to, but not, one.
+    Share,
+}
+
+impl Bound {
+    /// Whether a value keeps it.
+    pub fn holds(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Self::Any => true,
+                Self::NotNegative => value >= 0.0,
+                Self::Positive => value > 0.0,
+                Self::Share => (0.0..1.0).contains(&value),
+            }
+    }
+
+    /// What it asks for, to follow "must be".
+    pub const fn form(self) -> &'static str {
+        match self {
+            Self::Any => "a number",
+            Self::NotNegative => "zero or more",
+            Self::Positive => "more than zero",
+            Self::Share => "at least zero and less than one",
+        }
+    }
+}
+
+/// A parameter of a kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KindParameter {
+    /// Its name, with the unit last.
+    pub name: &'static str,
+    /// The unit, as plain text.
+    pub unit: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Lowest and highest value to expect on V-Track.
+    pub v_track: [f64; 2],
+    /// Lowest and highest value to expect at real scale.
+    pub real_scale: [f64; 2],
+    /// A value on V-Track to start from.
+    pub typical: f64,
+    /// Its value where none is given; without one it must be given.
+    pub default: Option<f64>,
+    /// Which values make sense at all.
+    pub bound: Bound,
+}
+
+impl KindParameter {
+    /// A parameter that must be given, and be more than zero.
+    pub(super) const fn new(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+        Self {
+            name,
+            unit,
+            meaning,
+            v_track: [0.0, 0.0],
+            real_scale: [0.0, 0.0],
+            typical: 0.0,
+            default: None,
+            bound: Bound::Positive,
+        }
+    }
+
+    /// With its ranges on V-Track and at real scale, and a typical value on V-Track.
+    pub(super) const fn ranges(
+        mut self,
+        v_track: [f64; 2],
+        real_scale: [f64; 2],
+        typical: f64,
+    ) -> Self {
+        self.v_track = v_track;
+        self.real_scale = real_scale;
+        self.typical = typical;
+        self
+    }
+
+    /// With a value that holds where none is given.
+    pub(super) const fn or(mut self, default: f64) -> Self {
+        self.default = Some(default);
+        self
+    }
+
+    /// With another bound.
+    pub(super) const fn bound(mut self, bound: Bound) -> Self {
+        self.bound = bound;
+        self
+    }
+}
+
+impl Kind {
+    /// The kind of that name, if there is one.
+    pub fn from_name(physics: &str) -> Option<&'static Self> {
+        super::KINDS.iter().find(|kind| kind.physics == physics)
+    }
+
+    /// The parameter of that name, if the kind has it.
+    pub fn parameter(&self, name: &str) -> Option<&'static KindParameter> {
+        self.parameters.iter().find(|parameter| parameter.name == name)
+    }
+}

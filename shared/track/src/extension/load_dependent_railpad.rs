@@ -1,0 +1,98 @@
+//! Railpads that are stiffer the more load they carry.
+
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use crate::element::SpringDamper;
+use crate::model::{Assembly, ForceLaw, Law, Reaction, Support};
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "load_dependent_railpad",
+    summary: "railpads that grow stiffer with the load that they carry",
+    classes: &[Class::Frequency, Class::Global, Class::Load],
+    place: PlaceKind::Sleepers,
+    measuring_chain: false,
+    parameters: &[
+        KindParameter::new("exponent", "1", "power of the load with which the stiffness grows")
+            .ranges([0.2, 0.7], [0.2, 0.7], 0.4)
+            .bound(Bound::Share),
+        KindParameter::new("reference_load_N", "N", "load at which the stiffness is nominal")
+            .ranges([500.0, 2500.0], [1.2e4, 6e4], 1500.0)
+            .or(1500.0),
+        KindParameter::new("toe_load_N", "N", "load from the fastening, without any wheel")
+            .ranges([100.0, 1000.0], [5e3, 2e4], 400.0)
+            .or(400.0),
+    ],
+    look_alikes: &["support_variation", "frequency_dependent_railpad"],
+    would_separate: "passes with a second wheel load, over 25 spans or more",
+    build: |inputs| {
+        Ok(Arc::new(LoadDependentRailpad {
+            sleepers: inputs.sleepers(),
+            exponent: inputs.value("exponent"),
+            reference_load_n: inputs.value("reference_load_N"),
+            toe_load_n: inputs.value("toe_load_N"),
+            seat_load_n: SEAT_SHARE * inputs.design.wheel.load_n,
+        }))
+    },
+};
+
+/// Share of the wheel's load that the nearest rail seat carries, on a track of usual stiffness:
+/// where the railpad is linearised.
+const SEAT_SHARE: f64 = 1.0 / 3.0;
+
+/// Tangent stiffness `k_p (T / T_0)^gamma` under the load `T`, toe load included (mismatch
+/// catalogue 13).
+#[derive(Debug)]
+struct LoadDependentRailpad {
+    sleepers: Vec<usize>,
+    exponent: f64,
+    reference_load_n: f64,
+    toe_load_n: f64,
+    seat_load_n: f64,
+}
+
+impl Extension for LoadDependentRailpad {
+    fn assemble(&self, assembly: &mut Assembly) {
+        for &index in &self.sleepers {
+            let support = assembly.supports()[index];
+            let law = PowerLaw::new(self, support.railpad_stiffness);
+            let railpad_stiffness = law.tangent(self.toe_load_n + self.seat_load_n);
+            assembly.set_support(index, Support { railpad_stiffness, ..support });
+            let port = assembly.layout().railpad_port(index);
+            let linear = SpringDamper { stiffness: railpad_stiffness, damping: 0.0 };
+            assembly.add_force_law(ForceLaw { port, linear, law: Arc::new(law) });
+        }
+    }
+}
+
+/// `dT/dy = k_0 (T / T_0)^gamma`, `T = toe` at `y = 0`; never in tension.
+#[derive(Debug)]
+struct PowerLaw {
+    stiffness_n_m: f64,
+    exponent: f64,
+    /// `T_0` in N.
+    nominal_load_n: f64,
+    toe_load_n: f64,
+}
+
+impl PowerLaw {
+    fn new(pad: &LoadDependentRailpad, stiffness_n_m: f64) -> Self {
+        let nominal_load_n = pad.toe_load_n + pad.reference_load_n;
+        let (exponent, toe_load_n) = (pad.exponent, pad.toe_load_n);
+        Self { stiffness_n_m, exponent, nominal_load_n, toe_load_n }
+    }
+
+    fn tangent(&self, load_n: f64) -> f64 {
+        self.stiffness_n_m * (load_n / self.nominal_load_n).powf(self.exponent)
+    }
+}
+
+impl Law for PowerLaw {
+    fn reaction(&self, displacement_m: f64, _velocity_m_s: f64) -> Reaction {
+        let rest = 1.0 - self.exponent;
+        // The equation integrated: (T / T_0)^(1 - gamma) grows linearly with y.
+        let slope = rest * self.stiffness_n_m / self.nominal_load_n;
+        let root = (self.toe_load_n / self.nominal_load_n).powf(rest) + slope * displacement_m;
+        let load_n = self.nominal_load_n * root.max(0.0).powf(1.0 / rest);
+        Reaction { force: load_n - self.toe_load_n, stiffness: self.tangent(load_n), damping: 0.0 }
+    }
+}

@@ -1,0 +1,49 @@
+//! An odometer that is off.
+
+use super::{Bound, Class, Extension, Kind, KindParameter, Measured, PlaceKind};
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "position_error",
+    summary: "recorded positions are shifted or stretched",
+    classes: &[Class::Noise],
+    place: PlaceKind::Nowhere,
+    measuring_chain: true,
+    parameters: &[
+        KindParameter::new("offset_m", "m", "recorded minus true position at the first sample")
+            .ranges([-2e-2, 2e-2], [-0.5, 0.5], 1e-2)
+            .bound(Bound::Any)
+            .or(0.0),
+        KindParameter::new("scale", "1", "recorded over true way, minus one")
+            .ranges([-0.03, 0.03], [-0.03, 0.03], 0.01)
+            .bound(Bound::Any)
+            .or(0.0),
+    ],
+    look_alikes: &["support_variation"],
+    would_separate: "a marker on the track that every pass must see at its place",
+    build: |inputs| {
+        if inputs.value("scale") <= -1.0 {
+            return Err(inputs.refuse("scale", "more than -1: positions must grow"));
+        }
+        Ok(Arc::new(PositionError {
+            offset_m: inputs.value("offset_m"),
+            scale: inputs.value("scale"),
+        }))
+    },
+};
+
+/// `x_0 + offset + (1 + scale) (x - x_0)`, with `x_0` the first true position.
+#[derive(Debug)]
+struct PositionError {
+    offset_m: f64,
+    scale: f64,
+}
+
+impl Extension for PositionError {
+    fn measure(&self, measured: &mut Measured) {
+        let first = measured.position_m.first().copied().unwrap_or_default();
+        for position in &mut measured.position_m {
+            *position = first + self.offset_m + (1.0 + self.scale) * (*position - first);
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! The kinds of extensions that there are.
+
+use super::Kind;
+
+/// All kinds, physics first, the measuring chain last.
+pub static KINDS: &[Kind] = &[
+    super::rail_joint::KIND,
+    super::squat::KIND,
+    super::corrugation::KIND,
+    super::roughness_spectrum::KIND,
+    super::contact_patch_filter::KIND,
+    super::wheel_flat::KIND,
+    super::wheel_out_of_round::KIND,
+    super::second_wheel::KIND,
+    super::flexible_axle_box::KIND,
+    super::fastening_clamp::KIND,
+    super::missing_railpad::KIND,
+    super::load_dependent_railpad::KIND,
+    super::frequency_dependent_railpad::KIND,
+    super::sleeper_bolt::KIND,
+    super::hanging_sleeper::KIND,
+    super::subgrade_layer::KIND,
+    super::support_variation::KIND,
+    super::rail_cross_section::KIND,
+    super::sensor_mount_resonance::KIND,
+    super::clipping::KIND,
+    super::position_error::KIND,
+    super::gain_error::KIND,
+    super::electrical_hum::KIND,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extension::{Bound, ExtensionInstance, PlaceKind};
+    use crate::model::{Mesh, Support, TrackModel};
+    use std::collections::HashSet;
+    use tracktwin_parameters::{ParameterSet, TrackDesign};
+
+    const SPANS: usize = 12;
+
+    /// An extension with typical values at a place in the middle of the track.
+    fn typical(kind: &Kind) -> ExtensionInstance {
+        let instance = ExtensionInstance::new(kind.physics);
+        let instance = match kind.place {
+            PlaceKind::Nowhere => instance,
+            PlaceKind::Point => instance.at([0.8, 0.8]),
+            PlaceKind::Stretch => instance.at([0.6, 0.9]),
+            PlaceKind::Sleepers => instance.on([4, 5]),
+        };
+        let named = kind.parameters.iter().filter(|parameter| parameter.typical != 0.0);
+        named.fold(instance, |instance, parameter| instance.with(parameter.name, parameter.typical))
+    }
+
+    #[test]
+    fn every_kind_builds_a_track_at_its_typical_values() {
+        let design = TrackDesign::v_track();
+        let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
+        let mesh = Mesh::uniform(SPANS, 4, 4);
+        for kind in KINDS {
+            let extension = typical(kind).build(&design, SPANS);
+            let extension = extension.unwrap_or_else(|error| panic!("{error}"));
+            TrackModel::build(&design, &mesh, &supports, &[extension]).unwrap();
+        }
+    }
+
+    #[test]
+    fn names_are_unique_and_look_alikes_exist() {
+        let names: HashSet<_> = KINDS.iter().map(|kind| kind.physics).collect();
+        assert_eq!(names.len(), KINDS.len());
+        for kind in KINDS {
+            for other in kind.look_alikes {
+                assert!(names.contains(other) && other != &kind.physics, "{}", kind.physics);
+            }
+        }
+    }
+
+    #[test]
+    fn typical_values_lie_inside_their_ranges_and_bounds() {
+        for kind in KINDS {
+            for parameter in kind.parameters {
+                let [low, high] = parameter.v_track;
+                let inside = (low..=high).contains(&parameter.typical);
+                assert!(inside, "{} {}", kind.physics, parameter.name);
+                let zero = parameter.typical == 0.0 && parameter.bound == Bound::Positive;
+                assert!(zero || parameter.bound.holds(parameter.typical), "{}", parameter.name);
+            }
+        }
+    }
+
+    #[test]
+    fn an_instance_survives_json_with_its_parameters_beside_its_name() {
+        for kind in KINDS {
+            let instance = typical(kind);
+            let json = serde_json::to_value(&instance).unwrap();
+            for (name, value) in &instance.parameters {
+                assert_eq!(json[name], *value);
+            }
+            assert_eq!(serde_json::from_value::<ExtensionInstance>(json).unwrap(), instance);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_by_name() {
+        let refusal = |instance: ExtensionInstance| {
+            instance.build(&TrackDesign::v_track(), SPANS).unwrap_err().to_string()
+        };
+        assert!(refusal(ExtensionInstance::new("loose_bolt")).contains("sleeper_bolt"));
+        let bolt = ExtensionInstance::new("sleeper_bolt");
+        assert!(refusal(bolt.clone()).contains("needs stiffness_N_per_m"));
+        assert!(refusal(bolt.clone().with("stiffness", 1.0)).contains("has no parameter"));
+        let bolt = bolt.with("stiffness_N_per_m", 1e7);
+        assert!(refusal(bolt.clone().with("stiffness_N_per_m", -1.0)).contains("more than zero"));
+        assert!(refusal(bolt.on([11])).contains("sleepers = [numbers]"));
+        let joint = ExtensionInstance::new("rail_joint").with("dip_m", 1e-4);
+        assert!(refusal(joint.clone()).contains("a point of the rail"));
+        assert!(refusal(joint.at([1.6, 1.6])).contains("track of 1.5 m"));
+    }
+}

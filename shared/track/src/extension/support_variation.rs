@@ -1,0 +1,90 @@
+//! Railpads and ballast that differ from sleeper to sleeper.
+
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use crate::model::{Assembly, Support};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "support_variation",
+    summary: "railpads and ballast differ from sleeper to sleeper",
+    classes: &[Class::Frequency, Class::Local],
+    place: PlaceKind::Sleepers,
+    measuring_chain: false,
+    parameters: &[
+        KindParameter::new("ballast_cv", "1", "scatter of the ballast stiffness over its mean")
+            .ranges([0.05, 0.4], [0.1, 0.5], 0.2)
+            .bound(Bound::NotNegative)
+            .or(0.0),
+        KindParameter::new("railpad_cv", "1", "scatter of the railpad stiffness over its mean")
+            .ranges([0.05, 0.4], [0.1, 0.5], 0.2)
+            .bound(Bound::NotNegative)
+            .or(0.0),
+        KindParameter::new("length_m", "m", "distance at which the correlation falls to 1/e")
+            .ranges([0.1, 2.0], [0.5, 10.0], 0.4)
+            .or(0.4),
+        KindParameter::new("seed", "1", "seed of the draw").bound(Bound::NotNegative).or(1.0),
+    ],
+    look_alikes: &["hanging_sleeper", "missing_railpad"],
+    would_separate: "nothing needs to: it is what the baseline's own values at each sleeper are",
+    build: |inputs| {
+        Ok(Arc::new(SupportVariation {
+            sleepers: inputs.sleepers(),
+            ballast_cv: inputs.value("ballast_cv"),
+            railpad_cv: inputs.value("railpad_cv"),
+            correlation: (-inputs.design.sleeper.spacing_m / inputs.value("length_m")).exp(),
+            seed: inputs.value("seed") as u64,
+        }))
+    },
+};
+
+/// Logarithms of the stiffness that are a Gauss-Markov sequence along the track (mismatch
+/// catalogue 11); damping stays.
+#[derive(Debug)]
+struct SupportVariation {
+    sleepers: Vec<usize>,
+    ballast_cv: f64,
+    railpad_cv: f64,
+    /// From one sleeper to the next.
+    correlation: f64,
+    seed: u64,
+}
+
+impl Extension for SupportVariation {
+    fn assemble(&self, assembly: &mut Assembly) {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let ballast = self.factors(&mut random, self.ballast_cv);
+        let railpad = self.factors(&mut random, self.railpad_cv);
+        for ((&index, ballast), railpad) in self.sleepers.iter().zip(ballast).zip(railpad) {
+            let support = assembly.supports()[index];
+            let ballast_stiffness = ballast * support.ballast_stiffness;
+            let railpad_stiffness = railpad * support.railpad_stiffness;
+            let changed = Support { railpad_stiffness, ballast_stiffness, ..support };
+            assembly.set_support(index, changed);
+        }
+    }
+}
+
+impl SupportVariation {
+    /// Factors of mean one and coefficient of variation `cv`, one a sleeper.
+    fn factors(&self, random: &mut impl Rng, cv: f64) -> Vec<f64> {
+        let variance = (1.0 + cv * cv).ln();
+        let fresh = (1.0 - self.correlation * self.correlation).sqrt();
+        let mut value = standard_normal(random);
+        let mut next = || {
+            let factor = (variance.sqrt() * value - 0.5 * variance).exp();
+            value = self.correlation * value + fresh * standard_normal(random);
+            factor
+        };
+        self.sleepers.iter().map(|_| next()).collect()
+    }
+}
+
+/// A standard normal number (Box & Muller 1958).
+fn standard_normal(random: &mut impl Rng) -> f64 {
+    let unit = |bits: u64| ((bits >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
+    let radius = (-2.0 * unit(random.next_u64()).ln()).sqrt();
+    radius * (TAU * unit(random.next_u64())).cos()
+}

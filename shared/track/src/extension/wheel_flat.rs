@@ -1,0 +1,55 @@
+//! A flat of the wheel's tread.
+
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "wheel_flat",
+    summary: "a flat of the wheel's tread, met once a turn",
+    classes: &[Class::Wavelength, Class::WheelAngle, Class::Concentrated],
+    place: PlaceKind::Nowhere,
+    measuring_chain: false,
+    parameters: &[
+        KindParameter::new("length_m", "m", "length of the flat along the tread").ranges(
+            [1e-3, 8e-3],
+            [2e-2, 8e-2],
+            3.5e-3,
+        ),
+        KindParameter::new("phase_m", "m", "where the flat first meets the rail, from x = 0")
+            .ranges([0.0, 0.41], [0.0, 2.05], 0.0)
+            .bound(Bound::Any)
+            .or(0.0),
+    ],
+    look_alikes: &["wheel_out_of_round", "squat"],
+    would_separate: "more laps: the flat's places walk along the track, a squat's stay",
+    build: |inputs| {
+        let (length_m, radius_m) = (inputs.value("length_m"), inputs.design.wheel.radius_m);
+        Ok(Arc::new(WheelFlat {
+            length_m,
+            depth_m: length_m * length_m / (16.0 * radius_m),
+            circumference_m: TAU * radius_m,
+            phase_m: inputs.value("phase_m"),
+        }))
+    },
+};
+
+/// A worn flat of length `l` on a wheel of radius `R`: `d/2 (1 + cos 2 pi s / l)` deep at a
+/// distance `s` along the tread from its middle, with `d = l² / (16 R)` (mismatch catalogue 20).
+#[derive(Debug)]
+#[expect(clippy::struct_field_names, reason = "the unit belongs to the name")]
+struct WheelFlat {
+    length_m: f64,
+    depth_m: f64,
+    circumference_m: f64,
+    phase_m: f64,
+}
+
+impl Extension for WheelFlat {
+    fn wheel_profile_m(&self, rolled_m: f64) -> f64 {
+        let half_turn = 0.5 * self.circumference_m;
+        let after = (rolled_m - self.phase_m + half_turn).rem_euclid(self.circumference_m);
+        let place = (after - half_turn) / self.length_m;
+        if place.abs() < 0.5 { 0.5 * self.depth_m * (1.0 + (TAU * place).cos()) } else { 0.0 }
+    }
+}

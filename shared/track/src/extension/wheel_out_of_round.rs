@@ -1,0 +1,56 @@
+//! A wheel that is not round.
+
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+pub(super) const KIND: Kind = Kind {
+    physics: "wheel_out_of_round",
+    summary: "waves around the wheel's tread",
+    classes: &[Class::Wavelength, Class::WheelAngle, Class::Global],
+    place: PlaceKind::Nowhere,
+    measuring_chain: false,
+    parameters: &[
+        KindParameter::new("order", "1", "how many waves there are on a turn").ranges(
+            [1.0, 60.0],
+            [1.0, 30.0],
+            20.0,
+        ),
+        KindParameter::new("amplitude_m", "m", "amplitude of the waves").ranges(
+            [2e-7, 5e-6],
+            [1e-5, 1e-3],
+            2e-6,
+        ),
+        KindParameter::new("phase_rad", "rad", "phase at x = 0")
+            .ranges([0.0, TAU], [0.0, TAU], 0.0)
+            .bound(Bound::Any)
+            .or(0.0),
+    ],
+    look_alikes: &["corrugation", "roughness_spectrum"],
+    would_separate: "more laps: the wheel's waves lie elsewhere on the track in every lap",
+    build: |inputs| {
+        if inputs.value("order").fract() != 0.0 {
+            return Err(inputs.refuse("order", "a whole number of waves a turn"));
+        }
+        Ok(Arc::new(WheelOutOfRound {
+            wave_number: inputs.value("order") / inputs.design.wheel.radius_m,
+            amplitude_m: inputs.value("amplitude_m"),
+            phase_rad: inputs.value("phase_rad"),
+        }))
+    },
+};
+
+/// `a cos(n x / R + phi)` (mismatch catalogue 20).
+#[derive(Debug)]
+struct WheelOutOfRound {
+    /// Wave number along the tread in rad/m.
+    wave_number: f64,
+    amplitude_m: f64,
+    phase_rad: f64,
+}
+
+impl Extension for WheelOutOfRound {
+    fn wheel_profile_m(&self, rolled_m: f64) -> f64 {
+        self.amplitude_m * (self.wave_number * rolled_m + self.phase_rad).cos()
+    }
+}

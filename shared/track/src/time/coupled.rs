@@ -1,0 +1,106 @@
+//! Contacts and force laws that push on one track: their forces at the end of a step.
+
+use super::kinematics::Kinematics;
+use crate::model::{ForceLaw, HertzContact, Reaction};
+use nalgebra::{DMatrix, DVector};
+
+/// Change of the motions, relative to the largest of them, at which Newton's iteration has
+/// converged: some hundred roundings of a double.
+const TOLERANCE: f64 = 1e-13;
+/// Newton's steps; laws without jumps take three to ten, more means that they do not fit.
+const STEPS_MAX: usize = 100;
+/// Halvings of a step that makes things worse.
+const HALVINGS_MAX: usize = 30;
+
+/// What resists a motion.
+pub(super) enum Resistance<'a> {
+    /// A wheel's contact, at its approach.
+    Contact(HertzContact),
+    /// A force law on the track, with its motion so far and the time step; at rest without one.
+    Law(&'a ForceLaw, Kinematics, Option<f64>),
+}
+
+impl Resistance<'_> {
+    /// The force at a motion in m, and by how much it grows with the motion.
+    fn at(&self, motion_m: f64) -> (f64, f64) {
+        match self {
+            Self::Contact(contact) => {
+                let force = contact.force(motion_m);
+                let slope = if motion_m > 0.0 { 1.5 * force / motion_m } else { 0.0 };
+                (force, slope)
+            }
+            Self::Law(law, _, None) => {
+                let Reaction { force, stiffness, .. } = law.correction(motion_m, 0.0);
+                (force, stiffness)
+            }
+            Self::Law(law, before, Some(dt)) => {
+                let velocity = before.velocity_at(motion_m, *dt);
+                let Reaction { force, stiffness, damping } = law.correction(motion_m, velocity);
+                (force, stiffness + 2.0 / dt * damping)
+            }
+        }
+    }
+
+    /// Whether there is no force at a motion, nor near it.
+    pub(super) fn rests_at(&self, motion_m: f64) -> bool {
+        self.at(motion_m) == (0.0, 0.0)
+    }
+}
+
+/// Motions `y` in m and forces `R(y)` in N with `y + S R(y) = free`, by Newton's method with
+/// shortened steps; `S` in m/N, starting from a guess of the motions.
+///
+/// `None` if no motions are found that fit, as when something is not a number.
+pub(super) fn solve(
+    resistances: &[Resistance],
+    compliance: &DMatrix<f64>,
+    free: &DVector<f64>,
+    guess: DVector<f64>,
+) -> Option<(DVector<f64>, DVector<f64>)> {
+    let residual = |motions: &DVector<f64>| {
+        let forces = forces(resistances, motions);
+        motions + compliance * forces - free
+    };
+    let mut motions = guess;
+    let mut error = residual(&motions);
+    for _ in 0..STEPS_MAX {
+        let step = jacobian(resistances, compliance, &motions).lu().solve(&-&error)?;
+        let mut length = 1.0;
+        let mut next = &motions + &step;
+        let mut next_error = residual(&next);
+        for _ in 0..HALVINGS_MAX {
+            if next_error.norm() <= error.norm() || step.amax() <= TOLERANCE * next.amax() {
+                break;
+            }
+            length *= 0.5;
+            next = &motions + length * &step;
+            next_error = residual(&next);
+        }
+        (motions, error) = (next, next_error);
+        if length * step.amax() <= TOLERANCE * motions.amax() {
+            let forces = forces(resistances, &motions);
+            return Some((motions, forces));
+        }
+    }
+    None
+}
+
+fn forces(resistances: &[Resistance], motions: &DVector<f64>) -> DVector<f64> {
+    let pairs = resistances.iter().zip(motions.iter());
+    DVector::from_iterator(motions.len(), pairs.map(|(law, &motion)| law.at(motion).0))
+}
+
+/// `I + S diag(R')`.
+fn jacobian(
+    resistances: &[Resistance],
+    compliance: &DMatrix<f64>,
+    motions: &DVector<f64>,
+) -> DMatrix<f64> {
+    let mut jacobian = compliance.clone();
+    for (column, law) in resistances.iter().enumerate() {
+        let slope = law.at(motions[column]).1;
+        jacobian.column_mut(column).scale_mut(slope);
+        jacobian[(column, column)] += 1.0;
+    }
+    jacobian
+}
