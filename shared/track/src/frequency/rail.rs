@@ -279,7 +279,7 @@ fn pieces(matrices: &Matrices, rail_dofs: usize) -> Vec<Piece> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extension::SleeperBolt;
+    use crate::extension::ExtensionInstance;
     use crate::frequency::{Place, receptance};
     use tracktwin_parameters::ParameterSet;
 
@@ -293,9 +293,10 @@ mod tests {
                 Support { railpad_stiffness: nominal.railpad_stiffness * scale, ..nominal }
             })
             .collect::<Vec<_>>();
-        let bolts = SleeperBolt { sleepers: vec![2, 5], stiffness: 3e7 };
-        let mesh = Mesh::uniform(SPANS, 4, 4);
-        TrackModel::build(&TrackDesign::v_track(), &mesh, &supports, &[Box::new(bolts)]).unwrap()
+        let (design, mesh) = (TrackDesign::v_track(), Mesh::uniform(SPANS, 4, 4));
+        let bolts = ExtensionInstance::new("sleeper_bolt").with("stiffness_N_per_m", 3e7);
+        let bolts = bolts.on([2, 5]).build(&design, SPANS).unwrap();
+        TrackModel::build(&design, &mesh, &supports, &[bolts]).unwrap()
     }
 
     #[test]
