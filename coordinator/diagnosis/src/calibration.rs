@@ -2,6 +2,7 @@
 
 use crate::forward::{Forward, Linearised};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::sync::Arc;
 use tracktwin_track::extension::Extension;
 use tracktwin_track::model::ModelError;
 
@@ -82,7 +83,7 @@ impl Observation {
 pub fn calibrate(
     forward: &Forward,
     observation: &Observation,
-    extensions: &[Box<dyn Extension>],
+    extensions: &[Arc<dyn Extension>],
     start: DVector<f64>,
 ) -> Result<Calibration, CalibrationError> {
     let prior = Prior { mean: forward.unknowns.typical(), precision: forward.unknowns.precision() };
@@ -122,7 +123,7 @@ struct Prior {
 fn linearise(
     forward: &Forward,
     observation: &Observation,
-    extensions: &[Box<dyn Extension>],
+    extensions: &[Arc<dyn Extension>],
     prior: &Prior,
     values: &DVector<f64>,
 ) -> Result<Calibration, CalibrationError> {

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use tracktwin_track::extension::Extension;
 use tracktwin_track::frequency::{RailReceptances, support_stiffness};
 use tracktwin_track::model::{HertzContact, ModelError, Roughness, TrackModel};
@@ -98,7 +99,7 @@ impl Forward {
     pub fn log_power(
         &self,
         values: &DVector<f64>,
-        extensions: &[Box<dyn Extension>],
+        extensions: &[Arc<dyn Extension>],
     ) -> Result<DVector<f64>, ModelError> {
         let transfer = self.transfer(values, extensions, false)?;
         let mut all = DVector::zeros(self.count());
@@ -116,7 +117,7 @@ impl Forward {
     pub fn linearised(
         &self,
         values: &DVector<f64>,
-        extensions: &[Box<dyn Extension>],
+        extensions: &[Arc<dyn Extension>],
     ) -> Result<Linearised, ModelError> {
         let transfer = self.transfer(values, extensions, true)?;
         let variations = self.variations(values)?;
@@ -151,7 +152,7 @@ impl Forward {
     fn transfer(
         &self,
         values: &DVector<f64>,
-        extensions: &[Box<dyn Extension>],
+        extensions: &[Arc<dyn Extension>],
         from_seats: bool,
     ) -> Result<Transfer, ModelError> {
         let design = &self.section.design;
