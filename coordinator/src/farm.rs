@@ -107,9 +107,13 @@ pub async fn embedded(
     shutdown: CancellationToken,
     mut progress: impl FnMut(Status),
 ) -> Result<Status, FarmError> {
-    let _claim = library.claim()?;
-    // Whoever held these died with the process that served it.
-    library.release_all(task.campaign).await?;
+    let claim = library.claim()?;
+    if claim.is_exclusive() {
+        // Whoever held these died with the process that served it.
+        library.release_all(task.campaign).await?;
+    }
+    // Who runs a campaign that was paused or cancelled means to go on with it.
+    library.resume(task.campaign).await?;
     let dispatch = Dispatch::new(library.clone(), task.campaign, task.cases, task.timing).await?;
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
     let coordinator = format!("http://{}", listener.local_addr()?);

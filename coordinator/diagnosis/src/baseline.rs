@@ -103,7 +103,8 @@ impl Unknowns {
     /// Inverse of the prior covariance.
     pub fn precision(&self) -> DMatrix<f64> {
         let mut covariance = DMatrix::zeros(self.count(), self.count());
-        for (field, range) in [self.ballast(), self.railpad(), self.level()].into_iter().enumerate() {
+        for (field, range) in [self.ballast(), self.railpad(), self.level()].into_iter().enumerate()
+        {
             for i in range.clone() {
                 for j in range.clone() {
                     let distance = (i as f64 - j as f64) / prior::LENGTH;

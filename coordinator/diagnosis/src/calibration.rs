@@ -90,8 +90,8 @@ pub fn calibrate(
     let mut values = start;
     let mut state = linearise(forward, observation, extensions, &prior, &values)?;
     for _ in 0..STEPS_MAX {
-        let gradient = state.jacobian.tr_mul(&state.residual)
-            - &prior.precision * (&values - &prior.mean);
+        let gradient =
+            state.jacobian.tr_mul(&state.residual) - &prior.precision * (&values - &prior.mean);
         let mut step = state.precision.solve(&gradient);
         let longest = step.amax();
         if longest > STEP_MAX {

@@ -20,4 +20,4 @@ pub use finding::{Finding, Place};
 pub use forward::{Forward, Linearised};
 pub use null_model::{NullError, NullModel, whitening};
 pub use section::Section;
-pub use spectra::{SpeedSpectra, Spectra};
+pub use spectra::{Spectra, SpeedSpectra};

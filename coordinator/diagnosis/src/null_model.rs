@@ -74,9 +74,11 @@ impl NullModel {
                 let surfaces: Vec<_> =
                     seeds.map(|s| Surface::rough(seed.wrapping_add(s), level, length_m)).collect();
                 let simulated = simulate(forward, &model, &surfaces)?;
-                let count = done.fetch_add(surfaces.len() as u64, std::sync::atomic::Ordering::Relaxed);
+                let count =
+                    done.fetch_add(surfaces.len() as u64, std::sync::atomic::Ordering::Relaxed);
                 progress((count + surfaces.len() as u64) as f64);
-                let difference = |log_power: DVector<f64>| (log_power - &expected).as_slice().to_vec();
+                let difference =
+                    |log_power: DVector<f64>| (log_power - &expected).as_slice().to_vec();
                 Ok(simulated.into_iter().map(difference).collect())
             })
             .collect::<Result<_, NullError>>()?;
@@ -182,7 +184,8 @@ fn simulate(
             let powers = log_powers(&signal, &windows, &forward.bands);
             for (sleeper, powers) in powers.into_iter().flatten().enumerate() {
                 for (band, power) in powers.into_iter().enumerate() {
-                    let row = sleeper * forward.per_sleeper() + speed * forward.bands.count() + band;
+                    let row =
+                        sleeper * forward.per_sleeper() + speed * forward.bands.count() + band;
                     all[row] = power;
                 }
             }

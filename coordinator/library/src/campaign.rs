@@ -1,9 +1,7 @@
 //! The table `campaign`.
 
-use crate::writer::Write;
+use crate::engine::{Connection, Row, Write, sql};
 use crate::{Library, LibraryError};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 
 /// A campaign as the library keeps it.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,9 +38,8 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
     pub async fn campaigns(&self) -> Result<Vec<CampaignRecord>, LibraryError> {
-        let rows = sqlx::query("select * from campaign order by created_at, id")
-            .fetch_all(self.readers())
-            .await?;
+        let rows =
+            self.readers().rows(sql("select * from campaign order by created_at, id")).await?;
         rows.iter().map(record).collect()
     }
 
@@ -51,10 +48,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError::UnknownCampaign`] when it is not there.
     pub async fn campaign(&self, id: &str) -> Result<CampaignRecord, LibraryError> {
-        let row = sqlx::query("select * from campaign where id = ?")
-            .bind(id)
-            .fetch_optional(self.readers())
-            .await?;
+        let row = self.readers().row(sql("select * from campaign where id = $1").bind(id)).await?;
         row.as_ref()
             .map_or_else(|| Err(LibraryError::UnknownCampaign { id: id.to_owned() }), record)
     }
@@ -69,21 +63,21 @@ pub(crate) fn seed_from_sql(seed: i64) -> Result<u64, LibraryError> {
     u64::try_from(seed).map_err(|_| LibraryError::Damaged { what: format!("a seed of {seed}") })
 }
 
-fn record(row: &SqliteRow) -> Result<CampaignRecord, LibraryError> {
-    let id: String = row.try_get("id")?;
-    let speeds: String = row.try_get("speeds_km_h")?;
+fn record(row: &Row) -> Result<CampaignRecord, LibraryError> {
+    let id: String = row.get("id")?;
+    let speeds: String = row.get("speeds_km_h")?;
     let speeds_km_h = serde_json::from_str(&speeds).map_err(|error| LibraryError::Damaged {
         what: format!("campaign {id}: speeds_km_h: {error}"),
     })?;
     Ok(CampaignRecord {
         id,
-        name: row.try_get("name")?,
-        definition_json: row.try_get("definition")?,
-        definition_hash: row.try_get("definition_hash")?,
-        experiment_json: row.try_get("experiment")?,
-        experiment_hash: row.try_get("experiment_hash")?,
+        name: row.get("name")?,
+        definition_json: row.get("definition")?,
+        definition_hash: row.get("definition_hash")?,
+        experiment_json: row.get("experiment")?,
+        experiment_hash: row.get("experiment_hash")?,
         speeds_km_h,
-        seed: seed_from_sql(row.try_get("seed")?)?,
+        seed: seed_from_sql(row.get("seed")?)?,
     })
 }
 
@@ -92,31 +86,28 @@ struct Insert(CampaignRecord);
 impl Write for Insert {
     type Answer = ();
 
-    async fn apply(&self, connection: &mut SqliteConnection) -> Result<(), LibraryError> {
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let campaign = &self.0;
         let speeds = serde_json::to_string(&campaign.speeds_km_h).expect("numbers become JSON");
-        sqlx::query(
+        let insert = format!(
             "insert into campaign (id, name, definition, definition_hash, experiment,
                 experiment_hash, speeds_km_h, seed, created_at)
-            values (?, ?, ?, ?, ?, ?, ?, ?, strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
-            on conflict (id) do nothing",
-        )
-        .bind(&campaign.id)
-        .bind(&campaign.name)
-        .bind(&campaign.definition_json)
-        .bind(&campaign.definition_hash)
-        .bind(&campaign.experiment_json)
-        .bind(&campaign.experiment_hash)
-        .bind(speeds)
-        .bind(sql_seed(campaign.seed)?)
-        .execute(&mut *connection)
-        .await?;
-        let stored: String =
-            sqlx::query_scalar("select definition_hash from campaign where id = ?")
-                .bind(&campaign.id)
-                .fetch_one(connection)
-                .await?;
-        if stored == campaign.definition_hash {
+            values ($1, $2, $3, $4, $5, $6, $7, $8, {}) on conflict (id) do nothing",
+            connection.dialect().now()
+        );
+        let insert = sql(insert)
+            .bind(&campaign.id)
+            .bind(&campaign.name)
+            .bind(&campaign.definition_json)
+            .bind(&campaign.definition_hash)
+            .bind(&campaign.experiment_json)
+            .bind(&campaign.experiment_hash)
+            .bind(speeds)
+            .bind(sql_seed(campaign.seed)?);
+        connection.execute(insert).await?;
+        let ask = sql("select definition_hash from campaign where id = $1").bind(&campaign.id);
+        let stored = connection.row(ask).await?.map(|row| row.get::<String>("definition_hash"));
+        if stored.transpose()?.as_ref() == Some(&campaign.definition_hash) {
             Ok(())
         } else {
             Err(LibraryError::OtherDefinition { id: campaign.id.clone() })

@@ -1,10 +1,9 @@
 //! The table `campaign_case`: the cases and where they stand.
 
 use crate::campaign::{seed_from_sql, sql_seed};
-use crate::writer::Write;
+use crate::engine::{Connection, Row, Statement, Write, sql};
 use crate::{Library, LibraryError, State};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{QueryBuilder, Row, SqliteConnection};
+use std::fmt::Write as _;
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 
 /// Cases in one statement: ten values each, well below the 32,766 that `SQLite` takes.
@@ -67,17 +66,31 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
     pub async fn status_of(&self, campaign: &str, cases: u32) -> Result<Status, LibraryError> {
-        let rows: Vec<(String, u32)> = sqlx::query_as(
-            "select state, count(*) from campaign_case
-            where campaign_id = ? and sobol_index < ? group by state",
-        )
-        .bind(campaign)
-        .bind(cases)
-        .fetch_all(self.readers())
-        .await?;
+        let all = self.status(campaign).await?;
+        // Indices have no gaps.
+        if all.total() <= cases {
+            return Ok(all);
+        }
+        let count = "select state, count(*) as cases from campaign_case
+            where campaign_id = $1 and sobol_index < $2 group by state";
+        self.counts(sql(count).bind(campaign).bind(cases)).await
+    }
+
+    /// The counts of a campaign; they cost the same however many cases it has.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn status(&self, campaign: &str) -> Result<Status, LibraryError> {
+        let sum = "select state, cast(sum(cases) as bigint) as cases from case_count
+            where campaign_id = $1 group by state";
+        self.counts(sql(sum).bind(campaign)).await
+    }
+
+    async fn counts(&self, ask: Statement) -> Result<Status, LibraryError> {
         let mut status = Status::default();
-        for (state, count) in rows {
-            match State::from_name(&state) {
+        for row in self.readers().rows(ask).await? {
+            let count = row.get_u32("cases")?;
+            match State::from_name(&row.get::<String>("state")?) {
                 State::Waiting => status.waiting = count,
                 State::Leased => status.leased = count,
                 State::Finished => status.finished = count,
@@ -85,14 +98,6 @@ impl Library {
             }
         }
         Ok(status)
-    }
-
-    /// The counts of a campaign.
-    ///
-    /// # Errors
-    /// [`LibraryError`] when the library cannot be read.
-    pub async fn status(&self, campaign: &str) -> Result<Status, LibraryError> {
-        self.status_of(campaign, u32::MAX).await
     }
 
     /// One case, if the campaign has it.
@@ -104,12 +109,8 @@ impl Library {
         campaign: &str,
         index: u32,
     ) -> Result<Option<CaseRecord>, LibraryError> {
-        let row =
-            sqlx::query("select * from campaign_case where campaign_id = ? and sobol_index = ?")
-                .bind(campaign)
-                .bind(index)
-                .fetch_optional(self.readers())
-                .await?;
+        let ask = "select * from campaign_case where campaign_id = $1 and sobol_index = $2";
+        let row = self.readers().row(sql(ask).bind(campaign).bind(index)).await?;
         row.as_ref().map(record).transpose()
     }
 
@@ -122,38 +123,33 @@ impl Library {
         campaign: &str,
         limit: u32,
     ) -> Result<Vec<CaseRecord>, LibraryError> {
-        let rows = sqlx::query(
-            "select * from campaign_case where campaign_id = ? and state = 'failed'
-            order by sobol_index limit ?",
-        )
-        .bind(campaign)
-        .bind(limit)
-        .fetch_all(self.readers())
-        .await?;
+        let ask = "select * from campaign_case where campaign_id = $1 and state = 'failed'
+            order by sobol_index limit $2";
+        let rows = self.readers().rows(sql(ask).bind(campaign).bind(limit)).await?;
         rows.iter().map(record).collect()
     }
 }
 
 /// The case in a row that has the columns of `campaign_case`.
-pub(crate) fn case_of(row: &SqliteRow) -> Result<Case, LibraryError> {
+pub(crate) fn case_of(row: &Row) -> Result<Case, LibraryError> {
     let mut parameters = ParameterSet::nominal();
     for &parameter in Parameter::ALL {
-        parameters[parameter] = row.try_get(parameter.name())?;
+        parameters[parameter] = row.get(parameter.name())?;
     }
     Ok(Case {
-        index: row.try_get("sobol_index")?,
+        index: row.get_u32("sobol_index")?,
         parameters,
-        surface_seed: seed_from_sql(row.try_get("surface_seed")?)?,
+        surface_seed: seed_from_sql(row.get("surface_seed")?)?,
     })
 }
 
-fn record(row: &SqliteRow) -> Result<CaseRecord, LibraryError> {
+fn record(row: &Row) -> Result<CaseRecord, LibraryError> {
     Ok(CaseRecord {
         case: case_of(row)?,
-        state: State::from_name(row.try_get("state")?),
-        attempts: row.try_get("attempts")?,
-        worker: row.try_get("worker")?,
-        error: row.try_get("error")?,
+        state: State::from_name(&row.get::<String>("state")?),
+        attempts: row.get_u32("attempts")?,
+        worker: row.get("worker")?,
+        error: row.get("error")?,
     })
 }
 
@@ -165,23 +161,34 @@ struct Insert {
 impl Write for Insert {
     type Answer = ();
 
-    async fn apply(&self, connection: &mut SqliteConnection) -> Result<(), LibraryError> {
-        let seeds = self.cases.iter().map(|case| sql_seed(case.surface_seed));
-        let seeds = seeds.collect::<Result<Vec<i64>, _>>()?;
-        let mut query = QueryBuilder::new("insert into campaign_case (campaign_id, sobol_index, ");
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let columns = Parameter::ALL.len() + 4;
+        let mut insert = "insert into campaign_case (campaign_id, sobol_index, ".to_owned();
         for parameter in Parameter::ALL {
-            query.push(parameter.name()).push(", ");
+            insert.extend([parameter.name(), ", "]);
         }
-        query.push("surface_seed, parameter_hash) ");
-        query.push_values(self.cases.iter().zip(seeds), |mut row, (case, seed)| {
-            row.push_bind(&self.campaign).push_bind(case.index);
-            for &value in case.parameters.values() {
-                row.push_bind(value);
+        insert.push_str("surface_seed, parameter_hash) values ");
+        for row in 0..self.cases.len() {
+            let numbers = row * columns + 1..=(row + 1) * columns;
+            for (column, number) in numbers.enumerate() {
+                let before = if column > 0 {
+                    ", "
+                } else if row > 0 {
+                    ", ("
+                } else {
+                    "("
+                };
+                let _ = write!(insert, "{before}${number}");
             }
-            row.push_bind(seed).push_bind(case.parameter_hash());
-        });
-        query.push(" on conflict (campaign_id, sobol_index) do nothing");
-        query.build().execute(connection).await?;
-        Ok(())
+            insert.push(')');
+        }
+        insert.push_str(" on conflict (campaign_id, sobol_index) do nothing");
+        let mut insert = sql(insert);
+        for case in &self.cases {
+            insert = insert.bind(&self.campaign).bind(case.index);
+            insert = case.parameters.values().iter().fold(insert, |it, &value| it.bind(value));
+            insert = insert.bind(sql_seed(case.surface_seed)?).bind(case.parameter_hash());
+        }
+        connection.execute(insert).await.map(drop)
     }
 }

@@ -1,27 +1,24 @@
 //! One hash over everything a campaign has found.
 
 use crate::case::case_of;
+use crate::engine::sql;
 use crate::result::LEVEL_COLUMNS;
 use crate::{Library, LibraryError};
-use sqlx::Row;
 use tokio_stream::StreamExt;
 
 impl Library {
     /// BLAKE3 (hexadecimal) over all results of a campaign by index and speed: parameters, seed and
-    /// features, to the bit. Equal campaigns have equal digests whoever simulated them, and in
-    /// whatever order.
+    /// features, to the bit. Equal campaigns have equal digests whoever simulated them, in whatever
+    /// order, and in whichever database.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read or has no such campaign.
     pub async fn digest(&self, campaign: &str) -> Result<String, LibraryError> {
         self.campaign(campaign).await?;
         let mut hasher = blake3::Hasher::new_derive_key("tracktwin library digest 1");
-        let mut rows = sqlx::query(
-            "select * from result_with_parameters where campaign_id = ?
-            order by sobol_index, speed_km_h",
-        )
-        .bind(campaign)
-        .fetch(self.readers());
+        let ask = "select * from result_with_parameters where campaign_id = $1
+            order by sobol_index, speed_km_h";
+        let mut rows = self.readers().stream(sql(ask).bind(campaign));
         while let Some(row) = rows.next().await {
             let row = row?;
             let case = case_of(&row)?;
@@ -30,11 +27,14 @@ impl Library {
                 hasher.update(&value.to_be_bytes());
             }
             for column in ["speed_km_h"].iter().chain(&LEVEL_COLUMNS) {
-                hasher.update(&row.try_get::<f64, _>(*column)?.to_be_bytes());
+                hasher.update(&row.get::<f64>(column)?.to_be_bytes());
             }
-            let log_power: &[u8] = row.try_get("log_power")?;
-            // The length keeps neighbouring fields apart.
-            hasher.update(&(log_power.len() as u64).to_be_bytes()).update(log_power);
+            let log_power = row.doubles("log_power")?;
+            // The length in bytes keeps neighbouring fields apart.
+            hasher.update(&(8 * log_power.len() as u64).to_be_bytes());
+            for value in log_power {
+                hasher.update(&value.to_be_bytes());
+            }
         }
         Ok(hasher.finalize().to_hex().to_string())
     }

@@ -1,69 +1,102 @@
 //! Why a library refuses, or fails.
 
+use sqlx::error::DatabaseError;
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// Why something cannot be read from a library or written to it; one line each.
+///
+/// `library` is a path, or a URL without its password.
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
     /// Not a library URL at all.
-    #[error("library {url}: write sqlite:PATH")]
+    #[error("library {url}: write sqlite:PATH or postgres://USER@HOST/DATABASE")]
     UnknownUrl {
         /// The URL.
         url: String,
     },
-    /// A PostgreSQL library.
-    #[error(
-        "library {url}: PostgreSQL libraries come with the distributed farm; write sqlite:PATH"
-    )]
-    PostgresNotSupported {
+    /// A PostgreSQL URL that cannot be read.
+    #[error("library {url}: {reason}; write postgres://USER:PASSWORD@HOST:PORT/DATABASE")]
+    BadPostgresUrl {
         /// The URL, without what stands before its host.
         url: String,
+        /// What is wrong with it.
+        reason: String,
     },
     /// There is nothing at this path.
     #[error(
-        "library {path}: there is no such file; `tracktwin run --library sqlite:{path}` makes one"
+        "library {library}: there is no such file; `tracktwin run --library sqlite:{library}` makes \
+         one"
     )]
     Missing {
-        /// The path.
-        path: PathBuf,
+        /// The library.
+        library: String,
+    },
+    /// The database holds no library.
+    #[error("library {library}: the database is empty; `tracktwin run` fills it")]
+    Empty {
+        /// The library.
+        library: String,
     },
     /// The folder that should hold the library is not there.
-    #[error("library {path}: the folder {folder} is not there; make it first")]
+    #[error("library {library}: the folder {folder} is not there; make it first")]
     NoFolder {
-        /// The library's path.
-        path: PathBuf,
+        /// The library.
+        library: String,
         /// The folder.
         folder: PathBuf,
     },
-    /// The file is something else.
-    #[error("library {path}: the file is not a tracktwin library")]
+    /// The file or database is something else.
+    #[error("library {library}: what is there is not a tracktwin library")]
     NotALibrary {
-        /// The path.
-        path: PathBuf,
+        /// The library.
+        library: String,
+    },
+    /// The server knows no such database or user, or does not let it in.
+    #[error("library {library}: {reason}")]
+    NotLetIn {
+        /// The library.
+        library: String,
+        /// What the server said.
+        reason: String,
+    },
+    /// There is no server.
+    #[error("library {library}: the server cannot be reached")]
+    Unreachable {
+        /// The library.
+        library: String,
+        /// Why not.
+        source: sqlx::Error,
     },
     /// A later version of the program has written it.
     #[error(
-        "library {path}: its schema {found} is newer than this program's ({known}); use the program \
-         that wrote it, or a later one"
+        "library {library}: its schema {found} is newer than this program's ({known}); use the \
+         program that wrote it, or a later one"
     )]
     NewerSchema {
-        /// The path.
-        path: PathBuf,
+        /// The library.
+        library: String,
         /// The library's schema.
         found: i64,
         /// The newest schema known here.
         known: i64,
     },
     /// Another process hands out its cases.
-    #[error("library {path}: another process is running a campaign on it")]
+    #[error("library {library}: another process is running a campaign on it")]
     InUse {
-        /// The path.
-        path: PathBuf,
+        /// The library.
+        library: String,
     },
     /// There is no such campaign.
     #[error("the library has no campaign {id}")]
     UnknownCampaign {
         /// The campaign.
+        id: String,
+    },
+    /// There is no such worker.
+    #[error("the library knows no worker {id}")]
+    UnknownWorker {
+        /// The worker.
         id: String,
     },
     /// A campaign of that id but another definition.
@@ -88,16 +121,25 @@ pub enum LibraryError {
     #[error("the library is closed")]
     Closed,
     /// The lock file beside the library.
-    #[error("library {path}: cannot be locked")]
+    #[error("library {library}: cannot be locked")]
     Lock {
-        /// The path.
-        path: PathBuf,
+        /// The library.
+        library: String,
         /// What the system said.
         source: std::io::Error,
     },
+    /// The database does not answer now, and may later.
+    #[error("the library's database does not answer: {reason}")]
+    Unavailable {
+        /// What was found.
+        reason: String,
+    },
+    /// There is no room for what should be written.
+    #[error("the library's disk is full; nothing is lost: make room and go on")]
+    DiskFull,
     /// The database failed.
     #[error("the library's database failed")]
-    Database(#[from] sqlx::Error),
+    Database(#[source] sqlx::Error),
     /// A change of the schema failed.
     #[error("the library's schema cannot be brought up to date")]
     Migration(#[from] sqlx::migrate::MigrateError),
@@ -109,15 +151,72 @@ impl LibraryError {
         matches!(
             self,
             Self::UnknownUrl { .. }
-                | Self::PostgresNotSupported { .. }
+                | Self::BadPostgresUrl { .. }
                 | Self::Missing { .. }
+                | Self::Empty { .. }
                 | Self::NoFolder { .. }
                 | Self::NotALibrary { .. }
+                | Self::NotLetIn { .. }
                 | Self::NewerSchema { .. }
                 | Self::InUse { .. }
                 | Self::UnknownCampaign { .. }
+                | Self::UnknownWorker { .. }
                 | Self::OtherDefinition { .. }
                 | Self::SeedTooLarge { .. }
         )
+    }
+
+    /// Whether the same may succeed later, when somebody has mended the machine.
+    pub fn is_temporary(&self) -> bool {
+        match self {
+            Self::Unavailable { .. } | Self::DiskFull => true,
+            Self::Database(error) => code(error).as_deref() == Some(SQLITE_BUSY),
+            _ => false,
+        }
+    }
+
+    pub(crate) const fn is_unavailable(&self) -> bool {
+        matches!(self, Self::Unavailable { .. })
+    }
+}
+
+/// Another process wrote for longer than anybody waits.
+const SQLITE_BUSY: &str = "5";
+
+/// The disk is full: found in a file, or in the memory shared between processes.
+const SQLITE_FULL: [&str; 2] = ["13", "4874"];
+
+/// The class of PostgreSQL's codes for a connection that broke; and single codes for a server that
+/// stops, was stopped, or is not up yet, has no connection left, and for transactions that should
+/// simply be tried again.
+const POSTGRES_BROKEN: &str = "08";
+const POSTGRES_LATER: [&str; 6] = ["57P01", "57P02", "57P03", "53300", "40001", "40P01"];
+
+/// Server-side disk full.
+const POSTGRES_FULL: &str = "53100";
+
+fn code(error: &sqlx::Error) -> Option<String> {
+    error.as_database_error().and_then(DatabaseError::code).map(Cow::into_owned)
+}
+
+impl From<sqlx::Error> for LibraryError {
+    fn from(error: sqlx::Error) -> Self {
+        use sqlx::Error::{Io, PoolTimedOut, Protocol, Tls, WorkerCrashed};
+        if matches!(error, Io(_) | PoolTimedOut | Protocol(_) | Tls(_) | WorkerCrashed) {
+            return Self::Unavailable { reason: error.to_string() };
+        }
+        if matches!(error, sqlx::Error::PoolClosed) {
+            return Self::Closed;
+        }
+        match code(&error).as_deref() {
+            Some(code) if SQLITE_FULL.contains(&code) || code == POSTGRES_FULL => Self::DiskFull,
+            Some(code)
+                if POSTGRES_LATER.contains(&code)
+                    || (code.len() == 5 && code.starts_with(POSTGRES_BROKEN)) =>
+            {
+                Self::Unavailable { reason: error.to_string() }
+            }
+            _ => Self::Database(error),
+        }
     }
 }

@@ -1,28 +1,46 @@
 //! Leases: handing cases out, keeping them, taking them back.
 
+use crate::attempt::{self, Ended};
 use crate::case::case_of;
-use crate::writer::Write;
-use crate::{Ending, Library, LibraryError, Policy, State};
-use sqlx::{Row, SqliteConnection};
+use crate::engine::{Connection, Row, Write, sql};
+use crate::{Ending, Library, LibraryError, Policy};
 use tracktwin_parameters::Case;
+
+/// Campaigns that are looked at for one lease.
+///
+/// The first has cases to give, except where other coordinators take its last ones just now.
+const CAMPAIGNS_TRIED: u32 = 4;
+
+/// Expired leases ended with one lease; more wait for the next.
+const EXPIRED_MAX: u32 = 500;
 
 /// A worker's wish for cases.
 #[derive(Clone, Debug)]
 pub struct LeaseRequest {
-    /// The campaign.
-    pub campaign: String,
+    /// Only cases of this campaign; else of the running one with the largest priority, the oldest
+    /// among equals.
+    pub campaign: Option<String>,
     /// Only cases with a smaller index.
     pub indices_below: u32,
     /// Who asks.
     pub worker: String,
     /// Most cases wanted.
     pub cases_max: u32,
-    /// The coordinator's clock.
+    /// The library's clock.
     pub now_unix_ms: i64,
     /// How long the lease lasts without renewal.
     pub lease_ms: i64,
     /// What becomes of cases whose lease has expired.
     pub after_loss: Policy,
+}
+
+/// Cases handed to a worker, all of one campaign.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lease {
+    /// The campaign.
+    pub campaign: String,
+    /// The cases, by ascending index; at least one.
+    pub cases: Vec<Leased>,
 }
 
 /// A case handed to a worker.
@@ -44,11 +62,12 @@ pub struct Held {
 }
 
 impl Library {
-    /// Hands out the first waiting cases, after expired leases have ended.
+    /// Hands out the first waiting cases of a campaign that is running, after expired leases have
+    /// ended. There are none for a worker in quarantine.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
-    pub async fn lease(&self, request: LeaseRequest) -> Result<Vec<Leased>, LibraryError> {
+    pub async fn lease(&self, request: LeaseRequest) -> Result<Option<Lease>, LibraryError> {
         self.write(request).await
     }
 
@@ -78,102 +97,123 @@ impl Library {
         held: Vec<Held>,
     ) -> Result<(), LibraryError> {
         let (campaign, worker) = (campaign.to_owned(), worker.to_owned());
-        self.write(Release { campaign, worker, held }).await
+        let now_unix_ms = self.now_unix_ms();
+        self.write(Release { campaign, worker, held, now_unix_ms }).await
     }
 
     /// Takes back every lease of a campaign; no attempt is counted.
     ///
-    /// For a coordinator whose workers die with it, so that none can be alive when it starts.
+    /// For a coordinator whose workers die with it, so that none can be alive when it starts, and
+    /// that is alone: see [`crate::Claim::is_exclusive`].
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
     pub async fn release_all(&self, campaign: &str) -> Result<(), LibraryError> {
-        self.write(ReleaseAll { campaign: campaign.to_owned() }).await
+        let now_unix_ms = self.now_unix_ms();
+        self.write(ReleaseAll { campaign: campaign.to_owned(), now_unix_ms }).await
     }
 }
 
 impl Write for LeaseRequest {
-    type Answer = Vec<Leased>;
+    type Answer = Option<Lease>;
 
-    async fn apply(&self, connection: &mut SqliteConnection) -> Result<Vec<Leased>, LibraryError> {
+    async fn apply(&self, connection: &mut Connection) -> Result<Option<Lease>, LibraryError> {
         end_expired(connection, self.now_unix_ms, self.after_loss).await?;
+        for campaign in self.candidates(connection).await? {
+            let cases = self.take(connection, &campaign).await?;
+            if !cases.is_empty() {
+                return Ok(Some(Lease { campaign, cases }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl LeaseRequest {
+    /// Campaigns that have waiting cases, the most urgent first.
+    async fn candidates(&self, connection: &mut Connection) -> Result<Vec<String>, LibraryError> {
+        let only = if self.campaign.is_some() { "id = $4 and" } else { "" };
+        let ask = format!(
+            "select id from campaign where {only} state = 'running'
+                and not exists (select 1 from worker where id = $1 and state = 'quarantined')
+                and exists (select 1 from campaign_case
+                    where campaign_id = campaign.id and state = 'waiting' and sobol_index < $2)
+            order by priority desc, created_at, id limit $3"
+        );
+        let ask = sql(ask).bind(&self.worker).bind(self.indices_below).bind(CAMPAIGNS_TRIED);
+        let ask = match &self.campaign {
+            Some(campaign) => ask.bind(campaign),
+            None => ask,
+        };
+        connection.rows(ask).await?.iter().map(|row| row.get("id")).collect()
+    }
+
+    /// Leases the first waiting cases of a campaign.
+    async fn take(
+        &self,
+        connection: &mut Connection,
+        campaign: &str,
+    ) -> Result<Vec<Leased>, LibraryError> {
         // The limit stands in a CTE of its own: it is evaluated once, whatever the planner does.
-        let rows = sqlx::query(
+        let take = format!(
             "with next as (
-                select campaign_id, sobol_index from campaign_case
-                where campaign_id = ? and state = 'waiting' and sobol_index < ?
-                order by sobol_index limit ?)
-            update campaign_case set state = 'leased', epoch = epoch + 1, worker = ?,
-                lease_expires_unix_ms = ?
-            from next
-            where campaign_case.campaign_id = next.campaign_id
-                and campaign_case.sobol_index = next.sobol_index
-            returning *",
-        )
-        .bind(&self.campaign)
-        .bind(self.indices_below)
-        .bind(self.cases_max)
-        .bind(&self.worker)
-        .bind(self.now_unix_ms.saturating_add(self.lease_ms))
-        .fetch_all(connection)
-        .await?;
-        let leased = |row| Ok(Leased { case: case_of(row)?, epoch: row.try_get("epoch")? });
-        let mut leased = rows.iter().map(leased).collect::<Result<Vec<_>, LibraryError>>()?;
-        leased.sort_by_key(|leased| leased.case.index);
-        Ok(leased)
+                select campaign_id as next_campaign, sobol_index as next_index from campaign_case
+                where campaign_id = $1 and state = 'waiting' and sobol_index < $2
+                order by sobol_index limit $3 {})
+            update campaign_case set state = 'leased', epoch = epoch + 1, worker = $4,
+                leased_unix_ms = $5, lease_expires_unix_ms = $6
+            from next where campaign_id = next_campaign and sobol_index = next_index
+            returning sobol_index, railpad_stiffness_N_m, railpad_damping_N_s_m,
+                ballast_stiffness_N_m, ballast_damping_N_s_m, sleeper_EI_N_m2, irregularity_level,
+                surface_seed, epoch",
+            connection.dialect().skipping_locked()
+        );
+        let take = sql(take)
+            .bind(campaign)
+            .bind(self.indices_below)
+            .bind(self.cases_max)
+            .bind(&self.worker)
+            .bind(self.now_unix_ms)
+            .bind(self.now_unix_ms.saturating_add(self.lease_ms));
+        let leased = |row: &Row| Ok(Leased { case: case_of(row)?, epoch: row.get_u32("epoch")? });
+        let rows = connection.rows(take).await?;
+        let mut cases = rows.iter().map(leased).collect::<Result<Vec<_>, LibraryError>>()?;
+        cases.sort_by_key(|leased| leased.case.index);
+        Ok(cases)
     }
 }
 
 /// Ends leases that have expired, of any campaign.
 async fn end_expired(
-    connection: &mut SqliteConnection,
+    connection: &mut Connection,
     now_unix_ms: i64,
     policy: Policy,
 ) -> Result<(), LibraryError> {
-    let expired: Vec<(String, u32, u32, String)> = sqlx::query_as(
-        "select campaign_id, sobol_index, attempts, worker from campaign_case
-        where state = 'leased' and lease_expires_unix_ms <= ?",
-    )
-    .bind(now_unix_ms)
-    .fetch_all(&mut *connection)
-    .await?;
-    for (campaign, index, attempts, worker) in expired {
-        let attempts = attempts + 1;
-        let after = Attempted {
+    let ask = format!(
+        "select campaign_id, sobol_index, attempts from campaign_case
+        where state = 'leased' and lease_expires_unix_ms <= $1
+        order by lease_expires_unix_ms limit $2 {}",
+        connection.dialect().skipping_locked()
+    );
+    for row in connection.rows(sql(ask).bind(now_unix_ms).bind(EXPIRED_MAX)).await? {
+        let attempts = row.get_u32("attempts")? + 1;
+        let ended = Ended {
+            campaign: &row.get::<String>("campaign_id")?,
+            index: row.get_u32("sobol_index")?,
             attempts,
             state: policy(Ending::Lost, attempts),
-            error: &format!("lease {attempts} expired: worker {worker} fell silent"),
+            ending: "lost",
+            error: "the lease expired: its worker fell silent",
+            now_unix_ms,
         };
-        end_attempt(connection, &campaign, index, after).await?;
+        attempt::end(connection, ended).await?;
     }
     Ok(())
 }
 
-/// Where an attempt without result leaves its case.
-pub(crate) struct Attempted<'a> {
-    pub(crate) attempts: u32,
-    pub(crate) state: State,
-    pub(crate) error: &'a str,
-}
-
-pub(crate) async fn end_attempt(
-    connection: &mut SqliteConnection,
-    campaign: &str,
-    index: u32,
-    after: Attempted<'_>,
-) -> Result<(), LibraryError> {
-    sqlx::query(
-        "update campaign_case set state = ?, attempts = ?, error = ?, lease_expires_unix_ms = null
-        where campaign_id = ? and sobol_index = ?",
-    )
-    .bind(after.state.name())
-    .bind(after.attempts)
-    .bind(after.error)
-    .bind(campaign)
-    .bind(index)
-    .execute(connection)
-    .await?;
-    Ok(())
+/// Indices and epochs, each as a list to be bound.
+fn lists(held: &[Held]) -> (Vec<i64>, Vec<i64>) {
+    held.iter().map(|held| (i64::from(held.index), i64::from(held.epoch))).unzip()
 }
 
 struct Renew {
@@ -186,26 +226,27 @@ struct Renew {
 impl Write for Renew {
     type Answer = Vec<Held>;
 
-    async fn apply(&self, connection: &mut SqliteConnection) -> Result<Vec<Held>, LibraryError> {
-        let mut lost = Vec::new();
-        for &held in &self.held {
-            let renewed = sqlx::query(
-                "update campaign_case set lease_expires_unix_ms = ?
-                where campaign_id = ? and sobol_index = ?
-                    and state = 'leased' and worker = ? and epoch = ?",
-            )
-            .bind(self.until_unix_ms)
+    async fn apply(&self, connection: &mut Connection) -> Result<Vec<Held>, LibraryError> {
+        let renew = format!(
+            "update campaign_case set lease_expires_unix_ms = $3 from {}
+            where campaign_id = $1 and sobol_index = held_index and epoch = held_epoch
+                and state = 'leased' and worker = $2
+            returning sobol_index, epoch",
+            connection.dialect().held("$4", "$5")
+        );
+        let (indices, epochs) = lists(&self.held);
+        let renew = sql(renew)
             .bind(&self.campaign)
-            .bind(held.index)
             .bind(&self.worker)
-            .bind(held.epoch)
-            .execute(&mut *connection)
-            .await?;
-            if renewed.rows_affected() == 0 {
-                lost.push(held);
-            }
-        }
-        Ok(lost)
+            .bind(self.until_unix_ms)
+            .bind(indices)
+            .bind(epochs);
+        let rows = connection.rows(renew).await?;
+        let held = |row: &Row| {
+            Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? })
+        };
+        let renewed = rows.iter().map(held).collect::<Result<Vec<_>, LibraryError>>()?;
+        Ok(self.held.iter().copied().filter(|held| !renewed.contains(held)).collect())
     }
 }
 
@@ -213,44 +254,46 @@ struct Release {
     campaign: String,
     worker: String,
     held: Vec<Held>,
+    now_unix_ms: i64,
 }
 
 impl Write for Release {
     type Answer = ();
 
-    async fn apply(&self, connection: &mut SqliteConnection) -> Result<(), LibraryError> {
-        for held in &self.held {
-            sqlx::query(
-                "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
-                where campaign_id = ? and sobol_index = ?
-                    and state = 'leased' and worker = ? and epoch = ?",
-            )
-            .bind(&self.campaign)
-            .bind(held.index)
-            .bind(&self.worker)
-            .bind(held.epoch)
-            .execute(&mut *connection)
-            .await?;
-        }
-        Ok(())
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let held = connection.dialect().held("$3", "$4");
+        let theirs = "campaign_id = $1 and sobol_index = held_index and epoch = held_epoch
+            and state = 'leased' and worker = $2";
+        let note = format!(
+            "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
+                ended_unix_ms, ending)
+            select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $5, 'returned'
+            from campaign_case, {held} where {theirs}
+            on conflict (campaign_id, sobol_index, epoch) do nothing"
+        );
+        let end = format!(
+            "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
+            from {held} where {theirs}"
+        );
+        let (indices, epochs) = lists(&self.held);
+        let bound = |text| {
+            let (indices, epochs) = (indices.clone(), epochs.clone());
+            sql(text).bind(&self.campaign).bind(&self.worker).bind(indices).bind(epochs)
+        };
+        connection.execute(bound(note).bind(self.now_unix_ms)).await?;
+        connection.execute(bound(end)).await.map(drop)
     }
 }
 
 struct ReleaseAll {
     campaign: String,
+    now_unix_ms: i64,
 }
 
 impl Write for ReleaseAll {
     type Answer = ();
 
-    async fn apply(&self, connection: &mut SqliteConnection) -> Result<(), LibraryError> {
-        sqlx::query(
-            "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
-            where campaign_id = ? and state = 'leased'",
-        )
-        .bind(&self.campaign)
-        .execute(connection)
-        .await?;
-        Ok(())
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        attempt::end_all(connection, &self.campaign, "abandoned", self.now_unix_ms).await
     }
 }

@@ -2,25 +2,34 @@
 //!
 //! Owns the schema's use and every statement; nothing else in the program speaks SQL. It stores and
 //! counts but decides nothing: what becomes of a case whose attempt ended is asked of a [`Policy`],
-//! and the clock comes in as an argument.
+//! and what time it is comes in as an argument where anything depends on it.
 
+mod attempt;
+mod audit;
 mod campaign;
 mod case;
+mod control;
 mod digest;
+mod engine;
 mod error;
 mod lease;
 mod library;
+mod overview;
 mod report;
 mod result;
 mod state;
-mod url;
-mod writer;
+mod tally;
+mod worker;
 
+pub use audit::{Audit, AuditCounts, AuditFinding};
 pub use campaign::CampaignRecord;
 pub use case::{CaseRecord, Status};
+pub use control::Retry;
 pub use error::LibraryError;
-pub use lease::{Held, LeaseRequest, Leased};
+pub use lease::{Held, Lease, LeaseRequest, Leased};
 pub use library::{Claim, Library};
+pub use overview::{CampaignOverview, Cause};
 pub use report::{CaseReport, Report, Verdict};
 pub use result::LibraryEntry;
-pub use state::{Ending, Policy, State};
+pub use state::{CampaignState, Ending, Policy, State};
+pub use worker::{Registration, WorkerRecord, WorkerState};

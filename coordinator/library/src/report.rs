@@ -1,10 +1,11 @@
 //! Taking reports: each case's first result is stored, and whatever comes later changes nothing.
 
-use crate::lease::{Attempted, end_attempt};
-use crate::result::insert_result;
-use crate::writer::Write;
-use crate::{Ending, Library, LibraryError, Policy, State};
-use sqlx::SqliteConnection;
+use crate::attempt::{self, Ended};
+use crate::engine::{Connection, Row, Write, sql};
+use crate::result::insert_results;
+use crate::tally::Tally;
+use crate::{Ending, Held, Library, LibraryError, Policy, State, audit};
+use std::collections::{HashMap, HashSet};
 use tracktwin_signal::Features;
 
 /// What a worker hands in.
@@ -24,10 +25,12 @@ pub struct Report {
     pub speeds_km_h: Vec<f64>,
     /// The cases.
     pub cases: Vec<CaseReport>,
-    /// The coordinator's clock.
+    /// The library's clock.
     pub now_unix_ms: i64,
     /// What becomes of cases that could not be simulated.
     pub after_failure: Policy,
+    /// Share of the stored cases that another worker is to simulate again, 0 to 1.
+    pub audit_share: f64,
 }
 
 /// What became of one case.
@@ -54,7 +57,8 @@ pub enum Verdict {
     Duplicate,
     /// The failure of a lease that has ended; nothing changed.
     Late,
-    /// No such case, never leased so, or other parameters than the case has; nothing changed.
+    /// No such case, never leased so to this worker, or other parameters than the case has; nothing
+    /// changed.
     Refused,
 }
 
@@ -74,19 +78,39 @@ impl Library {
 impl Write for Report {
     type Answer = Vec<Verdict>;
 
-    async fn apply(&self, connection: &mut SqliteConnection) -> Result<Vec<Verdict>, LibraryError> {
+    async fn apply(&self, connection: &mut Connection) -> Result<Vec<Verdict>, LibraryError> {
+        let mut standings = self.standings(connection).await?;
+        let earlier = self.earlier_leases(connection, &standings).await?;
+        let mut finished = Vec::new();
         let mut verdicts = Vec::with_capacity(self.cases.len());
         for case in &self.cases {
-            verdicts.push(self.apply_case(case, connection).await?);
+            let standing = standings.get_mut(&case.index);
+            let verdict =
+                standing.as_deref().map_or(Verdict::Refused, |it| self.verdict(case, it, &earlier));
+            verdicts.push(verdict);
+            let (Verdict::Stored, Some(standing)) = (verdict, standing) else { continue };
+            match &case.outcome {
+                Ok(features) => {
+                    if self.overtakes(case, standing) {
+                        attempt::overtake(connection, self, case.index).await?;
+                    }
+                    finished.push((case, &**features));
+                    standing.state = State::Finished;
+                }
+                Err(reason) => {
+                    standing.state = self.fail(connection, case, standing, reason).await?;
+                }
+            }
         }
+        self.finish(connection, &finished).await?;
+        Tally::of(self, &verdicts).store(connection).await?;
         Ok(verdicts)
     }
 }
 
-/// What decides the fate of a report.
-#[derive(sqlx::FromRow)]
+/// Where a case stands before a report of it.
 struct Standing {
-    state: String,
+    state: State,
     epoch: u32,
     attempts: u32,
     worker: Option<String>,
@@ -94,71 +118,126 @@ struct Standing {
 }
 
 impl Report {
-    async fn apply_case(
+    /// Where the reported cases stand, locked against others.
+    async fn standings(
         &self,
-        case: &CaseReport,
-        connection: &mut SqliteConnection,
-    ) -> Result<Verdict, LibraryError> {
-        let standing: Option<Standing> = sqlx::query_as(
-            "select state, epoch, attempts, worker, parameter_hash from campaign_case
-            where campaign_id = ? and sobol_index = ?",
-        )
-        .bind(&self.campaign)
-        .bind(case.index)
-        .fetch_optional(&mut *connection)
-        .await?;
-        let verdict = standing.as_ref().map_or(Verdict::Refused, |it| self.verdict(case, it));
-        if let (Verdict::Stored, Some(standing)) = (verdict, standing) {
-            match &case.outcome {
-                Ok(features) => self.finish(case, features, connection).await?,
-                Err(reason) => {
-                    let attempts = standing.attempts + 1;
-                    let state = (self.after_failure)(Ending::Failed, attempts);
-                    let after = Attempted { attempts, state, error: reason };
-                    end_attempt(connection, &self.campaign, case.index, after).await?;
-                }
-            }
-        }
-        Ok(verdict)
+        connection: &mut Connection,
+    ) -> Result<HashMap<u32, Standing>, LibraryError> {
+        let dialect = connection.dialect();
+        let ask = format!(
+            "select sobol_index, state, epoch, attempts, worker, parameter_hash from campaign_case
+            where campaign_id = $1 and sobol_index {} order by sobol_index {}",
+            dialect.listed("$2"),
+            dialect.locking()
+        );
+        let ask = sql(ask).bind(&self.campaign).bind(self.indices(|_| true));
+        let standing = |row: &Row| {
+            let standing = Standing {
+                state: State::from_name(&row.get::<String>("state")?),
+                epoch: row.get_u32("epoch")?,
+                attempts: row.get_u32("attempts")?,
+                worker: row.get("worker")?,
+                parameter_hash: row.get("parameter_hash")?,
+            };
+            Ok((row.get_u32("sobol_index")?, standing))
+        };
+        connection.rows(ask).await?.iter().map(standing).collect()
     }
 
-    fn verdict(&self, case: &CaseReport, standing: &Standing) -> Verdict {
-        let state = State::from_name(&standing.state);
-        let known = (1..=standing.epoch).contains(&case.epoch);
-        if !known || case.parameter_hash != standing.parameter_hash {
+    /// Leases of these cases that the worker had, and that have ended.
+    async fn earlier_leases(
+        &self,
+        connection: &mut Connection,
+        standings: &HashMap<u32, Standing>,
+    ) -> Result<HashSet<Held>, LibraryError> {
+        let present = |case: &CaseReport| {
+            standings.get(&case.index).is_none_or(|standing| self.is_present(case, standing))
+        };
+        let late = self.indices(|case| !present(case));
+        if late.is_empty() {
+            return Ok(HashSet::new());
+        }
+        let ask = format!(
+            "select sobol_index, epoch from attempt
+            where campaign_id = $1 and worker = $2 and sobol_index {}",
+            connection.dialect().listed("$3")
+        );
+        let ask = sql(ask).bind(&self.campaign).bind(&self.worker).bind(late);
+        let held = |row: &Row| {
+            Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? })
+        };
+        connection.rows(ask).await?.iter().map(held).collect()
+    }
+
+    fn indices(&self, which: impl Fn(&CaseReport) -> bool) -> Vec<i64> {
+        self.cases.iter().filter(|case| which(case)).map(|case| case.index.into()).collect()
+    }
+
+    /// Whether the report is of the case's last lease.
+    fn is_present(&self, case: &CaseReport, standing: &Standing) -> bool {
+        case.epoch == standing.epoch && standing.worker.as_ref() == Some(&self.worker)
+    }
+
+    /// Whether an earlier lease brings the result that a later one is working on.
+    fn overtakes(&self, case: &CaseReport, standing: &Standing) -> bool {
+        standing.state == State::Leased && !self.is_present(case, standing)
+    }
+
+    fn verdict(&self, case: &CaseReport, standing: &Standing, earlier: &HashSet<Held>) -> Verdict {
+        let present = self.is_present(case, standing);
+        let held = present || earlier.contains(&Held { index: case.index, epoch: case.epoch });
+        if !held || case.epoch == 0 || case.parameter_hash != standing.parameter_hash {
             return Verdict::Refused;
         }
-        let current = state == State::Leased
-            && case.epoch == standing.epoch
-            && standing.worker.as_ref() == Some(&self.worker);
-        match (&case.outcome, state) {
+        match (&case.outcome, standing.state) {
             (_, State::Finished) => Verdict::Duplicate,
             (Ok(_), _) => Verdict::Stored,
-            (Err(_), _) if current => Verdict::Stored,
+            (Err(_), State::Leased) if present => Verdict::Stored,
             (Err(_), _) => Verdict::Late,
         }
     }
 
+    async fn fail(
+        &self,
+        connection: &mut Connection,
+        case: &CaseReport,
+        standing: &Standing,
+        reason: &str,
+    ) -> Result<State, LibraryError> {
+        let attempts = standing.attempts + 1;
+        let state = (self.after_failure)(Ending::Failed, attempts);
+        let ended = Ended {
+            campaign: &self.campaign,
+            index: case.index,
+            attempts,
+            state,
+            ending: "failed",
+            error: reason,
+            now_unix_ms: self.now_unix_ms,
+        };
+        attempt::end(connection, ended).await?;
+        Ok(state)
+    }
+
     async fn finish(
         &self,
-        case: &CaseReport,
-        features: &[Features],
-        connection: &mut SqliteConnection,
+        connection: &mut Connection,
+        finished: &[(&CaseReport, &[Features])],
     ) -> Result<(), LibraryError> {
-        assert_eq!(features.len(), self.speeds_km_h.len(), "checked where the message came in");
-        for (&speed_km_h, features) in self.speeds_km_h.iter().zip(features) {
-            insert_result(self, case, speed_km_h, features, connection).await?;
+        if finished.is_empty() {
+            return Ok(());
         }
-        sqlx::query(
-            "update campaign_case set state = 'finished', worker = ?, error = null,
+        insert_results(connection, self, finished).await?;
+        let update = format!(
+            "update campaign_case set state = 'finished', worker = $2, error = null,
                 lease_expires_unix_ms = null
-            where campaign_id = ? and sobol_index = ?",
-        )
-        .bind(&self.worker)
-        .bind(&self.campaign)
-        .bind(case.index)
-        .execute(connection)
-        .await?;
-        Ok(())
+            where campaign_id = $1 and sobol_index {}",
+            connection.dialect().listed("$3")
+        );
+        let indices = finished.iter().map(|(case, _)| i64::from(case.index)).collect::<Vec<_>>();
+        connection
+            .execute(sql(update).bind(&self.campaign).bind(&self.worker).bind(indices))
+            .await?;
+        audit::sample(connection, self, finished.iter().map(|(case, _)| *case)).await
     }
 }

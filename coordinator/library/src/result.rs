@@ -1,10 +1,10 @@
 //! The table `result`: what came out of each case at each speed.
 
 use crate::case::case_of;
+use crate::engine::{Connection, Dialect, Row, Value, iso_utc, sql};
 use crate::report::{CaseReport, Report};
 use crate::{Library, LibraryError};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
+use std::fmt::Write as _;
 use tokio_stream::StreamExt;
 use tracktwin_parameters::Case;
 use tracktwin_signal::Features;
@@ -55,16 +55,13 @@ impl Library {
         mut take: impl FnMut(LibraryEntry),
     ) -> Result<(), LibraryError> {
         let speeds = self.campaign(campaign).await?.speeds_km_h.len();
-        let mut rows = sqlx::query(
-            "select * from result_with_parameters where campaign_id = ?
-            order by sobol_index, speed_km_h",
-        )
-        .bind(campaign)
-        .fetch(self.readers());
+        let ask = "select * from result_with_parameters where campaign_id = $1
+            order by sobol_index, speed_km_h";
+        let mut rows = self.readers().stream(sql(ask).bind(campaign));
         let mut entry: Option<LibraryEntry> = None;
         while let Some(row) = rows.next().await {
             let row = row?;
-            let index: u32 = row.try_get("sobol_index")?;
+            let index = row.get_u32("sobol_index")?;
             match &mut entry {
                 Some(entry) if entry.case.index == index => entry.features.push(features_of(&row)?),
                 _ => {
@@ -91,56 +88,144 @@ fn complete(entry: LibraryEntry, speeds: usize) -> Result<LibraryEntry, LibraryE
     Err(LibraryError::Damaged { what: format!("case {index} has {found} of {speeds} results") })
 }
 
-fn features_of(row: &SqliteRow) -> Result<Features, LibraryError> {
-    let blob: &[u8] = row.try_get("log_power")?;
-    let levels = LEVEL_COLUMNS.iter().map(|&column| row.try_get(column));
-    Ok(Features { log_power: doubles(blob), band_levels_db: levels.collect::<Result<_, _>>()? })
+fn features_of(row: &Row) -> Result<Features, LibraryError> {
+    let levels = LEVEL_COLUMNS.iter().map(|&column| row.get(column));
+    let band_levels_db = levels.collect::<Result<_, _>>()?;
+    Ok(Features { log_power: row.doubles("log_power")?, band_levels_db })
 }
 
-/// Doubles in big-endian order, as bytes.
-fn bytes(doubles: &[f64]) -> Vec<u8> {
-    doubles.iter().flat_map(|value| value.to_be_bytes()).collect()
-}
-
-fn doubles(bytes: &[u8]) -> Vec<f64> {
-    let (chunks, _) = bytes.as_chunks::<8>();
-    chunks.iter().map(|chunk| f64::from_be_bytes(*chunk)).collect()
-}
-
-pub(crate) async fn insert_result(
+/// Stores the results of cases that have none.
+pub(crate) async fn insert_results(
+    connection: &mut Connection,
     report: &Report,
-    case: &CaseReport,
-    speed_km_h: f64,
-    features: &Features,
-    connection: &mut SqliteConnection,
+    finished: &[(&CaseReport, &[Features])],
 ) -> Result<(), LibraryError> {
-    let mut query = sqlx::query(
-        "insert into result (campaign_id, sobol_index, speed_km_h, duration_s, worker,
-            code_version, model_hash, experiment_hash, parameter_hash, finished_at, log_power,
-            level_50_Hz_dB, level_63_Hz_dB, level_80_Hz_dB, level_100_Hz_dB, level_125_Hz_dB,
-            level_160_Hz_dB, level_200_Hz_dB, level_250_Hz_dB, level_315_Hz_dB, level_400_Hz_dB,
-            level_500_Hz_dB, level_630_Hz_dB, level_800_Hz_dB, level_1000_Hz_dB, level_1250_Hz_dB,
-            level_1600_Hz_dB, level_2000_Hz_dB, level_2500_Hz_dB, level_3150_Hz_dB,
-            level_4000_Hz_dB)
-        values (?, ?, ?, ?, ?, ?, ?, ?, ?,
-            strftime('%Y-%m-%dT%H:%M:%fZ', ? / 1000.0, 'unixepoch'), ?,
-            ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(&report.campaign)
-    .bind(case.index)
-    .bind(speed_km_h)
-    .bind(case.duration_s)
-    .bind(&report.worker)
-    .bind(&report.code_version)
-    .bind(&report.model_hash)
-    .bind(&report.experiment_hash)
-    .bind(&case.parameter_hash)
-    .bind(report.now_unix_ms)
-    .bind(bytes(&features.log_power));
-    assert_eq!(features.band_levels_db.len(), LEVEL_COLUMNS.len(), "checked where it came in");
-    for &level in &features.band_levels_db {
-        query = query.bind(level);
+    match connection.dialect() {
+        Dialect::Sqlite => insert_one_by_one(connection, report, finished).await,
+        Dialect::Postgres => insert_at_once(connection, report, finished).await,
     }
-    query.execute(connection).await?;
+}
+
+/// The passes of cases, each with its speed.
+fn passes<'a>(
+    report: &'a Report,
+    finished: &'a [(&'a CaseReport, &'a [Features])],
+) -> impl Iterator<Item = (&'a CaseReport, f64, &'a Features)> {
+    finished.iter().flat_map(|&(case, features)| {
+        assert_eq!(features.len(), report.speeds_km_h.len(), "checked where the message came in");
+        let speeds = report.speeds_km_h.iter().copied();
+        speeds.zip(features).map(move |(speed_km_h, features)| {
+            let levels = features.band_levels_db.len();
+            assert_eq!(levels, LEVEL_COLUMNS.len(), "checked where the message came in");
+            (case, speed_km_h, features)
+        })
+    })
+}
+
+/// The columns that are one for a whole report, and then those that are not.
+const INSERT: &str = "insert into result (campaign_id, worker, code_version, model_hash,
+    experiment_hash, finished_at, sobol_index, speed_km_h, duration_s, parameter_hash, log_power";
+
+/// Without a network, a statement a row costs least.
+async fn insert_one_by_one(
+    connection: &mut Connection,
+    report: &Report,
+    finished: &[(&CaseReport, &[Features])],
+) -> Result<(), LibraryError> {
+    let mut insert = format!("{INSERT}, {}) values ($1", LEVEL_COLUMNS.join(", "));
+    for number in 2..=11 + LEVEL_COLUMNS.len() {
+        let _ = write!(insert, ", ${number}");
+    }
+    insert.push(')');
+    let finished_at = iso_utc(report.now_unix_ms);
+    for (case, speed_km_h, features) in passes(report, finished) {
+        let row = sql(insert.clone())
+            .bind(&report.campaign)
+            .bind(&report.worker)
+            .bind(&report.code_version)
+            .bind(&report.model_hash)
+            .bind(&report.experiment_hash)
+            .bind(&finished_at)
+            .bind(case.index)
+            .bind(speed_km_h)
+            .bind(case.duration_s)
+            .bind(&case.parameter_hash)
+            .bind(features.log_power.clone());
+        let levels = &features.band_levels_db;
+        let row = levels.iter().fold(row, |row, &level| row.bind(level));
+        connection.execute(row).await?;
+    }
     Ok(())
+}
+
+/// Over a network, one statement for all: features and levels of all rows travel as one array each,
+/// of which every row takes its stretch.
+async fn insert_at_once(
+    connection: &mut Connection,
+    report: &Report,
+    finished: &[(&CaseReport, &[Features])],
+) -> Result<(), LibraryError> {
+    let mut rows = Columns::default();
+    for (case, speed_km_h, features) in passes(report, finished) {
+        rows.push(case, speed_km_h, features);
+    }
+    let mut insert = format!("{INSERT}, {}) ", LEVEL_COLUMNS.join(", "));
+    insert.push_str(
+        "select $1, $2, $3, $4, $5, $6, sobol_index, speed_km_h, duration_s, parameter_hash,
+            ($12)[first_bin:last_bin]",
+    );
+    for level in 1..=LEVEL_COLUMNS.len() {
+        let _ = write!(insert, ", ($13)[{} * (place - 1) + {level}]", LEVEL_COLUMNS.len());
+    }
+    insert.push_str(
+        " from unnest($7, $8, $9, $10, $11, $14) with ordinality
+            as of (sobol_index, speed_km_h, duration_s, parameter_hash, first_bin, last_bin, place)",
+    );
+    let insert = sql(insert)
+        .bind(&report.campaign)
+        .bind(&report.worker)
+        .bind(&report.code_version)
+        .bind(&report.model_hash)
+        .bind(&report.experiment_hash)
+        .bind(iso_utc(report.now_unix_ms))
+        .bind(rows.index)
+        .bind(rows.speed_km_h)
+        .bind(rows.duration_s)
+        .bind(Value::Texts(rows.parameter_hash))
+        .bind(rows.first_bin)
+        .bind(rows.log_power)
+        .bind(rows.level_db)
+        .bind(rows.last_bin);
+    connection.execute(insert).await.map(drop)
+}
+
+/// Results as columns.
+#[derive(Default)]
+struct Columns {
+    index: Vec<i64>,
+    speed_km_h: Vec<f64>,
+    duration_s: Vec<f64>,
+    parameter_hash: Vec<String>,
+    /// Where in `log_power` a row's features begin and end, counted from 1.
+    first_bin: Vec<i64>,
+    last_bin: Vec<i64>,
+    log_power: Vec<f64>,
+    level_db: Vec<f64>,
+}
+
+impl Columns {
+    fn push(&mut self, case: &CaseReport, speed_km_h: f64, features: &Features) {
+        self.index.push(case.index.into());
+        self.speed_km_h.push(speed_km_h);
+        self.duration_s.push(case.duration_s);
+        self.parameter_hash.push(case.parameter_hash.clone());
+        self.first_bin.push(self.bins() + 1);
+        self.log_power.extend_from_slice(&features.log_power);
+        self.last_bin.push(self.bins());
+        self.level_db.extend_from_slice(&features.band_levels_db);
+    }
+
+    fn bins(&self) -> i64 {
+        i64::try_from(self.log_power.len()).expect("memory holds fewer")
+    }
 }

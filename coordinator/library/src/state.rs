@@ -1,7 +1,9 @@
-//! The states of a case, and the ways an attempt at it ends.
+//! The states of campaigns and cases, and the ways an attempt at a case ends.
+//!
+//! `docs/case-states.md` draws them.
 
 /// Where a case stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
     /// Nobody works on it.
     Waiting,
@@ -9,7 +11,7 @@ pub enum State {
     Leased,
     /// Its results are stored.
     Finished,
-    /// It was given up.
+    /// It was given up: it failed, or lost its worker, too often.
     Failed,
 }
 
@@ -29,6 +31,36 @@ impl State {
             .into_iter()
             .find(|state| state.name() == name)
             .unwrap_or(Self::Failed)
+    }
+}
+
+/// Whether a campaign's cases are handed out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CampaignState {
+    /// They are.
+    Running,
+    /// None are handed out; those in work are finished.
+    Paused,
+    /// None are handed out, and those in work are taken back.
+    Cancelled,
+}
+
+impl CampaignState {
+    /// As the library and people spell it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Running => "running",
+            Self::Paused => "paused",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// The schema admits no other names.
+    pub(crate) fn from_name(name: &str) -> Self {
+        [Self::Running, Self::Paused]
+            .into_iter()
+            .find(|state| state.name() == name)
+            .unwrap_or(Self::Cancelled)
     }
 }
 

@@ -126,7 +126,7 @@ pub(super) async fn choose(library: &Library, id: Option<&str>) -> Result<Campai
     }
     let mut campaigns = library.campaigns().await?;
     let names: Vec<_> = campaigns.iter().map(|campaign| campaign.id.as_str()).collect();
-    let path = library.path().display();
+    let path = library.name();
     match campaigns.len() {
         0 => Err(anyhow::anyhow!(
             "library {path}: it holds no campaign yet; `tracktwin run` adds one"

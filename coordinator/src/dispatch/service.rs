@@ -3,7 +3,7 @@
 use super::{Pace, after_attempt};
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 use tonic::{Request, Response, Status};
 use tracktwin_library::{
     self as library, CampaignRecord, Held, LeaseRequest, Library, LibraryError, Report, Verdict,
@@ -133,8 +133,9 @@ impl Dispatch {
             experiment_hash: self.campaign.experiment_hash.clone(),
             speeds_km_h: self.shape.speeds_km_h.clone(),
             cases: reports.into_iter().map(library_report).collect(),
-            now_unix_ms: now_unix_ms(),
+            now_unix_ms: self.library.now_unix_ms(),
             after_failure: after_attempt,
+            audit_share: 0.0,
         };
         self.library.report(report).await.map_err(|error| unavailable(&error))
     }
@@ -180,28 +181,27 @@ impl Farm for Dispatch {
         self.known(&worker)?;
         let cases_max = cases_max.min(self.pace().cases_per_lease());
         let request = LeaseRequest {
-            campaign: self.campaign.id.clone(),
+            campaign: Some(self.campaign.id.clone()),
             indices_below: self.cases,
             worker,
             cases_max,
-            now_unix_ms: now_unix_ms(),
+            now_unix_ms: self.library.now_unix_ms(),
             lease_ms: unix_ms(self.timing.lease),
             after_loss: after_attempt,
         };
         let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
-        let lease = if leased.is_empty() {
-            Lease::NoneNow { retry_after_s: self.timing.retry.as_secs_f64(), reason: None }
-        } else {
-            let cases = leased.into_iter();
-            Lease::Cases(CaseLease {
-                campaign: self.campaign.id.clone(),
+        let lease = match leased {
+            None => Lease::NoneNow { retry_after_s: self.timing.retry.as_secs_f64(), reason: None },
+            Some(library::Lease { campaign, cases }) => Lease::Cases(CaseLease {
+                campaign,
                 experiment_json: self.campaign.experiment_json.clone(),
                 experiment_hash: self.campaign.experiment_hash.clone(),
                 lease_s: self.timing.lease.as_secs_f64(),
                 cases: cases
+                    .into_iter()
                     .map(|library::Leased { case, epoch }| LeasedCase { case, epoch })
                     .collect(),
-            })
+            }),
         };
         Ok(Response::new(lease.into()))
     }
@@ -212,7 +212,7 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::RenewResponse>, Status> {
         // Without registration too: leases outlive a restart of the coordinator.
         let farm::RenewRequest { worker, campaign_id, cases } = request.into_inner();
-        let until = now_unix_ms().saturating_add(unix_ms(self.timing.lease));
+        let until = self.library.now_unix_ms().saturating_add(unix_ms(self.timing.lease));
         let lost = self
             .library
             .renew(&campaign_id, &worker, held(cases)?, until)
@@ -311,8 +311,4 @@ fn unavailable(error: &LibraryError) -> Status {
 
 fn unix_ms(duration: Duration) -> i64 {
     i64::try_from(duration.as_millis()).unwrap_or(i64::MAX)
-}
-
-fn now_unix_ms() -> i64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, unix_ms)
 }

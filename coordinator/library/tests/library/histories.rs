@@ -1,9 +1,10 @@
 //! Any history of leases, reports, expiries, repetitions and restarts ends with each case finished
 //! or given up exactly once.
 
-use crate::support::{ATTEMPTS_MAX, CAMPAIGN, failed, finished, held, lease, library, report, url};
+use crate::support::{ATTEMPTS_MAX, CAMPAIGN, Home, failed, finished, held, lease, report};
 use proptest::prelude::*;
-use tracktwin_library::{Leased, Library, State, Verdict};
+use tokio::runtime::Runtime;
+use tracktwin_library::{Leased, Library, Retry, State, Verdict};
 
 const CASES: u32 = 6;
 
@@ -35,6 +36,12 @@ enum Event {
     Restart {
         alone: bool,
     },
+    /// Workers turn to the other coordinator.
+    TurnToOther,
+    Pause,
+    Resume,
+    Cancel,
+    Retry,
 }
 
 fn event() -> impl Strategy<Value = Event> {
@@ -46,27 +53,31 @@ fn event() -> impl Strategy<Value = Event> {
         1 => any::<usize>().prop_map(|lease| Event::Release { lease }),
         2 => (1..1500_i64).prop_map(|ms| Event::Pass { ms }),
         1 => any::<bool>().prop_map(|alone| Event::Restart { alone }),
+        2 => Just(Event::TurnToOther),
+        1 => prop_oneof![Just(Event::Pause), Just(Event::Cancel), Just(Event::Retry)],
+        1 => Just(Event::Resume),
     ]
 }
 
-/// A farm, and what it must have stored if it keeps its promises.
-struct Farm {
-    folder: tempfile::TempDir,
-    library: Option<Library>,
+/// A farm of two coordinators, and what it must have stored if it keeps its promises.
+struct Farm<'a> {
+    home: &'a Home,
+    libraries: [Option<Library>; 2],
+    present: usize,
     now: i64,
     leases: Vec<(String, Leased)>,
     stored: [u32; CASES as usize],
 }
 
-impl Farm {
-    async fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let library = Some(library(&folder, CASES).await);
-        Self { folder, library, now: 0, leases: Vec::new(), stored: [0; CASES as usize] }
+impl<'a> Farm<'a> {
+    async fn new(home: &'a Home) -> Self {
+        let libraries = [Some(home.library(CASES).await), Some(home.open().await)];
+        let stored = [0; CASES as usize];
+        Self { home, libraries, present: 0, now: 0, leases: Vec::new(), stored }
     }
 
     fn library(&self) -> &Library {
-        self.library.as_ref().unwrap()
+        self.libraries[self.present].as_ref().unwrap()
     }
 
     fn earlier(&self, choice: usize) -> Option<(String, Leased)> {
@@ -84,6 +95,7 @@ impl Farm {
 
     async fn finish(&mut self, worker: &str, leased: &Leased) {
         let verdict = report(self.library(), worker, vec![finished(leased)]).await[0];
+        assert_ne!(verdict, Verdict::Refused, "{worker} held {leased:?}");
         if verdict == Verdict::Stored {
             self.stored[leased.case.index as usize] += 1;
         }
@@ -94,6 +106,13 @@ impl Farm {
             Event::Lease { worker, max } => self.lease(format!("w{worker}"), max).await,
             Event::Pass { ms } => self.now += ms,
             Event::Restart { alone } => self.restart(alone).await,
+            Event::TurnToOther => self.present = 1 - self.present,
+            Event::Pause => self.library().pause(CAMPAIGN).await.unwrap(),
+            Event::Resume => self.library().resume(CAMPAIGN).await.unwrap(),
+            Event::Cancel => self.library().cancel(CAMPAIGN).await.unwrap(),
+            Event::Retry => {
+                self.library().retry(CAMPAIGN, Retry::Failed).await.unwrap();
+            }
             Event::Finish { lease } => {
                 if let Some((worker, leased)) = self.earlier(lease) {
                     self.finish(&worker, &leased).await;
@@ -121,16 +140,17 @@ impl Farm {
     }
 
     async fn restart(&mut self, alone: bool) {
-        self.library.take().unwrap().close().await;
-        let library = Library::open(&url(&self.folder)).await.unwrap();
+        self.libraries[self.present].take().unwrap().close().await;
+        let library = self.home.open().await;
         if alone {
             library.release_all(CAMPAIGN).await.unwrap();
         }
-        self.library = Some(library);
+        self.libraries[self.present] = Some(library);
     }
 
     /// A sound worker does what is left.
     async fn end(&mut self) {
+        self.library().resume(CAMPAIGN).await.unwrap();
         for _ in 0..=ATTEMPTS_MAX * CASES {
             let before = self.leases.len();
             self.now += 1000;
@@ -159,20 +179,39 @@ impl Farm {
     }
 }
 
+/// Each history works on a real database with committed transactions.
+const HISTORIES: u32 = 48;
+
+fn play(runtime: &Runtime, home: &Home, events: Vec<Event>) {
+    runtime.block_on(async {
+        let mut farm = Farm::new(home).await;
+        for event in events {
+            farm.happen(event).await;
+        }
+        farm.end().await;
+        farm.check().await;
+        for library in farm.libraries.into_iter().flatten() {
+            library.close().await;
+        }
+    });
+}
+
 proptest! {
-    // Each history works on a real file with durable commits.
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: HISTORIES, ..ProptestConfig::default() })]
+
     #[test]
-    fn every_history_ends_with_each_case_finished_or_given_up_once(
+    fn every_history_ends_with_each_case_finished_or_given_up_once_in_a_file(
         events in proptest::collection::vec(event(), 1..40)
     ) {
-        tokio::runtime::Runtime::new().unwrap().block_on(async {
-            let mut farm = Farm::new().await;
-            for event in events {
-                farm.happen(event).await;
-            }
-            farm.end().await;
-            farm.check().await;
-        });
+        play(&Runtime::new().unwrap(), &Home::sqlite_in_memory(), events);
+    }
+
+    #[test]
+    fn every_history_ends_with_each_case_finished_or_given_up_once_on_a_server(
+        events in proptest::collection::vec(event(), 1..40)
+    ) {
+        if let Some(home) = Home::postgres() {
+            play(&Runtime::new().unwrap(), &home, events);
+        }
     }
 }

@@ -1,14 +1,21 @@
 //! What is a library, and what is not.
 
-use crate::support::{CAMPAIGN, case, library, record, url};
-use sqlx::{Connection, SqliteConnection};
+use crate::support::{CAMPAIGN, Home, case, on_both_databases, record};
+use sqlx::{Connection, PgConnection, SqliteConnection};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 
-async fn sql(folder: &tempfile::TempDir, statement: &'static str) {
-    let path = format!("{}?mode=rwc", url(folder));
-    let mut connection = SqliteConnection::connect(&path).await.unwrap();
-    sqlx::raw_sql(statement).execute(&mut connection).await.unwrap();
-    connection.close().await.unwrap();
+/// Does something to the database behind the library's back.
+async fn sql(home: &Home, statement: &'static str) {
+    if home.folder.is_some() {
+        let mut connection =
+            SqliteConnection::connect(&format!("{}?mode=rwc", home.url)).await.unwrap();
+        sqlx::raw_sql(statement).execute(&mut connection).await.unwrap();
+        connection.close().await.unwrap();
+    } else {
+        let mut connection = PgConnection::connect(&home.url).await.unwrap();
+        sqlx::raw_sql(statement).execute(&mut connection).await.unwrap();
+        connection.close().await.unwrap();
+    }
 }
 
 async fn refusal(url: &str) -> LibraryError {
@@ -18,85 +25,122 @@ async fn refusal(url: &str) -> LibraryError {
     error
 }
 
-#[tokio::test]
-async fn what_is_stored_is_there_after_reopening() {
-    let folder = tempfile::tempdir().unwrap();
-    library(&folder, 3).await.close().await;
-    let library = Library::open(&url(&folder)).await.unwrap();
-    assert_eq!(library.campaigns().await.unwrap(), [record()]);
-    assert_eq!(library.case(CAMPAIGN, 2).await.unwrap().unwrap().case, case(2));
-    assert_eq!(library.case(CAMPAIGN, 3).await.unwrap(), None);
+on_both_databases! {
+    async fn what_is_stored_is_there_after_reopening(home: &Home) {
+        home.library(3).await.close().await;
+        let library = home.open().await;
+        assert_eq!(library.campaigns().await.unwrap(), [record()]);
+        assert_eq!(library.case(CAMPAIGN, 2).await.unwrap().unwrap().case, case(2));
+        assert_eq!(library.case(CAMPAIGN, 3).await.unwrap(), None);
+    }
+
+    async fn a_database_of_somebody_else_is_refused_and_left_alone(home: &Home) {
+        sql(home, "create table diary (entry text)").await;
+        assert!(matches!(refusal(&home.url).await, LibraryError::NotALibrary { .. }));
+        let error = Library::open_or_create(&home.url).await.err().unwrap();
+        assert!(matches!(error, LibraryError::NotALibrary { .. }), "{error}");
+        // As it was: a table of the same name as ours can still be made.
+        sql(home, "create table campaign (diary text); create table _sqlx_migrations (diary text)")
+            .await;
+    }
+
+    async fn a_library_of_a_later_schema_is_refused(home: &Home) {
+        home.library(1).await.close().await;
+        sql(
+            home,
+            "insert into _sqlx_migrations (version, description, success, checksum, execution_time)
+            values (99, 'later', true, '', 0)",
+        )
+        .await;
+        let error = refusal(&home.url).await;
+        assert!(matches!(error, LibraryError::NewerSchema { found: 99, .. }), "{error}");
+    }
+
+    async fn a_campaign_may_grow_but_not_become_another(home: &Home) {
+        let library = home.library(2).await;
+        let cases: Vec<_> = (0..5).map(case).collect();
+        library.insert_campaign(&record()).await.unwrap();
+        library.insert_cases(CAMPAIGN, &cases).await.unwrap();
+        assert_eq!(library.status(CAMPAIGN).await.unwrap().total(), 5);
+        let other = CampaignRecord { definition_hash: "other".to_owned(), ..record() };
+        let error = library.insert_campaign(&other).await.unwrap_err();
+        assert!(matches!(error, LibraryError::OtherDefinition { .. }), "{error}");
+    }
+
+    async fn a_closed_library_says_so(home: &Home) {
+        let library = home.library(1).await;
+        library.clone().close().await;
+        let error = library.insert_campaign(&record()).await.unwrap_err();
+        assert!(matches!(error, LibraryError::Closed), "{error}");
+        let error = library.campaigns().await.unwrap_err();
+        assert!(matches!(error, LibraryError::Closed), "{error}");
+    }
 }
 
 #[tokio::test]
-async fn a_missing_library_is_not_made_by_asking_it() {
-    let folder = tempfile::tempdir().unwrap();
-    assert!(matches!(refusal(&url(&folder)).await, LibraryError::Missing { .. }));
-    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
-    let deeper = format!("sqlite:{}/no/library.sqlite", folder.path().display());
+async fn a_missing_file_is_not_made_by_asking_it() {
+    let home = Home::sqlite();
+    assert!(matches!(refusal(&home.url).await, LibraryError::Missing { .. }));
+    let folder = home.folder.as_ref().unwrap().path();
+    assert_eq!(std::fs::read_dir(folder).unwrap().count(), 0);
+    let deeper = format!("sqlite:{}/no/library.sqlite", folder.display());
     let error = Library::open_or_create(&deeper).await.err().unwrap();
     assert!(matches!(error, LibraryError::NoFolder { .. }), "{error}");
 }
 
 #[tokio::test]
-async fn a_file_that_is_no_library_is_refused_and_left_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("library.sqlite");
+async fn an_empty_database_is_not_filled_by_asking_it() {
+    let Some(home) = Home::postgres() else { return };
+    assert!(matches!(refusal(&home.url).await, LibraryError::Empty { .. }));
+    assert!(matches!(refusal(&home.url).await, LibraryError::Empty { .. }));
+}
+
+#[tokio::test]
+async fn a_server_that_is_not_there_or_lets_nobody_in_is_told_apart() {
+    let error = Library::open("postgres://me:secret@127.0.0.1:1/tracks").await.err().unwrap();
+    assert!(matches!(error, LibraryError::Unreachable { .. }), "{error:?}");
+    assert_eq!(
+        error.to_string(),
+        "library postgres://127.0.0.1:1/tracks: the server cannot be reached"
+    );
+    let Some(home) = Home::postgres() else { return };
+    let elsewhere = format!("{}_that_is_not_there", home.url);
+    let error = refusal(&elsewhere).await;
+    assert!(error.to_string().ends_with("does not exist"), "{error}");
+}
+
+#[tokio::test]
+async fn a_file_that_is_no_database_is_refused_and_left_alone() {
+    let home = Home::sqlite();
+    let path = home.folder.as_ref().unwrap().path().join("library.sqlite");
     std::fs::write(&path, "railpad,ballast\n1,2\n".repeat(100)).unwrap();
     let before = std::fs::read(&path).unwrap();
-    assert!(matches!(refusal(&url(&folder)).await, LibraryError::NotALibrary { .. }));
+    assert!(matches!(refusal(&home.url).await, LibraryError::NotALibrary { .. }));
     assert_eq!(std::fs::read(&path).unwrap(), before);
 
     std::fs::remove_file(&path).unwrap();
-    sql(&folder, "create table diary (entry text)").await;
+    sql(&home, "create table diary (entry text)").await;
     let before = std::fs::read(&path).unwrap();
-    assert!(matches!(refusal(&url(&folder)).await, LibraryError::NotALibrary { .. }));
+    assert!(matches!(refusal(&home.url).await, LibraryError::NotALibrary { .. }));
     assert_eq!(std::fs::read(&path).unwrap(), before);
 }
 
 #[tokio::test]
-async fn a_library_of_a_later_schema_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    library(&folder, 1).await.close().await;
-    sql(
-        &folder,
-        "insert into _sqlx_migrations (version, description, success, checksum, execution_time)
-        values (99, 'later', true, x'00', 0)",
-    )
-    .await;
-    let error = refusal(&url(&folder)).await;
-    assert!(matches!(error, LibraryError::NewerSchema { found: 99, known: 1, .. }), "{error}");
-}
-
-#[tokio::test]
-async fn one_process_at_a_time_hands_out_cases() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 1).await;
+async fn with_a_file_one_process_at_a_time_hands_out_cases() {
+    let home = Home::sqlite();
+    let library = home.library(1).await;
     let claim = library.claim().unwrap();
-    let other = Library::open(&url(&folder)).await.unwrap();
+    assert!(claim.is_exclusive());
+    let other = home.open().await;
     assert!(matches!(other.claim(), Err(LibraryError::InUse { .. })));
     drop(claim);
     other.claim().unwrap();
 }
 
 #[tokio::test]
-async fn a_campaign_may_grow_but_not_become_another() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 2).await;
-    let cases: Vec<_> = (0..5).map(case).collect();
-    library.insert_campaign(&record()).await.unwrap();
-    library.insert_cases(CAMPAIGN, &cases).await.unwrap();
-    assert_eq!(library.status(CAMPAIGN).await.unwrap().total(), 5);
-    let other = CampaignRecord { definition_hash: "other".to_owned(), ..record() };
-    let error = library.insert_campaign(&other).await.unwrap_err();
-    assert!(matches!(error, LibraryError::OtherDefinition { .. }), "{error}");
-}
-
-#[tokio::test]
-async fn a_closed_library_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 1).await;
-    library.clone().close().await;
-    let error = library.insert_campaign(&record()).await.unwrap_err();
-    assert!(matches!(error, LibraryError::Closed), "{error}");
+async fn with_a_server_any_number_of_processes_hands_out_cases() {
+    let Some(home) = Home::postgres() else { return };
+    let (one, other) = (home.library(1).await, home.open().await);
+    let claims = [one.claim().unwrap(), other.claim().unwrap()];
+    assert!(claims.iter().all(|claim| !claim.is_exclusive()));
 }

@@ -1,106 +1,94 @@
 //! Leases: nobody's case is another's, and none is forgotten.
 
-use crate::support::{CAMPAIGN, failed, finished, held, lease, library, report};
+use crate::support::{CAMPAIGN, Home, failed, finished, held, lease, on_both_databases, report};
 use std::collections::HashSet;
 use tokio::task::JoinSet;
 use tracktwin_library::{Held, State, Status, Verdict};
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn workers_that_ask_at_once_never_share_a_case_nor_exceed_their_limit() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 100).await;
-    let mut workers = JoinSet::new();
-    for worker in 0..20 {
-        let library = library.clone();
-        workers.spawn(async move { lease(&library, &format!("w{worker}"), 7, 0).await });
-    }
-    let leases = workers.join_all().await;
-    assert!(leases.iter().all(|lease| lease.len() <= 7));
-    let indices: Vec<_> = leases.iter().flatten().map(|leased| leased.case.index).collect();
-    assert_eq!(indices.iter().collect::<HashSet<_>>().len(), indices.len());
-    assert_eq!(indices.len(), 100);
-}
-
-#[tokio::test]
-async fn cases_are_handed_out_in_order_and_in_full() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 5).await;
-    let leased = lease(&library, "w", 3, 0).await;
-    assert_eq!(leased.iter().map(held).collect::<Vec<_>>(), [0, 1, 2].map(first_lease));
-    assert_eq!(leased[2].case, crate::support::case(2));
-}
 
 fn first_lease(index: u32) -> Held {
     Held { index, epoch: 1 }
 }
 
-#[tokio::test]
-async fn an_expired_lease_goes_to_another_worker_and_a_renewed_one_does_not() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 2).await;
-    let mine = lease(&library, "a", 2, 0).await;
-    let kept = vec![held(&mine[0])];
-    assert_eq!(library.renew(CAMPAIGN, "a", kept, 5000).await.unwrap(), []);
-    assert_eq!(lease(&library, "b", 2, 999).await, []);
-    let theirs = lease(&library, "b", 2, 1000).await;
-    assert_eq!(theirs.iter().map(held).collect::<Vec<_>>(), [Held { index: 1, epoch: 2 }]);
-    let lost = library.renew(CAMPAIGN, "a", mine.iter().map(held).collect(), 9000).await.unwrap();
-    assert_eq!(lost, [held(&mine[1])]);
-}
-
-#[tokio::test]
-async fn a_case_that_loses_three_workers_is_given_up_with_the_reason() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 1).await;
-    for attempt in 0..3 {
-        assert_eq!(lease(&library, "w", 1, attempt * 1000).await.len(), 1);
+on_both_databases! {
+    async fn workers_that_ask_at_once_never_share_a_case_nor_exceed_their_limit(home: &Home) {
+        let library = home.library(100).await;
+        let mut workers = JoinSet::new();
+        for worker in 0..20 {
+            let library = library.clone();
+            workers.spawn(async move { lease(&library, &format!("w{worker}"), 7, 0).await });
+        }
+        let leases = workers.join_all().await;
+        assert!(leases.iter().all(|lease| lease.len() <= 7));
+        let indices: Vec<_> = leases.iter().flatten().map(|leased| leased.case.index).collect();
+        assert_eq!(indices.iter().collect::<HashSet<_>>().len(), indices.len());
+        assert_eq!(indices.len(), 100);
     }
-    assert_eq!(lease(&library, "w", 1, 3000).await, []);
-    let failures = library.failures(CAMPAIGN, 10).await.unwrap();
-    assert_eq!(failures[0].attempts, 3);
-    assert_eq!(failures[0].error.as_deref(), Some("lease 3 expired: worker w fell silent"));
-}
 
-#[tokio::test]
-async fn a_case_that_fails_is_tried_again_and_then_given_up() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 1).await;
-    for attempt in 1..=3 {
-        let leased = lease(&library, "w", 1, 0).await;
-        assert_eq!(report(&library, "w", vec![failed(&leased[0])]).await, [Verdict::Stored]);
-        // Said again, it does not count again.
-        assert_eq!(report(&library, "w", vec![failed(&leased[0])]).await, [Verdict::Late]);
+    async fn cases_are_handed_out_in_order_and_in_full(home: &Home) {
+        let library = home.library(5).await;
+        let leased = lease(&library, "w", 3, 0).await;
+        assert_eq!(leased.iter().map(held).collect::<Vec<_>>(), [0, 1, 2].map(first_lease));
+        assert_eq!(leased[2].case, crate::support::case(2));
+    }
+
+    async fn an_expired_lease_goes_to_another_worker_and_a_renewed_one_does_not(home: &Home) {
+        let library = home.library(2).await;
+        let mine = lease(&library, "a", 2, 0).await;
+        let kept = vec![held(&mine[0])];
+        assert_eq!(library.renew(CAMPAIGN, "a", kept, 5000).await.unwrap(), []);
+        assert_eq!(lease(&library, "b", 2, 999).await, []);
+        let theirs = lease(&library, "b", 2, 1000).await;
+        assert_eq!(theirs.iter().map(held).collect::<Vec<_>>(), [Held { index: 1, epoch: 2 }]);
+        let lost = library.renew(CAMPAIGN, "a", mine.iter().map(held).collect(), 9000).await.unwrap();
+        assert_eq!(lost, [held(&mine[1])]);
+    }
+
+    async fn a_case_that_loses_three_workers_is_given_up_with_the_reason(home: &Home) {
+        let library = home.library(1).await;
+        for attempt in 0..3 {
+            assert_eq!(lease(&library, "w", 1, attempt * 1000).await.len(), 1);
+        }
+        assert_eq!(lease(&library, "w", 1, 3000).await, []);
+        let failures = library.failures(CAMPAIGN, 10).await.unwrap();
+        assert_eq!(failures[0].attempts, 3);
+        assert_eq!(failures[0].error.as_deref(), Some("the lease expired: its worker fell silent"));
+    }
+
+    async fn a_case_that_fails_is_tried_again_and_then_given_up(home: &Home) {
+        let library = home.library(1).await;
+        for attempt in 1..=3 {
+            let leased = lease(&library, "w", 1, 0).await;
+            assert_eq!(report(&library, "w", vec![failed(&leased[0])]).await, [Verdict::Stored]);
+            // Said again, it does not count again.
+            assert_eq!(report(&library, "w", vec![failed(&leased[0])]).await, [Verdict::Late]);
+            let record = library.case(CAMPAIGN, 0).await.unwrap().unwrap();
+            assert_eq!(record.attempts, attempt);
+            assert_eq!(record.error.as_deref(), Some("it does not stand"));
+        }
+        let status = library.status(CAMPAIGN).await.unwrap();
+        assert_eq!(status, Status { failed: 1, ..Status::default() });
+    }
+
+    async fn a_released_case_waits_without_an_attempt_counted(home: &Home) {
+        let library = home.library(2).await;
+        let leased = lease(&library, "a", 2, 0).await;
+        // Not by somebody else, and not what was finished meanwhile.
+        library.release(CAMPAIGN, "b", vec![held(&leased[0])]).await.unwrap();
+        report(&library, "a", vec![finished(&leased[1])]).await;
+        library.release(CAMPAIGN, "a", vec![held(&leased[1])]).await.unwrap();
+        let status = library.status(CAMPAIGN).await.unwrap();
+        assert_eq!(status, Status { leased: 1, finished: 1, ..Status::default() });
+
+        library.release(CAMPAIGN, "a", vec![held(&leased[0])]).await.unwrap();
         let record = library.case(CAMPAIGN, 0).await.unwrap().unwrap();
-        assert_eq!(record.attempts, attempt);
-        assert_eq!(record.error.as_deref(), Some("it does not stand"));
+        assert_eq!((record.state, record.attempts), (State::Waiting, 0));
+        assert_eq!(lease(&library, "b", 2, 0).await[0].epoch, 2);
     }
-    let status = library.status(CAMPAIGN).await.unwrap();
-    assert_eq!(status, Status { failed: 1, ..Status::default() });
-}
 
-#[tokio::test]
-async fn a_released_case_waits_without_an_attempt_counted() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 2).await;
-    let leased = lease(&library, "a", 2, 0).await;
-    // Not by somebody else, and not what was finished meanwhile.
-    library.release(CAMPAIGN, "b", vec![held(&leased[0])]).await.unwrap();
-    report(&library, "a", vec![finished(&leased[1])]).await;
-    library.release(CAMPAIGN, "a", vec![held(&leased[1])]).await.unwrap();
-    let status = library.status(CAMPAIGN).await.unwrap();
-    assert_eq!(status, Status { leased: 1, finished: 1, ..Status::default() });
-
-    library.release(CAMPAIGN, "a", vec![held(&leased[0])]).await.unwrap();
-    let record = library.case(CAMPAIGN, 0).await.unwrap().unwrap();
-    assert_eq!((record.state, record.attempts), (State::Waiting, 0));
-    assert_eq!(lease(&library, "b", 2, 0).await[0].epoch, 2);
-}
-
-#[tokio::test]
-async fn a_new_coordinator_takes_back_what_died_with_the_old_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 4).await;
-    lease(&library, "w", 3, 0).await;
-    library.release_all(CAMPAIGN).await.unwrap();
-    assert_eq!(library.status(CAMPAIGN).await.unwrap().waiting, 4);
+    async fn a_new_coordinator_takes_back_what_died_with_the_old_one(home: &Home) {
+        let library = home.library(4).await;
+        lease(&library, "w", 3, 0).await;
+        library.release_all(CAMPAIGN).await.unwrap();
+        assert_eq!(library.status(CAMPAIGN).await.unwrap().waiting, 4);
+    }
 }

@@ -1,112 +1,104 @@
 //! Reports: the first result of a case stays, and the digest knows nothing of how it came.
 
-use crate::support::{CAMPAIGN, case, failed, features, finished, lease, library, report};
+use crate::support::{
+    CAMPAIGN, Home, case, failed, features, finished, lease, on_both_databases, report,
+};
 use tracktwin_library::{CaseReport, LibraryEntry, LibraryError, Verdict};
 
-#[tokio::test]
-async fn a_second_report_changes_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 2).await;
-    let leased = lease(&library, "w", 2, 0).await;
-    let reports: Vec<_> = leased.iter().map(finished).collect();
-    assert_eq!(report(&library, "w", reports.clone()).await, [Verdict::Stored; 2]);
-    let digest = library.digest(CAMPAIGN).await.unwrap();
-    let mut other = reports[0].clone();
-    other.outcome.as_mut().unwrap()[0].log_power[0] += 1.0;
-    assert_eq!(report(&library, "w", vec![other]).await, [Verdict::Duplicate]);
-    assert_eq!(report(&library, "w", vec![failed(&leased[1])]).await, [Verdict::Duplicate]);
-    assert_eq!(library.digest(CAMPAIGN).await.unwrap(), digest);
-    assert_eq!(library.status(CAMPAIGN).await.unwrap().finished, 2);
-}
-
-#[tokio::test]
-async fn a_late_result_is_stored_if_it_is_the_first() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 1).await;
-    let slow = lease(&library, "slow", 1, 0).await;
-    let quick = lease(&library, "quick", 1, 1000).await;
-    assert_eq!(report(&library, "slow", vec![failed(&slow[0])]).await, [Verdict::Late]);
-    assert_eq!(report(&library, "slow", vec![finished(&slow[0])]).await, [Verdict::Stored]);
-    assert_eq!(report(&library, "quick", vec![finished(&quick[0])]).await, [Verdict::Duplicate]);
-}
-
-#[tokio::test]
-async fn results_of_cases_never_leased_or_of_other_parameters_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 2).await;
-    let leased = lease(&library, "w", 1, 0).await;
-    let good = finished(&leased[0]);
-    let refused = vec![
-        CaseReport { index: 1, ..good.clone() },
-        CaseReport { index: 7, ..good.clone() },
-        CaseReport { epoch: 0, ..good.clone() },
-        CaseReport { epoch: 2, ..good.clone() },
-        CaseReport { parameter_hash: "0".to_owned(), ..good.clone() },
-    ];
-    assert_eq!(report(&library, "w", refused).await, [Verdict::Refused; 5]);
-    assert_eq!(library.status(CAMPAIGN).await.unwrap().finished, 0);
-}
-
-#[tokio::test]
-async fn the_digest_does_not_depend_on_order_worker_or_attempts() {
-    let mut digests = Vec::new();
-    for reversed in [false, true] {
-        let folder = tempfile::tempdir().unwrap();
-        let library = library(&folder, 9).await;
-        if reversed {
-            lease(&library, "lost", 5, 0).await;
-        }
-        let worker = if reversed { "b" } else { "a" };
-        let mut reports: Vec<_> =
-            lease(&library, worker, 9, 1000).await.iter().map(finished).collect();
-        if reversed {
-            reports.reverse();
-        }
-        for case in reports {
-            report(&library, worker, vec![case]).await;
-        }
-        digests.push(library.digest(CAMPAIGN).await.unwrap());
+on_both_databases! {
+    async fn a_second_report_changes_nothing(home: &Home) {
+        let library = home.library(2).await;
+        let leased = lease(&library, "w", 2, 0).await;
+        let reports: Vec<_> = leased.iter().map(finished).collect();
+        assert_eq!(report(&library, "w", reports.clone()).await, [Verdict::Stored; 2]);
+        let digest = library.digest(CAMPAIGN).await.unwrap();
+        let mut other = reports[0].clone();
+        other.outcome.as_mut().unwrap()[0].log_power[0] += 1.0;
+        assert_eq!(report(&library, "w", vec![other]).await, [Verdict::Duplicate]);
+        assert_eq!(report(&library, "w", vec![failed(&leased[1])]).await, [Verdict::Duplicate]);
+        assert_eq!(library.digest(CAMPAIGN).await.unwrap(), digest);
+        assert_eq!(library.status(CAMPAIGN).await.unwrap().finished, 2);
     }
-    assert_eq!(digests[0], digests[1]);
-}
 
-#[tokio::test]
-async fn the_digest_notices_one_bit() {
-    let mut digests = Vec::new();
-    for nudged in [false, true] {
-        let folder = tempfile::tempdir().unwrap();
-        let library = library(&folder, 1).await;
-        let mut case = finished(&lease(&library, "w", 1, 0).await[0]);
-        if nudged {
-            let value = &mut case.outcome.as_mut().unwrap()[1].log_power[4];
-            *value = value.next_up();
+    async fn a_late_result_is_stored_if_it_is_the_first(home: &Home) {
+        let library = home.library(1).await;
+        let slow = lease(&library, "slow", 1, 0).await;
+        let quick = lease(&library, "quick", 1, 1000).await;
+        assert_eq!(report(&library, "slow", vec![failed(&slow[0])]).await, [Verdict::Late]);
+        assert_eq!(report(&library, "slow", vec![finished(&slow[0])]).await, [Verdict::Stored]);
+        assert_eq!(report(&library, "quick", vec![finished(&quick[0])]).await, [Verdict::Duplicate]);
+    }
+
+    async fn results_of_cases_never_leased_or_of_other_parameters_are_refused(home: &Home) {
+        let library = home.library(2).await;
+        let leased = lease(&library, "w", 1, 0).await;
+        let good = finished(&leased[0]);
+        let refused = vec![
+            CaseReport { index: 1, ..good.clone() },
+            CaseReport { index: 7, ..good.clone() },
+            CaseReport { epoch: 0, ..good.clone() },
+            CaseReport { epoch: 2, ..good.clone() },
+            CaseReport { parameter_hash: "0".to_owned(), ..good.clone() },
+        ];
+        assert_eq!(report(&library, "w", refused).await, [Verdict::Refused; 5]);
+        assert_eq!(library.status(CAMPAIGN).await.unwrap().finished, 0);
+    }
+
+    async fn the_digest_does_not_depend_on_order_worker_or_attempts(home: &Home) {
+        let mut digests = Vec::new();
+        for reversed in [false, true] {
+                let home = home.another();
+            let library = home.library(9).await;
+            if reversed {
+                lease(&library, "lost", 5, 0).await;
+            }
+            let worker = if reversed { "b" } else { "a" };
+            let mut reports: Vec<_> =
+                lease(&library, worker, 9, 1000).await.iter().map(finished).collect();
+            if reversed {
+                reports.reverse();
+            }
+            for case in reports {
+                report(&library, worker, vec![case]).await;
+            }
+            digests.push(library.digest(CAMPAIGN).await.unwrap());
         }
-        report(&library, "w", vec![case]).await;
-        digests.push(library.digest(CAMPAIGN).await.unwrap());
+        assert_eq!(digests[0], digests[1]);
     }
-    assert_ne!(digests[0], digests[1]);
-}
 
-#[tokio::test]
-async fn the_training_set_is_what_was_reported_to_the_bit() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 4).await;
-    let leased = lease(&library, "w", 4, 0).await;
-    // One case is left out.
-    for index in [3, 0, 2] {
-        report(&library, "w", vec![finished(&leased[index])]).await;
+    async fn the_digest_notices_one_bit(home: &Home) {
+        let mut digests = Vec::new();
+        for nudged in [false, true] {
+                let home = home.another();
+            let library = home.library(1).await;
+            let mut case = finished(&lease(&library, "w", 1, 0).await[0]);
+            if nudged {
+                let value = &mut case.outcome.as_mut().unwrap()[1].log_power[4];
+                *value = value.next_up();
+            }
+            report(&library, "w", vec![case]).await;
+            digests.push(library.digest(CAMPAIGN).await.unwrap());
+        }
+        assert_ne!(digests[0], digests[1]);
     }
-    let mut entries = Vec::new();
-    library.training_set(CAMPAIGN, |entry| entries.push(entry)).await.unwrap();
-    let expected =
-        [0, 2, 3].map(|index| LibraryEntry { case: case(index), features: features(index) });
-    assert_eq!(entries, expected);
-}
 
-#[tokio::test]
-async fn an_unknown_campaign_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = library(&folder, 1).await;
-    let error = library.digest("nowhere-1").await.unwrap_err();
-    assert!(matches!(&error, LibraryError::UnknownCampaign { id } if id == "nowhere-1"), "{error}");
+    async fn the_training_set_is_what_was_reported_to_the_bit(home: &Home) {
+        let library = home.library(4).await;
+        let leased = lease(&library, "w", 4, 0).await;
+        // One case is left out.
+        for index in [3, 0, 2] {
+            report(&library, "w", vec![finished(&leased[index])]).await;
+        }
+        let mut entries = Vec::new();
+        library.training_set(CAMPAIGN, |entry| entries.push(entry)).await.unwrap();
+        let expected =
+            [0, 2, 3].map(|index| LibraryEntry { case: case(index), features: features(index) });
+        assert_eq!(entries, expected);
+    }
+
+    async fn an_unknown_campaign_is_named(home: &Home) {
+        let library = home.library(1).await;
+        let error = library.digest("nowhere-1").await.unwrap_err();
+        assert!(matches!(&error, LibraryError::UnknownCampaign { id } if id == "nowhere-1"), "{error}");
+    }
 }

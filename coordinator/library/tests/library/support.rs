@@ -1,6 +1,7 @@
-//! A library in a temporary folder, and a campaign to put into it.
+//! A library in either database, and a campaign to put into it.
 
 use tempfile::TempDir;
+use test_postgres::Server;
 use tracktwin_library::{
     CampaignRecord, CaseReport, Ending, Held, LeaseRequest, Leased, Library, Report, State, Verdict,
 };
@@ -16,17 +17,86 @@ pub(crate) fn policy(_: Ending, attempts: u32) -> State {
     if attempts < ATTEMPTS_MAX { State::Waiting } else { State::Failed }
 }
 
-pub(crate) fn url(folder: &TempDir) -> String {
-    format!("sqlite:{}", folder.path().join("library.sqlite").display())
+/// Where a test's library is: nobody else's.
+pub(crate) struct Home {
+    pub(crate) url: String,
+    /// With `SQLite`.
+    pub(crate) folder: Option<TempDir>,
 }
 
-/// A library of so many cases.
-pub(crate) async fn library(folder: &TempDir, count: u32) -> Library {
-    let library = Library::open_or_create(&url(folder)).await.unwrap();
-    library.insert_campaign(&record()).await.unwrap();
+impl Home {
+    pub(crate) fn sqlite() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let url = format!("sqlite:{}", folder.path().join("library.sqlite").display());
+        Self { url, folder: Some(folder) }
+    }
+
+    /// A file in memory where the system has a place for such: for what isn't about the disk.
+    pub(crate) fn sqlite_in_memory() -> Self {
+        let memory = std::path::Path::new("/dev/shm");
+        if !memory.is_dir() {
+            return Self::sqlite();
+        }
+        let folder = TempDir::new_in(memory).unwrap();
+        let url = format!("sqlite:{}", folder.path().join("library.sqlite").display());
+        Self { url, folder: Some(folder) }
+    }
+
+    /// None where there is no server.
+    pub(crate) fn postgres() -> Option<Self> {
+        Server::shared().map(|server| Self { url: server.database(), folder: None })
+    }
+
+    /// Another database of the same kind.
+    pub(crate) fn another(&self) -> Self {
+        match self.folder {
+            Some(_) => Self::sqlite(),
+            None => Self::postgres().unwrap(),
+        }
+    }
+
+    /// The library of so many cases.
+    pub(crate) async fn library(&self, count: u32) -> Library {
+        let library = Library::open_or_create(&self.url).await.unwrap();
+        fill(&library, CAMPAIGN, count).await;
+        library
+    }
+
+    pub(crate) async fn open(&self) -> Library {
+        Library::open(&self.url).await.unwrap()
+    }
+}
+
+/// The same test on either database, as `NAME::sqlite` and `NAME::postgres`.
+macro_rules! on_both_databases {
+    ($(async fn $name:ident($home:ident: &Home) $body:block)*) => {$(
+        mod $name {
+            use super::*;
+
+            async fn body($home: &Home) $body
+
+            #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+            async fn sqlite() {
+                body(&Home::sqlite()).await;
+            }
+
+            #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+            async fn postgres() {
+                if let Some(home) = Home::postgres() {
+                    body(&home).await;
+                }
+            }
+        }
+    )*};
+}
+pub(crate) use on_both_databases;
+
+/// Stores a campaign of so many cases.
+pub(crate) async fn fill(library: &Library, campaign: &str, count: u32) {
+    let record = CampaignRecord { id: campaign.to_owned(), ..record() };
+    library.insert_campaign(&record).await.unwrap();
     let cases: Vec<_> = (0..count).map(case).collect();
-    library.insert_cases(CAMPAIGN, &cases).await.unwrap();
-    library
+    library.insert_cases(campaign, &cases).await.unwrap();
 }
 
 pub(crate) fn record() -> CampaignRecord {
@@ -59,17 +129,22 @@ pub(crate) fn features(index: u32) -> Vec<Features> {
     record().speeds_km_h.into_iter().map(pass).collect()
 }
 
-pub(crate) async fn lease(library: &Library, worker: &str, max: u32, now: i64) -> Vec<Leased> {
-    let request = LeaseRequest {
-        campaign: CAMPAIGN.to_owned(),
+/// What a worker asks for at a time, of any campaign.
+pub(crate) fn request(worker: &str, max: u32, now: i64) -> LeaseRequest {
+    LeaseRequest {
+        campaign: None,
         indices_below: u32::MAX,
         worker: worker.to_owned(),
         cases_max: max,
         now_unix_ms: now,
         lease_ms: 1000,
         after_loss: policy,
-    };
-    library.lease(request).await.unwrap()
+    }
+}
+
+pub(crate) async fn lease(library: &Library, worker: &str, max: u32, now: i64) -> Vec<Leased> {
+    let request = LeaseRequest { campaign: Some(CAMPAIGN.to_owned()), ..request(worker, max, now) };
+    library.lease(request).await.unwrap().map(|lease| lease.cases).unwrap_or_default()
 }
 
 pub(crate) fn held(leased: &Leased) -> Held {
@@ -95,7 +170,12 @@ pub(crate) async fn report(
     worker: &str,
     cases: Vec<CaseReport>,
 ) -> Vec<Verdict> {
-    let report = Report {
+    library.report(message(worker, cases)).await.unwrap()
+}
+
+/// What a worker sends.
+pub(crate) fn message(worker: &str, cases: Vec<CaseReport>) -> Report {
+    Report {
         campaign: CAMPAIGN.to_owned(),
         worker: worker.to_owned(),
         code_version: "0.1.0".to_owned(),
@@ -105,6 +185,6 @@ pub(crate) async fn report(
         cases,
         now_unix_ms: 1_700_000_000_000,
         after_failure: policy,
-    };
-    library.report(report).await.unwrap()
+        audit_share: 0.0,
+    }
 }

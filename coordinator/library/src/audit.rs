@@ -1,0 +1,210 @@
+//! The table `audit`: finished cases that another worker simulates again.
+//!
+//! Which cases is decided by their hash, so that the share holds whatever the order and nobody can
+//! choose. What the second worker finds is compared by who asks; here it is only kept.
+
+use crate::case::case_of;
+use crate::engine::{Connection, Row, Write, sql};
+use crate::report::CaseReport;
+use crate::{Library, LibraryError, Report};
+use tracktwin_parameters::Case;
+
+/// Expired audits taken back with one request for audits.
+const AUDITS_MAX: u32 = 100;
+
+/// A finished case to be simulated again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Audit {
+    /// The campaign.
+    pub campaign: String,
+    /// The case.
+    pub case: Case,
+    /// Whose result is looked at.
+    pub worker: String,
+}
+
+/// What came of an audit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AuditFinding {
+    /// Whether both agree within the tolerance of who compared.
+    pub agrees: bool,
+    /// Largest difference of a band level, in dB.
+    pub difference_db: f64,
+}
+
+/// Audits of a campaign, counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AuditCounts {
+    /// Not yet done.
+    pub open: u32,
+    /// Both workers agreed.
+    pub agree: u32,
+    /// They did not.
+    pub differ: u32,
+}
+
+impl Library {
+    /// Cases of a campaign for `worker` to audit, none of them its own; for `lease_ms`, after which
+    /// others may be asked.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn audit_sample(
+        &self,
+        campaign: &str,
+        worker: &str,
+        cases_max: u32,
+        lease_ms: i64,
+    ) -> Result<Vec<Audit>, LibraryError> {
+        let (campaign, worker) = (campaign.to_owned(), worker.to_owned());
+        let cases_max = cases_max.min(AUDITS_MAX);
+        let now_unix_ms = self.now_unix_ms();
+        self.write(Sample { campaign, worker, cases_max, now_unix_ms, lease_ms }).await
+    }
+
+    /// Keeps what an auditor found; answers whose result it was about, or nothing where the audit
+    /// was not this worker's any more.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn audited(
+        &self,
+        campaign: &str,
+        index: u32,
+        auditor: &str,
+        finding: AuditFinding,
+    ) -> Result<Option<String>, LibraryError> {
+        let (campaign, auditor) = (campaign.to_owned(), auditor.to_owned());
+        let now_unix_ms = self.now_unix_ms();
+        self.write(Found { campaign, index, auditor, finding, now_unix_ms }).await
+    }
+
+    /// How a campaign's audits stand.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn audits(&self, campaign: &str) -> Result<AuditCounts, LibraryError> {
+        let ask =
+            "select state, count(*) as cases from audit where campaign_id = $1 group by state";
+        let mut counts = AuditCounts::default();
+        for row in self.readers().rows(sql(ask).bind(campaign)).await? {
+            let cases = row.get_u32("cases")?;
+            match row.get::<String>("state")?.as_str() {
+                "agrees" => counts.agree = cases,
+                "differs" => counts.differ = cases,
+                _ => counts.open += cases,
+            }
+        }
+        Ok(counts)
+    }
+}
+
+/// Marks the share of newly finished cases that is to be audited.
+pub(crate) async fn sample<'a>(
+    connection: &mut Connection,
+    report: &Report,
+    finished: impl Iterator<Item = &'a CaseReport>,
+) -> Result<(), LibraryError> {
+    for case in finished.filter(|case| is_sampled(&case.parameter_hash, report.audit_share)) {
+        let mark = "insert into audit (campaign_id, sobol_index, worker) values ($1, $2, $3)
+            on conflict (campaign_id, sobol_index) do nothing";
+        let mark = sql(mark).bind(&report.campaign).bind(case.index).bind(&report.worker);
+        connection.execute(mark).await?;
+    }
+    Ok(())
+}
+
+/// Whether the case with this hash (hexadecimal) is among the share.
+fn is_sampled(parameter_hash: &str, share: f64) -> bool {
+    let leading = parameter_hash.get(..8).and_then(|digits| u32::from_str_radix(digits, 16).ok());
+    leading.is_some_and(|leading| f64::from(leading) < share * 2_f64.powi(32))
+}
+
+struct Sample {
+    campaign: String,
+    worker: String,
+    cases_max: u32,
+    now_unix_ms: i64,
+    lease_ms: i64,
+}
+
+impl Write for Sample {
+    type Answer = Vec<Audit>;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<Vec<Audit>, LibraryError> {
+        let take = format!(
+            "with next as (
+                select campaign_id as next_campaign, sobol_index as next_index from audit
+                where campaign_id = $1 and worker <> $2 and (state = 'waiting'
+                    or (state = 'leased' and lease_expires_unix_ms <= $3))
+                order by sobol_index limit $4 {})
+            update audit set state = 'leased', auditor = $2, lease_expires_unix_ms = $5
+            from next where campaign_id = next_campaign and sobol_index = next_index
+            returning sobol_index, worker",
+            connection.dialect().skipping_locked()
+        );
+        let take = sql(take)
+            .bind(&self.campaign)
+            .bind(&self.worker)
+            .bind(self.now_unix_ms)
+            .bind(self.cases_max)
+            .bind(self.now_unix_ms.saturating_add(self.lease_ms));
+        let mut audits = Vec::new();
+        for taken in connection.rows(take).await? {
+            let ask = "select * from campaign_case where campaign_id = $1 and sobol_index = $2";
+            let ask = sql(ask).bind(&self.campaign).bind(taken.get::<i64>("sobol_index")?);
+            let audit = |row: &Row| -> Result<Audit, LibraryError> {
+                Ok(Audit {
+                    campaign: self.campaign.clone(),
+                    case: case_of(row)?,
+                    worker: taken.get("worker")?,
+                })
+            };
+            let row = connection.row(ask).await?;
+            audits.extend(row.as_ref().map(audit).transpose()?);
+        }
+        Ok(audits)
+    }
+}
+
+struct Found {
+    campaign: String,
+    index: u32,
+    auditor: String,
+    finding: AuditFinding,
+    now_unix_ms: i64,
+}
+
+impl Write for Found {
+    type Answer = Option<String>;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<Option<String>, LibraryError> {
+        let keep = "update audit set state = $4, difference_dB = $5, ended_unix_ms = $6,
+                lease_expires_unix_ms = null
+            where campaign_id = $1 and sobol_index = $2 and auditor = $3 and state = 'leased'
+            returning worker";
+        let keep = sql(keep)
+            .bind(&self.campaign)
+            .bind(self.index)
+            .bind(&self.auditor)
+            .bind(if self.finding.agrees { "agrees" } else { "differs" })
+            .bind(self.finding.difference_db)
+            .bind(self.now_unix_ms);
+        connection.row(keep).await?.map(|row| row.get("worker")).transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_sampled;
+
+    #[test]
+    fn the_share_of_sampled_hashes_is_the_share_asked_for() {
+        let hash = |case: u32| blake3::hash(&case.to_be_bytes()).to_hex();
+        for (share, expected) in [(0.0, 0..=0), (1.0, 10_000..=10_000), (0.01, 70..=130)] {
+            let sampled = (0..10_000).filter(|&case| is_sampled(&hash(case), share)).count();
+            // Three standard deviations about the mean of 100.
+            assert!(expected.contains(&sampled), "{sampled} at {share}");
+        }
+    }
+}

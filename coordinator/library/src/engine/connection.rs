@@ -1,0 +1,132 @@
+//! The connection that writes, and the connections that read.
+
+use super::patience::Patience;
+use super::{Dialect, Row, Statement, sql};
+use crate::LibraryError;
+use sqlx::{Connection as _, PgConnection, PgPool, SqliteConnection, SqlitePool};
+use std::pin::Pin;
+use tokio_stream::{Stream, StreamExt};
+
+/// A connection that writes, inside a transaction.
+pub(crate) enum Connection {
+    Sqlite(SqliteConnection),
+    Postgres(PgConnection),
+}
+
+impl Connection {
+    pub(crate) const fn dialect(&self) -> Dialect {
+        match self {
+            Self::Sqlite(_) => Dialect::Sqlite,
+            Self::Postgres(_) => Dialect::Postgres,
+        }
+    }
+
+    /// Runs a statement; answers how many rows it changed.
+    pub(crate) async fn execute(&mut self, statement: Statement) -> Result<u64, LibraryError> {
+        Ok(match self {
+            Self::Sqlite(connection) => {
+                statement.for_sqlite().execute(connection).await?.rows_affected()
+            }
+            Self::Postgres(connection) => {
+                statement.for_postgres().execute(connection).await?.rows_affected()
+            }
+        })
+    }
+
+    pub(crate) async fn rows(&mut self, statement: Statement) -> Result<Vec<Row>, LibraryError> {
+        Ok(match self {
+            Self::Sqlite(connection) => {
+                let rows = statement.for_sqlite().fetch_all(connection).await?;
+                rows.into_iter().map(Row::Sqlite).collect()
+            }
+            Self::Postgres(connection) => {
+                let rows = statement.for_postgres().fetch_all(connection).await?;
+                rows.into_iter().map(Row::Postgres).collect()
+            }
+        })
+    }
+
+    pub(crate) async fn row(&mut self, statement: Statement) -> Result<Option<Row>, LibraryError> {
+        Ok(self.rows(statement).await?.into_iter().next())
+    }
+
+    /// Begins a transaction; with `SQLite` as one that writes, for a reading one that becomes a
+    /// writing one may be refused despite any timeout.
+    pub(super) async fn begin(&mut self) -> Result<(), LibraryError> {
+        let text = match self {
+            Self::Sqlite(_) => "begin immediate",
+            Self::Postgres(_) => "begin",
+        };
+        self.execute(sql(text)).await.map(drop)
+    }
+
+    pub(super) async fn commit(&mut self) -> Result<(), LibraryError> {
+        self.execute(sql("commit")).await.map(drop)
+    }
+
+    /// Leaves nothing of the present transaction, if there is one.
+    pub(super) async fn rollback(&mut self) {
+        // It fails where the database has rolled back by itself, or is gone with the transaction.
+        let _ = self.execute(sql("rollback")).await;
+    }
+
+    pub(super) async fn close(self) {
+        // What is committed is on the disk already; closing only tidies up.
+        let _ = match self {
+            Self::Sqlite(connection) => connection.close().await,
+            Self::Postgres(connection) => connection.close().await,
+        };
+    }
+}
+
+/// Connections that read.
+#[derive(Clone)]
+pub(crate) enum Readers {
+    Sqlite(SqlitePool),
+    Postgres(PgPool),
+}
+
+impl Readers {
+    /// All rows at once, waiting for a database that is away.
+    pub(crate) async fn rows(&self, statement: Statement) -> Result<Vec<Row>, LibraryError> {
+        let mut patience = Patience::new(true);
+        loop {
+            match self.stream(statement.clone()).collect::<Result<Vec<_>, _>>().await {
+                Err(error) if error.is_unavailable() => {
+                    if patience.wait().await.is_err() {
+                        return Err(error);
+                    }
+                }
+                done => return done,
+            }
+        }
+    }
+
+    pub(crate) async fn row(&self, statement: Statement) -> Result<Option<Row>, LibraryError> {
+        Ok(self.rows(statement).await?.into_iter().next())
+    }
+
+    /// The rows as they come, so that memory does not grow with their number.
+    pub(crate) fn stream(
+        &self,
+        statement: Statement,
+    ) -> Pin<Box<dyn Stream<Item = Result<Row, LibraryError>> + Send + '_>> {
+        match self {
+            Self::Sqlite(pool) => {
+                let rows = statement.for_sqlite().fetch(pool);
+                Box::pin(rows.map(|row| Ok(Row::Sqlite(row?))))
+            }
+            Self::Postgres(pool) => {
+                let rows = statement.for_postgres().fetch(pool);
+                Box::pin(rows.map(|row| Ok(Row::Postgres(row?))))
+            }
+        }
+    }
+
+    pub(crate) async fn close(&self) {
+        match self {
+            Self::Sqlite(pool) => pool.close().await,
+            Self::Postgres(pool) => pool.close().await,
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! Two databases behind one face: statements, rows, connections, and the task that writes.
+//!
+//! Owns what differs between `SQLite` and PostgreSQL, so that the tables' modules write each
+//! statement once, with `$1` for its first value; both databases understand that. Knows no table.
+
+mod connection;
+mod dialect;
+mod iso;
+mod open;
+mod patience;
+mod postgres;
+mod row;
+mod sqlite;
+mod statement;
+mod target;
+mod writer;
+
+pub(crate) use connection::{Connection, Readers};
+pub(crate) use dialect::Dialect;
+pub(crate) use iso::iso_utc;
+pub(crate) use open::{Opened, open, open_or_create};
+pub(crate) use postgres::unix_ms;
+pub(crate) use row::Row;
+pub(crate) use statement::{Statement, Value, sql};
+pub(crate) use target::Target;
+pub(crate) use writer::{Write, Writer};

@@ -1,0 +1,49 @@
+//! Opening a library, whichever database it is in.
+
+use super::{Readers, Target, Writer, postgres, sqlite};
+use crate::LibraryError;
+use std::path::Path;
+
+/// An open library's connections.
+pub(crate) struct Opened {
+    pub(crate) target: Target,
+    pub(crate) readers: Readers,
+    pub(crate) writer: Writer,
+    /// What the database's clock is ahead of this machine's.
+    pub(crate) clock_ahead_ms: i64,
+}
+
+/// Opens a library that is there.
+pub(crate) async fn open(url: &str) -> Result<Opened, LibraryError> {
+    let target = Target::parse(url)?;
+    if target.path().is_some_and(|path| !path.is_file()) {
+        return Err(LibraryError::Missing { library: target.name() });
+    }
+    connect(target, false).await
+}
+
+/// Opens a library, or makes an empty one.
+pub(crate) async fn open_or_create(url: &str) -> Result<Opened, LibraryError> {
+    let target = Target::parse(url)?;
+    let folder = target.path().and_then(Path::parent);
+    if let Some(folder) = folder.filter(|it| !it.as_os_str().is_empty() && !it.is_dir()) {
+        let folder = folder.to_owned();
+        return Err(LibraryError::NoFolder { library: target.name(), folder });
+    }
+    connect(target, true).await
+}
+
+async fn connect(target: Target, create: bool) -> Result<Opened, LibraryError> {
+    let (readers, writing, clock_ahead_ms) = match &target {
+        Target::Sqlite(path) => {
+            let (readers, writing) = sqlite::open(path).await?;
+            (readers, Some(writing), 0)
+        }
+        Target::Postgres { options, name } => {
+            let (readers, clock_ahead_ms) = postgres::open(options, name, create).await?;
+            (readers, None, clock_ahead_ms)
+        }
+    };
+    let writer = Writer::start(target.clone(), writing);
+    Ok(Opened { target, readers, writer, clock_ahead_ms })
+}

@@ -1,0 +1,117 @@
+//! A library on a server.
+
+use super::{Connection, Readers};
+use crate::LibraryError;
+use sqlx::migrate::{MigrateError, Migrator};
+use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
+use sqlx::{ConnectOptions, Connection as _, PgConnection};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations/postgres");
+
+/// Connections of one coordinator that read beside the one that writes.
+const READERS: u32 = 4;
+
+/// How long a reader waits for a free connection, or for the server to come back.
+const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Opens the library in this database and brings its schema up to date; answers also what the
+/// server's clock is ahead of this machine's, in ms.
+pub(super) async fn open(
+    options: &PgConnectOptions,
+    name: &str,
+    create: bool,
+) -> Result<(Readers, i64), LibraryError> {
+    let mut connection = options.connect().await.map_err(|error| unreachable(error, name))?;
+    let is_there = refuse_strangers(&mut connection, name).await?;
+    if !is_there && !create {
+        return Err(LibraryError::Empty { library: name.to_owned() });
+    }
+    migrate(&mut connection, name, is_there).await?;
+    let clock_ahead_ms = clock_ahead_ms(&mut connection).await?;
+    connection.close().await?;
+    let readers = PgPoolOptions::new()
+        .max_connections(READERS)
+        .acquire_timeout(ACQUIRE_TIMEOUT)
+        .connect_lazy_with(options.clone().options([("default_transaction_read_only", "on")]));
+    Ok((Readers::Postgres(readers), clock_ahead_ms))
+}
+
+/// A connection that writes.
+pub(super) async fn connect(options: &PgConnectOptions) -> Result<Connection, LibraryError> {
+    Ok(Connection::Postgres(options.connect().await?))
+}
+
+/// Why there is no connection: what the user can mend, or what may pass.
+fn unreachable(error: sqlx::Error, name: &str) -> LibraryError {
+    let library = name.to_owned();
+    match &error {
+        // No such database; no such user; wrong password; not let in.
+        sqlx::Error::Database(refusal)
+            if ["3D000", "28000", "28P01", "42501"]
+                .map(Some)
+                .contains(&refusal.code().as_deref()) =>
+        {
+            LibraryError::NotLetIn { library, reason: refusal.message().to_owned() }
+        }
+        _ => LibraryError::Unreachable { library, source: error },
+    }
+}
+
+/// Whether the library's tables are there; refuses a database that holds other things.
+async fn refuse_strangers(connection: &mut PgConnection, name: &str) -> Result<bool, LibraryError> {
+    let (ours, tables): (i64, i64) = sqlx::query_as(
+        "select count(*) filter (where table_name in ('campaign', 'campaign_case', 'result')),
+            count(*) filter (where table_name <> '_sqlx_migrations')
+        from information_schema.tables where table_schema = current_schema()",
+    )
+    .fetch_one(connection)
+    .await?;
+    match (ours, tables) {
+        (3, _) => Ok(true),
+        (_, 0) => Ok(false),
+        _ => Err(LibraryError::NotALibrary { library: name.to_owned() }),
+    }
+}
+
+/// Brings the schema up to date. Somebody who may only read is not asked to write where nothing
+/// needs to be.
+async fn migrate(
+    connection: &mut PgConnection,
+    name: &str,
+    is_there: bool,
+) -> Result<(), LibraryError> {
+    let known = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0);
+    if is_there {
+        let found: i64 = sqlx::query_scalar("select max(version) from _sqlx_migrations")
+            .fetch_one(&mut *connection)
+            .await?;
+        if found > known {
+            return Err(LibraryError::NewerSchema { library: name.to_owned(), found, known });
+        }
+        if found == known {
+            return Ok(());
+        }
+    }
+    MIGRATIONS.run(connection).await.map_err(|error| match error {
+        // Another program was quicker.
+        MigrateError::VersionMissing(found) if found > known => {
+            LibraryError::NewerSchema { library: name.to_owned(), found, known }
+        }
+        other => other.into(),
+    })
+}
+
+async fn clock_ahead_ms(connection: &mut PgConnection) -> Result<i64, LibraryError> {
+    let server: i64 =
+        sqlx::query_scalar("select (extract(epoch from clock_timestamp()) * 1000)::bigint")
+            .fetch_one(connection)
+            .await?;
+    Ok(server - unix_ms())
+}
+
+/// This machine's clock.
+pub(crate) fn unix_ms() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
+}

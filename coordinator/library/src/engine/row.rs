@@ -1,0 +1,61 @@
+//! A row of either database.
+
+use crate::LibraryError;
+use sqlx::postgres::PgRow;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Decode, Postgres, Sqlite, Type};
+use std::borrow::Cow;
+
+/// A row that a statement answered.
+pub(crate) enum Row {
+    Sqlite(SqliteRow),
+    Postgres(PgRow),
+}
+
+/// What a column may be read as: `String`, `i64`, `f64`, or one of these that may be missing.
+pub(crate) trait Column:
+    for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres>
+{
+}
+
+impl<T> Column for T where
+    T: for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres>
+{
+}
+
+impl Row {
+    /// The value of a column.
+    pub(crate) fn get<T: Column>(&self, column: &str) -> Result<T, LibraryError> {
+        Ok(match self {
+            Self::Sqlite(row) => sqlx::Row::try_get(row, column)?,
+            Self::Postgres(row) => sqlx::Row::try_get(row, &*folded(column))?,
+        })
+    }
+
+    /// A count or an index.
+    pub(crate) fn get_u32(&self, column: &str) -> Result<u32, LibraryError> {
+        let value: i64 = self.get(column)?;
+        u32::try_from(value)
+            .map_err(|_| LibraryError::Damaged { what: format!("{column} is {value}") })
+    }
+
+    /// A series of doubles: an array with PostgreSQL, a blob with `SQLite`.
+    pub(crate) fn doubles(&self, column: &str) -> Result<Vec<f64>, LibraryError> {
+        Ok(match self {
+            Self::Sqlite(row) => {
+                let (chunks, _) = sqlx::Row::try_get::<&[u8], _>(row, column)?.as_chunks::<8>();
+                chunks.iter().map(|chunk| f64::from_be_bytes(*chunk)).collect()
+            }
+            Self::Postgres(row) => sqlx::Row::try_get(row, &*folded(column))?,
+        })
+    }
+}
+
+/// As PostgreSQL spells an unquoted name.
+fn folded(column: &str) -> Cow<'_, str> {
+    if column.bytes().any(|byte| byte.is_ascii_uppercase()) {
+        Cow::Owned(column.to_ascii_lowercase())
+    } else {
+        Cow::Borrowed(column)
+    }
+}

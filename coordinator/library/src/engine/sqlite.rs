@@ -1,0 +1,82 @@
+//! A library in a file.
+
+use super::{Connection, Readers};
+use crate::LibraryError;
+use sqlx::migrate::{MigrateError, Migrator};
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
+use std::path::Path;
+use std::time::Duration;
+
+static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations/sqlite");
+
+/// `application_id` of a library, set by the first migration.
+const APPLICATION_ID: i64 = 0x7477_696e;
+
+/// How long to wait for another process that writes.
+///
+/// The longest write is a thousand cases; anything beyond half a minute is a stuck process.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Connections that read beside the one that writes.
+const READERS: u32 = 4;
+
+/// Opens the file, made where there is none, and brings its schema up to date.
+pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryError> {
+    let options = SqliteConnectOptions::new()
+        .filename(path)
+        .create_if_missing(true)
+        .busy_timeout(BUSY_TIMEOUT)
+        .foreign_keys(true);
+    let mut connection = options.connect().await.map_err(|error| not_a_database(error, path))?;
+    refuse_strangers(&mut connection, path).await?;
+    connection.close().await?;
+
+    // Only now, since it changes the file.
+    let options = options.journal_mode(SqliteJournalMode::Wal).synchronous(SqliteSynchronous::Full);
+    let mut connection = options.connect().await?;
+    migrate(&mut connection, path).await?;
+    let readers = SqlitePoolOptions::new()
+        .max_connections(READERS)
+        .connect_lazy_with(options.create_if_missing(false).pragma("query_only", "on"));
+    Ok((Readers::Sqlite(readers), Connection::Sqlite(connection)))
+}
+
+/// `SQLITE_NOTADB`, the result code for a file that is no database.
+fn not_a_database(error: sqlx::Error, path: &Path) -> LibraryError {
+    match error.as_database_error().and_then(sqlx::error::DatabaseError::code) {
+        Some(code) if code == "26" => {
+            LibraryError::NotALibrary { library: path.display().to_string() }
+        }
+        _ => error.into(),
+    }
+}
+
+/// Refuses a database of somebody else, before anything is written to it.
+async fn refuse_strangers(
+    connection: &mut SqliteConnection,
+    path: &Path,
+) -> Result<(), LibraryError> {
+    let (application_id, tables): (i64, i64) = sqlx::query_as(
+        "select application_id,
+            (select count(*) from sqlite_schema where type = 'table' and name <> '_sqlx_migrations')
+        from pragma_application_id",
+    )
+    .fetch_one(connection)
+    .await
+    .map_err(|error| not_a_database(error, path))?;
+    if application_id != APPLICATION_ID && tables > 0 {
+        return Err(LibraryError::NotALibrary { library: path.display().to_string() });
+    }
+    Ok(())
+}
+
+async fn migrate(connection: &mut SqliteConnection, path: &Path) -> Result<(), LibraryError> {
+    let known = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0);
+    MIGRATIONS.run(connection).await.map_err(|error| match error {
+        MigrateError::VersionMissing(found) if found > known => {
+            LibraryError::NewerSchema { library: path.display().to_string(), found, known }
+        }
+        other => other.into(),
+    })
+}

@@ -1,0 +1,124 @@
+//! A statement and its values, for either database.
+
+use sqlx::postgres::PgArguments;
+use sqlx::query::Query;
+use sqlx::sqlite::SqliteArguments;
+use sqlx::{AssertSqlSafe, Postgres, Sqlite};
+use std::borrow::Cow;
+
+/// A value to be bound; a missing one keeps its type, for PostgreSQL asks.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Value {
+    Text(Option<String>),
+    Integer(Option<i64>),
+    Real(Option<f64>),
+    /// With `SQLite` a blob of big-endian doubles.
+    Doubles(Option<Vec<f64>>),
+    /// A list for a statement's own use; with `SQLite` JSON. See [`super::Dialect::listed`].
+    Integers(Vec<i64>),
+    /// The same of texts.
+    Texts(Vec<String>),
+}
+
+/// A statement of this crate's own making.
+#[derive(Clone, Debug)]
+pub(crate) struct Statement {
+    text: Cow<'static, str>,
+    values: Vec<Value>,
+}
+
+/// A statement without values yet. `text` must not hold anything that came from outside.
+pub(crate) fn sql(text: impl Into<Cow<'static, str>>) -> Statement {
+    Statement { text: text.into(), values: Vec::new() }
+}
+
+impl Statement {
+    /// Binds the next value: the first is `$1`.
+    pub(crate) fn bind(mut self, value: impl Into<Value>) -> Self {
+        self.values.push(value.into());
+        self
+    }
+
+    pub(super) fn for_sqlite(self) -> Query<'static, Sqlite, SqliteArguments> {
+        let query = sqlx::query(AssertSqlSafe(self.text));
+        self.values.into_iter().fold(query, |query, value| match value {
+            Value::Text(text) => query.bind(text),
+            Value::Integer(integer) => query.bind(integer),
+            Value::Real(real) => query.bind(real),
+            Value::Doubles(doubles) => query.bind(doubles.as_deref().map(big_endian)),
+            Value::Integers(integers) => query.bind(format!("{integers:?}")),
+            Value::Texts(texts) => query.bind(serde_json::Value::from(texts).to_string()),
+        })
+    }
+
+    pub(super) fn for_postgres(self) -> Query<'static, Postgres, PgArguments> {
+        let query = sqlx::query(AssertSqlSafe(self.text));
+        self.values.into_iter().fold(query, |query, value| match value {
+            Value::Text(text) => query.bind(text),
+            Value::Integer(integer) => query.bind(integer),
+            Value::Real(real) => query.bind(real),
+            Value::Doubles(doubles) => query.bind(doubles),
+            Value::Integers(integers) => query.bind(integers),
+            Value::Texts(texts) => query.bind(texts),
+        })
+    }
+}
+
+/// Doubles in big-endian order, as bytes.
+fn big_endian(doubles: &[f64]) -> Vec<u8> {
+    doubles.iter().flat_map(|value| value.to_be_bytes()).collect()
+}
+
+impl From<&str> for Value {
+    fn from(text: &str) -> Self {
+        Self::Text(Some(text.to_owned()))
+    }
+}
+
+impl From<&String> for Value {
+    fn from(text: &String) -> Self {
+        Self::Text(Some(text.clone()))
+    }
+}
+
+impl From<String> for Value {
+    fn from(text: String) -> Self {
+        Self::Text(Some(text))
+    }
+}
+
+impl From<i64> for Value {
+    fn from(integer: i64) -> Self {
+        Self::Integer(Some(integer))
+    }
+}
+
+impl From<u32> for Value {
+    fn from(integer: u32) -> Self {
+        Self::Integer(Some(integer.into()))
+    }
+}
+
+impl From<f64> for Value {
+    fn from(real: f64) -> Self {
+        Self::Real(Some(real))
+    }
+}
+
+impl From<Vec<f64>> for Value {
+    fn from(doubles: Vec<f64>) -> Self {
+        Self::Doubles(Some(doubles))
+    }
+}
+
+impl From<Vec<i64>> for Value {
+    fn from(integers: Vec<i64>) -> Self {
+        Self::Integers(integers)
+    }
+}
+
+impl From<Option<String>> for Value {
+    fn from(text: Option<String>) -> Self {
+        Self::Text(text)
+    }
+}

@@ -1,0 +1,95 @@
+//! Which database a library URL means.
+
+use crate::LibraryError;
+use sqlx::postgres::PgConnectOptions;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Where a library is.
+#[derive(Clone)]
+pub(crate) enum Target {
+    Sqlite(PathBuf),
+    Postgres {
+        // Several hundred bytes, and a library has one.
+        options: Box<PgConnectOptions>,
+        /// The URL without user, password and settings.
+        name: String,
+    },
+}
+
+impl Target {
+    /// What `sqlite:PATH` (or `sqlite://PATH`) or `postgres://[USER[:PASSWORD]@]HOST/DATABASE` means.
+    pub(crate) fn parse(url: &str) -> Result<Self, LibraryError> {
+        if let Some((scheme @ ("postgres" | "postgresql"), rest)) = url.split_once("://") {
+            let name = format!("{scheme}://{}", public(rest));
+            let options = PgConnectOptions::from_str(url).map_err(|source| {
+                LibraryError::BadPostgresUrl { url: name.clone(), reason: source.to_string() }
+            })?;
+            let options = Box::new(options.application_name("tracktwin"));
+            return Ok(Self::Postgres { options, name });
+        }
+        let path = url.strip_prefix("sqlite:").map(|rest| rest.strip_prefix("//").unwrap_or(rest));
+        match path {
+            // A database in memory is not shared between connections, and no library.
+            Some(path) if !path.is_empty() && !path.starts_with(':') => {
+                Ok(Self::Sqlite(PathBuf::from(path)))
+            }
+            _ => Err(LibraryError::UnknownUrl { url: url.to_owned() }),
+        }
+    }
+
+    /// What people may be told: a path, or a URL without password.
+    pub(crate) fn name(&self) -> String {
+        match self {
+            Self::Sqlite(path) => path.display().to_string(),
+            Self::Postgres { name, .. } => name.clone(),
+        }
+    }
+
+    /// The file, with `SQLite`.
+    pub(crate) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Sqlite(path) => Some(path),
+            Self::Postgres { .. } => None,
+        }
+    }
+}
+
+/// Host and database: what stands before may hold a password, and so may what comes after.
+fn public(rest: &str) -> &str {
+    let rest = rest.split_once('?').map_or(rest, |(rest, _)| rest);
+    rest.rsplit_once('@').map_or(rest, |(_, host)| host)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(url: &str) -> String {
+        Target::parse(url).err().expect("it should be refused").to_string()
+    }
+
+    #[test]
+    fn a_sqlite_url_is_a_path() {
+        for (url, path) in
+            [("sqlite:a/b.sqlite", "a/b.sqlite"), ("sqlite:///a/b.sqlite", "/a/b.sqlite")]
+        {
+            assert_eq!(Target::parse(url).unwrap().path(), Some(Path::new(path)));
+        }
+    }
+
+    #[test]
+    fn other_urls_are_refused_with_what_to_write() {
+        for url in ["a.sqlite", "sqlite:", "sqlite::memory:", "mysql://x"] {
+            assert!(refusal(url).contains("sqlite:PATH"), "{url}");
+        }
+    }
+
+    #[test]
+    fn no_message_shows_a_password() {
+        let name = Target::parse("postgres://me:sec@ret@host:1/db?password=secret").unwrap().name();
+        assert_eq!(name, "postgres://host:1/db");
+        let message = refusal("postgres://me:secret@host:port/db");
+        assert!(message.contains("host:port") && !message.contains("secret"), "{message}");
+    }
+}

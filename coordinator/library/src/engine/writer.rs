@@ -1,0 +1,220 @@
+//! The one task that writes: what arrives together is committed together.
+//!
+//! A durable commit waits for the disk, and `SQLite` has one writer at a time. So all writes of a
+//! process go through one connection, and nobody is answered before the commit. A PostgreSQL server
+//! that goes away is waited for, within a bound.
+
+use super::patience::Patience;
+use super::{Connection, Target, postgres};
+use crate::LibraryError;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::sync::{Notify, mpsc, oneshot};
+use tokio::task::JoinHandle;
+
+/// Writes committed together at most.
+///
+/// Enough to make the disk's part of each negligible, and few enough that the first waits
+/// milliseconds for the last.
+const GROUP_MAX: usize = 256;
+
+/// Writes that wait for the writer before those who ask have to wait themselves.
+const QUEUE_MAX: usize = 1024;
+
+/// A transaction on a server that takes longer has lost its server, whatever the network says.
+const SERVER_TIMEOUT: Duration = Duration::from_mins(1);
+
+/// A change to the library, made inside a transaction that others share.
+pub(crate) trait Write: Send + Sync + 'static {
+    /// What it answers once it is committed.
+    type Answer: Send + 'static;
+
+    /// Makes the change. It may be called again after a transaction that failed, or whose success
+    /// was not heard of.
+    fn apply(
+        &self,
+        connection: &mut Connection,
+    ) -> impl Future<Output = Result<Self::Answer, LibraryError>> + Send;
+}
+
+/// A handle on the writing task.
+pub(crate) struct Writer {
+    orders: mpsc::Sender<Box<dyn Order>>,
+    closing: Arc<Notify>,
+    task: Mutex<Option<JoinHandle<()>>>,
+}
+
+impl Writer {
+    /// Starts the task; without a connection it makes its own when there is something to write.
+    pub(super) fn start(target: Target, connection: Option<Connection>) -> Self {
+        let (orders, receiver) = mpsc::channel(QUEUE_MAX);
+        let closing = Arc::new(Notify::new());
+        let session = Session { target, connection, patient: true };
+        let task = tokio::spawn(write_all(session, receiver, closing.clone()));
+        Self { orders, closing, task: Mutex::new(Some(task)) }
+    }
+
+    /// Makes a change and waits until it is on the disk.
+    pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
+        let (reply, answer) = oneshot::channel();
+        let order = Pending { write, answer: None, reply };
+        self.orders.send(Box::new(order)).await.map_err(|_| LibraryError::Closed)?;
+        answer.await.map_err(|_| LibraryError::Closed)?
+    }
+
+    /// Finishes what was ordered and closes the connection.
+    pub(crate) async fn close(&self) {
+        self.closing.notify_one();
+        let task = self.task.lock().expect("nobody panics while holding it").take();
+        if let Some(task) = task {
+            // A writer that panicked has already failed those who waited for it.
+            let _ = task.await;
+        }
+    }
+}
+
+/// An ordered write of any kind.
+trait Order: Send {
+    fn apply<'a>(
+        &'a mut self,
+        connection: &'a mut Connection,
+    ) -> Pin<Box<dyn Future<Output = Result<(), LibraryError>> + Send + 'a>>;
+
+    fn reply(self: Box<Self>, committed: Result<(), LibraryError>);
+}
+
+struct Pending<W: Write> {
+    write: W,
+    answer: Option<W::Answer>,
+    reply: oneshot::Sender<Result<W::Answer, LibraryError>>,
+}
+
+impl<W: Write> Order for Pending<W> {
+    fn apply<'a>(
+        &'a mut self,
+        connection: &'a mut Connection,
+    ) -> Pin<Box<dyn Future<Output = Result<(), LibraryError>> + Send + 'a>> {
+        Box::pin(async {
+            self.answer = Some(self.write.apply(connection).await?);
+            Ok(())
+        })
+    }
+
+    fn reply(self: Box<Self>, committed: Result<(), LibraryError>) {
+        let Self { answer, reply, .. } = *self;
+        let answer = committed.map(|()| answer.expect("what is committed was applied"));
+        // Who asked may have gone; the write stands all the same.
+        let _ = reply.send(answer);
+    }
+}
+
+async fn write_all(
+    mut session: Session,
+    mut orders: mpsc::Receiver<Box<dyn Order>>,
+    closing: Arc<Notify>,
+) {
+    let mut group = Vec::new();
+    loop {
+        tokio::select! {
+            biased;
+            count = orders.recv_many(&mut group, GROUP_MAX) => if count == 0 { break },
+            () = closing.notified() => orders.close(),
+        }
+        session.commit_and_reply(&mut group).await;
+    }
+    if let Some(connection) = session.connection {
+        connection.close().await;
+    }
+}
+
+/// The connection that writes, through the life of several.
+struct Session {
+    target: Target,
+    connection: Option<Connection>,
+    /// Whether to wait for the database: not after having waited in vain, until it is back.
+    patient: bool,
+}
+
+impl Session {
+    /// Commits a group, or each of it alone where one spoils it for the others.
+    async fn commit_and_reply(&mut self, group: &mut Vec<Box<dyn Order>>) {
+        match self.commit(group).await {
+            Ok(()) => group.drain(..).for_each(|order| order.reply(Ok(()))),
+            Err(LibraryError::Unavailable { reason }) => {
+                let away = || LibraryError::Unavailable { reason: reason.clone() };
+                group.drain(..).for_each(|order| order.reply(Err(away())));
+            }
+            Err(error) => match group.pop() {
+                Some(order) if group.is_empty() => order.reply(Err(error)),
+                last => {
+                    for mut order in group.drain(..).chain(last) {
+                        let alone = self.commit(std::slice::from_mut(&mut order)).await;
+                        order.reply(alone);
+                    }
+                }
+            },
+        }
+    }
+
+    /// Commits these orders together, waiting for a database that is away.
+    async fn commit(&mut self, orders: &mut [Box<dyn Order>]) -> Result<(), LibraryError> {
+        let mut patience = Patience::new(self.patient);
+        loop {
+            match self.try_to_commit(orders).await {
+                Err(error) if error.is_unavailable() => {
+                    self.connection = None;
+                    if patience.wait().await.is_err() {
+                        self.patient = false;
+                        return Err(error);
+                    }
+                }
+                done => {
+                    self.patient = true;
+                    return done;
+                }
+            }
+        }
+    }
+
+    async fn try_to_commit(&mut self, orders: &mut [Box<dyn Order>]) -> Result<(), LibraryError> {
+        let connection = match (&mut self.connection, &self.target) {
+            (Some(connection), _) => connection,
+            (none, Target::Postgres { options, .. }) => {
+                none.insert(postgres::connect(options).await?)
+            }
+            (None, Target::Sqlite(_)) => return Err(LibraryError::Closed),
+        };
+        let transaction = transaction(connection, orders);
+        match &self.target {
+            Target::Sqlite(_) => transaction.await,
+            Target::Postgres { .. } => {
+                tokio::time::timeout(SERVER_TIMEOUT, transaction).await.unwrap_or_else(|_| {
+                    let reason = format!("no answer within {} s", SERVER_TIMEOUT.as_secs());
+                    Err(LibraryError::Unavailable { reason })
+                })
+            }
+        }
+    }
+}
+
+async fn transaction(
+    connection: &mut Connection,
+    orders: &mut [Box<dyn Order>],
+) -> Result<(), LibraryError> {
+    connection.begin().await?;
+    let mut done = Ok(());
+    for order in orders {
+        done = order.apply(connection).await;
+        if done.is_err() {
+            break;
+        }
+    }
+    if done.is_ok() {
+        done = connection.commit().await;
+    }
+    if done.is_err() {
+        connection.rollback().await;
+    }
+    done
+}

@@ -1,0 +1,80 @@
+//! What reports add up to: the tables `worker` (its counts) and `progress`.
+
+use crate::engine::{Connection, sql};
+use crate::{LibraryError, Report, Verdict};
+
+/// Length of the intervals in which progress is told, in s.
+pub(crate) const INTERVAL_S: i64 = 10;
+
+/// What one report adds.
+pub(crate) struct Tally<'a> {
+    report: &'a Report,
+    finished: u32,
+    failed: u32,
+    busy_s: f64,
+    /// Failures after the last finished case.
+    failed_since: u32,
+}
+
+impl<'a> Tally<'a> {
+    /// Counts what was stored.
+    pub(crate) fn of(report: &'a Report, verdicts: &[Verdict]) -> Self {
+        let mut tally = Self { report, finished: 0, failed: 0, busy_s: 0.0, failed_since: 0 };
+        for (case, verdict) in report.cases.iter().zip(verdicts) {
+            match (&case.outcome, verdict) {
+                (Ok(_), Verdict::Stored) => {
+                    tally.finished += 1;
+                    tally.busy_s += case.duration_s;
+                    tally.failed_since = 0;
+                }
+                (Err(_), Verdict::Stored) => {
+                    tally.failed += 1;
+                    tally.failed_since += 1;
+                }
+                _ => {}
+            }
+        }
+        tally
+    }
+
+    pub(crate) async fn store(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        if self.finished + self.failed == 0 {
+            return Ok(());
+        }
+        let worker = "update worker set cases_finished = cases_finished + $2,
+                cases_failed = cases_failed + $3, busy_s = busy_s + $4,
+                failures_in_a_row = case when $2 > 0 then $5 else failures_in_a_row + $5 end,
+                last_seen_unix_ms = case when last_seen_unix_ms < $6 then $6
+                    else last_seen_unix_ms end
+            where id = $1";
+        let worker = sql(worker)
+            .bind(&self.report.worker)
+            .bind(self.finished)
+            .bind(self.failed)
+            .bind(self.busy_s)
+            .bind(self.failed_since)
+            .bind(self.report.now_unix_ms);
+        connection.execute(worker).await?;
+        let progress = format!(
+            "insert into progress (campaign_id, from_unix_s, writer, finished, failed, busy_s)
+            values ($1, $2, {}, $3, $4, $5)
+            on conflict (campaign_id, from_unix_s, writer) do update set
+                finished = progress.finished + excluded.finished,
+                failed = progress.failed + excluded.failed,
+                busy_s = progress.busy_s + excluded.busy_s",
+            connection.dialect().writer()
+        );
+        let progress = sql(progress)
+            .bind(&self.report.campaign)
+            .bind(interval(self.report.now_unix_ms))
+            .bind(self.finished)
+            .bind(self.failed)
+            .bind(self.busy_s);
+        connection.execute(progress).await.map(drop)
+    }
+}
+
+/// When the interval of an instant began, in s since 1970.
+pub(crate) const fn interval(unix_ms: i64) -> i64 {
+    unix_ms.div_euclid(1000 * INTERVAL_S) * INTERVAL_S
+}

@@ -1,0 +1,168 @@
+//! The server: started once a test binary, with a database for each test.
+
+use crate::installation::{as_somebody, programs};
+use std::io::Write;
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, OnceLock};
+use std::time::{Duration, Instant};
+
+/// When a server that does not answer has failed.
+const START_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Runs the server until its standard input says "keep" or ends, and then removes its files; so it
+/// leaves nothing behind even if the test is killed.
+const KEEPER: &str = "\"$0\" -D \"$1\" -p \"$2\" -c fsync=\"$3\" -c full_page_writes=\"$3\" \
+    -c listen_addresses=127.0.0.1 -c unix_socket_directories= -c shared_buffers=64MB \
+    -c max_connections=200 > \"$1/log\" 2>&1 & server=$!; \
+    read -r word; kill -INT $server; wait $server; [ \"$word\" = keep ] || rm -rf \"$1\"";
+
+/// Servers of this process so far.
+static SERVERS: AtomicU32 = AtomicU32::new(0);
+
+/// What a server is to be like.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Settings {
+    /// Whether a commit waits for the disk; only where durability is what is tested or measured.
+    pub durable: bool,
+}
+
+/// A PostgreSQL server of this process alone, on the loopback interface.
+pub struct Server {
+    programs: PathBuf,
+    data: PathBuf,
+    port: u16,
+    settings: Settings,
+    keeper: Mutex<Option<(Child, ChildStdin)>>,
+    databases: AtomicU32,
+}
+
+impl Server {
+    /// The server that this process's tests share, started with the first.
+    ///
+    /// Prints one line where there is none, so that a skipped test says so.
+    ///
+    /// # Panics
+    /// When it cannot be started, or is missing although `TRACKTWIN_REQUIRE_POSTGRES` is set.
+    pub fn shared() -> Option<&'static Self> {
+        static SHARED: OnceLock<Option<Server>> = OnceLock::new();
+        let shared = SHARED.get_or_init(|| Self::start(Settings::default()));
+        if shared.is_none() {
+            eprintln!("skipped: no PostgreSQL server");
+        }
+        shared.as_ref()
+    }
+
+    /// A server of one's own, to be stopped and started.
+    ///
+    /// # Panics
+    /// As [`Server::shared`].
+    pub fn start(settings: Settings) -> Option<Self> {
+        let Some(programs) = programs() else {
+            assert!(
+                std::env::var_os("TRACKTWIN_REQUIRE_POSTGRES").is_none(),
+                "a PostgreSQL server is demanded and not installed; set PG_BIN to its folder"
+            );
+            return None;
+        };
+        let number = SERVERS.fetch_add(1, Ordering::Relaxed);
+        let name = format!("tracktwin-postgres-{}-{number}", std::process::id());
+        let data = std::env::temp_dir().join(name);
+        initialise(&programs, &data);
+        let (keeper, databases) = (Mutex::default(), AtomicU32::new(0));
+        let server = Self { programs, data, port: free_port(), settings, keeper, databases };
+        server.start_again();
+        Some(server)
+    }
+
+    /// The URL of a new, empty database.
+    ///
+    /// # Panics
+    /// When it cannot be made.
+    pub fn database(&self) -> String {
+        let name = format!("test_{}", self.databases.fetch_add(1, Ordering::Relaxed));
+        let mut command = Command::new(self.programs.join("createdb"));
+        let port = self.port.to_string();
+        command.args(["-h", "127.0.0.1", "-U", "postgres", "-p", &port, &name]);
+        succeed(&mut command);
+        format!("postgres://postgres@127.0.0.1:{port}/{name}")
+    }
+
+    /// Stops the server, as an administrator would: connections end, data stay.
+    ///
+    /// # Panics
+    /// When it cannot be stopped.
+    pub fn stop(&self) {
+        let keeper = self.keeper.lock().expect("nobody panics while holding it").take();
+        let Some((mut keeper, mut input)) = keeper else { return };
+        input.write_all(b"keep\n").expect("the keeper listens");
+        keeper.wait().expect("the keeper ends");
+    }
+
+    /// Starts a stopped server with what it held.
+    ///
+    /// # Panics
+    /// When it does not answer in time.
+    pub fn start_again(&self) {
+        let fsync = if self.settings.durable { "on" } else { "off" };
+        let mut keeper = as_somebody(Path::new("sh"));
+        keeper.arg("-c").arg(KEEPER).arg(self.programs.join("postgres")).arg(&self.data);
+        keeper.args([&self.port.to_string(), fsync]);
+        // Elsewhere: its own folder may be one that the server's user may not enter.
+        keeper.current_dir("/").stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+        let mut keeper = keeper.spawn().expect("a shell starts");
+        let input = keeper.stdin.take().expect("it was asked for");
+        *self.keeper.lock().expect("nobody panics while holding it") = Some((keeper, input));
+        let begin = Instant::now();
+        while !self.answers() {
+            assert!(begin.elapsed() < START_TIMEOUT, "no PostgreSQL server: {}", self.log());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Whether it takes connections: it may listen before it does.
+    fn answers(&self) -> bool {
+        let listens = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).is_ok();
+        let port = self.port.to_string();
+        let mut ask = Command::new(self.programs.join("pg_isready"));
+        ask.args(["-q", "-h", "127.0.0.1", "-p", &port]);
+        listens && ask.status().is_ok_and(|status| status.success())
+    }
+
+    fn log(&self) -> String {
+        std::fs::read_to_string(self.data.join("log")).unwrap_or_default()
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let keeper = self.keeper.get_mut().ok().and_then(Option::take);
+        if let Some((mut keeper, input)) = keeper {
+            // The keeper sees the end of its input, and tidies up.
+            drop(input);
+            let _ = keeper.wait();
+        } else {
+            let _ = std::fs::remove_dir_all(&self.data);
+        }
+    }
+}
+
+fn initialise(programs: &Path, data: &Path) {
+    let mut command = as_somebody(&programs.join("initdb"));
+    command.args(["--no-sync", "--auth=trust", "--username=postgres", "--encoding=UTF8"]);
+    succeed(command.args(["--locale=C", "-D"]).arg(data).current_dir("/"));
+}
+
+/// A port that nobody listens on now.
+fn free_port() -> u16 {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("loopback has ports");
+    listener.local_addr().expect("a bound socket has an address").port()
+}
+
+fn succeed(command: &mut Command) {
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}: {said}");
+}
