@@ -6,6 +6,7 @@
 mod axis;
 mod chart;
 mod evaluation_page;
+mod farm_page;
 mod map_picture;
 mod models_page;
 mod number;
@@ -15,5 +16,6 @@ mod spectrum_picture;
 mod track_picture;
 
 pub use evaluation_page::evaluation_page;
+pub use farm_page::{Farm, FarmCampaign, FarmWorker, duration, farm_page, farm_view};
 pub use models_page::{Tested, models_page};
 pub use receptance::{ReceptanceCurve, receptance_chart};

@@ -32,6 +32,17 @@ code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.85rem}
 
 /// A whole page: a heading, one sentence that says it all, the rest.
 pub(crate) fn page(title: &str, summary: &str, body: &Markup) -> String {
+    page_with(title, summary, &Markup::default(), body, &Markup::default())
+}
+
+/// A whole page, with more in its head and behind its end.
+pub(crate) fn page_with(
+    title: &str,
+    summary: &str,
+    head: &Markup,
+    body: &Markup,
+    end: &Markup,
+) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -41,11 +52,13 @@ pub(crate) fn page(title: &str, summary: &str, body: &Markup) -> String {
                 meta name="color-scheme" content="light dark";
                 title { (title) }
                 style { (PreEscaped(CHART_STYLE)) (PreEscaped(PAGE_STYLE)) }
+                (head)
             }
             body {
                 header { h1 { (title) } p.summary { (summary) } }
                 main { (body) }
                 footer { p { "tracktwin " (env!("CARGO_PKG_VERSION")) } }
+                (end)
             }
         }
     };

@@ -1,12 +1,23 @@
 //! Hands cases to workers and takes their results.
 //!
 //! Owns the gRPC service and its decisions; the queue itself is the library's, so that nothing of
-//! it is lost with this process.
+//! it is lost with this process, and so that several coordinators may serve one library.
 
+mod audits;
 mod batch;
+mod breaker;
+mod campaigns;
+mod counts;
+mod messages;
 mod policy;
+mod roster;
 mod service;
+mod settings;
 
 pub use batch::Pace;
-pub use policy::{ATTEMPTS_MAX, after_attempt};
-pub use service::{Dispatch, DispatchError, Timing};
+pub use breaker::Breaker;
+pub use campaigns::DispatchError;
+pub use counts::Counts;
+pub use policy::{FAILURES_MAX, LOSSES_MAX, after_attempt};
+pub use service::Dispatch;
+pub use settings::{Clock, Scope, Settings, Timing};

@@ -2,19 +2,23 @@
 
 use tracktwin_library::{Ending, State};
 
-/// Attempts after which a case is given up.
+/// Attempts after which a case that fails is given up.
 ///
-/// Three is the usual choice: one lost machine and one unlucky restart are forgiven, and a case
-/// that kills its workers kills no more than three.
-pub const ATTEMPTS_MAX: u32 = 3;
+/// Three is the usual choice: the next worker may be the sound one. Simulations are pure, so three
+/// failures are the case's own.
+pub const FAILURES_MAX: u32 = 3;
+
+/// Attempts after which a case that loses its workers is given up.
+///
+/// A lost worker takes its whole lease with it, and where a scheduler takes nodes away every few
+/// seconds an innocent case may lose several in a row. One that kills its workers stops after ten.
+pub const LOSSES_MAX: u32 = 10;
 
 /// Where a case goes after so many attempts without result, the last of which ended so.
-///
-/// A failure is tried again like a lost lease: the next worker may be the sound one. Simulations
-/// are pure, so three failures are the case's own.
 pub const fn after_attempt(ending: Ending, attempts: u32) -> State {
     match ending {
-        Ending::Failed | Ending::Lost if attempts < ATTEMPTS_MAX => State::Waiting,
+        Ending::Failed if attempts < FAILURES_MAX => State::Waiting,
+        Ending::Lost if attempts < LOSSES_MAX => State::Waiting,
         Ending::Failed | Ending::Lost => State::Failed,
     }
 }
@@ -24,10 +28,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_case_is_given_up_after_three_attempts_however_they_ended() {
-        for ending in [Ending::Failed, Ending::Lost] {
-            let states = [1, 2, 3, 4].map(|attempts| after_attempt(ending, attempts));
-            assert_eq!(states, [State::Waiting, State::Waiting, State::Failed, State::Failed]);
-        }
+    fn a_case_is_given_up_after_three_failures_or_ten_lost_workers() {
+        let states = |ending| [1, 2, 3, 9, 10].map(|attempts| after_attempt(ending, attempts));
+        let (wait, give_up) = (State::Waiting, State::Failed);
+        assert_eq!(states(Ending::Failed), [wait, wait, give_up, give_up, give_up]);
+        assert_eq!(states(Ending::Lost), [wait, wait, wait, wait, give_up]);
     }
 }

@@ -1,143 +1,240 @@
 //! The gRPC service: messages in, library calls, messages out.
 
-use super::{Pace, after_attempt};
-use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard};
-use std::time::{Duration, Instant};
+use super::audits::{self, Audits, Found};
+use super::campaigns::{Campaigns, DispatchError, Served};
+use super::messages::{held, library_report, malformed, unavailable, unfit, verdict_message};
+use super::roster::{Roster, Standing};
+use super::settings::Settings;
+use super::{Counts, after_attempt};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::time::Instant;
 use tonic::{Request, Response, Status};
-use tracktwin_library::{
-    self as library, CampaignRecord, Held, LeaseRequest, Library, LibraryError, Report, Verdict,
-};
+use tracktwin_library::{self as library, Ending, LeaseRequest, Library, Report, State, Verdict, WorkerState};
 use tracktwin_protocol::farm::farm_server::Farm;
 use tracktwin_protocol::{
-    BadMessage, CaseLease, CaseReport, Lease, LeasedCase, Outcome, PROTOCOL_VERSION, Registration,
-    Shape, farm, held_from_messages, held_to_messages,
+    CaseLease, CaseReport, Lease, LeasedCase, Outcome, Registration, farm, held_to_messages,
 };
-use tracktwin_worker::{CODE_VERSION, Experiment, ExperimentError, MODEL_HASH};
 
-/// A worker that was not heard of for so long is forgotten; if it comes back, it registers anew.
-const FORGET_AFTER: Duration = Duration::from_mins(10);
+/// After the library had no case to give, it is not asked again for so long.
+const NOTHING: Duration = Duration::from_millis(100);
 
-/// How long leases last, and what follows from it.
-#[derive(Clone, Copy, Debug)]
-pub struct Timing {
-    /// A lease that is not renewed for so long has lost its worker.
-    pub lease: Duration,
-    /// How often workers renew.
-    pub heartbeat: Duration,
-    /// When a worker that got no cases asks again.
-    pub retry: Duration,
-}
+/// Workers without work that may ask once a second all together.
+const IDLE_CALLS_S: f64 = 400.0;
 
-impl Default for Timing {
-    /// Three heartbeats may be lost; a dead worker's cases go to others within 12 s.
-    fn default() -> Self {
-        Self {
-            lease: Duration::from_secs(12),
-            heartbeat: Duration::from_secs(3),
-            retry: Duration::from_millis(500),
-        }
-    }
-}
-
-/// Why a campaign can't be dispatched.
-#[derive(Debug, thiserror::Error)]
-pub enum DispatchError {
-    /// The library can't be read.
-    #[error(transparent)]
-    Library(#[from] LibraryError),
-    /// Its experiment can't be done by this version.
-    #[error("campaign {campaign}: {source}")]
-    Experiment {
-        /// The campaign.
-        campaign: String,
-        /// Why not.
-        source: ExperimentError,
-    },
-}
-
-/// The farm's service, for one campaign of a library.
+/// The farm's service, for the campaigns of a library.
 pub struct Dispatch {
     library: Library,
-    campaign: CampaignRecord,
-    /// Only cases with a smaller index.
-    cases: u32,
-    shape: Shape,
-    timing: Timing,
-    pace: Mutex<Pace>,
-    workers: Mutex<HashMap<String, Worker>>,
-}
-
-/// A registered worker.
-struct Worker {
-    code_version: String,
-    model_hash: String,
-    heard_of: Instant,
+    settings: Settings,
+    campaigns: Campaigns,
+    roster: Roster,
+    audits: Audits,
+    nothing_until: Mutex<Option<Instant>>,
+    counts: Counts,
 }
 
 impl Dispatch {
-    /// The service that hands out the first `cases` cases of a campaign.
-    ///
-    /// # Errors
-    /// [`DispatchError`] when the campaign is not there, or this version can't do its experiment.
-    pub async fn new(
-        library: Library,
-        campaign: &str,
-        cases: u32,
-        timing: Timing,
-    ) -> Result<Self, DispatchError> {
-        let campaign = library.campaign(campaign).await?;
-        let experiment = Experiment::from_json(&campaign.experiment_json).map_err(|source| {
-            DispatchError::Experiment { campaign: campaign.id.clone(), source }
-        })?;
-        let shape = Shape {
-            bins: experiment.features.frequencies_hz().len(),
-            speeds_km_h: experiment.speeds_km_h,
-        };
-        let (pace, workers) = (Mutex::default(), Mutex::default());
-        Ok(Self { library, campaign, cases, shape, timing, pace, workers })
-    }
-
-    fn workers(&self) -> MutexGuard<'_, HashMap<String, Worker>> {
-        self.workers.lock().expect("nobody panics while holding it")
-    }
-
-    fn pace(&self) -> MutexGuard<'_, Pace> {
-        self.pace.lock().expect("nobody panics while holding it")
-    }
-
-    /// Version and model hash of a worker; one that has not registered is told to.
-    fn known(&self, worker: &str) -> Result<(String, String), Status> {
-        match self.workers().get_mut(worker) {
-            Some(known) => {
-                known.heard_of = Instant::now();
-                Ok((known.code_version.clone(), known.model_hash.clone()))
-            }
-            None => Err(Status::unauthenticated("register first")),
+    /// A service that hands out what `settings` say of a library.
+    pub fn new(library: Library, settings: Settings, counts: Counts) -> Self {
+        Self {
+            campaigns: Campaigns::new(library.clone()),
+            audits: Audits::new(library.clone(), &settings),
+            roster: Roster::default(),
+            nothing_until: Mutex::default(),
+            library,
+            settings,
+            counts,
         }
     }
 
-    /// Stores checked reports of this campaign.
+    /// Whether this version can do a campaign's experiment.
+    ///
+    /// # Errors
+    /// [`DispatchError`] when it can't, or the library can't be read.
+    pub async fn check(&self, campaign: &str) -> Result<(), DispatchError> {
+        self.campaigns.of(campaign).await.map(drop)
+    }
+
+    fn now_unix_ms(&self) -> i64 {
+        match &self.settings.clock {
+            Some(clock) => clock(),
+            None => self.library.now_unix_ms(),
+        }
+    }
+
+    /// How a worker stands; one that has not registered is told to.
+    async fn standing(&self, worker: &str) -> Result<Standing, Status> {
+        let stranger = || Status::unauthenticated("register first");
+        let standing = self.roster.standing(worker).ok_or_else(stranger)?;
+        if !standing.to_be_noted {
+            return Ok(standing);
+        }
+        let known = self.library.heartbeat(worker, self.now_unix_ms()).await;
+        if let Some(record) = known.map_err(|error| unavailable(&error))? {
+            self.roster.quarantine(worker, record.state, record.reason);
+        }
+        self.roster.standing(worker).ok_or_else(stranger)
+    }
+
+    /// Cases for a worker that is to have some.
+    async fn hand_out(&self, worker: &str, cases_max: u32) -> Result<Lease, Status> {
+        let failed = |error: &DispatchError| {
+            tracing::error!("no cases can be handed out: {error:?}");
+            Status::unavailable(error.to_string())
+        };
+        let audit = self.audits.lease(worker, &self.campaigns).await;
+        if let Some(lease) = audit.map_err(|error| failed(&error))? {
+            return Ok(Lease::Cases(lease));
+        }
+        if self.had_nothing() {
+            return Ok(self.none_now());
+        }
+        let scope = self.settings.scope.as_ref();
+        let request = LeaseRequest {
+            campaign: scope.map(|scope| scope.campaign.clone()),
+            indices_below: scope.map_or(u32::MAX, |scope| scope.cases),
+            worker: worker.to_owned(),
+            cases_max: cases_max.min(self.campaigns.cases_per_lease()),
+            now_unix_ms: self.now_unix_ms(),
+            lease_ms: unix_ms(self.settings.timing.lease),
+            after_loss: after_attempt,
+        };
+        let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
+        let Some(leased) = leased else {
+            let mut until = self.nothing_until.lock().expect("nobody panics while holding it");
+            *until = Some(Instant::now() + NOTHING.min(self.settings.timing.retry));
+            return Ok(self.none_now());
+        };
+        match self.campaigns.of(&leased.campaign).await {
+            Ok(served) => {
+                self.campaigns.leased(&served);
+                self.counts.leased.inc_by(leased.cases.len() as u64);
+                let cases = leased.cases.into_iter();
+                let cases = cases.map(|it| LeasedCase { case: it.case, epoch: it.epoch });
+                Ok(Lease::Cases(served.lease(cases.collect(), self.settings.timing.lease)))
+            }
+            Err(error) => {
+                self.give_up_campaign(worker, &leased).await;
+                Err(failed(&error))
+            }
+        }
+    }
+
+    /// A campaign that this version can't do must not hold up the others.
+    async fn give_up_campaign(&self, worker: &str, leased: &library::Lease) {
+        let held = leased.cases.iter();
+        let held = held.map(|it| library::Held { index: it.case.index, epoch: it.epoch });
+        let released = self.library.release(&leased.campaign, worker, held.collect()).await;
+        let paused = self.library.pause(&leased.campaign).await;
+        tracing::error!("campaign {} is paused: {released:?}, {paused:?}", leased.campaign);
+    }
+
+    fn had_nothing(&self) -> bool {
+        let until = self.nothing_until.lock().expect("nobody panics while holding it");
+        until.is_some_and(|until| until > Instant::now())
+    }
+
+    /// The more workers have nothing to do, the less often each asks.
+    fn none_now(&self) -> Lease {
+        let (workers, cores) = self.roster.present();
+        let crowd = f64::from(cores).max(workers as f64) / IDLE_CALLS_S;
+        let retry_after_s = self.settings.timing.retry.as_secs_f64().max(crowd);
+        Lease::NoneNow { retry_after_s, reason: None }
+    }
+
+    /// Stores checked reports; those of audits are compared instead.
     async fn store(
         &self,
-        worker: String,
-        provenance: (String, String),
+        worker: &str,
+        standing: Standing,
+        served: &Arc<Served>,
         reports: Vec<CaseReport>,
     ) -> Result<Vec<Verdict>, Status> {
-        let (code_version, model_hash) = provenance;
+        let mut verdicts = vec![Verdict::Refused; reports.len()];
+        let mut places = Vec::new();
+        let mut ordinary = Vec::new();
+        for (place, report) in reports.into_iter().enumerate() {
+            if report.epoch == audits::EPOCH {
+                verdicts[place] = self.audited(worker, served, &report).await?;
+            } else {
+                places.push(place);
+                ordinary.push(report);
+            }
+        }
+        if ordinary.is_empty() {
+            return Ok(verdicts);
+        }
+        let failed: Vec<bool> =
+            ordinary.iter().map(|it| matches!(it.outcome, Outcome::Failed { .. })).collect();
+        let durations_s: Vec<f64> = ordinary.iter().map(|it| it.duration_s).collect();
         let report = Report {
-            campaign: self.campaign.id.clone(),
-            worker,
-            code_version,
-            model_hash,
-            experiment_hash: self.campaign.experiment_hash.clone(),
-            speeds_km_h: self.shape.speeds_km_h.clone(),
-            cases: reports.into_iter().map(library_report).collect(),
-            now_unix_ms: self.library.now_unix_ms(),
+            campaign: served.record.id.clone(),
+            worker: worker.to_owned(),
+            code_version: standing.code_version,
+            model_hash: standing.model_hash,
+            experiment_hash: served.record.experiment_hash.clone(),
+            speeds_km_h: served.shape.speeds_km_h.clone(),
+            cases: ordinary.into_iter().map(library_report).collect(),
+            now_unix_ms: self.now_unix_ms(),
             after_failure: after_attempt,
-            audit_share: 0.0,
+            audit_share: self.settings.audit_share,
         };
-        self.library.report(report).await.map_err(|error| unavailable(&error))
+        let stored = self.library.report(report).await.map_err(|error| unavailable(&error))?;
+        served.measured(durations_s);
+        if self.settings.put_aside && self.roster.reported(worker, &failed) {
+            tracing::warn!(worker, "put aside: it fails where other workers don't");
+            self.counts.put_aside.inc();
+        }
+        for (place, verdict) in places.into_iter().zip(stored) {
+            verdicts[place] = verdict;
+        }
+        Ok(verdicts)
+    }
+
+    async fn audited(
+        &self,
+        worker: &str,
+        served: &Arc<Served>,
+        report: &CaseReport,
+    ) -> Result<Verdict, Status> {
+        let found = self.audits.report(worker, served, report).await;
+        Ok(match found.map_err(|error| unavailable(&error))? {
+            None => Verdict::Refused,
+            Some(Found::Agreement) => {
+                self.counts.audited.inc();
+                Verdict::Duplicate
+            }
+            Some(Found::Wrong { worker, reason }) => {
+                self.counts.audited.inc();
+                self.counts.differed.inc();
+                self.roster.quarantine(&worker, WorkerState::Quarantined, Some(reason));
+                Verdict::Duplicate
+            }
+        })
+    }
+
+    fn count(&self, verdicts: &[Verdict]) {
+        for verdict in verdicts {
+            match verdict {
+                Verdict::Stored => self.counts.stored.inc(),
+                Verdict::Duplicate => self.counts.duplicates.inc(),
+                Verdict::Late => self.counts.late.inc(),
+                Verdict::Refused => self.counts.refused.inc(),
+            };
+        }
+    }
+}
+
+impl Served {
+    /// These cases, for a while.
+    pub(crate) fn lease(&self, cases: Vec<LeasedCase>, lease: Duration) -> CaseLease {
+        CaseLease {
+            campaign: self.record.id.clone(),
+            experiment_json: self.record.experiment_json.clone(),
+            experiment_hash: self.record.experiment_hash.clone(),
+            lease_s: lease.as_secs_f64(),
+            cases,
+        }
     }
 }
 
@@ -149,27 +246,26 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::RegisterResponse>, Status> {
         let registration =
             Registration::try_from(request.into_inner()).map_err(|error| malformed(&error))?;
-        let Registration { worker, code_version, model_hash, protocol_version, .. } = registration;
-        if protocol_version != PROTOCOL_VERSION {
-            tracing::warn!("worker {worker} (version {code_version}) refused: other protocol");
-            return Err(Status::failed_precondition(other_protocol(
-                &worker,
-                &code_version,
-                protocol_version,
-            )));
+        if let Some(reason) = unfit(&registration) {
+            tracing::warn!("refused: {reason}");
+            self.counts.unfit.inc();
+            return Err(Status::failed_precondition(reason));
         }
-        if model_hash != MODEL_HASH {
-            tracing::warn!("worker {worker} (version {code_version}) refused: other physics");
-            return Err(Status::failed_precondition(format!(
-                "worker {worker} simulates other physics than this coordinator: its model hash is \
-                 {model_hash} (version {code_version}), here it is {MODEL_HASH} (version \
-                 {CODE_VERSION}); install the coordinator's version"
-            )));
+        let Registration { worker, code_version, model_hash, cores, .. } = registration.clone();
+        let full = |_| Status::resource_exhausted("too many workers have registered");
+        self.roster.add(registration).map_err(full)?;
+        let now_unix_ms = self.now_unix_ms();
+        tracing::info!(worker, code_version, cores, "worker registered");
+        let registration =
+            library::Registration { worker: worker.clone(), code_version, model_hash, cores, now_unix_ms };
+        let state = self.library.register_worker(registration).await;
+        if state.map_err(|error| unavailable(&error))? == WorkerState::Quarantined {
+            let record = self.library.worker(&worker).await.map_err(|error| unavailable(&error))?;
+            let reason = record.and_then(|record| record.reason);
+            self.roster.quarantine(&worker, WorkerState::Quarantined, reason);
         }
-        let mut workers = self.workers();
-        workers.retain(|_, worker| worker.heard_of.elapsed() < FORGET_AFTER);
-        workers.insert(worker, Worker { code_version, model_hash, heard_of: Instant::now() });
-        let heartbeat_s = self.timing.heartbeat.as_secs_f64();
+        self.counts.registered.inc();
+        let heartbeat_s = self.settings.timing.heartbeat.as_secs_f64();
         Ok(Response::new(farm::RegisterResponse { heartbeat_s }))
     }
 
@@ -177,32 +273,17 @@ impl Farm for Dispatch {
         &self,
         request: Request<farm::LeaseRequest>,
     ) -> Result<Response<farm::LeaseResponse>, Status> {
+        let begun = Instant::now();
         let farm::LeaseRequest { worker, cases_max } = request.into_inner();
-        self.known(&worker)?;
-        let cases_max = cases_max.min(self.pace().cases_per_lease());
-        let request = LeaseRequest {
-            campaign: Some(self.campaign.id.clone()),
-            indices_below: self.cases,
-            worker,
-            cases_max,
-            now_unix_ms: self.library.now_unix_ms(),
-            lease_ms: unix_ms(self.timing.lease),
-            after_loss: after_attempt,
+        let standing = self.standing(&worker).await?;
+        let lease = match standing.aside {
+            Some((wait, reason)) => {
+                Lease::NoneNow { retry_after_s: wait.as_secs_f64(), reason: Some(reason) }
+            }
+            None if standing.on_trial => self.hand_out(&worker, cases_max.min(1)).await?,
+            None => self.hand_out(&worker, cases_max).await?,
         };
-        let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
-        let lease = match leased {
-            None => Lease::NoneNow { retry_after_s: self.timing.retry.as_secs_f64(), reason: None },
-            Some(library::Lease { campaign, cases }) => Lease::Cases(CaseLease {
-                campaign,
-                experiment_json: self.campaign.experiment_json.clone(),
-                experiment_hash: self.campaign.experiment_hash.clone(),
-                lease_s: self.timing.lease.as_secs_f64(),
-                cases: cases
-                    .into_iter()
-                    .map(|library::Leased { case, epoch }| LeasedCase { case, epoch })
-                    .collect(),
-            }),
-        };
+        self.counts.lease_s.observe(begun.elapsed().as_secs_f64());
         Ok(Response::new(lease.into()))
     }
 
@@ -212,12 +293,15 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::RenewResponse>, Status> {
         // Without registration too: leases outlive a restart of the coordinator.
         let farm::RenewRequest { worker, campaign_id, cases } = request.into_inner();
-        let until = self.library.now_unix_ms().saturating_add(unix_ms(self.timing.lease));
-        let lost = self
-            .library
-            .renew(&campaign_id, &worker, held(cases)?, until)
-            .await
-            .map_err(|error| unavailable(&error))?;
+        let until = self.now_unix_ms().saturating_add(unix_ms(self.settings.timing.lease));
+        // Audits are not leases of the library, and long enough.
+        let held = held(cases)?.into_iter().filter(|held| held.epoch != audits::EPOCH).collect();
+        let lost = self.library.renew(&campaign_id, &worker, held, until).await;
+        let lost = lost.map_err(|error| unavailable(&error))?;
+        if self.roster.standing(&worker).is_some_and(|standing| standing.to_be_noted) {
+            let noted = self.library.heartbeat(&worker, self.now_unix_ms()).await;
+            noted.map_err(|error| unavailable(&error))?;
+        }
         let lost = held_to_messages(lost.into_iter().map(|held| (held.index, held.epoch)));
         Ok(Response::new(farm::RenewResponse { lost }))
     }
@@ -226,27 +310,32 @@ impl Farm for Dispatch {
         &self,
         request: Request<farm::ReportRequest>,
     ) -> Result<Response<farm::ReportResponse>, Status> {
+        let begun = Instant::now();
         let farm::ReportRequest { worker, campaign_id, experiment_hash, cases } =
             request.into_inner();
-        let provenance = self.known(&worker)?;
+        let standing = self.standing(&worker).await?;
         let indices: Vec<u32> = cases.iter().map(|case| case.sobol_index).collect();
-        let ours =
-            campaign_id == self.campaign.id && experiment_hash == self.campaign.experiment_hash;
-        let verdicts = if ours {
-            let reports = CaseReport::all_checked(cases, &self.shape);
-            let reports = reports.map_err(|error| malformed(&error))?;
-            let durations: Vec<f64> = reports.iter().map(|report| report.duration_s).collect();
-            let verdicts = self.store(worker, provenance, reports).await?;
-            for case_s in durations {
-                self.pace().measured(case_s);
-            }
-            verdicts
-        } else {
-            vec![Verdict::Refused; indices.len()]
+        let served = match self.campaigns.of(&campaign_id).await {
+            Ok(served) => Some(served).filter(|it| it.record.experiment_hash == experiment_hash),
+            Err(DispatchError::Library(library::LibraryError::UnknownCampaign { .. })) => None,
+            Err(error) => return Err(Status::unavailable(error.to_string())),
         };
+        let verdicts = match served {
+            Some(served) => {
+                let reports = CaseReport::all_checked(cases, &served.shape).map_err(|error| {
+                    tracing::warn!(worker, "report refused: {error}");
+                    self.counts.malformed.inc();
+                    malformed(&error)
+                })?;
+                self.store(&worker, standing, &served, reports).await?
+            }
+            None => vec![Verdict::Refused; indices.len()],
+        };
+        self.count(&verdicts);
         let receipts = indices.into_iter().zip(verdicts).map(|(sobol_index, verdict)| {
             farm::Receipt { sobol_index, verdict: verdict_message(verdict).into() }
         });
+        self.counts.report_s.observe(begun.elapsed().as_secs_f64());
         Ok(Response::new(farm::ReportResponse { receipts: receipts.collect() }))
     }
 
@@ -261,52 +350,6 @@ impl Farm for Dispatch {
             .map_err(|error| unavailable(&error))?;
         Ok(Response::new(farm::ReleaseResponse {}))
     }
-}
-
-/// What a worker is told that speaks another protocol.
-fn other_protocol(worker: &str, version: &str, protocol: u32) -> String {
-    let mend = if protocol < PROTOCOL_VERSION {
-        "update the worker to the coordinator's version"
-    } else {
-        "install the coordinator's version on the worker, or update the coordinator"
-    };
-    format!(
-        "worker {worker} (version {version}) speaks protocol {protocol}, this coordinator (version \
-         {CODE_VERSION}) speaks {PROTOCOL_VERSION}: {mend}"
-    )
-}
-
-fn held(messages: Vec<farm::HeldCase>) -> Result<Vec<Held>, Status> {
-    let held = held_from_messages(messages).map_err(|error| malformed(&error))?;
-    Ok(held.into_iter().map(|(index, epoch)| Held { index, epoch }).collect())
-}
-
-fn library_report(report: CaseReport) -> library::CaseReport {
-    let CaseReport { index, epoch, parameter_hash, duration_s, outcome } = report;
-    let outcome = match outcome {
-        Outcome::Finished(passes) => Ok(passes.into_iter().map(|pass| pass.features).collect()),
-        Outcome::Failed { reason } => Err(reason),
-    };
-    library::CaseReport { index, epoch, parameter_hash, duration_s, outcome }
-}
-
-const fn verdict_message(verdict: Verdict) -> farm::Verdict {
-    match verdict {
-        Verdict::Stored => farm::Verdict::Stored,
-        Verdict::Duplicate => farm::Verdict::Duplicate,
-        Verdict::Late => farm::Verdict::Late,
-        Verdict::Refused => farm::Verdict::Refused,
-    }
-}
-
-fn malformed(error: &BadMessage) -> Status {
-    Status::invalid_argument(error.to_string())
-}
-
-/// The worker asks again; what is wrong with the library is the coordinator's to say.
-fn unavailable(error: &LibraryError) -> Status {
-    tracing::error!("the library does not answer: {error:?}");
-    Status::unavailable(error.to_string())
 }
 
 fn unix_ms(duration: Duration) -> i64 {

@@ -1,0 +1,353 @@
+//! How far a farm is: campaigns, workers, newest results, and the space covered so far.
+
+use crate::axis::Axis;
+use crate::chart::Chart;
+use crate::number::{Shown, significant};
+use crate::page::{figure, page_with};
+use maud::{Markup, PreEscaped, html};
+use tracktwin_parameters::{Parameter, ParameterSet};
+
+const SPECTRUM: [f64; 2] = [560.0, 300.0];
+const SCATTER: [f64; 2] = [420.0, 300.0];
+const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
+
+/// Pairs of parameters whose plane is shown.
+const PLANES: [[Parameter; 2]; 2] = [
+    [Parameter::RailpadStiffness, Parameter::BallastStiffness],
+    [Parameter::RailpadDamping, Parameter::BallastDamping],
+];
+
+/// What the page adds to every page's style.
+const STYLE: &str = "
+.progress{display:flex;height:1rem;background:var(--faint);max-width:60rem;margin:.4rem 0}.progress i{display:block}
+.progress .finished{background:var(--c)}.progress .leased{background:var(--f)}.progress .failed{background:var(--b)}
+form{display:inline}button,input{font:inherit;font-size:.88rem;padding:.15rem .6rem}.state{font-weight:600}.bad{color:var(--b);font-weight:600}
+";
+
+/// Asks for the page's middle every other second; without it the page says how it was.
+const SCRIPT: &str = "
+setInterval(async()=>{try{const answer=await fetch('view');if(answer.ok)document.querySelector('main').innerHTML=await answer.text();
+document.querySelector('footer').style.opacity=1}catch{document.querySelector('footer').style.opacity=.3}},2000)
+";
+
+/// Everything that the page shows, at one moment.
+#[derive(Clone, Debug, Default)]
+pub struct Farm {
+    /// What the library is called.
+    pub library: String,
+    /// When, for people.
+    pub at: String,
+    /// The campaigns, in the order they are worked on.
+    pub campaigns: Vec<FarmCampaign>,
+    /// The workers, those heard of last first.
+    pub workers: Vec<FarmWorker>,
+    /// Whether the reader may press buttons.
+    pub may_control: bool,
+}
+
+/// A campaign as it stands.
+#[derive(Clone, Debug, Default)]
+pub struct FarmCampaign {
+    /// Its id.
+    pub id: String,
+    /// `running`, `paused` or `cancelled`.
+    pub state: String,
+    /// Cases of the largest are handed out first.
+    pub priority: i64,
+    /// Cases nobody works on.
+    pub waiting: u32,
+    /// Cases that workers hold.
+    pub leased: u32,
+    /// Cases with results.
+    pub finished: u32,
+    /// Cases that were given up.
+    pub failed: u32,
+    /// Cases finished a second, lately.
+    pub per_second: f64,
+    /// Why cases were given up, and how many so.
+    pub causes: Vec<(String, u32)>,
+    /// Frequencies of the spectra in Hz.
+    pub frequencies_hz: Vec<f64>,
+    /// ln LWPS of the newest cases at the fastest speed, with what each is called.
+    pub newest: Vec<(String, Vec<f64>)>,
+    /// Finished cases, or an even share of them where there are many.
+    pub covered: Vec<ParameterSet>,
+    /// Cases that were given up.
+    pub given_up: Vec<ParameterSet>,
+}
+
+/// A worker as it was last heard of.
+#[derive(Clone, Debug, Default)]
+pub struct FarmWorker {
+    /// Its name.
+    pub id: String,
+    /// Version of its program.
+    pub code_version: String,
+    /// Groups of cases it simulates at a time.
+    pub cores: u32,
+    /// Results it has brought.
+    pub finished: u64,
+    /// Failures it has reported.
+    pub failed: u64,
+    /// Mean computing time of a case in s.
+    pub case_s: Option<f64>,
+    /// For how long it was not heard of, in s.
+    pub silent_s: f64,
+    /// Why it gets no cases, if so.
+    pub aside: Option<String>,
+}
+
+impl FarmCampaign {
+    /// All cases.
+    pub const fn cases(&self) -> u32 {
+        self.waiting + self.leased + self.finished + self.failed
+    }
+
+    /// How long the rest takes at the present rate, in s.
+    pub fn eta_s(&self) -> Option<f64> {
+        let left = f64::from(self.waiting + self.leased);
+        (self.per_second > 0.0 && left > 0.0).then(|| left / self.per_second)
+    }
+}
+
+/// The whole page.
+pub fn farm_page(farm: &Farm) -> String {
+    let head = html! { style { (PreEscaped(STYLE)) } };
+    let script = html! { script { (PreEscaped(SCRIPT)) } };
+    page_with("The farm", &summary(farm), &head, &farm_view(farm), &script)
+}
+
+/// The middle of the page, which changes.
+pub fn farm_view(farm: &Farm) -> Markup {
+    html! {
+        p.note { "library " code { (farm.library) } ", " (farm.at) }
+        @if farm.campaigns.is_empty() {
+            p { "No campaign yet: " code { "tracktwin campaign add FILE --library URL" } " adds one." }
+        }
+        @for campaign in &farm.campaigns { (campaign_part(campaign, farm.may_control)) }
+        h2 { "Workers" }
+        (workers(&farm.workers))
+        @if !farm.may_control { (login()) }
+    }
+}
+
+/// What a reader in a hurry needs, in one sentence.
+fn summary(farm: &Farm) -> String {
+    let running =
+        farm.campaigns.iter().filter(|it| it.state == "running" && it.waiting + it.leased > 0);
+    let rate: f64 = farm.campaigns.iter().map(|campaign| campaign.per_second).sum();
+    let alive = farm.workers.iter().filter(|worker| worker.silent_s < 60.0).count();
+    format!(
+        "{} campaigns, {} of them with work to do; {alive} workers; {} cases a second.",
+        farm.campaigns.len(),
+        running.count(),
+        significant(rate)
+    )
+}
+
+fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
+    let FarmCampaign { waiting, leased, finished, failed, .. } = campaign;
+    html! {
+        section {
+            h2 { (campaign.id) " " span.state { (campaign.state) } }
+            (progress(campaign))
+            p {
+                (finished) " of " (campaign.cases()) " cases finished, " (leased) " in work, "
+                (waiting) " waiting, "
+                span.bad[*failed > 0] { (failed) " given up" } "; "
+                (significant(campaign.per_second)) " a second, "
+                (campaign.eta_s().map_or_else(|| "nothing left to wait for".to_owned(), |eta| format!("{} left", duration(eta))))
+                @if campaign.priority != 0 { ", priority " (campaign.priority) }
+            }
+            @if may_control { (buttons(campaign)) }
+            @if !campaign.causes.is_empty() { (causes(&campaign.causes)) }
+            (figure(&pictures(campaign), "Left: local wavelet power spectra of the newest cases at the fastest speed. Right: finished cases in the parameter space; given-up ones in the second colour."))
+        }
+    }
+}
+
+fn progress(campaign: &FarmCampaign) -> Markup {
+    let share = |count: u32| 100.0 * f64::from(count) / f64::from(campaign.cases().max(1));
+    html! {
+        div.progress role="progressbar" aria-valuenow=(campaign.finished) aria-valuemax=(campaign.cases()) {
+            @for (class, count) in [("finished", campaign.finished), ("failed", campaign.failed), ("leased", campaign.leased)] {
+                i class=(class) style=(format!("width:{:.3}%", share(count))) {}
+            }
+        }
+    }
+}
+
+fn buttons(campaign: &FarmCampaign) -> Markup {
+    let button = |action: &str| {
+        html! {
+            form method="post" action=(format!("campaign/{action}")) {
+                input type="hidden" name="campaign" value=(campaign.id);
+                button { (action) }
+            }
+            " "
+        }
+    };
+    html! {
+        p {
+            @if campaign.state == "running" { (button("pause")) } @else { (button("resume")) }
+            @if campaign.failed > 0 { (button("retry")) }
+        }
+    }
+}
+
+fn causes(causes: &[(String, u32)]) -> Markup {
+    html! {
+        table {
+            thead { tr { th.words { "given up because" } th { "cases" } } }
+            tbody { @for (cause, count) in causes { tr { td.words { (cause) } td { (count) } } } }
+        }
+    }
+}
+
+fn workers(workers: &[FarmWorker]) -> Markup {
+    html! {
+        div.scroll { table {
+            thead { tr {
+                th { "worker" } th { "version" } th { "cores" } th { "finished" } th { "failed" }
+                th { "computing time" small { "s a case" } } th { "heard of" small { "s ago" } }
+                th.words { "" }
+            } }
+            tbody {
+                @for worker in workers { tr {
+                    td { (worker.id) } td { (worker.code_version) } td { (worker.cores) }
+                    td { (worker.finished) } td { (worker.failed) }
+                    td { (worker.case_s.map(significant).unwrap_or_default()) }
+                    td { (format!("{:.0}", worker.silent_s)) }
+                    td.words.bad { (worker.aside.as_deref().unwrap_or_default()) }
+                } }
+            }
+        } }
+    }
+}
+
+fn login() -> Markup {
+    html! {
+        form method="post" action="login" {
+            label { "Token, to pause, resume and retry: " input type="password" name="token"; }
+            " " button { "unlock" }
+        }
+    }
+}
+
+fn pictures(campaign: &FarmCampaign) -> Vec<String> {
+    let mut pictures = Vec::new();
+    if !campaign.newest.is_empty() {
+        pictures.push(spectra(campaign));
+    }
+    if !campaign.covered.is_empty() || !campaign.given_up.is_empty() {
+        pictures.extend(PLANES.map(|plane| scatter(campaign, plane)));
+    }
+    pictures
+}
+
+fn spectra(campaign: &FarmCampaign) -> String {
+    // ln of a power to dB.
+    let decibel = 10.0 / std::f64::consts::LN_10;
+    let frequencies = &campaign.frequencies_hz;
+    let (Some(&low), Some(&high)) = (frequencies.first(), frequencies.last()) else {
+        return String::new();
+    };
+    let levels = campaign.newest.iter().flat_map(|(_, values)| values);
+    let y = Axis::around("LWPS in dB re 1 (m/s²)²", levels.map(|value| decibel * value));
+    let x = Axis::logarithmic("frequency in Hz", low, high);
+    let mut chart = Chart::new("Newest cases", SPECTRUM, x, y);
+    for ((name, values), class) in campaign.newest.iter().zip(CLASSES) {
+        let points = frequencies.iter().zip(values);
+        chart.line(&format!("{class} thin"), points.map(|(&f, value)| (f, decibel * value)));
+        chart.explain(class, name);
+    }
+    chart.into_svg()
+}
+
+fn scatter(campaign: &FarmCampaign, [x, y]: [Parameter; 2]) -> String {
+    let axis = |parameter: Parameter| {
+        let shown = Shown::of(parameter);
+        let [low, high] = parameter.range();
+        let label = format!("{} in {}", parameter.label(), shown.unit);
+        Axis::linear(&label, low / shown.divisor, high / shown.divisor)
+    };
+    let [x_divisor, y_divisor] = [x, y].map(|parameter| Shown::of(parameter).divisor);
+    let points = |sets: &[ParameterSet]| -> Vec<(f64, f64)> {
+        sets.iter().map(|set| (set[x] / x_divisor, set[y] / y_divisor)).collect()
+    };
+    let mut chart = Chart::new("Parameter space", SCATTER, axis(x), axis(y));
+    chart.dots("c pale", 1.6, &points(&campaign.covered));
+    chart.dots("b", 3.0, &points(&campaign.given_up));
+    chart.into_svg()
+}
+
+/// A time as people say it: the two largest units that matter.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.max(0.0).round() as u64;
+    let (days, hours, minutes) = (whole / 86_400, whole / 3600 % 24, whole / 60 % 60);
+    match (days, hours, minutes) {
+        (0, 0, 0) => format!("{whole} s"),
+        (0, 0, _) => format!("{minutes} min {} s", whole % 60),
+        (0, ..) => format!("{hours} h {minutes} min"),
+        _ => format!("{days} d {hours} h"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn farm() -> Farm {
+        let campaign = FarmCampaign {
+            id: "a<b>-1234".to_owned(),
+            state: "running".to_owned(),
+            waiting: 60,
+            leased: 10,
+            finished: 29,
+            failed: 1,
+            per_second: 2.0,
+            causes: vec![("the sleeper floats".to_owned(), 1)],
+            frequencies_hz: vec![50.0, 500.0, 4000.0],
+            newest: vec![("case 7".to_owned(), vec![-1.0, 0.0, 1.0])],
+            covered: vec![ParameterSet::nominal()],
+            ..FarmCampaign::default()
+        };
+        let worker = FarmWorker {
+            id: "node-1".to_owned(),
+            aside: Some("in quarantine".to_owned()),
+            ..FarmWorker::default()
+        };
+        let (campaigns, workers) = (vec![campaign], vec![worker]);
+        Farm { campaigns, workers, may_control: true, ..Farm::default() }
+    }
+
+    #[test]
+    fn the_page_tells_progress_causes_and_workers_and_escapes_names() {
+        let page = farm_page(&farm());
+        for part in [
+            "29 of 100 cases finished",
+            "35 s left",
+            "the sleeper floats",
+            "in quarantine",
+            "case 7",
+            "Parameter space",
+        ] {
+            assert!(page.contains(part), "{part}");
+        }
+        assert!(page.contains("a&lt;b&gt;-1234") && !page.contains("a<b>"));
+    }
+
+    #[test]
+    fn buttons_stand_only_where_they_may_be_pressed() {
+        assert!(farm_page(&farm()).contains("campaign/pause"));
+        let locked = Farm { may_control: false, ..farm() };
+        let page = farm_page(&locked);
+        assert!(!page.contains("campaign/pause") && page.contains("action=\"login\""));
+    }
+
+    #[test]
+    fn durations_have_two_units() {
+        let said = [12.0, 75.0, 3_700.0, 200_000.0].map(duration);
+        assert_eq!(said, ["12 s", "1 min 15 s", "1 h 1 min", "2 d 7 h"]);
+    }
+}

@@ -1,0 +1,93 @@
+//! Puts a worker aside that fails and fails: its machine may be at fault.
+
+use std::time::Duration;
+use tokio::time::Instant;
+
+/// Failures in a row after which a worker is put aside: one group of cases.
+const FAILURES_IN_A_ROW: u32 = 8;
+
+/// How long it is put aside the first time; twice as long each further time.
+const FIRST: Duration = Duration::from_secs(15);
+
+/// The longest: a machine that was mended is of use again within this.
+const LONGEST: Duration = Duration::from_mins(10);
+
+/// The circuit breaker of one worker.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Breaker {
+    failures_in_a_row: u32,
+    openings: u32,
+    open_until: Option<Instant>,
+}
+
+impl Breaker {
+    /// Takes how the worker's cases ended, in order.
+    pub fn reported(&mut self, failed: impl IntoIterator<Item = bool>) {
+        for failed in failed {
+            if failed {
+                self.failures_in_a_row += 1;
+            } else {
+                *self = Self::default();
+            }
+        }
+    }
+
+    /// Whether it has failed too often in a row.
+    pub const fn is_failing(&self) -> bool {
+        // After it was put aside one further failure suffices.
+        self.failures_in_a_row >= FAILURES_IN_A_ROW || (self.openings > 0 && self.failures_in_a_row > 0)
+    }
+
+    /// Puts it aside; a trial follows.
+    pub fn open(&mut self, now: Instant) {
+        let wait = FIRST.saturating_mul(2_u32.saturating_pow(self.openings)).min(LONGEST);
+        self.openings = self.openings.saturating_add(1);
+        self.failures_in_a_row = 0;
+        self.open_until = Some(now + wait);
+    }
+
+    /// For how long it still gets no cases.
+    pub fn open_for(&self, now: Instant) -> Option<Duration> {
+        let left = self.open_until?.saturating_duration_since(now);
+        (!left.is_zero()).then_some(left)
+    }
+
+    /// Whether it was put aside and has not yet shown that it works again.
+    pub const fn is_on_trial(&self) -> bool {
+        self.openings > 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_failures_in_a_row_are_too_many_and_one_success_forgives_them() {
+        let mut breaker = Breaker::default();
+        breaker.reported([true; 7]);
+        assert!(!breaker.is_failing());
+        breaker.reported([false, true]);
+        assert!(!breaker.is_failing());
+        breaker.reported([true; 7]);
+        assert!(breaker.is_failing());
+    }
+
+    #[test]
+    fn each_time_it_is_put_aside_for_twice_as_long_until_it_works_again() {
+        let now = Instant::now();
+        let mut breaker = Breaker::default();
+        let mut waits = Vec::new();
+        for _ in 0..8 {
+            breaker.reported([true; 8]);
+            breaker.open(now);
+            waits.push(breaker.open_for(now).unwrap().as_secs());
+        }
+        assert_eq!(waits, [15, 30, 60, 120, 240, 480, 600, 600]);
+        assert!(breaker.open_for(now + LONGEST).is_none() && breaker.is_on_trial());
+        breaker.reported([true]);
+        assert!(breaker.is_failing(), "a failed trial is enough");
+        breaker.reported([false]);
+        assert!(!breaker.is_on_trial() && breaker.open_for(now).is_none());
+    }
+}

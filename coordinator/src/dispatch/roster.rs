@@ -1,0 +1,186 @@
+//! The workers that talk to this coordinator.
+
+use super::Breaker;
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard};
+use std::time::Duration;
+use tokio::time::Instant;
+use tracktwin_library::WorkerState;
+use tracktwin_protocol::Registration;
+
+/// A worker that was not heard of for so long is forgotten; if it comes back, it registers anew.
+const FORGET_AFTER: Duration = Duration::from_mins(10);
+
+/// One heard of within this counts as present.
+const PRESENT: Duration = Duration::from_mins(1);
+
+/// How often the library is told that a worker is alive.
+const NOTE_EVERY: Duration = Duration::from_secs(5);
+
+/// Workers known at a time: what strangers with the token may make a coordinator remember.
+const WORKERS_MAX: usize = 65_536;
+
+/// Registered workers.
+#[derive(Default)]
+pub(crate) struct Roster(Mutex<HashMap<String, Worker>>);
+
+struct Worker {
+    registration: Registration,
+    heard_of: Instant,
+    /// When the library was told last.
+    noted: Instant,
+    /// Why it is in quarantine.
+    quarantine: Option<String>,
+    breaker: Breaker,
+}
+
+/// What speaks for or against giving a worker cases.
+#[derive(Clone, Debug)]
+pub(crate) struct Standing {
+    /// Version of its program.
+    pub(crate) code_version: String,
+    /// Hash of its physics.
+    pub(crate) model_hash: String,
+    /// Why it gets none, and for how long.
+    pub(crate) aside: Option<(Duration, String)>,
+    /// Whether it gets one only, to show that it works again.
+    pub(crate) on_trial: bool,
+    /// Whether the library is to be told that it is alive.
+    pub(crate) to_be_noted: bool,
+}
+
+/// There are too many workers already.
+#[derive(Debug)]
+pub(crate) struct Full;
+
+impl Roster {
+    /// Takes in a worker, or takes it in anew.
+    pub(crate) fn add(&self, registration: Registration) -> Result<(), Full> {
+        let mut workers = self.lock();
+        workers.retain(|_, worker| worker.heard_of.elapsed() < FORGET_AFTER);
+        if workers.len() >= WORKERS_MAX && !workers.contains_key(&registration.worker) {
+            return Err(Full);
+        }
+        let now = Instant::now();
+        let name = registration.worker.clone();
+        // A restart of the connection forgives nothing.
+        let breaker = workers.get(&name).map(|worker| worker.breaker).unwrap_or_default();
+        let worker =
+            Worker { registration, heard_of: now, noted: now, quarantine: None, breaker };
+        workers.insert(name, worker);
+        Ok(())
+    }
+
+    /// How a worker stands; nothing if it has not registered.
+    pub(crate) fn standing(&self, worker: &str) -> Option<Standing> {
+        let mut workers = self.lock();
+        let worker = workers.get_mut(worker)?;
+        let now = Instant::now();
+        worker.heard_of = now;
+        let to_be_noted = now.duration_since(worker.noted) >= NOTE_EVERY;
+        if to_be_noted {
+            worker.noted = now;
+        }
+        let quarantine = worker.quarantine.clone();
+        let aside = quarantine.map(|reason| (PRESENT, format!("in quarantine: {reason}")));
+        let failing = || {
+            let left = worker.breaker.open_for(now)?;
+            Some((left, "put aside: it fails where other workers don't".to_owned()))
+        };
+        Some(Standing {
+            code_version: worker.registration.code_version.clone(),
+            model_hash: worker.registration.model_hash.clone(),
+            aside: aside.or_else(failing),
+            on_trial: worker.breaker.is_on_trial(),
+            to_be_noted,
+        })
+    }
+
+    /// Notes whether the library has a worker in quarantine.
+    pub(crate) fn quarantine(&self, worker: &str, state: WorkerState, reason: Option<String>) {
+        if let Some(worker) = self.lock().get_mut(worker) {
+            let reason = reason.unwrap_or_else(|| "no reason given".to_owned());
+            worker.quarantine = (state == WorkerState::Quarantined).then_some(reason);
+        }
+    }
+
+    /// Notes how a worker's cases ended; says whether it was put aside for it.
+    ///
+    /// Only where others succeed: where everybody fails, the cases are at fault.
+    pub(crate) fn reported(&self, worker: &str, failed: &[bool]) -> bool {
+        let mut workers = self.lock();
+        let Some(it) = workers.get_mut(worker) else { return false };
+        it.breaker.reported(failed.iter().copied());
+        let present = |it: &Worker| it.heard_of.elapsed() < PRESENT;
+        let failing = it.breaker.is_failing();
+        let others = workers.iter().filter(|(name, it)| *name != worker && present(it));
+        let mut sound = others.filter(|(_, it)| !it.breaker.is_failing());
+        let put_aside = failing && sound.next().is_some();
+        if put_aside && let Some(it) = workers.get_mut(worker) {
+            it.breaker.open(Instant::now());
+        }
+        put_aside
+    }
+
+    /// Cores of the workers that are present, and how many these are.
+    pub(crate) fn present(&self) -> (usize, u32) {
+        let workers = self.lock();
+        let present = workers.values().filter(|worker| worker.heard_of.elapsed() < PRESENT);
+        present.fold((0, 0), |(count, cores), worker| {
+            (count + 1, cores.saturating_add(worker.registration.cores))
+        })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<String, Worker>> {
+        self.0.lock().expect("nobody panics while holding it")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn roster(names: &[&str]) -> Roster {
+        let roster = Roster::default();
+        for name in names {
+            let registration = Registration {
+                worker: (*name).to_owned(),
+                code_version: "1".to_owned(),
+                model_hash: "m".to_owned(),
+                cores: 2,
+                protocol_version: 1,
+            };
+            roster.add(registration).unwrap();
+        }
+        roster
+    }
+
+    #[test]
+    fn a_worker_that_fails_where_others_do_not_is_put_aside_and_then_on_trial() {
+        let roster = roster(&["bad", "good"]);
+        assert!(roster.reported("bad", &[true; 8]));
+        let standing = roster.standing("bad").unwrap();
+        assert!(standing.aside.is_some() && standing.on_trial);
+        assert!(roster.standing("good").unwrap().aside.is_none());
+    }
+
+    #[test]
+    fn where_everybody_fails_nobody_is_put_aside() {
+        let roster = roster(&["a", "b"]);
+        assert!(roster.reported("a", &[true; 8]), "b has not failed yet");
+        assert!(!roster.reported("b", &[true; 7]));
+        let alone = self::roster(&["alone"]);
+        assert!(!alone.reported("alone", &[true; 100]));
+        assert!(alone.standing("alone").unwrap().aside.is_none());
+    }
+
+    #[test]
+    fn quarantine_is_told_with_its_reason() {
+        let roster = roster(&["w"]);
+        roster.quarantine("w", WorkerState::Quarantined, Some("it differs".to_owned()));
+        let (_, reason) = roster.standing("w").unwrap().aside.unwrap();
+        assert_eq!(reason, "in quarantine: it differs");
+        roster.quarantine("w", WorkerState::Active, None);
+        assert!(roster.standing("w").unwrap().aside.is_none());
+    }
+}
