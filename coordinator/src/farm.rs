@@ -1,7 +1,7 @@
 //! The farm in one process: a coordinator, and workers that talk to it as a cluster's would.
 
 use crate::campaign::{Campaign, cases};
-use crate::dispatch::{Dispatch, DispatchError, Timing};
+use crate::dispatch::{Counts, Dispatch, DispatchError, Scope, Settings, Timing};
 use crate::service::{Security, ServeError, serve};
 use std::net::Ipv4Addr;
 use std::num::NonZeroUsize;
@@ -114,7 +114,15 @@ pub async fn embedded(
     }
     // Who runs a campaign that was paused or cancelled means to go on with it.
     library.resume(task.campaign).await?;
-    let dispatch = Dispatch::new(library.clone(), task.campaign, task.cases, task.timing).await?;
+    let settings = Settings {
+        timing: task.timing,
+        scope: Some(Scope { campaign: task.campaign.to_owned(), cases: task.cases }),
+        // There is no other machine to turn to.
+        put_aside: false,
+        ..Settings::default()
+    };
+    let dispatch = Dispatch::new(library.clone(), settings, Counts::default());
+    dispatch.check(task.campaign).await?;
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
     let coordinator = format!("http://{}", listener.local_addr()?);
 

@@ -2,6 +2,7 @@
 //!
 //! - [`campaign`]: what is to be simulated; from an index to a case.
 //! - [`dispatch`]: hands cases to workers and takes their results (gRPC).
+//! - [`dashboard`]: pages and metrics for people and Prometheus.
 //! - [`service`]: the coordinator on a port: certificates, tokens, starting and stopping.
 //! - [`farm`]: coordinator and workers in one process.
 //! - [`training`]: from a library to a training set.
@@ -11,6 +12,7 @@
 
 pub mod campaign;
 pub mod commands;
+pub mod dashboard;
 pub mod dispatch;
 pub mod farm;
 pub mod service;

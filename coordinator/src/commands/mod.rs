@@ -1,18 +1,22 @@
 //! What the program can be told to do: one file a subcommand, each load, compute, store, report.
 
+mod campaign;
 mod certs;
+mod coordinator;
 mod evaluate;
 mod library;
 mod progress;
 mod receptance;
 mod run;
+mod signals;
 mod simulate;
+mod status;
 mod stop;
 mod train;
 
 use stop::{OrInput, Stop};
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use std::process::ExitCode;
 
 /// Digital twin of railway track: how stiff are railpad, sleeper and ballast, sleeper by sleeper,
@@ -26,6 +30,19 @@ use std::process::ExitCode;
 struct Program {
     #[command(subcommand)]
     command: Command,
+    /// How log lines look; which ones appear, `RUST_LOG` says.
+    #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text,
+          env = "TRACKTWIN_LOG_FORMAT")]
+    log_format: LogFormat,
+}
+
+/// How log lines look.
+#[derive(Clone, Copy, ValueEnum)]
+enum LogFormat {
+    /// For people.
+    Text,
+    /// For machines: one JSON object a line.
+    Json,
 }
 
 /// The subcommands.
@@ -44,6 +61,13 @@ enum Command {
     /// Ask the model library.
     #[command(subcommand)]
     Library(library::Question),
+    /// Serve campaigns to workers on this and other machines.
+    Coordinator(coordinator::Arguments),
+    /// Add campaigns to a library, pause, resume, cancel and retry them.
+    #[command(subcommand)]
+    Campaign(campaign::Action),
+    /// Show how far a farm is: campaigns, rates, failures, workers.
+    Status(status::Arguments),
     /// Make certificates and a token for a farm of several machines.
     Certs(certs::Arguments),
     /// Print a shell's completions for this program.
@@ -56,7 +80,7 @@ enum Command {
 /// Reads the command line, runs one command and turns its end into an exit code.
 pub fn main() -> ExitCode {
     let program = Program::parse();
-    log_to_stderr();
+    log_to_stderr(&program);
     match run(program.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Stop::Input(error)) => report(&error, 2),
@@ -79,6 +103,9 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Train(arguments) => asynchronously(train::run(arguments)),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
         Command::Library(question) => asynchronously(library::run(question)),
+        Command::Coordinator(arguments) => asynchronously(coordinator::run(arguments)),
+        Command::Campaign(action) => asynchronously(campaign::run(action)),
+        Command::Status(arguments) => asynchronously(status::run(arguments)),
         Command::Certs(arguments) => certs::run(&arguments),
         Command::Completions { shell } => {
             completions(shell);
@@ -87,12 +114,20 @@ fn run(command: Command) -> Result<(), Stop> {
     }
 }
 
-/// Sends warnings, or what `RUST_LOG` asks for, to standard error.
-fn log_to_stderr() {
+/// Sends warnings, a service's course, or what `RUST_LOG` asks for, to standard error.
+fn log_to_stderr(program: &Program) {
     // A statement over a whole library takes a second or more: that is no fault.
+    let usual = match program.command {
+        Command::Coordinator(_) => "warn,tracktwin=info,sqlx::query=error",
+        _ => "warn,sqlx::query=error",
+    };
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn,sqlx::query=error"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(usual));
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    match program.log_format {
+        LogFormat::Text => log.init(),
+        LogFormat::Json => log.json().init(),
+    }
 }
 
 fn asynchronously(work: impl Future<Output = Result<(), Stop>>) -> Result<(), Stop> {

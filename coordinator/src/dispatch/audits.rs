@@ -162,9 +162,10 @@ fn difference(stored: &[Features], found: &Outcome) -> f64 {
     if passes.len() != stored.len() {
         return f64::INFINITY;
     }
-    let pairs = stored.iter().zip(passes).flat_map(|(stored, pass)| {
-        stored.band_levels_db.iter().zip(&pass.features.band_levels_db)
-    });
+    let pairs = stored
+        .iter()
+        .zip(passes)
+        .flat_map(|(stored, pass)| stored.band_levels_db.iter().zip(&pass.features.band_levels_db));
     pairs.map(|(stored, found)| (stored - found).abs()).fold(0.0, f64::max)
 }
 

@@ -35,7 +35,8 @@ impl Breaker {
     /// Whether it has failed too often in a row.
     pub const fn is_failing(&self) -> bool {
         // After it was put aside one further failure suffices.
-        self.failures_in_a_row >= FAILURES_IN_A_ROW || (self.openings > 0 && self.failures_in_a_row > 0)
+        self.failures_in_a_row >= FAILURES_IN_A_ROW
+            || (self.openings > 0 && self.failures_in_a_row > 0)
     }
 
     /// Puts it aside; a trial follows.

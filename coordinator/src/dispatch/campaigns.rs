@@ -33,9 +33,8 @@ pub(crate) struct Served {
 
 impl Served {
     fn new(record: CampaignRecord) -> Result<Self, DispatchError> {
-        let experiment = Experiment::from_json(&record.experiment_json).map_err(|source| {
-            DispatchError::Experiment { campaign: record.id.clone(), source }
-        })?;
+        let experiment = Experiment::from_json(&record.experiment_json)
+            .map_err(|source| DispatchError::Experiment { campaign: record.id.clone(), source })?;
         let shape = Shape {
             bins: experiment.features.frequencies_hz().len(),
             speeds_km_h: experiment.speeds_km_h.clone(),

@@ -65,8 +65,7 @@ impl Roster {
         let name = registration.worker.clone();
         // A restart of the connection forgives nothing.
         let breaker = workers.get(&name).map(|worker| worker.breaker).unwrap_or_default();
-        let worker =
-            Worker { registration, heard_of: now, noted: now, quarantine: None, breaker };
+        let worker = Worker { registration, heard_of: now, noted: now, quarantine: None, breaker };
         workers.insert(name, worker);
         Ok(())
     }

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::time::Instant;
 use tonic::{Request, Response, Status};
-use tracktwin_library::{self as library, Ending, LeaseRequest, Library, Report, State, Verdict, WorkerState};
+use tracktwin_library::{self as library, LeaseRequest, Library, Report, Verdict, WorkerState};
 use tracktwin_protocol::farm::farm_server::Farm;
 use tracktwin_protocol::{
     CaseLease, CaseReport, Lease, LeasedCase, Outcome, Registration, farm, held_to_messages,
@@ -256,8 +256,13 @@ impl Farm for Dispatch {
         self.roster.add(registration).map_err(full)?;
         let now_unix_ms = self.now_unix_ms();
         tracing::info!(worker, code_version, cores, "worker registered");
-        let registration =
-            library::Registration { worker: worker.clone(), code_version, model_hash, cores, now_unix_ms };
+        let registration = library::Registration {
+            worker: worker.clone(),
+            code_version,
+            model_hash,
+            cores,
+            now_unix_ms,
+        };
         let state = self.library.register_worker(registration).await;
         if state.map_err(|error| unavailable(&error))? == WorkerState::Quarantined {
             let record = self.library.worker(&worker).await.map_err(|error| unavailable(&error))?;

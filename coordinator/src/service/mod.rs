@@ -4,6 +4,7 @@
 //! answered is [`dispatch`](crate::dispatch)'s.
 
 mod certificates;
+mod coordinator;
 mod guard;
 mod listener;
 mod peer;
@@ -11,6 +12,7 @@ mod security;
 mod serve;
 
 pub use certificates::{CertificatesError, issue};
+pub use coordinator::{Coordinator, CoordinatorError};
 pub use guard::Guard;
 pub use listener::accept;
 pub use peer::{Peer, PeerAddress};

@@ -3,6 +3,7 @@
 mod sample;
 
 use super::progress::Progress;
+use super::signals::stop_on_signal;
 use super::{OrInput, Stop, evaluate, say, train};
 use crate::campaign::{Campaign, DEFAULT};
 use crate::farm::{self, Task};
@@ -10,8 +11,6 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use tokio::signal::unix::{SignalKind, signal};
-use tokio_util::sync::CancellationToken;
 use tracktwin_library::{Library, Status};
 use tracktwin_signal::recording::Recording;
 
@@ -94,7 +93,7 @@ fn all_cores() -> NonZeroUsize {
 async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -> Result<(), Stop> {
     farm::prepare(library, campaign).await?;
     let id = campaign.id();
-    let shutdown = stop_on_signal()?;
+    let shutdown = stop_on_signal("stopping: cases that are begun go back to the library")?;
     let mut progress = None::<Progress>;
     let task = Task::new(&id, campaign.cases, cores);
     let status = farm::embedded(library, task, shutdown, |status: Status| {
@@ -119,21 +118,4 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
         );
     }
     Ok(())
-}
-
-/// Is cancelled by Ctrl-C or SIGTERM.
-fn stop_on_signal() -> std::io::Result<CancellationToken> {
-    let shutdown = CancellationToken::new();
-    let (mut interrupt, mut terminate) =
-        (signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?);
-    let stop = shutdown.clone();
-    tokio::spawn(async move {
-        tokio::select! {
-            _ = interrupt.recv() => {}
-            _ = terminate.recv() => {}
-        }
-        eprintln!("stopping: cases that are begun go back to the library");
-        stop.cancel();
-    });
-    Ok(shutdown)
 }

@@ -1,0 +1,184 @@
+//! `tracktwin coordinator`: serves campaigns to workers on other machines.
+
+use super::signals::stop_on_signal;
+use super::{OrInput, Stop};
+use crate::campaign::Campaign;
+use crate::dispatch::{Settings, Timing};
+use crate::farm;
+use crate::service::{Coordinator, CoordinatorError, Security};
+use anyhow::Context;
+use clap::Args;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tracktwin_library::Library;
+
+/// What `coordinator` is told.
+#[derive(Args)]
+#[command(after_help = "On one machine:
+  tracktwin coordinator --campaign mine.toml --library sqlite:library.sqlite
+  tracktwin-worker --coordinator http://127.0.0.1:7700
+On a cluster:
+  tracktwin certs certs --host head
+  tracktwin coordinator --library postgres://... --listen 0.0.0.0:7700 --dashboard 127.0.0.1:7780 \\
+      --tls-cert certs/coordinator.pem --tls-key certs/coordinator-key.pem --token-file certs/token
+
+Any number of coordinators may serve one PostgreSQL library; one at a time a SQLite library.
+It may be killed and started again at any time: workers wait and go on.
+
+Exit codes: 0 stopped as asked, or done with --exit-when-done; 2 wrong input; 3 failure.")]
+pub(super) struct Arguments {
+    /// Campaign file (TOML) to add before serving; may be repeated. `tracktwin campaign add` adds
+    /// more while it runs; with none it serves what the library holds.
+    #[arg(long = "campaign", value_name = "FILE")]
+    campaigns: Vec<PathBuf>,
+    /// Library to fill: sqlite:PATH or `postgres://USER@HOST/DATABASE`.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+    /// Address for workers.
+    #[arg(long, value_name = "ADDR", env = "TRACKTWIN_LISTEN", default_value = "127.0.0.1:7700")]
+    listen: SocketAddr,
+    /// Address for people and Prometheus: pages at /, /metrics, /healthz.
+    #[arg(long, value_name = "ADDR", env = "TRACKTWIN_DASHBOARD")]
+    dashboard: Option<SocketAddr>,
+    /// End when every running campaign is done.
+    #[arg(long)]
+    exit_when_done: bool,
+    /// Share of the cases that another worker simulates again for comparison, such as 1%.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0%")]
+    audit: f64,
+    /// After so many seconds without a heartbeat a worker's cases go to others.
+    #[arg(long, value_name = "SECONDS", value_parser = lease, default_value = "12")]
+    lease: Duration,
+    /// File with the token that workers must show.
+    #[arg(long, value_name = "FILE", env = "TRACKTWIN_TOKEN_FILE")]
+    token_file: Option<PathBuf>,
+    /// The coordinator's certificate (PEM).
+    #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CERT", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Key of that certificate (PEM).
+    #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_KEY", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Demand workers' certificates of this authority (mutual TLS).
+    #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CLIENT_CA", requires = "tls_cert")]
+    tls_client_ca: Option<PathBuf>,
+    /// Serve other machines in plain text, or anybody: where the network itself is trusted.
+    #[arg(long, env = "TRACKTWIN_INSECURE")]
+    insecure: bool,
+}
+
+pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    let security = arguments.security().or_input()?;
+    // Before anything is opened, so that nothing wrong is found out late.
+    security.check(arguments.listen).context("--listen").or_input()?;
+    security.acceptor().or_input()?;
+    if let Some(address) = arguments.dashboard {
+        let pages = Security { identity_pem: None, ..security.clone() };
+        // Pages are plain HTTP: beyond this machine a proxy has to carry them.
+        pages.check(address).context("--dashboard").or_input()?;
+    }
+    let campaigns = arguments.campaigns.iter().map(|path| Campaign::read(path, None));
+    let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
+    let library = Library::open_or_create(&arguments.library).await.or_input()?;
+    for campaign in &campaigns {
+        farm::prepare(&library, campaign).await?;
+    }
+    let coordinator = Coordinator {
+        library: library.clone(),
+        listener: bind("--listen", arguments.listen).await.or_input()?,
+        dashboard: match arguments.dashboard {
+            Some(address) => Some(bind("--dashboard", address).await.or_input()?),
+            None => None,
+        },
+        security,
+        settings: Settings {
+            timing: Timing::of_lease(arguments.lease),
+            audit_share: arguments.audit,
+            ..Settings::default()
+        },
+        exit_when_done: arguments.exit_when_done,
+    };
+    let stop = stop_on_signal("stopping: calls under way are answered, leases stay")?;
+    let ended = coordinator.run(stop).await;
+    library.close().await;
+    ended.map_err(|error| match error {
+        CoordinatorError::Library(error) if error.is_wrong_input() => Stop::Input(error.into()),
+        CoordinatorError::Security(error) => Stop::Input(error.into()),
+        error => Stop::Failure(error.into()),
+    })
+}
+
+impl Arguments {
+    fn security(&self) -> anyhow::Result<Security> {
+        let identity_pem = match (&self.tls_cert, &self.tls_key) {
+            (Some(certificate), Some(key)) => Some([read(certificate)?, read(key)?]),
+            _ => None,
+        };
+        let token = self.token_file.as_deref().map(token).transpose()?;
+        let client_ca_pem = self.tls_client_ca.as_deref().map(read).transpose()?;
+        Ok(Security { identity_pem, client_ca_pem, token, insecure: self.insecure })
+    }
+}
+
+fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))
+}
+
+fn token(path: &Path) -> anyhow::Result<String> {
+    let text = String::from_utf8_lossy(&read(path)?).trim().to_owned();
+    anyhow::ensure!(
+        !text.is_empty(),
+        "{}: the file is empty; `tracktwin certs` makes a token",
+        path.display()
+    );
+    Ok(text)
+}
+
+async fn bind(argument: &str, address: SocketAddr) -> anyhow::Result<TcpListener> {
+    let bound = TcpListener::bind(address).await;
+    bound.with_context(|| format!("{argument} {address}: no port to be had"))
+}
+
+/// A share: `1%` or `0.01`.
+fn share(text: &str) -> Result<f64, String> {
+    let (number, divisor) = match text.strip_suffix('%') {
+        Some(percent) => (percent, 100.0),
+        None => (text, 1.0),
+    };
+    let share = number.trim().parse::<f64>().map(|number| number / divisor);
+    match share {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("write a share from 0% to 100%, such as 1%".to_owned()),
+    }
+}
+
+/// The length of a lease: long enough for a heartbeat to get through, short enough to matter.
+fn lease(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.5..=3600.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("write seconds from 0.5 to 3600".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_written_as_percent_or_as_numbers() {
+        assert_eq!(share("1%").unwrap(), 0.01);
+        assert_eq!(share("0.5").unwrap(), 0.5);
+        for wrong in ["", "-1%", "200%", "NaN", "some"] {
+            assert!(share(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn leases_are_neither_shorter_than_a_heartbeat_nor_endless() {
+        assert_eq!(lease("1.5").unwrap(), Duration::from_millis(1500));
+        for wrong in ["0", "0.1", "1e9", "NaN", "soon"] {
+            assert!(lease(wrong).is_err(), "{wrong}");
+        }
+    }
+}

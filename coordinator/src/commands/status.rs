@@ -1,0 +1,181 @@
+//! `tracktwin status`: how far a farm is, once or all the time.
+
+use super::{OrInput, Stop, say};
+use crate::dashboard::{Detail, farm};
+use clap::Args;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::io::IsTerminal;
+use std::time::Duration;
+use tracktwin_library::Library;
+use tracktwin_report::{Farm, FarmCampaign, FarmWorker, duration};
+
+/// Characters of a progress bar.
+const BAR: usize = 40;
+
+/// Causes of failure shown for a campaign.
+const CAUSES: usize = 3;
+
+/// Workers shown; the others are counted.
+const WORKERS: usize = 20;
+
+/// A worker heard of within this is alive, in s.
+const ALIVE_S: f64 = 60.0;
+
+/// Clears the screen and puts the cursor into its corner (ECMA-48).
+const CLEAR: &str = "\x1b[2J\x1b[H";
+
+/// What `status` is told.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// The library: sqlite:PATH or `postgres://USER@HOST/DATABASE`.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+    /// Look again and again, until Ctrl-C.
+    #[arg(long, conflicts_with = "json")]
+    watch: bool,
+    /// Between two looks.
+    #[arg(long, value_name = "SECONDS", default_value_t = 2, requires = "watch",
+          value_parser = clap::value_parser!(u64).range(1..))]
+    every: u64,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    let library = Library::open(&arguments.library).await.or_input()?;
+    let terminal = std::io::stdout().is_terminal();
+    loop {
+        let farm = farm(&library, Detail::Counts).await?;
+        if arguments.json {
+            say(&format!("{:#}", as_json(&farm)));
+        } else if arguments.watch && terminal {
+            say(&format!("{CLEAR}{}", text(&farm)));
+        } else {
+            say(&text(&farm));
+        }
+        if !arguments.watch {
+            library.close().await;
+            return Ok(());
+        }
+        tokio::time::sleep(Duration::from_secs(arguments.every)).await;
+    }
+}
+
+fn text(farm: &Farm) -> String {
+    let mut text = format!("{}   {}\n", farm.library, farm.at);
+    if farm.campaigns.is_empty() {
+        text += "\nno campaign yet; `tracktwin campaign add FILE` adds one\n";
+    }
+    for campaign in &farm.campaigns {
+        campaign_text(&mut text, campaign);
+    }
+    if !farm.workers.is_empty() {
+        workers_text(&mut text, &farm.workers);
+    }
+    text.truncate(text.trim_end().len());
+    text
+}
+
+fn campaign_text(text: &mut String, campaign: &FarmCampaign) {
+    let FarmCampaign { id, state, waiting, leased, finished, failed, .. } = campaign;
+    let cases = campaign.cases();
+    let share = f64::from(*finished) / f64::from(cases.max(1));
+    let full = (share * BAR as f64) as usize;
+    let bar = format!("{}{}", "█".repeat(full), "░".repeat(BAR - full));
+    let left = match campaign.eta_s() {
+        Some(eta) => format!("{} left", duration(eta)),
+        None if waiting + leased > 0 => "rate not known yet".to_owned(),
+        None => "done".to_owned(),
+    };
+    let _ = write!(
+        text,
+        "\n{id}  ({state})\n{bar} {:5.1} %  {:.1} cases/s  {left}\n\
+         {cases} cases: {finished} finished, {leased} in work, {waiting} waiting, {failed} given up\n",
+        100.0 * share,
+        campaign.per_second,
+    );
+    for (cause, count) in campaign.causes.iter().take(CAUSES) {
+        let _ = writeln!(text, "  {count} given up: {cause}");
+    }
+}
+
+fn workers_text(text: &mut String, workers: &[FarmWorker]) {
+    let alive = workers.iter().filter(|worker| worker.silent_s < ALIVE_S).count();
+    let _ = writeln!(text, "\n{alive} workers alive, {} in the last hour", workers.len());
+    let width = workers.iter().map(|it| it.id.len()).max().unwrap_or(0).max("worker".len());
+    let _ = writeln!(text, "{:width$}  cores  finished  failed  s a case  heard of", "worker");
+    for worker in workers.iter().take(WORKERS) {
+        let case_s = worker.case_s.map_or_else(String::new, |case_s| format!("{case_s:.3}"));
+        let _ = writeln!(
+            text,
+            "{:width$}  {:5}  {:8}  {:6}  {case_s:>8}  {} ago  {}",
+            worker.id,
+            worker.cores,
+            worker.finished,
+            worker.failed,
+            duration(worker.silent_s),
+            worker.aside.as_deref().unwrap_or_default(),
+        );
+    }
+    if workers.len() > WORKERS {
+        let _ = writeln!(text, "and {} more", workers.len() - WORKERS);
+    }
+}
+
+fn as_json(farm: &Farm) -> Value {
+    let campaign = |it: &FarmCampaign| {
+        let causes = it.causes.iter().map(|(error, cases)| json!({"error": error, "cases": cases}));
+        json!({
+            "campaign": it.id, "state": it.state, "priority": it.priority, "cases": it.cases(),
+            "finished": it.finished, "leased": it.leased, "waiting": it.waiting,
+            "failed": it.failed, "cases_per_s": it.per_second, "remaining_s": it.eta_s(),
+            "causes": causes.collect::<Vec<_>>(),
+        })
+    };
+    let worker = |it: &FarmWorker| {
+        json!({
+            "worker": it.id, "code_version": it.code_version, "cores": it.cores,
+            "finished": it.finished, "failed": it.failed, "case_s": it.case_s,
+            "silent_s": it.silent_s, "aside": it.aside,
+        })
+    };
+    json!({
+        "library": farm.library, "at": farm.at,
+        "campaigns": farm.campaigns.iter().map(campaign).collect::<Vec<_>>(),
+        "workers": farm.workers.iter().map(worker).collect::<Vec<_>>(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_text_tells_progress_causes_and_workers() {
+        let campaign = FarmCampaign {
+            id: "v-track-1".to_owned(),
+            state: "running".to_owned(),
+            waiting: 50,
+            finished: 49,
+            failed: 1,
+            per_second: 10.0,
+            causes: vec![("the sleeper floats".to_owned(), 1)],
+            ..FarmCampaign::default()
+        };
+        let worker = FarmWorker { id: "node-1".to_owned(), cores: 8, ..FarmWorker::default() };
+        let farm = Farm { campaigns: vec![campaign], workers: vec![worker; 25], ..Farm::default() };
+        let text = text(&farm);
+        for part in [
+            "49.0 %",
+            "10.0 cases/s",
+            "5 s left",
+            "1 given up: the sleeper floats",
+            "25 workers alive",
+            "and 5 more",
+        ] {
+            assert!(text.contains(part), "{part} is not in\n{text}");
+        }
+    }
+}
