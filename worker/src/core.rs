@@ -42,11 +42,15 @@ impl Core {
 
     /// Waits for work, or ends the worker where that has lasted too long.
     async fn wait(&self, retry_after_s: f64) {
-        if self.idle_exit.is_some_and(|limit| self.session.idle_for() >= limit) {
-            tracing::info!("no work for {} s: done", self.session.idle_for().as_secs());
-            self.session.shutdown.cancel();
+        let mut wait = Duration::try_from_secs_f64(retry_after_s).unwrap_or(Duration::MAX);
+        if let Some(limit) = self.idle_exit {
+            let idle = self.session.idle_for();
+            if idle >= limit {
+                tracing::info!("no work for {} s: done", idle.as_secs());
+                self.session.shutdown.cancel();
+            }
+            wait = wait.min(limit.saturating_sub(idle));
         }
-        let wait = Duration::try_from_secs_f64(retry_after_s).unwrap_or(Duration::MAX);
         tokio::select! {
             () = tokio::time::sleep(wait) => {}
             () = self.session.shutdown.cancelled() => {}

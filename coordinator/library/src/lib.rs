@@ -15,6 +15,7 @@ mod error;
 mod lease;
 mod library;
 mod overview;
+mod recent;
 mod report;
 mod result;
 mod state;

@@ -88,7 +88,7 @@ fn complete(entry: LibraryEntry, speeds: usize) -> Result<LibraryEntry, LibraryE
     Err(LibraryError::Damaged { what: format!("case {index} has {found} of {speeds} results") })
 }
 
-fn features_of(row: &Row) -> Result<Features, LibraryError> {
+pub(crate) fn features_of(row: &Row) -> Result<Features, LibraryError> {
     let levels = LEVEL_COLUMNS.iter().map(|&column| row.get(column));
     let band_levels_db = levels.collect::<Result<_, _>>()?;
     Ok(Features { log_power: row.doubles("log_power")?, band_levels_db })

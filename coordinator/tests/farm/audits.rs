@@ -41,7 +41,8 @@ async fn work(coordinator: &Coordinator, worker: &str, prepare: Prepare) {
     let config = Config {
         prepare,
         worker: worker.to_owned(),
-        idle_exit: Some(Duration::from_secs(1)),
+        // Longer than the pause after which audits are looked for again.
+        idle_exit: Some(Duration::from_secs(3)),
         ..Config::new(coordinator.url.clone(), CORES)
     };
     let run = agent::run(config, CancellationToken::new());

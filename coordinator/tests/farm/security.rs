@@ -95,7 +95,7 @@ async fn a_coordinator_of_another_authority_or_with_an_expired_certificate_gets_
     let others = certificates(now);
     let expired = certificates(now - time::Duration::days(3));
     for (shown, trusted, fault) in
-        [(&others, &ours, "UnknownIssuer"), (&expired, &expired, "expired")]
+        [(&others, &ours, "invalid peer certificate"), (&expired, &expired, "expired")]
     {
         let coordinator = guarded(shown.path()).await;
         let credentials = Credentials {
