@@ -6,6 +6,7 @@
 //! - [`service`]: the coordinator on a port: certificates, tokens, starting and stopping.
 //! - [`farm`]: coordinator and workers in one process.
 //! - [`training`]: from a library to a training set.
+//! - [`provenance`]: what a library keeps of trainings and evaluations.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
 //!
 //! The library, the surrogate, evaluation and reports are crates of their own beside `src`.
@@ -15,5 +16,6 @@ pub mod commands;
 pub mod dashboard;
 pub mod dispatch;
 pub mod farm;
+pub mod provenance;
 pub mod service;
 pub mod training;

@@ -1,7 +1,7 @@
 //! The table `campaign`.
 
 use crate::engine::{Connection, Row, Write, sql};
-use crate::{Library, LibraryError};
+use crate::{Library, LibraryError, bins};
 
 /// A campaign as the library keeps it.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,7 +108,7 @@ impl Write for Insert {
         let ask = sql("select definition_hash from campaign where id = $1").bind(&campaign.id);
         let stored = connection.row(ask).await?.map(|row| row.get::<String>("definition_hash"));
         if stored.transpose()?.as_ref() == Some(&campaign.definition_hash) {
-            Ok(())
+            bins::insert(connection, campaign).await
         } else {
             Err(LibraryError::OtherDefinition { id: campaign.id.clone() })
         }

@@ -4,8 +4,10 @@
 //! counts but decides nothing: what becomes of a case whose attempt ended is asked of a [`Policy`],
 //! and what time it is comes in as an argument where anything depends on it.
 
+mod array;
 mod attempt;
 mod audit;
+mod bins;
 mod campaign;
 mod case;
 mod control;
@@ -15,6 +17,7 @@ mod error;
 mod lease;
 mod library;
 mod overview;
+mod provenance;
 mod recent;
 mod report;
 mod result;
@@ -22,6 +25,7 @@ mod state;
 mod tally;
 mod worker;
 
+pub use array::StoredArray;
 pub use audit::{Audit, AuditCounts, AuditFinding};
 pub use campaign::CampaignRecord;
 pub use case::{CaseRecord, Status};
@@ -30,6 +34,10 @@ pub use error::LibraryError;
 pub use lease::{Held, Lease, LeaseRequest, Leased};
 pub use library::{Claim, Library};
 pub use overview::{CampaignOverview, Cause};
+pub use provenance::{
+    DiagnosisRecord, EvaluationRecord, HypothesisRecord, MismatchRecord, SleeperRecord,
+    SurrogateRecord, TrainingRecord,
+};
 pub use report::{CaseReport, Report, Verdict};
 pub use result::LibraryEntry;
 pub use state::{CampaignState, Ending, Policy, State};

@@ -30,7 +30,9 @@ impl Library {
     /// [`LibraryError`] when the URL is none, nothing is there, it is no library, or a later
     /// version of the program has written it.
     pub async fn open(url: &str) -> Result<Self, LibraryError> {
-        Ok(Self(Arc::new(engine::open(url).await?)))
+        let library = Self(Arc::new(engine::open(url).await?));
+        library.add_missing_bins().await?;
+        Ok(library)
     }
 
     /// Opens the library at `sqlite:PATH` or `postgres://...`, or makes an empty one there.

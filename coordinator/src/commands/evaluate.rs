@@ -1,7 +1,7 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
 use super::{OrInput, Stop, say};
-use crate::training;
+use crate::{provenance, training};
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -61,5 +61,9 @@ pub(super) async fn evaluate(
     evaluation.write(folder)?;
     let page = tracktwin_report::evaluation_page(&evaluation, recording, &extractor);
     std::fs::write(folder.join("report.html"), page)?;
+    if let Err(error) = library.record_evaluation(provenance::evaluation(&evaluation)).await {
+        // The answer stands in the folder; somebody who may only read the library has it all the same.
+        tracing::warn!("the library does not keep this evaluation: {error:?}");
+    }
     Ok(evaluation)
 }

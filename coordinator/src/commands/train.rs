@@ -3,7 +3,7 @@
 use super::library::choose;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
-use crate::training;
+use crate::{provenance, training};
 use clap::Args;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -63,6 +63,7 @@ pub(super) async fn train(
     let page = tracktwin_report::models_page(&trained, &tested);
     std::fs::write(folder.join("models.html"), page)?;
     std::fs::write(folder.join("mase.json"), mase_json(&trained))?;
+    library.record_training(provenance::training(&trained)).await?;
     Ok(trained)
 }
 

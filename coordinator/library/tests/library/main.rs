@@ -2,8 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
+mod campaigns;
 mod histories;
 mod opening;
+mod provenance;
 mod queue;
 mod results;
 mod support;
+mod upgrade;
+mod workers;

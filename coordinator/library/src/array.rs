@@ -1,0 +1,60 @@
+//! The table `stored_array`: series of numbers that are dear to compute.
+
+use crate::engine::{Connection, Write, sql};
+use crate::{Library, LibraryError};
+
+/// A stored series of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredArray {
+    /// Hash of all that the numbers follow from.
+    pub key: String,
+    /// What kind of series it is, as in `null-campaign`.
+    pub kind: String,
+    /// What the numbers are: shape and units, as JSON.
+    pub meta_json: String,
+    /// The numbers.
+    pub numbers: Vec<f64>,
+}
+
+impl Library {
+    /// Keeps a series; one that is there under the key stays as it is.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn store_array(&self, array: StoredArray) -> Result<(), LibraryError> {
+        self.write(array).await
+    }
+
+    /// The series of this key, if it is there.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn array(&self, key: &str) -> Result<Option<StoredArray>, LibraryError> {
+        let ask = sql("select * from stored_array where key = $1").bind(key);
+        let Some(row) = self.readers().row(ask).await? else { return Ok(None) };
+        Ok(Some(StoredArray {
+            key: row.get("key")?,
+            kind: row.get("kind")?,
+            meta_json: row.get("meta")?,
+            numbers: row.doubles("numbers")?,
+        }))
+    }
+}
+
+impl Write for StoredArray {
+    type Answer = ();
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let insert = format!(
+            "insert into stored_array (key, kind, meta, numbers, created_at)
+            values ($1, $2, $3, $4, {}) on conflict (key) do nothing",
+            connection.dialect().now()
+        );
+        let insert = sql(insert)
+            .bind(&self.key)
+            .bind(&self.kind)
+            .bind(&self.meta_json)
+            .bind(self.numbers.clone());
+        connection.execute(insert).await.map(drop)
+    }
+}

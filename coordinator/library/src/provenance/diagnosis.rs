@@ -1,0 +1,129 @@
+//! The tables `diagnosis`, `mismatch` and `hypothesis`.
+
+use crate::engine::{Connection, Value, Write, sql};
+use crate::{Library, LibraryError};
+
+/// A diagnosed recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiagnosisRecord {
+    /// The recording's name.
+    pub recording: String,
+    /// `consistent`, `left_out_physics`, `unknown_physics` or `measurement_chain`.
+    pub verdict: String,
+    /// Version of the program.
+    pub code_version: String,
+    /// `diagnosis.json`.
+    pub document_json: String,
+    /// Where recording and twin differ, in the document's order.
+    pub mismatches: Vec<MismatchRecord>,
+    /// What may explain it, the most probable first.
+    pub hypotheses: Vec<HypothesisRecord>,
+}
+
+/// Where a recording and the twin differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MismatchRecord {
+    /// From where to where along the track, in m.
+    pub x_m: [f64; 2],
+    /// Lowest and highest frequency, in Hz.
+    pub frequency_hz: [f64; 2],
+    /// By how much, in dB.
+    pub level_db: f64,
+    /// How probable so large a difference is by chance.
+    pub p_value: f64,
+}
+
+/// What may explain a mismatch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HypothesisRecord {
+    /// Name of the physics.
+    pub physics: String,
+    /// Of its being present.
+    pub probability: f64,
+    /// From where to where along the track in m, if it is anywhere in particular.
+    pub x_m: Option<[f64; 2]>,
+    /// JSON object: name with unit to mean and sd.
+    pub parameters_json: String,
+}
+
+impl Library {
+    /// Keeps a diagnosis; answers its id.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn record_diagnosis(&self, record: DiagnosisRecord) -> Result<String, LibraryError> {
+        self.write(record).await
+    }
+}
+
+impl Write for DiagnosisRecord {
+    type Answer = String;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<String, LibraryError> {
+        let id = super::id("tracktwin diagnosis 1", &[&self.recording, &self.document_json]);
+        let insert = format!(
+            "insert into diagnosis (id, recording, verdict, code_version, document, created_at)
+            values ($1, $2, $3, $4, $5, {}) on conflict (id) do nothing",
+            connection.dialect().now()
+        );
+        let insert = sql(insert)
+            .bind(&id)
+            .bind(&self.recording)
+            .bind(&self.verdict)
+            .bind(&self.code_version)
+            .bind(&self.document_json);
+        connection.execute(insert).await?;
+        for (place, mismatch) in (1..).zip(&self.mismatches) {
+            mismatch.insert(connection, &id, place).await?;
+        }
+        for (place, hypothesis) in (1..).zip(&self.hypotheses) {
+            hypothesis.insert(connection, &id, place).await?;
+        }
+        Ok(id)
+    }
+}
+
+impl MismatchRecord {
+    async fn insert(
+        &self,
+        connection: &mut Connection,
+        id: &str,
+        place: u32,
+    ) -> Result<(), LibraryError> {
+        let insert = "insert into mismatch (diagnosis_id, place, from_x_m, to_x_m,
+                from_frequency_Hz, to_frequency_Hz, level_dB, p_value)
+            values ($1, $2, $3, $4, $5, $6, $7, $8) on conflict (diagnosis_id, place) do nothing";
+        let insert = sql(insert)
+            .bind(id)
+            .bind(place)
+            .bind(self.x_m[0])
+            .bind(self.x_m[1])
+            .bind(self.frequency_hz[0])
+            .bind(self.frequency_hz[1])
+            .bind(self.level_db)
+            .bind(self.p_value);
+        connection.execute(insert).await.map(drop)
+    }
+}
+
+impl HypothesisRecord {
+    async fn insert(
+        &self,
+        connection: &mut Connection,
+        id: &str,
+        place: u32,
+    ) -> Result<(), LibraryError> {
+        let insert = "insert into hypothesis (diagnosis_id, place, physics, probability, from_x_m,
+                to_x_m, parameters)
+            values ($1, $2, $3, $4, $5, $6, $7) on conflict (diagnosis_id, place) do nothing";
+        let insert = sql(insert)
+            .bind(id)
+            .bind(place)
+            .bind(&self.physics)
+            .bind(self.probability)
+            .bind(Value::Real(self.x_m.map(|x_m| x_m[0])))
+            .bind(Value::Real(self.x_m.map(|x_m| x_m[1])))
+            .bind(&self.parameters_json);
+        connection.execute(insert).await.map(drop)
+    }
+}

@@ -1,0 +1,102 @@
+//! The tables `evaluation` and `sleeper_estimate`.
+
+use crate::engine::{Connection, Value, Write, sql};
+use crate::{Library, LibraryError};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use tracktwin_parameters::Parameter;
+
+/// An evaluated recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EvaluationRecord {
+    /// The recording's name.
+    pub recording: String,
+    /// How the estimates were made.
+    pub method: String,
+    /// The campaign the surrogates were trained on.
+    pub campaign: String,
+    /// Its digest when they were.
+    pub library_digest: String,
+    /// Version of the program.
+    pub code_version: String,
+    /// `evaluation.json`.
+    pub document_json: String,
+    /// Its sleepers.
+    pub sleepers: Vec<SleeperRecord>,
+}
+
+/// What an evaluation says of a sleeper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SleeperRecord {
+    /// Its name.
+    pub id: String,
+    /// Its place along the track in m.
+    pub x_m: f64,
+    /// Mean and standard deviation of each parameter, in its unit.
+    pub estimates: BTreeMap<Parameter, [f64; 2]>,
+    /// What to keep in mind, in a few words; empty if nothing.
+    pub flags: String,
+}
+
+impl Library {
+    /// Keeps an evaluation; answers its id.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn record_evaluation(
+        &self,
+        record: EvaluationRecord,
+    ) -> Result<String, LibraryError> {
+        self.write(record).await
+    }
+}
+
+impl Write for EvaluationRecord {
+    type Answer = String;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<String, LibraryError> {
+        let texts = [&self.recording, &self.campaign, &self.document_json];
+        let id = super::id("tracktwin evaluation 1", &texts.map(String::as_str));
+        let insert = format!(
+            "insert into evaluation (id, recording, method, campaign_id, library_digest,
+                code_version, document, created_at)
+            values ($1, $2, $3, $4, $5, $6, $7, {}) on conflict (id) do nothing",
+            connection.dialect().now()
+        );
+        let insert = sql(insert)
+            .bind(&id)
+            .bind(&self.recording)
+            .bind(&self.method)
+            .bind(&self.campaign)
+            .bind(&self.library_digest)
+            .bind(&self.code_version)
+            .bind(&self.document_json);
+        connection.execute(insert).await?;
+        for sleeper in &self.sleepers {
+            sleeper.insert(connection, &id).await?;
+        }
+        Ok(id)
+    }
+}
+
+impl SleeperRecord {
+    async fn insert(&self, connection: &mut Connection, id: &str) -> Result<(), LibraryError> {
+        let mut insert =
+            "insert into sleeper_estimate (evaluation_id, sleeper, x_m, flags".to_owned();
+        let mut values = "$1, $2, $3, $4".to_owned();
+        for (place, parameter) in Parameter::ALL.iter().enumerate() {
+            let name = parameter.name();
+            let _ = write!(insert, ", {name}, {name}_sd");
+            let _ = write!(values, ", ${}, ${}", 2 * place + 5, 2 * place + 6);
+        }
+        let insert =
+            format!("{insert}) values ({values}) on conflict (evaluation_id, sleeper) do nothing");
+        let mut insert = sql(insert).bind(id).bind(&self.id).bind(self.x_m).bind(&self.flags);
+        for parameter in Parameter::ALL {
+            let estimate = self.estimates.get(parameter);
+            insert = insert.bind(Value::Real(estimate.map(|of| of[0])));
+            insert = insert.bind(Value::Real(estimate.map(|of| of[1])));
+        }
+        connection.execute(insert).await.map(drop)
+    }
+}

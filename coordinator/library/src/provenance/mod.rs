@@ -1,0 +1,22 @@
+//! What was made of the library's results, and from what: trainings, evaluations, diagnoses.
+//!
+//! The tables hold what one asks about, and the whole document beside it. Recording the same again
+//! changes nothing: a record's id is a hash of what it says.
+
+mod diagnosis;
+mod evaluation;
+mod training;
+
+pub use diagnosis::{DiagnosisRecord, HypothesisRecord, MismatchRecord};
+pub use evaluation::{EvaluationRecord, SleeperRecord};
+pub use training::{SurrogateRecord, TrainingRecord};
+
+/// Hash of texts in order, 128 bits in hexadecimal.
+fn id(kind: &str, texts: &[&str]) -> String {
+    let mut hasher = blake3::Hasher::new_derive_key(kind);
+    for text in texts {
+        // The length keeps neighbouring texts apart.
+        hasher.update(&(text.len() as u64).to_be_bytes()).update(text.as_bytes());
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}

@@ -1,0 +1,102 @@
+//! The tables `training` and `surrogate`.
+
+use crate::engine::{Connection, Write, sql};
+use crate::{Library, LibraryError};
+use tracktwin_parameters::Parameter;
+
+/// Surrogates trained together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainingRecord {
+    /// The campaign they were trained on.
+    pub campaign: String,
+    /// Its digest when it was read.
+    pub library_digest: String,
+    /// Cases, those kept for testing included.
+    pub cases: u32,
+    /// What decided which were kept; below 2^63.
+    pub seed: u64,
+    /// Version of the program.
+    pub code_version: String,
+    /// Each of them.
+    pub surrogates: Vec<SurrogateRecord>,
+}
+
+/// How well a surrogate does on cases it was not trained on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurrogateRecord {
+    /// The feature set it reads.
+    pub feature: String,
+    /// The speeds it reads together, ascending.
+    pub speeds_km_h: Vec<f64>,
+    /// What it tells.
+    pub parameter: Parameter,
+    /// Mean absolute error on the test set over the parameter's range (paper, eq. 11).
+    pub mase_test: f64,
+    /// The same over the folds of the training set.
+    pub mase_folds: f64,
+    /// Share of the test cases inside their 90 % intervals.
+    pub coverage_90_test: f64,
+}
+
+impl Library {
+    /// Keeps what a training has reached; answers its id.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn record_training(&self, record: TrainingRecord) -> Result<String, LibraryError> {
+        self.write(record).await
+    }
+}
+
+impl TrainingRecord {
+    fn id(&self) -> String {
+        let Self { campaign, library_digest, seed, code_version, surrogates, .. } = self;
+        let scores: Vec<_> = surrogates
+            .iter()
+            .map(|it| {
+                format!("{} {:?} {} {}", it.feature, it.speeds_km_h, it.parameter, it.mase_test)
+            })
+            .collect();
+        let texts = [campaign, library_digest, &seed.to_string(), code_version, &scores.join("\n")];
+        super::id("tracktwin training 1", &texts.map(String::as_str))
+    }
+}
+
+impl Write for TrainingRecord {
+    type Answer = String;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<String, LibraryError> {
+        let id = self.id();
+        let insert = format!(
+            "insert into training (id, campaign_id, library_digest, cases, seed, code_version,
+                created_at)
+            values ($1, $2, $3, $4, $5, $6, {}) on conflict (id) do nothing",
+            connection.dialect().now()
+        );
+        let insert = sql(insert)
+            .bind(&id)
+            .bind(&self.campaign)
+            .bind(&self.library_digest)
+            .bind(self.cases)
+            .bind(crate::campaign::sql_seed(self.seed)?)
+            .bind(&self.code_version);
+        connection.execute(insert).await?;
+        for it in &self.surrogates {
+            let speeds = serde_json::to_string(&it.speeds_km_h).expect("numbers become JSON");
+            let insert = "insert into surrogate (training_id, feature, speeds_km_h, parameter,
+                    mase_test, mase_folds, coverage_90_test)
+                values ($1, $2, $3, $4, $5, $6, $7)
+                on conflict (training_id, feature, speeds_km_h, parameter) do nothing";
+            let insert = sql(insert)
+                .bind(&id)
+                .bind(&it.feature)
+                .bind(speeds)
+                .bind(it.parameter.name())
+                .bind(it.mase_test)
+                .bind(it.mase_folds)
+                .bind(it.coverage_90_test);
+            connection.execute(insert).await?;
+        }
+        Ok(id)
+    }
+}

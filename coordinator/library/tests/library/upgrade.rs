@@ -1,0 +1,70 @@
+//! Libraries that earlier programs wrote are brought up to date, and hold what they held.
+
+use crate::support::{Home, policy};
+use sqlx::{Connection, SqliteConnection};
+use tracktwin_library::{LeaseRequest, Library, State, Status};
+
+const CAMPAIGN: &str = "released-13c0db7b51c4";
+
+/// A library as the first released schema left it.
+async fn released(home: &Home) {
+    let url = format!("{}?mode=rwc", home.url);
+    let mut connection = SqliteConnection::connect(&url).await.unwrap();
+    sqlx::raw_sql(include_str!("schemas/0001.sql")).execute(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn a_library_of_the_first_schema_keeps_all_it_holds() {
+    let home = Home::sqlite();
+    released(&home).await;
+    let library = Library::open(&home.url).await.unwrap();
+    // As a program in another language works it out from the file before.
+    assert_eq!(
+        library.digest(CAMPAIGN).await.unwrap(),
+        "1135fcd10b7b155789ce1cb0d0609df965284442f6ff283f8e78470d5a3d8eac"
+    );
+    let status = library.status(CAMPAIGN).await.unwrap();
+    assert_eq!(status, Status { leased: 1, finished: 1, failed: 1, waiting: 0 });
+    let given_up = library.case(CAMPAIGN, 1).await.unwrap().unwrap();
+    assert_eq!((given_up.state, given_up.attempts), (State::Failed, 3));
+    assert_eq!(given_up.error.as_deref(), Some("it does not stand"));
+}
+
+#[tokio::test]
+async fn a_library_of_the_first_schema_is_gone_on_with() {
+    let home = Home::sqlite();
+    released(&home).await;
+    let library = Library::open(&home.url).await.unwrap();
+    let request = LeaseRequest {
+        campaign: None,
+        indices_below: u32::MAX,
+        worker: "w".to_owned(),
+        cases_max: 9,
+        // Its lease has expired long ago.
+        now_unix_ms: library.now_unix_ms(),
+        lease_ms: 1000,
+        after_loss: policy,
+    };
+    let lease = library.lease(request).await.unwrap().unwrap();
+    assert_eq!((lease.campaign.as_str(), lease.cases.len()), (CAMPAIGN, 1));
+    assert_eq!((lease.cases[0].case.index, lease.cases[0].epoch), (2, 2));
+}
+
+#[tokio::test]
+async fn the_bins_of_an_old_campaign_are_known_after_opening_it() {
+    let home = Home::sqlite();
+    released(&home).await;
+    Library::open(&home.url).await.unwrap().close().await;
+    let mut connection = SqliteConnection::connect(&home.url).await.unwrap();
+    let [bins, values]: [i64; 2] = sqlx::query_as::<_, (i64, i64)>(
+        "select (select count(*) from frequency_bin),
+            (select sum(length(log_power)) / 16 from result)",
+    )
+    .fetch_one(&mut connection)
+    .await
+    .map(Into::into)
+    .unwrap();
+    assert_eq!(bins, values);
+    connection.close().await.unwrap();
+}

@@ -1,0 +1,124 @@
+//! Workers as all coordinators see them, and whether they can be believed.
+
+use crate::support::{CAMPAIGN, Home, failed, finished, lease, message, on_both_databases, report};
+use tracktwin_library::{
+    AuditCounts, AuditFinding, CaseReport, Library, LibraryError, Registration, Report, Retry,
+    State, Verdict, WorkerState,
+};
+
+fn registration(worker: &str, now_unix_ms: i64) -> Registration {
+    Registration {
+        worker: worker.to_owned(),
+        code_version: "0.1.0".to_owned(),
+        model_hash: "m".to_owned(),
+        cores: 4,
+        now_unix_ms,
+    }
+}
+
+/// Simulates `count` cases, all of which are to be audited.
+async fn work_audited(library: &Library, worker: &str, count: u32) {
+    let leased = lease(library, worker, count, 0).await;
+    let message = message(worker, leased.iter().map(finished).collect());
+    library.report(Report { audit_share: 1.0, ..message }).await.unwrap();
+}
+
+on_both_databases! {
+    async fn what_a_worker_does_is_counted_for_all_coordinators(home: &Home) {
+        let library = home.library(5).await;
+        let state = library.register_worker(registration("w", 1000)).await.unwrap();
+        assert_eq!(state, WorkerState::Active);
+        assert_eq!(library.heartbeat("stranger", 2000).await.unwrap(), None);
+        library.heartbeat("w", 2000).await.unwrap().unwrap();
+        let leased = lease(&library, "w", 5, 0).await;
+        let reports = [failed(&leased[0]), finished(&leased[1]), failed(&leased[2])];
+        report(&library, "w", reports.to_vec()).await;
+        report(&library, "w", vec![failed(&leased[3])]).await;
+        let other = home.open().await;
+        let worker = other.worker("w").await.unwrap().unwrap();
+        assert_eq!((worker.cases_finished, worker.cases_failed), (1, 3));
+        assert_eq!(worker.failures_in_a_row, 2);
+        assert_eq!(worker.mean_case_s(), Some(0.25));
+        assert_eq!(worker.registered_unix_ms, 1000);
+        // The report's clock.
+        assert_eq!(worker.last_seen_unix_ms, 1_700_000_000_000);
+        assert_eq!(other.workers(1_700_000_000_001).await.unwrap(), []);
+        assert_eq!(other.workers(0).await.unwrap(), [worker]);
+        report(&library, "w", vec![finished(&leased[4])]).await;
+        assert_eq!(library.worker("w").await.unwrap().unwrap().failures_in_a_row, 0);
+    }
+
+    async fn a_worker_in_quarantine_gets_nothing_until_it_is_pardoned(home: &Home) {
+        let library = home.library(2).await;
+        library.register_worker(registration("w", 0)).await.unwrap();
+        library.quarantine_worker("w", "nine failures in a row").await.unwrap();
+        assert_eq!(lease(&library, "w", 1, 0).await, []);
+        // It comes again under its name, perhaps to another coordinator.
+        let state = library.register_worker(registration("w", 9)).await.unwrap();
+        assert_eq!(state, WorkerState::Quarantined);
+        let record = library.heartbeat("w", 10).await.unwrap().unwrap();
+        assert_eq!(record.reason.as_deref(), Some("nine failures in a row"));
+        library.pardon_worker("w").await.unwrap();
+        assert_eq!(lease(&library, "w", 1, 0).await.len(), 1);
+        let error = library.quarantine_worker("stranger", "why not").await.unwrap_err();
+        assert!(matches!(error, LibraryError::UnknownWorker { .. }), "{error}");
+    }
+
+    async fn a_worker_writes_only_what_it_holds_or_held(home: &Home) {
+        let library = home.library(2).await;
+        let leased = lease(&library, "honest", 2, 0).await;
+        let stolen = report(&library, "thief", vec![finished(&leased[0])]).await;
+        assert_eq!(stolen, [Verdict::Refused]);
+        // An epoch that another had.
+        lease(&library, "late", 1, 1000).await;
+        assert_eq!(report(&library, "late", vec![finished(&leased[0])]).await, [Verdict::Refused]);
+        assert_eq!(report(&library, "honest", vec![finished(&leased[0])]).await, [Verdict::Stored]);
+        let again = CaseReport { epoch: 2, ..finished(&leased[0]) };
+        assert_eq!(report(&library, "late", vec![again]).await, [Verdict::Duplicate]);
+    }
+
+    async fn an_audit_goes_to_another_worker_and_is_kept(home: &Home) {
+        let library = home.library(3).await;
+        work_audited(&library, "first", 2).await;
+        assert_eq!(library.audit_sample(CAMPAIGN, "first", 9, 1000).await.unwrap(), []);
+        let audits = library.audit_sample(CAMPAIGN, "second", 9, 1000).await.unwrap();
+        assert_eq!(audits.len(), 2);
+        assert_eq!((audits[0].case.index, audits[0].worker.as_str()), (0, "first"));
+        // They are the second's for now.
+        assert_eq!(library.audit_sample(CAMPAIGN, "third", 9, 1000).await.unwrap(), []);
+        let agrees = AuditFinding { agrees: true, difference_db: 1e-12 };
+        let differs = AuditFinding { agrees: false, difference_db: 3.0 };
+        assert_eq!(library.audited(CAMPAIGN, 0, "third", differs).await.unwrap(), None);
+        let whose = library.audited(CAMPAIGN, 0, "second", agrees).await.unwrap();
+        assert_eq!(whose.as_deref(), Some("first"));
+        library.audited(CAMPAIGN, 1, "second", differs).await.unwrap();
+        // Said again, it is over.
+        assert_eq!(library.audited(CAMPAIGN, 1, "second", agrees).await.unwrap(), None);
+        let counts = library.audits(CAMPAIGN).await.unwrap();
+        assert_eq!(counts, AuditCounts { open: 0, agree: 1, differ: 1 });
+    }
+
+    async fn an_audit_whose_worker_falls_silent_goes_to_the_next(home: &Home) {
+        let library = home.library(1).await;
+        work_audited(&library, "first", 1).await;
+        assert_eq!(library.audit_sample(CAMPAIGN, "second", 1, -1).await.unwrap().len(), 1);
+        assert_eq!(library.audit_sample(CAMPAIGN, "third", 1, 1000).await.unwrap().len(), 1);
+    }
+
+    async fn flagged_results_are_computed_again_when_asked_for(home: &Home) {
+        let library = home.library(3).await;
+        library.register_worker(registration("bad", 0)).await.unwrap();
+        work_audited(&library, "bad", 2).await;
+        work_audited(&library, "good", 1).await;
+        // Two cases at two speeds.
+        assert_eq!(library.flag_worker("bad", "differs by 3 dB").await.unwrap(), 4);
+        assert_eq!(library.worker("bad").await.unwrap().unwrap().state, WorkerState::Quarantined);
+        assert_eq!(library.retry(CAMPAIGN, Retry::Flagged).await.unwrap(), 2);
+        let state = library.case(CAMPAIGN, 0).await.unwrap().unwrap().state;
+        assert_eq!(state, State::Waiting);
+        assert_eq!(library.audits(CAMPAIGN).await.unwrap().open, 1);
+        let leased = lease(&library, "good", 3, 0).await;
+        let verdicts = report(&library, "good", leased.iter().map(finished).collect()).await;
+        assert_eq!(verdicts, [Verdict::Stored; 2]);
+    }
+}

@@ -1,0 +1,58 @@
+//! What the library keeps of trainings and evaluations: the records made of them.
+
+use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
+use tracktwin_library::{EvaluationRecord, SleeperRecord, SurrogateRecord, TrainingRecord};
+use tracktwin_surrogate::{ModelGroup, Trained};
+use tracktwin_worker::CODE_VERSION;
+
+/// What a library keeps of surrogates trained on it.
+///
+/// # Panics
+/// Never: a library holds fewer than 2^32 cases of a campaign.
+pub fn training(trained: &Trained) -> TrainingRecord {
+    TrainingRecord {
+        campaign: trained.campaign().to_owned(),
+        library_digest: trained.library_digest().to_owned(),
+        cases: u32::try_from(trained.entries()).expect("an index of a case is a u32"),
+        seed: trained.split_seed(),
+        code_version: CODE_VERSION.to_owned(),
+        surrogates: trained.groups().iter().flat_map(surrogates).collect(),
+    }
+}
+
+fn surrogates(group: &ModelGroup) -> impl Iterator<Item = SurrogateRecord> {
+    let key = group.key();
+    group.models().iter().map(move |model| SurrogateRecord {
+        feature: key.feature.clone(),
+        speeds_km_h: key.speeds_km_h.clone(),
+        parameter: model.parameter,
+        mase_test: model.score.mase_test,
+        mase_folds: model.score.mase_folds,
+        coverage_90_test: model.score.coverage_90_test,
+    })
+}
+
+/// What a library keeps of an evaluation by its surrogates.
+pub fn evaluation(evaluation: &Evaluation) -> EvaluationRecord {
+    let provenance = &evaluation.provenance;
+    EvaluationRecord {
+        recording: evaluation.recording.clone(),
+        method: evaluation.method.to_owned(),
+        campaign: provenance.campaign.clone(),
+        library_digest: provenance.library_digest.clone(),
+        code_version: provenance.code_version.to_owned(),
+        document_json: evaluation.to_json(),
+        sleepers: evaluation.sleepers.iter().map(sleeper).collect(),
+    }
+}
+
+fn sleeper(sleeper: &SleeperEvaluation) -> SleeperRecord {
+    let estimates = sleeper.estimates.iter().map(|(&of, it)| (of, [it.mean, it.sd]));
+    let flags: Vec<_> = sleeper.flags.iter().map(|flag| flag.label()).collect();
+    SleeperRecord {
+        id: sleeper.id.clone(),
+        x_m: sleeper.x_m,
+        estimates: estimates.collect(),
+        flags: flags.join("; "),
+    }
+}
