@@ -5,6 +5,7 @@
 
 pub mod agent;
 mod backoff;
+pub mod command;
 mod connection;
 mod coordinators;
 mod core;

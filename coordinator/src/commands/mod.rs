@@ -90,9 +90,22 @@ pub fn main() -> ExitCode {
 
 /// One line that says what is wrong.
 fn report(error: &anyhow::Error, code: u8) -> ExitCode {
-    let line = format!("{error:#}").replace('\n', " ");
+    let line = chain(error).replace('\n', " ");
     eprintln!("tracktwin: {line}");
     ExitCode::from(code)
+}
+
+/// What is wrong and why, each thing said once: some errors tell their source themselves.
+fn chain(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for part in error.chain().map(ToString::to_string) {
+        if line.is_empty() {
+            line = part;
+        } else if !line.contains(&part) {
+            line = format!("{line}: {part}");
+        }
+    }
+    line
 }
 
 fn run(command: Command) -> Result<(), Stop> {

@@ -11,8 +11,9 @@ pub const FAILURES_MAX: u32 = 3;
 /// Attempts after which a case that loses its workers is given up.
 ///
 /// A lost worker takes its whole lease with it, and where a scheduler takes nodes away every few
-/// seconds an innocent case may lose several in a row. One that kills its workers stops after ten.
-pub const LOSSES_MAX: u32 = 10;
+/// seconds an innocent case loses one attempt in two. Twenty in a row are then one in a million, and
+/// a case that kills its workers stops after so many.
+pub const LOSSES_MAX: u32 = 20;
 
 /// Where a case goes after so many attempts without result, the last of which ended so.
 pub const fn after_attempt(ending: Ending, attempts: u32) -> State {
@@ -28,8 +29,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_case_is_given_up_after_three_failures_or_ten_lost_workers() {
-        let states = |ending| [1, 2, 3, 9, 10].map(|attempts| after_attempt(ending, attempts));
+    fn a_case_is_given_up_after_three_failures_or_twenty_lost_workers() {
+        let states = |ending| [1, 2, 3, 19, 20].map(|attempts| after_attempt(ending, attempts));
         let (wait, give_up) = (State::Waiting, State::Failed);
         assert_eq!(states(Ending::Failed), [wait, wait, give_up, give_up, give_up]);
         assert_eq!(states(Ending::Lost), [wait, wait, wait, wait, give_up]);

@@ -1,0 +1,83 @@
+//! Coordinators that are killed.
+
+use crate::farm::{Engine, Farm};
+use std::time::{Duration, Instant};
+
+/// Kills the coordinator so many times and lets the last one finish.
+fn coordinator_is_killed(farm: &Farm, times: u32) {
+    let workers = [farm.worker(), farm.worker()];
+    for kill in 0..times {
+        let coordinator = farm.coordinator(0);
+        // Moments spread over start, work and commit by the golden ratio.
+        std::thread::sleep(Duration::from_millis(150 + u64::from(kill) * 618 % 700));
+        coordinator.kill();
+    }
+    let mut coordinator = farm.coordinator(0);
+    Farm::finish(&mut coordinator);
+    drop(workers);
+    farm.assert_undisturbed();
+}
+
+#[test]
+fn a_coordinator_killed_again_and_again_loses_nothing_sqlite() {
+    let Some(farm) = Farm::new(Engine::Sqlite) else { return };
+    coordinator_is_killed(&farm, 4);
+}
+
+#[test]
+fn a_coordinator_killed_again_and_again_loses_nothing_postgres() {
+    let Some(farm) = Farm::new(Engine::Postgres) else { return };
+    coordinator_is_killed(&farm, 4);
+}
+
+#[test]
+#[ignore = "takes a minute; see docs/farm-faults.md"]
+fn a_coordinator_killed_twenty_times_loses_nothing() {
+    for engine in [Engine::Sqlite, Engine::Postgres] {
+        let Some(farm) = Farm::many(engine, 400) else { continue };
+        coordinator_is_killed(&farm, 20);
+    }
+}
+
+#[test]
+fn where_one_of_two_coordinators_dies_the_other_goes_on() {
+    let Some(farm) = Farm::new(Engine::Postgres) else { return };
+    let (first, mut second) = (farm.coordinator(0), farm.coordinator(1));
+    let workers = [farm.worker(), farm.worker()];
+    farm.reach(8);
+    first.kill();
+    Farm::finish(&mut second);
+    drop(workers);
+    farm.assert_undisturbed();
+}
+
+#[test]
+fn a_second_coordinator_on_a_sqlite_library_is_refused_in_one_line() {
+    let Some(farm) = Farm::new(Engine::Sqlite) else { return };
+    let first = farm.coordinator(0);
+    let worker = farm.worker();
+    farm.reach(1);
+    let mut second = farm.coordinator(1);
+    assert_eq!(second.ended(Duration::from_secs(10)).code(), Some(2));
+    drop((first, worker));
+}
+
+#[test]
+fn a_coordinator_that_is_back_has_its_workers_back_within_five_seconds() {
+    let Some(farm) = Farm::new(Engine::Sqlite) else { return };
+    let first = farm.coordinator(0);
+    let worker = farm.worker();
+    farm.reach(1);
+    first.kill();
+    // Long enough for the worker's waits to have grown.
+    std::thread::sleep(Duration::from_secs(3));
+    let before = farm.finished();
+    let begun = Instant::now();
+    let mut second = farm.coordinator(0);
+    farm.reach(before + 1);
+    let back = begun.elapsed();
+    assert!(back < Duration::from_secs(5), "{back:?}");
+    Farm::finish(&mut second);
+    drop(worker);
+    farm.assert_undisturbed();
+}

@@ -1,0 +1,68 @@
+//! Databases that stop, and disks that are full.
+
+use crate::farm::Farm;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+use test_postgres::{Server, Settings};
+
+#[test]
+fn a_postgres_server_stopped_and_started_in_the_middle_loses_nothing() {
+    let Some(server) = Server::start(Settings { durable: true }) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let farm = Farm::on(folder, server.database(), 64);
+    let mut coordinator = farm.coordinator(0);
+    let workers = [farm.worker(), farm.worker()];
+    farm.reach(8);
+    server.stop();
+    std::thread::sleep(Duration::from_secs(2));
+    server.start_again();
+    Farm::finish(&mut coordinator);
+    drop(workers);
+    farm.assert_undisturbed();
+}
+
+/// A small file system of its own, where that is allowed.
+struct Tmpfs<'a>(&'a Path);
+
+impl<'a> Tmpfs<'a> {
+    fn mount(path: &'a Path, size: &str) -> Option<Self> {
+        let mut mount = Command::new("mount");
+        mount.args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(path);
+        let mounted = mount.output().is_ok_and(|output| output.status.success());
+        mounted.then_some(Self(path))
+    }
+
+    fn grow(&self, size: &str) {
+        let mut grow = Command::new("mount");
+        grow.args(["-o", &format!("remount,size={size}")]).arg(self.0);
+        assert!(grow.status().unwrap().success());
+    }
+}
+
+impl Drop for Tmpfs<'_> {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").args(["-l"]).arg(self.0).status();
+    }
+}
+
+#[test]
+fn a_full_disk_stops_the_campaign_until_there_is_room_and_loses_nothing() {
+    let volume = tempfile::tempdir().unwrap();
+    let Some(disk) = Tmpfs::mount(volume.path(), "700k") else {
+        eprintln!("skipped: no file system may be mounted here");
+        return;
+    };
+    let library = format!("sqlite:{}", volume.path().join("l.sqlite").display());
+    let farm = Farm::on(tempfile::tempdir().unwrap(), library, 64);
+    let mut coordinator = farm.coordinator(0);
+    let worker = farm.worker();
+    // Long enough to fill it: 64 results take more than there is.
+    std::thread::sleep(Duration::from_secs(6));
+    assert!(farm.finished() < 64, "the disk never got full");
+    assert!(coordinator.0.try_wait().unwrap().is_none(), "the coordinator waits for room");
+    disk.grow("64m");
+    Farm::finish(&mut coordinator);
+    drop(worker);
+    farm.assert_undisturbed();
+}

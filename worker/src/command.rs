@@ -1,0 +1,195 @@
+//! The command line of `tracktwin-worker`: arguments, signals, log and exit codes.
+
+use crate::agent::{self, AgentError, Config};
+use crate::{Credentials, Token};
+use anyhow::Context;
+use clap::{Parser, ValueEnum};
+use std::net::SocketAddr;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio_util::sync::CancellationToken;
+
+/// Exit code for wrong arguments, and for a worker that is of no use to its coordinator.
+const REFUSED: u8 = 2;
+
+/// Exit code when something failed that may pass.
+const FAILED: u8 = 3;
+
+/// How long a computation that no longer matters may hold up the end.
+const END: Duration = Duration::from_millis(100);
+
+/// Worker of a tracktwin campaign: leases cases from a coordinator, simulates them and hands in
+/// their features, until it is stopped (Ctrl-C or SIGTERM).
+///
+/// It may come and go at any time: what it has handed in stays, what it has not is given to others.
+/// Told to stop, it finishes or hands back what it has within ten seconds.
+#[derive(Parser)]
+#[command(name = "tracktwin-worker", version, max_term_width = 100)]
+#[command(after_help = "On one machine:
+  tracktwin-worker --coordinator http://127.0.0.1:7700
+On a cluster:
+  tracktwin-worker --coordinator https://head:7700 --tls-ca certs/ca.pem \\
+      --token-file certs/token --idle-exit 300 --give-up-after 3600
+
+Exit codes, for batch systems:
+  0  stopped as asked, or no work for --idle-exit seconds: don't start it again
+  2  wrong arguments, or refused by the coordinator (token, version, physics): mend it first
+  3  failure, or no coordinator for --give-up-after seconds: starting it again may help")]
+struct Arguments {
+    /// Address of a coordinator, http://HOST:PORT or https://HOST:PORT; several, separated by
+    /// commas, where several coordinators serve one library.
+    #[arg(
+        long = "coordinator",
+        value_name = "URL",
+        env = "TRACKTWIN_COORDINATOR",
+        required = true,
+        value_delimiter = ','
+    )]
+    coordinators: Vec<String>,
+    /// Cores to use [default: all].
+    #[arg(long, value_name = "N", env = "TRACKTWIN_CORES")]
+    cores: Option<NonZeroUsize>,
+    /// End, with exit code 0, when there was no work for so long.
+    #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_IDLE_EXIT")]
+    idle_exit: Option<u64>,
+    /// End, with exit code 3, when no coordinator has answered for so long [default: never].
+    #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_GIVE_UP_AFTER")]
+    give_up_after: Option<u64>,
+    /// File with the farm's token.
+    #[arg(long, value_name = "FILE", env = "TRACKTWIN_TOKEN_FILE")]
+    token_file: Option<PathBuf>,
+    /// Certificate of the farm's authority (ca.pem), for https.
+    #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CA")]
+    tls_ca: Option<PathBuf>,
+    /// The worker's own certificate, where the coordinator demands one.
+    #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CERT", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Key of that certificate.
+    #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_KEY", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Allow plain text over a network, which is to be trusted itself then.
+    #[arg(long, env = "TRACKTWIN_INSECURE")]
+    insecure: bool,
+    /// Answer /healthz and /metrics (Prometheus) on this address, such as 127.0.0.1:7701.
+    #[arg(long, value_name = "ADDR", env = "TRACKTWIN_HEALTH")]
+    health: Option<SocketAddr>,
+    /// How log lines look; which ones appear, `RUST_LOG` says.
+    #[arg(long, value_enum, default_value_t = LogFormat::Text, env = "TRACKTWIN_LOG_FORMAT")]
+    log_format: LogFormat,
+}
+
+/// How log lines look.
+#[derive(Clone, Copy, ValueEnum)]
+enum LogFormat {
+    /// For people.
+    Text,
+    /// For machines: one JSON object a line.
+    Json,
+}
+
+/// Reads the command line, works, and turns the end into an exit code.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    log_to_stderr(arguments.log_format);
+    let config = match config(&arguments) {
+        Ok(config) => config,
+        Err(error) => return report(&error, REFUSED),
+    };
+    match serve(config, arguments.health) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let refused = error.downcast_ref::<AgentError>().is_some_and(|error| !error.may_pass());
+            report(&error, if refused { REFUSED } else { FAILED })
+        }
+    }
+}
+
+fn report(error: &anyhow::Error, code: u8) -> ExitCode {
+    let line = format!("{error:#}").replace('\n', " ");
+    eprintln!("tracktwin-worker: {line}");
+    ExitCode::from(code)
+}
+
+fn config(arguments: &Arguments) -> anyhow::Result<Config> {
+    let cores = match arguments.cores {
+        Some(cores) => cores,
+        None => std::thread::available_parallelism()?,
+    };
+    let token = arguments.token_file.as_deref().map(token).transpose()?;
+    let identity_pem = match (&arguments.tls_cert, &arguments.tls_key) {
+        (Some(certificate), Some(key)) => Some([read(certificate)?, read(key)?]),
+        _ => None,
+    };
+    Ok(Config {
+        coordinators: arguments.coordinators.clone(),
+        credentials: Credentials {
+            token,
+            ca_pem: arguments.tls_ca.as_deref().map(read).transpose()?,
+            identity_pem,
+            insecure: arguments.insecure,
+        },
+        idle_exit: arguments.idle_exit.map(Duration::from_secs),
+        give_up_after: arguments.give_up_after.map(Duration::from_secs),
+        ..Config::new(String::new(), cores)
+    })
+}
+
+fn token(path: &Path) -> anyhow::Result<Token> {
+    let text = String::from_utf8_lossy(&read(path)?).into_owned();
+    Token::new(&text).with_context(|| path.display().to_string())
+}
+
+fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))
+}
+
+fn serve(config: Config, health: Option<SocketAddr>) -> anyhow::Result<()> {
+    let runtime = tokio::runtime::Runtime::new()?;
+    let served = runtime.block_on(async {
+        let shutdown = CancellationToken::new();
+        stop_on_signals(shutdown.clone())?;
+        let port = match health {
+            Some(address) => {
+                let port = TcpListener::bind(address).await;
+                Some(port.with_context(|| format!("--health {address}: no port to be had"))?)
+            }
+            None => None,
+        };
+        tracing::info!(worker = config.worker, cores = config.cores, "worker starts");
+        Ok(agent::run_with_health(config, port, shutdown).await?)
+    });
+    // A group given back at the end may still be computing; nobody waits for it.
+    runtime.shutdown_timeout(END);
+    served
+}
+
+/// Cancels `shutdown` on the first Ctrl-C or SIGTERM.
+fn stop_on_signals(shutdown: CancellationToken) -> anyhow::Result<()> {
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    tokio::spawn(async move {
+        tokio::select! {
+            _ = terminate.recv() => {}
+            _ = interrupt.recv() => {}
+        }
+        tracing::info!("stopping: what has begun is finished, the rest given back");
+        shutdown.cancel();
+    });
+    Ok(())
+}
+
+/// Sends warnings, or what `RUST_LOG` asks for, to standard error.
+fn log_to_stderr(format: LogFormat) {
+    let filter = tracing_subscriber::EnvFilter::builder()
+        .with_default_directive(tracing_subscriber::filter::LevelFilter::WARN.into())
+        .from_env_lossy();
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    match format {
+        LogFormat::Text => log.init(),
+        LogFormat::Json => log.json().init(),
+    }
+}
