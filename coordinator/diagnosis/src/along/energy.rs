@@ -1,0 +1,65 @@
+//! Power of a whitened pass between any two places.
+
+use rustfft::num_complex::Complex64;
+use tracktwin_signal::recording::Pass;
+
+/// Power of a pass summed up along the track.
+#[derive(Clone, Debug)]
+pub(crate) struct Energy<'a> {
+    position_m: &'a [f64],
+    /// Sum of the squared magnitudes before each sample.
+    summed: Vec<f64>,
+}
+
+impl<'a> Energy<'a> {
+    /// Of a whitened signal of the pass.
+    pub(crate) fn new(pass: &'a Pass, whitened: &[Complex64]) -> Self {
+        let mut summed = Vec::with_capacity(whitened.len() + 1);
+        let mut sum = 0.0;
+        summed.push(sum);
+        for value in whitened {
+            sum += value.norm_sqr();
+            summed.push(sum);
+        }
+        Self { position_m: &pass.position_m, summed }
+    }
+
+    /// First and last place of the pass in m.
+    pub(crate) fn ends(&self) -> [f64; 2] {
+        [self.position_m[0], self.position_m[self.position_m.len() - 1]]
+    }
+
+    /// Mean power between two places in m; zero where the pass has no sample.
+    pub(crate) fn mean(&self, from_m: f64, to_m: f64) -> f64 {
+        let [start, end] =
+            [from_m, to_m].map(|place| self.position_m.partition_point(|&x| x < place));
+        if end <= start {
+            return 0.0;
+        }
+        (self.summed[end] - self.summed[start]) / (end - start) as f64
+    }
+}
+
+/// Mean speed of a pass in m/s by its positions.
+pub(crate) fn speed_m_s(pass: &Pass) -> f64 {
+    let positions = &pass.position_m;
+    let length = positions[positions.len() - 1] - positions[0];
+    length / (positions.len() - 1) as f64 * pass.signal.sample_rate_hz()
+}
+
+/// Indices of the passes at each speed, fastest first.
+///
+/// Nominal speeds within 2 % are one: a drive doesn't hold its speed more closely.
+pub(crate) fn by_speed(passes: &[Pass]) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..passes.len()).collect();
+    order.sort_by(|&a, &b| passes[b].speed_km_h.total_cmp(&passes[a].speed_km_h));
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for index in order {
+        let speed = passes[index].speed_km_h;
+        match groups.last_mut() {
+            Some(group) if passes[group[0]].speed_km_h / speed < 1.02 => group.push(index),
+            _ => groups.push(vec![index]),
+        }
+    }
+    groups
+}

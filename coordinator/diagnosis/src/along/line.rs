@@ -1,0 +1,178 @@
+//! Lines in the spectrum of a stretch of track, each over what lies beside it.
+
+use super::background::{hann, median};
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex64;
+use std::ops::Range;
+use tracktwin_signal::recording::Pass;
+
+/// Bins to a resolution cell: the transform is padded to twice its length.
+const PADDING: usize = 2;
+
+/// Resolution cells on either side of a line that belong to the line (Hann's main lobe).
+const LOBE: f64 = 2.5;
+
+/// Resolution cells on either side up to which neighbours are taken.
+const REACH: f64 = 18.0;
+
+/// How many independent values the median of the neighbours is worth.
+///
+/// Hann makes two of three cells independent; a median of exponential variables has 2.08 times the
+/// variance of their mean.
+const NEIGHBOURS: f64 = 2.0 * (REACH - LOBE) / 1.5 / 2.08;
+
+/// What tells the place of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ruler {
+    /// The positions of the recording.
+    Odometer,
+    /// The time, at constant speed between the ends of the pass: better where the odometer wanders
+    /// by more than a part of the wavelength.
+    Clock,
+}
+
+impl Ruler {
+    pub(crate) const BOTH: [Self; 2] = [Self::Odometer, Self::Clock];
+}
+
+/// Values of a pass on `points` even places from `from_m` to `to_m` (excluded).
+pub(crate) fn on_even_places(
+    pass: &Pass,
+    values: &[Complex64],
+    [from_m, to_m]: [f64; 2],
+    points: usize,
+    ruler: Ruler,
+) -> Vec<Complex64> {
+    let positions = &pass.position_m;
+    let last = positions.len() - 1;
+    let per_sample = (positions[last] - positions[0]) / last as f64;
+    let index_at = |x: f64| match ruler {
+        Ruler::Clock => (x - positions[0]) / per_sample,
+        Ruler::Odometer => {
+            let after = positions.partition_point(|&place| place <= x).clamp(1, last);
+            let (low, high) = (positions[after - 1], positions[after]);
+            let part = if high > low { (x - low) / (high - low) } else { 0.0 };
+            (after - 1) as f64 + part
+        }
+    };
+    let step = (to_m - from_m) / points as f64;
+    let value = |point: usize| {
+        let index = index_at(from_m + point as f64 * step).clamp(0.0, last as f64);
+        let low = (index.floor() as usize).min(last.saturating_sub(1));
+        let part = index - low as f64;
+        values[low] * (1.0 - part) + values[low + 1] * part
+    };
+    (0..points).map(value).collect()
+}
+
+/// Power of a stretch on lines of wave number (or of frequency).
+#[derive(Clone, Debug)]
+pub(crate) struct Spectrum {
+    step: f64,
+    power: Vec<f64>,
+}
+
+impl Spectrum {
+    /// Of values evenly `step` apart, under a Hann window; of an analytic signal or a real one.
+    pub(crate) fn new(values: &[Complex64], step: f64) -> Self {
+        let length = values.len();
+        let windowed = values.iter().enumerate().map(|(i, value)| value * hann(i, length));
+        let mut lines: Vec<_> = windowed.collect();
+        lines.resize(PADDING * length, Complex64::ZERO);
+        FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
+        let power = lines[..=length * PADDING / 2].iter().map(Complex64::norm_sqr).collect();
+        Self { step: 1.0 / (step * (PADDING * length) as f64), power }
+    }
+
+    /// Distance of the bins in cycles per unit of `step`.
+    pub(crate) const fn bin_width(&self) -> f64 {
+        self.step
+    }
+
+    /// Number of bins.
+    pub(crate) const fn len(&self) -> usize {
+        self.power.len()
+    }
+
+    /// The bin next to a wave number or frequency.
+    pub(crate) fn bin(&self, place: f64) -> usize {
+        ((place / self.step).round() as usize).min(self.power.len() - 1)
+    }
+
+    /// Power of a bin over the median of its neighbours', as a mean: one where there is no line.
+    ///
+    /// The louder side counts: on the flank of a resonance the other is no background. Neighbours
+    /// that `skip` names don't count; none where too few are left on either side.
+    pub(crate) fn ratio(&self, bin: usize, skip: impl Fn(f64) -> bool) -> Option<f64> {
+        let [near, far] = [LOBE, REACH].map(|cells| (cells * PADDING as f64) as usize);
+        let below = bin.saturating_sub(far).max(1)..bin.saturating_sub(near).max(1);
+        let above = (bin + near + 1).min(self.len())..(bin + far + 1).min(self.len());
+        let side = |bins: Range<usize>| {
+            let powers: Vec<f64> =
+                bins.filter(|&other| !skip(other as f64 * self.step)).map(|i| self.power[i]).collect();
+            // A quarter of what there is inside a spectrum: the tail assumes few fewer.
+            (powers.len() >= (far - near) / 4).then(|| median(powers))
+        };
+        let mean = [side(below), side(above)].into_iter().flatten().fold(0.0, f64::max) / 2f64.ln();
+        (mean > 0.0).then(|| self.power[bin] / mean)
+    }
+
+    /// `ln P` of a ratio this large where there is no line.
+    pub(crate) fn ln_tail(ratio: f64) -> f64 {
+        super::tail::ln_line_tail(NEIGHBOURS, ratio)
+    }
+}
+
+/// Power that a tone of amplitude `a` has over the mean of noise of one-sided density `s` on a
+/// stretch of length `l`: `a^2 l / (2 * 1.5 s)`; this is `a` from the ratio.
+///
+/// Hann's equivalent noise bandwidth is 1.5 cells.
+pub(crate) fn amplitude(ratio: f64, density: f64, length: f64) -> f64 {
+    (3.0 * density * (ratio - 1.0).max(0.0) / length).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::along::testing::noise;
+    use std::f64::consts::TAU;
+
+    fn values(tone: f64) -> Vec<Complex64> {
+        let line = |i: usize| tone * (TAU * 0.05 * i as f64).cos();
+        noise(4, 4000).into_iter().enumerate().map(|(i, n)| (n + line(i)).into()).collect()
+    }
+
+    #[test]
+    fn the_amplitude_of_a_tone_in_noise_comes_back() {
+        let spectrum = Spectrum::new(&values(0.5), 1.0);
+        let ratio = spectrum.ratio(spectrum.bin(0.05), |_| false).unwrap();
+        // White noise of variance one has density 2 over half a cycle a sample. A line 250 times
+        // above its neighbours is known to 1 / sqrt(2 * 250), their median to a quarter.
+        let found = amplitude(ratio, 2.0, 4000.0);
+        assert!((found / 0.5 - 1.0).abs() < 0.2, "{found}");
+    }
+
+    #[test]
+    fn ratios_of_noise_exceed_a_level_no_more_often_than_their_tail_says() {
+        let mut above = 0;
+        let mut tried = 0;
+        for seed in 0..20 {
+            let noise: Vec<_> = noise(seed, 2000).into_iter().map(Complex64::from).collect();
+            let spectrum = Spectrum::new(&noise, 1.0);
+            for bin in (50..1950).step_by(4) {
+                let ratio = spectrum.ratio(bin, |_| false).unwrap();
+                above += usize::from(Spectrum::ln_tail(ratio) < 0.01f64.ln());
+                tried += 1;
+            }
+        }
+        let share = above as f64 / f64::from(tried);
+        // The louder side makes the test careful: at most 1 %, and 0.1 % is one standard deviation.
+        assert!((0.001..=0.012).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn a_line_without_neighbours_has_no_ratio() {
+        let spectrum = Spectrum::new(&values(0.0), 1.0);
+        assert!(spectrum.ratio(100, |_| true).is_none());
+    }
+}

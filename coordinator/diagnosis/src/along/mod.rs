@@ -1,0 +1,18 @@
+//! A pass as a function of the place: background, whitened power, lines, tail probabilities.
+//!
+//! Owns what the tests of wheel, impacts and measuring chain have in common; what is concluded is
+//! left to them.
+
+mod background;
+mod energy;
+mod line;
+mod tail;
+#[cfg(test)]
+pub(crate) mod testing;
+
+pub(crate) use background::{Background, hann, median, whitened};
+pub(crate) use energy::{Energy, by_speed, speed_m_s};
+pub(crate) use line::{Ruler, Spectrum, amplitude, on_even_places};
+pub(crate) use tail::{
+    combined, ln_even_odds_tail, ln_gamma_tail, ln_student_tail, of_best,
+};

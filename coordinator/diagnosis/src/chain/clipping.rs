@@ -1,0 +1,66 @@
+//! Crests that all stop at one height.
+
+use crate::along::{ln_even_odds_tail, of_best};
+use tracktwin_signal::recording::{Pass, Recording};
+
+/// Thickness of the layer below the greatest value, as a share of it.
+const LAYER: f64 = 0.01;
+
+/// A pass whose crests are cut off.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clipping {
+    /// Index of the pass.
+    pub pass: usize,
+    /// Acceleration in m/s2 at which it is cut.
+    pub level_m_s2: f64,
+    /// Crests that reach it, above or below.
+    pub crests: usize,
+    /// Samples within the layer, as a share of all.
+    pub share: f64,
+    /// Probability of as many crests there without a limit, in logarithm.
+    pub ln_p: f64,
+}
+
+/// The passes that are cut off, with a probability below `alpha` that none is.
+///
+/// Heights of crests become rarer with height: of those in two layers of equal thickness below the
+/// greatest, no more than half are in the upper one, but for chance.
+pub fn clipping(recording: &Recording, alpha: f64) -> Vec<Clipping> {
+    let passes = recording.passes.iter().enumerate();
+    let sides = passes.flat_map(|(index, pass)| [1.0, -1.0].map(|sign| side(index, pass, sign)));
+    let tries = 2 * recording.passes.len();
+    let cut = sides.map(|side| Clipping { ln_p: of_best(side.ln_p, tries), ..side });
+    let mut all: Vec<Clipping> = cut.filter(|side| side.ln_p <= alpha.ln()).collect();
+    // One entry a pass: the side that is cut more surely.
+    all.sort_by(|a, b| a.pass.cmp(&b.pass).then(a.ln_p.total_cmp(&b.ln_p)));
+    all.dedup_by_key(|side| side.pass);
+    all
+}
+
+fn side(index: usize, pass: &Pass, sign: f64) -> Clipping {
+    let samples = pass.signal.samples();
+    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+    let value = |index: usize| sign * (samples[index] - mean);
+    let greatest = (0..samples.len()).map(value).fold(0.0, f64::max);
+    let [upper, lower] = [1.0 - LAYER, 1.0 - 2.0 * LAYER].map(|share| share * greatest);
+    let (mut high, mut next, mut within) = (0, 0, 0);
+    let mut crest = f64::MIN;
+    for index in 0..samples.len() {
+        let value = value(index);
+        within += usize::from(value > upper);
+        // A crest is what lies between two descents below both layers.
+        if value > lower {
+            crest = crest.max(value);
+        } else if crest > lower {
+            if crest > upper { high += 1 } else { next += 1 }
+            crest = f64::MIN;
+        }
+    }
+    Clipping {
+        pass: index,
+        level_m_s2: sign * greatest + mean,
+        crests: high,
+        share: within as f64 / samples.len() as f64,
+        ln_p: ln_even_odds_tail(high, high + next),
+    }
+}

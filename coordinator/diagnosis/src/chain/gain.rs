@@ -1,0 +1,122 @@
+//! Passes at one speed that differ by a constant factor.
+
+use crate::along::{Background, Energy, by_speed, ln_student_tail, median, of_best, whitened};
+use tracktwin_signal::recording::{Pass, Recording};
+
+/// Bands in Hz whose power is compared; a gain is the same in all.
+const BANDS_HZ: [[f64; 2]; 3] = [[100.0, 400.0], [400.0, 1200.0], [1200.0, 4000.0]];
+/// Greatest frequency as a share of the sample rate.
+const HIGH_SHARE: f64 = 0.4;
+/// Difference of two passes in dB that is usual: a speed that is off by one per cent does as much.
+const USUAL_DB: f64 = 0.2;
+/// Difference of the bands' gains in dB above which it is no gain but something else.
+const UNIFORM_DB: f64 = 0.6;
+/// Fewest stretches for a mean and its scatter.
+const STRETCHES_MIN: usize = 6;
+
+/// The gain of a pass over the others at its speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gain {
+    /// Index of the pass.
+    pub pass: usize,
+    /// How many passes there are at this speed, with it.
+    pub passes: usize,
+    /// Level over the median of the other passes at its speed in dB, and its standard deviation.
+    pub gain_db: (f64, f64),
+    /// Greatest difference between bands in dB.
+    pub spread_db: f64,
+    /// Probability that the pass differs no more than usual, in logarithm, for all passes.
+    pub ln_p: f64,
+}
+
+impl Gain {
+    /// Whether it is a gain at all: the same in every band, and unlikely otherwise.
+    pub fn is_error(&self, alpha: f64) -> bool {
+        let uniform = self.spread_db < UNIFORM_DB.max(0.2 * self.gain_db.0.abs());
+        uniform && self.ln_p <= alpha.ln()
+    }
+}
+
+/// Gains of all passes that have another one at their speed.
+pub fn gains(recording: &Recording) -> Vec<Gain> {
+    let groups = by_speed(&recording.passes);
+    let tries = recording.passes.len();
+    let mut gains: Vec<Gain> = groups.iter().flat_map(|group| of_speed(recording, group)).collect();
+    for gain in &mut gains {
+        gain.ln_p = of_best(gain.ln_p, tries);
+    }
+    gains.sort_by_key(|gain| gain.pass);
+    gains
+}
+
+fn of_speed(recording: &Recording, group: &[usize]) -> Vec<Gain> {
+    let passes: Vec<&Pass> = group.iter().map(|&index| &recording.passes[index]).collect();
+    let Some(background) = Background::of(&passes[0].signal) else { return Vec::new() };
+    if group.len() < 2 {
+        return Vec::new();
+    }
+    // Levels in dB by pass, band and stretch.
+    let level = |pass: &&Pass| levels(recording, pass, &background);
+    let levels: Vec<Vec<Vec<f64>>> = passes.iter().map(level).collect();
+    let gain = |this: usize| {
+        let bands: Vec<Vec<f64>> =
+            (0..levels[this].len()).map(|band| differences(&levels, this, band)).collect();
+        gain(group, this, &bands)
+    };
+    (0..group.len()).filter_map(gain).collect()
+}
+
+/// Level of a pass over the median of the others, stretch by stretch, in dB.
+fn differences(levels: &[Vec<Vec<f64>>], this: usize, band: usize) -> Vec<f64> {
+    let stretches = levels.iter().map(|pass| pass[band].len()).min().unwrap_or(0);
+    let over = |stretch: usize| {
+        let others = (0..levels.len()).filter(|&pass| pass != this);
+        levels[this][band][stretch] - median(others.map(|p| levels[p][band][stretch]).collect())
+    };
+    (0..stretches).map(over).filter(|level| level.is_finite()).collect()
+}
+
+fn gain(group: &[usize], this: usize, bands: &[Vec<f64>]) -> Option<Gain> {
+    let count = bands.iter().map(Vec::len).min()?;
+    if count < STRETCHES_MIN {
+        return None;
+    }
+    let all: Vec<f64> = (0..count)
+        .map(|i| bands.iter().map(|band| band[i]).sum::<f64>() / bands.len() as f64)
+        .collect();
+    let (mean, deviation) = mean_and_deviation(&all);
+    let means: Vec<f64> = bands.iter().map(|band| mean_and_deviation(band).0).collect();
+    let ends = means.iter().fold([f64::MAX, f64::MIN], |e, m| [e[0].min(*m), e[1].max(*m)]);
+    let beyond = (mean.abs() - USUAL_DB) / deviation.max(1e-6);
+    // Two-sided.
+    let ln_p = (ln_student_tail(count as f64 - 1.0, beyond) + 2f64.ln()).min(0.0);
+    let gain_db = (mean, deviation);
+    let (pass, passes) = (group[this], group.len());
+    Some(Gain { pass, passes, gain_db, spread_db: ends[1] - ends[0], ln_p })
+}
+
+/// Mean and the standard deviation of it.
+fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    (mean, (square / (count - 1.0) / count).sqrt())
+}
+
+/// Levels in dB over one background: by band, by sleeper spacing along the track.
+fn levels(recording: &Recording, pass: &Pass, background: &Background) -> Vec<Vec<f64>> {
+    let top = HIGH_SHARE * pass.signal.sample_rate_hz();
+    let spacing = recording.spacing_m;
+    let band = |[low, high]: [f64; 2]| {
+        let white = whitened(&pass.signal, background, [low, high.min(top)]);
+        let energy = Energy::new(pass, &white);
+        let [from, to] = energy.ends();
+        let stretches = ((to - from) / spacing).floor() as usize;
+        let start = |stretch: usize| from + stretch as f64 * spacing;
+        // The fading ends stay out.
+        (1..stretches.saturating_sub(1))
+            .map(|stretch| 10.0 * energy.mean(start(stretch), start(stretch + 1)).log10())
+            .collect()
+    };
+    BANDS_HZ.into_iter().filter(|[low, _]| *low < 0.5 * top).map(band).collect()
+}

@@ -1,0 +1,162 @@
+//! Lines of the mains: at a fixed frequency whatever the speed, narrower than any structure.
+
+use crate::along::{
+    Background, Spectrum, amplitude, by_speed, combined, ln_gamma_tail, of_best, speed_m_s,
+};
+use rustfft::num_complex::Complex64;
+use tracktwin_signal::recording::{Pass, Recording};
+
+/// Frequencies of electrical supplies in Hz: railways of central Europe, the mains of Europe and
+/// of America.
+const MAINS_HZ: [f64; 3] = [50.0 / 3.0, 50.0, 60.0];
+/// Harmonics looked for.
+const HARMONICS: usize = 6;
+/// Duration in s of a segment: longer than this the mains' frequency is not steady.
+const SEGMENT_S: f64 = 4.0;
+/// How far in Hz the mains may be from their nominal frequency.
+const DRIFT_HZ: f64 = 0.1;
+/// Probability of one speed's line without hum above which it isn't heard at that speed.
+const EACH_SPEED: f64 = 0.05;
+/// Segments from which their mean follows a gamma distribution well enough.
+const SEGMENTS_MIN: usize = 4;
+/// Waves in a segment below which a line has no neighbours on its lower side.
+const WAVES_MIN: f64 = 10.0;
+/// Resolution cells within which a line may be the sleepers'.
+const CELLS_APART: f64 = 1.5;
+
+/// A line of the mains.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hum {
+    /// Its frequency in Hz.
+    pub frequency_hz: f64,
+    /// Its amplitude in m/s2, mean of all passes, and the standard deviation of that.
+    pub amplitude_m_s2: (f64, f64),
+    /// Power over its neighbours', mean of all speeds.
+    pub ratio: f64,
+    /// Probability of such a line at any mains frequency without hum, in logarithm.
+    pub ln_p: f64,
+}
+
+/// The lines of the mains that are less likely than `alpha` without them, most certain first.
+pub fn hum(recording: &Recording, alpha: f64) -> Vec<Hum> {
+    let speeds: Option<Vec<Vec<Heard>>> = by_speed(&recording.passes)
+        .into_iter()
+        .map(|group| group.into_iter().map(|i| Heard::of(&recording.passes[i])).collect())
+        .collect();
+    let Some(speeds) = speeds else { return Vec::new() };
+    let mut found = Vec::new();
+    let mut tries = 0;
+    for mains in MAINS_HZ {
+        for harmonic in 1..=HARMONICS {
+            let (line, bins) = line(&speeds, recording.spacing_m, mains * harmonic as f64);
+            tries += bins;
+            found.extend(line);
+        }
+    }
+    for line in &mut found {
+        line.ln_p = of_best(line.ln_p, tries);
+    }
+    found.retain(|line: &Hum| line.ln_p <= alpha.ln());
+    found.sort_by(|a, b| a.ln_p.total_cmp(&b.ln_p));
+    found
+}
+
+/// The line nearest to a mains frequency, and how many bins were looked at.
+fn line(speeds: &[Vec<Heard>], spacing_m: f64, frequency: f64) -> (Option<Hum>, usize) {
+    let mut tries = 0;
+    let (mut each, mut ratios, mut amplitudes) = (Vec::new(), Vec::new(), Vec::new());
+    for passes in speeds {
+        let lines: Option<Vec<Line>> = passes.iter().map(|pass| pass.line(frequency)).collect();
+        let Some(lines) = lines else { return (None, 0) };
+        tries = lines.iter().map(|line| line.tries).fold(tries, usize::max);
+        let mean = |of: fn(&Line) -> f64| lines.iter().map(of).sum::<f64>() / lines.len() as f64;
+        ratios.push(mean(|line| line.ratio));
+        amplitudes.extend(lines.iter().map(|line| line.amplitude));
+        // Where it may be the sleepers' a line says nothing either way.
+        if !passes.iter().any(|pass| pass.may_be_sleepers(frequency, spacing_m)) {
+            each.push(mean(|line| line.ln_p));
+        }
+    }
+    if each.is_empty() || each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) {
+        return (None, tries);
+    }
+    let count = amplitudes.len() as f64;
+    let mean = amplitudes.iter().sum::<f64>() / count;
+    let square = amplitudes.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / count;
+    let hum = Hum {
+        frequency_hz: frequency,
+        amplitude_m_s2: (mean, square.sqrt().max(0.05 * mean)),
+        ratio: ratios.iter().sum::<f64>() / ratios.len() as f64,
+        ln_p: combined(&each),
+    };
+    (Some(hum), tries)
+}
+
+/// The spectra of a pass's segments.
+struct Heard {
+    spectra: Vec<Spectrum>,
+    background: Background,
+    duration_s: f64,
+    speed_m_s: f64,
+    rate_hz: f64,
+}
+
+/// A line in one pass.
+struct Line {
+    ratio: f64,
+    amplitude: f64,
+    ln_p: f64,
+    tries: usize,
+}
+
+impl Heard {
+    /// None where the pass is too short.
+    fn of(pass: &Pass) -> Option<Self> {
+        let (samples, rate_hz) = (pass.signal.samples(), pass.signal.sample_rate_hz());
+        let segments = ((pass.signal.duration_s() / SEGMENT_S) as usize).max(1);
+        let length = samples.len() / segments;
+        let spectrum = |part: &[f64]| {
+            let mean = part.iter().sum::<f64>() / length as f64;
+            let values: Vec<_> = part.iter().map(|value| Complex64::from(value - mean)).collect();
+            Spectrum::new(&values, 1.0 / rate_hz)
+        };
+        Some(Self {
+            spectra: samples.chunks_exact(length).map(spectrum).collect(),
+            background: Background::of(&pass.signal)?,
+            duration_s: length as f64 / rate_hz,
+            speed_m_s: speed_m_s(pass),
+            rate_hz,
+        })
+    }
+
+    fn may_be_sleepers(&self, frequency: f64, spacing_m: f64) -> bool {
+        let order = frequency * spacing_m / self.speed_m_s;
+        let cell = spacing_m / self.speed_m_s / self.duration_s;
+        order > 0.5 && (order - order.round()).abs() < CELLS_APART * cell
+    }
+
+    /// None where the segments are too short for the frequency, or not sampled fast enough.
+    fn line(&self, frequency: f64) -> Option<Line> {
+        if frequency > 0.4 * self.rate_hz || frequency * self.duration_s < WAVES_MIN {
+            return None;
+        }
+        let reach = DRIFT_HZ * frequency / 50.0;
+        let first = &self.spectra[0];
+        let bins = first.bin(frequency - reach)..=first.bin(frequency + reach);
+        let tries = bins.clone().count();
+        let segments = self.spectra.len();
+        let mean = |bin: usize| -> Option<f64> {
+            let ratios: Option<Vec<f64>> =
+                self.spectra.iter().map(|spectrum| spectrum.ratio(bin, |_| false)).collect();
+            ratios.map(|ratios| ratios.iter().sum::<f64>() / segments as f64)
+        };
+        let ratio = bins.filter_map(mean).fold(0.0, f64::max);
+        let ln_p = if segments < SEGMENTS_MIN {
+            Spectrum::ln_tail(ratio)
+        } else {
+            ln_gamma_tail(segments as f64, ratio)
+        };
+        let amplitude = amplitude(ratio, self.background.at(frequency), self.duration_s);
+        Some(Line { ratio, amplitude, ln_p, tries })
+    }
+}

@@ -1,0 +1,33 @@
+//! What sensor, recorder, clock and odometer did: never physics of the track.
+//!
+//! Owns `clipping`, `electrical_hum`, `gain_error` and `position_error`, passes that can't be used
+//! at all, and per pass what a model of the track must know of the chain: noise, gain, offset. A
+//! resonance of the sensor's mounting needs the track's model and is left to it.
+
+mod clipping;
+mod gain;
+mod hum;
+mod offset;
+mod trouble;
+
+pub use clipping::{Clipping, clipping};
+pub use gain::{Gain, gains};
+pub use hum::{Hum, hum};
+pub use offset::{Offset, Offsets, offsets};
+pub use trouble::{Trouble, troubles};
+
+use crate::along::Background;
+use tracktwin_signal::recording::Recording;
+
+/// Density of every pass's noise floor in (m/s2)2/Hz: the median of the upper half of its spectrum.
+///
+/// None for a pass that is too short or stands still.
+pub fn noise_floors(recording: &Recording) -> Vec<Option<f64>> {
+    let floor = |pass: &tracktwin_signal::recording::Pass| {
+        Background::of(&pass.signal).map(|background| background.floor())
+    };
+    recording.passes.iter().map(floor).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,139 @@
+//! Where one pass's odometer stands against another's, by the surface that both ran over.
+
+use crate::along::{
+    Background, Ruler, by_speed, combined, median, of_best, on_even_places, speed_m_s, whitened,
+};
+use rustfft::num_complex::Complex64;
+use tracktwin_signal::recording::{Pass, Recording};
+
+/// Band in Hz and shortest wave in m of what is compared: the surface's own sound.
+const LOW_HZ: f64 = 500.0;
+const SHORTEST_M: f64 = 1.2e-3;
+/// Greatest frequency as a share of the sample rate.
+const HIGH_SHARE: f64 = 0.4;
+/// Points on the shortest wave.
+const POINTS: f64 = 4.0;
+/// Offsets looked for, in sleeper spacings either way.
+const REACH_SPACINGS: f64 = 0.5;
+/// Logarithm of the probability of a correlation by chance below which a stretch is matched.
+const MATCHED: f64 = -9.0;
+/// Difference in m of two odometers that is usual: each wanders by three millimetres.
+const USUAL_M: f64 = 6e-3;
+/// Standard deviation in m of that limit: an offset is called an error some way beyond it.
+const USUAL_DEVIATION_M: f64 = 1e-3;
+
+/// Where two passes' odometers differ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offset {
+    /// Place in m.
+    pub x_m: f64,
+    /// How much further on the second pass says the same spot of the rail is, in m.
+    pub offset_m: f64,
+    /// Correlation of the two, 0 to 1.
+    pub correlation: f64,
+}
+
+/// All stretches of two passes at one speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Offsets {
+    /// Indices of the passes.
+    pub passes: [usize; 2],
+    /// The stretches that match.
+    pub matched: Vec<Offset>,
+    /// Stretches that were compared.
+    pub stretches: usize,
+    /// Median correlation over all stretches.
+    pub correlation: f64,
+}
+
+impl Offsets {
+    /// Straight line through the offsets: value in m in the middle, slope in m/m.
+    pub fn line(&self) -> (f64, f64) {
+        let count = self.matched.len().max(1) as f64;
+        let mean = |of: &dyn Fn(&Offset) -> f64| self.matched.iter().map(of).sum::<f64>() / count;
+        let (x, offset) = (mean(&|o| o.x_m), mean(&|o| o.offset_m));
+        let cross = mean(&|o| (o.x_m - x) * (o.offset_m - offset));
+        let square = mean(&|o| (o.x_m - x).powi(2));
+        (offset, if square > 0.0 { cross / square } else { 0.0 })
+    }
+
+    /// The offset in m that a tenth of the stretches exceed.
+    pub fn greatest_m(&self) -> f64 {
+        let mut sizes: Vec<f64> = self.matched.iter().map(|o| o.offset_m.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.get(sizes.len().saturating_sub(1 + sizes.len() / 10)).copied().unwrap_or(0.0)
+    }
+
+    /// Probability of offsets as great between usual odometers, in logarithm: the normal tail
+    /// beyond the usual limit.
+    pub fn ln_p(&self) -> f64 {
+        let beyond = (self.greatest_m() - USUAL_M) / USUAL_DEVIATION_M;
+        if beyond <= 0.0 { 0.0 } else { -0.5 * beyond * beyond - (1.0 + beyond).ln() }
+    }
+}
+
+/// Offsets of every pass against the first at its speed.
+pub fn offsets(recording: &Recording) -> Vec<Offsets> {
+    let groups = by_speed(&recording.passes);
+    let pairs = groups.iter().flat_map(|group| group[1..].iter().map(|&other| [group[0], other]));
+    pairs.filter_map(|pair| compare(recording, pair)).collect()
+}
+
+fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
+    let [first, second] = passes.map(|index| &recording.passes[index]);
+    let from = first.position_m[0].max(second.position_m[0]);
+    let last = |pass: &Pass| pass.position_m[pass.position_m.len() - 1];
+    let to = last(first).min(last(second));
+    let high = (speed_m_s(first) / SHORTEST_M).min(HIGH_SHARE * recording.sample_rate_hz);
+    let low = LOW_HZ.min(0.25 * high);
+    let step = speed_m_s(first) / high / POINTS;
+    let points = ((to - from) / step) as usize;
+    let values = |pass: &Pass| -> Option<Vec<Complex64>> {
+        let white = whitened(&pass.signal, &Background::of(&pass.signal)?, [low, high]);
+        let ends = [from, from + points as f64 * step];
+        Some(on_even_places(pass, &white, ends, points, Ruler::Odometer))
+    };
+    let (a, b) = (values(first)?, values(second)?);
+    let length = (recording.spacing_m / step) as usize;
+    let reach = (REACH_SPACINGS * recording.spacing_m / step) as usize;
+    // Independent values of a stretch: bandwidth times duration.
+    let freedom = (high - low) * length as f64 * step / speed_m_s(first);
+    let mut all = Offsets { passes, matched: Vec::new(), stretches: 0, correlation: 0.0 };
+    let mut correlations = Vec::new();
+    let mut start = reach;
+    while start + length + reach <= points.min(a.len()).min(b.len()) {
+        let (lag, correlation) = best_lag(&a[start..start + length], &b, start, reach);
+        let ln_p = combined(&[of_best(-freedom * correlation.powi(2), 2 * reach)]);
+        all.stretches += 1;
+        correlations.push(correlation);
+        if ln_p < MATCHED {
+            let x_m = from + (start + length / 2) as f64 * step;
+            all.matched.push(Offset { x_m, offset_m: lag * step, correlation });
+        }
+        start += length;
+    }
+    all.correlation = median(correlations);
+    Some(all)
+}
+
+/// The lag in points, with a parabola through the peak, and the correlation there.
+fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize) -> (f64, f64) {
+    let norm = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
+    let own = norm(part);
+    let correlation = |lag: usize| {
+        let shifted = &other[start + lag - reach..][..part.len()];
+        let cross: Complex64 = part.iter().zip(shifted).map(|(x, y)| x.conj() * y).sum();
+        cross.norm() / (own * norm(shifted)).max(f64::MIN_POSITIVE)
+    };
+    let values: Vec<f64> = (0..=2 * reach).map(correlation).collect();
+    let best = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(reach);
+    let mut lag = best as f64;
+    if best > 0 && best + 1 < values.len() {
+        let [left, peak, right] = [values[best - 1], values[best], values[best + 1]];
+        let curvature = left - 2.0 * peak + right;
+        if curvature < 0.0 {
+            lag += 0.5 * (left - right) / curvature;
+        }
+    }
+    (lag - reach as f64, values[best])
+}

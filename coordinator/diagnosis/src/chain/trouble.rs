@@ -1,0 +1,156 @@
+//! Passes that say nothing about the track, and why.
+
+use super::offset::Offsets;
+use crate::along::Background;
+use std::fmt;
+use tracktwin_signal::recording::{Pass, Recording};
+
+/// Longest stretch in s without a change that a sensor at work shows.
+const STILL_S: f64 = 2e-3;
+/// Logarithm of the probability of a stretch without a change by chance.
+const STILL_LN_P: f64 = -20.0;
+/// Share of samples at the limit above which a pass is saturated.
+const SATURATED: f64 = 0.02;
+/// Correlation of two passes at one speed below which they have no track in common.
+const UNLIKE: f64 = 0.3;
+/// Sleeper spacings that a pass must cover to be compared with itself elsewhere.
+const SPANS_MIN: f64 = 4.0;
+
+/// Why a pass can't be used.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Trouble {
+    /// The signal doesn't change for a while.
+    DropOut {
+        /// Index of the pass.
+        pass: usize,
+        /// Where in m it begins.
+        from_m: f64,
+        /// For how long in s.
+        duration_s: f64,
+    },
+    /// The signal doesn't change at all.
+    Dead {
+        /// Index of the pass.
+        pass: usize,
+    },
+    /// A large part of the samples is at the recorder's limit.
+    Saturated {
+        /// Index of the pass.
+        pass: usize,
+        /// Their share.
+        share: f64,
+    },
+    /// Two passes over the same track at one speed have nothing in common: noise, another track, or
+    /// positions that are off by more than half a sleeper spacing.
+    Unlike {
+        /// Indices of the passes.
+        passes: [usize; 2],
+        /// Their median correlation.
+        correlation: f64,
+    },
+    /// The pass covers too few sleepers.
+    Short {
+        /// Index of the pass.
+        pass: usize,
+        /// What it covers in m.
+        length_m: f64,
+    },
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DropOut { pass, from_m, duration_s } => write!(
+                f,
+                "pass {}: no change for {:.1} ms from {from_m:.3} m on: a drop-out; leave the stretch out",
+                pass + 1,
+                1e3 * duration_s
+            ),
+            Self::Dead { pass } => {
+                write!(f, "pass {}: the signal doesn't change; check sensor and cable", pass + 1)
+            }
+            Self::Saturated { pass, share } => write!(
+                f,
+                "pass {}: {:.1} % of the samples are at the recorder's limit; record again with less gain",
+                pass + 1,
+                1e2 * share
+            ),
+            Self::Unlike { passes: [first, second], correlation } => write!(
+                f,
+                "passes {} and {}: at one speed, but their correlation above 500 Hz is {correlation:.2}: noise, another track, or positions off by more than half a sleeper spacing",
+                first + 1,
+                second + 1
+            ),
+            Self::Short { pass, length_m } => write!(
+                f,
+                "pass {}: covers {length_m:.2} m, fewer than {SPANS_MIN:.0} sleeper spacings; record more",
+                pass + 1
+            ),
+        }
+    }
+}
+
+/// Everything that makes passes unusable; `offsets` are those of the same recording.
+pub fn troubles(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
+    let passes = recording.passes.iter().enumerate();
+    let mut all: Vec<Trouble> =
+        passes.flat_map(|(index, pass)| of_pass(index, pass, recording.spacing_m)).collect();
+    let unlike = |offsets: &&Offsets| {
+        // Where half of the stretches match, the rest is noise or a worn clock, not another track.
+        2 * offsets.matched.len() < offsets.stretches && offsets.correlation < UNLIKE
+    };
+    all.extend(offsets.iter().filter(unlike).map(|offsets| Trouble::Unlike {
+        passes: offsets.passes,
+        correlation: offsets.correlation,
+    }));
+    all
+}
+
+fn of_pass(index: usize, pass: &Pass, spacing_m: f64) -> Vec<Trouble> {
+    let samples = pass.signal.samples();
+    let length_m = pass.position_m[samples.len() - 1] - pass.position_m[0];
+    let mut all = Vec::new();
+    if length_m < SPANS_MIN * spacing_m {
+        all.push(Trouble::Short { pass: index, length_m });
+    }
+    if Background::of(&pass.signal).is_none() && samples.windows(2).all(|pair| pair[0] == pair[1]) {
+        all.push(Trouble::Dead { pass: index });
+        return all;
+    }
+    let share = share_at_limits(samples);
+    if share > SATURATED {
+        all.push(Trouble::Saturated { pass: index, share });
+        return all;
+    }
+    all.extend(drop_out(index, pass));
+    all
+}
+
+/// Share of samples that have exactly the greatest or the least value.
+fn share_at_limits(samples: &[f64]) -> f64 {
+    let ends = samples.iter().fold([f64::MAX, f64::MIN], |e, s| [e[0].min(*s), e[1].max(*s)]);
+    samples.iter().filter(|sample| ends.contains(sample)).count() as f64 / samples.len() as f64
+}
+
+/// The longest stretch without a change, if chance doesn't make it.
+fn drop_out(index: usize, pass: &Pass) -> Option<Trouble> {
+    let (samples, rate) = (pass.signal.samples(), pass.signal.sample_rate_hz());
+    let equal = samples.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    let (mut run, mut longest, mut end) = (0, 0, 0);
+    for (place, pair) in samples.windows(2).enumerate() {
+        run = if pair[0] == pair[1] { run + 1 } else { 0 };
+        if run > longest {
+            (longest, end) = (run, place + 1);
+        }
+    }
+    // Outside the run: how often two neighbours are alike by the recorder's steps.
+    let share = (equal - longest + 1) as f64 / (samples.len() - longest) as f64;
+    let ln_p = longest as f64 * share.ln() + (samples.len() as f64).ln();
+    let duration_s = longest as f64 / rate;
+    let still = duration_s >= STILL_S && ln_p < STILL_LN_P;
+    still.then(|| Trouble::DropOut {
+        pass: index,
+        from_m: pass.position_m[end - longest],
+        duration_s,
+    })
+}

@@ -1,0 +1,258 @@
+//! A wave of one length in a stretch of rail: a line that stays in wavelength at every speed.
+
+use crate::along::{
+    Background, Ruler, Spectrum, amplitude, by_speed, combined, median, of_best, on_even_places,
+    speed_m_s, whitened,
+};
+use rustfft::num_complex::Complex64;
+use std::f64::consts::TAU;
+use tracktwin_signal::recording::{Pass, Recording};
+use tracktwin_track::model::Roughness;
+
+/// Wavelengths looked for, in sleeper spacings: 2 mm to 62 mm of 125 mm.
+const WAVELENGTHS: [f64; 2] = [0.016, 0.5];
+/// Lengths of the stretches looked at, in sleeper spacings.
+const STRETCHES: [f64; 3] = [4.0, 8.0, 16.0];
+/// Lowest and highest frequency in Hz and as a share of the sample rate.
+const LOW_HZ: f64 = 60.0;
+const HIGH_SHARE: f64 = 0.4;
+/// Power over the noise floor below which a wave can't be told from the sensor's noise.
+const AUDIBLE: f64 = 3.0;
+/// Magnitude at which a whitened signal is held: an impact has lines too, if it repeats.
+const HOLD: f64 = 2.5;
+/// Probability of one speed's line without a wave above which it doesn't repeat at that speed.
+const EACH_SPEED: f64 = 0.05;
+/// Harmonics of the sleepers' passing that are not called corrugation, and how near they are in
+/// resolution cells.
+const SLEEPER_HARMONICS: f64 = 16.0;
+const CELLS_APART: f64 = 2.0;
+/// Waves on a stretch below which the neighbours of a line lie too far from it: 18 cells are then
+/// two fifths of its wave number, and the track's resonances show.
+const WAVES_MIN: f64 = 45.0;
+/// Level of eq. B.6 that amplitudes are stated for, and the relative deviation of its root.
+const LEVEL: f64 = 3.0;
+const ROOT_LEVEL_DEVIATION: f64 = 0.23;
+
+/// A corrugated stretch of rail.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Corrugation {
+    /// Wavelength in m and its standard deviation.
+    pub wavelength_m: (f64, f64),
+    /// Amplitude in m and its standard deviation, at irregularity level 3; goes with its root.
+    pub amplitude_m: (f64, f64),
+    /// First and last place in m.
+    pub stretch_m: [f64; 2],
+    /// Probability of such a line anywhere on a rail without corrugation, in logarithm.
+    pub ln_p: f64,
+    /// Power of the line over its neighbours' in its stretch.
+    pub ratio: f64,
+}
+
+/// A candidate: where, which bin, how unlikely.
+struct Candidate {
+    stretch_m: [f64; 2],
+    wave_number: f64,
+    ln_p: f64,
+    ratio: f64,
+    ruler: Ruler,
+}
+
+/// The most certain corrugation that is less likely than `alpha` on a rail without.
+///
+/// `orders_m` is the circumference of a wheel whose orders are not to be called corrugation.
+pub fn corrugation(
+    recording: &Recording,
+    alpha: f64,
+    orders_m: Option<f64>,
+) -> Option<Corrugation> {
+    let [shortest, longest] = WAVELENGTHS.map(|share| share * recording.spacing_m);
+    let whitened: Vec<(Vec<Complex64>, [f64; 2])> = recording
+        .passes
+        .iter()
+        .map(|pass| held(pass, [1.0 / longest, 1.0 / shortest]))
+        .collect::<Option<_>>()?;
+    let search = Search { recording, whitened: &whitened, orders_m, lengths: [shortest, longest] };
+    let mut candidates = Vec::new();
+    let mut tries = 0;
+    for ruler in Ruler::BOTH {
+        for stretch_m in search.stretches() {
+            let (best, bins) = search.best_line(stretch_m, ruler);
+            tries += bins;
+            candidates.extend(best);
+        }
+    }
+    let best = candidates.into_iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
+    let ln_p = of_best(best.ln_p, tries);
+    (ln_p <= alpha.ln()).then(|| search.describe(&best, ln_p))
+}
+
+/// The whitened pass, held at a few times its usual magnitude, and the wave numbers it can be
+/// asked for.
+fn held(pass: &Pass, [low, high]: [f64; 2]) -> Option<(Vec<Complex64>, [f64; 2])> {
+    let background = Background::of(&pass.signal)?;
+    let speed = speed_m_s(pass);
+    let audible = background.audible_hz(AUDIBLE);
+    let top = (high * speed).min(HIGH_SHARE * pass.signal.sample_rate_hz()).min(audible);
+    let band = [(low * speed).max(LOW_HZ), top];
+    if band[1] < 2.0 * band[0] {
+        return None;
+    }
+    // Lines at the ends of the band need neighbours beyond them.
+    let mut values = whitened(&pass.signal, &background, [0.5 * band[0], 1.2 * band[1]]);
+    for value in &mut values {
+        let magnitude = value.norm();
+        if magnitude > HOLD {
+            *value *= HOLD / magnitude;
+        }
+    }
+    Some((values, band.map(|frequency| frequency / speed)))
+}
+
+struct Search<'a> {
+    recording: &'a Recording,
+    whitened: &'a [(Vec<Complex64>, [f64; 2])],
+    orders_m: Option<f64>,
+    /// Shortest and longest wave in m.
+    lengths: [f64; 2],
+}
+
+impl Search<'_> {
+    /// Stretches of all lengths that overlap by half, inside every pass.
+    fn stretches(&self) -> Vec<[f64; 2]> {
+        let passes = &self.recording.passes;
+        let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
+        let ends = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
+        let to = ends.fold(f64::MAX, f64::min);
+        let mut all = Vec::new();
+        for length in STRETCHES.map(|spans| spans * self.recording.spacing_m) {
+            let mut start = from;
+            while start + length <= to {
+                all.push([start, start + length]);
+                start += 0.5 * length;
+            }
+        }
+        all
+    }
+
+    /// Lowest and highest wave number in cycles/m that every pass can be asked for.
+    fn band(&self) -> [f64; 2] {
+        let ends = self.whitened.iter().map(|(_, band)| *band);
+        ends.fold([1.0 / self.lengths[1], 1.0 / self.lengths[0]], |all, one| {
+            [all[0].max(one[0]), all[1].min(one[1])]
+        })
+    }
+
+    fn spectrum(&self, pass: usize, stretch_m: [f64; 2], ruler: Ruler) -> Spectrum {
+        let length = stretch_m[1] - stretch_m[0];
+        // Four points on the shortest wave.
+        let points = (4.0 * length / self.lengths[0]).ceil() as usize;
+        let pass_values = &self.whitened[pass].0;
+        let pass = &self.recording.passes[pass];
+        let values = on_even_places(pass, pass_values, stretch_m, points, ruler);
+        Spectrum::new(&values, length / points as f64)
+    }
+
+    /// Belongs to the sleepers or to the wheel.
+    fn is_known(&self, wave_number: f64, cell: f64) -> bool {
+        let near = |period: f64, harmonics: f64| {
+            let order = wave_number * period;
+            let nearest = order.round();
+            nearest >= 1.0
+                && nearest <= harmonics
+                && (order - nearest).abs() < CELLS_APART * cell * period
+        };
+        near(self.recording.spacing_m, SLEEPER_HARMONICS)
+            || self.orders_m.is_some_and(|circumference| near(circumference, f64::INFINITY))
+    }
+
+    /// The least likely line of a stretch, and how many bins were looked at.
+    fn best_line(&self, stretch_m: [f64; 2], ruler: Ruler) -> (Option<Candidate>, usize) {
+        let cell = 1.0 / (stretch_m[1] - stretch_m[0]);
+        let speeds: Vec<Vec<Spectrum>> = by_speed(&self.recording.passes)
+            .into_iter()
+            .map(|group| group.into_iter().map(|p| self.spectrum(p, stretch_m, ruler)).collect())
+            .collect();
+        let [low, high] = self.band();
+        let low = low.max(WAVES_MIN * cell);
+        let mut best: Option<Candidate> = None;
+        let mut looked_at = 0;
+        for bin in speeds[0][0].bin(low) + 1..speeds[0][0].bin(high) {
+            let wave_number = bin as f64 * speeds[0][0].bin_width();
+            if self.is_known(wave_number, cell) {
+                continue;
+            }
+            let skip = |other: f64| self.is_known(other, cell);
+            let ratios: Option<Vec<f64>> = speeds
+                .iter()
+                .map(|passes| {
+                    let each: Option<Vec<f64>> =
+                        passes.iter().map(|spectrum| spectrum.ratio(bin, skip)).collect();
+                    each.map(|each| each.iter().sum::<f64>() / each.len() as f64)
+                })
+                .collect();
+            let Some(ratios) = ratios else { continue };
+            looked_at += 1;
+            let each: Vec<f64> = ratios.iter().map(|&ratio| Spectrum::ln_tail(ratio)).collect();
+            if each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) {
+                continue;
+            }
+            let ln_p = combined(&each);
+            if best.as_ref().is_none_or(|best| ln_p < best.ln_p) {
+                let ratio = ratios.iter().sum::<f64>() / ratios.len() as f64;
+                best = Some(Candidate { stretch_m, wave_number, ln_p, ratio, ruler });
+            }
+        }
+        (best, looked_at)
+    }
+
+    fn describe(&self, best: &Candidate, ln_p: f64) -> Corrugation {
+        let extent = self.extent(best);
+        // The amplitude is that of the stretch itself, not of one that reaches beyond it.
+        let length = extent[1] - extent[0];
+        let density = TAU * Roughness::new(LEVEL).density(TAU * best.wave_number);
+        let amplitude = amplitude(self.ratio(extent, best), density, length);
+        let wavelength = 1.0 / best.wave_number;
+        // A strong line's place is known to a fraction of a cell; the bins are half a cell apart.
+        let deviation = 0.25 / (best.stretch_m[1] - best.stretch_m[0]) * wavelength * wavelength;
+        let relative = ROOT_LEVEL_DEVIATION.hypot(0.15);
+        Corrugation {
+            wavelength_m: (wavelength, deviation),
+            amplitude_m: (amplitude, relative * amplitude),
+            stretch_m: extent,
+            ln_p,
+            ratio: best.ratio,
+        }
+    }
+
+    /// Power of the candidate's line over its neighbours' on a stretch, mean of all passes.
+    fn ratio(&self, stretch_m: [f64; 2], best: &Candidate) -> f64 {
+        let at = |pass| {
+            let spectrum = self.spectrum(pass, stretch_m, best.ruler);
+            spectrum.ratio(spectrum.bin(best.wave_number), |_| false).unwrap_or(0.0)
+        };
+        let passes = 0..self.recording.passes.len();
+        let count = passes.len() as f64;
+        passes.map(at).sum::<f64>() / count
+    }
+
+    /// From where to where the line has at least half of its greatest amplitude.
+    fn extent(&self, best: &Candidate) -> [f64; 2] {
+        let half = 0.5 * STRETCHES[0] * self.recording.spacing_m;
+        let [from, to] = self.stretches().into_iter().fold([f64::MAX, f64::MIN], |ends, stretch| {
+            [ends[0].min(stretch[0]), ends[1].max(stretch[1])]
+        });
+        let step = 0.25 * self.recording.spacing_m;
+        let count = ((to - from - 2.0 * half) / step).max(0.0) as usize + 1;
+        let middles: Vec<f64> = (0..count).map(|i| from + half + i as f64 * step).collect();
+        let level = |&middle: &f64| self.ratio([middle - half, middle + half], best);
+        let levels: Vec<f64> = middles.iter().map(level).collect();
+        let greatest = levels.iter().copied().fold(0.0, f64::max);
+        let inside = levels.iter().copied().filter(|level| *level >= 0.25 * greatest);
+        // Half the amplitude under a window that is half inside: the stretch's end is its middle.
+        let full = median(inside.collect());
+        let loud = |level: &f64| *level >= 0.25 * full;
+        let first = levels.iter().position(loud).unwrap_or(0);
+        let last = levels.iter().rposition(loud).unwrap_or(count - 1);
+        [middles[first], middles[last]]
+    }
+}

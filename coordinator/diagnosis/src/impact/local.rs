@@ -1,0 +1,91 @@
+//! Impacts that come at the same place of the track in every pass and at every speed.
+
+use super::repeated::{Cells, cells};
+use super::shape::{Observed, Shape, fit};
+use crate::along::{combined, of_best};
+use tracktwin_signal::recording::Recording;
+
+/// Probability of one speed's power without an impact above which it doesn't repeat there.
+const EACH_SPEED: f64 = 0.01;
+/// Cells that are looked at beside a cell: odometers wander by millimetres from speed to speed.
+const NEIGHBOURS: usize = 1;
+/// Impacts beyond which a rail is rough rather than damaged at places.
+const IMPACTS_MAX: usize = 8;
+
+/// A short event at one place of the track.
+#[derive(Clone, Debug)]
+pub struct Impact {
+    /// Its place along the track in m and the standard deviation of that.
+    pub x_m: (f64, f64),
+    /// Probability to see as much anywhere on a rail without defects, in logarithm.
+    pub ln_p: f64,
+    /// Power over what is normal around it, mean of all speeds.
+    pub power_ratio: f64,
+    /// What it looks like as a wave of the surface; none where too little of it can be heard.
+    pub shape: Option<Shape>,
+}
+
+/// All impacts that are less likely than `alpha` on a rail without defects, most certain first.
+///
+/// Places in `except` (`[from, to]` in m) are passed over.
+pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Impact> {
+    let speeds = cells(recording, false);
+    let Some(first) = speeds.first() else { return Vec::new() };
+    let allowed = |x: f64| !except.iter().any(|[from, to]| (*from..=*to).contains(&x));
+    let mut candidates: Vec<(usize, f64)> = (0..first.ratio.len())
+        .filter(|&cell| allowed(first.place_m(cell)))
+        .map(|cell| (cell, of_best(ln_p(&speeds, cell), first.ratio.len())))
+        .filter(|(_, ln_p)| *ln_p <= alpha.ln())
+        .collect();
+    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut found: Vec<Impact> = Vec::new();
+    for (cell, ln_p) in candidates {
+        let x = first.place_m(cell);
+        let apart = |other: &Impact| (other.x_m.0 - x).abs() > 0.5 * recording.spacing_m;
+        if found.len() < IMPACTS_MAX && found.iter().all(apart) {
+            found.push(impact(recording, &speeds, cell, ln_p));
+        }
+    }
+    found
+}
+
+/// `ln P` of a cell over all speeds: certain (0) where one speed doesn't show it.
+fn ln_p(speeds: &[Cells], cell: usize) -> f64 {
+    let best = |cells: &Cells| {
+        let around = cell.saturating_sub(NEIGHBOURS)..(cell + NEIGHBOURS + 1).min(cells.ratio.len());
+        let tries = around.len();
+        of_best(around.map(|other| cells.ln_tail(other)).fold(0.0, f64::min), tries)
+    };
+    let each: Vec<f64> = speeds.iter().map(best).collect();
+    if each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) { 0.0 } else { combined(&each) }
+}
+
+fn impact(recording: &Recording, speeds: &[Cells], cell: usize, ln_p: f64) -> Impact {
+    let x = speeds[0].place_m(cell);
+    let width = speeds[0].width_m;
+    let mut places = Vec::new();
+    let mut observed = Vec::new();
+    for pass in &recording.passes {
+        if let Some(seen) = Observed::at(pass, x, width) {
+            places.push(seen.x_m);
+            observed.push(seen);
+        }
+    }
+    let power = |cells: &Cells| {
+        let around = cell.saturating_sub(NEIGHBOURS)..(cell + NEIGHBOURS + 1).min(cells.ratio.len());
+        around.map(|other| cells.ratio[other]).fold(0.0, f64::max)
+    };
+    let power_ratio = speeds.iter().map(power).sum::<f64>() / speeds.len() as f64;
+    let x_m = mean_and_deviation(&places).unwrap_or((x, width));
+    Impact { x_m, ln_p, power_ratio, shape: fit(&observed) }
+}
+
+/// Mean and standard deviation; the passes of one odometer err together, so it is not divided by
+/// the root of their number.
+fn mean_and_deviation(values: &[f64]) -> Option<(f64, f64)> {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    // A millimetre is what the ringing of the contact hides.
+    (!values.is_empty()).then(|| (mean, (square / count).sqrt().max(1e-3)))
+}

@@ -1,0 +1,18 @@
+//! Short defects and waves of the rail's surface, told from the passes alone.
+//!
+//! Owns impacts that repeat at a place (`squat`, the dip of a `rail_joint`) and `corrugation`.
+//! What repeats with the wheel is `wheel`'s.
+
+mod corrugation;
+mod local;
+mod repeated;
+mod shape;
+
+pub use corrugation::{Corrugation, corrugation};
+pub use local::{Impact, impacts};
+pub use shape::{Form, Shape};
+pub(crate) use repeated::{Cells, cells};
+pub(crate) use shape::{Observed, fit};
+
+#[cfg(test)]
+mod tests;

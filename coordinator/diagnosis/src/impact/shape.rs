@@ -1,0 +1,248 @@
+//! The wave of the surface that an impact is made by, from its spectrum over the background's.
+//!
+//! An impact and the irregularity go through the same wheel, contact and track: the ratio of their
+//! spectra is that of their surfaces, `q(f) = |Z(k)|^2 / (pi v S(2 pi k))` with `k = f/v`,
+//! whatever the track is. `S` is eq. B.6; its level scales the depth, not the length.
+
+use super::repeated::band;
+use crate::along::{Background, hann, speed_m_s};
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+use tracktwin_signal::recording::Pass;
+use tracktwin_track::model::Roughness;
+
+/// Time in s before and after the first blow that is looked at: what follows is the track's ringing.
+const BEFORE_S: f64 = 0.005;
+const AFTER_S: f64 = 0.015;
+/// Lowest frequency in Hz of the shape.
+const LOW_HZ: f64 = 400.0;
+/// Bands to an octave.
+const BANDS_PER_OCTAVE: f64 = 6.0;
+/// Standard deviation of the logarithm of a band's ratio: how far the track at a place differs from
+/// the track in the mean, in power (a decibel).
+const MODEL_DEVIATION: f64 = 0.25;
+/// Level of eq. B.6 that depths are stated for, and the relative standard deviation of its square
+/// root: levels are between 1 and 5.
+const LEVEL: f64 = 3.0;
+const ROOT_LEVEL_DEVIATION: f64 = 0.23;
+/// Fewest bands that say something about a shape.
+const BANDS_MIN: usize = 6;
+
+/// What kind of wave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A kink with long flanks, `d exp(-|x|/l)`: a dipped joint.
+    Dip,
+    /// A smooth hollow, `d/2 (1 + cos(2 pi x/l))`: a squat, or a worn flat.
+    Hollow,
+}
+
+/// A wave that fits an impact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// The form that fits best.
+    pub form: Form,
+    /// Length in m and its standard deviation: `l` of the form.
+    pub length_m: (f64, f64),
+    /// Depth in m and its standard deviation, at irregularity level 3; goes with the root of it.
+    pub depth_m: (f64, f64),
+    /// Change of slope at the kink in rad at level 3: `2 d/l` of a dip. Known better than either.
+    pub slope_rad: f64,
+    /// How much better than the other form: half the difference of the sums of squares.
+    pub lead: f64,
+}
+
+/// An impact's spectrum over the background, by band.
+#[derive(Clone, Debug)]
+pub(crate) struct Observed {
+    /// Place of the blow in m.
+    pub x_m: f64,
+    /// Wave number in cycles/m, `q v` in m and its variance in the logarithm, by band.
+    bands: Vec<(f64, f64, f64)>,
+    /// `q v` in m that the background alone has.
+    floor: f64,
+}
+
+impl Observed {
+    /// The blow nearest to `x_m`, within `reach_m`; none where the pass ends too close.
+    pub(crate) fn at(pass: &Pass, x_m: f64, reach_m: f64) -> Option<Self> {
+        let background = Background::of(&pass.signal)?;
+        let [_, high] = band(pass, &background)?;
+        let rate = pass.signal.sample_rate_hz();
+        let samples = pass.signal.samples();
+        let blow = loudest(pass, samples, x_m, reach_m);
+        let [before, after] = [BEFORE_S, AFTER_S].map(|time| (time * rate) as usize);
+        let start = blow.checked_sub(before)?;
+        let segment = samples.get(start..blow + after)?;
+        let (power, window_s) = spectrum(segment, before, rate);
+        let speed = speed_m_s(pass);
+        let step = rate / segment.len() as f64;
+        let mut bands = Vec::new();
+        let mut low = LOW_HZ.min(0.25 * high);
+        while low < high {
+            let next = low * 2f64.powf(1.0 / BANDS_PER_OCTAVE);
+            let bins = (low / step).ceil() as usize..(next / step).ceil() as usize;
+            if !bins.is_empty() && bins.end <= power.len() {
+                let count = bins.len() as f64;
+                let over = |bin: usize| power[bin] / background.at(bin as f64 * step);
+                let q = bins.map(over).sum::<f64>() / count;
+                let share = (window_s / q).min(1.0);
+                let variance = share * (2.0 - share) / count + MODEL_DEVIATION.powi(2);
+                bands.push(((low * next).sqrt() / speed, q * speed, variance));
+            }
+            low = next;
+        }
+        let x_m = pass.position_m[blow];
+        Some(Self { x_m, bands, floor: window_s * speed })
+    }
+}
+
+/// The sample of greatest magnitude within reach, of the signal's changes: the blow itself.
+fn loudest(pass: &Pass, samples: &[f64], x_m: f64, reach_m: f64) -> usize {
+    let place = |x: f64| pass.position_m.partition_point(|&position| position < x);
+    let range = place(x_m - reach_m).max(1)..place(x_m + reach_m).min(samples.len());
+    let magnitude = |index: usize| (samples[index] - samples[index - 1]).abs();
+    let middle = place(x_m).clamp(1, samples.len() - 1);
+    range.max_by(|&a, &b| magnitude(a).total_cmp(&magnitude(b))).unwrap_or(middle)
+}
+
+/// One-sided energy density of a segment and the energy in s of its window: rises before the blow,
+/// falls over the second half.
+fn spectrum(segment: &[f64], before: usize, rate: f64) -> (Vec<f64>, f64) {
+    let length = segment.len();
+    let mean = segment.iter().sum::<f64>() / length as f64;
+    let weight = |index: usize| {
+        let (rise, fall) = (before / 2, length / 2);
+        if index < rise {
+            hann(index, 2 * rise)
+        } else if index >= length - fall {
+            hann(length - index, 2 * fall)
+        } else {
+            1.0
+        }
+    };
+    let mut lines: Vec<_> = segment
+        .iter()
+        .enumerate()
+        .map(|(index, value)| Complex64::new((value - mean) * weight(index), 0.0))
+        .collect();
+    FftPlanner::new().plan_fft_forward(length).process(&mut lines);
+    let power =
+        lines[..length / 2].iter().map(|line| 2.0 * line.norm_sqr() / (rate * rate)).collect();
+    (power, (0..length).map(|index| weight(index).powi(2)).sum::<f64>() / rate)
+}
+
+impl Form {
+    /// `|Z(k)|` in m2 of depth 1 m and length `l` at `k` cycles/m.
+    fn transform(self, length: f64, wave_number: f64) -> f64 {
+        let turns = wave_number * length;
+        match self {
+            Self::Dip => 2.0 * length / (1.0 + (TAU * turns).powi(2)),
+            Self::Hollow => {
+                let rest = 1.0 - turns * turns;
+                // At one turn a length sine and rest vanish together: the limit is one half.
+                let value = if rest.abs() < 1e-6 {
+                    0.5
+                } else {
+                    (PI * turns).sin() / (PI * turns) / rest
+                };
+                (0.5 * length * value).abs()
+            }
+        }
+    }
+
+    const fn lengths_m(self) -> [f64; 2] {
+        match self {
+            Self::Dip => [2e-3, 0.3],
+            Self::Hollow => [1.5e-3, 0.1],
+        }
+    }
+}
+
+/// Sum of squares, length and depth of a form.
+struct Fitted {
+    squares: f64,
+    length: f64,
+    depth: f64,
+}
+
+/// The form and size that all the observed blows agree with best.
+pub(crate) fn fit(observed: &[Observed]) -> Option<Shape> {
+    if observed.iter().map(|seen| seen.bands.len()).sum::<usize>() < BANDS_MIN {
+        return None;
+    }
+    let [dip, hollow] = [Form::Dip, Form::Hollow].map(|form| grid(form, observed));
+    let (form, best, other) = if best_of(&dip).squares < best_of(&hollow).squares {
+        (Form::Dip, dip, hollow)
+    } else {
+        (Form::Hollow, hollow, dip)
+    };
+    let chosen = best_of(&best);
+    let (length, length_deviation) = spread(&best, chosen.squares, |fitted| fitted.length);
+    let (depth, depth_deviation) = spread(&best, chosen.squares, |fitted| fitted.depth);
+    let depth_deviation = depth_deviation.hypot(ROOT_LEVEL_DEVIATION * depth);
+    Some(Shape {
+        form,
+        length_m: (length, length_deviation),
+        depth_m: (depth, depth_deviation),
+        slope_rad: 2.0 * chosen.depth / chosen.length,
+        lead: 0.5 * (best_of(&other).squares - chosen.squares),
+    })
+}
+
+fn best_of(grid: &[Fitted]) -> &Fitted {
+    let best = grid.iter().min_by(|a, b| a.squares.total_cmp(&b.squares));
+    best.expect("a grid of lengths is not empty")
+}
+
+/// Mean and standard deviation of a quantity under the likelihood of the grid.
+fn spread(grid: &[Fitted], least: f64, quantity: impl Fn(&Fitted) -> f64) -> (f64, f64) {
+    let weight = |fitted: &Fitted| (-0.5 * (fitted.squares - least)).exp();
+    let sum: f64 = grid.iter().map(weight).sum();
+    let mean = grid.iter().map(|fitted| weight(fitted) * quantity(fitted)).sum::<f64>() / sum;
+    let square = |fitted: &Fitted| weight(fitted) * (quantity(fitted) - mean).powi(2);
+    // The grid's own step is the least that can be told.
+    let variance = grid.iter().map(square).sum::<f64>() / sum;
+    (mean, variance.sqrt().max(0.02 * mean))
+}
+
+/// Every length of the form with the depth that fits it best.
+fn grid(form: Form, observed: &[Observed]) -> Vec<Fitted> {
+    const LENGTHS: usize = 120;
+    let [shortest, longest] = form.lengths_m();
+    let length_of =
+        |step: usize| shortest * (longest / shortest).powf(step as f64 / (LENGTHS - 1) as f64);
+    let roughness = Roughness::new(LEVEL);
+    let fitted = |length: f64| {
+        let expected: Vec<(f64, f64, f64, f64)> = observed
+            .iter()
+            .flat_map(|seen| {
+                seen.bands.iter().map(|&(k, q, variance)| {
+                    let unit = form.transform(length, k).powi(2) / (PI * roughness.density(TAU * k));
+                    (q.ln(), unit, seen.floor, variance)
+                })
+            })
+            .collect();
+        best_depth(length, &expected)
+    };
+    (0..LENGTHS).map(|step| fitted(length_of(step))).collect()
+}
+
+/// The depth with the least sum of squares of logarithms.
+fn best_depth(length: f64, expected: &[(f64, f64, f64, f64)]) -> Fitted {
+    let squares = |depth: f64| -> f64 {
+        let square = |&(ln_q, unit, floor, variance): &(f64, f64, f64, f64)| {
+            // A null of the form is filled by what lies beside it in the band.
+            let model = depth * depth * unit + floor;
+            // Beyond three deviations a band counts as an outlier, not with its square.
+            ((ln_q - model.ln()).powi(2) / variance).min(9.0)
+        };
+        expected.iter().map(square).sum()
+    };
+    // From a tenth of a micrometre to two millimetres, in steps of 5 %.
+    let depths = (0..200).map(|step| 1e-7 * 1.05f64.powi(step));
+    let best = depths.map(|depth| (squares(depth), depth)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let (squares, depth) = best.expect("a range of depths is not empty");
+    Fitted { squares, length, depth }
+}

@@ -1,0 +1,23 @@
+//! What repeats with the turns of the wheel, told from the passes alone.
+//!
+//! Owns the flat and the orders of an out-of-round wheel, its circumference where that isn't known,
+//! and how well a model of orders predicts what it hasn't heard. What repeats with the track is
+//! `impact`'s.
+
+mod flat;
+mod out_of_round;
+
+pub use flat::{Flat, flat};
+pub use out_of_round::{Order, out_of_round};
+
+use std::f64::consts::TAU;
+use tracktwin_signal::recording::Recording;
+
+/// The wheel's circumference in m by its nominal radius, where the recording states one.
+pub fn nominal_circumference_m(recording: &Recording) -> Option<f64> {
+    let radius = recording.nominal.get("wheel")?.get("radius_m")?.as_f64()?;
+    (radius.is_finite() && radius > 0.0).then_some(TAU * radius)
+}
+
+#[cfg(test)]
+mod tests;
