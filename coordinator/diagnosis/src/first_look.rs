@@ -19,8 +19,9 @@ const EACH_TEST: f64 = FALSE_ALARMS / 8.0;
 /// Lead of one form over the other, in nats, below which an impact may be either.
 const FORM_LEAD: f64 = 3.0;
 
-/// Half the length in m around a blow of the wheel that is not searched for impacts of the track.
-const AROUND_BLOW_M: f64 = 0.02;
+/// Sleeper spacings around a place where the wheel's flat meets the rail in every pass: what is
+/// heard there is the flat and its ringing.
+const AROUND_BLOW: f64 = 0.4;
 
 /// What the passes tell by themselves.
 #[derive(Clone, Debug)]
@@ -43,7 +44,7 @@ pub struct FirstLook {
 pub fn first_look(recording: &Recording) -> FirstLook {
     let gains = chain::gains(recording);
     let offsets = chain::offsets(recording);
-    let mut findings = clipped(recording);
+    let mut findings: Vec<Finding> = clipped(recording).into_iter().collect();
     findings.extend(hum_finding(&chain::hum(recording, EACH_TEST)));
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let alarm = EACH_TEST.ln() - (offsets.len().max(1) as f64).ln();
@@ -62,15 +63,15 @@ pub fn first_look(recording: &Recording) -> FirstLook {
 fn surface(recording: &Recording) -> Vec<Finding> {
     let circumference = wheel::nominal_circumference_m(recording);
     let flat = circumference.and_then(|length| wheel::flat(recording, length, EACH_TEST));
-    let blows: Vec<[f64; 2]> = flat
-        .iter()
-        .flat_map(|flat| flat.blows_m.iter().flatten())
-        .map(|&x| [x - AROUND_BLOW_M, x + AROUND_BLOW_M])
-        .collect();
+    let reach = AROUND_BLOW * recording.spacing_m;
+    let blows = flat.as_ref().map(|flat| common_places(&flat.blows_m, reach)).unwrap_or_default();
     let turn = flat.as_ref().map(|flat| flat.circumference_m.0);
-    let orders = circumference
+    let mut orders = circumference
         .map(|length| wheel::out_of_round(recording, turn.unwrap_or(length), EACH_TEST))
         .unwrap_or_default();
+    if let Some(flat) = &flat {
+        orders.retain(|order| is_longer_than(order, flat));
+    }
     let mut findings: Vec<Finding> = flat.iter().map(flat_finding).collect();
     findings.extend(order_finding(&orders));
     findings.extend(impact::impacts(recording, EACH_TEST, &blows).iter().map(impact_finding));
@@ -79,6 +80,20 @@ fn surface(recording: &Recording) -> Vec<Finding> {
     let waves = impact::corrugation(recording, EACH_TEST, known);
     findings.extend(waves.as_ref().map(corrugation_finding));
     findings
+}
+
+/// Whether an order's waves are too long to be the flat's own harmonics: four of its lengths.
+fn is_longer_than(order: &Order, flat: &Flat) -> bool {
+    let length = flat.shape.as_ref().map_or(0.0, |shape| shape.length_m.0);
+    flat.circumference_m.0 / order.number as f64 > 4.0 * length
+}
+
+/// Stretches around the first pass's blows that every other pass has a blow in too.
+fn common_places(blows_m: &[Vec<f64>], reach_m: f64) -> Vec<[f64; 2]> {
+    let Some((first, others)) = blows_m.split_first() else { return Vec::new() };
+    let met =
+        |x: f64| others.iter().all(|pass| pass.iter().any(|other| (other - x).abs() < reach_m));
+    first.iter().filter(|x| met(**x)).map(|&x| [x - reach_m, x + reach_m]).collect()
 }
 
 fn clipped(recording: &Recording) -> Option<Finding> {
@@ -215,7 +230,10 @@ fn impact_finding(impact: &Impact) -> Finding {
             Form::Dip => ("a kink", "a hollow"),
         };
         let sure = if shape.lead < FORM_LEAD { "hardly " } else { "" };
-        form = format!("; its spectrum is {sure}more like {mine} than {other} (by {:.1} nats)", shape.lead);
+        form = format!(
+            "; its spectrum is {sure}more like {mine} than {other} (by {:.1} nats)",
+            shape.lead
+        );
     }
     // Three standard deviations, and 10 mm for the length of the defect itself.
     let reach = 3.0 * deviation.max(3e-3);

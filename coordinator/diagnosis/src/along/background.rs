@@ -131,7 +131,9 @@ pub(crate) fn smooth_length(length: usize) -> usize {
         }
         number == 1
     };
-    (length.max(1)..).find(|&number| is_smooth(number)).unwrap_or(length)
+    // A power of two lies within.
+    let upper = length.max(1).next_power_of_two();
+    (length.max(1)..=upper).find(|&number| is_smooth(number)).unwrap_or(upper)
 }
 
 /// The periodic Hann window.

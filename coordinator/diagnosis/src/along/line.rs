@@ -1,6 +1,7 @@
 //! Lines in the spectrum of a stretch of track, each over what lies beside it.
 
 use super::background::{hann, median};
+use super::tail::ln_line_tail;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 use std::ops::Range;
@@ -12,14 +13,38 @@ const PADDING: usize = 2;
 /// Resolution cells on either side of a line that belong to the line (Hann's main lobe).
 const LOBE: f64 = 2.5;
 
-/// Resolution cells on either side up to which neighbours are taken.
+/// Resolution cells on either side up to which neighbours are taken, unless told otherwise.
 const REACH: f64 = 18.0;
 
-/// How many independent values the median of the neighbours is worth.
+/// Bins that are worth one independent value of the neighbours' mean.
 ///
-/// Hann makes two of three cells independent; a median of exponential variables has 2.08 times the
-/// variance of their mean.
-const NEIGHBOURS: f64 = 2.0 * (REACH - LOBE) / 1.5 / 2.08;
+/// Padding, Hann and the variance of a median make it 6.2. That the louder side counts makes large
+/// ratios rarer: in a million bins of noise those of probability 1e-3 to 1e-5 follow 4.7 or less.
+const BINS_PER_NEIGHBOUR: f64 = 4.8;
+
+/// A line over what lies beside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Line {
+    /// Power over the neighbours', as a mean: one where there is no line.
+    pub ratio: f64,
+    /// How many independent values the neighbours are worth.
+    pub neighbours: f64,
+}
+
+impl Line {
+    /// `ln P` of such a line by chance.
+    pub(crate) fn ln_tail(self) -> f64 {
+        ln_line_tail(self.neighbours, self.ratio)
+    }
+
+    /// The mean of the same line in several passes; no surer than in one of them, for they share
+    /// their surface. None of none.
+    pub(crate) fn mean(lines: &[Self]) -> Option<Self> {
+        let least = lines.iter().map(|line| line.neighbours).min_by(f64::total_cmp)?;
+        let sum: f64 = lines.iter().map(|line| line.ratio).sum();
+        Some(Self { ratio: sum / lines.len() as f64, neighbours: least })
+    }
+}
 
 /// What tells the place of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +95,10 @@ pub(crate) fn on_even_places(
 pub(crate) struct Spectrum {
     step: f64,
     power: Vec<f64>,
+    /// Values that were transformed.
+    length: usize,
+    /// Resolution cells on either side up to which neighbours are taken.
+    reach: f64,
 }
 
 impl Spectrum {
@@ -81,7 +110,12 @@ impl Spectrum {
         lines.resize(PADDING * length, Complex64::ZERO);
         FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
         let power = lines[..=length * PADDING / 2].iter().map(Complex64::norm_sqr).collect();
-        Self { step: 1.0 / (step * (PADDING * length) as f64), power }
+        Self { step: 1.0 / (step * (PADDING * length) as f64), power, length, reach: REACH }
+    }
+
+    /// The same spectrum with neighbours up to so many resolution cells from a line.
+    pub(crate) fn reaching(self, reach: f64) -> Self {
+        Self { reach, ..self }
     }
 
     /// Distance of the bins in cycles per unit of `step`.
@@ -99,27 +133,32 @@ impl Spectrum {
         ((place / self.step).round() as usize).min(self.power.len() - 1)
     }
 
+    /// Amplitude of a tone in a real signal that has a bin's power.
+    pub(crate) fn amplitude(&self, bin: usize) -> f64 {
+        // Half of it is at negative frequencies, and the mean of Hann is one half.
+        4.0 * self.power[bin].sqrt() / self.length as f64
+    }
+
     /// Power of a bin over the median of its neighbours', as a mean: one where there is no line.
     ///
     /// The louder side counts: on the flank of a resonance the other is no background. Neighbours
     /// that `skip` names don't count; none where too few are left on either side.
-    pub(crate) fn ratio(&self, bin: usize, skip: impl Fn(f64) -> bool) -> Option<f64> {
-        let [near, far] = [LOBE, REACH].map(|cells| (cells * PADDING as f64) as usize);
+    pub(crate) fn line(&self, bin: usize, skip: impl Fn(f64) -> bool) -> Option<Line> {
+        let [near, far] = [LOBE, self.reach].map(|cells| (cells * PADDING as f64) as usize);
         let below = bin.saturating_sub(far).max(1)..bin.saturating_sub(near).max(1);
         let above = (bin + near + 1).min(self.len())..(bin + far + 1).min(self.len());
         let side = |bins: Range<usize>| {
-            let powers: Vec<f64> =
-                bins.filter(|&other| !skip(other as f64 * self.step)).map(|i| self.power[i]).collect();
-            // A quarter of what there is inside a spectrum: the tail assumes few fewer.
-            (powers.len() >= (far - near) / 4).then(|| median(powers))
+            let powers: Vec<f64> = bins
+                .filter(|&other| !skip(other as f64 * self.step))
+                .map(|i| self.power[i])
+                .collect();
+            (powers.len() >= (far - near) / 4).then(|| (powers.len(), median(powers)))
         };
-        let mean = [side(below), side(above)].into_iter().flatten().fold(0.0, f64::max) / 2f64.ln();
-        (mean > 0.0).then(|| self.power[bin] / mean)
-    }
-
-    /// `ln P` of a ratio this large where there is no line.
-    pub(crate) fn ln_tail(ratio: f64) -> f64 {
-        super::tail::ln_line_tail(NEIGHBOURS, ratio)
+        let sides: Vec<_> = [side(below), side(above)].into_iter().flatten().collect();
+        let mean = sides.iter().map(|(_, middle)| *middle).fold(0.0, f64::max) / 2f64.ln();
+        let bins: usize = sides.iter().map(|(bins, _)| bins).sum();
+        let neighbours = bins as f64 / BINS_PER_NEIGHBOUR;
+        (mean > 0.0).then(|| Line { ratio: self.power[bin] / mean, neighbours })
     }
 }
 
@@ -145,7 +184,7 @@ mod tests {
     #[test]
     fn the_amplitude_of_a_tone_in_noise_comes_back() {
         let spectrum = Spectrum::new(&values(0.5), 1.0);
-        let ratio = spectrum.ratio(spectrum.bin(0.05), |_| false).unwrap();
+        let ratio = spectrum.line(spectrum.bin(0.05), |_| false).unwrap().ratio;
         // White noise of variance one has density 2 over half a cycle a sample. A line 250 times
         // above its neighbours is known to 1 / sqrt(2 * 250), their median to a quarter.
         let found = amplitude(ratio, 2.0, 4000.0);
@@ -160,8 +199,8 @@ mod tests {
             let noise: Vec<_> = noise(seed, 2000).into_iter().map(Complex64::from).collect();
             let spectrum = Spectrum::new(&noise, 1.0);
             for bin in (50..1950).step_by(4) {
-                let ratio = spectrum.ratio(bin, |_| false).unwrap();
-                above += usize::from(Spectrum::ln_tail(ratio) < 0.01f64.ln());
+                let line = spectrum.line(bin, |_| false).unwrap();
+                above += usize::from(line.ln_tail() < 0.01f64.ln());
                 tried += 1;
             }
         }
@@ -173,6 +212,6 @@ mod tests {
     #[test]
     fn a_line_without_neighbours_has_no_ratio() {
         let spectrum = Spectrum::new(&values(0.0), 1.0);
-        assert!(spectrum.ratio(100, |_| true).is_none());
+        assert!(spectrum.line(100, |_| true).is_none());
     }
 }

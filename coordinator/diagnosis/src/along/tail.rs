@@ -120,8 +120,7 @@ pub(crate) fn ln_even_odds_tail(hits: usize, tries: usize) -> f64 {
     }
     let (n, k) = (tries as f64, hits as f64);
     // The first term of the sum and a geometric bound on the rest.
-    let first =
-        ln_gamma(n + 1.0) - ln_gamma(k + 1.0) - ln_gamma(n - k + 1.0) - n * 2f64.ln();
+    let first = ln_gamma(n + 1.0) - ln_gamma(k + 1.0) - ln_gamma(n - k + 1.0) - n * 2f64.ln();
     let falling = (n - k) / (k + 1.0);
     if falling >= 1.0 { 0.0 } else { (first - (-falling).ln_1p()).min(0.0) }
 }

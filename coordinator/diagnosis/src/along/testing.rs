@@ -4,7 +4,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
-use tracktwin_signal::recording::Recording;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::{Pass, Recording, Sleeper};
+use tracktwin_track::model::Surface;
 
 /// Independent values of mean zero and variance one (Box and Muller).
 pub(crate) fn noise(seed: u64, count: usize) -> Vec<f64> {
@@ -23,4 +25,62 @@ pub(crate) fn shared(name: &str) -> Option<Recording> {
     assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "../shared is not there");
     println!("skipped: ../shared is not there");
     None
+}
+
+/// What a chain does to a pass: its index, its samples, its positions.
+pub(crate) type Chain<'a> = dyn Fn(usize, &mut [f64], &mut [f64]) + 'a;
+
+/// Passes of a wheel that follows the surface: acceleration is the height's second derivative in
+/// time. Level 3 of eq. B.6, shared by all passes; white noise of 0.05 m/s2 of the sensor.
+pub(crate) struct Rolled<'a> {
+    /// Seed of the surface and of the noise.
+    pub seed: u64,
+    /// What is added to the surface's height in m in a pass at a place in m.
+    pub height_m: &'a dyn Fn(usize, f64) -> f64,
+    /// What the chain does to the passes.
+    pub chain: &'a Chain<'a>,
+}
+
+impl Rolled<'_> {
+    pub(crate) const RATE_HZ: f64 = 4e4;
+    pub(crate) const CIRCUMFERENCE_M: f64 = 0.408;
+
+    /// A surface, a wheel and a chain without defects.
+    pub(crate) const fn faultless(seed: u64) -> Self {
+        Self { seed, height_m: &|_, _| 0.0, chain: &|_, _, _| () }
+    }
+
+    /// Two passes at each of 13 and 8 km/h over 3 m.
+    pub(crate) fn recording(&self) -> Recording {
+        let surface = Surface::rough(self.seed, 3.0, 4.0);
+        let pass = |(index, speed_km_h): (usize, f64)| {
+            let step = speed_km_h / 3.6 / Self::RATE_HZ;
+            let count = (3.0 / step) as usize;
+            let height = |i: f64| surface.height(i * step) + (self.height_m)(index, i * step);
+            let heights: Vec<f64> = (0..count + 2).map(|i| height(i as f64)).collect();
+            let noise = noise(self.seed + 1000 * (1 + index as u64), count);
+            let curved = |w: &[f64]| (w[0] - 2.0 * w[1] + w[2]) * Self::RATE_HZ * Self::RATE_HZ;
+            let moved = heights.windows(3).map(curved);
+            let mut samples: Vec<f64> = moved.zip(noise).map(|(a, n)| a + 0.05 * n).collect();
+            let mut position_m: Vec<f64> = (0..count).map(|i| i as f64 * step).collect();
+            (self.chain)(index, &mut samples, &mut position_m);
+            let signal = Signal::new(Self::RATE_HZ, samples).unwrap();
+            Pass { file: String::new(), speed_km_h, signal, position_m }
+        };
+        let sleeper = |i: usize| Sleeper { id: format!("SN{i}"), x_m: i as f64 * 0.125 };
+        Recording {
+            name: "rolled".to_owned(),
+            sample_rate_hz: Self::RATE_HZ,
+            channel: String::new(),
+            passes: [13.0, 13.0, 8.0, 8.0].into_iter().enumerate().map(pass).collect(),
+            sleepers: (1..24).map(sleeper).collect(),
+            nominal: serde_json::Map::new(),
+            spacing_m: 0.125,
+        }
+    }
+}
+
+/// A hollow `d/2 (1 + cos(2 pi x/l))` around a place.
+pub(crate) fn hollow_m(depth: f64, length: f64, x: f64) -> f64 {
+    if x.abs() < 0.5 * length { 0.5 * depth * (1.0 + (TAU * x / length).cos()) } else { 0.0 }
 }

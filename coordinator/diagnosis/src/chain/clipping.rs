@@ -52,7 +52,11 @@ fn side(index: usize, pass: &Pass, sign: f64) -> Clipping {
         if value > lower {
             crest = crest.max(value);
         } else if crest > lower {
-            if crest > upper { high += 1 } else { next += 1 }
+            if crest > upper {
+                high += 1;
+            } else {
+                next += 1;
+            }
             crest = f64::MIN;
         }
     }

@@ -1,16 +1,12 @@
 //! Lines of the mains: at a fixed frequency whatever the speed, narrower than any structure.
 
-use crate::along::{
-    Background, Spectrum, amplitude, by_speed, combined, ln_gamma_tail, of_best, speed_m_s,
-};
+use crate::along::{Line, Spectrum, by_speed, combined, ln_gamma_tail, of_best, speed_m_s};
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Frequencies of electrical supplies in Hz: railways of central Europe, the mains of Europe and
-/// of America.
-const MAINS_HZ: [f64; 3] = [50.0 / 3.0, 50.0, 60.0];
-/// Harmonics looked for.
-const HARMONICS: usize = 6;
+/// Frequencies of electrical supplies in Hz and how many harmonics are looked for: railways of
+/// central Europe (their third is the next one's first), the mains of Europe and of America.
+const MAINS_HZ: [(f64, usize); 3] = [(50.0 / 3.0, 2), (50.0, 6), (60.0, 6)];
 /// Duration in s of a segment: longer than this the mains' frequency is not steady.
 const SEGMENT_S: f64 = 4.0;
 /// How far in Hz the mains may be from their nominal frequency.
@@ -39,15 +35,14 @@ pub struct Hum {
 
 /// The lines of the mains that are less likely than `alpha` without them, most certain first.
 pub fn hum(recording: &Recording, alpha: f64) -> Vec<Hum> {
-    let speeds: Option<Vec<Vec<Heard>>> = by_speed(&recording.passes)
-        .into_iter()
-        .map(|group| group.into_iter().map(|i| Heard::of(&recording.passes[i])).collect())
-        .collect();
-    let Some(speeds) = speeds else { return Vec::new() };
+    let heard = |group: Vec<usize>| {
+        group.into_iter().map(|index| Heard::of(&recording.passes[index])).collect()
+    };
+    let speeds: Vec<Vec<Heard>> = by_speed(&recording.passes).into_iter().map(heard).collect();
     let mut found = Vec::new();
     let mut tries = 0;
-    for mains in MAINS_HZ {
-        for harmonic in 1..=HARMONICS {
+    for (mains, harmonics) in MAINS_HZ {
+        for harmonic in 1..=harmonics {
             let (line, bins) = line(&speeds, recording.spacing_m, mains * harmonic as f64);
             tries += bins;
             found.extend(line);
@@ -66,10 +61,10 @@ fn line(speeds: &[Vec<Heard>], spacing_m: f64, frequency: f64) -> (Option<Hum>, 
     let mut tries = 0;
     let (mut each, mut ratios, mut amplitudes) = (Vec::new(), Vec::new(), Vec::new());
     for passes in speeds {
-        let lines: Option<Vec<Line>> = passes.iter().map(|pass| pass.line(frequency)).collect();
+        let lines: Option<Vec<Tone>> = passes.iter().map(|pass| pass.line(frequency)).collect();
         let Some(lines) = lines else { return (None, 0) };
         tries = lines.iter().map(|line| line.tries).fold(tries, usize::max);
-        let mean = |of: fn(&Line) -> f64| lines.iter().map(of).sum::<f64>() / lines.len() as f64;
+        let mean = |of: fn(&Tone) -> f64| lines.iter().map(of).sum::<f64>() / lines.len() as f64;
         ratios.push(mean(|line| line.ratio));
         amplitudes.extend(lines.iter().map(|line| line.amplitude));
         // Where it may be the sleepers' a line says nothing either way.
@@ -95,14 +90,13 @@ fn line(speeds: &[Vec<Heard>], spacing_m: f64, frequency: f64) -> (Option<Hum>, 
 /// The spectra of a pass's segments.
 struct Heard {
     spectra: Vec<Spectrum>,
-    background: Background,
     duration_s: f64,
     speed_m_s: f64,
     rate_hz: f64,
 }
 
 /// A line in one pass.
-struct Line {
+struct Tone {
     ratio: f64,
     amplitude: f64,
     ln_p: f64,
@@ -110,8 +104,7 @@ struct Line {
 }
 
 impl Heard {
-    /// None where the pass is too short.
-    fn of(pass: &Pass) -> Option<Self> {
+    fn of(pass: &Pass) -> Self {
         let (samples, rate_hz) = (pass.signal.samples(), pass.signal.sample_rate_hz());
         let segments = ((pass.signal.duration_s() / SEGMENT_S) as usize).max(1);
         let length = samples.len() / segments;
@@ -120,13 +113,12 @@ impl Heard {
             let values: Vec<_> = part.iter().map(|value| Complex64::from(value - mean)).collect();
             Spectrum::new(&values, 1.0 / rate_hz)
         };
-        Some(Self {
+        Self {
             spectra: samples.chunks_exact(length).map(spectrum).collect(),
-            background: Background::of(&pass.signal)?,
             duration_s: length as f64 / rate_hz,
             speed_m_s: speed_m_s(pass),
             rate_hz,
-        })
+        }
     }
 
     fn may_be_sleepers(&self, frequency: f64, spacing_m: f64) -> bool {
@@ -136,7 +128,7 @@ impl Heard {
     }
 
     /// None where the segments are too short for the frequency, or not sampled fast enough.
-    fn line(&self, frequency: f64) -> Option<Line> {
+    fn line(&self, frequency: f64) -> Option<Tone> {
         if frequency > 0.4 * self.rate_hz || frequency * self.duration_s < WAVES_MIN {
             return None;
         }
@@ -144,19 +136,20 @@ impl Heard {
         let first = &self.spectra[0];
         let bins = first.bin(frequency - reach)..=first.bin(frequency + reach);
         let tries = bins.clone().count();
+        let mean = |bin: usize| -> Option<(usize, Line)> {
+            let lines: Option<Vec<Line>> =
+                self.spectra.iter().map(|spectrum| spectrum.line(bin, |_| false)).collect();
+            Some((bin, Line::mean(&lines?)?))
+        };
+        let (bin, best) = bins.filter_map(mean).max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))?;
         let segments = self.spectra.len();
-        let mean = |bin: usize| -> Option<f64> {
-            let ratios: Option<Vec<f64>> =
-                self.spectra.iter().map(|spectrum| spectrum.ratio(bin, |_| false)).collect();
-            ratios.map(|ratios| ratios.iter().sum::<f64>() / segments as f64)
-        };
-        let ratio = bins.filter_map(mean).fold(0.0, f64::max);
         let ln_p = if segments < SEGMENTS_MIN {
-            Spectrum::ln_tail(ratio)
+            best.ln_tail()
         } else {
-            ln_gamma_tail(segments as f64, ratio)
+            ln_gamma_tail(segments as f64, best.ratio)
         };
-        let amplitude = amplitude(ratio, self.background.at(frequency), self.duration_s);
-        Some(Line { ratio, amplitude, ln_p, tries })
+        let square = |spectrum: &Spectrum| spectrum.amplitude(bin).powi(2);
+        let amplitude = (self.spectra.iter().map(square).sum::<f64>() / segments as f64).sqrt();
+        Some(Tone { ratio: best.ratio, amplitude, ln_p, tries })
     }
 }

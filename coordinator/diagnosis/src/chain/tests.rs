@@ -1,18 +1,152 @@
 //! Measuring chains with known faults.
 
 use super::*;
-use crate::along::testing::shared;
+use crate::along::testing::{Chain, Rolled, noise, shared};
+use std::f64::consts::TAU;
+
+const ALPHA: f64 = 0.0025;
+
+fn measured(seed: u64, chain: &Chain<'_>) -> Recording {
+    Rolled { chain, ..Rolled::faultless(seed) }.recording()
+}
 
 #[test]
-fn scratch_chain() {
-    for name in ["dev-01", "dev-02", "dev-03", "dev-04", "dev-05", "dev-06", "dev-07", "dev-08", "dev-09", "dev-10"] {
-        let Some(recording) = shared(name) else { return };
-        let start = std::time::Instant::now();
-        println!("{name} {:?}", clipping(&recording, 1.0).iter().map(|c| (c.crests, c.ln_p)).collect::<Vec<_>>());
-        println!("{name} {:?}", hum(&recording, 1.0));
-        println!("{name} {:?}", gains(&recording).iter().map(|g| (g.gain_db, g.spread_db, g.ln_p)).collect::<Vec<_>>());
-        let offsets = offsets(&recording);
-        for o in &offsets { println!("{name} {} {} {:?} {} {}", o.matched.len(), o.stretches, o.line(), o.greatest_m(), o.correlation); }
-        println!("{name} {:?} {:?} {:?}", troubles(&recording, &offsets), noise_floors(&recording), start.elapsed());
+fn a_limit_is_found_with_its_value() {
+    let recording = measured(1, &|pass, samples, _| {
+        if pass == 1 {
+            for sample in samples {
+                *sample = sample.clamp(-4.0, 4.0);
+            }
+        }
+    });
+    let found = clipping(&recording, ALPHA);
+    assert_eq!(found.len(), 1, "{found:?}");
+    // The mean of a pass without faults is zero within a hundredth.
+    assert_eq!(found[0].pass, 1);
+    assert!((found[0].level_m_s2.abs() - 4.0).abs() < 0.01, "{found:?}");
+}
+
+#[test]
+fn the_mains_are_found_at_every_speed_but_not_at_one_only() {
+    let hums = |passes: usize| {
+        let recording = measured(2, &|pass, samples, _| {
+            if pass < passes {
+                for (index, sample) in samples.iter_mut().enumerate() {
+                    *sample += 2.0 * (TAU * 50.0 * index as f64 / Rolled::RATE_HZ).sin();
+                }
+            }
+        });
+        hum(&recording, ALPHA)
+    };
+    let found = hums(4);
+    assert_eq!(found[0].frequency_hz, 50.0);
+    // A line ten times above its neighbours is known to a sixth, they to a fifth in power.
+    assert!((found[0].amplitude_m_s2.0 / 2.0 - 1.0).abs() < 0.35, "{found:?}");
+    assert!(hums(2).is_empty());
+}
+
+#[test]
+fn a_pass_with_another_gain_is_told_from_one_with_another_spectrum() {
+    let louder = measured(3, &|pass, samples, _| {
+        if pass == 1 {
+            for sample in samples {
+                *sample *= 1.15;
+            }
+        }
+    });
+    let found = gains(&louder);
+    // 1.15 is 1.21 dB; the noise of the sensor is a two hundredth of the signal's power.
+    assert!((found[1].gain_db.0 - 1.21).abs() < 0.1 && found[1].is_error(ALPHA), "{found:?}");
+    assert!(!found[2].is_error(ALPHA));
+    let rumble = measured(3, &|pass, samples, _| {
+        if pass == 1 {
+            let tone = |index: usize| (TAU * 200.0 * index as f64 / Rolled::RATE_HZ).sin();
+            for (index, sample) in samples.iter_mut().enumerate() {
+                *sample += 3.0 * tone(index);
+            }
+        }
+    });
+    assert!(!gains(&rumble)[1].is_error(ALPHA), "{:?}", gains(&rumble));
+}
+
+#[test]
+fn a_shifted_and_stretched_odometer_is_measured() {
+    let recording = measured(4, &|pass, _, positions| {
+        if pass == 3 {
+            for position in positions {
+                *position = 0.012 + 1.004 * *position;
+            }
+        }
+    });
+    let found = offsets(&recording);
+    assert_eq!(found[0].ln_p(), 0.0);
+    assert!(found[1].ln_p() < ALPHA.ln(), "{:?}", found[1].line());
+    let (middle, slope) = found[1].line();
+    // 12 mm at the beginning and 0.4 % on 1.5 m.
+    assert!((middle - 0.018).abs() < 3e-4 && (slope - 0.004).abs() < 3e-4, "{middle} {slope}");
+}
+
+#[test]
+fn odometers_that_wander_as_usual_are_no_error() {
+    let recording = measured(5, &|pass, _, positions| {
+        for position in positions {
+            *position += 3e-3 * (*position * 2.0 + pass as f64).sin();
+        }
+    });
+    assert!(offsets(&recording).iter().all(|pair| pair.ln_p() == 0.0));
+}
+
+#[test]
+fn passes_that_cannot_be_used_are_named_with_the_reason() {
+    let broken = |chain: &Chain<'_>| {
+        let recording = measured(6, chain);
+        troubles(&recording, &offsets(&recording))
+    };
+    assert!(broken(&|_, _, _| ()).is_empty());
+    let still = broken(&|pass, samples, _| {
+        if pass == 0 {
+            samples[10_000..10_200].fill(0.25);
+        }
+    });
+    assert!(matches!(still[..], [Trouble::DropOut { pass: 0, .. }]), "{still:?}");
+    let dead = broken(&|pass, samples, _| {
+        if pass == 1 {
+            samples.fill(0.0);
+        }
+    });
+    assert_eq!(dead, [Trouble::Dead { pass: 1 }]);
+    let noisy = broken(&|pass, samples, _| {
+        if pass == 2 {
+            samples.copy_from_slice(&noise(7, samples.len()));
+        }
+    });
+    assert!(matches!(noisy[..], [Trouble::Unlike { passes: [2, 3], .. }]), "{noisy:?}");
+    let full = broken(&|pass, samples, _| {
+        if pass == 3 {
+            for sample in samples {
+                *sample = sample.clamp(-1.0, 1.0);
+            }
+        }
+    });
+    assert!(matches!(full[..], [Trouble::Saturated { pass: 3, .. }]), "{full:?}");
+}
+
+#[test]
+fn a_faultless_chain_shows_nothing() {
+    for seed in 10..20 {
+        let recording = measured(seed, &|_, _, _| ());
+        assert!(clipping(&recording, ALPHA).is_empty(), "seed {seed}");
+        assert!(hum(&recording, ALPHA).is_empty(), "seed {seed}");
+        assert!(gains(&recording).iter().all(|gain| !gain.is_error(ALPHA)), "seed {seed}");
+        assert!(offsets(&recording).iter().all(|pair| pair.ln_p() == 0.0), "seed {seed}");
+    }
+}
+
+#[test]
+fn the_noise_of_an_independent_recording_is_what_was_added() {
+    let Some(recording) = shared("dev-01") else { return };
+    for floor in noise_floors(&recording) {
+        // 0.05 m/s2 over 50 kHz.
+        assert!((floor.unwrap() / 5e-8 - 1.0).abs() < 0.1, "{floor:?}");
     }
 }

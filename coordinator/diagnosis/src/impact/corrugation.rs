@@ -1,8 +1,8 @@
 //! A wave of one length in a stretch of rail: a line that stays in wavelength at every speed.
 
 use crate::along::{
-    Background, Ruler, Spectrum, amplitude, by_speed, combined, median, of_best, on_even_places,
-    speed_m_s, whitened,
+    Background, Line, Ruler, Spectrum, amplitude, by_speed, combined, median, of_best,
+    on_even_places, speed_m_s, whitened,
 };
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -182,23 +182,23 @@ impl Search<'_> {
                 continue;
             }
             let skip = |other: f64| self.is_known(other, cell);
-            let ratios: Option<Vec<f64>> = speeds
+            let lines: Option<Vec<Line>> = speeds
                 .iter()
                 .map(|passes| {
-                    let each: Option<Vec<f64>> =
-                        passes.iter().map(|spectrum| spectrum.ratio(bin, skip)).collect();
-                    each.map(|each| each.iter().sum::<f64>() / each.len() as f64)
+                    let each: Option<Vec<Line>> =
+                        passes.iter().map(|spectrum| spectrum.line(bin, skip)).collect();
+                    Line::mean(&each?)
                 })
                 .collect();
-            let Some(ratios) = ratios else { continue };
+            let Some(lines) = lines else { continue };
             looked_at += 1;
-            let each: Vec<f64> = ratios.iter().map(|&ratio| Spectrum::ln_tail(ratio)).collect();
+            let each: Vec<f64> = lines.iter().map(|line| line.ln_tail()).collect();
             if each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) {
                 continue;
             }
             let ln_p = combined(&each);
             if best.as_ref().is_none_or(|best| ln_p < best.ln_p) {
-                let ratio = ratios.iter().sum::<f64>() / ratios.len() as f64;
+                let ratio = lines.iter().map(|line| line.ratio).sum::<f64>() / lines.len() as f64;
                 best = Some(Candidate { stretch_m, wave_number, ln_p, ratio, ruler });
             }
         }
@@ -228,7 +228,8 @@ impl Search<'_> {
     fn ratio(&self, stretch_m: [f64; 2], best: &Candidate) -> f64 {
         let at = |pass| {
             let spectrum = self.spectrum(pass, stretch_m, best.ruler);
-            spectrum.ratio(spectrum.bin(best.wave_number), |_| false).unwrap_or(0.0)
+            let line = spectrum.line(spectrum.bin(best.wave_number), |_| false);
+            line.map_or(0.0, |line| line.ratio)
         };
         let passes = 0..self.recording.passes.len();
         let count = passes.len() as f64;
@@ -238,9 +239,10 @@ impl Search<'_> {
     /// From where to where the line has at least half of its greatest amplitude.
     fn extent(&self, best: &Candidate) -> [f64; 2] {
         let half = 0.5 * STRETCHES[0] * self.recording.spacing_m;
-        let [from, to] = self.stretches().into_iter().fold([f64::MAX, f64::MIN], |ends, stretch| {
-            [ends[0].min(stretch[0]), ends[1].max(stretch[1])]
-        });
+        let [from, to] =
+            self.stretches().into_iter().fold([f64::MAX, f64::MIN], |ends, stretch| {
+                [ends[0].min(stretch[0]), ends[1].max(stretch[1])]
+            });
         let step = 0.25 * self.recording.spacing_m;
         let count = ((to - from - 2.0 * half) / step).max(0.0) as usize + 1;
         let middles: Vec<f64> = (0..count).map(|i| from + half + i as f64 * step).collect();

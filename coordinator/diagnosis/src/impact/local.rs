@@ -1,7 +1,7 @@
 //! Impacts that come at the same place of the track in every pass and at every speed.
 
 use super::repeated::{Cells, cells};
-use super::shape::{Observed, Shape, fit};
+use super::shape::{Form, Observed, Shape, fit};
 use crate::along::{combined, of_best};
 use tracktwin_signal::recording::Recording;
 
@@ -52,7 +52,8 @@ pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Im
 /// `ln P` of a cell over all speeds: certain (0) where one speed doesn't show it.
 fn ln_p(speeds: &[Cells], cell: usize) -> f64 {
     let best = |cells: &Cells| {
-        let around = cell.saturating_sub(NEIGHBOURS)..(cell + NEIGHBOURS + 1).min(cells.ratio.len());
+        let around =
+            cell.saturating_sub(NEIGHBOURS)..(cell + NEIGHBOURS + 1).min(cells.ratio.len());
         let tries = around.len();
         of_best(around.map(|other| cells.ln_tail(other)).fold(0.0, f64::min), tries)
     };
@@ -72,12 +73,19 @@ fn impact(recording: &Recording, speeds: &[Cells], cell: usize, ln_p: f64) -> Im
         }
     }
     let power = |cells: &Cells| {
-        let around = cell.saturating_sub(NEIGHBOURS)..(cell + NEIGHBOURS + 1).min(cells.ratio.len());
+        let around =
+            cell.saturating_sub(NEIGHBOURS)..(cell + NEIGHBOURS + 1).min(cells.ratio.len());
         around.map(|other| cells.ratio[other]).fold(0.0, f64::max)
     };
     let power_ratio = speeds.iter().map(power).sum::<f64>() / speeds.len() as f64;
-    let x_m = mean_and_deviation(&places).unwrap_or((x, width));
-    Impact { x_m, ln_p, power_ratio, shape: fit(&observed) }
+    let (place, deviation) = mean_and_deviation(&places).unwrap_or((x, width));
+    let shape = fit(&observed);
+    // The loudest moment may be at either edge of a hollow.
+    let edge = match &shape {
+        Some(Shape { form: Form::Hollow, length_m: (length, _), .. }) => 0.5 * length,
+        _ => 0.0,
+    };
+    Impact { x_m: (place, deviation.hypot(edge)), ln_p, power_ratio, shape }
 }
 
 /// Mean and standard deviation; the passes of one odometer err together, so it is not divided by

@@ -10,8 +10,8 @@ mod shape;
 
 pub use corrugation::{Corrugation, corrugation};
 pub use local::{Impact, impacts};
-pub use shape::{Form, Shape};
 pub(crate) use repeated::{Cells, cells};
+pub use shape::{Form, Shape};
 pub(crate) use shape::{Observed, fit};
 
 #[cfg(test)]

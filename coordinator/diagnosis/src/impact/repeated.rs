@@ -58,11 +58,8 @@ impl Cells {
 /// Empty where no pass has sound enough above the impacts' lowest frequency.
 pub(crate) fn cells(recording: &Recording, each: bool) -> Vec<Cells> {
     let passes = &recording.passes;
-    let groups = if each {
-        (0..passes.len()).map(|index| vec![index]).collect()
-    } else {
-        by_speed(passes)
-    };
+    let groups =
+        if each { (0..passes.len()).map(|index| vec![index]).collect() } else { by_speed(passes) };
     let Some(width_m) = width(recording) else { return Vec::new() };
     let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
     let ends = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);

@@ -142,11 +142,8 @@ impl Form {
             Self::Hollow => {
                 let rest = 1.0 - turns * turns;
                 // At one turn a length sine and rest vanish together: the limit is one half.
-                let value = if rest.abs() < 1e-6 {
-                    0.5
-                } else {
-                    (PI * turns).sin() / (PI * turns) / rest
-                };
+                let value =
+                    if rest.abs() < 1e-6 { 0.5 } else { (PI * turns).sin() / (PI * turns) / rest };
                 (0.5 * length * value).abs()
             }
         }
@@ -219,7 +216,8 @@ fn grid(form: Form, observed: &[Observed]) -> Vec<Fitted> {
             .iter()
             .flat_map(|seen| {
                 seen.bands.iter().map(|&(k, q, variance)| {
-                    let unit = form.transform(length, k).powi(2) / (PI * roughness.density(TAU * k));
+                    let unit =
+                        form.transform(length, k).powi(2) / (PI * roughness.density(TAU * k));
                     (q.ln(), unit, seen.floor, variance)
                 })
             })

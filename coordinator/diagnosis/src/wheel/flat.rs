@@ -48,8 +48,7 @@ pub fn flat(recording: &Recording, circumference_m: f64, alpha: f64) -> Option<F
         (combined(&each), loudness, folds)
     };
     let rank = |(ln_p, loudness, _): &(f64, f64, Vec<Fold>)| ln_p - LOUDNESS * loudness;
-    let (ln_p, _, folds) =
-        trials.iter().map(at).min_by(|a, b| rank(a).total_cmp(&rank(b)))?;
+    let (ln_p, _, folds) = trials.iter().map(at).min_by(|a, b| rank(a).total_cmp(&rank(b)))?;
     let ln_p = of_best(ln_p, trials.len());
     if ln_p > alpha.ln() {
         return None;
@@ -77,12 +76,11 @@ impl Fold {
     fn best(cells: &Cells, period_m: f64) -> Self {
         let period = period_m / cells.step_m;
         let phases = period as usize;
-        let ln_tails: Vec<f64> =
-            (0..cells.ratio.len()).map(|cell| cells.ln_tail(cell)).collect();
+        let ln_tails: Vec<f64> = (0..cells.ratio.len()).map(|cell| cells.ln_tail(cell)).collect();
         let at = |phase: usize| {
-            let blows: Vec<usize> = (0..)
-                .map(|turn| (phase as f64 + f64::from(turn) * period).round() as usize)
-                .take_while(|&cell| cell < cells.ratio.len())
+            let blows: Vec<usize> = (0..=cells.ratio.len() / phases)
+                .map(|turn| (phase as f64 + turn as f64 * period).round() as usize)
+                .filter(|&cell| cell < cells.ratio.len())
                 .collect();
             let sum: f64 = blows.iter().map(|&cell| -ln_tails[cell].max(BLOW_MIN)).sum();
             let loudness = blows.iter().map(|&cell| (-ln_tails[cell]).sqrt()).sum();
@@ -104,8 +102,7 @@ fn describe(recording: &Recording, passes: &[Cells], folds: &[Fold], ln_p: f64) 
         let index = cells.passes[0];
         powers.extend(fold.blows.iter().map(|&cell| cells.ratio[cell]));
         for &cell in &fold.blows {
-            let seen =
-                Observed::at(&recording.passes[index], cells.place_m(cell), cells.width_m);
+            let seen = Observed::at(&recording.passes[index], cells.place_m(cell), cells.width_m);
             blows_m[index].push(seen.as_ref().map_or(cells.place_m(cell), |seen| seen.x_m));
             observed.extend(seen);
         }

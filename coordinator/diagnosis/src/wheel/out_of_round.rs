@@ -1,7 +1,7 @@
 //! Orders of an out-of-round wheel: lines at whole numbers of waves to a turn, at every speed.
 
 use crate::along::{
-    Ruler, Spectrum, amplitude, by_speed, combined, of_best, on_even_places, speed_m_s,
+    Line, Ruler, Spectrum, amplitude, by_speed, combined, of_best, on_even_places, speed_m_s,
 };
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -9,8 +9,10 @@ use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::model::Roughness;
 
 /// How far wear and an odometer's scale may take the circumference from its nominal value.
-const TOLERANCE: f64 = 0.01;
-/// Highest order: 10 mm of a wheel of 0.4 m.
+///
+/// Wider, and every short wave is near some order.
+const TOLERANCE: f64 = 0.005;
+/// Highest order: 10 mm of a wheel of 0.4 m. Beyond it a fifth of an order is within tolerance.
 const ORDER_MAX: usize = 40;
 /// Turns that a pass must have for orders to lie apart from what is between them.
 const TURNS_MIN: f64 = 5.0;
@@ -21,7 +23,14 @@ const HIGH_SHARE: f64 = 0.4;
 /// Probability of one speed's line without it above which it doesn't repeat at that speed.
 const EACH_SPEED: f64 = 0.05;
 /// Resolution cells around an order, or a harmonic of the sleepers' passing, that belong to it.
-const CELLS: f64 = 2.0;
+const CELLS: f64 = 1.5;
+/// Resolution cells on either side in which an order's neighbours lie, four orders of a way of nine
+/// turns: only what is between the orders counts.
+const REACH: f64 = 36.0;
+/// Parts of the way that an order must be heard in, and how much of its share of power in each: the
+/// wheel is as uneven at the end as at the beginning.
+const PARTS: usize = 3;
+const PART_SHARE: f64 = 0.2;
 /// Level of eq. B.6 that amplitudes are stated for, and the relative deviation of its root.
 const LEVEL: f64 = 3.0;
 const ROOT_LEVEL_DEVIATION: f64 = 0.23;
@@ -52,10 +61,14 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
     let mut tries = 0;
     let mut found: Vec<Order> = Vec::new();
     for ruler in Ruler::BOTH {
-        let speeds = search.spectra(ruler);
+        let speeds = search.spectra(search.stretch_m, ruler);
+        let parts = search.parts().map(|part| search.spectra(part, ruler));
         for number in 1..=ORDER_MAX {
             let (order, bins) = search.order(&speeds, number);
             tries += bins;
+            if !parts.iter().all(|part| order.is_heard(part, circumference_m)) {
+                continue;
+            }
             match found.iter_mut().find(|other| other.number == number) {
                 Some(other) if order.ln_p < other.ln_p => *other = order,
                 Some(_) => {}
@@ -70,6 +83,20 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
     found
 }
 
+impl Order {
+    /// Whether a part of the way has its share of the line's power, mean of all passes.
+    fn is_heard(&self, part: &[Vec<Spectrum>], circumference_m: f64) -> bool {
+        let wave_number = self.number as f64 / circumference_m;
+        let passes: Vec<&Spectrum> = part.iter().flatten().collect();
+        let ratio = |spectrum: &&Spectrum| {
+            let line = spectrum.line(spectrum.bin(wave_number), |_| false);
+            line.map_or(0.0, |line| line.ratio)
+        };
+        let mean = passes.iter().map(ratio).sum::<f64>() / passes.len() as f64;
+        mean >= PART_SHARE * self.ratio / PARTS as f64
+    }
+}
+
 struct Search<'a> {
     recording: &'a Recording,
     circumference_m: f64,
@@ -81,56 +108,63 @@ impl Search<'_> {
         self.stretch_m[1] - self.stretch_m[0]
     }
 
-    /// Spectra along the track of all passes, by speed.
-    fn spectra(&self, ruler: Ruler) -> Vec<Vec<Spectrum>> {
+    /// The way in equal parts.
+    fn parts(&self) -> [[f64; 2]; PARTS] {
+        let part = self.length() / PARTS as f64;
+        let start = |index: usize| self.stretch_m[0] + index as f64 * part;
+        std::array::from_fn(|index| [start(index), start(index + 1)])
+    }
+
+    /// Spectra along a stretch of the track of all passes, by speed.
+    fn spectra(&self, stretch_m: [f64; 2], ruler: Ruler) -> Vec<Vec<Spectrum>> {
         let passes = &self.recording.passes;
-        // Four points on the shortest wave.
-        let waves = self.length() / self.circumference_m * ORDER_MAX as f64;
-        let points = (8.0 * waves).ceil() as usize;
+        let length = stretch_m[1] - stretch_m[0];
+        // Eight points on the shortest wave.
+        let points = (8.0 * length / self.circumference_m * ORDER_MAX as f64).ceil() as usize;
         let spectrum = |index: usize| {
-            let smooth = smoothed(&passes[index], self.length() / points as f64);
-            let values = on_even_places(&passes[index], &smooth, self.stretch_m, points, ruler);
-            Spectrum::new(&values, self.length() / points as f64)
+            let smooth = smoothed(&passes[index], length / points as f64);
+            let values = on_even_places(&passes[index], &smooth, stretch_m, points, ruler);
+            Spectrum::new(&values, length / points as f64).reaching(REACH)
         };
         let speed = |group: Vec<usize>| group.into_iter().map(spectrum).collect();
         by_speed(passes).into_iter().map(speed).collect()
     }
 
-    /// Lies at a whole number of waves to `period_m`.
+    /// Lies within two resolution cells of a whole number of waves to `period_m`.
     fn is_multiple(&self, wave_number: f64, period_m: f64) -> bool {
         let order = wave_number * period_m;
-        let reach = CELLS * period_m / self.length() + TOLERANCE * order;
-        (order - order.round()).abs() < reach.min(0.35) && order.round() >= 1.0
+        order.round() >= 1.0 && (order - order.round()).abs() < CELLS * period_m / self.length()
     }
 
     /// The order's least likely line, and how many bins were looked at.
     fn order(&self, speeds: &[Vec<Spectrum>], number: usize) -> (Order, usize) {
         let middle = number as f64 / self.circumference_m;
-        let nothing = Order { number, amplitude_m: (0.0, 0.0), ln_p: 0.0, ratio: 1.0 };
+        let mut best = Order { number, amplitude_m: (0.0, 0.0), ln_p: 0.0, ratio: 1.0 };
         let spacing = self.recording.spacing_m;
-        let off_sleepers = (middle * spacing - (middle * spacing).round()).abs() / spacing;
-        let sleepers = middle * spacing > 0.5 && off_sleepers < CELLS / self.length();
-        if sleepers || !self.audible(middle) {
-            return (nothing, 0);
+        if self.is_multiple(middle, spacing) || !self.audible(middle) {
+            return (best, 0);
         }
-        let skip = |wave_number: f64| {
-            self.is_multiple(wave_number, self.circumference_m)
-                || self.is_multiple(wave_number, spacing)
-        };
-        let bins = speeds[0][0].bin(middle * (1.0 - TOLERANCE))
-            ..=speeds[0][0].bin(middle * (1.0 + TOLERANCE));
+        let first = &speeds[0][0];
+        let bins = first.bin(middle * (1.0 - TOLERANCE))..=first.bin(middle * (1.0 + TOLERANCE));
         let tries = bins.clone().count();
-        let mut best = nothing;
         for bin in bins {
-            let ratios: Vec<f64> = speeds.iter().filter_map(|s| mean_ratio(s, bin, skip)).collect();
-            let each: Vec<f64> = ratios.iter().map(|&ratio| Spectrum::ln_tail(ratio)).collect();
-            let all = ratios.len() == speeds.len();
-            if !all || each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) {
-                continue;
-            }
+            let turn = number as f64 / (bin as f64 * first.bin_width());
+            let skip = |wave_number: f64| {
+                self.is_multiple(wave_number, turn) || self.is_multiple(wave_number, spacing)
+            };
+            let lines: Option<Vec<Line>> = speeds
+                .iter()
+                .map(|passes| {
+                    let each: Option<Vec<Line>> =
+                        passes.iter().map(|s| s.line(bin, skip)).collect();
+                    Line::mean(&each?)
+                })
+                .collect();
+            let Some(lines) = lines else { continue };
+            let each: Vec<f64> = lines.iter().map(|line| line.ln_tail()).collect();
             let ln_p = combined(&each);
-            if ln_p < best.ln_p {
-                let ratio = ratios.iter().sum::<f64>() / ratios.len() as f64;
+            if each.iter().all(|&ln_p| ln_p <= EACH_SPEED.ln()) && ln_p < best.ln_p {
+                let ratio = lines.iter().map(|line| line.ratio).sum::<f64>() / lines.len() as f64;
                 let density = TAU * Roughness::new(LEVEL).density(TAU * middle);
                 let amplitude = amplitude(ratio, density, self.length());
                 let deviation = ROOT_LEVEL_DEVIATION.hypot(0.25) * amplitude;
@@ -146,13 +180,6 @@ impl Search<'_> {
             (LOW_HZ..HIGH_SHARE * pass.signal.sample_rate_hz()).contains(&frequency)
         })
     }
-}
-
-/// Mean over passes of one speed; none where one has no neighbours left.
-fn mean_ratio(passes: &[Spectrum], bin: usize, skip: impl Fn(f64) -> bool) -> Option<f64> {
-    let each: Option<Vec<f64>> =
-        passes.iter().map(|spectrum| spectrum.ratio(bin, &skip)).collect();
-    each.map(|each| each.iter().sum::<f64>() / each.len() as f64)
 }
 
 /// The acceleration without its mean, averaged over `step_m` of the way: short waves would fold
@@ -176,7 +203,8 @@ fn average(values: &[f64], width: usize) -> Vec<f64> {
         summed[index + 1] = summed[index] + value;
     }
     let around = |index: usize| {
-        let (from, to) = (index.saturating_sub(width / 2), (index + width.div_ceil(2)).min(values.len()));
+        let (from, to) =
+            (index.saturating_sub(width / 2), (index + width.div_ceil(2)).min(values.len()));
         (summed[to] - summed[from]) / (to - from) as f64
     };
     (0..values.len()).map(around).collect()
