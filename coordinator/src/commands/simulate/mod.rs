@@ -1,22 +1,25 @@
 //! `tracktwin simulate`: passes over one track, written as a recording.
 
+mod extensions;
+mod sensor;
 mod setting;
 mod track;
 
+use super::progress::Progress;
 use super::{OrInput, Stop};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, Normal};
+pub(super) use extensions::Extensions;
+use sensor::{Sensor, sample_rate_hz};
 pub(super) use setting::Setting;
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 use track::SimulatedTrack;
 use tracktwin_parameters::Preset;
-use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{Pass, Recording};
-use tracktwin_track::model::Surface;
-use tracktwin_track::time::{self, PassRecord};
+use tracktwin_track::extension::Class;
+use tracktwin_track::model::{Roughness, Surface};
+use tracktwin_track::time;
 
 /// Spans at either end of the track that are not recorded: the ends are held.
 const END_SPANS: usize = 6;
@@ -27,9 +30,9 @@ const RUN_IN_SPANS: usize = 3;
 /// What `simulate` is told.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Folder to write the recording to.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    /// Folder to write the recording to; what was put in is written beside it as `truth.json`.
+    #[arg(long, value_name = "DIR", required_unless_present = "extend")]
+    out: Option<PathBuf>,
     /// Speed in km/h; may stand several times [default: the preset's three].
     #[arg(long = "speed", value_name = "KMH")]
     speeds_km_h: Vec<f64>,
@@ -52,13 +55,10 @@ pub(super) struct Arguments {
     /// Share of the surface's power that differs from pass to pass, 0 to 1.
     #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
     unrepeated: f64,
-    /// Standard deviation of the sensor's white noise in m/s2.
-    #[arg(long, default_value_t = 0.0, value_name = "M_S2")]
-    noise: f64,
-    /// Stiffness of sleeper bolts in N/m (physics beyond the paper: a spring from each sleeper's
-    /// end to the ground).
-    #[arg(long, value_name = "N_M")]
-    sleeper_bolt: Option<f64>,
+    #[command(flatten)]
+    sensor: Sensor,
+    #[command(flatten)]
+    extensions: Extensions,
     /// Rail elements a span.
     #[arg(long, default_value_t = 8)]
     rail_elements: usize,
@@ -92,57 +92,104 @@ impl From<Track> for Preset {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
+    if arguments.extensions.asks_for_list() {
+        super::say(&extensions::list());
+        return Ok(());
+    }
+    let Some(out) = &arguments.out else {
+        return Err(anyhow!("--out: say in which folder the recording goes")).or_input();
+    };
+    arguments.sensor.check()?;
     let track = SimulatedTrack::new(arguments)?;
-    let recording = record(arguments, &track)?;
-    recording.write(&arguments.out)?;
-    std::fs::write(arguments.out.join("truth.json"), track.truth_json())?;
-    super::say(&format!("recording: {}", arguments.out.display()));
+    let drives = drives(arguments, &track);
+    let recording = Recording {
+        name: out.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        sample_rate_hz: sample_rate_hz(arguments.time_step),
+        channel: "vertical axle-box acceleration, positive downwards".to_owned(),
+        passes: record(arguments, &track, &drives)?,
+        sleepers: track.sleepers_recorded(),
+        nominal: track.nominal(),
+        spacing_m: track.design().sleeper.spacing_m,
+    };
+    recording.write(out)?;
+    std::fs::write(out.join("truth.json"), track.truth_json(&drives))?;
+    super::say(&format!("recording: {}", out.display()));
     Ok(())
 }
 
-/// Runs the wheel over the track, so often at each speed.
-fn record(arguments: &Arguments, track: &SimulatedTrack) -> Result<Recording, Stop> {
+/// One pass as it is to be driven.
+struct Drive {
+    speed_km_h: f64,
+    /// Seed of everything that differs from pass to pass.
+    seed: u64,
+    /// How far the wheel has rolled, modulo a turn, before it comes to the track's origin.
+    wheel_turned_m: f64,
+}
+
+/// The passes at each speed.
+///
+/// Where the wheel's own shape matters, every pass but the first begins at a random angle.
+fn drives(arguments: &Arguments, track: &SimulatedTrack) -> Vec<Drive> {
     let speeds_km_h = match &arguments.speeds_km_h[..] {
         [] => Preset::from(arguments.preset).speeds_km_h(),
         given => given.to_vec(),
     };
+    let turns = track.kinds().any(|kind| kind.classes.contains(&Class::WheelAngle));
+    let circumference_m = TAU * track.design().wheel.radius_m;
+    let drive = |speed_km_h: f64, pass: u32, first: bool| {
+        let seed = pass_seed(arguments.seed, speed_km_h, pass);
+        let share = (seed >> 11) as f64 / (1_u64 << 53) as f64;
+        let wheel_turned_m = if turns && !first { share * circumference_m } else { 0.0 };
+        Drive { speed_km_h, seed, wheel_turned_m }
+    };
+    let mut drives = Vec::new();
+    for speed_km_h in speeds_km_h {
+        for pass in 0..arguments.passes {
+            drives.push(drive(speed_km_h, pass, drives.is_empty()));
+        }
+    }
+    drives
+}
+
+/// Runs the wheel over the track, all passes of a speed together.
+fn record(
+    arguments: &Arguments,
+    track: &SimulatedTrack,
+    drives: &[Drive],
+) -> Result<Vec<Pass>, Stop> {
     let [from_m, to_m] = track.recorded_m();
     let mut passes = Vec::new();
-    for speed_km_h in speeds_km_h {
-        let drive = time::Pass {
+    let mut progress = Progress::begin("passes", 0, drives.len() as u64);
+    for together in drives.chunk_by(|a, b| a.speed_km_h == b.speed_km_h) {
+        let speed_km_h = together[0].speed_km_h;
+        let pass = time::Pass {
             speed_m_s: speed_km_h / 3.6,
             start_m: from_m - RUN_IN_SPANS as f64 * track.design().sleeper.spacing_m,
             end_m: to_m,
             time_step_s: arguments.time_step,
             local_flexibility: !arguments.no_local_flexibility,
         };
-        let number = 0..arguments.passes;
-        let seeds: Vec<_> =
-            number.map(|pass| pass_seed(arguments.seed, speed_km_h, pass)).collect();
-        let surfaces: Vec<_> = seeds.iter().map(|&seed| surface(arguments, track, seed)).collect();
-        let models = vec![track.model().clone(); surfaces.len()];
-        let driven = time::passes(&models, &drive, &surfaces).or_input()?;
-        for (record, seed) in driven.iter().zip(seeds) {
-            passes.push(measured(record, from_m, speed_km_h, arguments.noise, seed)?);
+        let turned = |drive: &Drive| track.model().clone().with_wheel_turned(drive.wheel_turned_m);
+        let models: Vec<_> = together.iter().map(turned).collect();
+        let surfaces: Vec<_> =
+            together.iter().map(|drive| surface(arguments, track, drive.seed)).collect();
+        let driven = time::passes(&models, &pass, &surfaces).or_input()?;
+        for ((model, record), drive) in models.iter().zip(&driven).zip(together) {
+            let sensor = &arguments.sensor;
+            passes.push(sensor.measured(model, record, speed_km_h, from_m, drive.seed)?);
         }
+        progress.at(passes.len() as u64, "");
     }
-    Ok(Recording {
-        name: arguments.out.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        sample_rate_hz: sample_rate_hz(arguments.time_step),
-        channel: "vertical axle-box acceleration, positive downwards".to_owned(),
-        passes,
-        sleepers: track.sleepers_between(from_m, to_m),
-        nominal: track.nominal(),
-        spacing_m: track.design().sleeper.spacing_m,
-    })
+    progress.end();
+    Ok(passes)
 }
 
 /// The surface that a pass sees: shared by all passes but for the unrepeated share.
 fn surface(arguments: &Arguments, track: &SimulatedTrack, pass_seed: u64) -> Surface {
-    let (level, length_m) = (track.level(), track.length_m());
-    let shared = Surface::rough(arguments.seed, level, length_m);
+    let roughness = Roughness::new(track.level());
+    let shared = track.model().surface(&roughness, arguments.seed);
     if arguments.unrepeated > 0.0 {
-        shared.blend(&Surface::rough(pass_seed, level, length_m), arguments.unrepeated)
+        shared.blend(&track.model().surface(&roughness, pass_seed), arguments.unrepeated)
     } else {
         shared
     }
@@ -155,37 +202,4 @@ fn pass_seed(seed: u64, speed_km_h: f64, pass: u32) -> u64 {
     hasher.update(&pass.to_le_bytes());
     let hash = hasher.finalize();
     u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
-}
-
-/// Samples a second, to the nanohertz: 1 / 2e-5 s is 50 kHz, not 49999.99999999999 Hz.
-fn sample_rate_hz(time_step_s: f64) -> f64 {
-    (1e9 / time_step_s).round() / 1e9
-}
-
-/// What the sensor makes of a pass, from `from_m` on.
-fn measured(
-    record: &PassRecord,
-    from_m: f64,
-    speed_km_h: f64,
-    noise_m_s2: f64,
-    seed: u64,
-) -> Result<Pass, Stop> {
-    let step_m = record.speed_m_s * record.time_step_s;
-    let position = |index: usize| record.start_m + (index + 1) as f64 * step_m;
-    let indices = 0..record.acceleration_m_s2.len();
-    let recorded: Vec<_> = indices.filter(|&index| position(index) >= from_m).collect();
-    let noise = Normal::new(0.0, noise_m_s2)
-        .map_err(|_| anyhow!("--noise: {noise_m_s2} is no standard deviation; give m/s2"))
-        .or_input()?;
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let samples = recorded
-        .iter()
-        .map(|&index| record.acceleration_m_s2[index] + noise.sample(&mut random))
-        .collect();
-    Ok(Pass {
-        file: String::new(),
-        speed_km_h,
-        signal: Signal::new(sample_rate_hz(record.time_step_s), samples)?,
-        position_m: recorded.into_iter().map(position).collect(),
-    })
 }

@@ -1,12 +1,12 @@
 //! The track that is simulated, and what is told of it.
 
 use super::super::{OrInput, Stop};
-use super::{Arguments, END_SPANS, Setting};
+use super::{Arguments, Drive, END_SPANS, Setting};
 use anyhow::anyhow;
 use serde_json::{Map, Value, json};
 use tracktwin_parameters::{Parameter, ParameterSet, Preset, TrackDesign};
 use tracktwin_signal::recording::Sleeper;
-use tracktwin_track::extension::ExtensionInstance;
+use tracktwin_track::extension::{ExtensionInstance, Kind};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
 /// A track with its own parameters at every sleeper.
@@ -14,7 +14,7 @@ pub(super) struct SimulatedTrack {
     design: TrackDesign,
     spans: usize,
     sleepers: Vec<ParameterSet>,
-    sleeper_bolt_n_m: Option<f64>,
+    extensions: Vec<ExtensionInstance>,
     model: TrackModel,
 }
 
@@ -30,17 +30,14 @@ impl SimulatedTrack {
         let supports: Vec<_> = sleepers.iter().map(Support::from).collect();
         let mesh = Mesh::uniform(spans, arguments.rail_elements, arguments.sleeper_elements);
         let design = preset.design();
-        let sleeper_bolt_n_m = arguments.sleeper_bolt;
-        let bolts = sleeper_bolt_n_m.map(|stiffness| {
-            ExtensionInstance::new("sleeper_bolt").with("stiffness_N_per_m", stiffness)
-        });
-        let extensions: Vec<_> = bolts
+        let instances = arguments.extensions.instances()?;
+        let extensions: Vec<_> = instances
             .iter()
-            .map(|bolts| bolts.build(&design, spans))
+            .map(|instance| instance.build(&design, spans))
             .collect::<Result<_, _>>()
             .or_input()?;
         let model = TrackModel::build(&design, &mesh, &supports, &extensions).or_input()?;
-        Ok(Self { design, spans, sleepers, sleeper_bolt_n_m, model })
+        Ok(Self { design, spans, sleepers, extensions: instances, model })
     }
 
     pub(super) fn design(&self) -> &TrackDesign {
@@ -56,8 +53,9 @@ impl SimulatedTrack {
         self.sleepers[0][Parameter::IrregularityLevel]
     }
 
-    pub(super) fn length_m(&self) -> f64 {
-        self.spans as f64 * self.design.sleeper.spacing_m
+    /// The kinds of its extensions.
+    pub(super) fn kinds(&self) -> impl Iterator<Item = &'static Kind> + '_ {
+        self.extensions.iter().filter_map(|instance| Kind::from_name(&instance.physics))
     }
 
     /// Where recording begins and ends, in m.
@@ -66,9 +64,10 @@ impl SimulatedTrack {
             .map(|spans| spans as f64 * self.design.sleeper.spacing_m)
     }
 
-    /// The sleepers that stand between two places in m.
-    pub(super) fn sleepers_between(&self, from_m: f64, to_m: f64) -> Vec<Sleeper> {
+    /// The sleepers that stand where it is recorded.
+    pub(super) fn sleepers_recorded(&self) -> Vec<Sleeper> {
         let spacing_m = self.design.sleeper.spacing_m;
+        let [from_m, to_m] = self.recorded_m();
         // Half a spacing: a sleeper at the very end is not lost to rounding.
         let recorded = from_m - 0.5 * spacing_m..to_m + 0.5 * spacing_m;
         (0..self.sleepers.len())
@@ -102,8 +101,9 @@ impl SimulatedTrack {
         }
     }
 
-    /// What was put in: the parameters of every sleeper, and the physics beyond the paper.
-    pub(super) fn truth_json(&self) -> String {
+    /// What was put in: the parameters of every sleeper, the physics beyond the paper, and with
+    /// which side down the wheel began every pass.
+    pub(super) fn truth_json(&self, drives: &[Drive]) -> String {
         let of = |set: &ParameterSet| -> Map<String, Value> {
             set.iter()
                 .map(|(parameter, value)| (parameter.name().to_owned(), json!(value)))
@@ -115,13 +115,12 @@ impl SimulatedTrack {
             .enumerate()
             .map(|(number, set)| (id(number), Value::Object(of(set))))
             .collect();
-        let left_out: Vec<Value> = self
-            .sleeper_bolt_n_m
-            .map(|stiffness| json!({"physics": "sleeper_bolt", "stiffness_N_m": stiffness}))
-            .into_iter()
-            .collect();
+        let drive = |drive: &Drive| json!({"speed_km_h": drive.speed_km_h, "wheel_turned_m": drive.wheel_turned_m});
         let truth = json!({
-            "left_out": left_out, "irregularity_level": self.level(), "sleepers": sleepers,
+            "left_out": self.extensions,
+            "irregularity_level": self.level(),
+            "sleepers": sleepers,
+            "passes": drives.iter().map(drive).collect::<Vec<_>>(),
         });
         format!("{truth:#}\n")
     }

@@ -29,3 +29,26 @@ impl Extension for Clipping {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::Measured;
+    use crate::extension::testing::{instance, track};
+
+    #[test]
+    fn a_chain_changes_the_signal_in_the_order_in_which_it_is_listed() {
+        let gain = instance("gain_error").with("factor", 2.0);
+        let clipping = instance("clipping").with("limit_m_s2", 3.0);
+        let recorded = |chain: [_; 2]| {
+            let mut measured = Measured {
+                time_step_s: 1e-5,
+                acceleration_m_s2: vec![-5.0, 1.0, 2.0],
+                position_m: vec![0.0, 1.0, 2.0],
+            };
+            track(&chain).measure(&mut measured);
+            measured.acceleration_m_s2
+        };
+        assert_eq!(recorded([gain.clone(), clipping.clone()]), [-3.0, 2.0, 3.0]);
+        assert_eq!(recorded([clipping, gain]), [-6.0, 2.0, 4.0]);
+    }
+}

@@ -31,3 +31,34 @@ impl Extension for ContactPatchFilter {
         1.0 / (1.0 + FRAC_PI_4 * (wave_number_rad_m * self.half_length_m).powi(3))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{extension, instance, track};
+    use crate::model::{Roughness, Surface};
+
+    #[test]
+    fn waves_much_longer_than_the_patch_pass_and_short_ones_do_not() {
+        let filter = extension(&instance("contact_patch_filter").with("half_length_m", 1e-3));
+        assert!((filter.roughness_gain(1.0) - 1.0).abs() < 1e-8);
+        // At kappa a = 1 the gain is 1 / (1 + pi / 4).
+        assert!((filter.roughness_gain(1e3) - 0.560_099).abs() < 1e-6);
+        // Far above, eight times less for an octave.
+        let octave = filter.roughness_gain(1e5) / filter.roughness_gain(2e5);
+        assert!((octave - 8.0).abs() < 1e-4, "{octave}");
+    }
+
+    #[test]
+    fn a_filtered_surface_bends_less_and_keeps_its_long_waves() {
+        let filter = instance("contact_patch_filter").with("half_length_m", 1.2e-3);
+        let filtered = track(&[filter]).surface(&Roughness::new(3.0), 1);
+        let plain = Surface::rough(1, 3.0, 1.5);
+        let bend = |surface: &Surface, step_m: f64| -> f64 {
+            let height = |x_m: f64| surface.height(x_m);
+            let second = |x_m: f64| height(x_m - step_m) - 2.0 * height(x_m) + height(x_m + step_m);
+            (2_000..12_000).map(|point| second(1e-4 * f64::from(point)).powi(2)).sum()
+        };
+        assert!(bend(&filtered, 2e-4) < 0.2 * bend(&plain, 2e-4));
+        assert!((bend(&filtered, 0.1) / bend(&plain, 0.1) - 1.0).abs() < 0.02);
+    }
+}

@@ -89,3 +89,53 @@ impl Extension for Corrugation {
         fade * self.amplitude_m * sum / (self.wave_numbers.len() as f64).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{
+        assert_felt_alike_in_both_solvers, assert_followed, extension, instance,
+    };
+
+    /// Mean square of the profile from 0.7 m to 0.9 m.
+    fn mean_square(bandwidth: f64) -> f64 {
+        let waves = instance("corrugation").at([0.5, 1.0]).with("bandwidth", bandwidth);
+        let waves = extension(&waves.with("wavelength_m", 2e-3).with("amplitude_m", 1e-6));
+        let height = |point: u32| waves.profile_m(0.7 + 1e-5 * f64::from(point));
+        (0..20_000).map(|point| height(point).powi(2)).sum::<f64>() / 20_000.0
+    }
+
+    #[test]
+    fn a_single_wave_has_half_the_square_of_its_amplitude() {
+        // A hundred whole waves of two hundred points.
+        assert!((mean_square(0.0) / 0.5e-12 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_band_of_waves_has_as_much() {
+        // 0.2 m resolve wave numbers that differ by 1 in 100; the waves differ by 0.3 / 16, so
+        // that neighbours still correlate a little.
+        let ratio = mean_square(0.3) / 0.5e-12;
+        assert!((0.7..1.3).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn outside_its_stretch_the_rail_is_as_it_was() {
+        let waves = instance("corrugation").at([0.5, 1.0]).with("wavelength_m", 8.5e-3);
+        let waves = extension(&waves.with("amplitude_m", 8e-7));
+        assert_eq!([0.49, 0.5, 1.0, 1.2].map(|x_m| waves.profile_m(x_m)), [0.0; 4]);
+        assert!((0..100).any(|point| waves.profile_m(0.7 + 1e-4 * f64::from(point)) > 7.9e-7));
+    }
+
+    #[test]
+    fn a_slow_wheel_follows_long_waves() {
+        let waves = instance("corrugation").with("wavelength_m", 0.15).with("amplitude_m", 1e-6);
+        let shape = extension(&waves);
+        assert_followed(&waves, |x_m| shape.profile_m(x_m));
+    }
+
+    #[test]
+    fn a_passing_wheel_feels_it_in_both_solvers_alike() {
+        let waves = instance("corrugation").with("wavelength_m", 8.5e-3);
+        assert_felt_alike_in_both_solvers(&waves.with("amplitude_m", 8e-7));
+    }
+}

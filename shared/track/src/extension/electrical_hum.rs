@@ -52,3 +52,25 @@ impl Extension for ElectricalHum {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::Measured;
+    use crate::extension::testing::{extension, instance};
+
+    #[test]
+    fn a_tone_of_its_frequency_is_added() {
+        let hum = extension(&instance("electrical_hum").with("amplitude_m_s2", 0.5));
+        let mut measured = Measured {
+            time_step_s: 1e-3,
+            acceleration_m_s2: vec![1.0; 40],
+            position_m: vec![0.0; 40],
+        };
+        hum.measure(&mut measured);
+        // 50 Hz: a quarter of a wave is five samples.
+        let at = |index: usize| measured.acceleration_m_s2[index];
+        for (index, expected) in [(0, 1.0), (5, 1.5), (15, 0.5), (25, 1.5)] {
+            assert!((at(index) - expected).abs() < 1e-9, "{index}: {}", at(index));
+        }
+    }
+}

@@ -54,3 +54,44 @@ impl Extension for FasteningClamp {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{
+        assert_felt_alike_in_both_solvers, direct_receptance, instance, relative_distance, track,
+        track_on,
+    };
+    use crate::frequency::Place;
+    use crate::model::Support;
+    use tracktwin_parameters::ParameterSet;
+
+    #[test]
+    fn a_vertical_clamp_is_more_stiffness_of_the_railpad() {
+        let clamps = instance("fastening_clamp").with("vertical_N_per_m", 5e7);
+        let mut support = Support::from(&ParameterSet::nominal());
+        let clamped = direct_receptance(&track(&[clamps]), Place::Rail(0.8));
+        support.railpad_stiffness += 5e7;
+        let stiffer = direct_receptance(&track_on(support, &[]), Place::Rail(0.8));
+        // Sums in another order.
+        assert!(relative_distance(&clamped, &stiffer) < 1e-9);
+    }
+
+    #[test]
+    fn a_clamp_against_rotation_is_not_felt_above_it_but_beside_it() {
+        // The track is symmetric about sleeper 5 at 0.75 m, where the rail does not rotate.
+        let clamp = instance("fastening_clamp").on([5]).with("rotational_N_m_per_rad", 3e5);
+        let (with, without) = (track(&[clamp]), track(&[]));
+        let felt = |x_m: f64| {
+            let place = Place::Rail(x_m);
+            relative_distance(&direct_receptance(&with, place), &direct_receptance(&without, place))
+        };
+        assert!(felt(0.75) < 1e-9, "{}", felt(0.75));
+        assert!(felt(0.8125) > 0.01, "{}", felt(0.8125));
+    }
+
+    #[test]
+    fn a_passing_wheel_feels_it_in_both_solvers_alike() {
+        let clamps = instance("fastening_clamp").on([3, 5]).with("rotational_N_m_per_rad", 3e5);
+        assert_felt_alike_in_both_solvers(&clamps.with("vertical_N_per_m", 1.5e8));
+    }
+}

@@ -62,3 +62,47 @@ impl Extension for FlexibleAxleBox {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{instance, track};
+    use rustfft::num_complex::Complex64;
+    use std::f64::consts::TAU;
+
+    const BOX_KG: f64 = 10.0;
+    const WHEEL_KG: f64 = 34.0;
+
+    #[test]
+    fn wheel_and_axle_box_move_as_two_masses_on_a_spring() {
+        let (stiffness, damping) = (4e8, 3e3);
+        let axle_box = instance("flexible_axle_box").with("mass_kg", BOX_KG);
+        let axle_box = axle_box.with("stiffness_N_per_m", stiffness);
+        let model = track(&[axle_box.with("damping_N_s_per_m", damping)]);
+        for frequency_hz in [50.0, 700.0, 1100.0, 3000.0] {
+            let omega = TAU * frequency_hz;
+            let spring = Complex64::new(stiffness, omega * damping);
+            // Cramer's rule for a unit force upwards on the wheel, displacements downwards.
+            let (wheel, axle) =
+                (spring - WHEEL_KG * omega * omega, spring - BOX_KG * omega * omega);
+            let determinant = wheel * axle - spring * spring;
+            let (wheel_up, axle_down) = (axle / determinant, -spring / determinant);
+            let sensed = -omega * omega * axle_down;
+            let vehicle = model.vehicle();
+            // Rounding, amplified where both masses nearly cancel.
+            let error = (vehicle.receptance(omega) - wheel_up).norm() / wheel_up.norm();
+            assert!(error < 1e-9, "{frequency_hz} Hz: {error}");
+            let error = (vehicle.acceleration_per_force(omega) - sensed).norm() / sensed.norm();
+            assert!(error < 1e-9, "{frequency_hz} Hz: {error}");
+        }
+    }
+
+    #[test]
+    fn a_stiff_axle_box_is_part_of_the_wheel() {
+        let axle_box = instance("flexible_axle_box").with("mass_kg", BOX_KG);
+        let axle_box = axle_box.with("stiffness_N_per_m", 1e15).with("damping_N_s_per_m", 0.0);
+        let (stiff, rigid) = (track(&[axle_box]), track(&[]));
+        let omega = TAU * 4000.0;
+        let [stiff, rigid] = [stiff, rigid].map(|model| model.vehicle().receptance(omega));
+        assert!((stiff / rigid - 1.0).norm() < 1e-3);
+    }
+}

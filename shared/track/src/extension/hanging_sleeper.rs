@@ -74,3 +74,86 @@ impl Law for Gap {
         Reaction { force, stiffness: stiffness + onset_slope, damping: onset * damping }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extension::testing::{distance, instance, pass_at, track, track_on};
+    use crate::frequency::{Place, receptance};
+    use crate::model::{Surface, TrackModel};
+    use crate::time::{self, Pass};
+    use tracktwin_parameters::ParameterSet;
+
+    /// Sleepers as good as rigid: all of the ballast sinks alike.
+    fn rigid() -> Support {
+        let nominal = Support::from(&ParameterSet::nominal());
+        Support { sleeper_bending_stiffness: 5e9, ..nominal }
+    }
+
+    fn hanging(gap_m: f64) -> TrackModel {
+        track_on(rigid(), &[instance("hanging_sleeper").on([5]).with("gap_m", gap_m)])
+    }
+
+    /// Where the contact point stands under the standing wheel, in m.
+    fn deflection(model: &TrackModel) -> f64 {
+        time::standing(model, &Pass { start_m: 0.75, ..pass_at(1.0) })
+    }
+
+    #[test]
+    fn a_gap_that_closes_takes_over_from_the_rail() {
+        let (open, closed) = (hanging(1.0), hanging(0.0));
+        let place = Place::SleeperSeat(5);
+        let of = |from, to| receptance(&open, from, to, &[0.0]).unwrap()[0].re;
+        let (own, cross) = (of(place, place), of(Place::Rail(0.75), place));
+        let stiffness = rigid().ballast_stiffness;
+        for gap_m in [0.0, 2e-5, 5e-5] {
+            // What the open gap would close by, less what the ballast pushes back.
+            let push = stiffness * (cross * 4500.0 - gap_m) / (1.0 + own * stiffness);
+            let expected = deflection(&open) - cross * push;
+            let found = deflection(&hanging(gap_m));
+            // The sleeper bends by a millionth of what it sinks.
+            assert!((found / expected - 1.0).abs() < 1e-5, "{gap_m}: {found} {expected}");
+        }
+        let plain = deflection(&track_on(rigid(), &[]));
+        assert!((deflection(&closed) / plain - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn over_a_gap_that_stays_open_the_wheel_runs_as_without_ballast() {
+        let (pass, surface) = (pass_at(13.0 / 3.6), Surface::rough(1, 3.0, 1.5));
+        let run = |model: &TrackModel| time::pass(model, &pass, &surface).unwrap();
+        let (wide, wider) = (run(&hanging(4e-4)), run(&hanging(4e-3)));
+        assert_eq!(wide, wider);
+        let plain = run(&track_on(rigid(), &[]));
+        assert!(distance(&wide.acceleration_m_s2, &plain.acceleration_m_s2) > 0.02);
+    }
+
+    #[test]
+    fn a_closing_gap_is_felt_and_every_step_has_a_solution() {
+        let (pass, surface) = (pass_at(13.0 / 3.6), Surface::rough(1, 3.0, 1.5));
+        let run = |gap_m: f64| {
+            let sleepers = instance("hanging_sleeper").on([4, 5]).with("gap_m", gap_m);
+            time::pass(&track(&[sleepers]), &pass, &surface).unwrap().acceleration_m_s2
+        };
+        let (closing, open) = (run(6e-5), run(1.0));
+        assert!(distance(&closing, &open) > 0.02, "{}", distance(&closing, &open));
+    }
+
+    #[test]
+    fn the_ballast_pushes_and_never_pulls() {
+        let gap = Gap { gap_m: 1e-4, ballast: SpringDamper { stiffness: 1e7, damping: 900.0 } };
+        assert_eq!(gap.reaction(0.9e-4, 1.0), Reaction::default());
+        assert_eq!(gap.reaction(1.1e-4, -1.0), Reaction::default());
+        let pressed = gap.reaction(2e-4, 0.01);
+        assert!((pressed.force - 1009.0).abs() < 1e-6, "{pressed:?}");
+        for (displacement, velocity) in [(1.000_5e-4, 0.01), (1.5e-4, -0.01)] {
+            let force = |u: f64, v: f64| gap.reaction(displacement + u, velocity + v).force;
+            let slope = gap.reaction(displacement, velocity);
+            let by_displacement = (force(1e-10, 0.0) - force(-1e-10, 0.0)) / 2e-10;
+            let by_velocity = (force(0.0, 1e-6) - force(0.0, -1e-6)) / 2e-6;
+            // Bilinear in both: rounding of differences only.
+            assert!((by_displacement / slope.stiffness - 1.0).abs() < 1e-4, "{displacement}");
+            assert!((by_velocity / slope.damping - 1.0).abs() < 1e-4, "{displacement}");
+        }
+    }
+}

@@ -96,3 +96,56 @@ impl Law for PowerLaw {
         Reaction { force: load_n - self.toe_load_n, stiffness: self.tangent(load_n), damping: 0.0 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extension::testing::{distance, instance, pass_at, track};
+    use crate::model::Surface;
+    use crate::time;
+    use tracktwin_parameters::{Parameter, ParameterSet};
+
+    const LAW: PowerLaw =
+        PowerLaw { stiffness_n_m: 1.5e8, exponent: 0.4, nominal_load_n: 1900.0, toe_load_n: 400.0 };
+
+    #[test]
+    fn the_force_is_the_integral_of_the_tangent() {
+        for displacement_m in [-1e-6, 0.0, 3e-6, 2e-5] {
+            let at = |shift: f64| LAW.reaction(displacement_m + shift, 0.0);
+            let slope = (at(1e-9).force - at(-1e-9).force) / 2e-9;
+            // A central difference over 1e-9 m of a curve that bends within 1e-5 m.
+            assert!((slope / at(0.0).stiffness - 1.0).abs() < 1e-5, "{displacement_m}");
+        }
+        assert!(LAW.reaction(0.0, 0.0).force.abs() < 1e-9);
+        assert!((LAW.tangent(1900.0) / 1.5e8 - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_pad_never_pulls_by_more_than_its_toe_load() {
+        assert_eq!(
+            LAW.reaction(-1.0, 0.0),
+            Reaction { force: -400.0, stiffness: 0.0, damping: 0.0 }
+        );
+    }
+
+    #[test]
+    fn with_exponent_zero_it_is_the_plain_pad() {
+        let (pass, surface) = (pass_at(13.0 / 3.6), Surface::rough(1, 3.0, 1.5));
+        let run = |exponent: f64| {
+            let pads = instance("load_dependent_railpad").on([3, 4, 5]);
+            let model = track(&[pads.with("exponent", exponent)]);
+            time::pass(&model, &pass, &surface).unwrap().acceleration_m_s2
+        };
+        let plain = time::pass(&track(&[]), &pass, &surface).unwrap().acceleration_m_s2;
+        // Newton's tolerance over 1e4 steps, in differences over dt².
+        assert!(distance(&run(0.0), &plain) < 1e-6, "{}", distance(&run(0.0), &plain));
+        assert!(distance(&run(0.5), &plain) > 1e-3);
+    }
+
+    #[test]
+    fn in_the_matrices_a_lighter_wheel_meets_softer_pads() {
+        let nominal = ParameterSet::nominal()[Parameter::RailpadStiffness];
+        let tangent = |load_n: f64| LAW.tangent(LAW.toe_load_n + SEAT_SHARE * load_n) / nominal;
+        assert!((tangent(4500.0) - 1.0).abs() < 1e-12 && tangent(3000.0) < 0.95);
+    }
+}

@@ -40,3 +40,32 @@ impl Extension for MissingRailpad {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{
+        assert_felt_alike_in_both_solvers, direct_receptance, instance, relative_distance, track,
+        track_on,
+    };
+    use crate::frequency::Place;
+    use crate::model::Support;
+    use tracktwin_parameters::ParameterSet;
+
+    #[test]
+    fn without_all_its_pads_the_track_is_one_on_soft_pads() {
+        let missing = instance("missing_railpad").with("stiffness_N_per_m", 1e7);
+        let soft = Support::from(&ParameterSet::nominal());
+        let railpad_damping = soft.railpad_damping * 1e7 / soft.railpad_stiffness;
+        let soft = Support { railpad_stiffness: 1e7, railpad_damping, ..soft };
+        let missing = direct_receptance(&track(&[missing]), Place::Rail(0.75));
+        let soft = direct_receptance(&track_on(soft, &[]), Place::Rail(0.75));
+        // What is taken out again cancels up to rounding.
+        assert!(relative_distance(&missing, &soft) < 1e-9);
+    }
+
+    #[test]
+    fn a_passing_wheel_feels_it_in_both_solvers_alike() {
+        let missing = instance("missing_railpad").on([4]).with("stiffness_N_per_m", 1e7);
+        assert_felt_alike_in_both_solvers(&missing);
+    }
+}

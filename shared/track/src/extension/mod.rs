@@ -8,6 +8,7 @@ mod instance;
 mod kind;
 mod measured;
 mod registry;
+mod text;
 
 mod clipping;
 mod contact_patch_filter;
@@ -30,6 +31,8 @@ mod sleeper_bolt;
 mod squat;
 mod subgrade_layer;
 mod support_variation;
+#[cfg(test)]
+mod testing;
 mod wheel_flat;
 mod wheel_out_of_round;
 
@@ -37,6 +40,7 @@ pub use instance::{ExtensionInstance, InstanceError};
 pub use kind::{Bound, Class, Kind, KindParameter, PlaceKind};
 pub use measured::Measured;
 pub use registry::KINDS;
+pub use text::InstanceTextError;
 
 use crate::model::{Assembly, Vehicle};
 use rustfft::num_complex::Complex64;

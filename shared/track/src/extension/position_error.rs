@@ -47,3 +47,24 @@ impl Extension for PositionError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::Measured;
+    use crate::extension::testing::{extension, instance};
+
+    #[test]
+    fn positions_are_shifted_at_the_start_and_stretched_from_there() {
+        let error = instance("position_error").with("offset_m", 0.01).with("scale", 0.1);
+        let mut measured = Measured {
+            time_step_s: 1e-5,
+            acceleration_m_s2: vec![1.0; 3],
+            position_m: vec![1.0, 1.5, 2.0],
+        };
+        extension(&error).measure(&mut measured);
+        assert_eq!(measured.acceleration_m_s2, [1.0; 3]);
+        for (found, expected) in measured.position_m.iter().zip([1.01, 1.56, 2.11]) {
+            assert!((found - expected).abs() < 1e-12, "{found}");
+        }
+    }
+}

@@ -54,3 +54,70 @@ impl Extension for RailCrossSection {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{FREQUENCIES_HZ, instance, pass_at, track};
+    use crate::frequency::{Place, receptance};
+    use crate::model::{HertzContact, Surface, TrackModel};
+    use crate::time;
+    use rustfft::num_complex::Complex64;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn the_contact_gives_way_by_one_over_its_stiffness_and_resonates() {
+        let section = instance("rail_cross_section").with("frequency_Hz", 8e3);
+        let model = track(&[section.with("stiffness_N_per_m", 1e9).with("loss_factor", 0.05)]);
+        let local =
+            |frequency_hz: f64| model.vehicle().oscillators[0].receptance(TAU * frequency_hz);
+        assert!((local(0.0) - 1e-9).norm() < 1e-18);
+        assert!((local(8e3) * Complex64::new(0.0, 5e7) - 1.0).norm() < 1e-9);
+        assert_eq!(model.vehicle().acceleration_per_force(TAU * FREQUENCIES_HZ[1]), {
+            Complex64::from(-1.0 / 44.0)
+        });
+    }
+
+    /// Amplitude in m/s2 at 2000 Hz that a small corrugation of 1 mm makes at 2 m/s.
+    fn amplitude(extensions: &[crate::extension::ExtensionInstance]) -> f64 {
+        let waves = instance("corrugation").with("wavelength_m", 1e-3).with("amplitude_m", 1e-9);
+        let (with, without): (TrackModel, TrackModel) =
+            (track(&[extensions, &[waves]].concat()), track(extensions));
+        let pass = time::Pass { start_m: 0.65, end_m: 0.8, ..pass_at(2.0) };
+        let run = |model| time::pass(model, &pass, &Surface::smooth()).unwrap().acceleration_m_s2;
+        let (with, without) = (run(&with), run(&without));
+        // 0.02 m around mid-span at 0.6875 m; the smooth rail's own part is taken out.
+        let sum = (1000..2000)
+            .map(|step| {
+                let phase = Complex64::cis(-TAU * 2e3 * 1e-5 * step as f64);
+                (with[step] - without[step]) * phase
+            })
+            .sum::<Complex64>();
+        sum.norm() * 2.0 / 1000.0
+    }
+
+    #[test]
+    fn both_domains_agree_on_what_a_wave_makes_of_vehicle_and_contact() {
+        let section = instance("rail_cross_section").with("frequency_Hz", 3e3);
+        let section = section.with("stiffness_N_per_m", 1e9);
+        let axle_box = instance("flexible_axle_box").with("mass_kg", 10.0);
+        let axle_box = axle_box.with("stiffness_N_per_m", 4e8).with("damping_N_s_per_m", 3e3);
+        for extension in [section, axle_box] {
+            let expected = |model: &TrackModel| {
+                let (omega, contact) = (TAU * 2e3, HertzContact::new(model.design()));
+                let stiffness = 1.5 * 4500.0 / contact.approach(4500.0);
+                let place = Place::Rail(0.68);
+                let rail = receptance(model, place, place, &[2e3]).unwrap()[0];
+                let vehicle = model.vehicle();
+                let force = 1e-9 / (1.0 / stiffness + rail + vehicle.receptance(omega));
+                (vehicle.acceleration_per_force(omega) * force).norm()
+            };
+            let (plain, extended) = (track(&[]), track(std::slice::from_ref(&extension)));
+            let in_time = amplitude(std::slice::from_ref(&extension)) / amplitude(&[]);
+            let in_frequency = expected(&extended) / expected(&plain);
+            // The receptance under the wheel changes over the 0.02 m, alike in both.
+            let ratio = in_time / in_frequency;
+            assert!((ratio - 1.0).abs() < 0.03, "{}: {in_time} {in_frequency}", extension.physics);
+            assert!((in_frequency - 1.0).abs() > 0.1, "{}", extension.physics);
+        }
+    }
+}

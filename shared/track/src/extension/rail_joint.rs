@@ -62,3 +62,78 @@ impl Extension for RailJoint {
         self.dip_m * (-(x_m - self.centre_m).abs() / self.dip_length_m).exp()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{
+        assert_felt_alike_in_both_solvers, extension, instance, track,
+    };
+    use crate::frequency::{Place, receptance};
+    use crate::model::{Mesh, Support, TrackModel};
+    use tracktwin_parameters::TrackDesign;
+
+    /// A support that carries next to nothing: the rail is a beam on its two ends.
+    const NOTHING: Support = Support {
+        railpad_stiffness: 0.0,
+        railpad_damping: 0.0,
+        ballast_stiffness: 1.0,
+        ballast_damping: 0.0,
+        sleeper_bending_stiffness: 5000.0,
+    };
+
+    /// Static deflection in m/N of a simply supported beam of two spans under its middle.
+    fn deflection(joint: Option<f64>, elements: usize, softened_m: f64) -> f64 {
+        let design = TrackDesign::v_track();
+        let joint = joint.map(|factor| {
+            let joint = instance("rail_joint").at([0.125, 0.125]);
+            let joint = joint.with("bending_factor", factor).with("bending_length_m", softened_m);
+            joint.build(&design, 2).unwrap()
+        });
+        let (mesh, joint) = (Mesh::uniform(2, elements, 2), Vec::from_iter(joint));
+        let model = TrackModel::build(&design, &mesh, &[NOTHING], &joint).unwrap();
+        let middle = Place::Rail(0.125);
+        receptance(&model, middle, middle, &[0.0]).unwrap()[0].re
+    }
+
+    #[test]
+    fn a_simply_supported_beam_sinks_deeper_by_the_work_of_the_softened_part() {
+        let (factor, softened_m, length) = (0.2, 0.0625, 0.25_f64);
+        // Unit load theorem: the moment is x / 2 up to the load in the middle.
+        let moments = ((0.5 * length).powi(3) - (0.5 * (length - softened_m)).powi(3)) / 6.0;
+        let bending_stiffness = TrackDesign::v_track().rail.bending_stiffness();
+        let expected = moments * (1.0 / factor - 1.0) / bending_stiffness;
+        let more = |elements| {
+            deflection(Some(factor), elements, softened_m) - deflection(None, elements, softened_m)
+        };
+        // The softened part is two whole elements: static deflections are exact.
+        assert!((more(4) / expected - 1.0).abs() < 1e-9, "{}", more(4) / expected);
+        // Spread over longer elements it lies where the moment is smaller, but as much of it.
+        let spread = more(1) / expected;
+        assert!((0.3..0.9).contains(&spread), "{spread}");
+    }
+
+    #[test]
+    fn a_joint_that_keeps_stiffness_and_height_is_none() {
+        let (with, without) = (track(&[instance("rail_joint").at([0.8, 0.8])]), track(&[]));
+        assert_eq!(with.matrices(), without.matrices());
+        assert_eq!(with.profile_m(0.8), 0.0);
+    }
+
+    #[test]
+    fn the_dip_is_a_kink_of_twice_its_depth_over_its_length() {
+        let joint = instance("rail_joint").at([0.8, 0.8]).with("dip_m", 1e-4);
+        let joint = extension(&joint.with("length_m", 0.01));
+        assert_eq!(joint.profile_m(0.8), 1e-4);
+        let slope = |side: f64| (joint.profile_m(0.8 + side) - joint.profile_m(0.8)) / side;
+        // A hundred-thousandth of the length away: as far from the tangent, and rounding.
+        let kink = slope(1e-7) - slope(-1e-7);
+        assert!((kink / -2e-2 - 1.0).abs() < 1e-4, "{kink}");
+    }
+
+    #[test]
+    fn a_passing_wheel_feels_dip_and_bending_in_both_solvers_alike() {
+        let joint = instance("rail_joint").at([0.6, 0.6]);
+        assert_felt_alike_in_both_solvers(&joint.clone().with("bending_factor", 0.15));
+        assert_felt_alike_in_both_solvers(&joint.with("dip_m", 8e-5));
+    }
+}

@@ -69,3 +69,35 @@ impl Extension for RoughnessSpectrum {
         10.0_f64.powf(0.1 * (self.level_db + self.slope_db * octaves + bump_db))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{extension, instance, track};
+    use crate::model::{Roughness, Surface};
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn level_slope_and_bump_add_up_in_decibels() {
+        let spectrum = instance("roughness_spectrum").with("level_dB", 1.0);
+        let spectrum = spectrum.with("slope_dB_per_octave", 2.0).with("bump_dB", 5.0);
+        let spectrum = spectrum.with("pivot_wavelength_m", 1e-2).with("bump_wavelength_m", 5e-3);
+        let spectrum = extension(&spectrum.with("bump_octaves", 0.1));
+        let level_db =
+            |wavelength_m: f64| 10.0 * spectrum.roughness_gain(TAU / wavelength_m).log10();
+        // The bump is ten standard deviations off at its neighbours' octaves.
+        for (wavelength_m, expected) in [(1e-2, 1.0), (5e-3, 8.0), (2.5e-3, 5.0), (2e-2, -1.0)] {
+            assert!((level_db(wavelength_m) - expected).abs() < 1e-9, "{wavelength_m}");
+        }
+    }
+
+    #[test]
+    fn four_times_the_power_is_twice_the_height_everywhere() {
+        let louder = instance("roughness_spectrum").with("level_dB", 10.0 * 4.0_f64.log10());
+        let (louder, plain) = (track(&[louder]), Surface::rough(3, 2.0, 1.5));
+        let louder = louder.surface(&Roughness::new(2.0), 3);
+        for x_m in [0.1, 0.5, 1.234] {
+            assert!((louder.height(x_m) / plain.height(x_m) - 2.0).abs() < 1e-9, "{x_m}");
+        }
+        assert_eq!(track(&[]).surface(&Roughness::new(2.0), 3), plain);
+    }
+}

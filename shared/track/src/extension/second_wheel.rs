@@ -36,3 +36,42 @@ impl Extension for SecondWheel {
         vehicle.further_wheels_m.push(self.distance_m);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{distance, instance, pass_at, smooth_accelerations, track};
+    use crate::model::Surface;
+    use crate::time;
+
+    #[test]
+    fn a_wheel_beyond_hearing_is_none_and_a_near_one_is_heard() {
+        let pass = pass_at(13.0 / 3.6);
+        let surface = Surface::rough(1, 3.0, 1.5);
+        let felt = |ahead: Option<f64>| {
+            let wheel = ahead.map(|metres| instance("second_wheel").with("distance_m", metres));
+            let model = track(&Vec::from_iter(wheel));
+            time::passes(&[model], &pass, std::slice::from_ref(&surface)).unwrap().remove(0)
+        };
+        let alone = felt(None).acceleration_m_s2;
+        let near = distance(&felt(Some(0.2)).acceleration_m_s2, &alone);
+        let far = distance(&felt(Some(0.5)).acceleration_m_s2, &alone);
+        assert!(near > 0.02 && far < near, "{near} {far}");
+    }
+
+    #[test]
+    fn on_a_smooth_symmetric_track_both_wheels_carry_their_load() {
+        let ahead = track(&[instance("second_wheel").with("distance_m", 0.25)]);
+        let pass = pass_at(1.0);
+        let forces = time::pass(&ahead, &pass, &Surface::smooth()).unwrap().contact_force_n;
+        let mean = forces.iter().sum::<f64>() / forces.len() as f64;
+        // Over many spans a wheel neither rises nor falls.
+        assert!((mean / 4500.0 - 1.0).abs() < 1e-3, "{mean}");
+        assert!(smooth_accelerations(&ahead, &pass).iter().all(|value| value.is_finite()));
+    }
+
+    #[test]
+    fn both_wheels_must_stay_on_the_track() {
+        let ahead = track(&[instance("second_wheel").with("distance_m", 0.6)]);
+        assert!(time::pass(&ahead, &pass_at(1.0), &Surface::smooth()).is_err());
+    }
+}

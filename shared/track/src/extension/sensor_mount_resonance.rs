@@ -49,3 +49,44 @@ impl Extension for SensorMountResonance {
         measured.filter(|frequency_hz| self.sensor_transfer(frequency_hz));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::Measured;
+    use crate::extension::testing::{extension, instance};
+    use rustfft::num_complex::Complex64;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn a_tone_is_recorded_as_the_transfer_says() {
+        let mount = instance("sensor_mount_resonance").with("frequency_Hz", 3200.0);
+        let mount = extension(&mount.with("damping_ratio", 0.03));
+        for frequency_hz in [100.0, 3100.0, 4500.0] {
+            let phase = |index: usize| TAU * frequency_hz * 1e-5 * index as f64;
+            let mut measured = Measured {
+                time_step_s: 1e-5,
+                acceleration_m_s2: (0..20_000).map(|index| phase(index).sin()).collect(),
+                position_m: vec![0.0; 20_000],
+            };
+            mount.measure(&mut measured);
+            // Tenths of a second from either end: the filter has rung itself out.
+            let sum = (5_000..15_000)
+                .map(|index| measured.acceleration_m_s2[index] * Complex64::cis(-phase(index)))
+                .sum::<Complex64>();
+            let found = sum * Complex64::new(0.0, 2.0 / 10_000.0);
+            let expected = mount.sensor_transfer(frequency_hz);
+            let error = (found - expected).norm() / expected.norm();
+            // 1000 to 45000 whole waves less a part of one.
+            assert!(error < 5e-3, "{frequency_hz} Hz: {found} {expected}");
+        }
+    }
+
+    #[test]
+    fn far_below_its_resonance_the_sensor_tells_the_truth() {
+        let mount = instance("sensor_mount_resonance").with("frequency_Hz", 3200.0);
+        let mount = extension(&mount.with("damping_ratio", 0.03));
+        assert!((mount.sensor_transfer(32.0) - 1.0).norm() < 2e-4);
+        // At resonance 1 / (2 zeta), and the quadrature of the damper.
+        assert!((mount.sensor_transfer(3200.0).norm() - 16.7).abs() < 0.05);
+    }
+}

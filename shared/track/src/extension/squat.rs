@@ -48,3 +48,34 @@ impl Extension for Squat {
         if place.abs() < 0.5 { 0.5 * self.depth_m * (1.0 + (TAU * place).cos()) } else { 0.0 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{
+        assert_felt_alike_in_both_solvers, assert_followed, extension, instance,
+    };
+
+    #[test]
+    fn the_hollow_is_as_deep_and_as_long_as_it_says() {
+        let squat = instance("squat").at([0.7, 0.7]).with("depth_m", 2e-5);
+        let squat = extension(&squat.with("length_m", 6e-3));
+        assert_eq!(squat.profile_m(0.7), 2e-5);
+        assert_eq!([squat.profile_m(0.6969), squat.profile_m(0.7031)], [0.0, 0.0]);
+        // Half deep a quarter of its length from the middle.
+        assert!((squat.profile_m(0.7015) / 1e-5 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_slow_wheel_follows_the_hollow_down_and_up() {
+        let squat = instance("squat").at([0.75, 0.75]).with("depth_m", 1e-5);
+        let squat = squat.with("length_m", 0.2);
+        let hollow = extension(&squat);
+        assert_followed(&squat, |x_m| hollow.profile_m(x_m));
+    }
+
+    #[test]
+    fn a_passing_wheel_feels_it_in_both_solvers_alike() {
+        let squat = instance("squat").at([0.65, 0.65]).with("depth_m", 2e-5);
+        assert_felt_alike_in_both_solvers(&squat.with("length_m", 6e-3));
+    }
+}

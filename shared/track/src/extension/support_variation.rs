@@ -88,3 +88,42 @@ fn standard_normal(random: &mut impl Rng) -> f64 {
     let radius = (-2.0 * unit(random.next_u64()).ln()).sqrt();
     radius * (TAU * unit(random.next_u64())).cos()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extension::testing::{assert_felt_alike_in_both_solvers, instance};
+
+    fn draw(cv: f64, correlation: f64, count: usize) -> Vec<f64> {
+        let (ballast_cv, railpad_cv, seed) = (cv, cv, 7);
+        let sleepers = (0..count).collect();
+        let variation = SupportVariation { sleepers, ballast_cv, railpad_cv, correlation, seed };
+        variation.factors(&mut ChaCha8Rng::seed_from_u64(seed), cv)
+    }
+
+    #[test]
+    fn the_factors_have_their_mean_scatter_and_correlation() {
+        let factors = draw(0.2, 0.7, 40_000);
+        let count = factors.len() as f64;
+        let mean = factors.iter().sum::<f64>() / count;
+        let cv = (factors.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / count).sqrt() / mean;
+        let product = |pair: &[f64]| (pair[0] - mean) * (pair[1] - mean);
+        let shared = factors.windows(2).map(product).sum::<f64>() / (count - 1.0);
+        // Some 7000 independent draws: 0.0024 is one standard error of mean and scatter.
+        assert!((mean - 1.0).abs() < 0.01, "{mean}");
+        assert!((cv - 0.2).abs() < 0.01, "{cv}");
+        // The logarithm makes 0.7 into 0.695.
+        assert!((shared / (mean * cv).powi(2) - 0.7).abs() < 0.03);
+    }
+
+    #[test]
+    fn without_scatter_nothing_changes() {
+        assert_eq!(draw(0.0, 0.7, 5), [1.0; 5]);
+    }
+
+    #[test]
+    fn a_passing_wheel_feels_it_in_both_solvers_alike() {
+        let variation = instance("support_variation").with("ballast_cv", 0.3);
+        assert_felt_alike_in_both_solvers(&variation.with("railpad_cv", 0.3));
+    }
+}

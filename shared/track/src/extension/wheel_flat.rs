@@ -53,3 +53,39 @@ impl Extension for WheelFlat {
         if place.abs() < 0.5 { 0.5 * self.depth_m * (1.0 + (TAU * place).cos()) } else { 0.0 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{
+        assert_felt_alike_in_both_solvers, assert_followed, extension, instance,
+    };
+    use std::f64::consts::TAU;
+
+    const CIRCUMFERENCE_M: f64 = TAU * 0.065;
+
+    #[test]
+    fn the_flat_comes_back_every_turn_and_is_as_deep_as_its_length_asks() {
+        let flat = instance("wheel_flat").with("length_m", 3.5e-3).with("phase_m", 0.1);
+        let flat = extension(&flat);
+        let depth_m = 3.5e-3_f64.powi(2) / (16.0 * 0.065);
+        for turn in [-1.0, 0.0, 1.0, 7.0] {
+            let met_m = 0.1 + turn * CIRCUMFERENCE_M;
+            assert!((flat.wheel_profile_m(met_m) / depth_m - 1.0).abs() < 1e-9, "{turn}");
+            assert_eq!(flat.wheel_profile_m(met_m + 1.8e-3), 0.0);
+        }
+        assert_eq!(flat.profile_m(0.1), 0.0);
+    }
+
+    #[test]
+    fn a_slow_wheel_follows_a_long_flat() {
+        let flat = instance("wheel_flat").with("length_m", 0.2).with("phase_m", 0.75);
+        let shape = extension(&flat);
+        assert_followed(&flat, |x_m| shape.wheel_profile_m(x_m));
+    }
+
+    #[test]
+    fn a_passing_wheel_feels_it_in_both_solvers_alike() {
+        let flat = instance("wheel_flat").with("length_m", 3.5e-3);
+        assert_felt_alike_in_both_solvers(&flat.with("phase_m", 0.6));
+    }
+}

@@ -54,3 +54,31 @@ impl Extension for WheelOutOfRound {
         self.amplitude_m * (self.wave_number * rolled_m + self.phase_rad).cos()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::testing::{
+        assert_felt_alike_in_both_solvers, assert_followed, extension, instance,
+    };
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn a_slow_wheel_follows_its_own_waves() {
+        let waves = instance("wheel_out_of_round").with("order", 3.0).with("amplitude_m", 1e-5);
+        let shape = extension(&waves);
+        assert_followed(&waves, |x_m| shape.wheel_profile_m(x_m));
+    }
+
+    #[test]
+    fn a_passing_wheel_feels_it_in_both_solvers_alike() {
+        let waves = instance("wheel_out_of_round").with("order", 20.0);
+        assert_felt_alike_in_both_solvers(&waves.with("amplitude_m", 2e-6));
+    }
+
+    #[test]
+    fn an_order_is_a_whole_number() {
+        let waves = instance("wheel_out_of_round").with("order", 2.5).with("amplitude_m", 1e-5);
+        let error = waves.build(&TrackDesign::v_track(), 12).unwrap_err();
+        assert!(error.to_string().contains("order is 2.5 but must be a whole number"), "{error}");
+    }
+}

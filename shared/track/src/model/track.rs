@@ -22,6 +22,8 @@ pub struct TrackModel {
     matrices: Matrices,
     force_laws: Vec<ForceLaw>,
     vehicle: Vehicle,
+    /// How far the first wheel had rolled before it came to the track's origin, in m.
+    wheel_turned_m: f64,
     extensions: Vec<Arc<dyn Extension>>,
 }
 
@@ -78,7 +80,8 @@ impl TrackModel {
         }
         let Assembled { layout, matrices, force_laws } = assembly.finish();
         let (design, extensions) = (design.clone(), extensions.to_vec());
-        Ok(Self { design, layout, matrices, force_laws, vehicle, extensions })
+        let wheel_turned_m = 0.0;
+        Ok(Self { design, layout, matrices, force_laws, vehicle, wheel_turned_m, extensions })
     }
 
     /// What it was built from, supports apart.
@@ -124,10 +127,18 @@ impl TrackModel {
         self.extensions.iter().map(|extension| extension.profile_m(x_m)).sum()
     }
 
-    /// Height in m, positive downwards, that the first wheel's own shape adds when it has rolled
-    /// from the track's origin to `x_m`.
+    /// Height in m, positive downwards, that the first wheel's own shape adds at `x_m`.
     pub fn wheel_profile_m(&self, x_m: f64) -> f64 {
-        self.extensions.iter().map(|extension| extension.wheel_profile_m(x_m)).sum()
+        let rolled_m = x_m + self.wheel_turned_m;
+        self.extensions.iter().map(|extension| extension.wheel_profile_m(rolled_m)).sum()
+    }
+
+    /// The same with a first wheel that has rolled so many metres more: in every pass it comes to
+    /// the track with another side down.
+    #[must_use]
+    pub fn with_wheel_turned(mut self, rolled_m: f64) -> Self {
+        self.wheel_turned_m += rolled_m;
+        self
     }
 
     /// By what extensions multiply the spectral density of the irregularity at a wave number in

@@ -16,3 +16,9 @@ mod run;
 pub use newmark::pass;
 pub use passes::passes;
 pub use run::{Pass, PassError, PassRecord};
+
+/// Where the contact point of the standing wheel is on a smooth rail, in m.
+#[cfg(test)]
+pub(crate) fn standing(model: &crate::model::TrackModel, pass: &Pass) -> f64 {
+    equilibrium::Equilibrium::new(model, pass, &[0.0]).unwrap().contacts_m[0]
+}

@@ -1,0 +1,74 @@
+//! Extensions on the command line: `--extend` and `--extension`.
+
+use super::super::{OrInput, Stop};
+use anyhow::{Context, anyhow};
+use clap::Args;
+use serde::Deserialize;
+use std::path::PathBuf;
+use tracktwin_track::extension::{ExtensionInstance, KINDS, Kind, KindParameter};
+
+/// Physics beyond the paper's model, and faults of the measuring chain.
+#[derive(Args)]
+pub(in crate::commands) struct Extensions {
+    /// Physics beyond the paper or a fault of the measuring chain; may stand several times:
+    /// `sleeper_bolt:stiffness_N_per_m=3e7`, `hanging_sleeper@SN19-SN20:gap_m=2e-4`,
+    /// `fastening_clamp@SN10-SN30/4:...`, `rail_joint@2.4375m:dip_m=8e-5`,
+    /// `corrugation@2m-3m:...`; `--extend list` shows all with their parameters.
+    #[arg(long = "extend", value_name = "NAME[@PLACE][:PARAMETER=VALUE,...]")]
+    extend: Vec<String>,
+    /// TOML file of `[[extension]]` tables, each with `physics`, `x_m` or `sleepers`, and values;
+    /// may stand several times.
+    #[arg(long = "extension", value_name = "FILE.toml")]
+    files: Vec<PathBuf>,
+}
+
+/// A file of extensions.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    extension: Vec<ExtensionInstance>,
+}
+
+impl Extensions {
+    /// Whether only the list of all kinds is asked for.
+    pub(in crate::commands) fn asks_for_list(&self) -> bool {
+        self.extend.iter().any(|text| text == "list")
+    }
+
+    /// Those of the files, then those of the command line.
+    pub(in crate::commands) fn instances(&self) -> Result<Vec<ExtensionInstance>, Stop> {
+        let mut instances = Vec::new();
+        for path in &self.files {
+            let shown = path.display();
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("--extension: {shown} cannot be read"))
+                .or_input()?;
+            let file: File = toml::from_str(&text)
+                .map_err(|error| anyhow!("--extension: {shown}: {}", error.message()))
+                .or_input()?;
+            instances.extend(file.extension);
+        }
+        for text in &self.extend {
+            let instance = text.parse().map_err(|error| anyhow!("--extend {text}: {error}"));
+            instances.push(instance.or_input()?);
+        }
+        Ok(instances)
+    }
+}
+
+/// All kinds, with what they need.
+pub(in crate::commands) fn list() -> String {
+    let parameter = |parameter: &KindParameter| {
+        let given = match parameter.default {
+            Some(value) => format!("else {value}"),
+            None => format!("needed, such as {:e}", parameter.typical),
+        };
+        format!("\n  {}: {}; {given}", parameter.name, parameter.meaning)
+    };
+    let kind = |kind: &Kind| {
+        let chain = if kind.measuring_chain { " (measuring chain)" } else { "" };
+        let parameters: String = kind.parameters.iter().map(parameter).collect();
+        format!("{}: {}{chain}\n  {}{parameters}", kind.physics, kind.summary, kind.place.form())
+    };
+    KINDS.iter().map(kind).collect::<Vec<_>>().join("\n")
+}

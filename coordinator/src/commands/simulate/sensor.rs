@@ -1,0 +1,137 @@
+//! The measuring chain of a simulated recording: extensions of the chain, noise, steps, odometer.
+
+use super::super::{OrInput, Stop};
+use anyhow::anyhow;
+use clap::Args;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_distr::{Distribution, Normal};
+use std::f64::consts::TAU;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::Pass;
+use tracktwin_track::extension::Measured;
+use tracktwin_track::model::TrackModel;
+use tracktwin_track::time::PassRecord;
+
+/// Wavelengths of the odometer's wander in m.
+const WANDER_M: [f64; 4] = [0.6, 1.1, 2.3, 4.7];
+
+/// Largest wander of the odometer in m: with it, positions still grow.
+const WANDER_MAX_M: f64 = 0.05;
+
+/// How what was felt is recorded.
+#[derive(Args)]
+pub(super) struct Sensor {
+    /// Standard deviation of the sensor's white noise in m/s2.
+    #[arg(long, default_value_t = 0.0, value_name = "M_S2")]
+    noise: f64,
+    /// Steps in which accelerations are recorded, in m/s2; 0 for none.
+    #[arg(long, default_value_t = 0.0, value_name = "M_S2")]
+    resolution: f64,
+    /// By how much the odometer wanders at most, in m.
+    #[arg(long, default_value_t = 0.0, value_name = "M")]
+    odometer: f64,
+}
+
+impl Sensor {
+    /// That noise, steps and wander are what such things can be.
+    pub(super) fn check(&self) -> Result<(), Stop> {
+        let limits = [
+            ("--noise", self.noise, f64::INFINITY),
+            ("--resolution", self.resolution, f64::INFINITY),
+            ("--odometer", self.odometer, WANDER_MAX_M),
+        ];
+        for (flag, value, most) in limits {
+            if !(value.is_finite() && 0.0 <= value && value <= most) {
+                let range = if most.is_finite() { format!("0 to {most}") } else { "0 up".into() };
+                return Err(anyhow!("{flag}: {value} must be a number from {range}")).or_input();
+            }
+        }
+        Ok(())
+    }
+
+    /// What is recorded of a pass from `from_m` on; `seed` fixes noise and wander.
+    pub(super) fn measured(
+        &self,
+        model: &TrackModel,
+        record: &PassRecord,
+        speed_km_h: f64,
+        from_m: f64,
+        seed: u64,
+    ) -> Result<Pass, Stop> {
+        let step_m = record.speed_m_s * record.time_step_s;
+        let count = record.acceleration_m_s2.len();
+        let position = |index: usize| record.start_m + (index + 1) as f64 * step_m;
+        let first = (0..count).find(|&index| position(index) >= from_m).unwrap_or(count);
+        let mut measured = Measured {
+            time_step_s: record.time_step_s,
+            acceleration_m_s2: record.acceleration_m_s2.clone(),
+            position_m: (0..count).map(position).collect(),
+        };
+        model.measure(&mut measured);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut samples = measured.acceleration_m_s2.split_off(first);
+        self.add_noise(&mut samples, &mut random)?;
+        let mut position_m = measured.position_m.split_off(first);
+        self.wander(&mut position_m, &mut random);
+        let signal = Signal::new(sample_rate_hz(record.time_step_s), samples)?;
+        Ok(Pass { file: String::new(), speed_km_h, signal, position_m })
+    }
+
+    fn add_noise(&self, samples: &mut [f64], random: &mut impl Rng) -> Result<(), Stop> {
+        let noise = Normal::new(0.0, self.noise).map_err(|error| anyhow!("--noise: {error}"))?;
+        for sample in samples {
+            *sample += noise.sample(random);
+            if self.resolution > 0.0 {
+                *sample = (*sample / self.resolution).round() * self.resolution;
+            }
+        }
+        Ok(())
+    }
+
+    /// Waves of random phase whose sum never exceeds the limit.
+    fn wander(&self, position_m: &mut [f64], random: &mut impl Rng) {
+        let unit = |bits: u64| (bits >> 11) as f64 / (1_u64 << 53) as f64;
+        let phases = WANDER_M.map(|_| TAU * unit(random.next_u64()));
+        let amplitude_m = self.odometer / WANDER_M.len() as f64;
+        for position in position_m {
+            let waves = WANDER_M.iter().zip(phases);
+            let sum: f64 =
+                waves.map(|(length, phase)| (TAU * *position / length + phase).sin()).sum();
+            *position += amplitude_m * sum;
+        }
+    }
+}
+
+/// Samples a second, to the nanohertz: 1 / 2e-5 s is 50 kHz, not 49999.99999999999 Hz.
+pub(super) fn sample_rate_hz(time_step_s: f64) -> f64 {
+    (1e9 / time_step_s).round() / 1e9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_odometer_wanders_by_no_more_than_it_may_and_never_goes_back() {
+        let sensor = Sensor { noise: 0.0, resolution: 0.0, odometer: WANDER_MAX_M };
+        for seed in 0..20 {
+            let truth: Vec<f64> = (0..3000).map(|index| f64::from(index) * 1e-3).collect();
+            let mut told = truth.clone();
+            sensor.wander(&mut told, &mut ChaCha8Rng::seed_from_u64(seed));
+            assert!(told.is_sorted_by(|a, b| a < b));
+            let most = told.iter().zip(&truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(most <= WANDER_MAX_M && most > 0.1 * WANDER_MAX_M, "{most}");
+        }
+    }
+
+    #[test]
+    fn accelerations_are_recorded_in_steps() {
+        let sensor = Sensor { noise: 0.05, resolution: 0.005, odometer: 0.0 };
+        let mut samples = vec![1.0; 1000];
+        sensor.add_noise(&mut samples, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
+        let steps = samples.iter().map(|sample| sample / 0.005);
+        assert!(steps.clone().all(|step| (step - step.round()).abs() < 1e-6));
+        assert!(steps.clone().any(|step| (step - 200.0).abs() > 5.0));
+    }
+}
