@@ -1,102 +1,118 @@
-use nalgebra::{DMatrix, DVector};
 use std::time::Instant;
-use tracktwin_diagnosis::*;
+use tracktwin_diagnosis::{NullModel, Problem, Subject, first_calibration, search};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 fn main() {
     let path = std::env::args().nth(1).unwrap();
     let recording = Recording::open(&path).unwrap();
     let t = Instant::now();
-    let bands = Bands::new(80.0, 5100.0);
-    let spectra = Spectra::new(&recording, &bands);
-    eprintln!("spectra {:?} bands {}", t.elapsed(), bands.count());
-    let first = recording.sleepers.iter().position(|s| s.id == "SN7").unwrap();
-    let last = recording.sleepers.iter().position(|s| s.id == "SN31").unwrap();
-    let section = Section {
-        design: TrackDesign::v_track(),
-        sleepers: last - first + 1,
-        first_x_m: recording.sleepers[first].x_m,
-    };
-    let speeds: Vec<f64> = spectra.speeds.iter().map(|s| s.speed_km_h).collect();
-    let noise: Vec<f64> = spectra.speeds.iter().map(|s| s.noise_density).collect();
-    eprintln!("noise {noise:?}");
-    let forward = Forward::new(section, bands, &speeds, noise);
-    let nb = forward.bands.count();
-    let mut l = DVector::zeros(forward.count());
-    let mut pv = DVector::zeros(forward.per_sleeper());
-    for (v, s) in spectra.speeds.iter().enumerate() {
-        let n = s.passes.len() as f64;
-        if let Some(var) = s.pass_variance() {
-            for b in 0..nb {
-                pv[v * nb + b] = var[b] / n;
-            }
-        }
-        for j in 0..forward.section.sleepers {
-            let m = s.mean(first + j).unwrap();
-            for b in 0..nb {
-                l[j * forward.per_sleeper() + v * nb + b] = m[b];
-            }
-        }
-    }
-    let t = Instant::now();
-    let start = forward.unknowns.typical();
-    let p = forward.log_power(&start, &[]).unwrap();
-    eprintln!("fd {:?}", t.elapsed());
-    let t = Instant::now();
-    let _ = forward.linearised(&start, &[]).unwrap();
-    eprintln!("lin {:?}", t.elapsed());
-    let _ = p;
-    // rough covariance
-    let cov = DMatrix::from_fn(forward.per_sleeper(), forward.per_sleeper(), |i, j| {
-        if i / nb == j / nb {
-            let d = (i as f64 - j as f64) / 1.5;
-            0.06 * (-0.5 * d * d).exp() + if i == j { 0.01 } else { 0.0 }
-        } else {
-            0.0
-        }
-    });
-    let w = whitening(cov).unwrap();
-    let obs = Observation { log_power: l.clone(), whitening: vec![w; forward.section.sleepers] };
-    let t = Instant::now();
-    let c = calibrate(&forward, &obs, &[], start).unwrap();
-    eprintln!("cal {:?} obj {}", t.elapsed(), c.objective);
-    let name = "/tmp/diag/".to_string() + &recording.name;
-    std::fs::create_dir_all("/tmp/diag").unwrap();
-    let nullfile = format!(
-        "{}.null.json",
-        std::env::args().nth(2).map(|n| format!("/tmp/diag/{n}")).unwrap_or(name.clone())
+    let subject = Subject::new(&recording, &TrackDesign::v_track()).unwrap();
+    let start = first_calibration(&subject).unwrap();
+    eprintln!(
+        "first {:?} sleepers {} from {}",
+        t.elapsed(),
+        subject.forward.section.sleepers,
+        recording.sleepers[subject.first_sleeper].id
     );
-    let null: NullModel = match std::fs::read(&nullfile) {
+    let file = format!(
+        "/tmp/diag/{}.null2.json",
+        std::env::args().nth(2).unwrap_or(recording.name.clone())
+    );
+    let null: NullModel = match std::fs::read(&file) {
         Ok(b) => serde_json::from_slice(&b).unwrap(),
         Err(_) => {
-            let t = Instant::now();
-            let n = NullModel::simulate(&forward, &c.values, 32, 1000, |_| ()).unwrap();
-            eprintln!("null {:?}", t.elapsed());
-            std::fs::write(&nullfile, serde_json::to_vec(&n).unwrap()).unwrap();
+            let n = NullModel::simulate(&subject.forward, &start, 32, 1000, |_| ()).unwrap();
+            std::fs::write(&file, serde_json::to_vec(&n).unwrap()).unwrap();
             n
         }
     };
-    let off = null.offset();
-    let cov = null.covariance(nb, &pv);
-    let sd = cov.diagonal().map(f64::sqrt);
-    let w = whitening(cov).unwrap();
-    let mut lo = l.clone();
-    for j in 0..forward.section.sleepers {
-        for i in 0..forward.per_sleeper() {
-            lo[j * forward.per_sleeper() + i] -= off[i];
+    eprintln!("null {:?}", t.elapsed());
+    let s = search(&subject, &null, start, &[], &|_, _| ()).unwrap();
+    let n = s.baseline.residual.len() as f64;
+    println!(
+        "{} baseline obj {:.0} chi2 {:.2} -> {:.0} chi2 {:.2}; held out per datum {:.3} -> {:.3}",
+        recording.name,
+        s.baseline.objective,
+        s.baseline.residual.norm_squared() / n,
+        s.last.objective,
+        s.last.residual.norm_squared() / n,
+        s.held_out[0],
+        s.held_out[1]
+    );
+    let nb = subject.forward.unknowns.count();
+    for r in &s.rounds {
+        println!(
+            " p={:.2e} accepted {} gains {:?}",
+            r.p_value,
+            r.accepted,
+            r.held_out_gain.iter().map(|g| g.round()).collect::<Vec<_>>()
+        );
+        for f in &r.fitted {
+            let p: Vec<_> = f
+                .calibration
+                .values
+                .rows(f.calibration.values.len() - f.candidate.free.len(), f.candidate.free.len())
+                .iter()
+                .map(|v| v.exp())
+                .collect();
+            println!(
+                "   {:8.1} d'={:5.1} {} {:?} {:?} {:?}",
+                f.log_evidence,
+                f.detectability,
+                f.candidate.kind.physics,
+                f.candidate.extension.sleepers.as_ref().map(|s| s
+                    .iter()
+                    .map(|i| recording.sleepers[i + subject.first_sleeper].id.clone())
+                    .collect::<Vec<_>>()
+                    .join(",")),
+                f.candidate.extension.x_m.map(|x| x[0]),
+                p
+            );
         }
     }
-    let obs = Observation { log_power: lo.clone(), whitening: vec![w; forward.section.sleepers] };
-    let t = Instant::now();
-    let c = calibrate(&forward, &obs, &[], c.values).unwrap();
-    eprintln!(
-        "cal2 {:?} obj {} chi2/n {}",
-        t.elapsed(),
-        c.objective,
-        c.residual.norm_squared() / c.residual.len() as f64
-    );
-    let fit = forward.log_power(&c.values, &[]).unwrap();
-    let out = serde_json::json!({"bands": forward.bands.centres_hz(), "speeds": speeds, "offset": off.as_slice(), "sd": sd.as_slice(), "pv": pv.as_slice(),
-      "residual": (lo - fit).as_slice(), "whitened": c.residual.as_slice(), "values": c.values.as_slice(), "sleepers": forward.section.sleepers, "first": recording.sleepers[first].id});
-    std::fs::write(format!("{name}.json"), serde_json::to_vec(&out).unwrap()).unwrap();
+    let u = &subject.forward.unknowns;
+    for (name, c) in [("before", &s.baseline), ("after", &s.last)] {
+        let g = u.global();
+        println!(
+            "  {name}: EI {:.0} cp {:.0} cb {:.0} kb {:.3e} kp {:.3e}",
+            c.values[g.start].exp(),
+            c.values[g.start + 1].exp(),
+            c.values[g.start + 2].exp(),
+            c.values.rows(0, u.ballast().len()).mean().exp(),
+            c.values.rows(u.railpad().start, u.ballast().len()).mean().exp()
+        );
+    }
+    let _ = nb;
+    if let Some(w) = std::env::args().nth(3) {
+        let j: usize = w.parse().unwrap();
+        let cs = &s.accepted;
+        let obs = &s.observation;
+        for (c, cal) in [(&[][..], &s.baseline), (&cs[..], &s.last)] {
+            let p = Problem { forward: &subject.forward, observation: obs, candidates: c };
+            let d = obs.difference(
+                &subject
+                    .forward
+                    .log_power(&cal.values, &p.extensions(&cal.values).unwrap())
+                    .unwrap(),
+            );
+            let b = subject.forward.bands.count();
+            for jj in j..j + 2 {
+                for v in 0..subject.forward.speeds_m_s.len() {
+                    println!(
+                        "SN{} v{} {:?}",
+                        jj + 7,
+                        v,
+                        (0..b)
+                            .map(|k| (4.343
+                                * d[jj * subject.forward.per_sleeper() + v * b + k]
+                                * 10.0)
+                                .round()
+                                / 10.0)
+                            .collect::<Vec<_>>()
+                    );
+                }
+            }
+        }
+    }
+    eprintln!("total {:?}", t.elapsed());
 }

@@ -1,142 +1,211 @@
-//! The baseline that fits a recording best, with what is known of it afterwards.
+//! The baseline, alone or with extensions, that fits a recording best, and what is known of it.
 
+use crate::candidate::Candidate;
 use crate::forward::{Forward, Linearised};
+use crate::observation::Observation;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
 use std::sync::Arc;
-use tracktwin_track::extension::Extension;
+use tracktwin_track::extension::{Extension, InstanceError};
 use tracktwin_track::model::ModelError;
 
 /// Gauss-Newton steps; five suffice where the track is not far from the catalogue's.
-const STEPS_MAX: usize = 12;
+const STEPS_MAX: usize = 10;
 
 /// Largest change of a logarithm in one step: further the linearisation does not carry.
 const STEP_MAX: f64 = 0.7;
 
 /// The search ends when the objective falls by less, in nats.
-const TOLERANCE: f64 = 0.02;
+const TOLERANCE: f64 = 0.2;
 
-/// Why no baseline is found.
+/// Step of a logarithm by which extensions' parameters are varied for derivatives.
+const VARIATION: f64 = 1e-2;
+
+/// Why no calibration is found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CalibrationError {
     /// Values that the search came to make no track.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// Values that the search came to make no extension.
+    #[error(transparent)]
+    Extension(#[from] InstanceError),
     /// Derivatives are not finite.
     #[error("the track's response is not a number: is a stiffness or a damping out of range?")]
     NotFinite,
 }
 
-/// What was measured and how well it is known, in the order of [`Forward`].
-#[derive(Clone, Debug)]
-pub struct Observation {
-    /// Log powers, less the offset between mean and expected log power.
-    pub log_power: DVector<f64>,
-    /// Inverse Cholesky factor of each sleeper's covariance: whitens its log powers.
-    pub whitening: Vec<DMatrix<f64>>,
+/// What is to be fitted: a baseline with the candidates that are part of the model.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<'a> {
+    /// Predicts.
+    pub forward: &'a Forward,
+    /// What was measured.
+    pub observation: &'a Observation,
+    /// What joins the baseline.
+    pub candidates: &'a [Candidate],
 }
 
-/// A fitted baseline.
+/// A fitted baseline with its extensions.
 #[derive(Clone, Debug)]
 pub struct Calibration {
-    /// The unknowns.
+    /// The baseline's unknowns, then the logarithms of the candidates' free parameters.
     pub values: DVector<f64>,
     /// Whitened residual.
     pub residual: DVector<f64>,
     /// Whitened derivatives.
     pub jacobian: DMatrix<f64>,
-    /// Posterior precision of the unknowns, factored.
+    /// Posterior precision of the values, factored.
     pub precision: Cholesky<f64, Dyn>,
-    /// Sum of squares of residual and prior, halved: the objective in nats.
+    /// Half the sum of squares of residual and prior: minus the log posterior, in nats.
     pub objective: f64,
-}
-
-impl Observation {
-    /// Whitens a vector of log powers.
-    pub fn whiten(&self, log_power: &DVector<f64>) -> DVector<f64> {
-        let size = log_power.len() / self.whitening.len();
-        let mut whitened = DVector::zeros(log_power.len());
-        for (sleeper, whitening) in self.whitening.iter().enumerate() {
-            let part = whitening * log_power.rows(sleeper * size, size);
-            whitened.rows_mut(sleeper * size, size).copy_from(&part);
-        }
-        whitened
-    }
-
-    fn whiten_matrix(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        let size = matrix.nrows() / self.whitening.len();
-        let mut whitened = DMatrix::zeros(matrix.nrows(), matrix.ncols());
-        for (sleeper, whitening) in self.whitening.iter().enumerate() {
-            let part = whitening * matrix.rows(sleeper * size, size);
-            whitened.rows_mut(sleeper * size, size).copy_from(&part);
-        }
-        whitened
-    }
-}
-
-/// Finds the baseline of greatest posterior probability, with extensions that stay as they are.
-///
-/// Gauss-Newton on the whitened log powers with the prior of [`crate::Unknowns`], from `start`;
-/// steps that lead uphill are halved.
-///
-/// # Errors
-/// [`CalibrationError`] when the model breaks down on the way.
-pub fn calibrate(
-    forward: &Forward,
-    observation: &Observation,
-    extensions: &[Arc<dyn Extension>],
-    start: DVector<f64>,
-) -> Result<Calibration, CalibrationError> {
-    let prior = Prior { mean: forward.unknowns.typical(), precision: forward.unknowns.precision() };
-    let mut values = start;
-    let mut state = linearise(forward, observation, extensions, &prior, &values)?;
-    for _ in 0..STEPS_MAX {
-        let gradient =
-            state.jacobian.tr_mul(&state.residual) - &prior.precision * (&values - &prior.mean);
-        let mut step = state.precision.solve(&gradient);
-        let longest = step.amax();
-        if longest > STEP_MAX {
-            step *= STEP_MAX / longest;
-        }
-        let before = state.objective;
-        let mut next = linearise(forward, observation, extensions, &prior, &(&values + &step))?;
-        while next.objective > before && step.amax() > 1e-3 {
-            step *= 0.5;
-            next = linearise(forward, observation, extensions, &prior, &(&values + &step))?;
-        }
-        if next.objective > before {
-            break;
-        }
-        values += step;
-        state = next;
-        if before - state.objective < TOLERANCE {
-            break;
-        }
-    }
-    Ok(state)
+    /// Logarithm of the evidence, up to a constant of the observation alone.
+    pub log_evidence: f64,
 }
 
 struct Prior {
     mean: DVector<f64>,
     precision: DMatrix<f64>,
+    /// Half the logarithm of the precision's determinant.
+    half_log_determinant: f64,
 }
 
-fn linearise(
-    forward: &Forward,
-    observation: &Observation,
-    extensions: &[Arc<dyn Extension>],
-    prior: &Prior,
-    values: &DVector<f64>,
-) -> Result<Calibration, CalibrationError> {
-    let Linearised { log_power, jacobian } = forward.linearised(values, extensions)?;
-    let residual = observation.whiten(&(&observation.log_power - log_power));
-    let jacobian = observation.whiten_matrix(&jacobian);
-    let from_prior = values - &prior.mean;
-    let objective =
-        0.5 * (residual.norm_squared() + from_prior.dot(&(&prior.precision * &from_prior)));
-    let precision = jacobian.tr_mul(&jacobian) + &prior.precision;
-    let precision = Cholesky::new(precision).ok_or(CalibrationError::NotFinite)?;
-    if !objective.is_finite() {
-        return Err(CalibrationError::NotFinite);
+impl Problem<'_> {
+    /// Finds the values of greatest posterior probability, from `start`: the baseline's unknowns,
+    /// followed by the candidates' parameters.
+    ///
+    /// Gauss-Newton on the whitened log powers; steps that lead uphill are halved.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when the model breaks down on the way.
+    pub fn calibrate(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
+        let prior = self.prior();
+        let mut values = start;
+        let mut state = self.linearise(&prior, &values)?;
+        for _ in 0..STEPS_MAX {
+            let gradient =
+                state.jacobian.tr_mul(&state.residual) - &prior.precision * (&values - &prior.mean);
+            let mut step = state.precision.solve(&gradient);
+            let longest = step.amax();
+            if longest > STEP_MAX {
+                step *= STEP_MAX / longest;
+            }
+            let mut objective = self.objective(&prior, &(&values + &step))?;
+            while objective > state.objective && step.amax() > 1e-3 {
+                step *= 0.5;
+                objective = self.objective(&prior, &(&values + &step))?;
+            }
+            let gain = state.objective - objective;
+            if gain <= 0.0 {
+                break;
+            }
+            values += step;
+            state = self.linearise(&prior, &values)?;
+            if gain < TOLERANCE {
+                break;
+            }
+        }
+        Ok(state)
     }
-    Ok(Calibration { values: values.clone(), residual, jacobian, precision, objective })
+
+    /// Values to start from: those of a baseline and a candidate's trial.
+    pub fn start(&self, baseline: &DVector<f64>, trials: &[&[f64]]) -> DVector<f64> {
+        let count = self.forward.unknowns.count();
+        let mut values: Vec<f64> = baseline.rows(0, count).iter().copied().collect();
+        for (candidate, trial) in self.candidates.iter().zip(trials) {
+            values.extend(candidate.logarithms(trial));
+        }
+        DVector::from_vec(values)
+    }
+
+    /// The candidates with the parameters of a calibration.
+    pub fn extensions(
+        &self,
+        values: &DVector<f64>,
+    ) -> Result<Vec<Arc<dyn Extension>>, InstanceError> {
+        let section = &self.forward.section;
+        let mut place = self.forward.unknowns.count();
+        let build = |candidate: &Candidate| {
+            let parameters: Vec<f64> =
+                values.rows(place, candidate.free.len()).iter().map(|value| value.exp()).collect();
+            place += candidate.free.len();
+            let placed = section.in_model(&candidate.with(&parameters));
+            placed.build(&section.design, section.spans())
+        };
+        self.candidates.iter().map(build).collect()
+    }
+
+    fn predict(&self, values: &DVector<f64>) -> Result<DVector<f64>, CalibrationError> {
+        Ok(self.forward.log_power(values, &self.extensions(values)?)?)
+    }
+
+    fn prior(&self) -> Prior {
+        let unknowns = &self.forward.unknowns;
+        let free = self.candidates.iter().flat_map(|candidate| candidate.free.iter());
+        let free: Vec<(f64, f64)> = free.map(|parameter| Candidate::prior(parameter)).collect();
+        let (count, all) = (unknowns.count(), unknowns.count() + free.len());
+        let mut mean = DVector::zeros(all);
+        mean.rows_mut(0, count).copy_from(&unknowns.typical());
+        let mut precision = DMatrix::zeros(all, all);
+        precision.view_mut((0, 0), (count, count)).copy_from(&unknowns.precision());
+        for (index, (middle, deviation)) in free.into_iter().enumerate() {
+            mean[count + index] = middle;
+            precision[(count + index, count + index)] = deviation.powi(-2);
+        }
+        let factor = Cholesky::new(precision.clone()).expect("a prior is positive definite");
+        Prior { mean, precision, half_log_determinant: 0.5 * factor.ln_determinant() }
+    }
+
+    fn objective(&self, prior: &Prior, values: &DVector<f64>) -> Result<f64, CalibrationError> {
+        let residual = self.observation.residual(&self.predict(values)?);
+        let objective = self.observation.fitted(&residual).norm_squared();
+        let from_prior = values - &prior.mean;
+        Ok(0.5 * (objective + from_prior.dot(&(&prior.precision * &from_prior))))
+    }
+
+    /// Whitened residual and derivatives at some values, held-out rows included.
+    pub(crate) fn whitened(
+        &self,
+        values: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DMatrix<f64>), CalibrationError> {
+        let extensions = self.extensions(values)?;
+        let Linearised { log_power, jacobian } = self.forward.linearised(values, &extensions)?;
+        let mut jacobian = jacobian.resize_horizontally(values.len(), 0.0);
+        let columns: Vec<_> = (self.forward.unknowns.count()..values.len())
+            .into_par_iter()
+            .map(|index| {
+                let mut varied = values.clone();
+                varied[index] += VARIATION;
+                Ok((index, (self.predict(&varied)? - &log_power) / VARIATION))
+            })
+            .collect::<Result<_, CalibrationError>>()?;
+        for (index, column) in columns {
+            jacobian.set_column(index, &column);
+        }
+        let residual = self.observation.residual(&log_power);
+        Ok((residual, self.observation.whiten_matrix(&jacobian)))
+    }
+
+    fn linearise(
+        &self,
+        prior: &Prior,
+        values: &DVector<f64>,
+    ) -> Result<Calibration, CalibrationError> {
+        let (residual, jacobian) = self.whitened(values)?;
+        let (residual, jacobian) =
+            (self.observation.fitted(&residual), self.observation.fitted_rows(&jacobian));
+        let from_prior = values - &prior.mean;
+        let objective =
+            0.5 * (residual.norm_squared() + from_prior.dot(&(&prior.precision * &from_prior)));
+        let precision = jacobian.tr_mul(&jacobian) + &prior.precision;
+        let precision = Cholesky::new(precision).ok_or(CalibrationError::NotFinite)?;
+        if !objective.is_finite() {
+            return Err(CalibrationError::NotFinite);
+        }
+        // Laplace: the constants of the prior's and the posterior's Gaussian cancel.
+        let log_evidence =
+            -objective + prior.half_log_determinant - 0.5 * precision.ln_determinant();
+        let values = values.clone();
+        Ok(Calibration { values, residual, jacobian, precision, objective, log_evidence })
+    }
 }

@@ -6,15 +6,17 @@
 
 use crate::bands::Bands;
 use crate::baseline::Unknowns;
+use crate::profile::Profile;
 use crate::section::Section;
+use crate::transfer::Transfer;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tracktwin_track::extension::Extension;
-use tracktwin_track::frequency::{RailReceptances, support_stiffness};
-use tracktwin_track::model::{HertzContact, ModelError, Roughness, TrackModel};
+use tracktwin_track::frequency::seat_stiffness;
+use tracktwin_track::model::{ModelError, Roughness, Support, TrackModel};
 
 /// Relative step by which stiffnesses are varied for derivatives.
 const STEP: f64 = 1e-4;
@@ -35,11 +37,17 @@ pub struct Forward {
     pub unknowns: Unknowns,
     /// One-sided power spectral density in m2/s3 of the sensor's noise at each speed.
     pub noise_density: Vec<f64>,
+    /// Where on the model's track the wheel begins a turn, in m: `[speed][pass]`; empty if nobody
+    /// knows.
+    pub wheel_starts_m: Vec<Vec<f64>>,
     /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
     windows: Vec<Vec<Vec<Vec<(usize, f64)>>>>,
     /// Spectrum of the surface at level one in m2/Hz at each speed and line.
     surface: Vec<Vec<f64>>,
 }
+
+/// Change of the dynamic stiffness at the rail seats: `[line][sleeper of the track]`.
+type Variation = Vec<Vec<Complex64>>;
 
 /// A prediction and its derivatives by the baseline's unknowns.
 pub struct Linearised {
@@ -47,16 +55,6 @@ pub struct Linearised {
     pub log_power: DVector<f64>,
     /// A row for each of them, a column for each unknown.
     pub jacobian: DMatrix<f64>,
-}
-
-/// Irregularity to acceleration, squared, at all lines and nodes.
-struct Transfer {
-    /// `|H|^2` in 1/s4, `[line][node]`.
-    power: Vec<Vec<f64>>,
-    /// `1 / (1/k_H + alpha_r + alpha_w)` in N/m, `[line][node]`.
-    stiffness: Vec<Vec<Complex64>>,
-    /// `alpha_r` from the rail seats, if asked for.
-    from_seats: Vec<Vec<Vec<Complex64>>>,
 }
 
 impl Forward {
@@ -79,7 +77,25 @@ impl Forward {
         let density = |v: f64, hz: f64| Roughness::new(1.0).density(TAU * hz / v) * TAU / v;
         let surface =
             speeds_m_s.iter().map(|&v| lines.iter().map(|&hz| density(v, hz)).collect()).collect();
-        Self { section, bands, speeds_m_s, unknowns, noise_density, windows, surface }
+        let wheel_starts_m = Vec::new();
+        Self {
+            section,
+            bands,
+            speeds_m_s,
+            unknowns,
+            noise_density,
+            wheel_starts_m,
+            windows,
+            surface,
+        }
+    }
+
+    /// The same for a track that ends so many spans beyond the sleepers compared.
+    #[must_use]
+    pub fn with_ends(&self, spans_beyond: usize) -> Self {
+        let section = Section { spans_beyond, ..self.section.clone() };
+        let speeds: Vec<f64> = self.speeds_m_s.iter().map(|speed| 3.6 * speed).collect();
+        Self::new(section, self.bands.clone(), &speeds, self.noise_density.clone())
     }
 
     /// How many log powers there are.
@@ -105,7 +121,8 @@ impl Forward {
         let mut all = DVector::zeros(self.count());
         self.fill(&mut all, |sleeper, speed, band| {
             let power = self.power(&transfer, values, sleeper, speed, band);
-            (power + self.noise(speed, band)).ln()
+            let floor = power + self.noise(speed, band);
+            mean(self.shape_powers(&transfer, sleeper, speed, band), |shape| (floor + shape).ln())
         });
         Ok(all)
     }
@@ -120,7 +137,7 @@ impl Forward {
         extensions: &[Arc<dyn Extension>],
     ) -> Result<Linearised, ModelError> {
         let transfer = self.transfer(values, extensions, true)?;
-        let variations = self.variations(values)?;
+        let variations = self.variations(values, extensions)?;
         let mut log_power = DVector::zeros(self.count());
         let mut jacobian = DMatrix::zeros(self.count(), self.unknowns.count());
         let rows: Vec<_> = (0..self.count())
@@ -155,57 +172,47 @@ impl Forward {
         extensions: &[Arc<dyn Extension>],
         from_seats: bool,
     ) -> Result<Transfer, ModelError> {
-        let design = &self.section.design;
         let supports = self.unknowns.supports(&self.section, values);
-        let model = TrackModel::build(design, &self.section.mesh(), &supports, extensions)?;
-        let lines = self.bands.lines_hz();
-        let receptances = RailReceptances::new(&model, lines, from_seats);
-        let (mass, load) = (design.wheel.mass_kg, design.wheel.load_n);
-        let contact = HertzContact::new(design);
-        // Slope of the Hertzian law at the static load.
-        let hertz = 1.5 * load / contact.approach(load);
-        let stiffness: Vec<Vec<Complex64>> = lines
-            .iter()
-            .zip(&receptances.direct)
-            .map(|(&hz, direct)| {
-                let wheel = -1.0 / (mass * (TAU * hz).powi(2));
-                direct.iter().map(|rail| (1.0 / hertz + wheel + rail).inv()).collect()
-            })
-            .collect();
-        let power = stiffness
-            .iter()
-            .map(|line| line.iter().map(|k| k.norm_sqr() / mass.powi(2)).collect())
-            .collect();
-        Ok(Transfer { power, stiffness, from_seats: receptances.from_seats })
+        let mesh = self.section.mesh();
+        let model = TrackModel::build(&self.section.design, &mesh, &supports, extensions)?;
+        let transfer = Transfer::new(model, self.bands.lines_hz(), from_seats);
+        Ok(transfer.with_wheel(&self.wheel_starts_m))
     }
 
-    /// Derivatives of each compared support's dynamic stiffness by the logarithms of `k_b`, `k_p`,
-    /// `EI_s`, `c_p` and `c_b`: `[sleeper][parameter][line]`.
-    fn variations(&self, values: &DVector<f64>) -> Result<Vec<[Vec<Complex64>; 5]>, ModelError> {
+    /// Derivatives of each sleeper's dynamic stiffness under the rail by the logarithms of `k_b`,
+    /// `k_p`, `EI_s`, `c_p` and `c_b`: `[parameter][line][sleeper of the track]`.
+    ///
+    /// Taken from the model with its extensions, which may stand in series with a support.
+    fn variations(
+        &self,
+        values: &DVector<f64>,
+        extensions: &[Arc<dyn Extension>],
+    ) -> Result<Vec<Variation>, ModelError> {
         let lines = self.bands.lines_hz();
-        let stiffness = |support| {
-            let elements = Section::sleeper_elements();
-            support_stiffness(&self.section.design, elements, &support, lines)
+        let supports = self.unknowns.supports(&self.section, values);
+        let stiffness = |vary: fn(&mut Support)| {
+            let mut varied = supports.clone();
+            varied.iter_mut().for_each(vary);
+            let mesh = self.section.mesh();
+            let model = TrackModel::build(&self.section.design, &mesh, &varied, extensions)?;
+            Ok(seat_stiffness(&model, lines))
         };
-        (0..self.section.sleepers)
-            .into_par_iter()
-            .map(|sleeper| {
-                let support = self.unknowns.support(values, sleeper);
-                let plain = stiffness(support)?;
-                let mut varied = [support; 5];
-                varied[0].ballast_stiffness *= 1.0 + STEP;
-                varied[1].railpad_stiffness *= 1.0 + STEP;
-                varied[2].sleeper_bending_stiffness *= 1.0 + STEP;
-                varied[3].railpad_damping *= 1.0 + STEP;
-                varied[4].ballast_damping *= 1.0 + STEP;
-                let mut derivatives = [const { Vec::new() }; 5];
-                for (derivative, support) in derivatives.iter_mut().zip(varied) {
-                    let changed = stiffness(support)?;
-                    *derivative = changed.iter().zip(&plain).map(|(a, b)| (a - b) / STEP).collect();
-                }
-                Ok(derivatives)
-            })
-            .collect()
+        let plain = stiffness(|_| ())?;
+        let derivative = |vary: fn(&mut Support)| {
+            let mut changed = stiffness(vary)?;
+            for (changed, plain) in changed.iter_mut().flatten().zip(plain.iter().flatten()) {
+                *changed = (*changed - plain) / STEP;
+            }
+            Ok(changed)
+        };
+        let vary: [fn(&mut Support); 5] = [
+            |support| support.ballast_stiffness *= 1.0 + STEP,
+            |support| support.railpad_stiffness *= 1.0 + STEP,
+            |support| support.sleeper_bending_stiffness *= 1.0 + STEP,
+            |support| support.railpad_damping *= 1.0 + STEP,
+            |support| support.ballast_damping *= 1.0 + STEP,
+        ];
+        vary.into_iter().map(derivative).collect()
     }
 
     fn noise(&self, speed: usize, band: usize) -> f64 {
@@ -213,13 +220,55 @@ impl Forward {
         bandwidth * self.noise_density[speed]
     }
 
+    /// Power in m2/s4 that the shapes of rail and wheel add, a value a pass; a single one where all
+    /// passes meet the same.
+    fn shape_powers(
+        &self,
+        transfer: &Transfer,
+        sleeper: usize,
+        speed: usize,
+        band: usize,
+    ) -> Vec<f64> {
+        let wheel = transfer.wheel.get(speed).map_or(&[][..], Vec::as_slice);
+        if transfer.rail.is_none() && wheel.is_empty() {
+            return vec![0.0];
+        }
+        let weights = self.bands.weights(band);
+        let window = &self.windows[speed][sleeper][band];
+        let powers: Vec<_> =
+            weights.iter().map(|&(line, _)| transfer.mean_power(window, line)).collect();
+        let gain = |frequency_hz: f64| {
+            let place = self.bands.line_of(frequency_hz) - weights[0].0 as f64;
+            let place = place.clamp(0.0, (powers.len() - 1) as f64);
+            let left = (place as usize).min(powers.len() - 2);
+            let share = place - left as f64;
+            (powers[left] * (1.0 - share) + powers[left + 1] * share).sqrt()
+        };
+        let power = |profile: &Profile| {
+            let window_m = self.section.window_m(sleeper);
+            let centre_hz = self.bands.centres_hz()[band];
+            profile.power(window_m, self.speeds_m_s[speed], centre_hz, gain)
+        };
+        let rail = transfer.rail.as_ref().map_or(0.0, power);
+        if wheel.is_empty() {
+            return vec![rail];
+        }
+        wheel.iter().map(|wheel| rail + power(wheel)).collect()
+    }
+
     /// Density of the surface at a line, at level one with the baseline's spectrum, times the
     /// line's weight.
-    fn excitation(&self, values: &DVector<f64>, speed: usize, line: usize) -> f64 {
+    fn excitation(
+        &self,
+        transfer: &Transfer,
+        values: &DVector<f64>,
+        speed: usize,
+        line: usize,
+    ) -> f64 {
         let wave_number = TAU * self.bands.lines_hz()[line] / self.speeds_m_s[speed];
         let shares = self.unknowns.spectrum_shares(wave_number);
         let shape: f64 = shares.iter().map(|&(knot, share)| share * values[knot]).sum();
-        self.surface[speed][line] * shape.exp()
+        self.surface[speed][line] * shape.exp() * transfer.roughness_gain(wave_number)
     }
 
     /// Power of the surface's excitation in m2/s4.
@@ -235,7 +284,7 @@ impl Forward {
         let lines = self.bands.weights(band).iter().map(|&(line, weight)| {
             let power = &transfer.power[line];
             let seen: f64 = window.iter().map(|&(node, share)| share * power[node]).sum();
-            weight * self.excitation(values, speed, line) * seen
+            weight * self.excitation(transfer, values, speed, line) * seen
         });
         lines.sum::<f64>() * self.scale(values, sleeper, speed)
     }
@@ -250,7 +299,7 @@ impl Forward {
     fn row(
         &self,
         transfer: &Transfer,
-        variations: &[[Vec<Complex64>; 5]],
+        variations: &[Variation],
         values: &DVector<f64>,
         row: usize,
     ) -> (f64, Vec<(usize, f64)>) {
@@ -263,7 +312,7 @@ impl Forward {
         let mut spectrum = Vec::new();
         let mut power = 0.0;
         for &(line, weight) in self.bands.weights(band) {
-            let weight = scale * weight * self.excitation(values, speed, line);
+            let weight = scale * weight * self.excitation(transfer, values, speed, line);
             let seen: f64 =
                 window.iter().map(|&(node, share)| share * transfer.power[line][node]).sum();
             power += weight * seen;
@@ -271,7 +320,7 @@ impl Forward {
             for (knot, share) in unknowns.spectrum_shares(wave_number) {
                 spectrum.push((knot, share * weight * seen));
             }
-            for (sums, &(in_track, compared)) in supports.iter_mut().zip(&near) {
+            for (sums, &(in_track, _)) in supports.iter_mut().zip(&near) {
                 // d alpha = -alpha_seat^2 dZ, d |H|^2 = -2 |H|^2 Re(k d alpha).
                 let column = &transfer.from_seats[line][in_track];
                 let felt: Complex64 = window
@@ -281,12 +330,16 @@ impl Forward {
                         2.0 * power * transfer.stiffness[line][node] * column[node] * column[node]
                     })
                     .sum();
-                for (sum, variation) in sums.iter_mut().zip(&variations[compared]) {
-                    *sum += weight * (felt * variation[line]).re;
+                for (sum, variation) in sums.iter_mut().zip(variations) {
+                    *sum += weight * (felt * variation[line][in_track]).re;
                 }
             }
         }
-        let total = power + self.noise(speed, band);
+        let floor = power + self.noise(speed, band);
+        let shapes = self.shape_powers(transfer, sleeper, speed, band);
+        let log_power = mean(shapes.clone(), |shape| (floor + shape).ln());
+        // What a change of the random power is divided by.
+        let total = 1.0 / mean(shapes, |shape| (floor + shape).recip());
         let mut derivatives: Vec<_> =
             spectrum.into_iter().map(|(knot, sum)| (knot, sum / total)).collect();
         derivatives.push((unknowns.level().start + sleeper, power / total));
@@ -302,17 +355,23 @@ impl Forward {
             ];
             derivatives.extend(columns.into_iter().zip(sums.iter().map(|sum| sum / total)));
         }
-        (total.ln(), derivatives)
+        (log_power, derivatives)
     }
 
     /// Sleepers of the track near a compared one: number in the track, and the compared one whose
     /// values it has.
     fn near(&self, sleeper: usize) -> Vec<(usize, usize)> {
-        let middle = Section::in_track(sleeper);
+        let middle = self.section.in_track(sleeper);
         self.section
             .compared()
             .enumerate()
             .filter(|(in_track, _)| in_track.abs_diff(middle) <= NEIGHBOURS)
             .collect()
     }
+}
+
+/// Mean of a function over some values.
+fn mean(values: Vec<f64>, function: impl Fn(f64) -> f64) -> f64 {
+    let count = values.len() as f64;
+    values.into_iter().map(function).sum::<f64>() / count
 }

@@ -8,22 +8,40 @@ mod along;
 mod bands;
 mod baseline;
 mod calibration;
+mod candidate;
 pub mod chain;
 mod finding;
 mod first_look;
 mod forward;
+mod held_out;
 pub mod impact;
 mod null_model;
+mod observation;
+mod outcome;
+mod profile;
+mod screen;
+mod search;
 mod section;
 mod spectra;
+mod subject;
+mod transfer;
 pub mod wheel;
 
 pub use bands::Bands;
 pub use baseline::Unknowns;
-pub use calibration::{Calibration, CalibrationError, Observation, calibrate};
+pub use calibration::{Calibration, CalibrationError, Problem};
+pub use candidate::{Candidate, candidates};
 pub use finding::{Finding, Place};
 pub use first_look::{FALSE_ALARMS, FirstLook, first_look};
 pub use forward::{Forward, Linearised};
-pub use null_model::{NullError, NullModel, whitening};
+pub use null_model::{NullError, NullModel};
+pub use observation::Observation;
+pub use outcome::{
+    BeforeAfter, Diagnosis, Estimate, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score,
+    Scores, SleeperValues, Verdict,
+};
+pub use screen::{Template, templates};
+pub use search::{Fitted, Round, Search, Stage, first_calibration, search};
 pub use section::Section;
 pub use spectra::{Spectra, SpeedSpectra};
+pub use subject::{Subject, SubjectError};

@@ -7,7 +7,7 @@
 use crate::forward::Forward;
 use crate::section::Section;
 use crate::spectra::log_powers;
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -26,10 +26,10 @@ const AT_A_TIME: u64 = 8;
 
 /// How far the covariance is drawn towards its diagonal: the sample is many, but not many times,
 /// the number of log powers.
-const SHRINKAGE: f64 = 0.05;
+const SHRINKAGE: f64 = 0.03;
 
-/// Standard deviation in nats of what the prediction itself is wrong by: a third of a decibel.
-const PREDICTION_ERROR: f64 = 0.04;
+/// Standard deviation in nats of what the prediction itself is wrong by: a tenth of a decibel.
+const PREDICTION_ERROR: f64 = 0.025;
 
 /// Bands over which the prediction's error hangs together.
 const PREDICTION_LENGTH: f64 = 1.5;
@@ -133,15 +133,6 @@ impl NullModel {
     fn parts(&self) -> impl Iterator<Item = &[f64]> {
         self.differences.iter().flat_map(|row| row.chunks_exact(self.per_sleeper))
     }
-}
-
-/// Inverse of the Cholesky factor: whitens vectors of that covariance.
-///
-/// None if the matrix is no covariance.
-pub fn whitening(covariance: DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let size = covariance.nrows();
-    let factor = Cholesky::new(covariance)?;
-    factor.l().solve_lower_triangular(&DMatrix::identity(size, size))
 }
 
 /// Why there is no null model.

@@ -2,12 +2,13 @@
 
 use crate::bands::{Bands, CENTRE_RAD};
 use std::f64::consts::{SQRT_2, TAU};
+use std::ops::Range;
 use tracktwin_parameters::TrackDesign;
+use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::model::Mesh;
 
-/// Spans modelled beyond the first and last sleeper compared, so that the track's ends are not
-/// heard there.
-const SPANS_BEYOND: usize = 10;
+/// Spans modelled beyond the first and last sleeper compared.
+const SPANS_BEYOND: usize = 16;
 
 /// Elements of the rail in a span and of a half sleeper (docs/accuracy.md).
 const ELEMENTS: usize = 8;
@@ -24,9 +25,17 @@ pub struct Section {
     pub sleepers: usize,
     /// Place of the first of them on the recording's scale in m.
     pub first_x_m: f64,
+    /// Spans modelled beyond the first and the last of them. Nobody knows how the track goes on;
+    /// the further away its ends, the less they matter.
+    pub spans_beyond: usize,
 }
 
 impl Section {
+    /// A section of so many sleepers with the usual length of track around it.
+    pub const fn new(design: TrackDesign, sleepers: usize, first_x_m: f64) -> Self {
+        Self { design, sleepers, first_x_m, spans_beyond: SPANS_BEYOND }
+    }
+
     /// Mesh of the whole track: the sleepers compared and what lies beyond them.
     pub fn mesh(&self) -> Mesh {
         Mesh::uniform(self.spans(), ELEMENTS, ELEMENTS)
@@ -34,32 +43,52 @@ impl Section {
 
     /// Spans of the whole track.
     pub fn spans(&self) -> usize {
-        self.sleepers - 1 + 2 * SPANS_BEYOND
-    }
-
-    /// Elements of a half sleeper.
-    pub const fn sleeper_elements() -> usize {
-        ELEMENTS
+        self.sleepers - 1 + 2 * self.spans_beyond
     }
 
     /// For each sleeper of the whole track the compared one whose values it has: itself, or the
     /// first or last.
     pub fn compared(&self) -> impl Iterator<Item = usize> + '_ {
-        (1..self.spans()).map(|sleeper| sleeper.clamp(SPANS_BEYOND, self.last()) - SPANS_BEYOND)
+        (1..self.spans())
+            .map(|sleeper| sleeper.clamp(self.spans_beyond, self.last()) - self.spans_beyond)
     }
 
     /// Number in the whole track (from 0) of a compared sleeper.
-    pub const fn in_track(sleeper: usize) -> usize {
-        SPANS_BEYOND + sleeper - 1
+    pub const fn in_track(&self, sleeper: usize) -> usize {
+        self.spans_beyond + sleeper - 1
     }
 
     const fn last(&self) -> usize {
-        SPANS_BEYOND + self.sleepers - 1
+        self.spans_beyond + self.sleepers - 1
     }
 
     /// Place on the model's track of a place on the recording's scale, both in m.
     pub fn model_x_m(&self, x_m: f64) -> f64 {
-        x_m - self.first_x_m + SPANS_BEYOND as f64 * self.design.sleeper.spacing_m
+        x_m - self.first_x_m + self.spans_beyond as f64 * self.design.sleeper.spacing_m
+    }
+
+    /// Place in the middle of a compared sleeper's window on the recording's scale, in m.
+    pub fn x_m(&self, sleeper: usize) -> f64 {
+        self.first_x_m + sleeper as f64 * self.design.sleeper.spacing_m
+    }
+
+    /// Ends of a compared sleeper's window on the model's track in m.
+    pub fn window_m(&self, sleeper: usize) -> Range<f64> {
+        let (middle_m, half_m) =
+            (self.model_x_m(self.x_m(sleeper)), 0.5 * self.design.sleeper.spacing_m);
+        middle_m - half_m..middle_m + half_m
+    }
+
+    /// An extension given in terms of the recording (compared sleepers, places on its scale) in
+    /// terms of the model's track.
+    pub fn in_model(&self, extension: &ExtensionInstance) -> ExtensionInstance {
+        let mut placed = extension.clone();
+        placed.x_m = extension.x_m.map(|ends| ends.map(|x_m| self.model_x_m(x_m)));
+        placed.sleepers = extension
+            .sleepers
+            .as_ref()
+            .map(|numbers| numbers.iter().map(|&number| self.in_track(number)).collect());
+        placed
     }
 
     /// Rail nodes that a sleeper's window sees at a speed in a band, with weights that sum to one.
@@ -70,7 +99,7 @@ impl Section {
         let spacing_m = self.design.sleeper.spacing_m;
         let blur_m = speed_m_s * CENTRE_RAD / (TAU * centre_hz * SQRT_2);
         let node_m = spacing_m / ELEMENTS as f64;
-        let middle = (SPANS_BEYOND + sleeper) * ELEMENTS;
+        let middle = (self.spans_beyond + sleeper) * ELEMENTS;
         let reach = ((0.5 * spacing_m + BLUR_REACH * blur_m) / node_m).ceil() as usize;
         let reach = reach.min(middle);
         let step = |distance_m: f64| 0.5 * libm::erf(distance_m / (SQRT_2 * blur_m));

@@ -8,5 +8,5 @@ mod rail;
 mod receptance;
 
 pub use peaks::{Peak, peaks};
-pub use rail::{RailReceptances, support_stiffness};
+pub use rail::{RailReceptances, seat_stiffness};
 pub use receptance::{FrequencyError, Place, receptance};

@@ -1,0 +1,184 @@
+//! What may be left out, where and how strong: the list that a recording is screened with.
+
+use crate::section::Section;
+use tracktwin_track::extension::{ExtensionInstance, KINDS, Kind, KindParameter};
+
+/// Of a parameter that may be zero, the least part of its greatest value that counts.
+const LEAST: f64 = 1e-2;
+
+/// A piece of physics at a place, in terms of the recording, with the parameters to be found.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// What it is.
+    pub kind: &'static Kind,
+    /// The physics with its place; compared sleepers count from 0, places are the recording's.
+    pub extension: ExtensionInstance,
+    /// Parameters to be fitted, inside their ranges.
+    pub free: Vec<&'static KindParameter>,
+    /// Values of the free parameters that screening tries.
+    pub trials: Vec<Vec<f64>>,
+}
+
+impl Candidate {
+    /// The extension with values for the free parameters.
+    pub fn with(&self, values: &[f64]) -> ExtensionInstance {
+        let pairs = self.free.iter().zip(values);
+        pairs.fold(self.extension.clone(), |extension, (parameter, &value)| {
+            extension.with(parameter.name, value)
+        })
+    }
+
+    /// Logarithms of values of the free parameters; of none a hundredth of what is usual.
+    pub fn logarithms(&self, values: &[f64]) -> Vec<f64> {
+        let logarithm = |(parameter, &value): (&&KindParameter, &f64)| {
+            value.max(LEAST * parameter.v_track[1]).ln()
+        };
+        self.free.iter().zip(values).map(logarithm).collect()
+    }
+
+    /// Middle and standard deviation of a parameter's logarithm before anything is measured: its
+    /// range holds two deviations.
+    pub fn prior(parameter: &KindParameter) -> (f64, f64) {
+        let [low, high] = parameter.v_track;
+        let (low, high) = (low.max(LEAST * high).ln(), high.ln());
+        (0.5 * (low + high), 0.5 * (high - low) + 0.1)
+    }
+}
+
+/// Every candidate for a section: each kind at each place it may have.
+pub fn candidates(section: &Section) -> Vec<Candidate> {
+    let mut all = Vec::new();
+    for kind in KINDS {
+        for (extension, free, trials) in families(kind, section) {
+            let free = free.iter().map(|name| parameter(kind, name)).collect();
+            all.push(Candidate { kind, extension, free, trials });
+        }
+    }
+    all
+}
+
+type Family = (ExtensionInstance, &'static [&'static str], Vec<Vec<f64>>);
+
+fn parameter(kind: &'static Kind, name: &str) -> &'static KindParameter {
+    let found = kind.parameters.iter().find(|parameter| parameter.name == name);
+    found.expect("candidates name parameters of the registry")
+}
+
+/// Places and trial values of a kind.
+fn families(kind: &'static Kind, section: &Section) -> Vec<Family> {
+    let new = || ExtensionInstance::new(kind.physics);
+    let sleepers = 0..section.sleepers;
+    let on_each = |free: &'static [&'static str], trials: &[&[f64]]| -> Vec<Family> {
+        let trials = grid(trials);
+        sleepers.clone().map(|sleeper| (new().on([sleeper]), free, trials.clone())).collect()
+    };
+    let everywhere = |free: &'static [&'static str], trials: &[&[f64]]| -> Vec<Family> {
+        vec![(new(), free, grid(trials))]
+    };
+    match kind.physics {
+        "rail_joint" => at_points(
+            section,
+            new,
+            &["bending_factor", "dip_m", "length_m"],
+            &[
+                vec![0.15, 0.0, 1.5e-2],
+                vec![0.4, 0.0, 1.5e-2],
+                vec![1.0, 6e-5, 1.5e-2],
+                vec![0.3, 6e-5, 1.5e-2],
+            ],
+        ),
+        "squat" => at_points(
+            section,
+            new,
+            &["depth_m", "length_m"],
+            &[vec![2e-5, 3e-3], vec![2e-5, 6e-3], vec![2e-5, 1e-2]],
+        ),
+        "missing_railpad" => on_each(&["stiffness_N_per_m"], &[&[5e6, 1.5e7]]),
+        "sleeper_bolt" => {
+            let mut all = on_each(&["stiffness_N_per_m"], &[&[1e7, 3e7]]);
+            all.extend(everywhere(&["stiffness_N_per_m"], &[&[5e6, 1e7, 2e7, 4e7]]));
+            all
+        }
+        "hanging_sleeper" => {
+            let mut all = on_each(&[], &[]);
+            let pairs = 0..section.sleepers - 1;
+            all.extend(pairs.map(|first| (new().on([first, first + 1]), &[][..], grid(&[]))));
+            all.iter_mut().for_each(|(extension, _, _)| {
+                *extension = extension.clone().with("gap_m", 2e-4);
+            });
+            all
+        }
+        "subgrade_layer" => {
+            let free: &[&str] = &["mass_kg", "stiffness_N_per_m", "damping_N_s_per_m"];
+            let mut all = on_each(free, &[&[0.5, 2.0], &[1.5e7, 5e7], &[1e3]]);
+            all.extend(everywhere(free, &[&[0.5, 1.5, 4.0], &[1.5e7, 3e7, 6e7, 1e8], &[5e2, 2e3]]));
+            all
+        }
+        "fastening_clamp" => clamps(section, new),
+        "flexible_axle_box" => everywhere(
+            &["mass_kg", "stiffness_N_per_m"],
+            &[&[2.0, 6.0, 15.0], &[5e7, 1e8, 2e8, 4e8, 8e8]],
+        ),
+        "frequency_dependent_railpad" => everywhere(
+            &["stiffness_ratio", "relaxation_time_s"],
+            &[&[0.5, 1.5, 3.0], &[3e-5, 1e-4, 3e-4, 1e-3]],
+        ),
+        "rail_cross_section" => everywhere(
+            &["frequency_Hz", "stiffness_N_per_m"],
+            &[&[6e3, 8e3, 1.1e4], &[5e8, 1e9, 2e9]],
+        ),
+        "second_wheel" => everywhere(
+            &["distance_m"],
+            &[&[0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.7, 0.8, 1.0]],
+        ),
+        "sensor_mount_resonance" => everywhere(
+            &["frequency_Hz", "damping_ratio"],
+            &[
+                &[
+                    1.2e3, 1.4e3, 1.7e3, 2e3, 2.3e3, 2.6e3, 2.9e3, 3.2e3, 3.6e3, 4e3, 4.5e3, 5e3,
+                    6e3, 7e3, 9e3,
+                ],
+                &[0.02, 0.05, 0.15],
+            ],
+        ),
+        _ => Vec::new(),
+    }
+}
+
+/// At every sleeper and every middle of a span.
+fn at_points(
+    section: &Section,
+    new: impl Fn() -> ExtensionInstance,
+    free: &'static [&'static str],
+    trials: &[Vec<f64>],
+) -> Vec<Family> {
+    let half_span_m = 0.5 * section.design.sleeper.spacing_m;
+    (0..2 * section.sleepers - 1)
+        .map(|half| {
+            let x_m = section.first_x_m + half as f64 * half_span_m;
+            (new().at([x_m, x_m]), free, trials.to_vec())
+        })
+        .collect()
+}
+
+/// On every second to fifth sleeper.
+fn clamps(section: &Section, new: impl Fn() -> ExtensionInstance) -> Vec<Family> {
+    let free: &[&str] = &["vertical_N_per_m", "rotational_N_m_per_rad"];
+    let trials = grid(&[&[3e7, 1.5e8], &[3e4, 3e5]]);
+    let patterns = (2..=5).flat_map(|every| (0..every).map(move |first| (every, first)));
+    patterns
+        .map(|(every, first)| {
+            let sleepers = (first..section.sleepers).step_by(every);
+            (new().on(sleepers), free, trials.clone())
+        })
+        .collect()
+}
+
+/// All combinations of one value from each list.
+fn grid(lists: &[&[f64]]) -> Vec<Vec<f64>> {
+    lists.iter().fold(vec![Vec::new()], |all, list| {
+        all.iter()
+            .flat_map(|head| list.iter().map(|&value| [&head[..], &[value]].concat()))
+            .collect()
+    })
+}

@@ -1,0 +1,103 @@
+//! What was measured, and how well it is known.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Log powers over the compared sleepers with their covariance, in the order of
+/// [`crate::Forward`]; some of them may be held out from fitting.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// Log powers, less the offset between mean and expected log power.
+    log_power: DVector<f64>,
+    /// Order in which a sleeper's log powers are whitened: those fitted first.
+    order: Vec<usize>,
+    /// How many of a sleeper's log powers are fitted.
+    fitted: usize,
+    /// Inverse Cholesky factor of each sleeper's covariance, in that order.
+    whitening: Vec<DMatrix<f64>>,
+}
+
+impl Observation {
+    /// Log powers with the covariance of each sleeper's; rows for which `held_out` is true are not
+    /// fitted. None if a covariance is none.
+    pub fn new(
+        log_power: DVector<f64>,
+        covariances: &[DMatrix<f64>],
+        held_out: impl Fn(usize) -> bool,
+    ) -> Option<Self> {
+        let size = log_power.len() / covariances.len();
+        let (last, first): (Vec<usize>, Vec<usize>) = (0..size).partition(|&row| held_out(row));
+        let fitted = first.len();
+        let order = [first, last].concat();
+        let whitening = covariances.iter().map(|covariance| {
+            let ordered = DMatrix::from_fn(size, size, |i, j| covariance[(order[i], order[j])]);
+            let factor = nalgebra::Cholesky::new(ordered)?;
+            factor.l().solve_lower_triangular(&DMatrix::identity(size, size))
+        });
+        let whitening = whitening.collect::<Option<_>>()?;
+        Some(Self { log_power, order, fitted, whitening })
+    }
+
+    /// Measured less predicted log powers.
+    pub fn difference(&self, predicted: &DVector<f64>) -> DVector<f64> {
+        &self.log_power - predicted
+    }
+
+    /// The whitened difference: of those held out, what the fitted ones do not tell.
+    pub fn residual(&self, predicted: &DVector<f64>) -> DVector<f64> {
+        self.whiten(&self.difference(predicted))
+    }
+
+    /// Whitens a vector in the order of [`crate::Forward`].
+    pub fn whiten(&self, vector: &DVector<f64>) -> DVector<f64> {
+        let matrix = DMatrix::from_column_slice(vector.len(), 1, vector.as_slice());
+        self.whiten_matrix(&matrix).column(0).into_owned()
+    }
+
+    /// Whitens every column of a matrix.
+    pub fn whiten_matrix(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let size = self.order.len();
+        let mut whitened = DMatrix::zeros(matrix.nrows(), matrix.ncols());
+        for (sleeper, whitening) in self.whitening.iter().enumerate() {
+            let rows: Vec<usize> = self.order.iter().map(|row| sleeper * size + row).collect();
+            let part = whitening * matrix.select_rows(&rows);
+            whitened.rows_mut(sleeper * size, size).copy_from(&part);
+        }
+        whitened
+    }
+
+    /// The fitted part of a whitened vector.
+    pub fn fitted(&self, whitened: &DVector<f64>) -> DVector<f64> {
+        whitened.select_rows(&self.rows(true))
+    }
+
+    /// The fitted rows of a whitened matrix.
+    pub fn fitted_rows(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
+        whitened.select_rows(&self.rows(true))
+    }
+
+    /// The part of a whitened vector that was held out.
+    pub fn held_out(&self, whitened: &DVector<f64>) -> DVector<f64> {
+        whitened.select_rows(&self.rows(false))
+    }
+
+    /// The rows of a whitened matrix that were held out.
+    pub fn held_out_rows(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
+        whitened.select_rows(&self.rows(false))
+    }
+
+    /// Sum over what was held out of the logarithms of its conditional standard deviations.
+    pub fn held_out_log_deviation(&self) -> f64 {
+        let of = |whitening: &DMatrix<f64>| -> f64 {
+            (self.fitted..self.order.len()).map(|row| -whitening[(row, row)].ln()).sum()
+        };
+        self.whitening.iter().map(of).sum()
+    }
+
+    fn rows(&self, fitted: bool) -> Vec<usize> {
+        let size = self.order.len();
+        let part = if fitted { 0..self.fitted } else { self.fitted..size };
+        (0..self.whitening.len())
+            .flat_map(|sleeper| part.clone().map(move |row| sleeper * size + row))
+            .collect()
+    }
+}

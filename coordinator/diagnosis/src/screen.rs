@@ -1,0 +1,79 @@
+//! A filter for every candidate: how much better the recording is understood with it.
+
+use crate::calibration::{Calibration, CalibrationError, Problem};
+use crate::candidate::Candidate;
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+/// Prior deviation of an effect's strength about each trial value.
+const STRENGTH_DEVIATION: f64 = 0.3;
+
+/// The trace of a candidate with certain values, as far as the baseline cannot imitate it.
+#[derive(Clone, Debug)]
+pub struct Template {
+    /// Number of the candidate.
+    pub candidate: usize,
+    /// Number of the trial.
+    pub trial: usize,
+    /// Whitened change of the log powers.
+    pub change: DVector<f64>,
+    /// The baseline's part in it: what it is multiplied with for a residual's projection.
+    pub imitation: DVector<f64>,
+    /// Square of its length, after the baseline has taken what it can: `d'^2`.
+    pub detectability: f64,
+}
+
+/// Works out the traces of all candidates and trials on a calibrated track.
+///
+/// # Errors
+/// [`CalibrationError`] when the calibrated track makes no model. A trial that makes none is left
+/// out.
+pub fn templates(
+    problem: &Problem<'_>,
+    calibration: &Calibration,
+    candidates: &[Candidate],
+    progress: impl Fn() + Sync,
+) -> Result<Vec<Template>, CalibrationError> {
+    let Problem { forward, observation, .. } = *problem;
+    let accepted = problem.extensions(&calibration.values)?;
+    let plain = forward.log_power(&calibration.values, &accepted)?;
+    let trials: Vec<(usize, usize)> = candidates
+        .iter()
+        .enumerate()
+        .flat_map(|(number, candidate)| (0..candidate.trials.len()).map(move |t| (number, t)))
+        .collect();
+    let templates = trials
+        .into_par_iter()
+        .filter_map(|(number, trial)| {
+            let candidate = &candidates[number];
+            let extension = candidate.with(&candidate.trials[trial]);
+            let section = &forward.section;
+            let built = section.in_model(&extension).build(&section.design, section.spans());
+            progress();
+            let extensions = [&accepted[..], &[built.ok()?]].concat();
+            let changed = forward.log_power(&calibration.values, &extensions).ok()?;
+            let change = observation.fitted(&observation.whiten(&(changed - &plain)));
+            let felt = calibration.jacobian.tr_mul(&change);
+            let imitation = calibration.precision.solve(&felt);
+            let detectability = change.norm_squared() - felt.dot(&imitation);
+            Some(Template { candidate: number, trial, change, imitation, detectability })
+        })
+        .collect();
+    Ok(templates)
+}
+
+impl Template {
+    /// Logarithm of the evidence for the effect in a whitened residual, against the baseline alone:
+    /// with strength `N(1, 0.3^2)` times the trial's (mismatch design, eq. 8).
+    ///
+    /// `felt` is the residual's product with the baseline's derivatives, zero for the residual of
+    /// a calibration (up to its prior).
+    pub fn log_evidence(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> f64 {
+        let along = self.change.dot(residual) - self.imitation.dot(felt);
+        let square = self.detectability;
+        let variance = STRENGTH_DEVIATION.powi(2);
+        let spread = 1.0 + variance * square;
+        along - 0.5 * square + 0.5 * variance * (along - square).powi(2) / spread
+            - 0.5 * spread.ln()
+    }
+}

@@ -1,0 +1,167 @@
+//! A recording made ready for diagnosis, or the reason why it can't be.
+
+use crate::bands::Bands;
+use crate::forward::Forward;
+use crate::null_model::NullModel;
+use crate::section::Section;
+use crate::spectra::Spectra;
+use nalgebra::{DMatrix, DVector};
+use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::recording::Recording;
+use tracktwin_track::model::ModelError;
+
+/// Bands compared in Hz, as far as the sample rate lets them: below, a window holds hardly a
+/// wavelet; above, hardly any irregularity.
+const BANDS_HZ: [f64; 2] = [80.0, 5100.0];
+
+/// Highest band as a part of the sample rate.
+const SAMPLE_RATE_SHARE: f64 = 0.35;
+
+/// Least number of bands from which physics can be told.
+const BANDS_MIN: usize = 12;
+
+/// Least number of neighbouring sleepers that all passes cover.
+const SLEEPERS_MIN: usize = 6;
+
+/// Part of a spacing that a pass must cover beyond a sleeper's window, where low bands reach.
+const MARGIN_SPANS: f64 = 0.6;
+
+/// Distances in spans at which the track may end, for what its unknown ends change.
+const ENDS_SPANS: [usize; 6] = [7, 8, 9, 10, 11, 13];
+
+/// Why a recording cannot be diagnosed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SubjectError {
+    /// Too few sleepers.
+    #[error(
+        "passes: only {sleepers} neighbouring sleepers lie inside every pass with a margin of \
+         {margin_m:.2} m; a diagnosis needs {SLEEPERS_MIN} or more: record a longer stretch"
+    )]
+    TooShort {
+        /// Sleepers inside every pass.
+        sleepers: usize,
+        /// Margin in m.
+        margin_m: f64,
+    },
+    /// Too low a sample rate.
+    #[error(
+        "sample_rate_Hz: {0} is too low: nothing above {high:.0} Hz can be compared with a model \
+         of this track", high = SAMPLE_RATE_SHARE * .0
+    )]
+    SampleRate(f64),
+}
+
+/// A recording in the terms of the forward model.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// Predicts it.
+    pub forward: Forward,
+    /// Its log powers in the order of [`Forward`], means over the passes of a speed.
+    pub log_power: DVector<f64>,
+    /// Variance of these means by what passes of one speed do not share, a value a speed and band.
+    pub pass_variance: DVector<f64>,
+    /// Number in the recording of the first sleeper compared.
+    pub first_sleeper: usize,
+    /// Passes at each speed.
+    pub passes: Vec<usize>,
+}
+
+impl Subject {
+    /// Takes from a recording what is compared.
+    ///
+    /// # Errors
+    /// [`SubjectError`] says what is missing.
+    pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, SubjectError> {
+        let highest_hz = BANDS_HZ[1].min(SAMPLE_RATE_SHARE * recording.sample_rate_hz);
+        let bands = Bands::new(BANDS_HZ[0], highest_hz.max(BANDS_HZ[0]));
+        if bands.count() < BANDS_MIN {
+            return Err(SubjectError::SampleRate(recording.sample_rate_hz));
+        }
+        let sleepers = covered(recording);
+        if sleepers.len() < SLEEPERS_MIN {
+            let margin_m = MARGIN_SPANS * recording.spacing_m;
+            return Err(SubjectError::TooShort { sleepers: sleepers.len(), margin_m });
+        }
+        let spectra = Spectra::new(recording, &bands);
+        let first_x_m = recording.sleepers[sleepers.start].x_m;
+        let section = Section::new(design.clone(), sleepers.len(), first_x_m);
+        let speeds: Vec<f64> = spectra.speeds.iter().map(|speed| speed.speed_km_h).collect();
+        let noise = spectra.speeds.iter().map(|speed| speed.noise_density).collect();
+        let forward = Forward::new(section, bands, &speeds, noise);
+        let log_power = log_power(&forward, &spectra, sleepers.start);
+        let pass_variance = pass_variance(&forward, &spectra);
+        let passes = spectra.speeds.iter().map(|speed| speed.passes.len()).collect();
+        Ok(Self { forward, log_power, pass_variance, first_sleeper: sleepers.start, passes })
+    }
+
+    /// Covariance of each sleeper's log powers: the null model's, what the passes do not share, and
+    /// what the unknown ends of the track change.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the values make no track.
+    pub fn covariances(
+        &self,
+        null: &NullModel,
+        values: &DVector<f64>,
+    ) -> Result<Vec<DMatrix<f64>>, ModelError> {
+        let common = null.covariance(self.forward.bands.count(), &self.pass_variance);
+        let mut all = vec![common; self.forward.section.sleepers];
+        let plain = self.forward.log_power(values, &[])?;
+        let size = self.forward.per_sleeper();
+        for spans in ENDS_SPANS {
+            let changed = self.forward.with_ends(spans).log_power(values, &[])? - &plain;
+            for (sleeper, covariance) in all.iter_mut().enumerate() {
+                let part = changed.rows(sleeper * size, size).into_owned();
+                covariance.ger(1.0 / ENDS_SPANS.len() as f64, &part, &part, 1.0);
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// The longest run of neighbouring sleepers that every pass covers with a margin.
+fn covered(recording: &Recording) -> std::ops::Range<usize> {
+    let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
+    let inside = |x_m: f64| {
+        recording.passes.iter().all(|pass| {
+            let (first, last) = (pass.position_m[0], pass.position_m[pass.position_m.len() - 1]);
+            first <= x_m - reach_m && x_m + reach_m <= last
+        })
+    };
+    let mut longest = 0..0;
+    let mut start = 0;
+    for (number, sleeper) in recording.sleepers.iter().enumerate() {
+        if !inside(sleeper.x_m) {
+            start = number + 1;
+        } else if number + 1 - start > longest.len() {
+            longest = start..number + 1;
+        }
+    }
+    longest
+}
+
+fn log_power(forward: &Forward, spectra: &Spectra, first: usize) -> DVector<f64> {
+    let mut all = DVector::zeros(forward.count());
+    for sleeper in 0..forward.section.sleepers {
+        for (number, speed) in spectra.speeds.iter().enumerate() {
+            let Some(mean) = speed.mean(first + sleeper) else { continue };
+            let row = sleeper * forward.per_sleeper() + number * forward.bands.count();
+            all.rows_mut(row, mean.len()).copy_from_slice(&mean);
+        }
+    }
+    all
+}
+
+/// A single pass at a speed scatters as passes of the other speeds do, or as a twentieth of the
+/// surface's power.
+fn pass_variance(forward: &Forward, spectra: &Spectra) -> DVector<f64> {
+    let bands = forward.bands.count();
+    let known: Vec<_> = spectra.speeds.iter().map(|speed| speed.pass_variance()).collect();
+    let typical = known.iter().flatten().next().cloned().unwrap_or(vec![0.01; bands]);
+    let of_speed = |(variance, speed): (&Option<Vec<f64>>, &crate::SpeedSpectra)| {
+        let count = speed.passes.len() as f64;
+        let variance = variance.as_ref().unwrap_or(&typical);
+        variance.iter().map(|value| value / count).collect::<Vec<_>>()
+    };
+    DVector::from_vec(known.iter().zip(&spectra.speeds).flat_map(of_speed).collect())
+}

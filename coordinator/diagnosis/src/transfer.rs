@@ -1,0 +1,69 @@
+//! From the surface under the wheel to the acceleration that is recorded.
+
+use crate::profile::Profile;
+use rustfft::num_complex::Complex64;
+use std::f64::consts::TAU;
+use tracktwin_track::frequency::RailReceptances;
+use tracktwin_track::model::{HertzContact, TrackModel};
+
+/// What a track with its extensions makes of the surface, at all lines of the spectrum and all
+/// nodes of its rail.
+pub(crate) struct Transfer {
+    /// Recorded acceleration over height of the surface, squared, in 1/s4: `[line][node]`.
+    pub(crate) power: Vec<Vec<f64>>,
+    /// Dynamic stiffness of contact, rail and vehicle in series in N/m: `[line][node]`.
+    pub(crate) stiffness: Vec<Vec<Complex64>>,
+    /// Receptances from the rail seats in m/N, `[line][sleeper][node]`; empty unless asked for.
+    pub(crate) from_seats: Vec<Vec<Vec<Complex64>>>,
+    /// The shape that extensions give the rail, if they do.
+    pub(crate) rail: Option<Profile>,
+    /// The shape of the wheel in each pass, `[speed][pass]`; empty for a round one.
+    pub(crate) wheel: Vec<Vec<Profile>>,
+    model: TrackModel,
+}
+
+impl Transfer {
+    /// Works it out for a model at these lines in Hz, with what derivatives need if `from_seats`.
+    ///
+    /// Source: mismatch design, eq. 2: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.
+    pub(crate) fn new(model: TrackModel, lines_hz: &[f64], from_seats: bool) -> Self {
+        let receptances = RailReceptances::new(&model, lines_hz, from_seats);
+        let load = model.design().wheel.load_n;
+        let contact = HertzContact::new(model.design());
+        // Slope of the Hertzian law at the static load.
+        let hertz = 1.5 * load / contact.approach(load);
+        let of_line = |(&hz, direct): (&f64, &Vec<Complex64>)| {
+            let vehicle = 1.0 / hertz + model.vehicle().receptance(TAU * hz);
+            direct.iter().map(|rail| (vehicle + rail).inv()).collect()
+        };
+        let stiffness: Vec<Vec<Complex64>> =
+            lines_hz.iter().zip(&receptances.direct).map(of_line).collect();
+        let power_of_line = |(&hz, line): (&f64, &Vec<Complex64>)| {
+            let felt = model.vehicle().acceleration_per_force(TAU * hz) * model.sensor_transfer(hz);
+            line.iter().map(|k| k.norm_sqr() * felt.norm_sqr()).collect()
+        };
+        let power = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
+        let from_seats = receptances.from_seats;
+        let rail = Profile::of_rail(&model);
+        Self { power, stiffness, from_seats, rail, wheel: Vec::new(), model }
+    }
+
+    /// The same with the wheel's shape in passes in which it begins a turn at these places in m:
+    /// `[speed][pass]`.
+    pub(crate) fn with_wheel(mut self, starts_m: &[Vec<f64>]) -> Self {
+        let of_pass = |start_m: &f64| Profile::of_wheel(&self.model, *start_m);
+        let of_speed = |starts: &Vec<f64>| starts.iter().map(of_pass).collect();
+        self.wheel = starts_m.iter().map(of_speed).collect::<Option<_>>().unwrap_or_default();
+        self
+    }
+
+    /// By what extensions multiply the surface's spectral density at a wave number in rad/m.
+    pub(crate) fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
+        self.model.roughness_gain(wave_number_rad_m)
+    }
+
+    /// Mean of the power over a window's nodes at a line.
+    pub(crate) fn mean_power(&self, window: &[(usize, f64)], line: usize) -> f64 {
+        window.iter().map(|&(node, share)| share * self.power[line][node]).sum()
+    }
+}
