@@ -135,11 +135,19 @@ impl Surface {
     /// Height in m at the place `x_m`, positive downwards.
     pub fn height(&self, x_m: f64) -> f64 {
         let count = self.coefficients.len();
-        let place = (x_m / self.step_m).rem_euclid(count as f64);
-        let knot = place.floor();
-        let weights = spline_weights(place - knot);
-        let first = knot as usize + count - 1;
-        weights.iter().zip(first..).map(|(w, index)| w * self.coefficients[index % count]).sum()
+        let mut place = x_m / self.step_m;
+        if !(0.0..count as f64).contains(&place) {
+            place = place.rem_euclid(count as f64);
+        }
+        let knot = place as usize;
+        let weights = spline_weights(place - knot as f64);
+        if let Some(four) =
+            knot.checked_sub(1).and_then(|first| self.coefficients.get(first..first + 4))
+        {
+            return weights.iter().zip(four).map(|(w, coefficient)| w * coefficient).sum();
+        }
+        let around = knot + count - 1..;
+        weights.iter().zip(around).map(|(w, index)| w * self.coefficients[index % count]).sum()
     }
 }
 

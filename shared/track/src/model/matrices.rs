@@ -95,6 +95,13 @@ impl Matrices {
         damped.zip(&self.stiffness).map(|(sum, stiffness)| sum + k * stiffness).collect()
     }
 
+    /// Place of an entry, if the pattern has it.
+    pub(crate) fn place(&self, row: usize, column: usize) -> Option<usize> {
+        let first = self.row_starts[row];
+        let columns = &self.columns[first..self.row_starts[row + 1]];
+        columns.binary_search(&column).ok().map(|offset| first + offset)
+    }
+
     /// Row, column and place of every entry.
     pub fn places(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
         (0..self.size()).flat_map(move |row| {

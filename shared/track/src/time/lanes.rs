@@ -1,8 +1,9 @@
 //! The fast solver: many cases at once, eight side by side in the lanes of vector registers.
 //!
-//! The same scheme on the same matrices as the plain solver. Cases on one pattern share the order
-//! of elimination; the wheel stands at the same place in all of them, so that its shape functions
-//! are scalars; and one forward elimination serves both the past and the contact force.
+//! The same scheme on the same matrices as the plain solver, in one of two ways. A track whose
+//! sleepers hang on single places of the rail, as all do without extensions that join them, is
+//! condensed to its rail; any other is eliminated as a whole. Either way the wheel stands at the
+//! same place in all cases, so that its shape functions are scalars.
 
 #![expect(
     clippy::inline_always,
@@ -10,18 +11,14 @@
 )]
 
 mod block;
+mod condensed;
 mod contact;
-mod elimination;
-mod factor;
-mod inertia;
-mod motion;
-mod runs;
+mod general;
+mod state;
 
 use super::{Pass, PassError, PassRecord};
 use crate::model::{Surface, TrackModel};
 use block::{Block, LANES};
-use elimination::Elimination;
-use motion::{Motion, Station};
 use std::array;
 
 /// Runs the wheel over many tracks, each with its own surface; the records come in their order.
@@ -40,31 +37,46 @@ pub(super) fn passes(
     if models.len() != surfaces.len() {
         return Err(PassError::Surfaces { models: models.len(), surfaces: surfaces.len() });
     }
+    let cases: Vec<_> = (models.iter().zip(surfaces))
+        .map(|(model, surface)| Case {
+            model,
+            surface,
+            hanging: condensed::hanging(model, pass.time_step_s),
+        })
+        .collect();
     let mut records: Vec<Option<PassRecord>> = vec![None; models.len()];
-    for family in families(models) {
-        let first = &models[family[0]];
-        pass.check(first)?;
-        let elimination = Elimination::new(first.layout(), first.matrices());
-        let stations = stations(first, pass, &elimination);
+    for family in families(&cases) {
+        let first = &cases[family[0]];
+        pass.check(first.model)?;
+        let solver = Solver::new(first, pass);
         for group in family.chunks(LANES) {
             // A short last group is filled up with copies of its last case.
-            let case = |lane: usize| group[lane.min(group.len() - 1)];
-            let models: [&TrackModel; LANES] = array::from_fn(|lane| &models[case(lane)]);
-            let surfaces: [&Surface; LANES] = array::from_fn(|lane| &surfaces[case(lane)]);
-            let forces = run(&elimination, &stations, models, pass, surfaces)?;
+            let lanes = array::from_fn(|lane| &cases[group[lane.min(group.len() - 1)]]);
+            let forces = solver.run(lanes, pass)?;
             for (lane, &index) in group.iter().enumerate() {
-                records[index] = Some(record(models[lane], pass, &forces, lane)?);
+                records[index] = Some(record(lanes[lane].model, pass, &forces, lane)?);
             }
         }
     }
     Ok(records.into_iter().flatten().collect())
 }
 
-/// Indices of the models that may run side by side: equal in all but their values.
-fn families(models: &[TrackModel]) -> Vec<Vec<usize>> {
+/// A track, its surface, and what hangs under its rail where it can be condensed.
+struct Case<'a> {
+    model: &'a TrackModel,
+    surface: &'a Surface,
+    hanging: Option<condensed::Hanging>,
+}
+
+/// Indices of the cases that may run side by side: equal in all but their values.
+fn families(cases: &[Case]) -> Vec<Vec<usize>> {
     let mut families: Vec<Vec<usize>> = Vec::new();
-    for (index, model) in models.iter().enumerate() {
-        let alike = |family: &&mut Vec<usize>| models[family[0]].has_pattern_of(model);
+    for (index, case) in cases.iter().enumerate() {
+        let alike = |family: &&mut Vec<usize>| {
+            let first = &cases[family[0]];
+            first.hanging.is_some() == case.hanging.is_some()
+                && first.model.has_pattern_of(case.model)
+        };
         match families.iter_mut().find(alike) {
             Some(family) => family.push(index),
             None => families.push(vec![index]),
@@ -73,25 +85,36 @@ fn families(models: &[TrackModel]) -> Vec<Vec<usize>> {
     families
 }
 
-/// Where the wheel stands at the end of every step, and at the start.
-fn stations(model: &TrackModel, pass: &Pass, elimination: &Elimination) -> Vec<Station> {
-    let station = |step| Station::new(model, pass, elimination, pass.position_m(step));
-    (0..=pass.steps()).map(station).collect()
+/// What a family has in common.
+enum Solver {
+    Condensed(condensed::Solver),
+    General(general::Solver),
 }
 
-/// Contact forces of eight cases at the start and after every step.
-fn run(
-    elimination: &Elimination,
-    stations: &[Station],
-    models: [&TrackModel; LANES],
-    pass: &Pass,
-    surfaces: [&Surface; LANES],
-) -> Result<Vec<Block>, PassError> {
-    let heights: Vec<Block> = (0..stations.len())
-        .map(|step| Block::from_fn(|lane| pass.height_m(models[lane], surfaces[lane], step)))
-        .collect();
-    let motion = Motion::start(elimination, &stations[0], models, pass, heights[0])?;
-    Ok(motion.run(&stations[1..], &heights[1..]))
+impl Solver {
+    fn new(first: &Case, pass: &Pass) -> Self {
+        match first.hanging {
+            Some(_) => Self::Condensed(condensed::Solver::new(first.model, pass)),
+            None => Self::General(general::Solver::new(first.model, pass)),
+        }
+    }
+
+    /// Contact forces of eight cases at the start and after every step.
+    fn run(&self, cases: [&Case; LANES], pass: &Pass) -> Result<Vec<Block>, PassError> {
+        let heights = cases.map(|case| pass.heights_m(case.model, case.surface));
+        let heights: Vec<Block> =
+            (0..=pass.steps()).map(|step| Block::from_fn(|lane| heights[lane][step])).collect();
+        let models = cases.map(|case| case.model);
+        match self {
+            Self::Condensed(solver) => {
+                let hanging = cases.map(|case| {
+                    case.hanging.as_ref().expect("a family is condensed as a whole or not at all")
+                });
+                solver.run(models, hanging, pass, &heights)
+            }
+            Self::General(solver) => solver.run(models, pass, &heights),
+        }
+    }
 }
 
 /// The record of one lane.
@@ -101,7 +124,7 @@ fn record(
     forces: &[Block],
     lane: usize,
 ) -> Result<PassRecord, PassError> {
-    let wheel = &model.design().wheel;
+    let wheel = &model.vehicle().wheel;
     let mut record = PassRecord::start(pass, forces[0].0[lane]);
     for (step, force) in forces.iter().enumerate().skip(1) {
         let force_n = force.0[lane];
@@ -116,8 +139,10 @@ fn record(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::SpringDamper;
     use crate::model::{Mesh, Support};
     use crate::time;
+    use std::sync::Arc;
     use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
 
     const SPACING_M: f64 = 0.125;
@@ -165,14 +190,18 @@ mod tests {
         let records = passes(&models, pass, &surfaces).unwrap();
         for ((model, surface), fast) in models.iter().zip(&surfaces).zip(&records) {
             let plain = time::pass(model, pass, surface).unwrap();
-            assert_eq!(plain.contact_force_n.len(), fast.contact_force_n.len());
-            let pairs = plain.acceleration_m_s2.iter().zip(&fast.acceleration_m_s2);
-            let difference = rms(pairs.map(|(a, b)| a - b));
-            let relative = difference / rms(plain.acceleration_m_s2.iter().copied());
-            // Rounding of two different orders of summation, in differences of 1e-16 of the
-            // displacement over dt² / 4.
-            assert!(relative < 1e-8, "{relative:e}");
+            assert_near(&plain, fast);
         }
+    }
+
+    fn assert_near(plain: &PassRecord, fast: &PassRecord) {
+        assert_eq!(plain.contact_force_n.len(), fast.contact_force_n.len());
+        let pairs = plain.acceleration_m_s2.iter().zip(&fast.acceleration_m_s2);
+        let relative =
+            rms(pairs.map(|(a, b)| a - b)) / rms(plain.acceleration_m_s2.iter().copied());
+        // Rounding of two different orders of summation, in differences of 1e-16 of the
+        // displacement over dt² / 4.
+        assert!(relative < 1e-8, "{relative:e}");
     }
 
     #[test]
@@ -189,6 +218,54 @@ mod tests {
     #[test]
     fn the_lanes_agree_with_the_plain_solver_when_wheels_lift_off() {
         assert_equal_to_plain(&Mesh::uniform(6, 4, 4), &pass(), 3000.0);
+    }
+
+    /// Something between sleepers, the ground and the rail.
+    #[derive(Clone, Copy, Debug)]
+    enum Extra {
+        /// A beam's worth of ballast between two sleepers: they hang on two places of the rail.
+        Between,
+        /// A mass on a spring under a sleeper.
+        Under,
+        /// A mass on a spring on the rail.
+        OnRail,
+    }
+
+    impl crate::extension::Extension for Extra {
+        fn assemble(&self, assembly: &mut crate::model::Assembly) {
+            let layout = assembly.layout();
+            let [first, second] = [0, 1].map(|sleeper| layout.sleeper_port(sleeper, 0));
+            let rail = layout.rail_port(0.3);
+            let element = SpringDamper { stiffness: 3e7, damping: 2e3 };
+            let port = match self {
+                Self::Between => first.minus(&second),
+                Self::Under | Self::OnRail => {
+                    let mass = assembly.append_dof();
+                    assembly.add_mass(&mass, 0.5);
+                    mass.minus(if matches!(self, Self::Under) { &first } else { &rail })
+                }
+            };
+            assembly.add_spring_damper(&port, element);
+        }
+    }
+
+    #[test]
+    fn the_lanes_agree_with_the_plain_solver_whatever_hangs_under_the_rail() {
+        let supports = vec![Support::from(&ParameterSet::nominal()); 5];
+        let mesh = Mesh::uniform(6, 4, 4);
+        let surface = Surface::rough(1, 3.0, 1.0);
+        // A port within an element has four places on the rail, more than one can be condensed.
+        for (extra, condensed) in
+            [(Extra::Between, false), (Extra::Under, true), (Extra::OnRail, false)]
+        {
+            let model =
+                TrackModel::build(&TrackDesign::v_track(), &mesh, &supports, &[Arc::new(extra)])
+                    .unwrap();
+            assert_eq!(condensed::hanging(&model, 1e-5).is_some(), condensed, "{extra:?}");
+            let plain = time::pass(&model, &pass(), &surface).unwrap();
+            let fast = &passes(&[model], &pass(), std::slice::from_ref(&surface)).unwrap()[0];
+            assert_near(&plain, fast);
+        }
     }
 
     #[test]

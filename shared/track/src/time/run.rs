@@ -100,8 +100,19 @@ impl Pass {
         self.eased_in(step, height)
     }
 
-    fn eased_in(&self, step: usize, height: impl Fn(f64) -> f64) -> f64 {
+    /// The heights under the first wheel at the start and after every step.
+    pub(super) fn heights_m(&self, model: &TrackModel, surface: &Surface) -> Vec<f64> {
+        let height =
+            |x_m: f64| surface.height(x_m) + model.profile_m(x_m) + model.wheel_profile_m(x_m);
         let first = height(self.start_m);
+        (0..=self.steps()).map(|step| self.eased(step, first, &height)).collect()
+    }
+
+    fn eased_in(&self, step: usize, height: impl Fn(f64) -> f64) -> f64 {
+        self.eased(step, height(self.start_m), height)
+    }
+
+    fn eased(&self, step: usize, first: f64, height: impl Fn(f64) -> f64) -> f64 {
         let time = (self.time_step_s * step as f64 / RAMP_S).min(1.0);
         let ramp = time * time * (3.0 - 2.0 * time);
         first + ramp * (height(self.position_m(step)) - first)

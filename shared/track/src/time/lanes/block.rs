@@ -31,6 +31,12 @@ impl Block {
         Self::from_fn(|lane| self.0[lane].mul_add(factor.0[lane], sum.0[lane]))
     }
 
+    /// `self × factor - less`, rounded once.
+    #[inline(always)]
+    pub(super) fn mul_sub(self, factor: Self, less: Self) -> Self {
+        Self::from_fn(|lane| self.0[lane].mul_add(factor.0[lane], -less.0[lane]))
+    }
+
     /// `sum - self × factor`, rounded once.
     #[inline(always)]
     pub(super) fn subtracted_from(self, factor: Self, sum: Self) -> Self {

@@ -1,6 +1,6 @@
 //! Sparse rows as runs of neighbouring entries, which inner loops go through without indices.
 
-use super::block::Block;
+use crate::time::lanes::block::Block;
 use std::collections::HashMap;
 
 /// What a block may be multiplied by.

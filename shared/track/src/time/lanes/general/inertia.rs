@@ -1,38 +1,10 @@
 //! What the past pushes with: the right-hand side of a time step.
 
-use super::block::{Block, LANES};
 use super::elimination::Elimination;
 use super::runs::Runs;
 use crate::model::{Matrices, TrackModel};
-
-/// The two combinations of displacement `u`, velocity `v` and acceleration `a` that the next step
-/// needs of a degree of freedom.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct State {
-    /// `p = u + dt v + dt² a / 4`.
-    inertial: Block,
-    /// `q = u + dt v / 2`.
-    viscous: Block,
-}
-
-impl State {
-    pub(super) fn at_rest(displacement: Block) -> Self {
-        Self { inertial: displacement, viscous: displacement }
-    }
-
-    /// Moves on to a new displacement `u`: `p` becomes `4 u - 2 q - p` and `q` `2 u - q`.
-    #[inline(always)]
-    pub(super) fn advance(&mut self, displacement: Block) {
-        let moved = displacement - self.viscous;
-        self.viscous = displacement + moved;
-        self.inertial = self.viscous + moved + (displacement - self.inertial);
-    }
-
-    #[inline(always)]
-    pub(super) fn inertial(&self) -> Block {
-        self.inertial
-    }
-}
+use crate::time::lanes::block::{Block, LANES};
+use crate::time::lanes::state::State;
 
 /// The states of all degrees of freedom, part by part.
 #[derive(Clone, Debug)]

@@ -1,11 +1,12 @@
 //! Wheel and track on their way, in all lanes.
 
-use super::block::{Block, LANES};
-use super::contact;
 use super::elimination::Elimination;
 use super::factor::Factor;
-use super::inertia::{Inertia, State, States, row_entries};
+use super::inertia::{Inertia, States, row_entries};
 use crate::model::{HertzContact, TrackModel};
+use crate::time::lanes::block::{Block, LANES};
+use crate::time::lanes::contact;
+use crate::time::lanes::state::State;
 use crate::time::{Pass, PassError};
 use pulp::{Arch, Simd, WithSimd};
 use tracktwin_parameters::Wheel;
@@ -73,7 +74,7 @@ impl Motion {
         height_m: Block,
     ) -> Result<Self, PassError> {
         let size = elimination.order.len();
-        let Wheel { mass_kg, load_n, .. } = models[0].design().wheel;
+        let Wheel { mass_kg, load_n, .. } = models[0].vehicle().wheel;
         let contact = HertzContact::new(models[0].design());
         let stiffness = Factor::new(elimination, |row| {
             row_entries(elimination, &models, row, |matrices, place| matrices.stiffness()[place])

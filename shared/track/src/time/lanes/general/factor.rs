@@ -1,9 +1,9 @@
 //! `L D Lᵀ` of a sparse symmetric matrix, in all lanes at once.
 
-use super::block::Block;
 use super::elimination::Elimination;
 use super::runs::Runs;
 use crate::time::PassError;
+use crate::time::lanes::block::Block;
 use std::mem;
 
 /// Factor of one matrix a lane, all on the same pattern.

@@ -1,0 +1,224 @@
+//! Wheel, rail and what hangs under it on their way, in all lanes.
+
+use super::pair;
+use super::rail::{Eliminated, Factor, Node, NodeRows};
+use super::supports::Supports;
+use super::table::Table;
+use crate::model::{HertzContact, TrackModel};
+use crate::time::Pass;
+use crate::time::lanes::block::Block;
+use crate::time::lanes::contact;
+use crate::time::lanes::state::State;
+use pulp::{Arch, Simd, WithSimd};
+use std::array;
+
+/// The wheel's place on the rail at the end of a step, the same in all lanes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Station {
+    /// The node left of the wheel, counted from 1.
+    pub(super) element: usize,
+    /// The load's share of deflection and rotation, left and right; zero where held.
+    pub(super) shape: [f64; 4],
+    /// Flexibility in m/N that the shape functions leave out; zero if the pass does.
+    pub(super) local_flexibility: f64,
+}
+
+impl Station {
+    pub(super) fn new(model: &TrackModel, pass: &Pass, x_m: f64) -> Self {
+        let point = model.layout().rail_point(x_m);
+        // What is held takes its share of the load to the ground.
+        let share = |index: usize| point.dofs[index].map_or(0.0, |_| point.shape[index]);
+        let local_flexibility = if pass.local_flexibility { point.local_flexibility } else { 0.0 };
+        Self { element: point.element + 1, shape: array::from_fn(share), local_flexibility }
+    }
+
+    /// Deflection of the rail under the wheel, but for the local one.
+    pub(super) fn deflection(&self, rail: &[Node]) -> Block {
+        under_wheel(self.shape.map(Block::splat), [rail[self.element], rail[self.element + 1]])
+    }
+}
+
+/// The states of a node's deflection and rotation, [`State`] part by part.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct NodeState {
+    pub(super) inertial: Node,
+    pub(super) viscous: Node,
+}
+
+/// Eight wheels on eight tracks.
+///
+/// Nodes of the rail count from 1; the places before and behind them stand for nothing.
+pub(super) struct Motion {
+    pub(super) contact: HertzContact,
+    pub(super) load: Block,
+    /// Deflection of the wheel alone under a unit force in a step, `dt² / 4 m`.
+    pub(super) wheel_compliance: Block,
+    pub(super) wheel: State,
+    /// `4 M / dt²` and `2 C / dt` of the rail.
+    pub(super) inertia: Table<[NodeRows; 2]>,
+    /// `4 M / dt² + 2 C / dt + K` of the rail on its supports.
+    pub(super) factor: Factor,
+    pub(super) rail: Vec<NodeState>,
+    pub(super) supports: Supports,
+    /// What the past of the supports pushes the nodes with.
+    pub(super) pushed: Vec<Node>,
+    /// What the displacement of an eliminated node would be but for the next node's; after
+    /// substitution the displacements.
+    pub(super) solution: Vec<Node>,
+}
+
+impl Motion {
+    /// Contact forces at the start and at every following station, over surfaces of the given
+    /// heights in m; with the widest vectors that the machine has.
+    pub(super) fn run(self, stations: &[Station], heights_m: &[Block]) -> Vec<Block> {
+        Arch::new().dispatch(Run { motion: self, stations, heights_m })
+    }
+
+    /// One time step; the contact forces at its end.
+    #[inline(always)]
+    fn advance(&mut self, station: &Station, height_m: Block) -> Block {
+        let element = station.element;
+        let arrived = self.eliminate(element);
+        let free = self.factor.meet(element, arrived);
+        let shape = station.shape.map(Block::splat);
+        let unit = self.factor.meet(element, [[shape[0], shape[1]], [shape[2], shape[3]]]);
+        let wheel_free = self.wheel_compliance.mul_add(self.load, self.wheel.inertial());
+        let overlap = wheel_free - under_wheel(shape, free) - height_m;
+        let compliance = under_wheel(shape, unit) + self.wheel_compliance;
+        let local = Block::splat(station.local_flexibility);
+        let force = contact::forces(self.contact, overlap, compliance + local);
+        self.substitute(element, loaded(free, unit, force));
+        self.supports.advance(&self.solution, &mut self.pushed);
+        self.wheel.advance(self.wheel_compliance.subtracted_from(force, wheel_free));
+        force
+    }
+
+    /// Elimination from both ends up to the wheel's element; the loads that arrive at its nodes.
+    ///
+    /// Left and right go side by side: neither has to wait for the other.
+    #[inline(always)]
+    fn eliminate(&mut self, element: usize) -> [Node; 2] {
+        let last = self.solution.len() - 2;
+        let (to_left, to_right) = (element - 1, last - element - 1);
+        let (mut left, mut right) = (Node::default(), Node::default());
+        for step in 0..to_left.max(to_right) {
+            if step < to_left {
+                left = self.eliminate_node(1 + step, left, *self.factor.from_left.at(1 + step));
+            }
+            if step < to_right {
+                let node = last - step;
+                right = self.eliminate_node(node, right, *self.factor.from_right.at(node));
+            }
+        }
+        let from_left = self.factor.from_left.at(element).passed;
+        let from_right = self.factor.from_right.at(element + 1).passed;
+        [
+            pair::subtract(from_left, left, self.past(element)),
+            pair::subtract(from_right, right, self.past(element + 1)),
+        ]
+    }
+
+    /// Eliminates a node, given the load on the one before it; the load on this one.
+    #[inline(always)]
+    fn eliminate_node(
+        &mut self,
+        node: usize,
+        before: Node,
+        Eliminated { passed, inverse }: Eliminated,
+    ) -> Node {
+        let load = pair::subtract(passed, before, self.past(node));
+        self.solution[node] = pair::times_vector(inverse, load);
+        load
+    }
+
+    /// What the past pushes a node with: inertia and dampers of the rail, and the supports.
+    #[inline(always)]
+    fn past(&self, node: usize) -> Node {
+        let [before, own, after] = [node - 1, node, node + 1].map(|node| &self.rail[node]);
+        let [mass, damping] = self.inertia.at(node);
+        let [mass_before, damping_before] = self.inertia.at(node - 1);
+        let sum = pair::add_symmetric(mass.own, own.inertial, self.pushed[node]);
+        let sum = pair::add(mass.next, after.inertial, sum);
+        let sum = pair::add_transposed(mass_before.next, before.inertial, sum);
+        let sum = pair::add_symmetric(damping.own, own.viscous, sum);
+        let sum = pair::add(damping.next, after.viscous, sum);
+        pair::add_transposed(damping_before.next, before.viscous, sum)
+    }
+
+    /// Substitution from the wheel's element to both ends; moves the rail on.
+    #[inline(always)]
+    fn substitute(&mut self, element: usize, [left, right]: [Node; 2]) {
+        let last = self.solution.len() - 2;
+        self.displace(element, left);
+        self.displace(element + 1, right);
+        let (to_left, to_right) = (element - 1, last - element - 1);
+        let (mut left, mut right) = (left, right);
+        for step in 0..to_left.max(to_right) {
+            if step < to_left {
+                let node = element - step;
+                let passed = self.factor.from_left.at(node).passed;
+                left = pair::subtract_transposed(passed, left, self.solution[node - 1]);
+                self.displace(node - 1, left);
+            }
+            if step < to_right {
+                let node = element + 1 + step;
+                let passed = self.factor.from_right.at(node).passed;
+                right = pair::subtract_transposed(passed, right, self.solution[node + 1]);
+                self.displace(node + 1, right);
+            }
+        }
+    }
+
+    /// Moves a node on to its displacement.
+    #[inline(always)]
+    fn displace(&mut self, node: usize, displacement: Node) {
+        self.solution[node] = displacement;
+        self.rail[node].advance(displacement);
+    }
+}
+
+impl NodeState {
+    #[inline(always)]
+    fn advance(&mut self, [deflection, rotation]: Node) {
+        let mut states = [0, 1]
+            .map(|motion| State { inertial: self.inertial[motion], viscous: self.viscous[motion] });
+        states[0].advance(deflection);
+        states[1].advance(rotation);
+        self.inertial = states.map(|state| state.inertial);
+        self.viscous = states.map(|state| state.viscous);
+    }
+}
+
+/// Deflection of the rail under the wheel, but for the local one.
+#[inline(always)]
+fn under_wheel(shape: [Block; 4], [[a, b], [c, d]]: [Node; 2]) -> Block {
+    let left = shape[1].mul_add(b, shape[0] * a);
+    shape[3].mul_add(d, shape[2].mul_add(c, left))
+}
+
+/// Displacements without contact and those of a unit force, put together.
+#[inline(always)]
+fn loaded(free: [Node; 2], unit: [Node; 2], force: Block) -> [Node; 2] {
+    [0, 1].map(|node| [0, 1].map(|motion| unit[node][motion].mul_add(force, free[node][motion])))
+}
+
+/// A whole pass, compiled once for every instruction set.
+struct Run<'a> {
+    motion: Motion,
+    stations: &'a [Station],
+    heights_m: &'a [Block],
+}
+
+impl WithSimd for Run<'_> {
+    type Output = Vec<Block>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<Block> {
+        let mut motion = self.motion;
+        let mut forces = vec![motion.load];
+        for (station, &height_m) in self.stations.iter().zip(self.heights_m) {
+            forces.push(motion.advance(station, height_m));
+        }
+        forces
+    }
+}
