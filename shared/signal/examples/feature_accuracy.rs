@@ -12,7 +12,8 @@ const WINDOW: usize = 3462;
 const MARGIN: usize = 6000;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let every_sample = FeatureDefinition { instant_rate_hz: 1e5, ..Default::default() };
+    let every_sample =
+        FeatureDefinition { instant_rate_hz: 1e5, thinned: false, ..Default::default() };
     let extractor = Extractor::new(&every_sample)?;
     let signal = noise::axle_box(WINDOW + 2 * MARGIN);
     let window = MARGIN..MARGIN + WINDOW;
@@ -20,11 +21,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let quick = extractor.extract(&signal, window.clone())?;
     println!("change of ln LWPS against the literal transform at every sample");
     report("quick, every sample", &literal.log_power, &quick.log_power);
-    for divisor in [2.0, 4.0, 8.0] {
+    for divisor in [1.0, 2.0, 4.0, 8.0] {
         let definition =
             FeatureDefinition { instant_rate_hz: 1e5 / divisor, ..every_sample.clone() };
         let fewer = Extractor::new(&definition)?.extract(&signal, window.clone())?;
         report(&format!("quick, every {divisor}"), &literal.log_power, &fewer.log_power);
+        let thinned = FeatureDefinition { thinned: true, ..definition };
+        let thinned = Extractor::new(&thinned)?.extract(&signal, window.clone())?;
+        report(&format!("quick, every {divisor}, thinned"), &literal.log_power, &thinned.log_power);
     }
     Ok(())
 }
@@ -37,6 +41,6 @@ fn report(name: &str, a: &[f64], b: &[f64]) {
     let p95 = changes[changes.len() * 95 / 100];
     let largest = changes[changes.len() - 1];
     println!(
-        "{name:20} median {median:.1e}  95 % {p95:.1e}  largest {largest:.1e} in bin {worst:?}"
+        "{name:24} median {median:.1e}  95 % {p95:.1e}  largest {largest:.1e} in bin {worst:?}"
     );
 }

@@ -27,6 +27,12 @@ pub struct FeatureDefinition {
     /// A quarter of 100 kHz: six instants a period at 4 kHz. It is taken on the recording's own
     /// clock, rounded so that instants divide the transformed stretch evenly (by less than 1e-4).
     pub instant_rate_hz: f64,
+    /// Whether low bins take fewer instants: half as many three octaves below the highest
+    /// frequency, and half as many again for every octave and a half from there.
+    ///
+    /// The lower a bin, the slower its power changes. Thinned out like this, all bins err about
+    /// alike by the instants left out.
+    pub thinned: bool,
     /// Real signal used on either side of the window, in s, as far as there is any.
     ///
     /// Three standard deviations (19 ms) of the wavelet at 50 Hz.
@@ -47,6 +53,7 @@ impl Default for FeatureDefinition {
             lowest_hz: 50.0,
             highest_hz: 4000.0,
             instant_rate_hz: 25_000.0,
+            thinned: true,
             margin_s: 0.06,
             floor_m2_s4: 1e-10,
         }
@@ -56,6 +63,10 @@ impl Default for FeatureDefinition {
 /// Part of a voice by which a point may lie outside a range: one that is meant to lie on the
 /// border is not lost to rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// Octaves over which the instants of a thinned definition are halved, the first time after twice
+/// as many.
+const OCTAVES_A_HALVING: f64 = 1.5;
 
 /// Why a definition is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -120,6 +131,11 @@ impl FeatureDefinition {
         Ok(())
     }
 
+    /// The same definition with all instants in every bin.
+    pub(crate) fn unthinned(&self) -> Self {
+        Self { thinned: false, ..self.clone() }
+    }
+
     fn check_ranges(&self) -> Result<(), DefinitionError> {
         let rate = self.reference_rate_hz;
         let ranges = [
@@ -152,6 +168,13 @@ impl FeatureDefinition {
         let wavelet = self.wavelet();
         0.5 * wavelet.share_of_a_voice(self.voices_per_octave)
             * wavelet.fourier(wavelet.centre_rad())
+    }
+
+    /// How often the instants of a bin at this frequency in Hz are halved.
+    pub(crate) fn halvings(&self, frequency_hz: f64) -> u32 {
+        let octaves_below = (self.highest_hz / frequency_hz).log2().max(0.0);
+        let steps = (octaves_below / OCTAVES_A_HALVING) as u32;
+        if self.thinned { steps.saturating_sub(1) } else { 0 }
     }
 
     /// Frequency in Hz of the grid's point `j`, `mu / (2 pi a_j)` with `a_j = s_0 2^(j / N_v)`

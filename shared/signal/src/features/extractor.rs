@@ -2,7 +2,7 @@
 
 use super::{
     DefinitionError, FeatureDefinition,
-    plan::{Buffers, Instants, Plan, in_samples},
+    plan::{Buffers, Instants, Plan, VOICE_REACH, in_samples},
     reassignment::{Bins, Squeezed},
     stretch::Stretch,
 };
@@ -13,10 +13,6 @@ use std::{
     ops::Range,
     sync::{Arc, Mutex, PoisonError},
 };
-
-/// Voices that matter to a bin lie within this many standard deviations of the wavelet; farther
-/// ones hold less than 0.2 % of a tone.
-const VOICE_REACH: f64 = 3.0;
 
 /// Sample rate that the highest frequency needs, in units of it: two by Nyquist, and room for the
 /// upper half of the highest band and an anti-aliasing filter.
@@ -84,7 +80,7 @@ pub struct Extractor {
     kept: Range<usize>,
     /// The bins of each band.
     bands: Vec<Range<usize>>,
-    plans: Mutex<HashMap<(u64, Instants), Arc<Plan>>>,
+    plans: Mutex<HashMap<(u64, Instants, bool), Arc<Plan>>>,
     buffers: Mutex<Vec<Buffers>>,
     accumulators: Mutex<Vec<Squeezed>>,
 }
@@ -159,7 +155,7 @@ impl Extractor {
     /// # Errors
     /// [`FeatureError::Window`] and [`FeatureError::SampleRate`].
     pub fn extract(&self, signal: &Signal, window: Range<usize>) -> Result<Features, FeatureError> {
-        self.squeeze(signal, window, |squeezed| {
+        self.squeeze(signal, window, &self.definition, |squeezed| {
             let lwps: Vec<_> =
                 (0..self.bins_hz.len()).map(|bin| squeezed.mean_power(bin)).collect();
             self.features(&lwps)
@@ -180,17 +176,22 @@ impl Extractor {
         }
     }
 
-    /// Computes the synchrosqueezed transform of a window and hands it to `read`.
+    /// Computes the synchrosqueezed transform of a window and hands it to `read`; `definition` says
+    /// whether instants are thinned out.
     pub(super) fn squeeze<R>(
         &self,
         signal: &Signal,
         window: Range<usize>,
+        definition: &FeatureDefinition,
         read: impl FnOnce(&Squeezed) -> R,
     ) -> Result<R, FeatureError> {
         let instants = self.instants(signal, &window)?;
         let mut squeezed = lock(&self.accumulators).pop().unwrap_or_default();
-        squeezed.clear(self.bins.rows(), instants.count);
-        self.voices(signal, window, |voice, weighted| squeezed.add(&self.bins, voice, weighted))?;
+        let halvings = self.bins_hz.iter().map(|&hz| definition.halvings(hz));
+        squeezed.clear(halvings, instants.count);
+        self.voices(signal, window, definition, |halvings, voice, weighted| {
+            squeezed.add(&self.bins, halvings, voice, weighted);
+        })?;
         let result = read(&squeezed);
         lock(&self.accumulators).push(squeezed);
         Ok(result)
@@ -202,11 +203,12 @@ impl Extractor {
         &self,
         signal: &Signal,
         window: Range<usize>,
-        take: impl FnMut(&[Complex64], &[Complex64]),
+        definition: &FeatureDefinition,
+        take: impl FnMut(u32, &[Complex64], &[Complex64]),
     ) -> Result<(), FeatureError> {
         let stretch = self.stretch(signal, &window)?;
         let instants = self.instants(signal, &window)?;
-        let plan = self.plan(signal.sample_rate_hz(), instants.planned());
+        let plan = self.plan(signal.sample_rate_hz(), instants.planned(), definition);
         let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
         plan.run(&stretch, &mut buffers, take);
         lock(&self.buffers).push(buffers);
@@ -248,13 +250,18 @@ impl Extractor {
         Ok(())
     }
 
-    fn plan(&self, sample_rate_hz: f64, instants: Instants) -> Arc<Plan> {
-        let key = (sample_rate_hz.to_bits(), instants);
+    fn plan(
+        &self,
+        sample_rate_hz: f64,
+        instants: Instants,
+        definition: &FeatureDefinition,
+    ) -> Arc<Plan> {
+        let key = (sample_rate_hz.to_bits(), instants, definition.thinned);
         if let Some(plan) = lock(&self.plans).get(&key) {
             return Arc::clone(plan);
         }
         // Made outside the lock: two threads may make the same plan, none waits for it.
-        let plan = Plan::new(&self.definition, &self.voices_hz, sample_rate_hz, instants);
+        let plan = Plan::new(definition, &self.voices_hz, sample_rate_hz, instants);
         let plan = Arc::new(plan);
         let mut plans = lock(&self.plans);
         if plans.len() >= PLANS_KEPT {

@@ -61,10 +61,11 @@ impl Extractor {
         columns: usize,
     ) -> Result<TimeFrequencyMap, FeatureError> {
         let (columns, mut map) = self.empty_map(signal, &window, columns)?;
-        map.magnitudes = self.squeeze(signal, window, |squeezed| {
-            let rows = self.kept().map(|bin| squeezed.bin(bin));
-            rows.flat_map(|row| columns.magnitudes(row)).collect()
-        })?;
+        map.magnitudes =
+            self.squeeze(signal, window, &self.definition().unthinned(), |squeezed| {
+                let rows = self.kept().map(|bin| squeezed.bin(bin));
+                rows.flat_map(|row| columns.magnitudes(row)).collect()
+            })?;
         Ok(map)
     }
 
@@ -82,7 +83,7 @@ impl Extractor {
         let (columns, mut map) = self.empty_map(signal, &window, columns)?;
         let height = self.definition().height_of_a_tone();
         let mut rows = Vec::new();
-        self.voices(signal, window, |voice, _| {
+        self.voices(signal, window, &self.definition().unthinned(), |_, voice, _| {
             rows.push(columns.magnitudes(voice).map(|magnitude| magnitude / height).collect());
         })?;
         // Voices descend and reach beyond the features on both sides.

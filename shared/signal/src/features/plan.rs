@@ -12,6 +12,10 @@ use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner, num_complex::Complex64};
 use std::{f64::consts::TAU, ops::Range, sync::Arc};
 
+/// Voices that matter to a bin lie within this many standard deviations of the wavelet; farther
+/// ones hold less than 0.2 % of a tone.
+pub(super) const VOICE_REACH: f64 = 3.0;
+
 /// How far a wavelet reaches, in its standard deviations: beyond, 4e-6 of its weight.
 const REACH: f64 = 5.0;
 
@@ -47,6 +51,11 @@ impl Instants {
         Self { parts: self.parts, count: self.count.next_multiple_of(INSTANTS_STEP) }
     }
 
+    /// Every second, fourth ... of them, halved so often.
+    const fn halved(self, halvings: u32) -> Self {
+        Self { parts: self.parts << halvings, count: self.count.div_ceil(1 << halvings) }
+    }
+
     /// Interval of two instants in s.
     pub(super) fn interval_s(self, sample_rate_hz: f64) -> f64 {
         self.parts as f64 / PARTS_OF_A_SAMPLE as f64 / sample_rate_hz
@@ -77,8 +86,10 @@ pub(super) struct Plan {
     octaves: Vec<Octave>,
 }
 
-/// Voices that share a circle.
+/// Voices that share a circle: an octave of them, or less where the instants are halved within it.
 struct Octave {
+    /// How often the instants are halved.
+    halvings: u32,
     /// Samples of margin on either side.
     margin: usize,
     samples: usize,
@@ -122,7 +133,8 @@ impl Plan {
     ) -> Self {
         let mut planners = Planners { real: RealFftPlanner::new(), complex: FftPlanner::new() };
         let octaves = voices_hz
-            .chunks(definition.voices_per_octave as usize)
+            .chunk_by(|a, b| halvings(definition, *a) == halvings(definition, *b))
+            .flat_map(|alike| alike.chunks(definition.voices_per_octave as usize))
             .map(|voices_hz| {
                 Octave::new(&mut planners, definition, voices_hz, sample_rate_hz, instants)
             })
@@ -130,26 +142,32 @@ impl Plan {
         Self { octaves }
     }
 
-    /// Hands every voice to `take`, from the highest frequency to the lowest: its values at the
-    /// instants (from the window's start on; more of them than the window has), and the values
-    /// with each frequency weighted by itself in Hz.
+    /// Hands every voice to `take`, from the highest frequency to the lowest: how often its
+    /// instants are halved, its values at them (from the window's start on; more than the window
+    /// has), and the values with each frequency weighted by itself in Hz.
     ///
     /// A value is a voice's share in the signal: over all voices they sum to the analytic signal.
     pub(super) fn run(
         &self,
         stretch: &Stretch,
         buffers: &mut Buffers,
-        mut take: impl FnMut(&[Complex64], &[Complex64]),
+        mut take: impl FnMut(u32, &[Complex64], &[Complex64]),
     ) {
         for octave in &self.octaves {
             octave.transform(stretch, buffers);
             for voice in &octave.voices {
                 octave.voice(voice, buffers);
                 let (values, weighted) = buffers.voices.split_at(octave.instants);
-                take(values, weighted);
+                take(octave.halvings, values, weighted);
             }
         }
     }
+}
+
+/// How often the instants of a voice are halved: no more than those of any bin that it matters to.
+fn halvings(definition: &FeatureDefinition, voice_hz: f64) -> u32 {
+    let centre = definition.wavelet_centre_rad;
+    definition.halvings(voice_hz * (centre + VOICE_REACH) / centre)
 }
 
 impl Octave {
@@ -161,11 +179,12 @@ impl Octave {
         instants: Instants,
     ) -> Self {
         let wavelet = definition.wavelet();
+        let halvings = halvings(definition, voices_hz[0]);
         let lowest_hz = voices_hz.iter().copied().fold(f64::INFINITY, f64::min);
         let reach = in_samples(REACH * wavelet.scale(lowest_hz), sample_rate_hz);
         let margin = in_samples(definition.margin_s, sample_rate_hz).min(reach);
         // Going round the circle from the window, the other margin begins beyond the reach.
-        let (instants, samples) = instants.circle(margin + reach);
+        let (instants, samples) = instants.halved(halvings).circle(margin + reach);
         let line_hz = sample_rate_hz / samples as f64;
         let factor = wavelet.share_of_a_voice(definition.voices_per_octave) / samples as f64;
         let voices = voices_hz
@@ -173,6 +192,7 @@ impl Octave {
             .map(|&voice_hz| Voice::new(wavelet, voice_hz, line_hz, samples / 2, factor))
             .collect();
         Self {
+            halvings,
             margin,
             samples,
             instants,
@@ -183,7 +203,7 @@ impl Octave {
         }
     }
 
-    /// The spectrum of the stretch on this octave's circle.
+    /// The spectrum of the stretch on this circle.
     fn transform(&self, stretch: &Stretch, buffers: &mut Buffers) {
         let Buffers { circle, spectrum, voices, scratch } = buffers;
         circle.clear();

@@ -9,7 +9,6 @@ use rustfft::num_complex::Complex64;
 /// cell's, or the next. Row 0 and the last row stand for frequencies outside all bins.
 #[derive(Debug)]
 pub(super) struct Bins {
-    count: usize,
     /// Bits of the mantissa that a cell leaves out.
     shift: u32,
     /// Leading bits of the first cell.
@@ -44,12 +43,7 @@ impl Bins {
             let row = borders_hz.partition_point(|&b| b <= f64::from_bits(leading << shift));
             Cell { row, border_hz: borders_hz.get(row).copied().unwrap_or(f64::NAN) }
         };
-        Self { count: frequencies_hz.len(), shift, base, cells: (base..=last).map(cell).collect() }
-    }
-
-    /// Rows of an accumulator: the bins and one on either side.
-    pub(super) const fn rows(&self) -> usize {
-        self.count + 2
+        Self { shift, base, cells: (base..=last).map(cell).collect() }
     }
 
     /// The row of a frequency in Hz; anything outside, NaN included, gets row 0 or the last.
@@ -64,48 +58,131 @@ impl Bins {
     }
 }
 
-/// The synchrosqueezed transform while it is summed, one row a bin (and one on either side), one
-/// column an instant.
+/// The synchrosqueezed transform while it is summed: a row a bin, and in each an instant out of
+/// 1, 2, 4 ... of the window's.
 #[derive(Debug, Default)]
 pub(super) struct Squeezed {
-    instants: usize,
+    /// Where what belongs to no bin or instant goes, then the bins' values, row after row.
     values: Vec<Complex64>,
+    rows: Vec<Row>,
+    /// Instants of the window when none is left out.
+    instants: usize,
     frequencies_hz: Vec<f64>,
+    places: Vec<u32>,
+    targets: Vec<Target>,
+    /// The halvings of the voices that the targets are for.
+    targets_for: Option<u32>,
+}
+
+/// A bin's place among the values.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    first: usize,
+    /// How often its instants are halved.
+    halvings: u32,
+    count: usize,
+}
+
+/// Where a row takes the instants of a voice.
+#[derive(Clone, Copy, Debug)]
+struct Target {
+    first: u32,
+    /// Bits that are zero in the instants that the row has.
+    skipped: u32,
+    /// How often the voice's instants are halved once more.
+    halvings: u32,
+}
+
+/// Places for what is dropped: several, so that an addition need not wait for the one before.
+const DROPPED: u32 = 8;
+
+/// No row: nothing is added anywhere but there.
+const NOWHERE: Target = Target { first: 0, skipped: u32::MAX, halvings: 0 };
+
+impl Target {
+    /// Where a value at an instant of the voice is added.
+    fn place(self, instant: u32) -> u32 {
+        if instant & self.skipped == 0 {
+            self.first + (instant >> self.halvings)
+        } else {
+            instant % DROPPED
+        }
+    }
 }
 
 impl Squeezed {
-    /// All zero, for so many rows and instants.
-    pub(super) fn clear(&mut self, rows: usize, instants: usize) {
+    /// All zero, for bins whose instants are halved so often and so many instants in all.
+    pub(super) fn clear(&mut self, halvings: impl Iterator<Item = u32>, instants: usize) {
+        let mut first = DROPPED as usize;
+        self.rows.clear();
+        self.rows.extend(halvings.map(|halvings| {
+            let row = Row { first, halvings, count: instants.div_ceil(1 << halvings) };
+            first += row.count;
+            row
+        }));
         self.instants = instants;
+        self.targets_for = None;
         self.values.clear();
-        self.values.resize(rows * instants, Complex64::ZERO);
-        self.frequencies_hz.clear();
-        self.frequencies_hz.resize(instants, 0.0);
+        self.values.resize(first, Complex64::ZERO);
     }
 
-    /// Adds a voice, given with its frequency-weighted twin (in Hz), at its instantaneous
-    /// frequencies (paper, eq. A.3, A.4).
-    pub(super) fn add(&mut self, bins: &Bins, voice: &[Complex64], weighted: &[Complex64]) {
-        let instants = self.instants;
-        let pairs = voice[..instants].iter().zip(&weighted[..instants]);
-        for (frequency_hz, (value, weighted)) in self.frequencies_hz.iter_mut().zip(pairs) {
+    /// Adds a voice whose instants are halved so often, given with its frequency-weighted twin (in
+    /// Hz), at its instantaneous frequencies (paper, eq. A.3, A.4).
+    ///
+    /// A bin that has more instants than the voice lies beyond its reach and gets nothing of it.
+    pub(super) fn add(
+        &mut self,
+        bins: &Bins,
+        halvings: u32,
+        voice: &[Complex64],
+        weighted: &[Complex64],
+    ) {
+        if self.targets_for != Some(halvings) {
+            self.targets = self.targets(halvings);
+            self.targets_for = Some(halvings);
+        }
+        let count = self.instants.div_ceil(1 << halvings);
+        let pairs = voice[..count].iter().zip(&weighted[..count]);
+        // In three passes: the last waits for memory only, and many of its additions at a time.
+        self.frequencies_hz.clear();
+        self.frequencies_hz.extend(pairs.map(|(value, weighted)| {
             let product = weighted.re * value.re + weighted.im * value.im;
-            *frequency_hz = product / value.norm_sqr();
+            product / value.norm_sqr()
+        }));
+        self.places.clear();
+        let targets = &self.targets;
+        let places = (0..)
+            .zip(&self.frequencies_hz)
+            .map(|(instant, &frequency_hz)| targets[bins.row(frequency_hz)].place(instant));
+        self.places.extend(places);
+        for (&place, value) in self.places.iter().zip(voice) {
+            self.values[place as usize] += value;
         }
-        for (instant, (value, &frequency_hz)) in voice.iter().zip(&self.frequencies_hz).enumerate()
-        {
-            self.values[bins.row(frequency_hz) * instants + instant] += value;
-        }
+    }
+
+    /// A target for every row of [`Bins`], those on either side included.
+    fn targets(&self, halvings: u32) -> Vec<Target> {
+        let target = |row: &Row| match row.halvings.checked_sub(halvings) {
+            Some(more) => Target {
+                first: u32::try_from(row.first).expect("fewer values than four thousand million"),
+                skipped: (1 << more) - 1,
+                halvings: more,
+            },
+            None => NOWHERE,
+        };
+        [NOWHERE].into_iter().chain(self.rows.iter().map(target)).chain([NOWHERE]).collect()
     }
 
     /// The values of a bin, by its place among the bins.
     pub(super) fn bin(&self, bin: usize) -> &[Complex64] {
-        &self.values[(bin + 1) * self.instants..][..self.instants]
+        let Row { first, count, .. } = self.rows[bin];
+        &self.values[first..first + count]
     }
 
     /// Mean of the squared magnitude over all instants, of one bin (paper, eq. 4).
     pub(super) fn mean_power(&self, bin: usize) -> f64 {
-        self.bin(bin).iter().map(Complex64::norm_sqr).sum::<f64>() / self.instants as f64
+        let values = self.bin(bin);
+        values.iter().map(Complex64::norm_sqr).sum::<f64>() / values.len() as f64
     }
 }
 
@@ -140,7 +217,7 @@ mod tests {
         let (_, bins) = bins();
         for frequency in [f64::NAN, -f64::NAN, -100.0, 0.0, 1e-300, 49.0, 4100.0, f64::INFINITY] {
             let row = bins.row(frequency);
-            assert!(row == 0 || row == bins.rows() - 1, "{frequency} Hz in row {row}");
+            assert!(row == 0 || row == 305, "{frequency} Hz in row {row}");
         }
     }
 }
