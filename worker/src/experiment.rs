@@ -114,12 +114,13 @@ pub(crate) struct Stretch {
 
 impl Experiment {
     /// The paper's simulation on a track of this design, at Table D1's speeds; 40 spans instead of
-    /// 25, on which the ends of the rail are heard.
+    /// 25, on which the ends of the rail are heard, and 4 rail elements in each, which with the
+    /// local flexibility are within 0.012 dB of 32.
     pub fn new(design: TrackDesign) -> Self {
         Self {
             design,
             spans: 40,
-            rail_elements_per_span: 8,
+            rail_elements_per_span: 4,
             sleeper_elements: 8,
             local_flexibility: true,
             time_step_s: 1e-5,
