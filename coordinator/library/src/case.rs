@@ -86,7 +86,7 @@ impl Library {
         self.counts(sql(sum).bind(campaign)).await
     }
 
-    async fn counts(&self, ask: Statement) -> Result<Status, LibraryError> {
+    pub(crate) async fn counts(&self, ask: Statement) -> Result<Status, LibraryError> {
         let mut status = Status::default();
         for row in self.readers().rows(ask).await? {
             let count = row.get_u32("cases")?;

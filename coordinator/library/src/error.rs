@@ -117,6 +117,23 @@ pub enum LibraryError {
         /// What was found.
         what: String,
     },
+    /// A statement that would write, where only reading is done.
+    #[error("`library sql` only reads; this statement would write")]
+    OnlyReads,
+    /// A statement that the database does not understand.
+    #[error("the database refuses the statement: {reason}")]
+    BadQuery {
+        /// What it said.
+        reason: String,
+    },
+    /// A row that does not fit its table.
+    #[error("a row does not fit the table {table}: {what}")]
+    BadRow {
+        /// The table.
+        table: &'static str,
+        /// What does not fit.
+        what: String,
+    },
     /// The library was closed meanwhile.
     #[error("the library is closed")]
     Closed,
@@ -163,6 +180,9 @@ impl LibraryError {
                 | Self::UnknownWorker { .. }
                 | Self::OtherDefinition { .. }
                 | Self::SeedTooLarge { .. }
+                | Self::OnlyReads
+                | Self::BadQuery { .. }
+                | Self::BadRow { .. }
         )
     }
 

@@ -1,7 +1,7 @@
 //! Opening and closing a library; the connections to it.
 
 use crate::LibraryError;
-use crate::engine::{self, Opened, Readers, Write, unix_ms};
+use crate::engine::{self, Opened, Readers, Target, Write, unix_ms};
 use std::fs::File;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -83,6 +83,10 @@ impl Library {
             }
             Err(std::fs::TryLockError::Error(source)) => Err(failed(source)),
         }
+    }
+
+    pub(crate) fn target(&self) -> &Target {
+        &self.0.target
     }
 
     pub(crate) fn readers(&self) -> &Readers {

@@ -26,7 +26,9 @@ use std::process::ExitCode;
 /// recording: the shortest way to see everything work.
 #[derive(Parser)]
 #[command(name = "tracktwin", version, propagate_version = true, max_term_width = 100)]
-#[command(after_help = "Exit codes: 0 done, 2 wrong input or usage, 3 failure.")]
+#[command(
+    after_help = "Exit codes: 0 done, 1 a negative answer, 2 wrong input or usage, 3 failure."
+)]
 struct Program {
     #[command(subcommand)]
     command: Command,
@@ -83,6 +85,7 @@ pub fn main() -> ExitCode {
     log_to_stderr(&program);
     match run(program.command) {
         Ok(()) => ExitCode::SUCCESS,
+        Err(Stop::Negative) => ExitCode::from(1),
         Err(Stop::Input(error)) => report(&error, 2),
         Err(Stop::Failure(error)) => report(&error, 3),
     }

@@ -1,8 +1,12 @@
 //! Why a command ends without being done.
 
+use tracktwin_library::LibraryError;
+
 /// The end of a command that is not success; each has its exit code.
 #[derive(Debug)]
 pub(super) enum Stop {
+    /// The answer is no, and was said (exit code 1).
+    Negative,
     /// What the user gave can't be used (exit code 2).
     Input(anyhow::Error),
     /// The machine, the network or the program failed (exit code 3).
@@ -12,6 +16,13 @@ pub(super) enum Stop {
 impl<E: Into<anyhow::Error>> From<E> for Stop {
     fn from(error: E) -> Self {
         Self::Failure(error.into())
+    }
+}
+
+impl Stop {
+    /// Wrong input or a failure, as the library says.
+    pub(super) fn from_library(error: LibraryError) -> Self {
+        if error.is_wrong_input() { Self::Input(error.into()) } else { Self::Failure(error.into()) }
     }
 }
 

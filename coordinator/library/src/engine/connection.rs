@@ -87,6 +87,13 @@ pub(crate) enum Readers {
 }
 
 impl Readers {
+    pub(crate) const fn dialect(&self) -> Dialect {
+        match self {
+            Self::Sqlite(_) => Dialect::Sqlite,
+            Self::Postgres(_) => Dialect::Postgres,
+        }
+    }
+
     /// All rows at once, waiting for a database that is away.
     pub(crate) async fn rows(&self, statement: Statement) -> Result<Vec<Row>, LibraryError> {
         let mut patience = Patience::new(true);

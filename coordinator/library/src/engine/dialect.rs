@@ -63,4 +63,12 @@ impl Dialect {
             }
         }
     }
+
+    /// How many elements a text column that holds a JSON array has.
+    pub(crate) fn json_length(self, column: &str) -> String {
+        match self {
+            Self::Sqlite => format!("json_array_length({column})"),
+            Self::Postgres => format!("jsonb_array_length({column}::jsonb)"),
+        }
+    }
 }

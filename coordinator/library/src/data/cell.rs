@@ -1,0 +1,38 @@
+//! A value of any table.
+
+use crate::data::ColumnKind;
+use crate::engine::Value;
+
+/// A value in a row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// Missing.
+    Null,
+    /// A truth.
+    Boolean(bool),
+    /// A text.
+    Text(String),
+    /// An integer.
+    Integer(i64),
+    /// A number.
+    Real(f64),
+    /// A series of numbers.
+    Doubles(Vec<f64>),
+}
+
+impl Cell {
+    /// To be bound where the column is of this kind; nothing if it does not fit.
+    pub(crate) fn bound_as(self, kind: ColumnKind) -> Option<Value> {
+        Some(match (kind, self) {
+            (ColumnKind::Text, Self::Null) => Value::Text(None),
+            (ColumnKind::Integer, Self::Null) => Value::Integer(None),
+            (ColumnKind::Real, Self::Null) => Value::Real(None),
+            (ColumnKind::Doubles, Self::Null) => Value::Doubles(None),
+            (ColumnKind::Text, Self::Text(text)) => Value::Text(Some(text)),
+            (ColumnKind::Integer, Self::Integer(integer)) => Value::Integer(Some(integer)),
+            (ColumnKind::Real, Self::Real(real)) => Value::Real(Some(real)),
+            (ColumnKind::Doubles, Self::Doubles(doubles)) => Value::Doubles(Some(doubles)),
+            _ => return None,
+        })
+    }
+}

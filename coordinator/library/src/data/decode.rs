@@ -1,0 +1,129 @@
+//! What a database answers, as cells.
+
+use super::{Cell, Column, ColumnKind, Table};
+use crate::LibraryError;
+use crate::engine::Row;
+use sqlx::postgres::{PgRow, PgValueFormat, PgValueRef};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row as _, TypeInfo, ValueRef};
+use std::fmt::Write as _;
+
+/// The row of a table, column by column.
+pub(super) fn table_row(table: &Table, row: &Row) -> Result<Vec<Cell>, LibraryError> {
+    cells(table.columns, row)
+}
+
+/// These columns of a row.
+pub(super) fn cells<'a>(
+    columns: impl IntoIterator<Item = &'a Column>,
+    row: &Row,
+) -> Result<Vec<Cell>, LibraryError> {
+    let cell = |column: &Column| {
+        Ok(match column.kind {
+            ColumnKind::Text => row.get::<Option<String>>(column.name)?.map(Cell::Text),
+            ColumnKind::Integer => row.get::<Option<i64>>(column.name)?.map(Cell::Integer),
+            ColumnKind::Real => row.get::<Option<f64>>(column.name)?.map(Cell::Real),
+            ColumnKind::Doubles => Some(Cell::Doubles(row.doubles(column.name)?)),
+        }
+        .unwrap_or(Cell::Null))
+    };
+    columns.into_iter().map(cell).collect()
+}
+
+/// Whatever a statement answers.
+pub(super) fn any_row(row: &Row, columns: &[String]) -> Result<Vec<Cell>, LibraryError> {
+    let cells = columns.iter().enumerate();
+    match row {
+        Row::Sqlite(row) => cells.map(|(place, name)| sqlite_cell(row, place, name)).collect(),
+        Row::Postgres(row) => cells.map(|(place, name)| postgres_cell(row, place, name)).collect(),
+    }
+}
+
+/// `SQLite` knows a type for each value, and no series: they are blobs.
+fn sqlite_cell(row: &SqliteRow, place: usize, name: &str) -> Result<Cell, LibraryError> {
+    let value = row.try_get_raw(place)?;
+    if value.is_null() {
+        return Ok(Cell::Null);
+    }
+    Ok(match value.type_info().name() {
+        "INTEGER" => Cell::Integer(row.try_get_unchecked(place)?),
+        "REAL" => Cell::Real(row.try_get_unchecked(place)?),
+        "BOOLEAN" => Cell::Boolean(row.try_get_unchecked(place)?),
+        "BLOB" => {
+            let bytes: &[u8] = row.try_get_unchecked(place)?;
+            match bytes.as_chunks::<8>() {
+                (chunks, []) if is_series(name) => {
+                    Cell::Doubles(chunks.iter().map(|it| f64::from_be_bytes(*it)).collect())
+                }
+                _ => Cell::Text(hexadecimal(bytes)),
+            }
+        }
+        _ => Cell::Text(row.try_get_unchecked(place)?),
+    })
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02X}");
+        text
+    })
+}
+
+/// Whether a column of that name holds series.
+fn is_series(name: &str) -> bool {
+    let mut columns = Table::ALL.into_iter().flat_map(|table| table.columns);
+    columns.any(|column| column.kind == ColumnKind::Doubles && column.name == name)
+}
+
+fn postgres_cell(row: &PgRow, place: usize, name: &str) -> Result<Cell, LibraryError> {
+    let value = row.try_get_raw(place)?;
+    if value.is_null() {
+        return Ok(Cell::Null);
+    }
+    let kind = value.type_info().name().to_owned();
+    let unknown = || LibraryError::BadQuery {
+        reason: format!(
+            "column {name} is of type {kind}: cast it to text, as in cast({name} as text)"
+        ),
+    };
+    Ok(match kind.as_str() {
+        "BOOL" => Cell::Boolean(row.try_get(place)?),
+        "INT2" => Cell::Integer(row.try_get::<i16, _>(place)?.into()),
+        "INT4" => Cell::Integer(row.try_get::<i32, _>(place)?.into()),
+        "INT8" => Cell::Integer(row.try_get(place)?),
+        "FLOAT4" => Cell::Real(row.try_get::<f32, _>(place)?.into()),
+        "FLOAT8" => Cell::Real(row.try_get(place)?),
+        "FLOAT8[]" => Cell::Doubles(row.try_get(place)?),
+        "NUMERIC" => numeric(&value).ok_or_else(unknown)?,
+        "TEXT" | "VARCHAR" | "CHAR" | "NAME" | "UNKNOWN" | "JSON" => {
+            Cell::Text(row.try_get_unchecked(place)?)
+        }
+        _ => return Err(unknown()),
+    })
+}
+
+/// A decimal number of any length, as PostgreSQL sends it: how many digits to base 10,000, the weight
+/// of the first, the sign, the decimals to show, the digits; each in two bytes. Sums and means of
+/// integers are such.
+fn numeric(value: &PgValueRef<'_>) -> Option<Cell> {
+    let bytes = value.as_bytes().ok()?;
+    if value.format() == PgValueFormat::Text {
+        return std::str::from_utf8(bytes).ok()?.parse().ok().map(Cell::Real);
+    }
+    let (words, _) = bytes.as_chunks::<2>();
+    let words: Vec<u16> = words.iter().map(|word| u16::from_be_bytes(*word)).collect();
+    let [_, weight, sign, decimals, digits @ ..] = &words[..] else { return None };
+    let mut text = if *sign == 0x4000 { "-0".to_owned() } else { "0".to_owned() };
+    for digit in digits {
+        let _ = write!(text, "{digit:04}");
+    }
+    let exponent = 4 * (i64::from(weight.cast_signed()) + 1 - i64::try_from(digits.len()).ok()?);
+    let real: f64 = format!("{text}e{exponent}").parse().ok()?;
+    // Whole numbers below 2^53 are exact.
+    let is_whole = *decimals == 0 && real.abs() < 2_f64.powi(53);
+    match *sign {
+        0 | 0x4000 if is_whole => Some(Cell::Integer(real as i64)),
+        0 | 0x4000 => Some(Cell::Real(real)),
+        _ => Some(Cell::Real(f64::NAN)),
+    }
+}

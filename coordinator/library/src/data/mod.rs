@@ -1,0 +1,18 @@
+//! The library as plain tables: asked in SQL, read out, written in, looked over.
+//!
+//! Owns what is the same for every table; knows no file format and compares nothing but what the
+//! schema itself promises.
+
+mod cell;
+mod decode;
+mod query;
+mod question;
+mod read;
+mod schema;
+mod verify;
+mod write;
+
+pub use cell::Cell;
+pub use query::Answer;
+pub use schema::{Column, ColumnKind, Table};
+pub use verify::Finding;

@@ -1,0 +1,98 @@
+//! Anybody's SQL, which only reads.
+
+use super::{Cell, decode, question, schema};
+use crate::engine::{Row, Target};
+use crate::{Library, LibraryError};
+use sqlx::postgres::PgConnectOptions;
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{
+    AssertSqlSafe, ConnectOptions, Executor, PgConnection, SqlSafeStr, SqliteConnection, Statement,
+};
+use std::path::Path;
+use tokio_stream::StreamExt;
+
+/// What takes the rows of an answer, one after the other.
+pub trait Answer {
+    /// What may go wrong with it.
+    type Error: From<LibraryError>;
+
+    /// The columns; comes first, and also where there are no rows.
+    ///
+    /// # Errors
+    /// Ends the answer.
+    fn columns(&mut self, names: &[String]) -> Result<(), Self::Error>;
+
+    /// A row.
+    ///
+    /// # Errors
+    /// Ends the answer.
+    fn row(&mut self, cells: Vec<Cell>) -> Result<(), Self::Error>;
+}
+
+impl Library {
+    /// Asks one statement of the user's, on a connection of its own that the database lets read
+    /// only.
+    ///
+    /// # Errors
+    /// [`LibraryError::OnlyReads`] for a statement that would write, [`LibraryError::BadQuery`] for
+    /// one that the database does not understand; or what `answer` says.
+    pub async fn query<A: Answer>(&self, text: &str, answer: &mut A) -> Result<(), A::Error> {
+        match self.target() {
+            Target::Sqlite(path) => sqlite(path, text, answer).await,
+            Target::Postgres { options, .. } => postgres(options, text, answer).await,
+        }
+    }
+}
+
+async fn sqlite<A: Answer>(path: &Path, text: &str, answer: &mut A) -> Result<(), A::Error> {
+    question::check(text)?;
+    // Opened for reading, so that no pragma can undo it.
+    let options = SqliteConnectOptions::new().filename(path).read_only(true);
+    let options = options.pragma("query_only", "on");
+    let mut connection: SqliteConnection = options.connect().await.map_err(LibraryError::from)?;
+    let text = AssertSqlSafe(text.to_owned()).into_sql_str();
+    let statement = connection.prepare(text).await.map_err(refused)?;
+    let columns = names(statement.columns());
+    answer.columns(&columns)?;
+    let mut rows = statement.query().fetch(&mut connection);
+    while let Some(row) = rows.next().await {
+        let row = Row::Sqlite(row.map_err(refused)?);
+        answer.row(decode::any_row(&row, &columns)?)?;
+    }
+    Ok(())
+}
+
+async fn postgres<A: Answer>(
+    options: &PgConnectOptions,
+    text: &str,
+    answer: &mut A,
+) -> Result<(), A::Error> {
+    let mut connection: PgConnection = options.connect().await.map_err(LibraryError::from)?;
+    // The protocol takes one statement at a time, so this transaction is all that it can end.
+    connection.execute("begin transaction read only").await.map_err(LibraryError::from)?;
+    let text = AssertSqlSafe(text.to_owned()).into_sql_str();
+    let statement = connection.prepare(text).await.map_err(refused)?;
+    let columns = names(statement.columns());
+    answer.columns(&columns)?;
+    let mut rows = statement.query().fetch(&mut connection);
+    while let Some(row) = rows.next().await {
+        let row = Row::Postgres(row.map_err(refused)?);
+        answer.row(decode::any_row(&row, &columns)?)?;
+    }
+    Ok(())
+}
+
+fn names<C: sqlx::Column>(columns: &[C]) -> Vec<String> {
+    columns.iter().map(|column| schema::spelled(column.name()).to_owned()).collect()
+}
+
+/// `SQLITE_READONLY` and its kin end so; PostgreSQL's code for a transaction that only reads.
+fn refused(error: sqlx::Error) -> LibraryError {
+    let sqlx::Error::Database(database) = &error else { return error.into() };
+    let code = database.code().unwrap_or_default();
+    let sqlite_result = code.parse::<u32>().map(|code| code % 256);
+    if sqlite_result == Ok(8) && code.len() < 5 || code == "25006" {
+        return LibraryError::OnlyReads;
+    }
+    LibraryError::BadQuery { reason: database.message().to_owned() }
+}

@@ -1,0 +1,190 @@
+//! Writing rows in that came from another library.
+
+use super::{Cell, Column, Table, decode};
+use crate::engine::{Connection, Write, sql};
+use crate::{Library, LibraryError};
+use std::collections::HashSet;
+use std::fmt::Write as _;
+
+/// Rows in one statement: of the widest table's 38 columns well below the 32,766 values that
+/// `SQLite` takes.
+const ROWS_A_STATEMENT: usize = 250;
+
+impl Library {
+    /// Adds rows that are not there yet; answers how many these were.
+    ///
+    /// Leases don't travel: a case that was leased elsewhere waits here.
+    ///
+    /// # Errors
+    /// [`LibraryError::OtherDefinition`] for a campaign that is another here;
+    /// [`LibraryError::BadRow`] for cells that don't fit their columns; or when the library cannot be
+    /// written.
+    pub async fn write_table(
+        &self,
+        table: &'static Table,
+        rows: Vec<Vec<Cell>>,
+    ) -> Result<u64, LibraryError> {
+        let mut added = 0;
+        let mut rows = rows.into_iter().peekable();
+        while rows.peek().is_some() {
+            let rows = rows.by_ref().take(ROWS_A_STATEMENT);
+            let rows = rows.map(|row| at_rest(table, row)).collect::<Vec<_>>();
+            self.refuse_other_campaigns(table, &rows).await?;
+            let rows = self.without_those_here(table, rows).await?;
+            if !rows.is_empty() {
+                added += self.write(Rows { table, rows }).await?;
+            }
+        }
+        Ok(added)
+    }
+
+    /// Leaves out rows of cases that are here, so that going on with a copy costs little.
+    async fn without_those_here(
+        &self,
+        table: &Table,
+        mut rows: Vec<Vec<Cell>>,
+    ) -> Result<Vec<Vec<Cell>>, LibraryError> {
+        let (campaign, index) = (table.column("campaign_id"), table.column("sobol_index"));
+        let (Some(campaign), Some(index)) = (campaign, index) else { return Ok(rows) };
+        // Rows come by campaign; those of a second one in the batch are simply sent.
+        let Some(Cell::Text(campaign)) = rows.first().map(|row| row[campaign].clone()) else {
+            return Ok(rows);
+        };
+        let indices: Vec<i64> = rows.iter().filter_map(|row| integer(&row[index])).collect();
+        let places: Vec<usize> = table.key.iter().filter_map(|name| table.column(name)).collect();
+        let ask = format!(
+            "select {} from {} where campaign_id = $1 and sobol_index {}",
+            table.key.join(", "),
+            table.name,
+            self.readers().dialect().listed("$2")
+        );
+        let columns = places.iter().map(|&place| &table.columns[place]);
+        let columns: Vec<&Column> = columns.collect();
+        let mut here = HashSet::new();
+        for row in self.readers().rows(sql(ask).bind(campaign).bind(indices)).await? {
+            here.insert(key(&decode::cells(columns.iter().copied(), &row)?));
+        }
+        rows.retain(|row| {
+            let cells: Vec<Cell> = places.iter().map(|&place| row[place].clone()).collect();
+            !here.contains(&key(&cells))
+        });
+        Ok(rows)
+    }
+
+    async fn refuse_other_campaigns(
+        &self,
+        table: &Table,
+        rows: &[Vec<Cell>],
+    ) -> Result<(), LibraryError> {
+        if table.name != "campaign" {
+            return Ok(());
+        }
+        let (id, hash) = (table.column("id"), table.column("definition_hash"));
+        let (Some(id), Some(hash)) = (id, hash) else { return Ok(()) };
+        for row in rows {
+            let (Cell::Text(id), Cell::Text(hash)) = (&row[id], &row[hash]) else { continue };
+            match self.campaign(id).await {
+                Ok(here) if here.definition_hash != *hash => {
+                    return Err(LibraryError::OtherDefinition { id: id.clone() });
+                }
+                Ok(_) | Err(LibraryError::UnknownCampaign { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    /// Says of cases whose results have come in from elsewhere that they are finished.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn settle(&self) -> Result<u64, LibraryError> {
+        self.write(Settle).await
+    }
+}
+
+/// A key as text; numbers in one way only, so equal keys have equal texts.
+fn key(cells: &[Cell]) -> String {
+    format!("{cells:?}")
+}
+
+fn integer(cell: &Cell) -> Option<i64> {
+    match cell {
+        Cell::Integer(integer) => Some(*integer),
+        _ => None,
+    }
+}
+
+/// A row as it stands where nobody works on it.
+fn at_rest(table: &Table, mut row: Vec<Cell>) -> Vec<Cell> {
+    let state = table.column("state");
+    let expires = table.column("lease_expires_unix_ms");
+    if let (Some(state), Some(expires)) = (state, expires)
+        && row.get(state) == Some(&Cell::Text("leased".to_owned()))
+    {
+        row[state] = Cell::Text("waiting".to_owned());
+        row[expires] = Cell::Null;
+    }
+    row
+}
+
+struct Rows {
+    table: &'static Table,
+    rows: Vec<Vec<Cell>>,
+}
+
+impl Write for Rows {
+    type Answer = u64;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
+        let columns = self.table.columns.len();
+        let mut insert =
+            format!("insert into {} ({}) values ", self.table.name, self.table.column_list());
+        for row in 0..self.rows.len() {
+            for column in 0..columns {
+                let before = if column > 0 {
+                    ", "
+                } else if row > 0 {
+                    ", ("
+                } else {
+                    "("
+                };
+                let _ = write!(insert, "{before}${}", row * columns + column + 1);
+            }
+            insert.push(')');
+        }
+        let _ = write!(insert, " on conflict ({}) do nothing", self.table.key.join(", "));
+        let mut insert = sql(insert);
+        for row in &self.rows {
+            let misfit = |what: String| LibraryError::BadRow { table: self.table.name, what };
+            if row.len() != columns {
+                return Err(misfit(format!("{} columns instead of {columns}", row.len())));
+            }
+            for (column, cell) in self.table.columns.iter().zip(row) {
+                let value = cell.clone().bound_as(column.kind);
+                let value = value.ok_or_else(|| misfit(format!("{cell:?} in {}", column.name)))?;
+                insert = insert.bind(value);
+            }
+        }
+        connection.execute(insert).await
+    }
+}
+
+struct Settle;
+
+impl Write for Settle {
+    type Answer = u64;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
+        let settle = format!(
+            "update campaign_case set state = 'finished', error = null,
+                lease_expires_unix_ms = null
+            where state <> 'finished' and (
+                select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                    and result.sobol_index = campaign_case.sobol_index)
+            = (select {} from campaign where campaign.id = campaign_case.campaign_id)",
+            connection.dialect().json_length("speeds_km_h")
+        );
+        connection.execute(sql(settle)).await
+    }
+}

@@ -1,0 +1,21 @@
+//! `tracktwin library digest`: one hash a campaign.
+
+use super::{Stop, Which, answer, open};
+use serde::Serialize;
+
+#[derive(Serialize)]
+struct Digest {
+    campaign: String,
+    digest: String,
+}
+
+pub(super) async fn run(which: &Which) -> Result<(), Stop> {
+    let (library, campaigns) = open(&which.library).await?;
+    let mut answers = Vec::new();
+    for campaign in campaigns {
+        let digest = library.digest(&campaign.id).await?;
+        answers.push(Digest { campaign: campaign.id, digest });
+    }
+    answer(which.json, &answers, |Digest { campaign, digest }| format!("{digest}  {campaign}"));
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! `tracktwin library export`: the library as files that others open as they are.
+
+use super::files::csv_file::CsvFile;
+use super::files::parquet_file::ParquetFile;
+use super::{OrInput, Stop, open_library};
+use crate::commands::say;
+use anyhow::{Context, anyhow};
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use tracktwin_library::{Cell, Library, Table};
+
+/// Rows held at a time, and in one group of a Parquet file: 30 MB of results.
+const ROWS_A_GROUP: usize = 8192;
+
+/// What `library export` is told.
+#[derive(Args)]
+#[command(
+    after_help = "A folder gets a file a table, which `library import` reads again. A file gets \
+    the training set:\none row a case and speed, parameters beside features.\n\n\
+    Examples:\n  tracktwin library export --out training.parquet --library sqlite:out/library.sqlite\n  \
+    python3 -c \"import pandas; print(pandas.read_parquet('training.parquet'))\""
+)]
+pub(in crate::commands) struct Arguments {
+    /// The library: sqlite:PATH or postgres://USER@HOST/DATABASE.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+    /// A folder for all tables, or a file for the training set.
+    #[arg(long, value_name = "DIR|FILE")]
+    out: PathBuf,
+    /// The files' format [default: what the file's name ends in, else parquet].
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Parquet: small, exact, with types; series are lists.
+    Parquet,
+    /// CSV: series are JSON arrays.
+    Csv,
+}
+
+impl Format {
+    const fn extension(self) -> &'static str {
+        match self {
+            Self::Parquet => "parquet",
+            Self::Csv => "csv",
+        }
+    }
+
+    fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?;
+        [Self::Parquet, Self::Csv].into_iter().find(|format| format.extension() == extension)
+    }
+}
+
+pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
+    let out = &arguments.out;
+    let library = open_library(&arguments.library).await?;
+    let named = Format::of(out).filter(|_| !out.is_dir());
+    let format = arguments.format.or(named).unwrap_or(Format::Parquet);
+    if named.is_some() {
+        let rows = export(&library, Table::ENTRIES, out, format).await?;
+        say(&format!("{}: {rows} rows, one a case and speed", out.display()));
+        return Ok(());
+    }
+    if let (Some(extension), false) = (out.extension(), out.is_dir()) {
+        let extension = extension.display();
+        return Err(anyhow!("--out {}: {extension} is neither parquet nor csv", out.display()))
+            .or_input();
+    }
+    std::fs::create_dir_all(out)
+        .with_context(|| format!("--out {}: the folder cannot be made", out.display()))
+        .or_input()?;
+    for table in Table::ALL {
+        let path = out.join(format!("{}.{}", table.name, format.extension()));
+        let rows = export(&library, table, &path, format).await?;
+        say(&format!("{}: {rows} rows", path.display()));
+    }
+    Ok(())
+}
+
+/// Writes a table beside the file and renames, so that no reader meets half of it.
+async fn export(
+    library: &Library,
+    table: &'static Table,
+    path: &Path,
+    format: Format,
+) -> Result<usize, Stop> {
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
+    let at = || format!("{}: it cannot be written", path.display());
+    let mut file = Sink::create(&partial, table, format).with_context(at).or_input()?;
+    let mut count = 0;
+    let take = async |rows: Vec<Vec<Cell>>| {
+        count += rows.len();
+        file.write(&rows).with_context(at)
+    };
+    library.read_table(table, ROWS_A_GROUP, take).await?;
+    file.end().with_context(at)?;
+    std::fs::rename(&partial, path).with_context(at)?;
+    Ok(count)
+}
+
+/// A file of either format.
+enum Sink {
+    Parquet(Box<ParquetFile>),
+    Csv(CsvFile),
+}
+
+impl Sink {
+    fn create(path: &Path, table: &'static Table, format: Format) -> anyhow::Result<Self> {
+        Ok(match format {
+            Format::Parquet => Self::Parquet(Box::new(ParquetFile::create(path, table)?)),
+            Format::Csv => Self::Csv(CsvFile::create(path, table)?),
+        })
+    }
+
+    fn write(&mut self, rows: &[Vec<Cell>]) -> anyhow::Result<()> {
+        match self {
+            Self::Parquet(file) => Ok(file.write(rows)?),
+            Self::Csv(file) => Ok(file.write(rows)?),
+        }
+    }
+
+    fn end(self) -> anyhow::Result<()> {
+        match self {
+            Self::Parquet(file) => Ok(file.end()?),
+            Self::Csv(file) => Ok(file.end()?),
+        }
+    }
+}

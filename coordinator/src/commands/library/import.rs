@@ -1,0 +1,62 @@
+//! `tracktwin library import`: what `export` wrote, into a library.
+
+use super::files::parquet_file;
+use super::{OrInput, Stop};
+use crate::commands::say;
+use anyhow::{Context, anyhow};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use tracktwin_library::{Cell, Library, Table};
+
+/// What `library import` is told.
+#[derive(Args)]
+pub(in crate::commands) struct Arguments {
+    /// The folder that `library export --format parquet` wrote.
+    folder: PathBuf,
+    /// The library, made where there is none: sqlite:PATH or postgres://USER@HOST/DATABASE. What it
+    /// holds stays as it is.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+}
+
+pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
+    let folder = &arguments.folder;
+    let file = |table: &Table| folder.join(format!("{}.parquet", table.name));
+    if !file(Table::ALL[0]).is_file() {
+        return Err(anyhow!(
+            "{}: there is no {} in it; `tracktwin library export --out FOLDER` writes one",
+            folder.display(),
+            file(Table::ALL[0]).file_name().unwrap_or_default().display()
+        ))
+        .or_input();
+    }
+    let library = Library::open_or_create(&arguments.library).await.map_err(Stop::from_library)?;
+    for table in Table::ALL {
+        let path = file(table);
+        if path.is_file() {
+            let (read, added) = import(&library, table, &path).await?;
+            say(&format!("{}: {added} of {read} rows added", table.name));
+        }
+    }
+    library.settle().await?;
+    library.close().await;
+    Ok(())
+}
+
+async fn import(
+    library: &Library,
+    table: &'static Table,
+    path: &Path,
+) -> Result<(usize, u64), Stop> {
+    let (mut read, mut added) = (0, 0);
+    let take = async |rows: Vec<Vec<Cell>>| {
+        read += rows.len();
+        added += library.write_table(table, rows).await?;
+        Ok::<(), anyhow::Error>(())
+    };
+    parquet_file::read(path, table, take)
+        .await
+        .with_context(|| format!("{}", path.display()))
+        .or_input()?;
+    Ok((read, added))
+}

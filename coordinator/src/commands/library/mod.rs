@@ -1,0 +1,102 @@
+//! `tracktwin library`: what a library holds, asked, copied and looked over.
+
+mod copy;
+mod digest;
+mod export;
+mod files;
+mod import;
+mod sql;
+mod status;
+mod verify;
+
+use super::{OrInput, Stop, say};
+use clap::{Args, Subcommand};
+use serde::Serialize;
+use tracktwin_library::{CampaignRecord, Library};
+
+/// What can be asked of a library, and done with it.
+#[derive(Subcommand)]
+pub(super) enum Question {
+    /// How many cases of each campaign are finished, waiting, in work and given up.
+    Status(Which),
+    /// A hash over all results in order: equal for equal campaigns, however and wherever they were
+    /// run.
+    Digest(Which),
+    /// Ask in SQL; nothing can be changed.
+    Sql(sql::Arguments),
+    /// Write the library's tables, or its training set, as Parquet or CSV files.
+    Export(export::Arguments),
+    /// Add what `export` wrote as Parquet files to a library.
+    Import(import::Arguments),
+    /// Copy a library into another, of either kind; interrupted, the same command goes on.
+    Copy(copy::Arguments),
+    /// Look everything over: hashes, gaps, duplicates, numbers that are none.
+    Verify(Which),
+}
+
+/// Which library is asked, and how it answers.
+#[derive(Args)]
+pub(super) struct Which {
+    /// The library: sqlite:PATH or postgres://USER@HOST/DATABASE.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) async fn run(question: Question) -> Result<(), Stop> {
+    match question {
+        Question::Status(which) => status::run(&which).await,
+        Question::Digest(which) => digest::run(&which).await,
+        Question::Sql(arguments) => sql::run(&arguments).await,
+        Question::Export(arguments) => export::run(&arguments).await,
+        Question::Import(arguments) => import::run(&arguments).await,
+        Question::Copy(arguments) => copy::run(&arguments).await,
+        Question::Verify(which) => verify::run(&which).await,
+    }
+}
+
+async fn open(url: &str) -> Result<(Library, Vec<CampaignRecord>), Stop> {
+    let library = open_library(url).await?;
+    let campaigns = library.campaigns().await?;
+    Ok((library, campaigns))
+}
+
+/// A library that is there.
+async fn open_library(url: &str) -> Result<Library, Stop> {
+    Library::open(url).await.map_err(Stop::from_library)
+}
+
+/// One campaign of a library: the named one, or the only one.
+pub(super) async fn choose(library: &Library, id: Option<&str>) -> Result<CampaignRecord, Stop> {
+    if let Some(id) = id {
+        return library.campaign(id).await.map_err(Stop::from_library);
+    }
+    let mut campaigns = library.campaigns().await?;
+    let names: Vec<_> = campaigns.iter().map(|campaign| campaign.id.as_str()).collect();
+    let name = library.name();
+    match campaigns.len() {
+        0 => Err(anyhow::anyhow!(
+            "library {name}: it holds no campaign yet; `tracktwin run` adds one"
+        ))
+        .or_input(),
+        1 => Ok(campaigns.remove(0)),
+        _ => Err(anyhow::anyhow!(
+            "library {name}: it holds several campaigns; choose one with --campaign: {}",
+            names.join(", ")
+        ))
+        .or_input(),
+    }
+}
+
+fn answer<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> String) {
+    if json {
+        let json = serde_json::to_string_pretty(answers).expect("counts and names become JSON");
+        say(&json);
+    } else {
+        for answer in answers {
+            say(&text(answer));
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! `tracktwin library sql`: the library asked in SQL.
+
+use super::files::text;
+use super::{Stop, open_library};
+use clap::{Args, ValueEnum};
+use std::io::{self, BufWriter, StdoutLock, Write};
+use tracktwin_library::{Answer, Cell, LibraryError};
+
+/// What `library sql` is told.
+#[derive(Args)]
+#[command(
+    after_help = "Tables and views, with worked queries: docs/how-to/query-the-library.md.\n\
+    Names with capitals need no quotes, in either database.\n\n\
+    Example:\n  tracktwin library sql \"select name, finished, cases from campaign_status\" \
+    --library sqlite:out/library.sqlite"
+)]
+pub(in crate::commands) struct Arguments {
+    /// The statement.
+    statement: String,
+    /// The library: sqlite:PATH or postgres://USER@HOST/DATABASE.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+    /// How the answer is written.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    /// Aligned columns, for people.
+    Table,
+    /// Comma-separated values with a head.
+    Csv,
+    /// An array with an object a row.
+    Json,
+}
+
+pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
+    let library = open_library(&arguments.library).await?;
+    let mut printer = Printer {
+        out: BufWriter::new(io::stdout().lock()),
+        format: arguments.format,
+        names: Vec::new(),
+        rows: Vec::new(),
+        printed: 0,
+    };
+    let answered = library.query(&arguments.statement, &mut printer).await;
+    match answered.and_then(|()| printer.end()) {
+        Ok(()) => Ok(()),
+        // Who reads has seen enough, as `head` has.
+        Err(Ended::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(Ended::Output(error)) => Err(error.into()),
+        Err(Ended::Library(error)) => Err(Stop::from_library(error)),
+    }
+}
+
+/// Why an answer ends early.
+enum Ended {
+    Library(LibraryError),
+    Output(io::Error),
+}
+
+impl From<LibraryError> for Ended {
+    fn from(error: LibraryError) -> Self {
+        Self::Library(error)
+    }
+}
+
+impl From<io::Error> for Ended {
+    fn from(error: io::Error) -> Self {
+        Self::Output(error)
+    }
+}
+
+struct Printer {
+    out: BufWriter<StdoutLock<'static>>,
+    format: Format,
+    names: Vec<String>,
+    /// For a table: all of it, since its columns are as wide as their widest cell.
+    rows: Vec<Vec<String>>,
+    printed: usize,
+}
+
+impl Answer for Printer {
+    type Error = Ended;
+
+    fn columns(&mut self, names: &[String]) -> Result<(), Ended> {
+        self.names = names.to_vec();
+        match self.format {
+            Format::Table => self.rows.push(self.names.clone()),
+            Format::Csv => writeln!(self.out, "{}", text::csv_line(&self.names))?,
+            Format::Json => write!(self.out, "[")?,
+        }
+        Ok(())
+    }
+
+    fn row(&mut self, cells: Vec<Cell>) -> Result<(), Ended> {
+        match self.format {
+            Format::Table => self.rows.push(cells.iter().map(text::cell).collect()),
+            Format::Csv => {
+                let cells: Vec<_> = cells.iter().map(text::cell).collect();
+                writeln!(self.out, "{}", text::csv_line(&cells))?;
+            }
+            Format::Json => {
+                let before = if self.printed == 0 { "\n" } else { ",\n" };
+                let names = self.names.iter().cloned();
+                let object: serde_json::Map<_, _> =
+                    names.zip(cells.into_iter().map(text::json)).collect();
+                write!(self.out, "{before}  {}", serde_json::Value::from(object))?;
+            }
+        }
+        self.printed += 1;
+        Ok(())
+    }
+}
+
+impl Printer {
+    fn end(&mut self) -> Result<(), Ended> {
+        match self.format {
+            Format::Table => text::table(&self.rows, &mut self.out)?,
+            Format::Csv => {}
+            Format::Json => writeln!(self.out, "{}]", if self.printed == 0 { "" } else { "\n" })?,
+        }
+        Ok(self.out.flush()?)
+    }
+}

@@ -1,0 +1,69 @@
+//! `tracktwin library status`: how many cases stand where.
+
+use super::{Stop, Which, answer, open};
+use serde::Serialize;
+use tracktwin_library::{CampaignRecord, Library};
+
+/// How many given-up cases are explained.
+const FAILURES_SHOWN: u32 = 5;
+
+#[derive(Serialize)]
+struct Counts {
+    campaign: String,
+    cases: u32,
+    finished: u32,
+    waiting: u32,
+    leased: u32,
+    failed: u32,
+    speeds_km_h: Vec<f64>,
+    failures: Vec<Failure>,
+}
+
+#[derive(Serialize)]
+struct Failure {
+    sobol_index: u32,
+    error: String,
+}
+
+pub(super) async fn run(which: &Which) -> Result<(), Stop> {
+    let (library, campaigns) = open(&which.library).await?;
+    let mut answers = Vec::new();
+    for campaign in campaigns {
+        answers.push(counts(&library, campaign).await?);
+    }
+    answer(which.json, &answers, Counts::text);
+    Ok(())
+}
+
+impl Counts {
+    fn text(&self) -> String {
+        let Self { campaign, cases, finished, waiting, leased, failed, .. } = self;
+        let counts = format!(
+            "{campaign}: {cases} cases, {finished} finished, {waiting} waiting, {leased} in work, \
+             {failed} given up"
+        );
+        let failures = self.failures.iter().map(|Failure { sobol_index, error }| {
+            format!("\n  case {sobol_index} was given up: {error}")
+        });
+        counts + &failures.collect::<String>()
+    }
+}
+
+async fn counts(library: &Library, campaign: CampaignRecord) -> Result<Counts, Stop> {
+    let status = library.status(&campaign.id).await?;
+    let failures = library.failures(&campaign.id, FAILURES_SHOWN).await?;
+    let failures = failures.into_iter().map(|case| Failure {
+        sobol_index: case.case.index,
+        error: case.error.unwrap_or_default(),
+    });
+    Ok(Counts {
+        cases: status.total(),
+        finished: status.finished,
+        waiting: status.waiting,
+        leased: status.leased,
+        failed: status.failed,
+        speeds_km_h: campaign.speeds_km_h,
+        failures: failures.collect(),
+        campaign: campaign.id,
+    })
+}
