@@ -18,7 +18,7 @@ const ROWS_AT_A_TIME: usize = 1000;
     exit code 1\nwhere a campaign is not the same in both."
 )]
 pub(in crate::commands) struct Arguments {
-    /// The library to copy: sqlite:PATH or postgres://USER@HOST/DATABASE.
+    /// The library to copy: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL")]
     from: String,
     /// Where to; made where there is none.

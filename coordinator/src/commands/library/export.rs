@@ -21,7 +21,7 @@ const ROWS_A_GROUP: usize = 8192;
     python3 -c \"import pandas; print(pandas.read_parquet('training.parquet'))\""
 )]
 pub(in crate::commands) struct Arguments {
-    /// The library: sqlite:PATH or postgres://USER@HOST/DATABASE.
+    /// The library: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
     library: String,
     /// A folder for all tables, or a file for the training set.

@@ -13,7 +13,7 @@ use tracktwin_library::{Cell, Library, Table};
 pub(in crate::commands) struct Arguments {
     /// The folder that `library export --format parquet` wrote.
     folder: PathBuf,
-    /// The library, made where there is none: sqlite:PATH or postgres://USER@HOST/DATABASE. What it
+    /// The library, made where there is none: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`. What it
     /// holds stays as it is.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
     library: String,

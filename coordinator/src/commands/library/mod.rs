@@ -37,7 +37,7 @@ pub(super) enum Question {
 /// Which library is asked, and how it answers.
 #[derive(Args)]
 pub(super) struct Which {
-    /// The library: sqlite:PATH or postgres://USER@HOST/DATABASE.
+    /// The library: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
     library: String,
     /// Answer in JSON.

@@ -17,7 +17,7 @@ use tracktwin_library::{Answer, Cell, LibraryError};
 pub(in crate::commands) struct Arguments {
     /// The statement.
     statement: String,
-    /// The library: sqlite:PATH or postgres://USER@HOST/DATABASE.
+    /// The library: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
     library: String,
     /// How the answer is written.

@@ -11,7 +11,9 @@ pub(super) async fn run(which: &Which) -> Result<(), Stop> {
         let findings: Vec<_> = findings.iter().map(json).collect();
         say(&format!("{:#}", serde_json::Value::from(findings)));
     } else {
-        findings.iter().for_each(|finding| say(&text(finding)));
+        for finding in &findings {
+            say(&text(finding));
+        }
     }
     if findings.is_empty() {
         if !which.json {
