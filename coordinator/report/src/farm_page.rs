@@ -7,8 +7,8 @@ use crate::page::{figure, page_with};
 use maud::{Markup, PreEscaped, html};
 use tracktwin_parameters::{Parameter, ParameterSet};
 
-const SPECTRUM: [f64; 2] = [560.0, 300.0];
-const SCATTER: [f64; 2] = [420.0, 300.0];
+const SPECTRUM: [f64; 2] = [520.0, 300.0];
+const SCATTER: [f64; 2] = [290.0, 300.0];
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
 /// Pairs of parameters whose plane is shown.
@@ -113,8 +113,12 @@ impl FarmCampaign {
 /// The whole page.
 pub fn farm_page(farm: &Farm) -> String {
     let head = html! { style { (PreEscaped(STYLE)) } };
-    let script = html! { script { (PreEscaped(SCRIPT)) } };
-    page_with("The farm", &summary(farm), &head, &farm_view(farm), &script)
+    // Outside of what changes, or typing would be lost.
+    let end = html! {
+        @if !farm.may_control { (login()) }
+        script { (PreEscaped(SCRIPT)) }
+    };
+    page_with("The farm", &summary(farm), &head, &farm_view(farm), &end)
 }
 
 /// The middle of the page, which changes.
@@ -127,7 +131,6 @@ pub fn farm_view(farm: &Farm) -> Markup {
         @for campaign in &farm.campaigns { (campaign_part(campaign, farm.may_control)) }
         h2 { "Workers" }
         (workers(&farm.workers))
-        @if !farm.may_control { (login()) }
     }
 }
 
@@ -147,22 +150,33 @@ fn summary(farm: &Farm) -> String {
 
 fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
     let FarmCampaign { waiting, leased, finished, failed, .. } = campaign;
+    let pictures = pictures(campaign);
     html! {
-        section {
-            h2 { (campaign.id) " " span.state { (campaign.state) } }
-            (progress(campaign))
-            p {
-                (finished) " of " (campaign.cases()) " cases finished, " (leased) " in work, "
-                (waiting) " waiting, "
-                span.bad[*failed > 0] { (failed) " given up" } "; "
-                (significant(campaign.per_second)) " a second, "
-                (campaign.eta_s().map_or_else(|| "nothing left to wait for".to_owned(), |eta| format!("{} left", duration(eta))))
-                @if campaign.priority != 0 { ", priority " (campaign.priority) }
+            section {
+                h2 { (campaign.id) " " span.state { (campaign.state) } }
+                (progress(campaign))
+                p {
+                    (finished) " of " (campaign.cases()) " cases finished, " (leased) " in work, "
+                    (waiting) " waiting, "
+                    span.bad[*failed > 0] { (failed) " given up" } "; "
+                    (significant(campaign.per_second)) " a second, "
+    (left(campaign))
+                    @if campaign.priority != 0 { ", priority " (campaign.priority) }
+                }
+                @if may_control { (buttons(campaign)) }
+                @if !campaign.causes.is_empty() { (causes(&campaign.causes)) }
+                @if !pictures.is_empty() {
+                    (figure(&pictures, "Left: local wavelet power spectra of the newest cases at the fastest speed. Right: finished cases in the parameter space; given-up ones in the second colour."))
+                }
             }
-            @if may_control { (buttons(campaign)) }
-            @if !campaign.causes.is_empty() { (causes(&campaign.causes)) }
-            (figure(&pictures(campaign), "Left: local wavelet power spectra of the newest cases at the fastest speed. Right: finished cases in the parameter space; given-up ones in the second colour."))
         }
+}
+
+fn left(campaign: &FarmCampaign) -> String {
+    match campaign.eta_s() {
+        Some(eta) => format!("{} left", duration(eta)),
+        None if campaign.waiting + campaign.leased > 0 => "rate not known yet".to_owned(),
+        None => "nothing left to do".to_owned(),
     }
 }
 
@@ -255,7 +269,7 @@ fn spectra(campaign: &FarmCampaign) -> String {
     let levels = campaign.newest.iter().flat_map(|(_, values)| values);
     let y = Axis::around("LWPS in dB re 1 (m/s²)²", levels.map(|value| decibel * value));
     let x = Axis::logarithmic("frequency in Hz", low, high);
-    let mut chart = Chart::new("Newest cases", SPECTRUM, x, y);
+    let mut chart = Chart::new("Newest", SPECTRUM, x, y);
     for ((name, values), class) in campaign.newest.iter().zip(CLASSES) {
         let points = frequencies.iter().zip(values);
         chart.line(&format!("{class} thin"), points.map(|(&f, value)| (f, decibel * value)));

@@ -68,8 +68,9 @@ pub(super) struct Which {
 /// Which campaign is meant.
 #[derive(Args)]
 pub(super) struct Named {
-    /// Its id, as `tracktwin status` tells it; may be left out where there is only one.
-    id: Option<String>,
+    /// Its id, as `tracktwin status` tells it, or its name if no other has the same; may be left
+    /// out where there is only one.
+    campaign: Option<String>,
     #[command(flatten)]
     which: Which,
 }
@@ -136,7 +137,13 @@ async fn add(
 impl Named {
     async fn open(self) -> Result<(Library, String), Stop> {
         let library = Library::open(&self.which.library).await.or_input()?;
-        let record = super::library::choose(&library, self.id.as_deref()).await?;
+        let named = self.campaign.as_deref();
+        let all = library.campaigns().await?;
+        let mut same = all.iter().filter(|it| Some(it.name.as_str()) == named);
+        if let (Some(only), None) = (same.next(), same.next()) {
+            return Ok((library, only.id.clone()));
+        }
+        let record = super::library::choose(&library, named).await?;
         Ok((library, record.id))
     }
 }

@@ -77,7 +77,7 @@ async fn pictured(library: &Library, campaign: FarmCampaign) -> Result<FarmCampa
         .unwrap_or_default();
     let newest = library.newest(id, NEWEST).await?.into_iter().filter_map(|entry| {
         let features = entry.features.into_iter().next()?;
-        Some((format!("case {}", entry.case.index), features.log_power))
+        Some((entry.case.index.to_string(), features.log_power))
     });
     let newest = newest.collect();
     let covered = library.covered(id, COVERED).await?;

@@ -6,6 +6,7 @@
 mod audits;
 mod campaigns;
 mod embedded;
+mod network;
 mod security;
 mod service;
 mod support;

@@ -1,0 +1,153 @@
+//! How many cases a second the farm can pass through: durable lease, and 12 kB of results a case
+//! through gRPC into the library, by workers that compute nothing.
+//!
+//! `cargo bench -p tracktwin --bench farm -- [throughput|workers|memory] [--cases N]`
+//!
+//! Everything but the PostgreSQL server runs in this process, so its CPU time is that of both sides.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark reports by stopping")]
+
+use std::num::NonZeroUsize;
+use std::time::{Duration, Instant};
+use test_postgres::Server;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tracktwin::campaign::Campaign;
+use tracktwin::dispatch::{Counts, Dispatch, Settings};
+use tracktwin::farm;
+use tracktwin::service::{Security, serve};
+use tracktwin_library::Library;
+use tracktwin_signal::{Features, ThirdOctave};
+use tracktwin_worker::agent::{self, Config};
+use tracktwin_worker::{Case, Experiment, ExperimentError, Outcome, PassFeatures, Simulate};
+
+/// Instead of physics: the features of one case, handed out again and again.
+struct StandIn(Vec<PassFeatures>);
+
+impl Simulate for StandIn {
+    fn simulate(&self, cases: &[Case]) -> Vec<Outcome> {
+        vec![Outcome::Finished(self.0.clone()); cases.len()]
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the signature is that of a preparation")]
+fn stand_in(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
+    let bins = experiment.features.frequencies_hz().len();
+    let pass = |&speed_km_h: &f64| PassFeatures {
+        speed_km_h,
+        features: Features {
+            log_power: (0..bins).map(|bin| (bin as f64 * speed_km_h).sin()).collect(),
+            band_levels_db: vec![speed_km_h; ThirdOctave::COUNT],
+        },
+    };
+    Ok(Box::new(StandIn(experiment.speeds_km_h.iter().map(pass).collect())))
+}
+
+/// What a run cost.
+struct Cost {
+    seconds: f64,
+    cpu_s: f64,
+    memory_mb: f64,
+}
+
+/// CPU time of this process so far, in s (proc(5): fields 14 and 15, in hundredths).
+fn cpu_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
+    let fields: Vec<&str> = stat.rsplit_once(')').unwrap().1.split_whitespace().collect();
+    (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / 100.0
+}
+
+/// Memory this process holds now, in MB.
+fn memory_mb() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find(|line| line.starts_with("VmRSS")).unwrap();
+    line.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap() / 1024.0
+}
+
+/// Passes so many cases through a library by so many workers of one core each.
+async fn pass_through(url: &str, cases: u32, workers: usize) -> Cost {
+    let campaign = Campaign::built_in(Some(cases)).unwrap();
+    let library = Library::open_or_create(url).await.unwrap();
+    farm::prepare(&library, &campaign).await.unwrap();
+    let settings = Settings { prepare: stand_in, ..Settings::default() };
+    let dispatch = Dispatch::new(library.clone(), settings, Counts::default());
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let coordinator = format!("http://{}", listener.local_addr().unwrap());
+    let stop = CancellationToken::new();
+    let end = stop.clone();
+    let server =
+        tokio::spawn(async move { serve(listener, dispatch, &Security::default(), end).await });
+
+    let (begun, cpu) = (Instant::now(), cpu_s());
+    let done = CancellationToken::new();
+    let workers: Vec<_> = (0..workers)
+        .map(|_| {
+            let config =
+                Config { prepare: stand_in, ..Config::new(coordinator.clone(), NonZeroUsize::MIN) };
+            tokio::spawn(agent::run(config, done.clone()))
+        })
+        .collect();
+    let id = campaign.id();
+    while library.status(&id).await.unwrap().finished < cases {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    let (seconds, cpu_s) = (begun.elapsed().as_secs_f64(), cpu_s() - cpu);
+    let memory_mb = memory_mb();
+    done.cancel();
+    for worker in workers {
+        worker.await.unwrap().unwrap();
+    }
+    stop.cancel();
+    server.await.unwrap().unwrap();
+    library.close().await;
+    Cost { seconds, cpu_s, memory_mb }
+}
+
+fn tell(name: &str, cases: u32, workers: usize, cost: &Cost) {
+    let Cost { seconds, cpu_s, memory_mb } = cost;
+    let cases = f64::from(cases);
+    println!(
+        "| {name} | {cases} | {workers} | {:.0} | {:.3} | {memory_mb:.0} |",
+        cases / seconds,
+        1000.0 * cpu_s / cases
+    );
+}
+
+async fn measure(engine: &str, cases: u32, workers: usize) {
+    let folder =
+        tempfile::tempdir_in(std::env::var("TRACKTWIN_BENCH_DIR").unwrap_or_else(|_| ".".into()))
+            .unwrap();
+    if engine == "sqlite" {
+        let url = format!("sqlite:{}", folder.path().join("l.sqlite").display());
+        let cost = pass_through(&url, cases, workers).await;
+        return tell("SQLite, synchronous=FULL", cases, workers, &cost);
+    }
+    let durable = test_postgres::Settings { durable: true };
+    let Some(server) = Server::start(durable) else { return };
+    let cost = pass_through(&server.database(), cases, workers).await;
+    tell("PostgreSQL, fsync (server's CPU not counted)", cases, workers, &cost);
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|it| it != "--bench").collect();
+    let cases = arguments.iter().skip_while(|it| *it != "--cases").nth(1);
+    let cases: u32 = cases.map_or(20_000, |text| text.parse().expect("--cases N"));
+    let what = arguments.first().filter(|it| !it.starts_with('-')).map_or("throughput", |it| it);
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    println!("| library | cases | workers | cases a second | CPU in ms a case | memory in MB |");
+    println!("|---|---|---|---|---|---|");
+    runtime.block_on(async {
+        match what {
+            "workers" => measure("sqlite", cases, 1000).await,
+            "memory" => {
+                for cases in [cases / 10, cases] {
+                    measure("sqlite", cases, 2).await;
+                }
+            }
+            _ => {
+                measure("sqlite", cases, 2).await;
+                measure("postgres", cases, 2).await;
+            }
+        }
+    });
+}

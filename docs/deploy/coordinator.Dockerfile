@@ -1,0 +1,22 @@
+# The coordinator: `docker build -f docs/deploy/coordinator.Dockerfile -t tracktwin .`
+FROM rust:1.95-slim-bookworm AS build
+RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev && rm -rf /var/lib/apt/lists/*
+WORKDIR /src
+COPY . .
+# Registry and target are kept between builds; the program is copied out of the cache.
+RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \
+    cargo build --release --locked --bin tracktwin && cp target/release/tracktwin /tracktwin
+
+FROM debian:bookworm-slim
+RUN apt-get update && apt-get install -y --no-install-recommends ca-certificates curl \
+    && rm -rf /var/lib/apt/lists/* \
+    && useradd --system --uid 10001 --create-home --home-dir /var/lib/tracktwin tracktwin
+COPY --from=build /tracktwin /usr/local/bin/tracktwin
+USER tracktwin
+WORKDIR /var/lib/tracktwin
+EXPOSE 7700 7780
+# Well is a coordinator whose library answers.
+HEALTHCHECK --interval=10s --timeout=5s --start-period=20s \
+    CMD curl --fail --silent http://127.0.0.1:7780/healthz
+ENTRYPOINT ["tracktwin"]
+CMD ["coordinator"]

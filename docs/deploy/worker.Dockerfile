@@ -1,0 +1,22 @@
+# A worker: `docker build -f docs/deploy/worker.Dockerfile -t tracktwin-worker .`
+#
+# Build both images from one commit: a worker whose physics differs is refused.
+FROM rust:1.95-slim-bookworm AS build
+RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev && rm -rf /var/lib/apt/lists/*
+WORKDIR /src
+COPY . .
+RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \
+    cargo build --release --locked -p tracktwin-worker && cp target/release/tracktwin-worker /tracktwin-worker
+
+FROM debian:bookworm-slim
+RUN apt-get update && apt-get install -y --no-install-recommends curl \
+    && rm -rf /var/lib/apt/lists/* \
+    && useradd --system --uid 10001 --no-create-home tracktwin
+COPY --from=build /tracktwin-worker /usr/local/bin/tracktwin-worker
+USER tracktwin
+ENV TRACKTWIN_HEALTH=127.0.0.1:7701
+# Well is a worker that answers; one that waits for its coordinator is well, too.
+HEALTHCHECK --interval=10s --timeout=5s CMD curl --fail --silent http://127.0.0.1:7701/healthz
+# It finishes or hands back what it has within ten seconds.
+STOPSIGNAL SIGTERM
+ENTRYPOINT ["tracktwin-worker"]
