@@ -6,6 +6,7 @@
 //! - [`service`]: the coordinator on a port: certificates, tokens, starting and stopping.
 //! - [`farm`]: coordinator and workers in one process.
 //! - [`training`]: from a library to a training set.
+//! - [`null_campaign`]: simulations of a track with nothing left out, kept in the library.
 //! - [`provenance`]: what a library keeps of trainings and evaluations.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
 //!
@@ -16,6 +17,7 @@ pub mod commands;
 pub mod dashboard;
 pub mod dispatch;
 pub mod farm;
+pub mod null_campaign;
 pub mod provenance;
 pub mod service;
 pub mod training;

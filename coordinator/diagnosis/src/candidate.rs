@@ -59,7 +59,7 @@ pub fn candidates(section: &Section) -> Vec<Candidate> {
 
 type Family = (ExtensionInstance, &'static [&'static str], Vec<Vec<f64>>);
 
-fn parameter(kind: &'static Kind, name: &str) -> &'static KindParameter {
+pub(crate) fn parameter(kind: &'static Kind, name: &str) -> &'static KindParameter {
     let found = kind.parameters.iter().find(|parameter| parameter.name == name);
     found.expect("candidates name parameters of the registry")
 }

@@ -28,6 +28,8 @@ const AROUND_BLOW: f64 = 0.4;
 pub struct FirstLook {
     /// What was found: chain first, then wheel, then the rail's surface.
     pub findings: Vec<Finding>,
+    /// The wheel's flat with the places of its blows, if it has one.
+    pub flat: Option<Flat>,
     /// Passes that can't be used, and why.
     pub troubles: Vec<Trouble>,
     /// Noise floor of each pass in (m/s2)2/Hz.
@@ -49,9 +51,11 @@ pub fn first_look(recording: &Recording) -> FirstLook {
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let alarm = EACH_TEST.ln() - (offsets.len().max(1) as f64).ln();
     findings.extend(offsets.iter().filter(|pair| pair.ln_p() <= alarm).map(offset_finding));
-    findings.extend(surface(recording));
+    let (flat, on_surface) = surface(recording);
+    findings.extend(on_surface);
     FirstLook {
         findings,
+        flat,
         troubles: chain::troubles(recording, &offsets),
         noise_floors: chain::noise_floors(recording),
         gains,
@@ -60,7 +64,7 @@ pub fn first_look(recording: &Recording) -> FirstLook {
 }
 
 /// What wheel and rail surface show.
-fn surface(recording: &Recording) -> Vec<Finding> {
+fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     let circumference = wheel::nominal_circumference_m(recording);
     let flat = circumference.and_then(|length| wheel::flat(recording, length, EACH_TEST));
     let reach = AROUND_BLOW * recording.spacing_m;
@@ -79,7 +83,7 @@ fn surface(recording: &Recording) -> Vec<Finding> {
     let known = turn.or(circumference.filter(|_| !orders.is_empty()));
     let waves = impact::corrugation(recording, EACH_TEST, known);
     findings.extend(waves.as_ref().map(corrugation_finding));
-    findings
+    (flat, findings)
 }
 
 /// Whether an order's waves are too long to be the flat's own harmonics: four of its lengths.

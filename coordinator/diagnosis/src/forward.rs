@@ -153,6 +153,49 @@ impl Forward {
         Ok(Linearised { log_power, jacobian })
     }
 
+    /// Changes of the log powers by dynamic stiffnesses added under each compared sleeper's rail
+    /// seat: a matrix a sleeper, a column for each shape over the lines, in parts of the track's own
+    /// stiffness there.
+    ///
+    /// # Errors
+    /// As [`Forward::log_power`].
+    pub(crate) fn port_columns(
+        &self,
+        values: &DVector<f64>,
+        extensions: &[Arc<dyn Extension>],
+        shapes: &[Vec<Complex64>],
+    ) -> Result<Vec<DMatrix<f64>>, ModelError> {
+        let transfer = self.transfer(values, extensions, true)?;
+        let of_sleeper = |sleeper: usize| {
+            let in_track = self.section.in_track(sleeper);
+            let seat_node = self.section.seat_node(sleeper);
+            let mut columns = DMatrix::zeros(self.count(), shapes.len());
+            for row in 0..self.count() {
+                let (seen_from, speed, band) = self.place(row);
+                if seen_from.abs_diff(sleeper) > NEIGHBOURS {
+                    continue;
+                }
+                let window = &self.windows[speed][seen_from][band];
+                let power = self.power(&transfer, values, seen_from, speed, band);
+                let floor = power + self.noise(speed, band);
+                let shapes_of_rail = self.shape_powers(&transfer, seen_from, speed, band);
+                let share = mean(shapes_of_rail, |shape| (floor + shape).recip())
+                    * self.scale(values, seen_from, speed);
+                for &(line, weight) in self.bands.weights(band) {
+                    let weight = share * weight * self.excitation(&transfer, values, speed, line);
+                    let column = &transfer.from_seats[line][in_track];
+                    let own = 1.0 / column[seat_node].norm();
+                    let felt = weight * own * transfer.felt(window, line, column);
+                    for (shape, lines) in shapes.iter().enumerate() {
+                        columns[(row, shape)] += (felt * lines[line]).re;
+                    }
+                }
+            }
+            columns
+        };
+        Ok((0..self.section.sleepers).into_par_iter().map(of_sleeper).collect())
+    }
+
     /// Sleeper, speed and band of a row.
     pub fn place(&self, row: usize) -> (usize, usize, usize) {
         let (sleeper, rest) = (row / self.per_sleeper(), row % self.per_sleeper());
@@ -321,15 +364,8 @@ impl Forward {
                 spectrum.push((knot, share * weight * seen));
             }
             for (sums, &(in_track, _)) in supports.iter_mut().zip(&near) {
-                // d alpha = -alpha_seat^2 dZ, d |H|^2 = -2 |H|^2 Re(k d alpha).
                 let column = &transfer.from_seats[line][in_track];
-                let felt: Complex64 = window
-                    .iter()
-                    .map(|&(node, share)| {
-                        let power = share * transfer.power[line][node];
-                        2.0 * power * transfer.stiffness[line][node] * column[node] * column[node]
-                    })
-                    .sum();
+                let felt = transfer.felt(window, line, column);
                 for (sum, variation) in sums.iter_mut().zip(variations) {
                     *sum += weight * (felt * variation[line][in_track]).re;
                 }

@@ -10,6 +10,7 @@ mod baseline;
 mod calibration;
 mod candidate;
 pub mod chain;
+mod conclusion;
 mod finding;
 mod first_look;
 mod forward;
@@ -18,12 +19,14 @@ pub mod impact;
 mod null_model;
 mod observation;
 mod outcome;
+mod port_scan;
 mod profile;
 mod screen;
 mod search;
 mod section;
 mod spectra;
 mod subject;
+mod suggestion;
 mod transfer;
 pub mod wheel;
 
@@ -31,6 +34,7 @@ pub use bands::Bands;
 pub use baseline::Unknowns;
 pub use calibration::{Calibration, CalibrationError, Problem};
 pub use candidate::{Candidate, candidates};
+pub use conclusion::Evidence;
 pub use finding::{Finding, Place};
 pub use first_look::{FALSE_ALARMS, FirstLook, first_look};
 pub use forward::{Forward, Linearised};
@@ -40,6 +44,7 @@ pub use outcome::{
     BeforeAfter, Diagnosis, Estimate, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score,
     Scores, SleeperValues, Verdict,
 };
+pub use port_scan::{Port, PortScan};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, Search, Stage, first_calibration, search};
 pub use section::Section;

@@ -24,6 +24,10 @@ const RUN_IN_SPANS: f64 = 4.0;
 /// Surfaces that are simulated side by side.
 const AT_A_TIME: u64 = 8;
 
+/// Step of the grid of logarithms on which null models are simulated: their scatter changes little
+/// when a stiffness changes by a fifth.
+const GRID_STEP: f64 = 0.4;
+
 /// How far the covariance is drawn towards its diagonal: the sample is many, but not many times,
 /// the number of log powers.
 const SHRINKAGE: f64 = 0.03;
@@ -84,6 +88,30 @@ impl NullModel {
             .collect::<Result<_, NullError>>()?;
         let differences = differences.into_iter().flatten().collect();
         Ok(Self { per_sleeper: forward.per_sleeper(), differences })
+    }
+
+    /// From stored numbers: simulation by simulation, each in the order of [`Forward`].
+    ///
+    /// None if they are not what a forward model of this kind has.
+    pub fn from_numbers(forward: &Forward, numbers: &[f64]) -> Option<Self> {
+        let whole = !numbers.is_empty() && numbers.len() % forward.count() == 0;
+        let differences = numbers.chunks_exact(forward.count()).map(<[f64]>::to_vec).collect();
+        whole.then(|| Self { per_sleeper: forward.per_sleeper(), differences })
+    }
+
+    /// The values, on a coarse grid and the same for all sleepers, that a null model is simulated
+    /// with: tracks that are nearly alike share it.
+    pub fn grid_values(forward: &Forward, values: &DVector<f64>) -> DVector<f64> {
+        let unknowns = &forward.unknowns;
+        let mut grid = unknowns.typical();
+        for range in [unknowns.ballast(), unknowns.railpad()] {
+            let mean = values.rows(range.start, range.len()).mean();
+            range.for_each(|index| grid[index] = (mean / GRID_STEP).round() * GRID_STEP);
+        }
+        for index in unknowns.global() {
+            grid[index] = (values[index] / GRID_STEP).round() * GRID_STEP;
+        }
+        grid
     }
 
     /// Mean difference of a sleeper's log powers, over all simulations and sleepers.

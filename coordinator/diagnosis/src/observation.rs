@@ -85,6 +85,12 @@ impl Observation {
         whitened.select_rows(&self.rows(false))
     }
 
+    /// Sum over all log powers of the logarithms of their conditional standard deviations.
+    pub fn log_deviation(&self) -> f64 {
+        let of = |whitening: &DMatrix<f64>| -whitening.diagonal().map(f64::ln).sum();
+        self.whitening.iter().map(of).sum()
+    }
+
     /// Sum over what was held out of the logarithms of its conditional standard deviations.
     pub fn held_out_log_deviation(&self) -> f64 {
         let of = |whitening: &DMatrix<f64>| -> f64 {

@@ -4,6 +4,7 @@ use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::{Candidate, candidates};
 use crate::null_model::NullModel;
 use crate::observation::Observation;
+use crate::port_scan::{Port, PortScan};
 use crate::screen::{Template, templates};
 use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
@@ -23,7 +24,17 @@ const REFINED_MAX: usize = 8;
 const SCREENED_MIN: f64 = 2.0;
 
 /// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
-const TEMPERATURE: f64 = 3.0;
+pub(crate) const TEMPERATURE: f64 = 3.0;
+
+/// Fitted candidates from whose values the model without them is fitted anew.
+const RESTARTS: usize = 3;
+
+/// Nats by which such a fit must be better to take its place.
+const BETTER: f64 = 3.0;
+
+/// Least log evidence for an effect beside one that was accepted before, over the first one's: what
+/// a first effect's model leaves unexplained looks like a small second one.
+const FURTHER_SHARE_MIN: f64 = 0.25;
 
 /// Least gain on held-out passes, in nats, for a name.
 const HELD_OUT_MIN: f64 = 4.0;
@@ -52,15 +63,21 @@ pub struct Fitted {
     pub log_evidence: f64,
     /// Length of its trace after re-tuning, `d'`, in the trial screened.
     pub detectability: f64,
+    /// Its trace: whitened change of the log powers.
+    pub change: DVector<f64>,
 }
 
 /// One search for an effect.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Round {
     /// Probability to see such evidence for anything if nothing is left out.
     pub p_value: f64,
     /// What was fitted, best first.
     pub fitted: Vec<Fitted>,
+    /// What an unknown dynamic stiffness under a rail seat would explain.
+    pub port: Option<Port>,
+    /// Probability to see as much evidence for one if nothing is left out.
+    pub port_p_value: f64,
     /// Gain of the best on each speed held out, in nats.
     pub held_out_gain: Vec<f64>,
     /// Whether the best was accepted.
@@ -80,6 +97,8 @@ pub struct Search {
     pub rounds: Vec<Round>,
     /// What was observed, with its covariance.
     pub observation: Observation,
+    /// Scatter to expect of each log power of a sleeper in the middle of the section.
+    pub deviation: DVector<f64>,
     /// Log density of each speed when it is held out, in nats a log power: baseline, extended.
     pub held_out: [f64; 2],
 }
@@ -133,22 +152,42 @@ pub fn search(
         accepted: Vec::new(),
         rounds: Vec::new(),
         observation: observation.clone(),
+        deviation: setting.covariances[setting.covariances.len() / 2].diagonal().map(f64::sqrt),
         held_out: [0.0; 2],
     };
-    let before = setting.held_out(&[], &search.baseline.values)?;
+    let mut before = setting.held_out(&[], &search.baseline.values)?;
     let mut reached = before.clone();
     while search.accepted.len() < EFFECTS_MAX {
         let accepted = search.accepted.clone();
         let problem =
             Problem { forward: &subject.forward, observation: &observation, candidates: &accepted };
-        let round = setting.round(&problem, &search.last, &all, &reached, progress)?;
-        let goes_on = round.0.accepted;
-        if let (true, Some(best)) = (goes_on, round.0.fitted.first()) {
+        let strongest = search.rounds.iter().flat_map(|round| round.fitted.first());
+        let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
+        let so_far = Reached { log_densities: &reached, strongest };
+        let (mut round, mut scores) =
+            setting.round(&problem, &search.last, &all, so_far, progress)?;
+        if let Some(better) = retuned(&problem, &search.last, &round.fitted)? {
+            // The candidates found a better baseline on their way: the opponent gets it too.
+            let gain = better.log_evidence - search.last.log_evidence;
+            round.fitted.iter_mut().for_each(|fitted| fitted.log_evidence -= gain);
+            if search.accepted.is_empty() {
+                search.baseline = better.clone();
+            }
+            search.last = better;
+            reached = setting.held_out(&accepted, &search.last.values)?;
+            if search.accepted.is_empty() {
+                before = reached.clone();
+            }
+            let so_far = Reached { log_densities: &reached, strongest };
+            (round, scores) = setting.round(&problem, &search.last, &all, so_far, progress)?;
+        }
+        let goes_on = round.accepted;
+        if let (true, Some(best)) = (goes_on, round.fitted.first()) {
             search.last = best.calibration.clone();
             search.accepted.push(best.candidate.clone());
-            reached = round.1;
+            reached = scores;
         }
-        search.rounds.push(round.0);
+        search.rounds.push(round);
         if !goes_on {
             break;
         }
@@ -156,6 +195,15 @@ pub fn search(
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
     search.held_out = [mean(&before), mean(&reached)];
     Ok(search)
+}
+
+/// How far earlier searches came.
+#[derive(Clone, Copy)]
+struct Reached<'a> {
+    /// Log density of each speed when it is held out.
+    log_densities: &'a [f64],
+    /// Greatest log evidence of an accepted effect in nats.
+    strongest: f64,
 }
 
 /// What stays the same through all searches.
@@ -218,7 +266,7 @@ impl<'a> Setting<'a> {
         problem: &Problem<'_>,
         current: &Calibration,
         all: &[Candidate],
-        reached: &[f64],
+        Reached { log_densities: reached, strongest }: Reached<'_>,
         progress: &(impl Fn(Stage, f64) + Sync),
     ) -> Result<(Round, Vec<f64>), CalibrationError> {
         let trials: usize = all.iter().map(|candidate| candidate.trials.len()).sum();
@@ -233,11 +281,23 @@ impl<'a> Setting<'a> {
             .map(|template| (template.log_evidence(&current.residual, &none), template))
             .collect();
         let highest = screened.iter().map(|(evidence, _)| *evidence).fold(f64::MIN, f64::max);
-        let p_value = self.p_value(problem.observation, current, &templates, highest);
-        let mut round =
-            Round { p_value, fitted: Vec::new(), held_out_gain: Vec::new(), accepted: false };
+        let nulls = self.null_residuals(problem.observation, current);
+        let excess = self.excess(current, &nulls);
+        let p_value = tail_probability(&nulls, highest / excess, |residual, felt| {
+            let evidence = templates.iter().map(|t| t.log_evidence(residual, felt));
+            Some(evidence.fold(f64::MIN, f64::max))
+        });
+        let mut round = Round { p_value, ..Round::default() };
         if p_value > FALSE_ALARM {
             return Ok((round, Vec::new()));
+        }
+        let ports = PortScan::new(problem, current)?;
+        round.port = ports.best(current, &current.residual, &none);
+        if let Some(port) = &round.port {
+            round.port_p_value =
+                tail_probability(&nulls, port.log_evidence / excess, |residual, felt| {
+                    ports.best(current, residual, felt).map(|port| port.log_evidence)
+                });
         }
         let chosen = choose(screened, all);
         let count = chosen.len() as f64;
@@ -255,7 +315,7 @@ impl<'a> Setting<'a> {
         fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         round.fitted = fitted;
         progress(Stage::HeldOut, 0.0);
-        let sure = TEMPERATURE * 20_f64.ln();
+        let sure = (TEMPERATURE * 20_f64.ln()).max(FURTHER_SHARE_MIN * strongest);
         let best = round.fitted.first().filter(|best| best.log_evidence >= sure);
         let Some(best) = best else { return Ok((round, Vec::new())) };
         let with: Vec<Candidate> =
@@ -270,24 +330,56 @@ impl<'a> Setting<'a> {
         Ok((round, scores))
     }
 
-    /// Probability of such evidence if nothing is left out: from the greatest evidence in each
-    /// null simulation, by a Gumbel distribution.
-    fn p_value(
-        &self,
-        observation: &Observation,
-        current: &Calibration,
-        templates: &[Template],
-        highest: f64,
-    ) -> f64 {
-        let greatest = |null: &DVector<f64>| {
+    /// Whitened null differences.
+    fn null_residuals(&self, observation: &Observation, current: &Calibration) -> Vec<Null> {
+        let of = |null: &DVector<f64>| {
             let residual = observation.fitted(&observation.whiten(null));
             let felt = current.jacobian.tr_mul(&residual);
-            let evidence = templates.iter().map(|t| t.log_evidence(&residual, &felt));
-            evidence.fold(f64::MIN, f64::max)
+            Null { residual, felt }
         };
-        let maxima: Vec<f64> = self.nulls.par_iter().map(greatest).collect();
-        gumbel_tail(&maxima, highest)
+        self.nulls.par_iter().map(of).collect()
     }
+
+    /// By how much the recording scatters about the model more than null simulations about theirs,
+    /// at least one: the median over the sleepers, which one place does not change.
+    fn excess(&self, current: &Calibration, nulls: &[Null]) -> f64 {
+        let sleepers = self.covariances.len();
+        let square = |residual: &DVector<f64>| {
+            let size = residual.len() / sleepers;
+            let of = |sleeper: usize| residual.rows(sleeper * size, size).norm_squared();
+            median((0..sleepers).map(of).collect())
+        };
+        let fitted = |null: &Null| {
+            square(&(&null.residual - &current.jacobian * current.precision.solve(&null.felt)))
+        };
+        let usual = median(nulls.par_iter().map(fitted).collect());
+        (square(&current.residual) / usual).max(1.0)
+    }
+}
+
+/// A null simulation as the calibration sees it.
+struct Null {
+    /// Whitened difference from the prediction.
+    residual: DVector<f64>,
+    /// Its product with the derivatives.
+    felt: DVector<f64>,
+}
+
+/// Probability of evidence as great as `found` if nothing is left out: from the greatest evidence
+/// in each null simulation, by a Gumbel distribution.
+fn tail_probability(
+    nulls: &[Null],
+    found: f64,
+    greatest: impl Fn(&DVector<f64>, &DVector<f64>) -> Option<f64> + Sync,
+) -> f64 {
+    let maxima: Vec<f64> =
+        nulls.par_iter().filter_map(|null| greatest(&null.residual, &null.felt)).collect();
+    gumbel_tail(&maxima, found)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Probability that a maximum is as high as `value`, from a sample of maxima.
@@ -334,5 +426,24 @@ fn refine(
     let calibration = with.calibrate(DVector::from_vec(start))?;
     let log_evidence = calibration.log_evidence - current.log_evidence;
     let detectability = template.detectability.max(0.0).sqrt();
-    Ok(Fitted { candidate: candidate.clone(), calibration, log_evidence, detectability })
+    let (candidate, change) = (candidate.clone(), template.change.clone());
+    Ok(Fitted { candidate, calibration, log_evidence, detectability, change })
+}
+
+/// The model without the candidates, fitted anew from where they came out, if that is better.
+fn retuned(
+    problem: &Problem<'_>,
+    current: &Calibration,
+    fitted: &[Fitted],
+) -> Result<Option<Calibration>, CalibrationError> {
+    let mut best: Option<Calibration> = None;
+    for fitted in fitted.iter().take(RESTARTS) {
+        let values = fitted.calibration.values.rows(0, current.values.len()).into_owned();
+        let again = problem.calibrate(values)?;
+        let known = best.as_ref().unwrap_or(current).objective;
+        if again.objective < known - BETTER {
+            best = Some(again);
+        }
+    }
+    Ok(best)
 }

@@ -62,6 +62,11 @@ impl Section {
         self.spans_beyond + self.sleepers - 1
     }
 
+    /// Rail node above a compared sleeper.
+    pub const fn seat_node(&self, sleeper: usize) -> usize {
+        (self.spans_beyond + sleeper) * ELEMENTS
+    }
+
     /// Place on the model's track of a place on the recording's scale, both in m.
     pub fn model_x_m(&self, x_m: f64) -> f64 {
         x_m - self.first_x_m + self.spans_beyond as f64 * self.design.sleeper.spacing_m
@@ -99,7 +104,7 @@ impl Section {
         let spacing_m = self.design.sleeper.spacing_m;
         let blur_m = speed_m_s * CENTRE_RAD / (TAU * centre_hz * SQRT_2);
         let node_m = spacing_m / ELEMENTS as f64;
-        let middle = (self.spans_beyond + sleeper) * ELEMENTS;
+        let middle = self.seat_node(sleeper);
         let reach = ((0.5 * spacing_m + BLUR_REACH * blur_m) / node_m).ceil() as usize;
         let reach = reach.min(middle);
         let step = |distance_m: f64| 0.5 * libm::erf(distance_m / (SQRT_2 * blur_m));

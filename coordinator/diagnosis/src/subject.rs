@@ -62,8 +62,8 @@ pub struct Subject {
     pub pass_variance: DVector<f64>,
     /// Number in the recording of the first sleeper compared.
     pub first_sleeper: usize,
-    /// Passes at each speed.
-    pub passes: Vec<usize>,
+    /// Numbers in the recording of the passes at each speed.
+    pub pass_numbers: Vec<Vec<usize>>,
 }
 
 impl Subject {
@@ -90,8 +90,9 @@ impl Subject {
         let forward = Forward::new(section, bands, &speeds, noise);
         let log_power = log_power(&forward, &spectra, sleepers.start);
         let pass_variance = pass_variance(&forward, &spectra);
-        let passes = spectra.speeds.iter().map(|speed| speed.passes.len()).collect();
-        Ok(Self { forward, log_power, pass_variance, first_sleeper: sleepers.start, passes })
+        let pass_numbers = spectra.speeds.iter().map(|speed| speed.passes.clone()).collect();
+        let first_sleeper = sleepers.start;
+        Ok(Self { forward, log_power, pass_variance, first_sleeper, pass_numbers })
     }
 
     /// Covariance of each sleeper's log powers: the null model's, what the passes do not share, and

@@ -62,6 +62,23 @@ impl Transfer {
         self.model.roughness_gain(wave_number_rad_m)
     }
 
+    /// By what a change of the dynamic stiffness at a seat, whose receptances to all nodes are
+    /// `column`, changes a window's mean power: its product's real part.
+    ///
+    /// `d alpha = -alpha_seat^2 dZ`, hence `d |H|^2 = 2 |H|^2 Re(k alpha_seat^2 dZ)`.
+    pub(crate) fn felt(
+        &self,
+        window: &[(usize, f64)],
+        line: usize,
+        column: &[Complex64],
+    ) -> Complex64 {
+        let (power, stiffness) = (&self.power[line], &self.stiffness[line]);
+        let at = |&(node, share): &(usize, f64)| {
+            2.0 * share * power[node] * stiffness[node] * column[node] * column[node]
+        };
+        window.iter().map(at).sum()
+    }
+
     /// Mean of the power over a window's nodes at a line.
     pub(crate) fn mean_power(&self, window: &[(usize, f64)], line: usize) -> f64 {
         window.iter().map(|&(node, share)| share * self.power[line][node]).sum()

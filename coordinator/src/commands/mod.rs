@@ -3,6 +3,7 @@
 mod campaign;
 mod certs;
 mod coordinator;
+mod diagnose;
 mod evaluate;
 mod library;
 mod progress;
@@ -60,6 +61,8 @@ enum Command {
     Train(train::Arguments),
     /// Tell the track's parameters under a recording, sleeper by sleeper.
     Evaluate(evaluate::Arguments),
+    /// Find where a recording and the simulation differ, and what physics was left out.
+    Diagnose(diagnose::Arguments),
     /// Ask the model library.
     #[command(subcommand)]
     Library(library::Question),
@@ -117,6 +120,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Receptance(arguments) => receptance::run(&arguments),
         Command::Train(arguments) => asynchronously(train::run(arguments)),
+        Command::Diagnose(arguments) => asynchronously(diagnose::run(arguments)),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
         Command::Library(question) => asynchronously(library::run(question)),
         Command::Coordinator(arguments) => asynchronously(coordinator::run(arguments)),

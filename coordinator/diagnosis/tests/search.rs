@@ -1,0 +1,86 @@
+//! The search on log powers that the forward model itself predicts, with known scatter: what was put
+//! in must come out, and where nothing was put in, nothing.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use tracktwin_diagnosis::{Bands, Forward, NullModel, Search, Section, Subject, search};
+use tracktwin_parameters::TrackDesign;
+use tracktwin_track::extension::ExtensionInstance;
+
+const SLEEPERS: usize = 7;
+const SPEEDS_KM_H: [f64; 2] = [7.0, 13.0];
+const SIMULATIONS: usize = 40;
+
+fn forward() -> Forward {
+    let section = Section::new(TrackDesign::v_track(), SLEEPERS, 1.0);
+    Forward::new(section, Bands::new(100.0, 3300.0), &SPEEDS_KM_H, vec![0.0; 2])
+}
+
+/// Standard normal numbers.
+struct Normal(ChaCha8Rng);
+
+impl Normal {
+    fn next(&mut self) -> f64 {
+        // Twelve uniform numbers: close enough to a Gaussian for scatter within three deviations.
+        let mut uniform = || (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    /// Scatter of log powers that neighbouring bands share, 0.15 nats.
+    fn scatter(&mut self, forward: &Forward) -> DVector<f64> {
+        let bands = forward.bands.count();
+        let covariance = DMatrix::from_fn(bands, bands, |i, j| {
+            let distance = (i as f64 - j as f64) / 1.5;
+            0.0225 * (-0.5 * distance * distance).exp() + if i == j { 1e-4 } else { 0.0 }
+        });
+        let factor = Cholesky::new(covariance).unwrap().l();
+        let mut all = DVector::zeros(forward.count());
+        for first in (0..forward.count()).step_by(bands) {
+            let white = DVector::from_fn(bands, |_, _| self.next());
+            all.rows_mut(first, bands).copy_from(&(&factor * white));
+        }
+        all
+    }
+}
+
+/// Searches a recording of this track with an extension in it.
+fn searched(seed: u64, extension: Option<ExtensionInstance>) -> Search {
+    let forward = forward();
+    let mut random = Normal(ChaCha8Rng::seed_from_u64(seed));
+    let numbers: Vec<f64> =
+        (0..SIMULATIONS).flat_map(|_| random.scatter(&forward).as_slice().to_vec()).collect();
+    let null = NullModel::from_numbers(&forward, &numbers).unwrap();
+    let section = &forward.section;
+    let built = extension.map(|extension| {
+        section.in_model(&extension).build(&section.design, section.spans()).unwrap()
+    });
+    let values = forward.unknowns.typical();
+    let expected = forward.log_power(&values, built.as_slice()).unwrap();
+    let log_power = expected + random.scatter(&forward);
+    let pass_variance = DVector::from_element(forward.per_sleeper(), 1e-3);
+    let pass_numbers = vec![vec![0], vec![1]];
+    let subject = Subject { forward, log_power, pass_variance, first_sleeper: 0, pass_numbers };
+    search(&subject, &null, values, &[], &|_, _| ()).unwrap()
+}
+
+#[test]
+fn a_bolt_under_one_sleeper_is_named_at_its_place_and_its_stiffness_found() {
+    let bolt = ExtensionInstance::new("sleeper_bolt").on([3]).with("stiffness_N_per_m", 3e7);
+    let found = searched(1, Some(bolt));
+    assert_eq!(found.accepted.len(), 1, "{:?}", found.rounds);
+    assert_eq!(found.accepted[0].extension.physics, "sleeper_bolt");
+    assert_eq!(found.accepted[0].extension.sleepers, Some(vec![3]));
+    let stiffness = found.last.values[found.last.values.len() - 1].exp();
+    // Two speeds and one scatter of 0.15 nats: a factor of two at most.
+    assert!((1.5e7..6e7).contains(&stiffness), "{stiffness}");
+    assert!(found.held_out[1] > found.held_out[0]);
+}
+
+#[test]
+fn where_nothing_is_left_out_nothing_is_named() {
+    for seed in 2..4 {
+        let found = searched(seed, None);
+        assert!(found.accepted.is_empty(), "{:?}", found.rounds);
+    }
+}
