@@ -2,7 +2,7 @@
 
 use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
 use crate::element::SpringDamper;
-use crate::model::{Assembly, ForceLaw, Law, Reaction, Support};
+use crate::model::{Assembly, ForceLaw, Law, Reaction};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
@@ -30,14 +30,9 @@ pub(super) const KIND: Kind = Kind {
             exponent: inputs.value("exponent"),
             reference_load_n: inputs.value("reference_load_N"),
             toe_load_n: inputs.value("toe_load_N"),
-            seat_load_n: SEAT_SHARE * inputs.design.wheel.load_n,
         }))
     },
 };
-
-/// Share of the wheel's load that the nearest rail seat carries, on a track of usual stiffness:
-/// where the railpad is linearised.
-const SEAT_SHARE: f64 = 1.0 / 3.0;
 
 /// Tangent stiffness `k_p (T / T_0)^gamma` under the load `T`, toe load included (mismatch
 /// catalogue 13).
@@ -47,19 +42,17 @@ struct LoadDependentRailpad {
     exponent: f64,
     reference_load_n: f64,
     toe_load_n: f64,
-    seat_load_n: f64,
 }
 
 impl Extension for LoadDependentRailpad {
     fn assemble(&self, assembly: &mut Assembly) {
         for &index in &self.sleepers {
-            let support = assembly.supports()[index];
-            let law = PowerLaw::new(self, support.railpad_stiffness);
-            let railpad_stiffness = law.tangent(self.toe_load_n + self.seat_load_n);
-            assembly.set_support(index, Support { railpad_stiffness, ..support });
+            let stiffness = assembly.supports()[index].railpad_stiffness;
+            let law = Arc::new(PowerLaw::new(self, stiffness));
             let port = assembly.layout().railpad_port(index);
-            let linear = SpringDamper { stiffness: railpad_stiffness, damping: 0.0 };
-            assembly.add_force_law(ForceLaw { port, linear, law: Arc::new(law) });
+            let place_m = assembly.layout().sleepers()[index].position_m;
+            let linear = SpringDamper { stiffness, damping: 0.0 };
+            assembly.add_force_law(ForceLaw { port, place_m, linear, law });
         }
     }
 }
@@ -100,10 +93,10 @@ impl Law for PowerLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extension::testing::{distance, instance, pass_at, track};
-    use crate::model::Surface;
+    use crate::extension::testing::{SPANS, distance, instance, pass_at, track};
+    use crate::model::{Mesh, Support, Surface, TrackModel};
     use crate::time;
-    use tracktwin_parameters::{Parameter, ParameterSet};
+    use tracktwin_parameters::{ParameterSet, TrackDesign};
 
     const LAW: PowerLaw =
         PowerLaw { stiffness_n_m: 1.5e8, exponent: 0.4, nominal_load_n: 1900.0, toe_load_n: 400.0 };
@@ -144,8 +137,19 @@ mod tests {
 
     #[test]
     fn in_the_matrices_a_lighter_wheel_meets_softer_pads() {
-        let nominal = ParameterSet::nominal()[Parameter::RailpadStiffness];
-        let tangent = |load_n: f64| LAW.tangent(LAW.toe_load_n + SEAT_SHARE * load_n) / nominal;
-        assert!((tangent(4500.0) - 1.0).abs() < 1e-12 && tangent(3000.0) < 0.95);
+        let stiffness = |load_n: f64| {
+            let mut design = TrackDesign::v_track();
+            design.wheel.load_n = load_n;
+            let pads = instance("load_dependent_railpad").with("exponent", 0.4);
+            let pads = pads.build(&design, SPANS).unwrap();
+            let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
+            let mesh = Mesh::uniform(SPANS, 2, 2);
+            let model = TrackModel::build(&design, &mesh, &supports, &[pads]).unwrap();
+            model.force_laws()[5].linear.stiffness
+        };
+        // A seat carries a third of the wheel, about its reference of 1500 N.
+        let (heavy, light) = (stiffness(4500.0), stiffness(3000.0));
+        assert!((heavy / 1.5e8 - 1.0).abs() < 0.1, "{heavy}");
+        assert!(light < 0.95 * heavy, "{light}");
     }
 }

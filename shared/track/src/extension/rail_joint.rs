@@ -16,8 +16,8 @@ pub(super) const KIND: Kind = Kind {
             .bound(Bound::NotNegative)
             .or(0.0),
         KindParameter::new("length_m", "m", "distance over which the dip falls to 1/e")
-            .ranges([5e-3, 3e-2], [0.1, 0.5], 1.5e-2)
-            .or(1.5e-2),
+            .ranges([5e-3, 4e-2], [0.1, 0.5], 2e-2)
+            .or(2e-2),
         KindParameter::new("bending_factor", "1", "what remains of the bending stiffness")
             .ranges([0.1, 0.6], [0.2, 0.5], 0.3)
             .or(1.0),

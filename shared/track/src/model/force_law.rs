@@ -30,7 +30,10 @@ pub trait Law: Debug + Send + Sync {
 pub struct ForceLaw {
     /// The motion that it resists.
     pub port: Port,
-    /// What the matrices hold in its place: its linearisation.
+    /// Where along the track it acts, in m: a wheel there loads it most.
+    pub place_m: f64,
+    /// What the matrices hold in its place: while the track is put together what its extension
+    /// put there, afterwards the law's slopes under the standing wheel.
     pub linear: SpringDamper,
     /// The law itself.
     pub law: Arc<dyn Law>,

@@ -1,5 +1,8 @@
 //! Mass, damping and stiffness on one common sparsity pattern.
 
+use super::Port;
+use crate::element::SpringDamper;
+
 /// One contribution to the three matrices.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Term {
@@ -51,6 +54,28 @@ impl Matrices {
                 matrices.row_starts[row + 1].max(matrices.row_starts[row]);
         }
         matrices
+    }
+
+    /// The same with springs and dampers on ports added.
+    pub(super) fn with(&self, elements: &[(&Port, SpringDamper)]) -> Self {
+        let (mass, damping, stiffness) = (&self.mass, &self.damping, &self.stiffness);
+        let present = self.places().map(|(row, column, place)| Term {
+            row,
+            column,
+            mass: mass[place],
+            damping: damping[place],
+            stiffness: stiffness[place],
+        });
+        let mut terms: Vec<_> = present.collect();
+        for (port, element) in elements {
+            for &(row, b_row) in port.entries() {
+                for &(column, b_column) in port.entries() {
+                    let SpringDamper { stiffness, damping } = element.share(b_row * b_column);
+                    terms.push(Term { row, column, mass: 0.0, damping, stiffness });
+                }
+            }
+        }
+        Self::from_terms(self.size(), terms)
     }
 
     /// Whether entries stand in the same places.

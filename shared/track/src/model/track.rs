@@ -2,7 +2,9 @@
 
 use super::assembly::Assembled;
 use super::{Assembly, ForceLaw, Layout, Matrices, Mesh, Roughness, Support, Surface, Vehicle};
+use crate::element::SpringDamper;
 use crate::extension::{Extension, Measured};
+use crate::time;
 use rustfft::num_complex::Complex64;
 use std::sync::Arc;
 use tracktwin_parameters::TrackDesign;
@@ -81,7 +83,30 @@ impl TrackModel {
         let Assembled { layout, matrices, force_laws } = assembly.finish();
         let (design, extensions) = (design.clone(), extensions.to_vec());
         let wheel_turned_m = 0.0;
-        Ok(Self { design, layout, matrices, force_laws, vehicle, wheel_turned_m, extensions })
+        let assembled =
+            Self { design, layout, matrices, force_laws, vehicle, wheel_turned_m, extensions };
+        Ok(assembled.linearised())
+    }
+
+    /// With every force law linearised where the wheel stands above it.
+    ///
+    /// A track that carries no wheel keeps what it has: a pass over it says so.
+    fn linearised(mut self) -> Self {
+        if self.force_laws.is_empty() {
+            return self;
+        }
+        let Some(tangents) = time::tangents(&self) else { return self };
+        let change = |(law, tangent): (&ForceLaw, &SpringDamper)| SpringDamper {
+            stiffness: tangent.stiffness - law.linear.stiffness,
+            damping: tangent.damping - law.linear.damping,
+        };
+        let pairs = self.force_laws.iter().zip(&tangents);
+        let changes: Vec<_> = pairs.map(|pair| (&pair.0.port, change(pair))).collect();
+        self.matrices = self.matrices.with(&changes);
+        for (law, tangent) in self.force_laws.iter_mut().zip(tangents) {
+            law.linear = tangent;
+        }
+        self
     }
 
     /// What it was built from, supports apart.

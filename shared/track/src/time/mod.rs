@@ -12,10 +12,12 @@ mod newmark;
 mod passes;
 mod rolling;
 mod run;
+mod statics;
 
 pub use newmark::pass;
 pub use passes::passes;
 pub use run::{Pass, PassError, PassRecord};
+pub(crate) use statics::tangents;
 
 /// Where the contact point of the standing wheel is on a smooth rail, in m.
 #[cfg(test)]

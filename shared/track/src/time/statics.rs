@@ -1,0 +1,80 @@
+//! The track at rest under standing loads, force laws included.
+
+use super::PassError;
+use super::cholesky::Cholesky;
+use super::coupled::{self, Resistance};
+use super::kinematics::Kinematics;
+use crate::element::SpringDamper;
+use crate::model::{Port, Reaction, TrackModel};
+use nalgebra::{DMatrix, DVector};
+
+/// A track whose stiffness has been factorised.
+pub(super) struct Statics<'a> {
+    model: &'a TrackModel,
+    stiffness: Cholesky,
+    /// Displacements of the track per unit force of each law.
+    units: Vec<Vec<f64>>,
+    /// How far each law gives way to a unit force of each.
+    compliance: DMatrix<f64>,
+}
+
+impl<'a> Statics<'a> {
+    pub(super) fn new(model: &'a TrackModel) -> Result<Self, PassError> {
+        let stiffness = Cholesky::new(model.matrices(), model.matrices().stiffness())?;
+        let ports: Vec<&Port> = model.force_laws().iter().map(|law| &law.port).collect();
+        let units: Vec<_> = ports.iter().map(|port| stiffness.solve_port(port)).collect();
+        let count = ports.len();
+        let compliance = DMatrix::from_fn(count, count, |i, j| ports[i].motion(&units[j]));
+        Ok(Self { model, stiffness, units, compliance })
+    }
+
+    /// Displacements under a load on each of the given places of the rail.
+    pub(super) fn under(&self, load_n: f64, places_m: &[f64]) -> Result<Vec<f64>, PassError> {
+        let layout = self.model.layout();
+        let mut track = vec![0.0; self.model.matrices().size()];
+        for &x_m in places_m {
+            for (dof, shape) in layout.rail_point(x_m).entries() {
+                track[dof] += shape * load_n;
+            }
+        }
+        self.stiffness.solve(&mut track);
+        let position_m = places_m.first().copied().unwrap_or_default();
+        self.resist(&mut track).ok_or(PassError::NotFinite { position_m })?;
+        Ok(track)
+    }
+
+    /// Lets the force laws push back on displacements that were found without them.
+    fn resist(&self, track: &mut [f64]) -> Option<()> {
+        let laws = self.model.force_laws();
+        if laws.is_empty() {
+            return Some(());
+        }
+        let resistance = |law| Resistance::Law(law, Kinematics::default(), None);
+        let resistances: Vec<_> = laws.iter().map(resistance).collect();
+        let motions = laws.iter().map(|law| law.port.motion(track));
+        let free = DVector::from_iterator(laws.len(), motions);
+        let (_, forces) = coupled::solve(&resistances, &self.compliance, &free, free.clone())?;
+        for (unit, force) in self.units.iter().zip(&forces) {
+            track.iter_mut().zip(unit).for_each(|(dof, unit)| *dof -= force * unit);
+        }
+        Some(())
+    }
+}
+
+/// Spring and damper that each force law of a track is to a small motion while the wheel stands
+/// above it; `None` where the track cannot carry the wheel.
+pub(crate) fn tangents(model: &TrackModel) -> Option<Vec<SpringDamper>> {
+    let statics = Statics::new(model).ok()?;
+    let mut standing: Option<(f64, Vec<f64>)> = None;
+    let mut tangents = Vec::with_capacity(model.force_laws().len());
+    for law in model.force_laws() {
+        let track = match standing.take() {
+            Some((place_m, track)) if place_m == law.place_m => track,
+            _ => statics.under(model.vehicle().wheel.load_n, &[law.place_m]).ok()?,
+        };
+        let Reaction { stiffness, damping, .. } = law.law.reaction(law.port.motion(&track), 0.0);
+        tangents.push(SpringDamper { stiffness, damping });
+        standing = Some((law.place_m, track));
+    }
+    Some(tangents)
+}
