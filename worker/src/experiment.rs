@@ -1,8 +1,9 @@
 //! What is done with every case of a campaign: everything but its parameters that decides results.
 
 use serde::{Deserialize, Serialize};
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::{Case, TrackDesign};
 use tracktwin_signal::{DefinitionError, FeatureDefinition, ThirdOctave};
+use tracktwin_track::extension::{ExtensionInstance, InstanceError, SampledExtension};
 
 /// Spans between what is evaluated and the held ends of the rail, at least.
 const END_SPANS: f64 = 8.0;
@@ -40,6 +41,10 @@ pub struct Experiment {
     pub wavelengths_m: [f64; 2],
     /// What is taken from the signal.
     pub features: FeatureDefinition,
+    /// Physics beyond the paper's model, and faults of the measuring chain; the evaluated sleeper
+    /// is number `spans / 2 - 1`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extensions: Vec<SampledExtension>,
 }
 
 /// Why an experiment can't be done; each names the setting.
@@ -82,6 +87,9 @@ pub enum ExperimentError {
         /// Spans that suffice.
         needed: usize,
     },
+    /// An extension can't be.
+    #[error("extension: {0}")]
+    Extension(#[from] InstanceError),
     /// The features can't be extracted.
     #[error("features: {0}")]
     Features(#[from] DefinitionError),
@@ -128,7 +136,21 @@ impl Experiment {
             run_in_spans: 2.0,
             wavelengths_m: WAVELENGTHS_M,
             features: FeatureDefinition::default(),
+            extensions: Vec::new(),
         }
+    }
+
+    /// The extensions that a case has, with its values: a function of the experiment and the
+    /// case's parameters and seed.
+    pub fn extensions_of(&self, case: &Case) -> Vec<ExtensionInstance> {
+        let seed = |number: usize| {
+            let mut hasher = blake3::Hasher::new_derive_key("tracktwin case extension 1");
+            hasher.update(case.parameter_hash().as_bytes()).update(&(number as u64).to_le_bytes());
+            let hash = hasher.finalize();
+            u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
+        };
+        let numbered = self.extensions.iter().enumerate();
+        numbered.filter_map(|(number, extension)| extension.draw(seed(number))).collect()
     }
 
     /// The same experiment, if it can be done.
@@ -160,6 +182,9 @@ impl Experiment {
         range("time_step_s", self.time_step_s, [1e-8, 0.1 / self.features.highest_hz])?;
         range("run_in_spans", self.run_in_spans, [0.0, 1000.0])?;
         self.check_room()?;
+        for extension in &self.extensions {
+            extension.check(&self.design, self.spans)?;
+        }
         Ok(self)
     }
 
@@ -294,6 +319,20 @@ mod tests {
         assert!(refusal(|e| e.sleeper_elements = 0).starts_with("sleeper_elements"));
         assert!(refusal(|e| e.wavelengths_m = [1.0, 0.1]).starts_with("wavelengths_m"));
         assert!(refusal(|e| e.features.highest_hz = 2000.0).starts_with("features"));
+    }
+
+    #[test]
+    fn an_experiment_without_extensions_does_not_speak_of_them() {
+        assert!(!experiment().to_json().contains("extension"));
+    }
+
+    #[test]
+    fn an_extension_that_cannot_be_is_refused() {
+        let message = refusal(|experiment| {
+            let bolts = r#"{"physics": "sleeper_bolt", "stiffness_N_per_m": [-1e7, 1e7]}"#;
+            experiment.extensions = vec![serde_json::from_str(bolts).unwrap()];
+        });
+        assert!(message.starts_with("extension: sleeper_bolt: stiffness_N_per_m"), "{message}");
     }
 
     #[test]

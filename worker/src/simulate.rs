@@ -5,6 +5,7 @@ use std::ops::Range;
 use tracktwin_parameters::{Case, Parameter};
 use tracktwin_protocol::{Outcome, PassFeatures};
 use tracktwin_signal::{Extractor, FeatureError, Features, Signal, SignalError};
+use tracktwin_track::extension::{InstanceError, Measured};
 use tracktwin_track::model::{Mesh, ModelError, Roughness, Support, Surface, TrackModel};
 use tracktwin_track::time::{self, Pass, PassError, PassRecord};
 
@@ -39,6 +40,8 @@ pub fn prepare_simulation(experiment: &Experiment) -> Result<Box<dyn Simulate>, 
 enum CaseError {
     #[error("track model: {0}")]
     Model(#[from] ModelError),
+    #[error("extension: {0}")]
+    Extension(#[from] InstanceError),
     #[error("pass at {speed_km_h} km/h: {source}")]
     Pass { speed_km_h: f64, source: PassError },
     #[error("acceleration at {speed_km_h} km/h: {source}")]
@@ -81,34 +84,37 @@ impl Simulation {
     /// The cases side by side, a speed at a time.
     fn together(&self, cases: &[Case]) -> Result<Vec<Outcome>, CaseError> {
         let models = cases.iter().map(|case| self.model(case)).collect::<Result<Vec<_>, _>>()?;
-        let surfaces: Vec<_> = cases.iter().map(|case| self.surface(case)).collect();
+        let pairs = cases.iter().zip(&models);
+        let surfaces: Vec<_> = pairs.map(|(case, model)| self.surface(case, model)).collect();
         let mut passes = vec![Vec::new(); cases.len()];
         for &speed_km_h in &self.experiment.speeds_km_h {
             let records = time::passes(&models, &self.pass(speed_km_h), &surfaces)
                 .map_err(|source| CaseError::Pass { speed_km_h, source })?;
-            for (passes, record) in passes.iter_mut().zip(&records) {
-                let features = self.features(record, speed_km_h)?;
+            for ((passes, record), model) in passes.iter_mut().zip(records).zip(&models) {
+                let features = self.features(&measured(record, model), speed_km_h)?;
                 passes.push(PassFeatures { speed_km_h, features });
             }
         }
         Ok(passes.into_iter().map(Outcome::Finished).collect())
     }
 
-    /// The track, every sleeper alike.
-    fn model(&self, case: &Case) -> Result<TrackModel, ModelError> {
+    /// The track, every sleeper alike, with the extensions that the case has.
+    fn model(&self, case: &Case) -> Result<TrackModel, CaseError> {
         let Experiment { design, spans, rail_elements_per_span, sleeper_elements, .. } =
             &self.experiment;
         let mesh = Mesh::uniform(*spans, *rail_elements_per_span, *sleeper_elements);
         let supports = vec![Support::from(&case.parameters); spans - 1];
-        TrackModel::build(design, &mesh, &supports, &[])
+        let extensions = self.experiment.extensions_of(case);
+        let built = extensions.iter().map(|extension| extension.build(design, *spans));
+        let extensions = built.collect::<Result<Vec<_>, _>>()?;
+        Ok(TrackModel::build(design, &mesh, &supports, &extensions)?)
     }
 
     /// The surface that the wheel meets at every speed.
-    fn surface(&self, case: &Case) -> Surface {
+    fn surface(&self, case: &Case, model: &TrackModel) -> Surface {
         let [shortest_m, longest_m] = self.experiment.wavelengths_m;
         let level = case.parameters[Parameter::IrregularityLevel];
-        let length_m = self.experiment.spans as f64 * self.experiment.design.sleeper.spacing_m;
-        Roughness { level, shortest_m, longest_m }.surface(case.surface_seed, length_m)
+        model.surface(&Roughness { level, shortest_m, longest_m }, case.surface_seed)
     }
 
     fn pass(&self, speed_km_h: f64) -> Pass {
@@ -152,6 +158,18 @@ impl Simulation {
     }
 }
 
+/// The record as the measuring chain has it; where the wheel was is taken for known.
+fn measured(mut record: PassRecord, model: &TrackModel) -> PassRecord {
+    let mut measured = Measured {
+        time_step_s: record.time_step_s,
+        position_m: vec![0.0; record.acceleration_m_s2.len()],
+        acceleration_m_s2: record.acceleration_m_s2,
+    };
+    model.measure(&mut measured);
+    record.acceleration_m_s2 = measured.acceleration_m_s2;
+    record
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,6 +201,21 @@ mod tests {
         assert_eq!(together, alone);
         assert!(matches!(&together[0], Outcome::Finished(passes) if passes.len() == 1));
         assert_ne!(together[0], together[1]);
+    }
+
+    #[test]
+    fn half_of_the_cases_have_an_extension_and_it_changes_them() {
+        let bolts = r#"{"physics": "sleeper_bolt", "share": 0.5, "stiffness_N_per_m": [1e7, 5e7]}"#;
+        let mut experiment = simulation().experiment;
+        experiment.extensions = vec![serde_json::from_str(bolts).unwrap()];
+        let extended = Simulation::new(&experiment).unwrap();
+        let with = |case: &Case| !experiment.extensions_of(case).is_empty();
+        let cases: Vec<_> = (0..20).map(case).collect();
+        let chosen = [cases.iter().find(|case| with(case)), cases.iter().find(|case| !with(case))];
+        let chosen = chosen.map(|case| case.unwrap().clone());
+        let (plain, bolted) = (simulation().simulate(&chosen), extended.simulate(&chosen));
+        assert_ne!(plain[0], bolted[0]);
+        assert_eq!(plain[1], bolted[1]);
     }
 
     #[test]

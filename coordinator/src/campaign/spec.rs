@@ -8,6 +8,7 @@ use tracktwin_parameters::{
     SpaceError,
 };
 use tracktwin_signal::FeatureDefinition;
+use tracktwin_track::extension::SampledExtension;
 use tracktwin_worker::{Experiment, ExperimentError};
 
 /// The campaign that `tracktwin run` simulates where none is named.
@@ -150,6 +151,8 @@ struct File {
     simulation: Simulation,
     #[serde(default)]
     features: FeatureDefinition,
+    #[serde(default)]
+    extension: Vec<SampledExtension>,
 }
 
 /// How a parameter is given.
@@ -269,6 +272,7 @@ impl File {
         experiment.speeds_km_h =
             self.speeds_km_h.clone().unwrap_or_else(|| self.preset.speeds_km_h());
         experiment.features = self.features.clone();
+        experiment.extensions = self.extension.clone();
         replace(&mut experiment.spans, simulation.spans);
         replace(&mut experiment.rail_elements_per_span, simulation.rail_elements_per_span);
         replace(&mut experiment.sleeper_elements, simulation.sleeper_elements);
@@ -324,6 +328,23 @@ mod tests {
     fn an_unknown_parameter_is_named_with_the_known_ones() {
         let message = refusal(|text| format!("{text}\n[parameters]\npad_stiffness = [1, 2]"));
         assert!(message.contains("`pad_stiffness`") && message.contains("railpad_stiffness_N_m"));
+    }
+
+    #[test]
+    fn an_extension_joins_the_experiment_or_is_refused_with_the_reason() {
+        let text = format!(
+            "{DEFAULT}\n[[extension]]\nphysics = \"hanging_sleeper\"\nsleepers = [19]\n\
+             share = 0.5\ngap_m = {{ low = 2e-5, high = 4e-4, scale = \"logarithmic\" }}\n"
+        );
+        let campaign = Campaign::parse(&text, "c.toml", None).unwrap();
+        assert_eq!(campaign.definition.experiment.extensions.len(), 1);
+        assert_ne!(campaign.id(), Campaign::built_in(None).unwrap().id());
+        let missing = text.replace("gap_m", "gap");
+        let message = Campaign::parse(&missing, "c.toml", None).unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "c.toml: extension: hanging_sleeper: has no parameter `gap`; it has gap_m"
+        );
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod instance;
 mod kind;
 mod measured;
 mod registry;
+mod sampled;
 mod text;
 
 mod clipping;
@@ -40,6 +41,7 @@ pub use instance::{ExtensionInstance, InstanceError};
 pub use kind::{Bound, Class, Kind, KindParameter, PlaceKind};
 pub use measured::Measured;
 pub use registry::KINDS;
+pub use sampled::{SampledExtension, SampledValue};
 pub use text::InstanceTextError;
 
 use crate::model::{Assembly, Vehicle};

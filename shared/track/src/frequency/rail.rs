@@ -270,6 +270,7 @@ mod tests {
     use super::*;
     use crate::extension::ExtensionInstance;
     use crate::frequency::{Place, receptance};
+    use crate::model::{Mesh, Support};
     use tracktwin_parameters::{ParameterSet, TrackDesign};
 
     const SPANS: usize = 9;

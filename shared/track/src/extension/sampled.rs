@@ -1,0 +1,155 @@
+//! Extensions whose presence and values differ from case to case of a campaign.
+
+use super::{Extension, ExtensionInstance, InstanceError};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tracktwin_parameters::{Scale, TrackDesign};
+
+/// An extension that a share of the cases has, with values drawn in their ranges.
+///
+/// In TOML its parameters stand beside its name, each as a number, `[low, high]` or
+/// `{ low, high, scale }`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SampledExtension {
+    /// Name of the kind.
+    pub physics: String,
+    /// From where to where it is along the track in m; twice the same for a point.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x_m: Option<[f64; 2]>,
+    /// Numbers of its sleepers, from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sleepers: Option<Vec<usize>>,
+    /// Share of the cases that have it, 0 to 1.
+    #[serde(default = "every_case")]
+    pub share: f64,
+    /// Values of its parameters or their ranges.
+    #[serde(flatten)]
+    pub parameters: BTreeMap<String, SampledValue>,
+}
+
+/// A parameter of a [`SampledExtension`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected a number, [low, high] or { low, high, scale }")]
+pub enum SampledValue {
+    /// The same in all cases that have it.
+    Fixed(f64),
+    /// Drawn evenly between two values.
+    Between([f64; 2]),
+    /// Drawn between two values, evenly on the given scale.
+    Scaled {
+        /// Lowest value.
+        low: f64,
+        /// Highest value.
+        high: f64,
+        /// What is even.
+        scale: Scale,
+    },
+}
+
+const fn every_case() -> f64 {
+    1.0
+}
+
+impl SampledValue {
+    /// The value at a place from 0 (lowest) to 1 (highest).
+    fn at(self, share: f64) -> f64 {
+        match self {
+            Self::Fixed(value) => value,
+            Self::Between([low, high]) | Self::Scaled { low, high, scale: Scale::Linear } => {
+                low + share * (high - low)
+            }
+            Self::Scaled { low, high, scale: Scale::Logarithmic } => low * (high / low).powf(share),
+        }
+    }
+}
+
+impl SampledExtension {
+    /// The extension of the case of this seed; `None` if the case goes without.
+    pub fn draw(&self, seed: u64) -> Option<ExtensionInstance> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut unit = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        let present = unit() < self.share;
+        // Drawn whether present or not: another share changes no value.
+        let instance = self.instance(&mut unit);
+        present.then_some(instance)
+    }
+
+    /// That it can be built at either end of all its ranges on a track of this design.
+    ///
+    /// # Errors
+    /// [`InstanceError`] names the parameter or the place that can't be.
+    pub fn check(&self, design: &TrackDesign, spans: usize) -> Result<(), InstanceError> {
+        if !(0.0..=1.0).contains(&self.share) {
+            return Err(InstanceError::Value {
+                physics: self.physics.clone(),
+                parameter: "share".to_owned(),
+                value: self.share,
+                form: "from 0 to 1",
+            });
+        }
+        let built = |end: f64| -> Result<Arc<dyn Extension>, InstanceError> {
+            self.instance(&mut || end).build(design, spans)
+        };
+        built(0.0).and_then(|_| built(1.0)).map(|_| ())
+    }
+
+    /// With every value at the place in its range that `unit` says.
+    fn instance(&self, unit: &mut impl FnMut() -> f64) -> ExtensionInstance {
+        let parameters = self.parameters.iter();
+        let parameters = parameters.map(|(name, value)| (name.clone(), value.at(unit()))).collect();
+        let (physics, sleepers) = (self.physics.clone(), self.sleepers.clone());
+        ExtensionInstance { physics, x_m: self.x_m, sleepers, parameters }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn voids(share: f64) -> SampledExtension {
+        let gap = SampledValue::Scaled { low: 1e-5, high: 1e-3, scale: Scale::Logarithmic };
+        SampledExtension {
+            physics: "hanging_sleeper".to_owned(),
+            x_m: None,
+            sleepers: Some(vec![4, 5]),
+            share,
+            parameters: BTreeMap::from([("gap_m".to_owned(), gap)]),
+        }
+    }
+
+    #[test]
+    fn the_share_of_cases_has_it_and_its_values_fill_their_range() {
+        let drawn: Vec<_> = (0..2000).filter_map(|seed| voids(0.5).draw(seed)).collect();
+        // 0.011 is one standard error.
+        assert!((drawn.len() as f64 / 2000.0 - 0.5).abs() < 0.05, "{}", drawn.len());
+        let gaps: Vec<f64> = drawn.iter().map(|void| void.parameters["gap_m"]).collect();
+        assert!(gaps.iter().all(|gap| (1e-5..1e-3).contains(gap)));
+        let low = gaps.iter().filter(|&&gap| gap < 1e-4).count() as f64;
+        assert!((low / gaps.len() as f64 - 0.5).abs() < 0.08, "{low}");
+    }
+
+    #[test]
+    fn a_case_s_values_depend_on_its_seed_alone() {
+        assert_eq!(voids(1.0).draw(7), voids(1.0).draw(7));
+        assert_ne!(voids(1.0).draw(7), voids(1.0).draw(8));
+        let rare = voids(0.3);
+        let seed = (0..100).find(|&seed| rare.draw(seed).is_some()).unwrap();
+        assert_eq!(rare.draw(seed), voids(1.0).draw(seed));
+    }
+
+    #[test]
+    fn it_survives_json_and_what_cannot_be_built_is_refused() {
+        let json = serde_json::to_string(&voids(0.5)).unwrap();
+        assert_eq!(serde_json::from_str::<SampledExtension>(&json).unwrap(), voids(0.5));
+        let design = TrackDesign::v_track();
+        voids(0.5).check(&design, 12).unwrap();
+        assert!(voids(1.5).check(&design, 12).unwrap_err().to_string().contains("share is 1.5"));
+        let mut negative = voids(0.5);
+        negative.parameters.insert("gap_m".to_owned(), SampledValue::Between([-1e-5, 1e-4]));
+        let refusal = negative.check(&design, 12).unwrap_err().to_string();
+        assert!(refusal.contains("gap_m is -0.00001"), "{refusal}");
+    }
+}
