@@ -89,6 +89,18 @@ mod tests {
     }
 
     #[test]
+    fn the_catalogue_in_the_documentation_has_every_kind_and_parameter() {
+        let catalogue = include_str!("../../../../docs/extensions.md");
+        for kind in KINDS {
+            for parameter in kind.parameters {
+                let row = format!("| `{}` | `{}` |", kind.physics, parameter.name);
+                assert!(catalogue.contains(&row), "{row}");
+            }
+            assert!(catalogue.contains(&format!("\n| `{}` | ", kind.physics)));
+        }
+    }
+
+    #[test]
     fn an_instance_survives_json_with_its_parameters_beside_its_name() {
         for kind in KINDS {
             let instance = typical(kind);
