@@ -54,11 +54,6 @@ impl Bands {
         &self.lines_hz
     }
 
-    /// Number of the line at a frequency in Hz, with the fraction to the next.
-    pub(crate) fn line_of(&self, frequency_hz: f64) -> f64 {
-        LINES_PER_OCTAVE * (frequency_hz / self.lines_hz[0]).log2()
-    }
-
     /// Lines of a band and their weights in Hz: the power of the analytic signal in the band is the
     /// weighted sum of the one-sided power spectral density.
     pub fn weights(&self, band: usize) -> &[(usize, f64)] {

@@ -6,7 +6,7 @@
 
 use crate::bands::Bands;
 use crate::baseline::Unknowns;
-use crate::profile::Profile;
+use crate::profile::Shape;
 use crate::section::Section;
 use crate::transfer::Transfer;
 use nalgebra::{DMatrix, DVector};
@@ -219,7 +219,7 @@ impl Forward {
         let mesh = self.section.mesh();
         let model = TrackModel::build(&self.section.design, &mesh, &supports, extensions)?;
         let transfer = Transfer::new(model, self.bands.lines_hz(), from_seats);
-        Ok(transfer.with_wheel(&self.wheel_starts_m))
+        Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
     }
 
     /// Derivatives of each sleeper's dynamic stiffness under the rail by the logarithms of `k_b`,
@@ -280,17 +280,14 @@ impl Forward {
         let window = &self.windows[speed][sleeper][band];
         let powers: Vec<_> =
             weights.iter().map(|&(line, _)| transfer.mean_power(window, line)).collect();
-        let gain = |frequency_hz: f64| {
-            let place = self.bands.line_of(frequency_hz) - weights[0].0 as f64;
-            let place = place.clamp(0.0, (powers.len() - 1) as f64);
-            let left = (place as usize).min(powers.len() - 2);
-            let share = place - left as f64;
-            (powers[left] * (1.0 - share) + powers[left + 1] * share).sqrt()
-        };
-        let power = |profile: &Profile| {
-            let window_m = self.section.window_m(sleeper);
-            let centre_hz = self.bands.centres_hz()[band];
-            profile.power(window_m, self.speeds_m_s[speed], centre_hz, gain)
+        let speed_m_s = self.speeds_m_s[speed];
+        let power = |shape: &Shape| {
+            let lines = weights.iter().zip(&powers);
+            let of_line = |(&(line, weight), power): (&(usize, f64), &f64)| {
+                let frequency_hz = self.bands.lines_hz()[line];
+                weight * power * shape.density(sleeper, speed_m_s, frequency_hz)
+            };
+            lines.map(of_line).sum::<f64>()
         };
         let rail = transfer.rail.as_ref().map_or(0.0, power);
         if wheel.is_empty() {

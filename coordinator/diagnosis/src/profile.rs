@@ -1,104 +1,135 @@
-//! The shape that an extension gives rail or wheel, as the wheel feels it in bands.
+//! The shape that an extension gives rail or wheel, as a spectrum over every sleeper.
+//!
+//! A shape is not random, but over one sleeper its mean power in a band is that of its spectrum,
+//! as for the surface: so both are added.
 
-use crate::bands::gain;
+use crate::section::Section;
 use rustfft::{Fft, FftPlanner, num_complex::Complex64};
-use std::cell::RefCell;
-use std::ops::Range;
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
-use tracktwin_track::model::TrackModel;
 
-/// Distance of two samples in m: the shortest waves compared have more than two of them.
-const STEP_M: f64 = 1e-4;
+/// Samples over a sleeper spacing: the shortest waves compared have more than two of them.
+const SAMPLES_PER_SPACING: usize = 1250;
 
-/// Places at which a band's power is taken, per wave of its centre.
-const PLACES_PER_WAVE: f64 = 5.0;
+/// Samples of a transform, zeros included.
+const SAMPLES: usize = 4096;
 
-/// How far a band reaches, in its standard deviations.
-const REACH: f64 = 4.0;
+/// Part of a spacing over which a shape passes from one sleeper's window to the next.
+const FADE: f64 = 0.3;
 
-/// Track that is transformed on either side of the shape, in m: a band's wavelet fades within it.
-const MARGIN_M: f64 = 0.3;
+/// Least height in m that is a shape: a nanometre is below any surface.
+const HEIGHT_MIN_M: f64 = 1e-9;
 
-/// A shape of the rail's surface and its spectrum.
-pub(crate) struct Profile {
-    /// Where it begins and ends in m, margins included.
-    stretch_m: Range<f64>,
-    samples: usize,
-    /// Amplitudes in m of waves with whole numbers of periods over the samples.
-    spectrum: Vec<Complex64>,
+/// Spectrum of a shape over the compared sleepers, `[sleeper][wave]`: squares of its Fourier
+/// integral in m4 at whole numbers of waves on [`SAMPLES`]; none for sleepers without a shape.
+pub(crate) struct Shape {
+    squares: Vec<Option<Vec<f64>>>,
+    step_m: f64,
+    spacing_m: f64,
 }
 
-impl Profile {
-    /// The shape that a model's extensions give the rail; none if they give it none.
-    pub(crate) fn of_rail(model: &TrackModel) -> Option<Self> {
-        Self::new(model.layout().length_m(), |x_m| model.profile_m(x_m))
+impl Shape {
+    /// The spectrum of a height in m by place on the model's track in m; none if it is flat.
+    pub(crate) fn new(section: &Section, height_m: impl Fn(f64) -> f64) -> Option<Self> {
+        let spacing_m = section.design.sleeper.spacing_m;
+        let step_m = spacing_m / SAMPLES_PER_SPACING as f64;
+        let transform = FftPlanner::new().plan_fft_forward(SAMPLES);
+        let of = |sleeper: usize| {
+            let middle_m = section.model_x_m(section.x_m(sleeper));
+            squares(&transform, step_m, spacing_m, |offset_m| height_m(middle_m + offset_m))
+        };
+        let squares: Vec<_> = (0..section.sleepers).map(of).collect();
+        squares.iter().any(Option::is_some).then_some(Self { squares, step_m, spacing_m })
     }
 
-    /// The shape of the wheel along the track in a pass in which it begins a turn at `start_m`;
-    /// none if it is round.
-    pub(crate) fn of_wheel(model: &TrackModel, start_m: f64) -> Option<Self> {
-        Self::new(model.layout().length_m(), |x_m| model.wheel_profile_m(x_m - start_m))
-    }
-
-    fn new(length_m: f64, height_m: impl Fn(f64) -> f64) -> Option<Self> {
-        let count = (length_m / STEP_M) as usize;
-        let height = |sample: usize| height_m(sample as f64 * STEP_M);
-        let highest = (0..count).map(height).fold(0.0, |highest: f64, h| highest.max(h.abs()));
-        if highest == 0.0 {
-            return None;
-        }
-        // What is a ten thousandth of the shape is heard as -80 dB.
-        let part = |sample: &usize| height(*sample).abs() > 1e-4 * highest;
-        let from_m = (0..count).find(part)? as f64 * STEP_M - MARGIN_M;
-        let to_m = (0..count).rev().find(part)? as f64 * STEP_M + MARGIN_M;
-        let samples = ((to_m - from_m) / STEP_M) as usize;
-        let samples = samples.next_power_of_two();
-        let mut spectrum: Vec<Complex64> = (0..samples)
-            .map(|sample| Complex64::from(height_m(from_m + sample as f64 * STEP_M)))
-            .collect();
-        FftPlanner::new().plan_fft_forward(samples).process(&mut spectrum);
-        spectrum.iter_mut().for_each(|amplitude| *amplitude /= samples as f64);
-        Some(Self { stretch_m: from_m..to_m, samples, spectrum })
-    }
-
-    /// Mean power over a window, from place to place in m, of the band around `centre_hz` at a
-    /// speed, where waves of a frequency are taken with a gain.
-    pub(crate) fn power(
-        &self,
-        window_m: Range<f64>,
-        speed_m_s: f64,
-        centre_hz: f64,
-        transfer: impl Fn(f64) -> f64,
-    ) -> f64 {
-        if window_m.end < self.stretch_m.start || window_m.start > self.stretch_m.end {
+    /// One-sided power spectral density in m2/Hz over a sleeper, at a speed and frequency.
+    pub(crate) fn density(&self, sleeper: usize, speed_m_s: f64, frequency_hz: f64) -> f64 {
+        let Some(squares) = &self.squares[sleeper] else { return 0.0 };
+        let place = frequency_hz / speed_m_s * self.step_m * SAMPLES as f64;
+        let left = place as usize;
+        if left + 1 >= squares.len() {
             return 0.0;
         }
-        let wave_hz = speed_m_s / (self.samples as f64 * STEP_M);
-        let reach_hz = REACH / crate::bands::CENTRE_RAD * centre_hz;
-        let first = (((centre_hz - reach_hz) / wave_hz).ceil() as usize).max(1);
-        let last = (((centre_hz + reach_hz) / wave_hz) as usize).min(self.samples / 2);
-        let places = (PLACES_PER_WAVE * centre_hz / wave_hz) as usize;
-        let places = places.next_power_of_two().min(self.samples);
-        let mut values = vec![Complex64::ZERO; places];
-        for wave in first..=last {
-            let frequency_hz = wave as f64 * wave_hz;
-            let weight = 2.0 * gain(centre_hz, frequency_hz) * transfer(frequency_hz);
-            values[wave % places] += weight * self.spectrum[wave];
-        }
-        inverse(places).process(&mut values);
-        let step_m = self.samples as f64 * STEP_M / places as f64;
-        let place = |x_m: f64| ((x_m - self.stretch_m.start) / step_m).ceil().max(0.0) as usize;
-        let (from, to) = (place(window_m.start), place(window_m.end));
-        let sum: f64 =
-            values[from.min(places)..to.min(places)].iter().map(Complex64::norm_sqr).sum();
-        sum / (to.max(from + 1) - from) as f64
+        let share = place - left as f64;
+        let square = squares[left] * (1.0 - share) + squares[left + 1] * share;
+        2.0 * square / (self.spacing_m * speed_m_s)
     }
 }
 
-/// The inverse transform of a length; lengths are few and come again and again.
-fn inverse(length: usize) -> Arc<dyn Fft<f64>> {
-    thread_local! {
-        static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
+/// Squares of the Fourier integral of a height around a sleeper.
+fn squares(
+    transform: &Arc<dyn Fft<f64>>,
+    step_m: f64,
+    spacing_m: f64,
+    height_m: impl Fn(f64) -> f64,
+) -> Option<Vec<f64>> {
+    let reach = (0.5 * (1.0 + FADE) * SAMPLES_PER_SPACING as f64).ceil() as i32;
+    let mut samples: Vec<Complex64> = (-reach..=reach)
+        .map(|sample| {
+            let offset_m = f64::from(sample) * step_m;
+            Complex64::from(window(offset_m / spacing_m) * height_m(offset_m))
+        })
+        .collect();
+    let highest = samples.iter().map(|height| height.re.abs()).fold(0.0, f64::max);
+    if highest < HEIGHT_MIN_M {
+        return None;
     }
-    PLANNER.with_borrow_mut(|planner| planner.plan_fft_inverse(length))
+    samples.resize(SAMPLES, Complex64::ZERO);
+    transform.process(&mut samples);
+    Some(samples[..SAMPLES / 2].iter().map(|value| value.norm_sqr() * step_m * step_m).collect())
+}
+
+/// Weight of a height at so many spacings from the sleeper: squares of neighbours' weights sum to
+/// one.
+fn window(spacings: f64) -> f64 {
+    let past = (spacings.abs() - 0.5) / FADE + 0.5;
+    (FRAC_PI_2 * past.clamp(0.0, 1.0)).cos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+    use tracktwin_parameters::TrackDesign;
+
+    fn section() -> Section {
+        Section::new(TrackDesign::v_track(), 5, 0.0)
+    }
+
+    #[test]
+    fn a_sine_has_its_power_at_its_own_frequency_over_every_sleeper() {
+        let (section, speed, length_m) = (section(), 3.0, 6e-3);
+        let sine = |x_m: f64| 1e-6 * (TAU * x_m / length_m).sin();
+        let shape = Shape::new(&section, sine).unwrap();
+        for sleeper in 0..5 {
+            let density = |hz: i32| shape.density(sleeper, speed, f64::from(hz));
+            let power: f64 = (0..2000).map(density).sum();
+            let moment: f64 = (0..2000).map(|hz| f64::from(hz) * density(hz)).sum();
+            // The window's square has a mean of one; lines stand 1 Hz apart.
+            assert!((power / 0.5e-12 - 1.0).abs() < 0.02, "{power}");
+            assert!((moment / power - 500.0).abs() < 5.0, "{}", moment / power);
+        }
+    }
+
+    #[test]
+    fn a_hollow_between_two_sleepers_belongs_half_to_each() {
+        let section = section();
+        let middle_m = section.model_x_m(0.5 * (section.x_m(1) + section.x_m(2)));
+        let hollow = |x_m: f64| 1e-5 * (-((x_m - middle_m) / 2e-3).powi(2)).exp();
+        let shape = Shape::new(&section, hollow).unwrap();
+        let (left, right) = (shape.density(1, 3.0, 400.0), shape.density(2, 3.0, 400.0));
+        assert!((left / right - 1.0).abs() < 1e-6);
+        // The Fourier integral of the Gaussian, shared by two.
+        let wave_number = TAU * 400.0 / 3.0;
+        let integral =
+            1e-5 * 2e-3 * std::f64::consts::PI.sqrt() * (-(wave_number * 2e-3 / 2.0).powi(2)).exp();
+        let expected = 2.0 * integral.powi(2) / (0.125 * 3.0);
+        assert!(((left + right) / expected - 1.0).abs() < 0.02, "{}", (left + right) / expected);
+        assert_eq!(shape.density(4, 3.0, 400.0), 0.0);
+    }
+
+    #[test]
+    fn a_flat_track_has_no_shape() {
+        assert!(Shape::new(&section(), |_| 0.0).is_none());
+    }
 }

@@ -2,7 +2,6 @@
 
 use crate::bands::{Bands, CENTRE_RAD};
 use std::f64::consts::{SQRT_2, TAU};
-use std::ops::Range;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::model::Mesh;
@@ -75,13 +74,6 @@ impl Section {
     /// Place in the middle of a compared sleeper's window on the recording's scale, in m.
     pub fn x_m(&self, sleeper: usize) -> f64 {
         self.first_x_m + sleeper as f64 * self.design.sleeper.spacing_m
-    }
-
-    /// Ends of a compared sleeper's window on the model's track in m.
-    pub fn window_m(&self, sleeper: usize) -> Range<f64> {
-        let (middle_m, half_m) =
-            (self.model_x_m(self.x_m(sleeper)), 0.5 * self.design.sleeper.spacing_m);
-        middle_m - half_m..middle_m + half_m
     }
 
     /// An extension given in terms of the recording (compared sleepers, places on its scale) in

@@ -1,6 +1,7 @@
 //! From the surface under the wheel to the acceleration that is recorded.
 
-use crate::profile::Profile;
+use crate::profile::Shape;
+use crate::section::Section;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use tracktwin_track::frequency::RailReceptances;
@@ -16,9 +17,9 @@ pub(crate) struct Transfer {
     /// Receptances from the rail seats in m/N, `[line][sleeper][node]`; empty unless asked for.
     pub(crate) from_seats: Vec<Vec<Vec<Complex64>>>,
     /// The shape that extensions give the rail, if they do.
-    pub(crate) rail: Option<Profile>,
+    pub(crate) rail: Option<Shape>,
     /// The shape of the wheel in each pass, `[speed][pass]`; empty for a round one.
-    pub(crate) wheel: Vec<Vec<Profile>>,
+    pub(crate) wheel: Vec<Vec<Shape>>,
     model: TrackModel,
 }
 
@@ -44,16 +45,19 @@ impl Transfer {
         };
         let power = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
         let from_seats = receptances.from_seats;
-        let rail = Profile::of_rail(&model);
-        Self { power, stiffness, from_seats, rail, wheel: Vec::new(), model }
+        Self { power, stiffness, from_seats, rail: None, wheel: Vec::new(), model }
     }
 
-    /// The same with the wheel's shape in passes in which it begins a turn at these places in m:
-    /// `[speed][pass]`.
-    pub(crate) fn with_wheel(mut self, starts_m: &[Vec<f64>]) -> Self {
-        let of_pass = |start_m: &f64| Profile::of_wheel(&self.model, *start_m);
+    /// The same with the shapes of rail and wheel over a section; in its passes the wheel begins a
+    /// turn at these places in m: `[speed][pass]`.
+    pub(crate) fn with_shapes(mut self, section: &Section, starts_m: &[Vec<f64>]) -> Self {
+        let model = &self.model;
+        let of_pass =
+            |start_m: &f64| Shape::new(section, |x_m| model.wheel_profile_m(x_m - start_m));
         let of_speed = |starts: &Vec<f64>| starts.iter().map(of_pass).collect();
-        self.wheel = starts_m.iter().map(of_speed).collect::<Option<_>>().unwrap_or_default();
+        let wheel = starts_m.iter().map(of_speed).collect::<Option<_>>().unwrap_or_default();
+        self.rail = Shape::new(section, |x_m| model.profile_m(x_m));
+        self.wheel = wheel;
         self
     }
 
