@@ -17,8 +17,9 @@ const CORES: u64 = 16;
 /// Cases computed side by side on a core, and reported together.
 const GROUP: u64 = 8;
 
-/// Work of a lease, in s, as the coordinator deals it out.
-const LEASE_WORK_S: f64 = 1.5;
+/// Work of a lease, in s, as the coordinator deals it out: more where there are many cores.
+const LEASE_WORK_S: [f64; 2] = [1.5, 30.0];
+const LEASES_A_SECOND: f64 = 100.0;
 
 /// Most groups of a lease.
 const GROUPS_MAX: f64 = 64.0;
@@ -26,9 +27,13 @@ const GROUPS_MAX: f64 = 64.0;
 /// Way of a message there and back in s, within a cluster.
 const ROUND_TRIP_S: f64 = 0.0005;
 
-/// Simulated time in s: many leases each, and the start does not count.
-const TIME_S: f64 = 60.0;
-const WARM_UP_S: f64 = 10.0;
+/// How far reports may lag before the full outbox holds up its cores: some seconds' results.
+const BACKLOG_NS: u64 = 3_000_000_000;
+
+/// Simulated time in s, of which the start does not count: until every core has had its first lease
+/// from a library that is overrun.
+const TIME_S: f64 = 900.0;
+const WARM_UP_S: f64 = 500.0;
 
 /// Service times of the library, in s.
 #[derive(Clone, Copy)]
@@ -58,7 +63,9 @@ const fn ns(seconds: f64) -> u64 {
 }
 
 fn simulate(cores: u64, case_s: f64, service: Service) -> Outcome {
-    let groups = (LEASE_WORK_S / (case_s * GROUP as f64)).round().clamp(1.0, GROUPS_MAX) as u64;
+    let [least_s, most_s] = LEASE_WORK_S;
+    let work_s = (cores as f64 / LEASES_A_SECOND).clamp(least_s, most_s);
+    let groups = (work_s / (case_s * GROUP as f64)).round().clamp(1.0, GROUPS_MAX) as u64;
     let group_ns = ns(case_s * GROUP as f64);
     // Cores start one after another over a second, as nodes do.
     let mut events: BinaryHeap<_> =
@@ -80,20 +87,17 @@ fn simulate(cores: u64, case_s: f64, service: Service) -> Outcome {
         if counts {
             library_busy += work;
         }
-        let answered = library_free + ns(ROUND_TRIP_S);
         let (next, step) = match step {
-            Step::Lease => (answered + group_ns, Step::Report(groups)),
+            Step::Lease => (library_free + ns(ROUND_TRIP_S) + group_ns, Step::Report(groups)),
             Step::Report(left) => {
                 if counts {
                     cases += GROUP;
                 }
-                // A core goes on computing while its report is under way; only leases wait.
+                // A core goes on computing while its report is under way, until the outbox is full.
+                let goes_on = now.max(library_free.saturating_sub(BACKLOG_NS));
                 match left {
-                    1 => (answered, Step::Lease),
-                    _ => (
-                        now.max(library_free.saturating_sub(BACKLOG_NS)) + group_ns,
-                        Step::Report(left - 1),
-                    ),
+                    1 => (goes_on, Step::Lease),
+                    _ => (goes_on + group_ns, Step::Report(left - 1)),
                 }
             }
         };
@@ -108,9 +112,6 @@ fn simulate(cores: u64, case_s: f64, service: Service) -> Outcome {
         library_busy: library_busy as f64 / 1e9 / time_s,
     }
 }
-
-/// How far reports may lag before the full outbox holds up its cores: some seconds' results.
-const BACKLOG_NS: u64 = 3_000_000_000;
 
 fn argument(name: &str, usual: f64) -> f64 {
     let mut arguments = std::env::args().skip_while(|it| it != name).skip(1);

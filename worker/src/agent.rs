@@ -25,7 +25,7 @@ pub const GROUP: usize = 8;
 const GRACE: Duration = Duration::from_secs(8);
 
 /// How a line to a coordinator is made.
-pub type Dial = fn(Endpoint) -> Channel;
+pub type Dial = fn(&Endpoint) -> Channel;
 
 /// What a worker is told at its start.
 #[derive(Clone, Debug)]
@@ -68,7 +68,7 @@ impl Config {
             idle_exit: None,
             prepare: prepare_simulation,
             model_hash: None,
-            dial: |endpoint| endpoint.connect_lazy(),
+            dial: Endpoint::connect_lazy,
             inline: false,
             counters: Arc::default(),
         }

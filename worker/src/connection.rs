@@ -33,7 +33,7 @@ pub(crate) fn connect(
         endpoint = endpoint.tls_config(tls).map_err(address)?;
     }
     let channel = dial(
-        endpoint
+        &endpoint
             .tcp_nodelay(true)
             .connect_timeout(CONNECT_TIMEOUT)
             .timeout(ANSWER_TIMEOUT)

@@ -2,11 +2,19 @@
 
 use tracktwin_worker::agent::GROUP;
 
-/// Computing time that a lease is to hold, in s.
+/// Computing time that a lease holds at least, in s.
 ///
 /// Long against the milliseconds that a lease and a report cost, short against what anybody would
 /// mind losing with a worker.
 const LEASE_WORK_S: f64 = 1.5;
+
+/// Leases a second that all cores together are to need: beyond this leases become longer.
+///
+/// A lease costs the library about a millisecond, so they take a tenth of its time.
+const LEASES_A_SECOND: f64 = 100.0;
+
+/// Computing time that a lease holds at most, in s: what the last cores may be waited for.
+const LEASE_WORK_MAX_S: f64 = 30.0;
 
 /// Most groups in a lease, whatever they take: what a lost worker may hold up.
 const GROUPS_MAX: f64 = 64.0;
@@ -27,9 +35,10 @@ impl Pace {
         self.case_s = Some(mean + NEWEST * (case_s - mean));
     }
 
-    /// Cases of a lease: whole groups, at least one.
-    pub fn cases_per_lease(&self) -> u32 {
-        let groups = self.case_s.map_or(1.0, |case_s| LEASE_WORK_S / (case_s * GROUP as f64));
+    /// Cases of a lease where so many cores are at work: whole groups, at least one.
+    pub fn cases_per_lease(&self, cores: u32) -> u32 {
+        let work_s = (f64::from(cores) / LEASES_A_SECOND).clamp(LEASE_WORK_S, LEASE_WORK_MAX_S);
+        let groups = self.case_s.map_or(1.0, |case_s| work_s / (case_s * GROUP as f64));
         // A case that takes no time at all makes the quotient infinite, and clamped.
         groups.round().clamp(1.0, GROUPS_MAX) as u32 * GROUP as u32
     }
@@ -42,15 +51,24 @@ mod tests {
     fn lease_at(case_s: f64) -> u32 {
         let mut pace = Pace::default();
         pace.measured(case_s);
-        pace.cases_per_lease()
+        pace.cases_per_lease(2)
     }
 
     #[test]
     fn a_lease_is_one_or_two_seconds_of_work_in_whole_groups() {
-        assert_eq!(Pace::default().cases_per_lease(), 8);
+        assert_eq!(Pace::default().cases_per_lease(2), 8);
         assert_eq!(lease_at(10.0), 8);
         assert_eq!(lease_at(0.02), 72);
         assert_eq!(lease_at(0.0), 512);
+    }
+
+    #[test]
+    fn the_more_cores_there_are_the_longer_leases_become_up_to_a_bound() {
+        let mut pace = Pace::default();
+        pace.measured(0.125);
+        let leases = [16, 160, 1600, 16_000].map(|cores| pace.cases_per_lease(cores));
+        // 1.5 s, 1.6 s, 16 s and 30 s of work in groups of a second.
+        assert_eq!(leases, [16, 16, 128, 240]);
     }
 
     #[test]
@@ -58,6 +76,6 @@ mod tests {
         let mut pace = Pace::default();
         pace.measured(0.02);
         (0..100).for_each(|_| pace.measured(0.1));
-        assert_eq!(pace.cases_per_lease(), 16);
+        assert_eq!(pace.cases_per_lease(2), 16);
     }
 }

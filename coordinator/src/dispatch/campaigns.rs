@@ -48,9 +48,9 @@ impl Served {
         durations_s.into_iter().for_each(|case_s| pace.measured(case_s));
     }
 
-    /// Cases of a lease.
-    pub(crate) fn cases_per_lease(&self) -> u32 {
-        self.pace.lock().expect("nobody panics while holding it").cases_per_lease()
+    /// Cases of a lease where so many cores are at work.
+    fn cases_per_lease(&self, cores: u32) -> u32 {
+        self.pace.lock().expect("nobody panics while holding it").cases_per_lease(cores)
     }
 }
 
@@ -83,8 +83,9 @@ impl Campaigns {
     }
 
     /// Cases of the next lease, as far as one can know before.
-    pub(crate) fn cases_per_lease(&self) -> u32 {
+    pub(crate) fn cases_per_lease(&self, cores: u32) -> u32 {
         let latest = self.latest.lock().expect("nobody panics while holding it");
-        latest.as_ref().map_or_else(|| Pace::default().cases_per_lease(), |it| it.cases_per_lease())
+        let unknown = || Pace::default().cases_per_lease(cores);
+        latest.as_ref().map_or_else(unknown, |it| it.cases_per_lease(cores))
     }
 }

@@ -94,7 +94,7 @@ impl Dispatch {
             campaign: scope.map(|scope| scope.campaign.clone()),
             indices_below: scope.map_or(u32::MAX, |scope| scope.cases),
             worker: worker.to_owned(),
-            cases_max: cases_max.min(self.campaigns.cases_per_lease()),
+            cases_max: cases_max.min(self.campaigns.cases_per_lease(self.roster.present().1)),
             now_unix_ms: self.now_unix_ms(),
             lease_ms: unix_ms(self.settings.timing.lease),
             after_loss: after_attempt,

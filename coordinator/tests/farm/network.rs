@@ -197,11 +197,16 @@ impl AsyncWrite for Accepted {
 }
 
 /// What the coordinator's host runs, each time it is started.
-async fn coordinate(library: Library, chance: Chance) -> turmoil::Result {
+async fn coordinate(library: Library, campaign: String, chance: Chance) -> turmoil::Result {
     let clock = || turmoil::sim_elapsed().map_or(0, |it| i64::try_from(it.as_millis()).unwrap());
     let settings =
         Settings { clock: Some(Arc::new(clock)), prepare: stand_in, ..Settings::default() };
     let dispatch = Dispatch::new(library, settings, Counts::default());
+    {
+        // Read here and now: the database's own tasks must not end with a host that crashes.
+        let _real = runtime().enter();
+        at_once(dispatch.check(&campaign))?;
+    }
     let (reports, releases) = (Mutex::default(), Mutex::default());
     let service = FarmServer::new(Troubled { dispatch, chance, reports, releases });
     let listener = TcpListener::bind((std::net::Ipv4Addr::UNSPECIFIED, PORT)).await?;
@@ -232,7 +237,7 @@ async fn work(name: &'static str) -> turmoil::Result {
     Ok(())
 }
 
-fn dial(endpoint: Endpoint) -> Channel {
+fn dial(endpoint: &Endpoint) -> Channel {
     endpoint.connect_with_connector_lazy(tower::service_fn(async |uri: Uri| {
         let host = uri.host().unwrap_or_default().to_owned();
         let stream = TcpStream::connect((host, PORT)).await?;
@@ -275,8 +280,8 @@ fn misbehaving(real: &Runtime, seed: u64) -> (String, Duration) {
         .max_message_latency(Duration::from_millis(1 + chance.below(300)))
         .simulation_duration(PATIENCE)
         .build();
-    let (served, luck) = (library.clone(), chance.clone());
-    sim.host("coordinator", move || coordinate(served.clone(), luck.clone()));
+    let (served, name, luck) = (library.clone(), id.clone(), chance.clone());
+    sim.host("coordinator", move || coordinate(served.clone(), name.clone(), luck.clone()));
     for worker in WORKERS {
         sim.host(worker, move || work(worker));
     }
