@@ -196,7 +196,11 @@ impl Campaign {
         Self::parse(DEFAULT, "built-in campaign", cases)
     }
 
-    fn parse(text: &str, path: &str, cases: Option<u32>) -> Result<Self, SpecError> {
+    /// Reads a campaign from text, which errors call `path`.
+    ///
+    /// # Errors
+    /// As [`Campaign::read`], the file's own apart.
+    pub fn parse(text: &str, path: &str, cases: Option<u32>) -> Result<Self, SpecError> {
         let file: File = toml::from_str(text).map_err(|error| SpecError::Malformed {
             path: path.to_owned(),
             line: line_of(text, error.span()),

@@ -5,6 +5,7 @@ mod certs;
 mod coordinator;
 mod diagnose;
 mod evaluate;
+mod extend;
 mod library;
 mod progress;
 mod receptance;
@@ -63,6 +64,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Find where a recording and the simulation differ, and what physics was left out.
     Diagnose(diagnose::Arguments),
+    /// Write a campaign that has the physics a diagnosis found in its parameter space.
+    Extend(extend::Arguments),
     /// Ask the model library.
     #[command(subcommand)]
     Library(library::Question),
@@ -121,6 +124,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Receptance(arguments) => receptance::run(&arguments),
         Command::Train(arguments) => asynchronously(train::run(arguments)),
         Command::Diagnose(arguments) => asynchronously(diagnose::run(arguments)),
+        Command::Extend(arguments) => extend::run(arguments),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
         Command::Library(question) => asynchronously(library::run(question)),
         Command::Coordinator(arguments) => asynchronously(coordinator::run(arguments)),

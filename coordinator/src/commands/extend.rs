@@ -1,0 +1,162 @@
+//! `tracktwin extend`: a campaign whose parameter space has what a diagnosis found.
+
+use super::{OrInput, Stop, say};
+use crate::campaign::Campaign;
+use anyhow::{Context, anyhow};
+use clap::Args;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use tracktwin_diagnosis::{Diagnosis, Estimate, FORMAT, Hypothesis};
+use tracktwin_track::extension::{Kind, KindParameter, PlaceKind};
+
+/// Share of the cases that have the extension: models must hold without it as well.
+const SHARE: f64 = 0.5;
+
+/// A parameter is drawn within so many standard deviations of what was found, and at least within
+/// this factor of it.
+const DEVIATIONS: f64 = 3.0;
+const FACTOR_MIN: f64 = 2.0;
+
+/// What `extend` is told.
+#[derive(Args)]
+#[command(
+    after_help = "Then `tracktwin run NEW.toml --library URL --out DIR` simulates the campaign \
+and trains models with which `tracktwin evaluate` gives stiffness without the bias."
+)]
+pub(super) struct Arguments {
+    /// The campaign to extend.
+    campaign: PathBuf,
+    /// The diagnosis, as `diagnose` wrote it.
+    #[arg(long, value_name = "FILE")]
+    from: PathBuf,
+    /// The new campaign; by default CAMPAIGN-extended.toml beside the old one.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
+    let Arguments { campaign: path, from, out } = arguments;
+    let text = std::fs::read_to_string(&path)
+        .with_context(|| format!("{}: cannot be read", path.display()))
+        .or_input()?;
+    let campaign = Campaign::parse(&text, &path.display().to_string(), None).or_input()?;
+    let diagnosis = read(&from).or_input()?;
+    let accepted: Vec<_> = diagnosis
+        .hypotheses
+        .iter()
+        .filter(|hypothesis| hypothesis.accepted)
+        .filter_map(|hypothesis| Some((hypothesis, Kind::from_name(&hypothesis.physics)?)))
+        .filter(|(_, kind)| !kind.measuring_chain)
+        .collect();
+    if accepted.is_empty() {
+        let name = from.display();
+        let verdict =
+            format!("{name}: hypotheses: no physics was accepted; there is nothing to extend with");
+        return Err(Stop::Input(anyhow!(verdict)));
+    }
+    let experiment = &campaign.definition.experiment;
+    let mut extended = text.trim_end().to_owned() + "\n";
+    for (hypothesis, kind) in &accepted {
+        let middle = experiment.spans / 2 - 1;
+        extended +=
+            &table(&diagnosis, hypothesis, kind, middle, experiment.design.sleeper.spacing_m);
+    }
+    let out = out.unwrap_or_else(|| beside(&path));
+    Campaign::parse(&extended, &out.display().to_string(), None).or_input()?;
+    std::fs::write(&out, extended)
+        .with_context(|| format!("{}: cannot be written", out.display()))
+        .or_input()?;
+    let names: Vec<_> =
+        accepted.iter().map(|(hypothesis, _)| hypothesis.physics.as_str()).collect();
+    say(&format!("{}: half of the cases have {}", out.display(), names.join(" and ")));
+    Ok(())
+}
+
+fn read(path: &Path) -> anyhow::Result<Diagnosis> {
+    let name = path.display();
+    let text = std::fs::read(path).with_context(|| format!("{name}: cannot be read"))?;
+    let diagnosis: Diagnosis =
+        serde_json::from_slice(&text).with_context(|| format!("{name}: is no diagnosis"))?;
+    if diagnosis.format != FORMAT {
+        return Err(anyhow!("{name}: format: {:?} is not {FORMAT:?}", diagnosis.format));
+    }
+    Ok(diagnosis)
+}
+
+fn beside(path: &Path) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-extended.toml"))
+}
+
+/// The campaign's table for a hypothesis: what has a place is put at the sleeper evaluated.
+fn table(
+    diagnosis: &Diagnosis,
+    hypothesis: &Hypothesis,
+    kind: &Kind,
+    middle: usize,
+    spacing_m: f64,
+) -> String {
+    let mut table = format!(
+        "\n# Found in {} with a probability of {:.0} %.\n[[extension]]\nphysics = \"{}\"\nshare = {SHARE:?}\n",
+        diagnosis.recording,
+        100.0 * hypothesis.probability,
+        kind.physics
+    );
+    let place = place(diagnosis, hypothesis, kind, middle, spacing_m);
+    table += &place;
+    for (name, estimate) in &hypothesis.parameters {
+        if let Some(parameter) = kind.parameters.iter().find(|known| known.name == name) {
+            let [low, high] = range(parameter, estimate);
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                table,
+                "{name} = {{ low = {low:e}, high = {high:e}, scale = \"logarithmic\" }}"
+            );
+        }
+    }
+    for parameter in kind.parameters {
+        let given = hypothesis.parameters.contains_key(parameter.name);
+        if !given && parameter.default.is_none() {
+            let _ = writeln!(table, "{} = {:e}", parameter.name, parameter.typical);
+        }
+    }
+    table
+}
+
+/// Where it is on the campaign's track.
+fn place(
+    diagnosis: &Diagnosis,
+    hypothesis: &Hypothesis,
+    kind: &Kind,
+    middle: usize,
+    spacing_m: f64,
+) -> String {
+    let Some(location) = &hypothesis.location else { return String::new() };
+    let everywhere = location.sleepers.len() == diagnosis.track.len();
+    match kind.place {
+        PlaceKind::Nowhere => String::new(),
+        PlaceKind::Sleepers if everywhere => String::new(),
+        PlaceKind::Sleepers => {
+            let place = |id: &String| diagnosis.track.iter().position(|sleeper| sleeper.id == *id);
+            let places: Vec<usize> = location.sleepers.iter().filter_map(place).collect();
+            let centre = places.get(places.len() / 2).copied().unwrap_or(0);
+            let moved = places.iter().filter_map(|place| (middle + place).checked_sub(centre));
+            format!("sleepers = {:?}\n", moved.collect::<Vec<_>>())
+        }
+        PlaceKind::Point => {
+            let x_m = location.x_m[0];
+            let nearest = diagnosis.track.iter().map(|sleeper| x_m - sleeper.x_m);
+            let offset = nearest.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+            let x_m = (middle + 1) as f64 * spacing_m + offset;
+            format!("x_m = [{x_m:.4}, {x_m:.4}]\n")
+        }
+        PlaceKind::Stretch => String::new(),
+    }
+}
+
+/// Where a parameter is drawn: about what was found.
+fn range(parameter: &KindParameter, estimate: &Estimate) -> [f64; 2] {
+    let factor = (DEVIATIONS * estimate.sd / estimate.mean).exp().clamp(FACTOR_MIN, 10.0);
+    let least = parameter.v_track[1] * 1e-3;
+    [(estimate.mean / factor).max(least), (estimate.mean * factor).max(10.0 * least)]
+}
