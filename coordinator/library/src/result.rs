@@ -101,7 +101,7 @@ pub(crate) async fn insert_results(
     finished: &[(&CaseReport, &[Features])],
 ) -> Result<(), LibraryError> {
     match connection.dialect() {
-        Dialect::Sqlite => insert_one_by_one(connection, report, finished).await,
+        Dialect::Sqlite => insert_in_groups(connection, report, finished).await,
         Dialect::Postgres => insert_at_once(connection, report, finished).await,
     }
 }
@@ -126,36 +126,53 @@ fn passes<'a>(
 const INSERT: &str = "insert into result (campaign_id, worker, code_version, model_hash,
     experiment_hash, finished_at, sobol_index, speed_km_h, duration_s, parameter_hash, log_power";
 
-/// Without a network, a statement a row costs least.
-async fn insert_one_by_one(
+/// Rows in one statement at most: 64 rows of 31 values stay well below the 32,766 that `SQLite` takes.
+const ROWS_MAX: usize = 64;
+
+/// Statements of as many rows as a power of two, so that there are few to prepare: each costs a turn
+/// of the thread that speaks to the file.
+async fn insert_in_groups(
     connection: &mut Connection,
     report: &Report,
     finished: &[(&CaseReport, &[Features])],
 ) -> Result<(), LibraryError> {
-    let mut insert = format!("{INSERT}, {}) values ($1", LEVEL_COLUMNS.join(", "));
-    for number in 2..=11 + LEVEL_COLUMNS.len() {
-        let _ = write!(insert, ", ${number}");
-    }
-    insert.push(')');
+    let passes: Vec<_> = passes(report, finished).collect();
     let finished_at = iso_utc(report.now_unix_ms);
-    for (case, speed_km_h, features) in passes(report, finished) {
-        let row = sql(insert.clone())
+    let mut rest = &passes[..];
+    while !rest.is_empty() {
+        let largest = 1 << rest.len().ilog2();
+        let (rows, after) = rest.split_at(ROWS_MAX.min(largest));
+        let mut insert = sql(insert_rows(rows.len()))
             .bind(&report.campaign)
             .bind(&report.worker)
             .bind(&report.code_version)
             .bind(&report.model_hash)
             .bind(&report.experiment_hash)
-            .bind(&finished_at)
-            .bind(case.index)
-            .bind(speed_km_h)
-            .bind(case.duration_s)
-            .bind(&case.parameter_hash)
-            .bind(features.log_power.clone());
-        let levels = &features.band_levels_db;
-        let row = levels.iter().fold(row, |row, &level| row.bind(level));
-        connection.execute(row).await?;
+            .bind(&finished_at);
+        for (case, speed_km_h, features) in rows {
+            insert = insert.bind(case.index).bind(*speed_km_h).bind(case.duration_s);
+            insert = insert.bind(&case.parameter_hash).bind(features.log_power.clone());
+            let levels = &features.band_levels_db;
+            insert = levels.iter().fold(insert, |insert, &level| insert.bind(level));
+        }
+        connection.execute(insert).await?;
+        rest = after;
     }
     Ok(())
+}
+
+/// The statement that inserts so many rows: six values for all of them, then those of each.
+fn insert_rows(rows: usize) -> String {
+    let own = 5 + LEVEL_COLUMNS.len();
+    let mut insert = format!("{INSERT}, {}) values ", LEVEL_COLUMNS.join(", "));
+    for row in 0..rows {
+        insert.push_str(if row > 0 { ", ($1" } else { "($1" });
+        for number in (2..=6).chain(7 + row * own..7 + (row + 1) * own) {
+            let _ = write!(insert, ", ${number}");
+        }
+        insert.push(')');
+    }
+    insert
 }
 
 /// Over a network, one statement for all: features and levels of all rows travel as one array each,

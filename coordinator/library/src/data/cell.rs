@@ -36,3 +36,9 @@ impl Cell {
         })
     }
 }
+
+impl From<f64> for Cell {
+    fn from(real: f64) -> Self {
+        Self::Real(real)
+    }
+}

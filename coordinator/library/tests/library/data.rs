@@ -6,9 +6,9 @@ use tracktwin_library::{Answer, Cell, Library, LibraryError, Table};
 
 /// An answer, kept.
 #[derive(Default)]
-struct Kept {
-    columns: Vec<String>,
-    rows: Vec<Vec<Cell>>,
+pub(crate) struct Kept {
+    pub(crate) columns: Vec<String>,
+    pub(crate) rows: Vec<Vec<Cell>>,
 }
 
 impl Answer for Kept {
@@ -48,7 +48,7 @@ async fn some_of_all(home: &Home) -> Library {
     library
 }
 
-async fn copy(from: &Library, to: &Library) -> u64 {
+pub(crate) async fn copy(from: &Library, to: &Library) -> u64 {
     let mut added = 0;
     for table in Table::ALL {
         let take = async |rows| {

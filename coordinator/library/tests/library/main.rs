@@ -4,8 +4,10 @@
 
 mod campaigns;
 mod data;
+mod faults;
 mod histories;
 mod opening;
+mod page;
 mod provenance;
 mod queue;
 mod results;

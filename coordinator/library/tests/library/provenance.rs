@@ -8,7 +8,7 @@ use tracktwin_library::{
 };
 use tracktwin_parameters::Parameter;
 
-fn training() -> TrainingRecord {
+pub(crate) fn training() -> TrainingRecord {
     TrainingRecord {
         campaign: CAMPAIGN.to_owned(),
         library_digest: "d".to_owned(),
@@ -26,7 +26,7 @@ fn training() -> TrainingRecord {
     }
 }
 
-fn evaluation() -> EvaluationRecord {
+pub(crate) fn evaluation() -> EvaluationRecord {
     let estimates = BTreeMap::from([(Parameter::BallastStiffness, [1.1e7, 6e5])]);
     EvaluationRecord {
         recording: "dev-01".to_owned(),
@@ -44,7 +44,7 @@ fn evaluation() -> EvaluationRecord {
     }
 }
 
-fn diagnosis() -> DiagnosisRecord {
+pub(crate) fn diagnosis() -> DiagnosisRecord {
     DiagnosisRecord {
         recording: "dev-02".to_owned(),
         verdict: "left_out_physics".to_owned(),

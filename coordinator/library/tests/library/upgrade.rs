@@ -4,10 +4,10 @@ use crate::support::{Home, policy};
 use sqlx::{Connection, SqliteConnection};
 use tracktwin_library::{LeaseRequest, Library, State, Status};
 
-const CAMPAIGN: &str = "released-13c0db7b51c4";
+pub(crate) const CAMPAIGN: &str = "released-13c0db7b51c4";
 
 /// A library as the first released schema left it.
-async fn released(home: &Home) {
+pub(crate) async fn released(home: &Home) {
     let url = format!("{}?mode=rwc", home.url);
     let mut connection = SqliteConnection::connect(&url).await.unwrap();
     sqlx::raw_sql(include_str!("schemas/0001.sql")).execute(&mut connection).await.unwrap();

@@ -1,0 +1,224 @@
+//! What breaks around the library, and what must hold all the same.
+
+use crate::support::{CAMPAIGN, Home, fill, finished, lease, report};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use test_postgres::{Server, Settings};
+use tracktwin_library::{Leased, Library, LibraryError, Verdict};
+
+/// Leases cases and reports them until none wait; whatever is not answered is tried again.
+async fn work(library: &Library, cases: usize) -> usize {
+    let mut temporary = 0;
+    let mut stored = 0;
+    while stored < cases {
+        let request = crate::support::request("w", 2, library.now_unix_ms());
+        let leased = match library.lease(request).await {
+            Ok(lease) => lease.map(|lease| lease.cases).unwrap_or_default(),
+            Err(error) => {
+                assert!(error.is_temporary(), "{error:?}");
+                temporary += 1;
+                continue;
+            }
+        };
+        for case in leased {
+            stored += finish(library, &case, &mut temporary).await;
+        }
+        // A case whose lease was not heard of comes back when that has expired.
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    temporary
+}
+
+async fn finish(library: &Library, case: &Leased, temporary: &mut usize) -> usize {
+    loop {
+        let message = crate::support::message("w", vec![finished(case)]);
+        match library.report(message).await {
+            // A duplicate: the first answer got lost.
+            Ok(verdicts) => {
+                assert!(matches!(verdicts[0], Verdict::Stored | Verdict::Duplicate));
+                return 1;
+            }
+            Err(error) => {
+                assert!(error.is_temporary(), "{error:?}");
+                *temporary += 1;
+            }
+        }
+    }
+}
+
+/// The digest of so many cases, undisturbed.
+async fn undisturbed(count: u32) -> String {
+    let home = Home::sqlite_in_memory();
+    let library = home.library(count).await;
+    let leased = lease(&library, "w", count, 0).await;
+    report(&library, "w", leased.iter().map(finished).collect()).await;
+    library.digest(CAMPAIGN).await.unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_server_stopped_and_started_again_loses_nothing() {
+    const CASES: u32 = 40;
+    let Some(server) = Server::start(Settings::default()) else {
+        eprintln!("skipped: no PostgreSQL server");
+        return;
+    };
+    let library = Library::open_or_create(&server.database()).await.unwrap();
+    fill(&library, CAMPAIGN, CASES).await;
+    let working = library.clone();
+    let worker = tokio::spawn(async move { work(&working, CASES as usize).await });
+    let server = std::sync::Arc::new(server);
+    for _ in 0..2 {
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        let server = server.clone();
+        let restart = move || {
+            server.stop();
+            server.start_again();
+        };
+        tokio::task::spawn_blocking(restart).await.unwrap();
+    }
+    worker.await.unwrap();
+    let status = library.status(CAMPAIGN).await.unwrap();
+    assert_eq!((status.finished, status.total()), (CASES, CASES));
+    assert_eq!(library.digest(CAMPAIGN).await.unwrap(), undisturbed(CASES).await);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_server_that_stays_away_is_told_as_such_within_a_bound() {
+    let Some(server) = Server::start(Settings::default()) else {
+        eprintln!("skipped: no PostgreSQL server");
+        return;
+    };
+    let library = Library::open_or_create(&server.database()).await.unwrap();
+    fill(&library, CAMPAIGN, 1).await;
+    server.stop();
+    let begin = Instant::now();
+    let error = library.pause(CAMPAIGN).await.unwrap_err();
+    assert!(matches!(error, LibraryError::Unavailable { .. }), "{error:?}");
+    assert!(error.is_temporary() && !error.is_wrong_input());
+    // Ten seconds of patience, and room for a slow machine.
+    assert!(begin.elapsed() < Duration::from_secs(30), "{:?}", begin.elapsed());
+    // Whoever comes now need not wait as long again.
+    let begin = Instant::now();
+    library.pause(CAMPAIGN).await.unwrap_err();
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+    server.start_again();
+    library.pause(CAMPAIGN).await.unwrap();
+}
+
+/// A file system of one megabyte, unmounted when dropped; none where that is not allowed.
+struct SmallDisk(tempfile::TempDir);
+
+impl SmallDisk {
+    fn new() -> Option<Self> {
+        let folder = tempfile::tempdir().unwrap();
+        let mut mount = Command::new("mount");
+        mount.args(["-t", "tmpfs", "-o", "size=1m", "tmpfs"]).arg(folder.path());
+        let mounted = mount.stderr(Stdio::null()).status().is_ok_and(|status| status.success());
+        if !mounted {
+            eprintln!("skipped: file systems cannot be mounted here");
+        }
+        mounted.then_some(Self(folder))
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(self.path()).status();
+    }
+}
+
+#[tokio::test]
+async fn a_full_disk_is_said_and_survived() {
+    const CASES: u32 = 30;
+    let Some(disk) = SmallDisk::new() else { return };
+    let url = format!("sqlite:{}", disk.path().join("library.sqlite").display());
+    let library = Library::open_or_create(&url).await.unwrap();
+    fill(&library, CAMPAIGN, CASES).await;
+    let leased = lease(&library, "w", CASES, library.now_unix_ms()).await;
+    let ballast = disk.path().join("ballast");
+    // As much as there is room for.
+    let _ = std::fs::write(&ballast, vec![0; 2 << 20]);
+    let mut refused = None;
+    for case in &leased {
+        let message = crate::support::message("w", vec![finished(case)]);
+        if let Err(error) = library.report(message).await {
+            refused = Some(error);
+            break;
+        }
+    }
+    let error = refused.expect("there is no room");
+    assert!(matches!(error, LibraryError::DiskFull), "{error:?}");
+    assert!(error.is_temporary());
+
+    std::fs::remove_file(&ballast).unwrap();
+    let reports = leased.iter().map(finished).collect();
+    let verdicts = report(&library, "w", reports).await;
+    assert!(verdicts.iter().all(|it| matches!(it, Verdict::Stored | Verdict::Duplicate)));
+    assert_eq!(library.digest(CAMPAIGN).await.unwrap(), undisturbed(CASES).await);
+    let findings = library.verify().await.unwrap();
+    assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+    library.close().await;
+}
+
+/// Set for a copy of this test's program: the library it is to write to until it is killed.
+const VICTIM: &str = "TRACKTWIN_TEST_VICTIM";
+
+/// Does nothing unless it is the copy that [`kill_writers`] starts.
+#[tokio::test]
+async fn victim() {
+    let Ok(url) = std::env::var(VICTIM) else { return };
+    let library = Library::open(&url).await.unwrap();
+    loop {
+        let leased = lease(&library, "victim", 3, library.now_unix_ms()).await;
+        report(&library, "victim", leased.iter().map(finished).collect()).await;
+    }
+}
+
+async fn kill_writers(home: &Home) {
+    const CASES: u32 = 400;
+    home.library(CASES).await.close().await;
+    for kill in 0..4_u64 {
+        let mut victim = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "faults::victim", "--nocapture"])
+            .env(VICTIM, &home.url)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // Moments spread over start and work by the golden ratio.
+        tokio::time::sleep(Duration::from_millis(150 + (kill * 618) % 400)).await;
+        victim.kill().unwrap();
+        victim.wait().unwrap();
+    }
+    let library = home.open().await;
+    let findings = library.verify().await.unwrap();
+    assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+    // The victims' leases have long expired.
+    let later = library.now_unix_ms() + 3_600_000;
+    loop {
+        let leased = lease(&library, "w", 100, later).await;
+        if leased.is_empty() {
+            break;
+        }
+        report(&library, "w", leased.iter().map(finished).collect()).await;
+    }
+    assert_eq!(library.status(CAMPAIGN).await.unwrap().finished, CASES);
+    assert_eq!(library.digest(CAMPAIGN).await.unwrap(), undisturbed(CASES).await);
+}
+
+#[tokio::test]
+async fn a_killed_writer_leaves_a_sound_file() {
+    kill_writers(&Home::sqlite()).await;
+}
+
+#[tokio::test]
+async fn a_killed_writer_leaves_a_sound_server() {
+    if let Some(home) = Home::postgres() {
+        kill_writers(&home).await;
+    }
+}

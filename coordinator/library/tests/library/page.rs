@@ -1,0 +1,137 @@
+//! What the page on querying says, holds on both databases.
+
+use crate::data::{Kept, copy};
+use crate::provenance::{diagnosis, evaluation, training};
+use crate::support::{Home, features, on_both_databases, policy};
+use crate::upgrade::{CAMPAIGN, released};
+use sqlx::{Connection, PgConnection};
+use tracktwin_library::{
+    CaseReport, DiagnosisRecord, EvaluationRecord, LeaseRequest, Library, Registration, Report,
+    TrainingRecord,
+};
+use tracktwin_signal::Features;
+
+const PAGE: &str = include_str!("../../../../docs/how-to/query-the-library.md");
+
+/// The page's blocks of a language.
+fn blocks(language: &str) -> Vec<&'static str> {
+    let begin = format!("```{language}\n");
+    PAGE.split(begin.as_str()).skip(1).filter_map(|block| block.split("```").next()).collect()
+}
+
+/// A library with something in every table that the page asks.
+async fn library(home: &Home) -> Library {
+    let file = Home::sqlite();
+    released(&file).await;
+    let old = Library::open(&file.url).await.unwrap();
+    let library = Library::open_or_create(&home.url).await.unwrap();
+    copy(&old, &library).await;
+    work(&library).await;
+    let campaign = || CAMPAIGN.to_owned();
+    library.record_training(TrainingRecord { campaign: campaign(), ..training() }).await.unwrap();
+    let evaluation = EvaluationRecord { campaign: campaign(), ..evaluation() };
+    library.record_evaluation(evaluation).await.unwrap();
+    let diagnosis = DiagnosisRecord { recording: "dev-01".to_owned(), ..diagnosis() };
+    library.record_diagnosis(diagnosis).await.unwrap();
+    library
+}
+
+/// Finishes the case that waits.
+async fn work(library: &Library) {
+    let now_unix_ms = library.now_unix_ms();
+    let registration = Registration {
+        worker: "w".to_owned(),
+        code_version: "0.1.0".to_owned(),
+        model_hash: "m".to_owned(),
+        cores: 1,
+        now_unix_ms,
+    };
+    library.register_worker(registration).await.unwrap();
+    let request = LeaseRequest {
+        campaign: None,
+        indices_below: u32::MAX,
+        worker: "w".to_owned(),
+        cases_max: 1,
+        now_unix_ms,
+        lease_ms: 1000,
+        after_loss: policy,
+    };
+    let lease = library.lease(request).await.unwrap().unwrap();
+    let campaign = library.campaign(CAMPAIGN).await.unwrap();
+    let pass = |pass: Features| Features { log_power: vec![pass.log_power[0]; 303], ..pass };
+    let leased = &lease.cases[0];
+    let case = CaseReport {
+        index: leased.case.index,
+        epoch: leased.epoch,
+        parameter_hash: leased.case.parameter_hash(),
+        duration_s: 0.02,
+        outcome: Ok(features(leased.case.index).into_iter().map(pass).collect()),
+    };
+    let report = Report {
+        campaign: CAMPAIGN.to_owned(),
+        worker: "w".to_owned(),
+        code_version: "0.1.0".to_owned(),
+        model_hash: "m".to_owned(),
+        experiment_hash: campaign.experiment_hash,
+        speeds_km_h: campaign.speeds_km_h,
+        cases: vec![case],
+        now_unix_ms,
+        after_failure: policy,
+        audit_share: 1.0,
+    };
+    library.report(report).await.unwrap();
+}
+
+on_both_databases! {
+    async fn every_query_of_the_page_has_an_answer(home: &Home) {
+        let library = library(home).await;
+        let queries = blocks("sql");
+        assert_eq!(queries.len(), 12);
+        for query in queries {
+            let mut answer = Kept::default();
+            library.query(query, &mut answer).await.unwrap_or_else(|error| {
+                panic!("{query}: {error}")
+            });
+            assert!(!answer.rows.is_empty(), "{query}");
+        }
+    }
+
+    async fn a_spectrum_in_plain_sql_is_the_stored_one_to_the_bit(home: &Home) {
+        let library = library(home).await;
+        let mut answer = Kept::default();
+        let ask = "select log_power from spectrum
+            where sobol_index = 0 and speed_km_h = 13 order by frequency_Hz";
+        library.query(ask, &mut answer).await.unwrap();
+        let entry = library.entry(CAMPAIGN, 0).await.unwrap().unwrap();
+        let stored = entry.features[1].log_power.iter().map(|&value| vec![value.into()]);
+        assert_eq!(answer.rows, stored.collect::<Vec<_>>());
+    }
+}
+
+#[tokio::test]
+async fn the_pages_role_for_analysts_reads_and_does_not_write() {
+    let Some(home) = Home::postgres() else { return };
+    let library = library(&home).await;
+    let mut owner = PgConnection::connect(&home.url).await.unwrap();
+    let [role] = blocks("postgresql")[..] else { panic!("one block makes the role") };
+    sqlx::raw_sql(role).execute(&mut owner).await.unwrap();
+    let url = home.url.replace("postgres@", "analyst:choose%20one@");
+    let analyst = Library::open(&url).await.unwrap();
+    let digest = library.digest(CAMPAIGN).await.unwrap();
+    assert_eq!(analyst.digest(CAMPAIGN).await.unwrap(), digest);
+    for query in blocks("sql") {
+        analyst.query(query, &mut Kept::default()).await.unwrap();
+    }
+    assert!(analyst.pause(CAMPAIGN).await.is_err());
+    let mut connection = PgConnection::connect(&url).await.unwrap();
+    for attempt in [
+        "delete from result",
+        "set default_transaction_read_only = off; update campaign set name = 'mine'",
+        "begin read write; insert into worker select * from worker; commit",
+        "create table mine (x text)",
+    ] {
+        let refused = sqlx::raw_sql(attempt).execute(&mut connection).await;
+        assert!(refused.is_err(), "{attempt}");
+        let _ = sqlx::raw_sql("rollback").execute(&mut connection).await;
+    }
+}
