@@ -106,14 +106,14 @@ async fn a_server_that_stays_away_is_told_as_such_within_a_bound() {
     library.pause(CAMPAIGN).await.unwrap();
 }
 
-/// A file system of one megabyte, unmounted when dropped; none where that is not allowed.
+/// A file system of eight megabytes, unmounted when dropped; none where that is not allowed.
 struct SmallDisk(tempfile::TempDir);
 
 impl SmallDisk {
     fn new() -> Option<Self> {
         let folder = tempfile::tempdir().unwrap();
         let mut mount = Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", "size=1m", "tmpfs"]).arg(folder.path());
+        mount.args(["-t", "tmpfs", "-o", "size=8m", "tmpfs"]).arg(folder.path());
         let mounted = mount.stderr(Stdio::null()).status().is_ok_and(|status| status.success());
         if !mounted {
             eprintln!("skipped: file systems cannot be mounted here");
@@ -134,7 +134,7 @@ impl Drop for SmallDisk {
 
 #[tokio::test]
 async fn a_full_disk_is_said_and_survived() {
-    const CASES: u32 = 30;
+    const CASES: u32 = 120;
     let Some(disk) = SmallDisk::new() else { return };
     let url = format!("sqlite:{}", disk.path().join("library.sqlite").display());
     let library = Library::open_or_create(&url).await.unwrap();
@@ -142,7 +142,7 @@ async fn a_full_disk_is_said_and_survived() {
     let leased = lease(&library, "w", CASES, library.now_unix_ms()).await;
     let ballast = disk.path().join("ballast");
     // As much as there is room for.
-    let _ = std::fs::write(&ballast, vec![0; 2 << 20]);
+    let _ = std::fs::write(&ballast, vec![0; 16 << 20]);
     let mut refused = None;
     for case in &leased {
         let message = crate::support::message("w", vec![finished(case)]);
