@@ -77,6 +77,16 @@ impl Chart {
         );
     }
 
+    /// Filled rectangles, each from left to right and from low to high.
+    pub(crate) fn cells(&mut self, class: &str, edges: &[[f64; 4]]) {
+        let _ = write!(self.marks, r#"<path class="cell {class}" d=""#);
+        for &[left, right, low, high] in edges {
+            let ([left, top], [right, bottom]) = (self.at(left, high), self.at(right, low));
+            let _ = write!(self.marks, "M{left:.1} {top:.1}H{right:.1}V{bottom:.1}H{left:.1}z");
+        }
+        self.marks += r#""/>"#;
+    }
+
     /// A thin line from bottom to top.
     pub(crate) fn vertical(&mut self, x: f64) {
         let [x, _] = self.at_x(x);

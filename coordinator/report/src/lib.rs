@@ -5,6 +5,7 @@
 
 mod axis;
 mod chart;
+mod diagnosis_page;
 mod evaluation_page;
 mod farm_page;
 mod map_picture;
@@ -15,6 +16,7 @@ mod receptance;
 mod spectrum_picture;
 mod track_picture;
 
+pub use diagnosis_page::{Origin, diagnosis_page};
 pub use evaluation_page::evaluation_page;
 pub use farm_page::{Farm, FarmCampaign, FarmWorker, duration, farm_page, farm_view};
 pub use models_page::{Tested, models_page};

@@ -1,0 +1,108 @@
+//! How well recording and prediction agree, in numbers, and what the numbers mean.
+
+use super::levels::{Side, cells, rms};
+use super::place::Site;
+use super::quantity::{digits, signed};
+use super::words::addition;
+use maud::{Markup, html};
+use tracktwin_diagnosis::{Diagnosis, Score, Scores};
+
+/// Scores, and differences and gains by speed.
+pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
+    let fit = &diagnosis.fit;
+    let with = addition(diagnosis);
+    html! {
+        h2 { "How well it fits" }
+        p { (meaning(diagnosis)) }
+        div.scroll { table {
+            thead { tr { th { "model" } th { "score" small { "on what it was fitted to" } } th { "score" small { "on speeds withheld from it" } } } }
+            tbody {
+                (scores("re-tuned track", &fit.before, false))
+                @if let Some(with) = &with { (scores(&format!("with {with}"), &fit.after, true)) }
+            }
+        } }
+        p.note { "Score: " (fit.score) ". Higher is better." }
+        @if !diagnosis.levels.speeds_km_h.is_empty() { (by_speed(diagnosis, with.is_some())) }
+    }
+}
+
+fn scores(name: &str, scores: &Scores, better: bool) -> Markup {
+    let text = |score: Score| signed(score.score, 2);
+    html! {
+        tr.better[better] {
+            td { (name) } td { (text(scores.in_sample)) }
+            td { (scores.held_out.map_or_else(|| "–".to_owned(), text)) }
+        }
+    }
+}
+
+/// One sentence that says what the scores mean.
+fn meaning(diagnosis: &Diagnosis) -> String {
+    let fit = &diagnosis.fit;
+    let single = "With a single speed nothing could be withheld, so no model was tested on passes that it had not seen; a second speed would make up for that.";
+    match (fit.before.held_out, fit.after.held_out) {
+        (Some(before), Some(after)) if addition(diagnosis).is_some() => {
+            let factor = (after.score - before.score).exp();
+            let change = if factor >= 1.0 { "more" } else { "less" };
+            let per_cent = 100.0 * (factor.max(1.0 / factor) - 1.0);
+            format!(
+                "Each speed was withheld in turn and predicted from the others: with the addition, every level measured at the withheld speed is on average {} % {change} probable than without it.",
+                digits(per_cent, 2)
+            )
+        }
+        (Some(_), _) => "Each speed was withheld in turn and predicted from the others: the two scores are alike where the model has learnt the track and not the noise.".to_owned(),
+        (None, _) => single.to_owned(),
+    }
+}
+
+/// Differences and gains, a row a speed.
+fn by_speed(diagnosis: &Diagnosis, extended: bool) -> Markup {
+    let levels = &diagnosis.levels;
+    let site = Site::first(diagnosis);
+    let gains = extended && !diagnosis.fit.held_out_gain_nats.is_empty();
+    let pair = |sides: [Option<f64>; 2]| -> String {
+        let [before, after] =
+            sides.map(|db| db.map_or_else(|| "–".to_owned(), |db| format!("{db:.1}")));
+        if extended { format!("{before} → {after}") } else { before }
+    };
+    let here = |speed: usize| {
+        pair(
+            [Side::Before, Side::After]
+                .map(|side| rms(levels, side, site.cells_at(diagnosis, speed))),
+        )
+    };
+    let overall = |speed: usize| {
+        pair([Side::Before, Side::After].map(|side| rms(levels, side, cells(diagnosis, speed))))
+    };
+    html! {
+        div.scroll { table {
+            thead { tr {
+                th { "speed" small { "km/h" } }
+                @if site.is_part(diagnosis) { th { "difference " (site.at()) small { "dB, root mean square" } } }
+                th { "difference over all sleepers" small { "dB, root mean square" } }
+                @if gains { th { "gain when withheld" small { "nats, all its levels together" } } }
+            } }
+            tbody {
+                @for (speed, km_h) in levels.speeds_km_h.iter().enumerate() {
+                    tr {
+                        td { (km_h) }
+                        @if site.is_part(diagnosis) { td { (here(speed)) } }
+                        td { (overall(speed)) }
+                        @if gains { td { (gain(diagnosis, *km_h).map_or_else(|| "–".to_owned(), |gain| signed(gain, 1))) } }
+                    }
+                }
+            }
+        } }
+        @if gains { p.note { "A gain is the logarithm of how much more probable the withheld passes are with the addition: 2.3 nats are a factor of ten." } }
+    }
+}
+
+/// The gain at a speed; its key begins with the speed in km/h.
+fn gain(diagnosis: &Diagnosis, km_h: f64) -> Option<f64> {
+    let speed = |key: &str| {
+        let number = key.trim_start().split(|c: char| !(c.is_ascii_digit() || c == '.')).next();
+        number.and_then(|number| number.parse::<f64>().ok())
+    };
+    let gains = diagnosis.fit.held_out_gain_nats.iter();
+    gains.filter(|(key, _)| speed(key) == Some(km_h)).map(|(_, gain)| *gain).next()
+}

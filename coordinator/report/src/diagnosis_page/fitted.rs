@@ -1,0 +1,50 @@
+//! Parameters of what was accepted, with units and intervals.
+
+use super::quantity::{interval, mean};
+use super::words::{accepted, physics};
+use maud::{Markup, html};
+use tracktwin_diagnosis::{Diagnosis, Hypothesis};
+use tracktwin_track::extension::{Bound, Kind, KindParameter};
+
+/// The table; nothing where nothing was accepted or what was has no parameters.
+pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
+    let of = |hypothesis: &&Hypothesis| !hypothesis.parameters.is_empty();
+    let with: Vec<&Hypothesis> = accepted(diagnosis).filter(of).collect();
+    if with.is_empty() {
+        return Markup::default();
+    }
+    html! {
+        h2 { "How strong it is" }
+        div.scroll { table {
+            thead { tr { th { "of" } th.words { "parameter" } th { "estimate" } th { "95 % interval" } th { "name" } } }
+            tbody {
+                @for hypothesis in with {
+                    @for (name, estimate) in &hypothesis.parameters {
+                        @let known = known(hypothesis, name);
+                        tr {
+                            td { (physics(&hypothesis.physics)) }
+                            td.words { (meaning(known, name)) }
+                            td { (mean(name, *estimate)) }
+                            td { (interval(name, *estimate, is_positive(known))) }
+                            td { code { (name) } }
+                        }
+                    }
+                }
+            }
+        } }
+        p.note { "Interval: two standard deviations to either side, with the stiffness at every sleeper free at the same time." }
+    }
+}
+
+fn known(hypothesis: &Hypothesis, name: &str) -> Option<&'static KindParameter> {
+    Kind::from_name(&hypothesis.physics)?.parameter(name)
+}
+
+fn meaning(known: Option<&KindParameter>, name: &str) -> String {
+    known.map_or_else(|| physics(name), |parameter| parameter.meaning.to_owned())
+}
+
+/// Whether values below zero make no sense.
+fn is_positive(known: Option<&KindParameter>) -> bool {
+    known.is_some_and(|parameter| parameter.bound != Bound::Any)
+}

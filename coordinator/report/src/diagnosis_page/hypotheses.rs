@@ -1,0 +1,110 @@
+//! What may be left out: how probable, where, what looks alike, what would tell.
+
+use super::quantity::{per_cent, signed};
+use super::words::{is_chain, list, physics, place, summary};
+use maud::{Markup, html};
+use tracktwin_diagnosis::{Diagnosis, Hypothesis, Verdict};
+
+/// Hypotheses that are shown one by one, accepted ones apart.
+const SHOWN: usize = 8;
+
+/// Probability below which a hypothesis that was not accepted is only counted.
+const LEAST: f64 = 0.005;
+
+/// The hypotheses, or what it means that there are none.
+pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
+    let worth = |(rank, hypothesis): &(usize, &Hypothesis)| {
+        hypothesis.accepted || (*rank < SHOWN && hypothesis.probability >= LEAST)
+    };
+    let shown: Vec<&Hypothesis> =
+        diagnosis.hypotheses.iter().enumerate().filter(worth).map(|(_, h)| h).collect();
+    let rest = diagnosis.hypotheses.len() - shown.len();
+    html! {
+        h2 { "What explains it" }
+        p { (opening(diagnosis.verdict, !shown.is_empty())) }
+        @for hypothesis in &shown { (row(diagnosis, hypothesis)) }
+        @if rest > 0 { p.note { (rest) " further " (if rest == 1 { "hypothesis is" } else { "hypotheses are" }) " less probable than these." } }
+        @if !shown.is_empty() { p.note { (LEGEND) } }
+    }
+}
+
+const LEGEND: &str = "Log evidence: the logarithm of how much more probable the recording is with the hypothesis than without it, in nats (3 is a factor of 20). \
+    Detectability d′: the size of its trace over the scatter once the track was re-tuned; below about 4 an effect is easily missed.";
+
+const fn opening(verdict: Verdict, any: bool) -> &'static str {
+    match (verdict, any) {
+        (Verdict::Consistent, true) => {
+            "Nothing was accepted. These came nearest, but none gains enough to be named."
+        }
+        (Verdict::Consistent, false) => {
+            "Nothing in the catalogue explains the recording better than the track model with its own stiffness at every sleeper. \
+             That excludes what would have stood out of the scatter; it doesn't exclude an effect that is weaker than the scatter or that looks just like a change of stiffness."
+        }
+        (Verdict::UnknownPhysics, _) => {
+            "The difference is real, but no kind of physics in the catalogue was accepted for it: each either explains too little or fails on passes that it was not fitted to."
+        }
+        (Verdict::MeasurementChain, _) => {
+            "These explain the recording by how it was measured. As long as the measuring chain is at fault, nothing is said about physics of the track."
+        }
+        (Verdict::LeftOutPhysics, _) => {
+            "What was accepted improves also the passes that it was not fitted to. Everything else is listed with its probability."
+        }
+    }
+}
+
+fn row(diagnosis: &Diagnosis, hypothesis: &Hypothesis) -> Markup {
+    let width = format!("width:{:.1}%", 100.0 * hypothesis.probability.clamp(0.0, 1.0));
+    html! {
+        div class=(class(hypothesis)) {
+            div.name { (physics(&hypothesis.physics)) small { (summary(&hypothesis.physics)) } }
+            div {
+                div.share {
+                    div.track { i style=(width) {} }
+                    b { (per_cent(hypothesis.probability)) }
+                    @if hypothesis.accepted { span.accepted-mark { "✓ accepted" } }
+                }
+                p { (facts(diagnosis, hypothesis)) }
+                @if !hypothesis.look_alikes.is_empty() || !hypothesis.would_separate.is_empty() {
+                    p { (alike(hypothesis)) }
+                }
+            }
+        }
+    }
+}
+
+fn class(hypothesis: &Hypothesis) -> String {
+    let mut class = "hypothesis".to_owned();
+    if hypothesis.accepted {
+        class += " accepted";
+    }
+    match hypothesis.physics.as_str() {
+        "unknown_physics" => class += " unknown",
+        name if is_chain(name) => class += " chain",
+        _ => {}
+    }
+    class
+}
+
+/// Place and strength of evidence.
+fn facts(diagnosis: &Diagnosis, hypothesis: &Hypothesis) -> String {
+    let place = match &hypothesis.location {
+        Some(location) => place(diagnosis, location),
+        None if is_chain(&hypothesis.physics) => "in the measuring chain".to_owned(),
+        None => "all along the track, or on the vehicle".to_owned(),
+    };
+    format!(
+        "{place} · log evidence {} nats · detectability d′ {:.1}",
+        signed(hypothesis.log_evidence, 1),
+        hypothesis.detectability
+    )
+}
+
+fn alike(hypothesis: &Hypothesis) -> String {
+    let names: Vec<String> = hypothesis.look_alikes.iter().map(|name| physics(name)).collect();
+    let separate = hypothesis.would_separate.trim_end_matches('.');
+    match (names.is_empty(), separate.is_empty()) {
+        (false, false) => format!("Looks much like {}. What would tell: {separate}.", list(&names)),
+        (false, true) => format!("Looks much like {}.", list(&names)),
+        _ => format!("What would tell: {separate}."),
+    }
+}

@@ -1,0 +1,92 @@
+//! Measured less predicted levels, and their means over cells.
+
+use tracktwin_diagnosis::{Diagnosis, Levels};
+
+/// Which prediction the measured levels are compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    /// The re-tuned baseline.
+    Before,
+    /// With what was named.
+    After,
+}
+
+/// Measured level in dB; none where there is no number.
+pub(super) fn measured(levels: &Levels, at: [usize; 3]) -> Option<f64> {
+    of(&levels.measured_db, at)
+}
+
+/// Predicted level in dB at `[speed, sleeper, band]`.
+pub(super) fn predicted(levels: &Levels, side: Side, at: [usize; 3]) -> Option<f64> {
+    let table = match side {
+        Side::Before => &levels.before_db,
+        Side::After => &levels.after_db,
+    };
+    of(table, at)
+}
+
+/// Measured less predicted level in dB.
+pub(super) fn difference(levels: &Levels, side: Side, at: [usize; 3]) -> Option<f64> {
+    Some(measured(levels, at)? - predicted(levels, side, at)?)
+}
+
+/// Scatter to expect in dB of one level at a speed in a band.
+pub(super) fn scatter(levels: &Levels, speed: usize, band: usize) -> Option<f64> {
+    levels.scatter_db.get(speed)?.get(band).copied().filter(|sd| sd.is_finite() && *sd > 0.0)
+}
+
+fn of(table: &[Vec<Vec<f64>>], [speed, sleeper, band]: [usize; 3]) -> Option<f64> {
+    table.get(speed)?.get(sleeper)?.get(band).copied().filter(|level| level.is_finite())
+}
+
+/// All cells of one speed.
+pub(super) fn cells(diagnosis: &Diagnosis, speed: usize) -> impl Iterator<Item = [usize; 3]> {
+    let bands = diagnosis.levels.frequency_hz.len();
+    (0..diagnosis.track.len())
+        .flat_map(move |sleeper| (0..bands).map(move |band| [speed, sleeper, band]))
+}
+
+/// All cells.
+pub(super) fn all_cells(diagnosis: &Diagnosis) -> impl Iterator<Item = [usize; 3]> {
+    (0..diagnosis.levels.speeds_km_h.len()).flat_map(|speed| cells(diagnosis, speed))
+}
+
+/// Root mean square difference in dB over cells; none without any.
+pub(super) fn rms(
+    levels: &Levels,
+    side: Side,
+    cells: impl Iterator<Item = [usize; 3]>,
+) -> Option<f64> {
+    let squares = cells.filter_map(|at| difference(levels, side, at)).map(|db| db * db);
+    let (sum, count) = squares.fold((0.0, 0u32), |(sum, n), square| (sum + square, n + 1));
+    (count > 0).then(|| (sum / f64::from(count)).sqrt())
+}
+
+/// Share of the cells whose difference is at most twice the scatter; none without any.
+pub(super) fn share_within_two_sd(diagnosis: &Diagnosis, side: Side) -> Option<f64> {
+    let levels = &diagnosis.levels;
+    let within = all_cells(diagnosis).filter_map(|at| {
+        Some(difference(levels, side, at)?.abs() <= 2.0 * scatter(levels, at[0], at[2])?)
+    });
+    let (inside, count) = within.fold((0u32, 0u32), |(yes, n), is| (yes + u32::from(is), n + 1));
+    (count > 0).then(|| f64::from(inside) / f64::from(count))
+}
+
+/// Mean square of difference over scatter at a sleeper, over speeds and bands.
+pub(super) fn strangeness(diagnosis: &Diagnosis, sleeper: usize) -> f64 {
+    let levels = &diagnosis.levels;
+    let here = all_cells(diagnosis).filter(|at| at[1] == sleeper);
+    let ratios = here.filter_map(|at| {
+        Some(difference(levels, Side::Before, at)? / scatter(levels, at[0], at[2])?)
+    });
+    let (sum, count) = ratios.fold((0.0, 0u32), |(sum, n), ratio| (sum + ratio * ratio, n + 1));
+    if count == 0 { 0.0 } else { sum / f64::from(count) }
+}
+
+/// The middle one of the scatters in dB; none without any.
+pub(super) fn usual_scatter(levels: &Levels) -> Option<f64> {
+    let mut all: Vec<f64> =
+        levels.scatter_db.iter().flatten().copied().filter(|sd| sd.is_finite()).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied()
+}

@@ -1,0 +1,237 @@
+//! Measured less predicted levels over the track and frequency, at each speed, before and after.
+
+use super::levels::{Side, all_cells, cells, difference, usual_scatter};
+use super::quantity::digits;
+use super::words::{addition, chance, numbers, sleepers, speeds, stretch};
+use crate::axis::Axis;
+use crate::chart::Chart;
+use crate::page::figure;
+use maud::{Markup, html};
+use tracktwin_diagnosis::{Diagnosis, Mismatch};
+
+const SIZE: [f64; 2] = [546.0, 250.0];
+
+/// Shades on either side of zero.
+const SHADES: usize = 6;
+
+/// Ends that the colour scale may have, in dB: a shade is a half to six decibels.
+const LIMITS_DB: [f64; 7] = [3.0, 6.0, 9.0, 12.0, 18.0, 24.0, 36.0];
+
+/// Scatters that reach the end of the scale: what is chance stays pale.
+const SCATTERS: f64 = 6.0;
+
+/// Pixels that a sleeper's name needs.
+const NAME_WIDTH: f64 = 46.0;
+
+/// The maps with their scale, and the mismatches in words.
+pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
+    let levels = &diagnosis.levels;
+    if levels.speeds_km_h.is_empty() || levels.frequency_hz.is_empty() || diagnosis.track.is_empty()
+    {
+        return html! { @if !diagnosis.mismatches.is_empty() { (mismatches(diagnosis)) } };
+    }
+    let limit_db = limit(diagnosis);
+    let with = addition(diagnosis);
+    let sides: &[Side] =
+        if with.is_some() { &[Side::Before, Side::After] } else { &[Side::Before] };
+    let panels: Vec<String> = (0..levels.speeds_km_h.len())
+        .flat_map(|speed| sides.iter().map(move |side| (speed, *side)))
+        .map(|(speed, side)| panel(diagnosis, speed, side, limit_db))
+        .collect();
+    html! {
+        h2 { "Where recording and prediction differ" }
+        (scale(limit_db))
+        (figure(&panels, &caption(diagnosis, with.as_deref())))
+        (mismatches(diagnosis))
+    }
+}
+
+/// The end of the colour scale in dB: nearly all differences before lie inside.
+fn limit(diagnosis: &Diagnosis) -> f64 {
+    let levels = &diagnosis.levels;
+    let mut sizes: Vec<f64> = all_cells(diagnosis)
+        .filter_map(|at| difference(levels, Side::Before, at))
+        .map(f64::abs)
+        .collect();
+    sizes.sort_by(f64::total_cmp);
+    let nearly_all = sizes.get(sizes.len() * 49 / 50).copied().unwrap_or_default();
+    let needed = nearly_all.max(SCATTERS * usual_scatter(levels).unwrap_or_default());
+    LIMITS_DB.into_iter().find(|limit| *limit >= needed).unwrap_or(LIMITS_DB[LIMITS_DB.len() - 1])
+}
+
+fn panel(diagnosis: &Diagnosis, speed: usize, side: Side, limit_db: f64) -> String {
+    let levels = &diagnosis.levels;
+    let km_h = levels.speeds_km_h[speed];
+    let grid = Grid::new(diagnosis);
+    let title = match (side, addition(diagnosis)) {
+        (Side::After, Some(with)) => format!("{km_h} km/h: after, with {with}"),
+        (_, Some(_)) => format!("{km_h} km/h: before, re-tuned track only"),
+        (_, None) => format!("{km_h} km/h"),
+    };
+    let mut chart = Chart::new(&title, SIZE, grid.position_axis(), grid.frequency_axis());
+    let mut shades = vec![Vec::new(); 2 * SHADES];
+    for at in cells(diagnosis, speed) {
+        if let Some(shade) = difference(levels, side, at).and_then(|db| shade(db, limit_db)) {
+            shades[shade].push(grid.cell(at[1], at[2]));
+        }
+    }
+    for (shade, cells) in shades.iter().enumerate().filter(|(_, cells)| !cells.is_empty()) {
+        chart.cells(&class(shade), cells);
+    }
+    for mismatch in diagnosis.mismatches.iter().filter(|m| m.speeds_km_h.contains(&km_h)) {
+        let [x, y] = grid.around(diagnosis, mismatch);
+        let corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]), (x[0], y[0])];
+        chart.line("box", corners);
+    }
+    chart.name_x(grid.names(diagnosis));
+    chart.into_svg()
+}
+
+/// Number of a difference's shade: the first half is for less than predicted; none for about zero.
+fn shade(difference_db: f64, limit_db: f64) -> Option<usize> {
+    let steps = (difference_db.abs() / limit_db * SHADES as f64).round() as usize;
+    let strength = steps.min(SHADES).checked_sub(1)?;
+    Some(if difference_db < 0.0 { strength } else { SHADES + strength })
+}
+
+fn class(shade: usize) -> String {
+    let side = if shade < SHADES { "less" } else { "more" };
+    format!("{side} s{}", shade % SHADES + 1)
+}
+
+/// Edges of sleepers and bands.
+struct Grid<'a> {
+    diagnosis: &'a Diagnosis,
+    half_span_m: f64,
+    half_band: f64,
+}
+
+impl<'a> Grid<'a> {
+    fn new(diagnosis: &'a Diagnosis) -> Self {
+        let track = &diagnosis.track;
+        let bands = &diagnosis.levels.frequency_hz;
+        // The middle one of the distances: a gap in the list leaves a gap in the map.
+        let mut spans: Vec<f64> = track.windows(2).map(|pair| pair[1].x_m - pair[0].x_m).collect();
+        spans.sort_by(f64::total_cmp);
+        let span_m = spans.get(spans.len() / 2).copied().filter(|span| *span > 0.0).unwrap_or(1.0);
+        let ratio = match bands[..] {
+            [first, .., last] => (last / first).powf(1.0 / (bands.len() - 1) as f64),
+            _ => 2.0,
+        };
+        Self { diagnosis, half_span_m: 0.5 * span_m, half_band: ratio.sqrt() }
+    }
+
+    /// Left, right, low and high edge of a cell.
+    fn cell(&self, sleeper: usize, band: usize) -> [f64; 4] {
+        let x_m = self.diagnosis.track[sleeper].x_m;
+        let hz = self.diagnosis.levels.frequency_hz[band];
+        let half = self.half_span_m;
+        [x_m - half, x_m + half, hz / self.half_band, hz * self.half_band]
+    }
+
+    fn position_axis(&self) -> Axis {
+        let last = self.diagnosis.track.len() - 1;
+        Axis::linear("sleeper", self.cell(0, 0)[0], self.cell(last, 0)[1])
+    }
+
+    fn frequency_axis(&self) -> Axis {
+        let last = self.diagnosis.levels.frequency_hz.len() - 1;
+        Axis::logarithmic("frequency in Hz", self.cell(0, 0)[2], self.cell(0, last)[3])
+    }
+
+    /// Names of sleepers, as many as there is room for.
+    fn names(&self, diagnosis: &Diagnosis) -> Vec<(f64, String)> {
+        let room = ((SIZE[0] / NAME_WIDTH) as usize).saturating_sub(2).max(1);
+        let step = diagnosis.track.len().div_ceil(room);
+        diagnosis.track.iter().step_by(step).map(|s| (s.x_m, s.id.clone())).collect()
+    }
+
+    /// The edges of a mismatch: those of its sleepers where they are known, and half a band more.
+    fn around(&self, diagnosis: &Diagnosis, mismatch: &Mismatch) -> [[f64; 2]; 2] {
+        let places = numbers(diagnosis, &mismatch.sleepers);
+        let x = match (places.iter().min(), places.iter().max()) {
+            (Some(&first), Some(&last)) => [self.cell(first, 0)[0], self.cell(last, 0)[1]],
+            _ => mismatch.x_m,
+        };
+        let [low, high] = mismatch.frequency_hz;
+        [x, [low / self.half_band, high * self.half_band]]
+    }
+}
+
+/// The colour scale: a box a shade, its ends in dB.
+fn scale(limit_db: f64) -> Markup {
+    let shades = (0..SHADES).rev().map(class);
+    let more = (SHADES..2 * SHADES).map(class);
+    html! {
+        div.scale {
+            span { "measured lower than predicted" }
+            span { "−" (limit_db) " dB" }
+            span.steps role="img" aria-label=(format!("colour scale from −{limit_db} to +{limit_db} dB")) {
+                @for class in shades { i class=(class) {} }
+                i {}
+                @for class in more { i class=(class) {} }
+            }
+            span { "+" (limit_db) " dB" }
+            span { "measured higher" }
+        }
+    }
+}
+
+fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
+    let shown = "Each cell is one sleeper and one band of frequency: its colour is the measured less the predicted vibration level.";
+    let scatter = usual_scatter(&diagnosis.levels).map_or_else(String::new, |db| {
+        format!(
+            " The rail's roughness alone scatters a level by about {} dB, so a pale speckle is to be expected everywhere; what stands out in one place, or in one band all along, is not chance.",
+            digits(db, 2)
+        )
+    });
+    let sides = with.map_or_else(
+        || " The prediction is that of the track model with its own stiffness at every sleeper.".to_owned(),
+        |with| format!(" Left: the track model re-tuned, with its own stiffness at every sleeper. Right: the same with {with}."),
+    );
+    let boxes = if diagnosis.mismatches.is_empty() {
+        ""
+    } else {
+        " Frames mark the mismatches listed below."
+    };
+    format!("{shown}{sides}{scatter}{boxes}")
+}
+
+fn mismatches(diagnosis: &Diagnosis) -> Markup {
+    if diagnosis.mismatches.is_empty() {
+        return html! { p { "Nowhere is the difference larger than chance explains." } };
+    }
+    let words = |mismatch: &Mismatch| {
+        let [low, high] = mismatch.frequency_hz;
+        format!(
+            "{}, {low:.0} to {high:.0} Hz, at {}: {} dB between measured and predicted (root mean square); probability to see as much anywhere by chance {}",
+            where_it_is(diagnosis, mismatch),
+            speeds(&mismatch.speeds_km_h),
+            digits(mismatch.level_db, 2),
+            chance(mismatch.p_value)
+        )
+    };
+    html! { ol.places { @for mismatch in &diagnosis.mismatches { li { (words(mismatch)) } } } }
+}
+
+fn where_it_is(diagnosis: &Diagnosis, mismatch: &Mismatch) -> String {
+    let everywhere = mismatch.sleepers.len() == diagnosis.track.len();
+    match sleepers(diagnosis, &mismatch.sleepers) {
+        _ if everywhere => "all along the track".to_owned(),
+        names if names.is_empty() => stretch(mismatch.x_m),
+        names => format!("{names} ({})", stretch(mismatch.x_m)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shades_grow_with_the_difference_and_end_at_the_limit() {
+        assert_eq!(shade(0.4, 6.0), None);
+        assert_eq!(shade(0.6, 6.0).map(class).as_deref(), Some("more s1"));
+        assert_eq!(shade(-3.1, 6.0).map(class).as_deref(), Some("less s3"));
+        assert_eq!(shade(40.0, 6.0).map(class).as_deref(), Some("more s6"));
+    }
+}

@@ -1,0 +1,63 @@
+//! The page of a diagnosis, for a track engineer who never read the paper.
+//!
+//! Owns what is shown of a diagnosis, in which order, and in which words. What the numbers are is
+//! the diagnosis' own affair.
+
+mod along;
+mod fit;
+mod fitted;
+mod headline;
+mod hypotheses;
+mod levels;
+mod mismatch_map;
+mod place;
+mod quantity;
+mod style;
+mod words;
+
+use crate::page::page_with;
+use maud::{Markup, PreEscaped, html};
+use tracktwin_diagnosis::Diagnosis;
+
+/// How a diagnosis came about.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// The command line that repeats it.
+    pub command: String,
+    /// The program and its version.
+    pub version: String,
+    /// The library or models it used, or why none; empty if that does not matter.
+    pub library: String,
+}
+
+/// The report of a diagnosis: what it is, where it shows, what explains it, what that changes.
+pub fn diagnosis_page(diagnosis: &Diagnosis, origin: &Origin) -> String {
+    let head = html! { style { (PreEscaped(style::STYLE)) } };
+    let body = html! {
+        (headline::headline(diagnosis))
+        (mismatch_map::section(diagnosis))
+        (place::section(diagnosis))
+        (hypotheses::section(diagnosis))
+        (fitted::section(diagnosis))
+        (along::section(diagnosis))
+        (fit::section(diagnosis))
+        (reproduce(diagnosis, origin))
+    };
+    let title = format!("Diagnosis of {}", diagnosis.recording);
+    // A number stays with its per cent sign when the line breaks.
+    let sentence = diagnosis.sentence.replace(" %", "\u{a0}%");
+    page_with(&title, &sentence, &head, &body, &Markup::default())
+}
+
+fn reproduce(diagnosis: &Diagnosis, origin: &Origin) -> Markup {
+    html! {
+        h2 { "How to reproduce it" }
+        pre { (origin.command) }
+        dl {
+            dt { "recording" } dd { (diagnosis.recording) }
+            dt { "program" } dd { (origin.version) }
+            @if !origin.library.is_empty() { dt { "library" } dd { (origin.library) } }
+            dt { "format" } dd { (diagnosis.format) ", beside this page in " code { "diagnosis.json" } }
+        }
+    }
+}

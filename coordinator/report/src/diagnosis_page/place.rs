@@ -1,0 +1,225 @@
+//! Measured and predicted levels by frequency where it matters.
+
+use super::levels::{Side, measured, predicted, scatter, strangeness};
+use super::words::{accepted, addition, numbers, sleepers};
+use crate::axis::Axis;
+use crate::chart::Chart;
+use crate::page::figure;
+use maud::{Markup, PreEscaped, html};
+use tracktwin_diagnosis::{Diagnosis, Location};
+
+const SIZE: [f64; 2] = [361.0, 280.0];
+
+/// Sleepers of a location up to which the strangest is shown, and beyond which their mean.
+const TOGETHER: usize = 3;
+
+/// Sleepers whose levels are shown together.
+pub(super) struct Site {
+    sleepers: Vec<usize>,
+    name: String,
+}
+
+impl Site {
+    /// Where the accepted physics are, or else where measured and predicted levels differ most.
+    fn all(diagnosis: &Diagnosis) -> Vec<Self> {
+        let mut sites: Vec<Self> = Vec::new();
+        for hypothesis in accepted(diagnosis) {
+            let site = hypothesis.location.as_ref().map_or_else(
+                || Self::everywhere(diagnosis),
+                |location| Self::of(diagnosis, location),
+            );
+            if sites.iter().all(|known| known.sleepers != site.sleepers) {
+                sites.push(site);
+            }
+        }
+        if sites.is_empty() { vec![Self::strangest(diagnosis)] } else { sites }
+    }
+
+    /// The first of them.
+    pub(super) fn first(diagnosis: &Diagnosis) -> Self {
+        Self::all(diagnosis).swap_remove(0)
+    }
+
+    fn of(diagnosis: &Diagnosis, location: &Location) -> Self {
+        let named = numbers(diagnosis, &location.sleepers);
+        if named.len() > TOGETHER {
+            let name = format!("mean over {}", sleepers(diagnosis, &location.sleepers));
+            return Self { sleepers: named, name };
+        }
+        match strangest_of(diagnosis, &named) {
+            Some(sleeper) => Self::one(diagnosis, sleeper),
+            None => nearest(diagnosis, location.x_m)
+                .map_or_else(|| Self::everywhere(diagnosis), |s| Self::one(diagnosis, s)),
+        }
+    }
+
+    fn strangest(diagnosis: &Diagnosis) -> Self {
+        let all: Vec<usize> = (0..diagnosis.track.len()).collect();
+        strangest_of(diagnosis, &all)
+            .map_or_else(|| Self::everywhere(diagnosis), |s| Self::one(diagnosis, s))
+    }
+
+    fn one(diagnosis: &Diagnosis, sleeper: usize) -> Self {
+        Self { sleepers: vec![sleeper], name: diagnosis.track[sleeper].id.clone() }
+    }
+
+    fn everywhere(diagnosis: &Diagnosis) -> Self {
+        let sleepers = (0..diagnosis.track.len()).collect();
+        Self { sleepers, name: "mean over all sleepers".to_owned() }
+    }
+
+    /// To follow a quantity: "at SN18", "over all sleepers".
+    pub(super) fn at(&self) -> String {
+        self.name.strip_prefix("mean ").map_or_else(|| format!("at {}", self.name), str::to_owned)
+    }
+
+    /// Whether there are sleepers beside it.
+    pub(super) fn is_part(&self, diagnosis: &Diagnosis) -> bool {
+        self.sleepers.len() < diagnosis.track.len()
+    }
+
+    /// All its cells.
+    pub(super) fn cells(&self, diagnosis: &Diagnosis) -> impl Iterator<Item = [usize; 3]> {
+        let speeds = diagnosis.levels.speeds_km_h.len();
+        (0..speeds).flat_map(|speed| self.cells_at(diagnosis, speed))
+    }
+
+    /// Its cells at one speed.
+    pub(super) fn cells_at(
+        &self,
+        diagnosis: &Diagnosis,
+        speed: usize,
+    ) -> impl Iterator<Item = [usize; 3]> {
+        let bands = diagnosis.levels.frequency_hz.len();
+        let of = move |&sleeper: &usize| (0..bands).map(move |band| [speed, sleeper, band]);
+        self.sleepers.iter().flat_map(of)
+    }
+
+    /// Mean over its sleepers of a level in a band.
+    fn mean(
+        &self,
+        speed: usize,
+        band: usize,
+        level: impl Fn([usize; 3]) -> Option<f64>,
+    ) -> Option<f64> {
+        let levels = self.sleepers.iter().filter_map(|&sleeper| level([speed, sleeper, band]));
+        let (sum, count) = levels.fold((0.0, 0u32), |(sum, n), level| (sum + level, n + 1));
+        (count > 0).then(|| sum / f64::from(count))
+    }
+}
+
+fn strangest_of(diagnosis: &Diagnosis, sleepers: &[usize]) -> Option<usize> {
+    let strange = |sleeper: &usize| strangeness(diagnosis, *sleeper);
+    sleepers.iter().copied().max_by(|a, b| strange(a).total_cmp(&strange(b)))
+}
+
+fn nearest(diagnosis: &Diagnosis, [from, to]: [f64; 2]) -> Option<usize> {
+    let distance = |at: &usize| (diagnosis.track[*at].x_m - 0.5 * (from + to)).abs();
+    (0..diagnosis.track.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+/// A row of charts a place, one chart a speed.
+pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
+    let levels = &diagnosis.levels;
+    if levels.speeds_km_h.is_empty() || levels.frequency_hz.is_empty() || diagnosis.track.is_empty()
+    {
+        return Markup::default();
+    }
+    let sites = Site::all(diagnosis);
+    let heading = match (addition(diagnosis), &sites[..]) {
+        (Some(_), [site]) => format!("Measured and predicted levels {}", site.at()),
+        (Some(_), _) => "Measured and predicted levels at the places".to_owned(),
+        (None, _) => format!("Where they differ most: {}", sites[0].name),
+    };
+    html! {
+        h2 { (heading) }
+        (keys(addition(diagnosis).as_deref()))
+        @for site in &sites {
+            @let charts: Vec<String> =
+                (0..levels.speeds_km_h.len()).map(|speed| chart(diagnosis, site, speed)).collect();
+            (figure(&charts, &caption(site)))
+        }
+    }
+}
+
+fn chart(diagnosis: &Diagnosis, site: &Site, speed: usize) -> String {
+    let levels = &diagnosis.levels;
+    let points = |level: &dyn Fn([usize; 3]) -> Option<f64>| -> Vec<(f64, f64)> {
+        let point = |(band, &hz): (usize, &f64)| Some((hz, site.mean(speed, band, level)?));
+        levels.frequency_hz.iter().enumerate().filter_map(point).collect()
+    };
+    let recorded = points(&|at| measured(levels, at));
+    let before = points(&|at| predicted(levels, Side::Before, at));
+    let after = points(&|at| predicted(levels, Side::After, at));
+    let named = addition(diagnosis).is_some();
+    let band = band(diagnosis, site, speed, if named { Side::After } else { Side::Before });
+    let all = [&recorded, &before, &after].into_iter().flatten().map(|point| point.1);
+    let y =
+        Axis::around("level in dB re 1 (m/s²)²", all.chain(band.iter().flat_map(|b| [b.1, b.2])));
+    let x = match (levels.frequency_hz.first(), levels.frequency_hz.last()) {
+        (Some(&low), Some(&high)) if high > low => Axis::logarithmic("frequency in Hz", low, high),
+        _ => Axis::around("frequency in Hz", levels.frequency_hz.iter().copied()),
+    };
+    let title = format!("{}, {} km/h", site.name, levels.speeds_km_h[speed]);
+    let mut chart = Chart::new(&title, SIZE, x, y);
+    if !band.is_empty() {
+        chart.band("a", &band);
+    }
+    if named {
+        chart.line("was", before);
+        chart.line("a", after);
+    } else {
+        chart.line("a", before);
+    }
+    chart.dots("ink", 2.3, &recorded);
+    chart.into_svg()
+}
+
+/// Two standard deviations to expect on either side of a prediction. Sleepers scatter each for
+/// itself, so that the mean over many scatters less.
+fn band(diagnosis: &Diagnosis, site: &Site, speed: usize, side: Side) -> Vec<(f64, f64, f64)> {
+    let levels = &diagnosis.levels;
+    let many = (site.sleepers.len() as f64).sqrt();
+    let of = |(band, &hz): (usize, &f64)| {
+        let level = site.mean(speed, band, |at| predicted(levels, side, at))?;
+        let two = 2.0 * scatter(levels, speed, band)? / many;
+        Some((hz, level - two, level + two))
+    };
+    levels.frequency_hz.iter().enumerate().filter_map(of).collect()
+}
+
+/// What dots, lines and band are.
+fn keys(with: Option<&str>) -> Markup {
+    let sample = |inside: &str| {
+        let svg = format!(
+            r#"<svg class="chart" width="26" height="12" viewBox="0 0 26 12" aria-hidden="true">{inside}</svg>"#
+        );
+        PreEscaped(svg)
+    };
+    let line = |class: &str| format!(r#"<path class="line {class}" d="M0 6H26"/>"#);
+    html! {
+        div.keys {
+            span { (sample(r#"<circle class="dot ink" cx="13" cy="6" r="2.8"/>"#)) "measured" }
+            @if let Some(with) = with {
+                span { (sample(&line("was"))) "before: re-tuned track only" }
+                span { (sample(&line("a"))) "after: with " (with) }
+            } @else {
+                span { (sample(&line("a"))) "predicted by the re-tuned track" }
+            }
+            span { (sample(r#"<rect class="band a" width="26" height="12"/>"#)) "where 95 % of the measured levels should lie" }
+        }
+    }
+}
+
+fn caption(site: &Site) -> String {
+    let what = match site.sleepers.len() {
+        1 => format!(
+            "Levels over one sleeper spacing around {}, mean over the passes of a speed.",
+            site.name
+        ),
+        _ => format!("Levels averaged over the passes of a speed and {}.", site.at()),
+    };
+    format!(
+        "{what} The band is twice the scatter that roughness alone gives; dots outside it are what the prediction can't explain. What keeps its frequency when the speed changes is structure; what moves with the speed is the shape of rail or wheel."
+    )
+}

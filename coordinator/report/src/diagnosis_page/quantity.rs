@@ -1,0 +1,190 @@
+//! Numbers with units for people: 30.0 MN/m, 0.15, 82 µm.
+//!
+//! Owns prefixes and digits. The unit of a parameter is what its name ends in.
+
+use tracktwin_diagnosis::Estimate;
+use tracktwin_parameters::Parameter;
+
+/// Ends of names, longest first where one ends in another, with the unit that they stand for and
+/// whether it takes prefixes.
+const UNITS: [(&str, &str, bool); 16] = [
+    ("_N_m_per_rad", "N m/rad", true),
+    ("_dB_per_octave", "dB/octave", false),
+    ("_N_s_per_m", "N s/m", true),
+    ("_N_per_m", "N/m", true),
+    ("_N_s_m", "N s/m", true),
+    ("_N_m2", "N m²", true),
+    ("_N_m", "N/m", true),
+    ("_m_s2", "m/s²", false),
+    ("_km_h", "km/h", false),
+    ("_dB", "dB", false),
+    ("_Hz", "Hz", false),
+    ("_kg", "kg", false),
+    ("_rad", "rad", false),
+    ("_N", "N", true),
+    ("_s", "s", true),
+    ("_m", "m", true),
+];
+
+/// Prefixes and their factors, the largest first.
+const PREFIXES: [(f64, &str); 6] =
+    [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ")];
+
+/// The unit in which a value of a parameter is shown.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unit {
+    factor: f64,
+    /// The unit with its prefix; empty for a plain number.
+    pub name: String,
+}
+
+impl Unit {
+    /// The unit for a value of about `size` of the parameter of that name.
+    pub(super) fn of(parameter: &str, size: f64) -> Self {
+        if let Some(known) = Parameter::from_name(parameter).filter(|p| p.unit().contains("1e-4")) {
+            let shown = crate::number::Shown::of(known);
+            return Self { factor: shown.divisor, name: shown.unit };
+        }
+        let plain = |name: &str| Self { factor: 1.0, name: name.to_owned() };
+        match UNITS.iter().find(|(end, ..)| parameter.ends_with(end)) {
+            Some((_, unit, true)) => {
+                let fits = |(factor, _): &&(f64, &str)| size.abs() >= *factor;
+                match PREFIXES.iter().find(fits) {
+                    Some((factor, prefix)) => {
+                        Self { factor: *factor, name: format!("{prefix}{unit}") }
+                    }
+                    None => plain(unit),
+                }
+            }
+            Some((_, unit, false)) => plain(unit),
+            None => plain(""),
+        }
+    }
+
+    /// The value in this unit.
+    pub(super) fn value(&self, si: f64) -> f64 {
+        si / self.factor
+    }
+
+    /// A text with this unit behind it.
+    pub(super) fn after(&self, text: &str) -> String {
+        if self.name.is_empty() { text.to_owned() } else { format!("{text} {}", self.name) }
+    }
+}
+
+/// Two values in one unit, with the decimals that show three digits of the second.
+pub(super) fn rounded_pair(unit: &Unit, si: [f64; 2]) -> [String; 2] {
+    let values = si.map(|value| unit.value(value));
+    let decimals = decimals_for(values[1], 3);
+    values.map(|value| unit.after(&rounded(value, decimals)))
+}
+
+/// The mean, as exactly as its standard deviation warrants, with its unit.
+pub(super) fn mean(parameter: &str, estimate: Estimate) -> String {
+    let unit = Unit::of(parameter, estimate.mean);
+    unit.after(&rounded(unit.value(estimate.mean), decimals(&unit, estimate)))
+}
+
+/// Two standard deviations to either side, with the unit; not below zero where `positive`.
+pub(super) fn interval(parameter: &str, estimate: Estimate, positive: bool) -> String {
+    let unit = Unit::of(parameter, estimate.mean);
+    let decimals = decimals(&unit, estimate);
+    let low = estimate.mean - 2.0 * estimate.sd;
+    let low = if positive { low.max(0.0) } else { low };
+    let [low, high] =
+        [low, estimate.mean + 2.0 * estimate.sd].map(|end| rounded(unit.value(end), decimals));
+    unit.after(&format!("{low} to {high}"))
+}
+
+/// Decimals that show one digit of the standard deviation, two if it begins with a one, and no
+/// more than three digits of the mean.
+fn decimals(unit: &Unit, estimate: Estimate) -> usize {
+    let (mean, sd) = (unit.value(estimate.mean), unit.value(estimate.sd));
+    let of_mean = decimals_for(mean, 3);
+    if !(sd.is_finite() && sd > 0.0) {
+        return of_mean;
+    }
+    let leading = sd / 10f64.powf(sd.log10().floor());
+    of_mean.min(decimals_for(sd, if leading < 2.0 { 2 } else { 1 }))
+}
+
+/// The number with so many significant digits, without a power of ten.
+pub(super) fn digits(value: f64, count: i32) -> String {
+    rounded(value, decimals_for(value, count))
+}
+
+fn decimals_for(value: f64, count: i32) -> usize {
+    if value == 0.0 || !value.is_finite() {
+        return 0;
+    }
+    (count - 1 - value.abs().log10().floor() as i32).clamp(0, 9) as usize
+}
+
+/// With a minus sign that is one, and none before zero.
+fn rounded(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_owned(),
+        Some(rest) => format!("−{rest}"),
+        None => text,
+    }
+}
+
+/// A probability in per cent; the ends are not claimed.
+pub(super) fn per_cent(probability: f64) -> String {
+    match 100.0 * probability {
+        p if p >= 99.5 => "over 99 %".to_owned(),
+        p if p < 1.0 => "under 1 %".to_owned(),
+        p => format!("{p:.0} %"),
+    }
+}
+
+/// A difference with its sign.
+pub(super) fn signed(value: f64, decimals: usize) -> String {
+    let text = rounded(value, decimals);
+    if value > 0.0 { format!("+{text}") } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(parameter: &str, si: f64) -> String {
+        let [_, text] = rounded_pair(&Unit::of(parameter, si), [0.0, si]);
+        text
+    }
+
+    #[test]
+    fn values_read_as_an_engineer_writes_them() {
+        assert_eq!(value("stiffness_N_per_m", 3e7), "30.0 MN/m");
+        assert_eq!(value("railpad_stiffness_N_m", 1.5e8), "150 MN/m");
+        assert_eq!(value("rotational_N_m_per_rad", 1.2e5), "120 kN m/rad");
+        assert_eq!(value("damping_N_s_per_m", 2e3), "2.00 kN s/m");
+        assert_eq!(value("sleeper_EI_N_m2", 5010.0), "5.01 kN m²");
+        assert_eq!(value("bending_factor", 0.15), "0.150");
+        assert_eq!(value("frequency_Hz", 3210.0), "3210 Hz");
+        assert_eq!(value("relaxation_time_s", 3e-4), "300 µs");
+        assert_eq!(value("offset_m", -4e-3), "−4.00 mm");
+        assert_eq!(value("irregularity_level", 3.0), "3.00 10⁻⁴ m² rad/m");
+    }
+
+    #[test]
+    fn the_deviation_decides_how_many_digits_are_shown() {
+        let dip = Estimate { mean: 8.2e-5, sd: 1.04e-5 };
+        assert_eq!(mean("dip_m", dip), "82 µm");
+        assert_eq!(interval("dip_m", dip, true), "61 to 103 µm");
+        let bending = Estimate { mean: 0.1512, sd: 0.031 };
+        assert_eq!(mean("bending_factor", bending), "0.15");
+        assert_eq!(mean("stiffness_N_per_m", Estimate { mean: 3.004e7, sd: 1.3e6 }), "30.0 MN/m");
+        let loose = Estimate { mean: 2e-5, sd: 1.5e-5 };
+        assert_eq!(interval("dip_m", loose, true), "0 to 50 µm");
+        assert_eq!(interval("offset_m", loose, false), "−10 to 50 µm");
+    }
+
+    #[test]
+    fn certainty_is_never_printed_as_a_hundred_per_cent() {
+        assert_eq!(per_cent(0.9999), "over 99 %");
+        assert_eq!(per_cent(0.934), "93 %");
+        assert_eq!(per_cent(0.001), "under 1 %");
+    }
+}

@@ -1,0 +1,99 @@
+//! Names of physics, sleepers and places as a reader says them.
+
+use super::quantity::digits;
+use tracktwin_diagnosis::{Diagnosis, Hypothesis, Location};
+use tracktwin_track::extension::Kind;
+
+/// Sleepers that are named one by one.
+const NAMED_MAX: usize = 4;
+
+/// A name of the catalogue in words.
+pub(super) fn physics(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// What a kind of physics is, in a sentence without a full stop.
+pub(super) fn summary(name: &str) -> &'static str {
+    match Kind::from_name(name) {
+        Some(kind) => kind.summary,
+        None if name == "unknown_physics" => "something that the catalogue does not have",
+        None => "",
+    }
+}
+
+/// Whether it is a fault of the measuring chain.
+pub(super) fn is_chain(name: &str) -> bool {
+    Kind::from_name(name).is_some_and(|kind| kind.measuring_chain)
+}
+
+/// What was accepted.
+pub(super) fn accepted(diagnosis: &Diagnosis) -> impl Iterator<Item = &Hypothesis> {
+    diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted)
+}
+
+/// What the second prediction has and the first has not.
+pub(super) fn addition(diagnosis: &Diagnosis) -> Option<String> {
+    let names: Vec<String> =
+        accepted(diagnosis).map(|hypothesis| physics(&hypothesis.physics)).collect();
+    (!names.is_empty()).then(|| list(&names))
+}
+
+/// "a", "a and b", "a, b and c".
+pub(super) fn list(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// Sleepers as "SN18", "SN18 to SN24" where none between is missing, or one by one.
+pub(super) fn sleepers(diagnosis: &Diagnosis, ids: &[String]) -> String {
+    let mut places = numbers(diagnosis, ids);
+    places.sort_unstable();
+    let together =
+        places.len() == ids.len() && places.windows(2).all(|pair| pair[1] == pair[0] + 1);
+    match (ids, places.first(), places.last()) {
+        ([first, _, .., last], Some(_), Some(_)) if together && ids.len() > 2 => {
+            format!("{first} to {last}")
+        }
+        _ if ids.len() > NAMED_MAX => {
+            format!("{} and {} more", ids[..NAMED_MAX].join(", "), ids.len() - NAMED_MAX)
+        }
+        _ => list(ids),
+    }
+}
+
+/// Where sleepers of these names stand in the list of sleepers.
+pub(super) fn numbers(diagnosis: &Diagnosis, ids: &[String]) -> Vec<usize> {
+    ids.iter().filter_map(|id| diagnosis.track.iter().position(|known| known.id == *id)).collect()
+}
+
+/// A place on the track.
+pub(super) fn place(diagnosis: &Diagnosis, location: &Location) -> String {
+    let stretch = stretch(location.x_m);
+    match sleepers(diagnosis, &location.sleepers) {
+        names if names.is_empty() => stretch,
+        names => format!("{names}, {stretch}"),
+    }
+}
+
+/// From where to where in m, to the millimetre.
+pub(super) fn stretch([from, to]: [f64; 2]) -> String {
+    if (to - from).abs() < 5e-4 {
+        format!("{from:.3} m")
+    } else {
+        format!("{from:.3} to {to:.3} m")
+    }
+}
+
+/// Speeds in km/h.
+pub(super) fn speeds(speeds_km_h: &[f64]) -> String {
+    let texts: Vec<String> = speeds_km_h.iter().map(ToString::to_string).collect();
+    format!("{} km/h", list(&texts))
+}
+
+/// How probable something is by chance, to follow "probability".
+pub(super) fn chance(p_value: f64) -> String {
+    if p_value < 1e-3 { "below 0.001".to_owned() } else { digits(p_value, 2) }
+}
