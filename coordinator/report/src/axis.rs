@@ -35,6 +35,11 @@ impl Axis {
         Self { label: label.to_owned(), low, high, logarithmic: true, step: None }
     }
 
+    /// Lowest and highest value.
+    pub(crate) const fn ends(&self) -> [f64; 2] {
+        [self.low, self.high]
+    }
+
     /// Where `value` lies: 0 at the low end, 1 at the high end.
     pub(crate) fn place(&self, value: f64) -> f64 {
         if self.logarithmic {

@@ -10,7 +10,7 @@ use maud::{Markup, html};
 use tracktwin_diagnosis::{BeforeAfter, Diagnosis, Estimate, SleeperValues};
 use tracktwin_parameters::Parameter;
 
-const SIZE: [f64; 2] = [1104.0, 205.0];
+const SIZE: [f64; 2] = [1104.0, 240.0];
 
 /// Sleepers whose names fit under the charts.
 const NAMES: usize = 20;
@@ -89,7 +89,9 @@ fn mark_places(chart: &mut Chart, diagnosis: &Diagnosis) {
         if to - from < 1e-3 {
             chart.vertical(from);
         } else if 2 * places.len() < diagnosis.track.len() {
-            places.iter().for_each(|&place| chart.vertical(diagnosis.track[place].x_m));
+            for place in places {
+                chart.vertical(diagnosis.track[place].x_m);
+            }
         }
     }
 }

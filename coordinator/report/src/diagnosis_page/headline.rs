@@ -1,11 +1,11 @@
 //! What stands beside and beneath the sentence: verdict, key figures, what to keep in mind.
 
-use super::levels::{Side, rms, share_within_two_sd};
+use super::levels::{Side, all_cells, difference, rms, share_within_two_sd, usual_scatter};
 use super::place::Site;
 use super::quantity::{digits, per_cent, signed};
-use super::words::{accepted, is_chain, physics};
+use super::words::{accepted, chance, is_chain, physics, speeds};
 use maud::{Markup, html};
-use tracktwin_diagnosis::{Diagnosis, Verdict};
+use tracktwin_diagnosis::{Diagnosis, Mismatch, Verdict};
 
 /// The verdict as a tag, key figures and notes.
 pub(super) fn headline(diagnosis: &Diagnosis) -> Markup {
@@ -58,20 +58,59 @@ fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
 }
 
 /// How far measured and predicted levels are apart.
-fn agreement(diagnosis: &Diagnosis) -> Option<(String, String)> {
-    let levels = &diagnosis.levels;
-    if accepted(diagnosis).next().is_none() {
-        let share = share_within_two_sd(diagnosis, Side::Before)?;
-        let what =
-            "of all levels lie within twice the scatter to expect; by chance it would be 95 %";
-        return Some((format!("{:.0} %", 100.0 * share), what.to_owned()));
+fn agreement(diagnosis: &Diagnosis) -> Vec<(String, String)> {
+    match (accepted(diagnosis).next().is_some(), diagnosis.mismatches.first()) {
+        (true, _) => improvement(diagnosis).into_iter().collect(),
+        (false, Some(mismatch)) => unexplained(diagnosis, mismatch),
+        (false, None) => chance_alone(diagnosis).into_iter().chain(compared(diagnosis)).collect(),
     }
+}
+
+fn improvement(diagnosis: &Diagnosis) -> Option<(String, String)> {
     let site = Site::first(diagnosis);
     let [before, after] = [Side::Before, Side::After]
-        .map(|side| rms(levels, side, site.cells(diagnosis)).map(|db| digits(db, 2)));
+        .map(|side| rms(&diagnosis.levels, side, site.cells(diagnosis)).map(|db| digits(db, 2)));
     Some((
         format!("{} → {} dB", before?, after?),
         format!("typical difference of measured and predicted level {}", site.at()),
+    ))
+}
+
+fn unexplained(diagnosis: &Diagnosis, mismatch: &Mismatch) -> Vec<(String, String)> {
+    let by_chance = usual_scatter(&diagnosis.levels).map_or_else(String::new, |db| {
+        format!("; the rail's roughness alone gives about {} dB", digits(db, 2))
+    });
+    vec![
+        (
+            format!("{} dB", digits(mismatch.level_db, 2)),
+            format!("between measured and predicted level in the largest mismatch{by_chance}"),
+        ),
+        (
+            chance(mismatch.p_value),
+            "probability to see as much anywhere if nothing were left out".to_owned(),
+        ),
+    ]
+}
+
+fn chance_alone(diagnosis: &Diagnosis) -> Option<(String, String)> {
+    let share = share_within_two_sd(diagnosis, Side::Before)?;
+    let what = "of all levels lie within twice the scatter to expect; by chance it would be 95 %";
+    Some((format!("{:.0} %", 100.0 * share), what.to_owned()))
+}
+
+/// What was looked at.
+fn compared(diagnosis: &Diagnosis) -> Option<(String, String)> {
+    let levels = &diagnosis.levels;
+    let (low, high) = (levels.frequency_hz.first()?, levels.frequency_hz.last()?);
+    let count =
+        all_cells(diagnosis).filter(|at| difference(levels, Side::Before, *at).is_some()).count();
+    Some((
+        format!("{count} levels"),
+        format!(
+            "were compared: {} sleepers, {low:.0} to {high:.0} Hz, at {}",
+            diagnosis.track.len(),
+            speeds(&levels.speeds_km_h)
+        ),
     ))
 }
 

@@ -90,6 +90,7 @@ fn facts(diagnosis: &Diagnosis, hypothesis: &Hypothesis) -> String {
     let place = match &hypothesis.location {
         Some(location) => place(diagnosis, location),
         None if is_chain(&hypothesis.physics) => "in the measuring chain".to_owned(),
+        None if hypothesis.physics == "unknown_physics" => "where the mismatches are".to_owned(),
         None => "all along the track, or on the vehicle".to_owned(),
     };
     format!(

@@ -9,7 +9,9 @@ use crate::page::figure;
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Mismatch};
 
-const SIZE: [f64; 2] = [546.0, 250.0];
+/// Width of a panel where two stand beside each other, and where three do.
+const WIDTHS: [f64; 2] = [546.0, 361.0];
+const HEIGHT: f64 = 250.0;
 
 /// Shades on either side of zero.
 const SHADES: usize = 6;
@@ -68,7 +70,8 @@ fn panel(diagnosis: &Diagnosis, speed: usize, side: Side, limit_db: f64) -> Stri
         (_, Some(_)) => format!("{km_h} km/h: before, re-tuned track only"),
         (_, None) => format!("{km_h} km/h"),
     };
-    let mut chart = Chart::new(&title, SIZE, grid.position_axis(), grid.frequency_axis());
+    let size = [WIDTHS[usize::from(addition(diagnosis).is_none())], HEIGHT];
+    let mut chart = Chart::new(&title, size, grid.position_axis(), grid.frequency_axis());
     let mut shades = vec![Vec::new(); 2 * SHADES];
     for at in cells(diagnosis, speed) {
         if let Some(shade) = difference(levels, side, at).and_then(|db| shade(db, limit_db)) {
@@ -79,11 +82,11 @@ fn panel(diagnosis: &Diagnosis, speed: usize, side: Side, limit_db: f64) -> Stri
         chart.cells(&class(shade), cells);
     }
     for mismatch in diagnosis.mismatches.iter().filter(|m| m.speeds_km_h.contains(&km_h)) {
-        let [x, y] = grid.around(diagnosis, mismatch);
+        let [x, y] = grid.around(mismatch);
         let corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]), (x[0], y[0])];
-        chart.line("box", corners);
+        chart.line(if side == Side::Before { "box" } else { "box then" }, corners);
     }
-    chart.name_x(grid.names(diagnosis));
+    chart.name_x(grid.names(size[0]));
     chart.into_svg()
 }
 
@@ -140,15 +143,16 @@ impl<'a> Grid<'a> {
     }
 
     /// Names of sleepers, as many as there is room for.
-    fn names(&self, diagnosis: &Diagnosis) -> Vec<(f64, String)> {
-        let room = ((SIZE[0] / NAME_WIDTH) as usize).saturating_sub(2).max(1);
-        let step = diagnosis.track.len().div_ceil(room);
-        diagnosis.track.iter().step_by(step).map(|s| (s.x_m, s.id.clone())).collect()
+    fn names(&self, width: f64) -> Vec<(f64, String)> {
+        let room = ((width / NAME_WIDTH) as usize).saturating_sub(2).max(1);
+        let track = &self.diagnosis.track;
+        let step = track.len().div_ceil(room);
+        track.iter().step_by(step).map(|s| (s.x_m, s.id.clone())).collect()
     }
 
     /// The edges of a mismatch: those of its sleepers where they are known, and half a band more.
-    fn around(&self, diagnosis: &Diagnosis, mismatch: &Mismatch) -> [[f64; 2]; 2] {
-        let places = numbers(diagnosis, &mismatch.sleepers);
+    fn around(&self, mismatch: &Mismatch) -> [[f64; 2]; 2] {
+        let places = numbers(self.diagnosis, &mismatch.sleepers);
         let x = match (places.iter().min(), places.iter().max()) {
             (Some(&first), Some(&last)) => [self.cell(first, 0)[0], self.cell(last, 0)[1]],
             _ => mismatch.x_m,

@@ -6,9 +6,12 @@ use crate::axis::Axis;
 use crate::chart::Chart;
 use crate::page::figure;
 use maud::{Markup, PreEscaped, html};
-use tracktwin_diagnosis::{Diagnosis, Location};
+use tracktwin_diagnosis::{Diagnosis, Levels, Location};
 
 const SIZE: [f64; 2] = [361.0, 280.0];
+
+/// Frequencies in Hz that get a thin line.
+const ROUND_HZ: [f64; 9] = [20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0];
 
 /// Sleepers of a location up to which the strangest is shown, and beyond which their mean.
 const TOGETHER: usize = 3;
@@ -129,7 +132,9 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let heading = match (addition(diagnosis), &sites[..]) {
         (Some(_), [site]) => format!("Measured and predicted levels {}", site.at()),
         (Some(_), _) => "Measured and predicted levels at the places".to_owned(),
-        (None, _) => format!("Where they differ most: {}", sites[0].name),
+        (None, _) => {
+            format!("Measured and predicted levels {}, where they differ most", sites[0].at())
+        }
     };
     html! {
         h2 { (heading) }
@@ -161,7 +166,8 @@ fn chart(diagnosis: &Diagnosis, site: &Site, speed: usize) -> String {
         _ => Axis::around("frequency in Hz", levels.frequency_hz.iter().copied()),
     };
     let title = format!("{}, {} km/h", site.name, levels.speeds_km_h[speed]);
-    let mut chart = Chart::new(&title, SIZE, x, y);
+    let mut chart = Chart::new(&title, SIZE, x, y.clone());
+    rule(&mut chart, levels, &y);
     if !band.is_empty() {
         chart.band("a", &band);
     }
@@ -173,6 +179,20 @@ fn chart(diagnosis: &Diagnosis, site: &Site, speed: usize) -> String {
     }
     chart.dots("ink", 2.3, &recorded);
     chart.into_svg()
+}
+
+/// Thin lines and names at round frequencies, more than the axis would choose itself: they tell
+/// what moves from one speed to the next.
+fn rule(chart: &mut Chart, levels: &Levels, y: &Axis) {
+    let (Some(&low), Some(&high)) = (levels.frequency_hz.first(), levels.frequency_hz.last())
+    else {
+        return;
+    };
+    let inside = |hz: &f64| (low * 0.999..=high * 1.001).contains(hz);
+    let round = ROUND_HZ.into_iter().filter(inside);
+    let [bottom, top] = y.ends();
+    round.clone().for_each(|hz| chart.line("rule", [(hz, bottom), (hz, top)]));
+    chart.name_x(round.map(|hz| (hz, hz.to_string())).collect());
 }
 
 /// Two standard deviations to expect on either side of a prediction. Sleepers scatter each for
