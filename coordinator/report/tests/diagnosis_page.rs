@@ -334,6 +334,16 @@ fn unknown_physics_is_placed_and_says_what_came_nearest() {
 }
 
 #[test]
+fn unknown_physics_that_was_accepted_has_no_second_prediction() {
+    let mut diagnosis = unknown();
+    diagnosis.hypotheses[0].accepted = true;
+    diagnosis.hypotheses[0].location = unknown().hypotheses.swap_remove(1).location;
+    let page = page("unknown-accepted", &diagnosis);
+    assert_reads(&page, &["84 %", "probability of this physics: unknown physics", "6.8 dB"]);
+    assert!(!page.contains("after, with"));
+}
+
+#[test]
 fn a_fault_of_the_measuring_chain_is_not_called_physics() {
     let page = page("chain", &chain());
     assert_reads(

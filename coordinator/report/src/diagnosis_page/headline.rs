@@ -3,7 +3,7 @@
 use super::levels::{Side, all_cells, difference, rms, share_within_two_sd, usual_scatter};
 use super::place::Site;
 use super::quantity::{digits, per_cent, signed};
-use super::words::{accepted, chance, is_chain, physics, speeds};
+use super::words::{accepted, addition, chance, is_chain, physics, speeds};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Mismatch, Verdict};
 
@@ -59,7 +59,7 @@ fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
 
 /// How far measured and predicted levels are apart.
 fn agreement(diagnosis: &Diagnosis) -> Vec<(String, String)> {
-    match (accepted(diagnosis).next().is_some(), diagnosis.mismatches.first()) {
+    match (addition(diagnosis).is_some(), diagnosis.mismatches.first()) {
         (true, _) => improvement(diagnosis).into_iter().collect(),
         (false, Some(mismatch)) => unexplained(diagnosis, mismatch),
         (false, None) => chance_alone(diagnosis).into_iter().chain(compared(diagnosis)).collect(),
@@ -116,7 +116,7 @@ fn compared(diagnosis: &Diagnosis) -> Option<(String, String)> {
 
 fn held_out(diagnosis: &Diagnosis) -> Option<(String, String)> {
     let gains = &diagnosis.fit.held_out_gain_nats;
-    accepted(diagnosis).next()?;
+    addition(diagnosis)?;
     if gains.is_empty() {
         return None;
     }

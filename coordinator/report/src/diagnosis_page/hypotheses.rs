@@ -1,7 +1,7 @@
 //! What may be left out: how probable, where, what looks alike, what would tell.
 
 use super::quantity::{per_cent, signed};
-use super::words::{is_chain, list, physics, place, summary};
+use super::words::{UNKNOWN, accepted, is_chain, list, physics, place, summary};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Hypothesis, Verdict};
 
@@ -21,7 +21,7 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let rest = diagnosis.hypotheses.len() - shown.len();
     html! {
         h2 { "What explains it" }
-        p { (opening(diagnosis.verdict, !shown.is_empty())) }
+        p { (opening(diagnosis)) }
         @for hypothesis in &shown { (row(diagnosis, hypothesis)) }
         @if rest > 0 { p.note { (rest) " further " (if rest == 1 { "hypothesis is" } else { "hypotheses are" }) " less probable than these." } }
         @if !shown.is_empty() { p.note { (LEGEND) } }
@@ -29,10 +29,14 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
 }
 
 const LEGEND: &str = "Log evidence: the logarithm of how much more probable the recording is with the hypothesis than without it, in nats (3 is a factor of 20). \
-    Detectability d′: the size of its trace over the scatter once the track was re-tuned; below about 4 an effect is easily missed.";
+    Detectability d′: the size of its trace over the scatter once the track was re-tuned; where it is small, the effect looks like a change of stiffness or drowns in the scatter.";
 
-const fn opening(verdict: Verdict, any: bool) -> &'static str {
-    match (verdict, any) {
+fn opening(diagnosis: &Diagnosis) -> &'static str {
+    let any = !diagnosis.hypotheses.is_empty();
+    match (diagnosis.verdict, any) {
+        (Verdict::Consistent, _) if accepted(diagnosis).next().is_some() => {
+            "What was accepted is within what the track model, with its own stiffness at every sleeper, is meant to show."
+        }
         (Verdict::Consistent, true) => {
             "Nothing was accepted. These came nearest, but none gains enough to be named."
         }
@@ -78,7 +82,7 @@ fn class(hypothesis: &Hypothesis) -> String {
         class += " accepted";
     }
     match hypothesis.physics.as_str() {
-        "unknown_physics" => class += " unknown",
+        UNKNOWN => class += " unknown",
         name if is_chain(name) => class += " chain",
         _ => {}
     }
@@ -90,7 +94,7 @@ fn facts(diagnosis: &Diagnosis, hypothesis: &Hypothesis) -> String {
     let place = match &hypothesis.location {
         Some(location) => place(diagnosis, location),
         None if is_chain(&hypothesis.physics) => "in the measuring chain".to_owned(),
-        None if hypothesis.physics == "unknown_physics" => "where the mismatches are".to_owned(),
+        None if hypothesis.physics == UNKNOWN => "where the mismatches are".to_owned(),
         None => "all along the track, or on the vehicle".to_owned(),
     };
     format!(

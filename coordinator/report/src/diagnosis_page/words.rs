@@ -16,7 +16,7 @@ pub(super) fn physics(name: &str) -> String {
 pub(super) fn summary(name: &str) -> &'static str {
     match Kind::from_name(name) {
         Some(kind) => kind.summary,
-        None if name == "unknown_physics" => "something that the catalogue does not have",
+        None if name == UNKNOWN => "something that the catalogue does not have",
         None => "",
     }
 }
@@ -26,15 +26,18 @@ pub(super) fn is_chain(name: &str) -> bool {
     Kind::from_name(name).is_some_and(|kind| kind.measuring_chain)
 }
 
+/// The name of what no kind explains.
+pub(super) const UNKNOWN: &str = "unknown_physics";
+
 /// What was accepted.
 pub(super) fn accepted(diagnosis: &Diagnosis) -> impl Iterator<Item = &Hypothesis> {
     diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted)
 }
 
-/// What the second prediction has and the first has not.
+/// What the second prediction has and the first has not. What has no name has no prediction.
 pub(super) fn addition(diagnosis: &Diagnosis) -> Option<String> {
-    let names: Vec<String> =
-        accepted(diagnosis).map(|hypothesis| physics(&hypothesis.physics)).collect();
+    let named = accepted(diagnosis).filter(|hypothesis| hypothesis.physics != UNKNOWN);
+    let names: Vec<String> = named.map(|hypothesis| physics(&hypothesis.physics)).collect();
     (!names.is_empty()).then(|| list(&names))
 }
 
