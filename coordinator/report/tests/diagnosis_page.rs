@@ -372,6 +372,24 @@ fn one_speed_says_that_nothing_could_be_withheld() {
 }
 
 #[test]
+fn a_kilometre_of_track_stays_a_page_of_a_megabyte() {
+    const TIMES: usize = 60;
+    let mut long = consistent();
+    let sleeper = long.track[0].clone();
+    long.track = (0..SLEEPERS * TIMES)
+        .map(|n| SleeperValues { id: format!("S{n}"), x_m: 0.6 * n as f64, ..sleeper.clone() })
+        .collect();
+    let Levels { measured_db, before_db, after_db, .. } = &mut long.levels;
+    for speed in [measured_db, before_db, after_db].into_iter().flatten() {
+        let short = std::mem::take(speed);
+        speed.extend(short.iter().cycle().take(SLEEPERS * TIMES).cloned());
+    }
+    let page = page("long", &long);
+    assert_reads(&page, &["Each cell is the mean of 8 sleepers"]);
+    assert!(page.len() < 1_500_000, "{} bytes", page.len());
+}
+
+#[test]
 fn missing_levels_leave_gaps_and_no_levels_leave_out_the_pictures() {
     let mut gaps = left_out();
     gaps.levels.measured_db[1][13][5] = f64::NAN;

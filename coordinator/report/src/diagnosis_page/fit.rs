@@ -3,7 +3,7 @@
 use super::levels::{Side, cells, rms};
 use super::place::Site;
 use super::quantity::{digits, signed};
-use super::words::addition;
+use super::words::{addition, speeds};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Score, Scores};
 
@@ -77,7 +77,7 @@ fn by_speed(diagnosis: &Diagnosis, extended: bool) -> Markup {
     html! {
         div.scroll { table {
             thead { tr {
-                th { "speed" small { "km/h" } }
+                th { "speed" }
                 @if site.is_part(diagnosis) { th { "difference " (site.at()) small { "dB, root mean square" } } }
                 th { "difference over all sleepers" small { "dB, root mean square" } }
                 @if gains { th { "gain when withheld" small { "nats, all its levels together" } } }
@@ -85,7 +85,7 @@ fn by_speed(diagnosis: &Diagnosis, extended: bool) -> Markup {
             tbody {
                 @for (speed, km_h) in levels.speeds_km_h.iter().enumerate() {
                     tr {
-                        td { (km_h) }
+                        td { (speeds(&[*km_h])) }
                         @if site.is_part(diagnosis) { td { (here(speed)) } }
                         td { (overall(speed)) }
                         @if gains { td { (gain(diagnosis, *km_h).map_or_else(|| "–".to_owned(), |gain| signed(gain, 1))) } }

@@ -75,11 +75,16 @@ pub(super) fn share_within_two_sd(diagnosis: &Diagnosis, side: Side) -> Option<f
 /// Mean square of difference over scatter at a sleeper, over speeds and bands.
 pub(super) fn strangeness(diagnosis: &Diagnosis, sleeper: usize) -> f64 {
     let levels = &diagnosis.levels;
-    let here = all_cells(diagnosis).filter(|at| at[1] == sleeper);
-    let ratios = here.filter_map(|at| {
-        Some(difference(levels, Side::Before, at)? / scatter(levels, at[0], at[2])?)
-    });
-    let (sum, count) = ratios.fold((0.0, 0u32), |(sum, n), ratio| (sum + ratio * ratio, n + 1));
+    let (mut sum, mut count) = (0.0, 0u32);
+    for speed in 0..levels.speeds_km_h.len() {
+        for band in 0..levels.frequency_hz.len() {
+            let difference = difference(levels, Side::Before, [speed, sleeper, band]);
+            if let (Some(db), Some(sd)) = (difference, scatter(levels, speed, band)) {
+                sum += (db / sd).powi(2);
+                count += 1;
+            }
+        }
+    }
     if count == 0 { 0.0 } else { sum / f64::from(count) }
 }
 

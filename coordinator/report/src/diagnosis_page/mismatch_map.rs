@@ -1,6 +1,6 @@
 //! Measured less predicted levels over the track and frequency, at each speed, before and after.
 
-use super::levels::{Side, all_cells, cells, difference, usual_scatter};
+use super::levels::{Side, all_cells, difference, usual_scatter};
 use super::quantity::digits;
 use super::words::{addition, chance, numbers, sleepers, speeds, stretch};
 use crate::axis::Axis;
@@ -21,6 +21,9 @@ const LIMITS_DB: [f64; 7] = [3.0, 6.0, 9.0, 12.0, 18.0, 24.0, 36.0];
 
 /// Scatters that reach the end of the scale: what is chance stays pale.
 const SCATTERS: f64 = 6.0;
+
+/// Most columns of cells in a panel.
+const COLUMNS_MAX: usize = 240;
 
 /// Pixels that a sleeper's name needs.
 const NAME_WIDTH: f64 = 46.0;
@@ -64,24 +67,26 @@ fn limit(diagnosis: &Diagnosis) -> f64 {
 fn panel(diagnosis: &Diagnosis, speed: usize, side: Side, limit_db: f64) -> String {
     let levels = &diagnosis.levels;
     let km_h = levels.speeds_km_h[speed];
+    let at = speeds(&[km_h]);
     let grid = Grid::new(diagnosis);
     let title = match (side, addition(diagnosis)) {
-        (Side::After, Some(with)) => format!("{km_h} km/h: after, with {with}"),
-        (_, Some(_)) => format!("{km_h} km/h: before, re-tuned track only"),
-        (_, None) => format!("{km_h} km/h"),
+        (Side::After, Some(with)) => format!("{at}: after, with {with}"),
+        (_, Some(_)) => format!("{at}: before, re-tuned track only"),
+        (_, None) => at,
     };
     let size = [WIDTHS[usize::from(addition(diagnosis).is_none())], HEIGHT];
     let mut chart = Chart::new(&title, size, grid.position_axis(), grid.frequency_axis());
     let mut shades = vec![Vec::new(); 2 * SHADES];
-    for at in cells(diagnosis, speed) {
-        if let Some(shade) = difference(levels, side, at).and_then(|db| shade(db, limit_db)) {
-            shades[shade].push(grid.cell(at[1], at[2]));
+    for (edges, db) in grid.cells(speed, side) {
+        if let Some(shade) = shade(db, limit_db) {
+            shades[shade].push(edges);
         }
     }
     for (shade, cells) in shades.iter().enumerate().filter(|(_, cells)| !cells.is_empty()) {
         chart.cells(&class(shade), cells);
     }
-    for mismatch in diagnosis.mismatches.iter().filter(|m| m.speeds_km_h.contains(&km_h)) {
+    let here = |mismatch: &&Mismatch| mismatch.speeds_km_h.contains(&km_h);
+    for mismatch in diagnosis.mismatches.iter().filter(here) {
         let [x, y] = grid.around(mismatch);
         let corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]), (x[0], y[0])];
         chart.line(if side == Side::Before { "box" } else { "box then" }, corners);
@@ -100,6 +105,11 @@ fn shade(difference_db: f64, limit_db: f64) -> Option<usize> {
 fn class(shade: usize) -> String {
     let side = if shade < SHADES { "less" } else { "more" };
     format!("{side} s{}", shade % SHADES + 1)
+}
+
+/// Sleepers that share a cell, so that a kilometre of track has no more cells than there are pixels.
+fn shared(diagnosis: &Diagnosis) -> usize {
+    diagnosis.track.len().div_ceil(COLUMNS_MAX).max(1)
 }
 
 /// Edges of sleepers and bands.
@@ -124,7 +134,28 @@ impl<'a> Grid<'a> {
         Self { diagnosis, half_span_m: 0.5 * span_m, half_band: ratio.sqrt() }
     }
 
-    /// Left, right, low and high edge of a cell.
+    /// The cells of a speed, each with its edges and the mean difference of its sleepers in dB.
+    fn cells(&self, speed: usize, side: Side) -> Vec<([f64; 4], f64)> {
+        let Diagnosis { track, levels, .. } = self.diagnosis;
+        let many = shared(self.diagnosis);
+        let sleepers = |first: usize| first..(first + many).min(track.len());
+        let cell = |first: usize, band: usize| {
+            let differences: Vec<f64> = sleepers(first)
+                .filter_map(|sleeper| difference(levels, side, [speed, sleeper, band]))
+                .collect();
+            let [left, _, low, high] = self.cell(first, band);
+            let [_, right, _, _] = self.cell(sleepers(first).end - 1, band);
+            let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+            (!differences.is_empty()).then_some(([left, right, low, high], mean))
+        };
+        let bands = levels.frequency_hz.len();
+        (0..track.len())
+            .step_by(many)
+            .flat_map(|first| (0..bands).filter_map(move |band| cell(first, band)))
+            .collect()
+    }
+
+    /// Left, right, low and high edge of a sleeper's band.
     fn cell(&self, sleeper: usize, band: usize) -> [f64; 4] {
         let x_m = self.diagnosis.track[sleeper].x_m;
         let hz = self.diagnosis.levels.frequency_hz[band];
@@ -182,7 +213,13 @@ fn scale(limit_db: f64) -> Markup {
 }
 
 fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
-    let shown = "Each cell is one sleeper and one band of frequency: its colour is the measured less the predicted vibration level.";
+    let sleepers = match shared(diagnosis) {
+        1 => "one sleeper".to_owned(),
+        many => format!("the mean of {many} sleepers"),
+    };
+    let shown = format!(
+        "Each cell is {sleepers} in one band of frequency: its colour is the measured less the predicted vibration level."
+    );
     let scatter = usual_scatter(&diagnosis.levels).map_or_else(String::new, |db| {
         format!(
             " The rail's roughness alone scatters a level by about {} dB, so a pale speckle is to be expected everywhere; what stands out in one place, or in one band all along, is not chance.",

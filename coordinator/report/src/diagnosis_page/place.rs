@@ -1,7 +1,7 @@
 //! Measured and predicted levels by frequency where it matters.
 
 use super::levels::{Side, measured, predicted, scatter, strangeness};
-use super::words::{accepted, addition, numbers, sleepers};
+use super::words::{accepted, addition, numbers, sleepers, speeds};
 use crate::axis::Axis;
 use crate::chart::Chart;
 use crate::page::figure;
@@ -112,8 +112,8 @@ impl Site {
 }
 
 fn strangest_of(diagnosis: &Diagnosis, sleepers: &[usize]) -> Option<usize> {
-    let strange = |sleeper: &usize| strangeness(diagnosis, *sleeper);
-    sleepers.iter().copied().max_by(|a, b| strange(a).total_cmp(&strange(b)))
+    let strange = sleepers.iter().map(|&sleeper| (strangeness(diagnosis, sleeper), sleeper));
+    strange.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, sleeper)| sleeper)
 }
 
 fn nearest(diagnosis: &Diagnosis, [from, to]: [f64; 2]) -> Option<usize> {
@@ -165,7 +165,7 @@ fn chart(diagnosis: &Diagnosis, site: &Site, speed: usize) -> String {
         (Some(&low), Some(&high)) if high > low => Axis::logarithmic("frequency in Hz", low, high),
         _ => Axis::around("frequency in Hz", levels.frequency_hz.iter().copied()),
     };
-    let title = format!("{}, {} km/h", site.name, levels.speeds_km_h[speed]);
+    let title = format!("{}, {}", site.name, speeds(&levels.speeds_km_h[speed..=speed]));
     let mut chart = Chart::new(&title, SIZE, x, y.clone());
     rule(&mut chart, levels, &y);
     if !band.is_empty() {

@@ -90,9 +90,10 @@ pub(super) fn stretch([from, to]: [f64; 2]) -> String {
     }
 }
 
-/// Speeds in km/h.
+/// Speeds in km/h, to the tenth.
 pub(super) fn speeds(speeds_km_h: &[f64]) -> String {
-    let texts: Vec<String> = speeds_km_h.iter().map(ToString::to_string).collect();
+    let tenths = |speed: &f64| ((speed * 10.0).round() / 10.0).to_string();
+    let texts: Vec<String> = speeds_km_h.iter().map(tenths).collect();
     format!("{} km/h", list(&texts))
 }
 
