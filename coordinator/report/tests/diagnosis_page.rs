@@ -9,7 +9,8 @@ use tracktwin_diagnosis::{
 };
 use tracktwin_report::{Origin, diagnosis_page};
 
-const SPEEDS_KM_H: [f64; 3] = [13.0, 10.0, 7.0];
+/// As metres a second times 3.6 come out.
+const SPEEDS_KM_H: [f64; 3] = [13.000_000_000_000_002, 10.0, 7.0];
 const SLEEPERS: usize = 29;
 const BANDS: usize = 33;
 const SCATTER_DB: f64 = 1.4;
@@ -341,6 +342,22 @@ fn unknown_physics_that_was_accepted_has_no_second_prediction() {
     let page = page("unknown-accepted", &diagnosis);
     assert_reads(&page, &["84 %", "probability of this physics: unknown physics", "6.8 dB"]);
     assert!(!page.contains("after, with"));
+}
+
+#[test]
+fn what_the_passes_show_alone_is_not_said_to_improve_the_prediction() {
+    let mut flat = hypothesis("wheel_flat", 0.999, "more laps");
+    (flat.accepted, flat.detectability, flat.log_evidence) = (true, 0.0, 14.0);
+    flat.parameters = estimates(&[("length_m", 3.1e-3, 2e-4)]);
+    let page = page(
+        "wheel-flat",
+        &Diagnosis { verdict: Verdict::LeftOutPhysics, hypotheses: vec![flat], ..consistent() },
+    );
+    assert_reads(&page, &["seen in the passes themselves; probability by chance below 0.001"]);
+    assert_reads(&page, &["The predictions on this page are without it", "3.1 mm", "over 99 %"]);
+    for claim in ["after, with", "d′ 0.0", "withheld speeds are predicted better"] {
+        assert!(!page.contains(claim), "{claim}");
+    }
 }
 
 #[test]

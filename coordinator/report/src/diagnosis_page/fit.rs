@@ -97,12 +97,13 @@ fn by_speed(diagnosis: &Diagnosis, extended: bool) -> Markup {
     }
 }
 
-/// The gain at a speed; its key begins with the speed in km/h.
+/// The gain at a speed; its key begins with the speed in km/h, perhaps rounded.
 fn gain(diagnosis: &Diagnosis, km_h: f64) -> Option<f64> {
     let speed = |key: &str| {
         let number = key.trim_start().split(|c: char| !(c.is_ascii_digit() || c == '.')).next();
         number.and_then(|number| number.parse::<f64>().ok())
     };
-    let gains = diagnosis.fit.held_out_gain_nats.iter();
-    gains.filter(|(key, _)| speed(key) == Some(km_h)).map(|(_, gain)| *gain).next()
+    let here = |key: &str| speed(key).is_some_and(|speed| (speed - km_h).abs() <= 0.51);
+    let mut gains = diagnosis.fit.held_out_gain_nats.iter();
+    gains.find(|(key, _)| here(key)).map(|(_, gain)| *gain)
 }

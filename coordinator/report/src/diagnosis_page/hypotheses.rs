@@ -1,7 +1,9 @@
 //! What may be left out: how probable, where, what looks alike, what would tell.
 
 use super::quantity::{per_cent, signed};
-use super::words::{UNKNOWN, accepted, is_chain, list, physics, place, summary};
+use super::words::{
+    UNKNOWN, accepted, addition, chance, is_chain, is_fitted, list, physics, place, summary,
+};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Hypothesis, Verdict};
 
@@ -48,7 +50,10 @@ fn opening(diagnosis: &Diagnosis) -> &'static str {
             "The difference is real, but no kind of physics in the catalogue was accepted for it: each either explains too little or fails on passes that it was not fitted to."
         }
         (Verdict::MeasurementChain, _) => {
-            "These explain the recording by how it was measured. As long as the measuring chain is at fault, nothing is said about physics of the track."
+            "What was accepted is in how the recording was made. As long as the measuring chain is at fault, nothing is said about physics of the track."
+        }
+        (Verdict::LeftOutPhysics, _) if addition(diagnosis).is_none() => {
+            "What was accepted shows in the passes themselves, without any model of the track. The predictions on this page are without it."
         }
         (Verdict::LeftOutPhysics, _) => {
             "What was accepted improves also the passes that it was not fitted to. Everything else is listed with its probability."
@@ -97,11 +102,19 @@ fn facts(diagnosis: &Diagnosis, hypothesis: &Hypothesis) -> String {
         None if hypothesis.physics == UNKNOWN => "where the mismatches are".to_owned(),
         None => "all along the track, or on the vehicle".to_owned(),
     };
-    format!(
-        "{place} · log evidence {} nats · detectability d′ {:.1}",
-        signed(hypothesis.log_evidence, 1),
-        hypothesis.detectability
-    )
+    let by_chance = (-hypothesis.log_evidence).exp();
+    let evidence = signed(hypothesis.log_evidence, 1);
+    match hypothesis.physics.as_str() {
+        UNKNOWN => format!("{place} · log evidence {evidence} nats"),
+        _ if is_fitted(hypothesis) => format!(
+            "{place} · log evidence {evidence} nats · detectability d′ {:.1}",
+            hypothesis.detectability
+        ),
+        _ => format!(
+            "{place} · seen in the passes themselves; probability by chance {}",
+            chance(by_chance)
+        ),
+    }
 }
 
 fn alike(hypothesis: &Hypothesis) -> String {

@@ -129,12 +129,11 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
         return Markup::default();
     }
     let sites = Site::all(diagnosis);
-    let heading = match (addition(diagnosis), &sites[..]) {
-        (Some(_), [site]) => format!("Measured and predicted levels {}", site.at()),
-        (Some(_), _) => "Measured and predicted levels at the places".to_owned(),
-        (None, _) => {
-            format!("Measured and predicted levels {}, where they differ most", sites[0].at())
-        }
+    let searched =
+        if accepted(diagnosis).next().is_none() { ", where they differ most" } else { "" };
+    let heading = match &sites[..] {
+        [site] => format!("Measured and predicted levels {}{searched}", site.at()),
+        _ => "Measured and predicted levels at the places".to_owned(),
     };
     html! {
         h2 { (heading) }

@@ -34,10 +34,15 @@ pub(super) fn accepted(diagnosis: &Diagnosis) -> impl Iterator<Item = &Hypothesi
     diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted)
 }
 
-/// What the second prediction has and the first has not. What has no name has no prediction.
+/// Whether the track model was fitted with it: what has no trace there was seen in the passes alone.
+pub(super) fn is_fitted(hypothesis: &Hypothesis) -> bool {
+    hypothesis.physics != UNKNOWN && hypothesis.detectability > 0.0
+}
+
+/// What the second prediction has and the first has not.
 pub(super) fn addition(diagnosis: &Diagnosis) -> Option<String> {
-    let named = accepted(diagnosis).filter(|hypothesis| hypothesis.physics != UNKNOWN);
-    let names: Vec<String> = named.map(|hypothesis| physics(&hypothesis.physics)).collect();
+    let fitted = accepted(diagnosis).filter(|hypothesis| is_fitted(hypothesis));
+    let names: Vec<String> = fitted.map(|hypothesis| physics(&hypothesis.physics)).collect();
     (!names.is_empty()).then(|| list(&names))
 }
 
@@ -75,6 +80,9 @@ pub(super) fn numbers(diagnosis: &Diagnosis, ids: &[String]) -> Vec<usize> {
 /// A place on the track.
 pub(super) fn place(diagnosis: &Diagnosis, location: &Location) -> String {
     let stretch = stretch(location.x_m);
+    if location.sleepers.len() == diagnosis.track.len() && !diagnosis.track.is_empty() {
+        return "all along the track".to_owned();
+    }
     match sleepers(diagnosis, &location.sleepers) {
         names if names.is_empty() => stretch,
         names => format!("{names}, {stretch}"),
