@@ -4,9 +4,12 @@
 //! and how well a model of orders predicts what it hasn't heard. What repeats with the track is
 //! `impact`'s.
 
+mod comb;
 mod flat;
+mod order_model;
 mod out_of_round;
 
+pub use comb::{CIRCUMFERENCES_M, Comb, CombBlock, HeldOut, comb};
 pub use flat::{Flat, flat};
 pub use out_of_round::{Order, out_of_round};
 

@@ -60,3 +60,23 @@ fn the_flat_of_an_independent_recording_is_measured() {
     // The grid of lengths is 3.6 % wide.
     assert!((length / 3.5e-3 - 1.0).abs() < 0.04, "{length}");
 }
+
+#[test]
+fn a_scratch() {
+    use tracktwin_signal::recording::import::*;
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../../shared/real/aba-k1/aba-k1.csv");
+    let layout = Layout {
+        acceleration: vec!["acc_left".into(), "acc_right".into()],
+        time: Some("t_s".into()),
+        speed: Some("speed_kmh".into()),
+        acceleration_unit: AccelerationUnit::Unknown,
+        ..Layout::default()
+    };
+    for imported in import(&[file], &layout).unwrap() {
+        let start = std::time::Instant::now();
+        println!("{:#?} {:?}", super::comb(&imported.recording.passes[0], 0.01), start.elapsed());
+        println!("{:?} {:?}", crate::chain::hum(&imported.recording, 0.01), start.elapsed());
+        println!("{:?}", crate::first_look(&imported.recording));
+    }
+}

@@ -75,6 +75,11 @@ pub enum Fault {
     /// The kind of file is not one that is read.
     #[error("its name ends in neither .parquet nor .csv; convert it to one of these")]
     UnknownKind,
+    /// The kind of table is not one that can be imported.
+    #[error(
+        "its name ends in none of .csv .txt .tsv .dat .parquet .npy .npz .mat; convert it to one of these"
+    )]
+    UnknownTable,
     /// A column that is needed is absent.
     #[error("there is no such column; name it so (the file has {})", present.join(", "))]
     NoColumn {

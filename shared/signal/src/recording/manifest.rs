@@ -45,7 +45,10 @@ impl Manifest {
             return Err(root.fault("format", fault));
         }
         let passes = root.list("passes", "a list of {file, speed_km_h}")?;
-        let sleepers = root.list("sleepers", "a list of {id, x_m}")?;
+        // An empty list says that their places are not known; the spacing then has to be.
+        let none_known = root.get("sleepers").and_then(Value::as_array).is_some_and(Vec::is_empty);
+        let sleepers =
+            if none_known { Vec::new() } else { root.list("sleepers", "a list of {id, x_m}")? };
         Ok(Self {
             sample_rate_hz: root.positive("sample_rate_Hz", "the samples per second")?,
             channel: root.get("channel").and_then(Value::as_str).unwrap_or_default().to_owned(),

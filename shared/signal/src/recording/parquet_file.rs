@@ -1,6 +1,7 @@
 //! Columns of numbers in Parquet files; knows nothing of what they mean.
 
 use super::error::{Fault, RecordingError};
+use super::import::Column;
 use parquet::basic::{Compression, Encoding, Repetition, Type as PhysicalType, ZstdLevel};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{DataType, DoubleType, FloatType};
@@ -37,6 +38,23 @@ pub(super) fn read<const N: usize>(
                 let kind = format!("{} values", schema.column(place).physical_type());
                 RecordingError::new(path, *name, Fault::NotNumeric { kind })
             })?;
+    }
+    Ok(columns)
+}
+
+/// Reads all columns that hold numbers.
+pub(super) fn read_all(path: &Path) -> Result<Vec<Column>, RecordingError> {
+    let unreadable = |error: ParquetError| {
+        RecordingError::new(path, "file", Fault::Unreadable { reason: error.to_string() })
+    };
+    let file = File::open(path).map_err(|error| unreadable(error.into()))?;
+    let reader = SerializedFileReader::new(file).map_err(unreadable)?;
+    let schema = reader.metadata().file_metadata().schema_descr();
+    let mut columns = Vec::new();
+    for (place, column) in schema.columns().iter().enumerate() {
+        if let Some(values) = column_values(&reader, place).map_err(unreadable)? {
+            columns.push(Column { name: column.path().string(), values, oddity: None });
+        }
     }
     Ok(columns)
 }

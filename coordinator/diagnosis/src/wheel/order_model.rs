@@ -1,0 +1,124 @@
+//! How well a model of wheel orders predicts what it hasn't heard.
+
+use super::comb::{Block, CombBlock, HeldOut, padding, shifts};
+use crate::along::median;
+
+/// Width in Hz of the bands of the smooth spectrum.
+const SMOOTH_HZ: f64 = 10.0;
+/// Resolution cells on either side of a tooth that hold its power.
+const TOOTH_CELLS: f64 = 1.5;
+/// How far in fundamentals the held-out one may be from its neighbours' mean: the share of a
+/// resolution cell that the orders drift in a block.
+const FOLLOW: f64 = 1.5e-3;
+
+/// What a spectrum is expected to be: a smooth one, and orders above it.
+struct OrderModel {
+    /// Mean power by band of [`SMOOTH_HZ`], between the teeth.
+    smooth: Vec<f64>,
+    /// Mean power by band, teeth and all: what is expected by one who knows of no wheel.
+    plain: Vec<f64>,
+    /// Power of every order's tooth, over the smooth one.
+    teeth: Vec<f64>,
+}
+
+/// Scores of the odd blocks under a model fitted on the even ones.
+pub(super) fn held_out(blocks: &[Block], fitted: &[CombBlock], band_hz: [f64; 2]) -> HeldOut {
+    let model = OrderModel::fit(blocks, fitted, band_hz);
+    let odd: Vec<usize> = (1..blocks.len()).step_by(2).filter(|i| i + 1 < blocks.len()).collect();
+    let count = odd.len().max(1) as f64;
+    let (mut explained, mut by_chance, mut gain_nats, mut better) = (0.0, 0.0, 0.0, 0);
+    for &index in &odd {
+        let block = &blocks[index];
+        let between = 0.5 * (fitted[index - 1].fundamental_hz + fitted[index + 1].fundamental_hz);
+        explained += block.near(between, 0.0, band_hz) / count;
+        let others: Vec<f64> = shifts().map(|shift| block.near(between, shift, band_hz)).collect();
+        by_chance += median(others) / count;
+        let gain = model.gain(block, between, band_hz);
+        gain_nats += gain / count;
+        better += usize::from(gain > 0.0);
+    }
+    HeldOut { blocks: odd.len(), explained, by_chance, gain_nats, better }
+}
+
+impl Block {
+    /// The most that a comb within the neighbours' reach explains.
+    fn near(&self, fundamental: f64, shift: f64, band_hz: [f64; 2]) -> f64 {
+        let trials = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|part| fundamental * (1.0 + part * FOLLOW));
+        trials.into_iter().map(|f| self.explained(f, shift, band_hz)).fold(0.0, f64::max)
+    }
+}
+
+impl OrderModel {
+    /// Means over the even blocks, each scaled to unit power in the band.
+    fn fit(blocks: &[Block], fitted: &[CombBlock], band_hz: [f64; 2]) -> Self {
+        let bands = ((band_hz[1] - band_hz[0]) / SMOOTH_HZ).ceil() as usize;
+        let even: Vec<usize> = (0..blocks.len()).step_by(2).collect();
+        let lowest = even.iter().map(|&i| fitted[i].fundamental_hz).fold(f64::MAX, f64::min);
+        let orders = (band_hz[1] / lowest) as usize + 2;
+        let mut smooth = vec![(0.0, 0.0); bands];
+        let mut plain = vec![(0.0, 0.0); bands];
+        let mut teeth = vec![(0.0, 0.0); orders];
+        for &index in &even {
+            let (block, fundamental) = (&blocks[index], fitted[index].fundamental_hz);
+            let bins = block.bins(band_hz);
+            let scale = 1.0 / block.mean_power(band_hz);
+            for bin in bins {
+                let (band, order, at_tooth) = block.place(bin, fundamental, band_hz);
+                let power = scale * block.power[bin];
+                add(&mut plain[band.min(bands - 1)], power);
+                if at_tooth {
+                    add(&mut teeth[order.min(orders - 1)], power);
+                } else {
+                    add(&mut smooth[band.min(bands - 1)], power);
+                }
+            }
+        }
+        let mean = |sums: Vec<(f64, f64)>| -> Vec<f64> {
+            sums.into_iter()
+                .map(|(sum, count)| if count > 0.0 { sum / count } else { 1.0 })
+                .collect()
+        };
+        Self { smooth: mean(smooth), plain: mean(plain), teeth: mean(teeth) }
+    }
+
+    /// Log predictive density of a block with teeth over that without (Whittle's likelihood), in
+    /// nats for the whole block.
+    fn gain(&self, block: &Block, fundamental: f64, band_hz: [f64; 2]) -> f64 {
+        let mean = block.mean_power(band_hz);
+        let gain = |bin: usize| {
+            let (band, order, at_tooth) = block.place(bin, fundamental, band_hz);
+            let power = block.power[bin] / mean;
+            let plain = self.plain[band.min(self.plain.len() - 1)];
+            let comb = if at_tooth {
+                self.teeth[order.min(self.teeth.len() - 1)]
+            } else {
+                self.smooth[band.min(self.smooth.len() - 1)]
+            };
+            (plain.ln() + power / plain) - (comb.ln() + power / comb)
+        };
+        // Padded bins repeat one another, and Hann leaves two of three cells independent.
+        block.bins(band_hz).map(gain).sum::<f64>() / (1.5 * padding() as f64)
+    }
+}
+
+impl Block {
+    fn mean_power(&self, band_hz: [f64; 2]) -> f64 {
+        let bins = self.bins(band_hz);
+        let count = bins.len().max(1) as f64;
+        self.power[bins].iter().sum::<f64>() / count
+    }
+
+    /// Band of the smooth spectrum, nearest order, and whether the bin is at its tooth.
+    fn place(&self, bin: usize, fundamental: f64, band_hz: [f64; 2]) -> (usize, usize, bool) {
+        let frequency = bin as f64 * self.step_hz;
+        let order = (frequency / fundamental).round();
+        let away = (frequency - order * fundamental).abs() / self.step_hz;
+        let band = ((frequency - band_hz[0]).max(0.0) / SMOOTH_HZ) as usize;
+        (band, order as usize, away < TOOTH_CELLS * padding() as f64)
+    }
+}
+
+fn add(sum: &mut (f64, f64), value: f64) {
+    sum.0 += value;
+    sum.1 += 1.0;
+}

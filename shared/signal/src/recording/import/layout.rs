@@ -1,0 +1,155 @@
+//! What the columns of a foreign table mean: names, units, and what the file doesn't say.
+
+use serde::Deserialize;
+
+/// Unit of an acceleration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum AccelerationUnit {
+    /// Metres per second squared.
+    #[default]
+    #[serde(rename = "m/s2")]
+    MetrePerSecondSquared,
+    /// Standard gravity.
+    #[serde(rename = "g")]
+    G,
+    /// Not known: levels mean something within the recording only.
+    #[serde(rename = "unknown")]
+    Unknown,
+}
+
+/// Unit of a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum TimeUnit {
+    /// Seconds.
+    #[default]
+    #[serde(rename = "s")]
+    Second,
+    /// Milliseconds.
+    #[serde(rename = "ms")]
+    Millisecond,
+}
+
+/// Unit of a position.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum PositionUnit {
+    /// Metres.
+    #[default]
+    #[serde(rename = "m")]
+    Metre,
+    /// Kilometres.
+    #[serde(rename = "km")]
+    Kilometre,
+    /// Millimetres.
+    #[serde(rename = "mm")]
+    Millimetre,
+}
+
+/// Unit of a speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum SpeedUnit {
+    /// Kilometres per hour.
+    #[default]
+    #[serde(rename = "km/h")]
+    KilometrePerHour,
+    /// Metres per second.
+    #[serde(rename = "m/s")]
+    MetrePerSecond,
+}
+
+impl AccelerationUnit {
+    /// One of it in m/s2; one where it isn't known.
+    pub(super) const fn in_si(self) -> f64 {
+        match self {
+            Self::MetrePerSecondSquared | Self::Unknown => 1.0,
+            Self::G => 9.806_65,
+        }
+    }
+}
+
+impl TimeUnit {
+    pub(super) const fn in_si(self) -> f64 {
+        match self {
+            Self::Second => 1.0,
+            Self::Millisecond => 1e-3,
+        }
+    }
+}
+
+impl PositionUnit {
+    pub(super) const fn in_si(self) -> f64 {
+        match self {
+            Self::Metre => 1.0,
+            Self::Kilometre => 1e3,
+            Self::Millimetre => 1e-3,
+        }
+    }
+}
+
+impl SpeedUnit {
+    pub(super) const fn in_si(self) -> f64 {
+        match self {
+            Self::KilometrePerHour => 1.0 / 3.6,
+            Self::MetrePerSecond => 1.0,
+        }
+    }
+}
+
+/// What the columns of the files mean, as a TOML file or flags say it.
+///
+/// The place of the wheel comes from `position`, else from the sum of `speed` (a column), else from
+/// `speed_km_h` at constant speed. The sample rate comes from `sample_rate_hz`, else from `time`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Layout {
+    /// Columns of vertical axle-box acceleration; each becomes a recording.
+    pub acceleration: Vec<String>,
+    /// Column of the time.
+    pub time: Option<String>,
+    /// Column of the position.
+    pub position: Option<String>,
+    /// Column of the speed.
+    pub speed: Option<String>,
+    /// Unit of the accelerations.
+    pub acceleration_unit: AccelerationUnit,
+    /// Unit of the time.
+    pub time_unit: TimeUnit,
+    /// Unit of the position.
+    pub position_unit: PositionUnit,
+    /// Unit of the speed column.
+    pub speed_unit: SpeedUnit,
+    /// Accelerations are positive upwards: their sign is turned.
+    pub upwards: bool,
+    /// Samples per second in Hz.
+    #[serde(rename = "sample_rate_Hz")]
+    pub sample_rate_hz: Option<f64>,
+    /// Speed of all passes in km/h.
+    pub speed_km_h: Option<f64>,
+    /// Distance of the sleepers in m.
+    pub spacing_m: f64,
+    /// Place of a sleeper in m; where it isn't known the recording has no sleepers.
+    pub sleeper_m: Option<f64>,
+    /// Radius of the wheel in m, where it is known.
+    pub wheel_radius_m: Option<f64>,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self {
+            acceleration: Vec::new(),
+            time: None,
+            position: None,
+            speed: None,
+            acceleration_unit: AccelerationUnit::default(),
+            time_unit: TimeUnit::default(),
+            position_unit: PositionUnit::default(),
+            speed_unit: SpeedUnit::default(),
+            upwards: false,
+            sample_rate_hz: None,
+            speed_km_h: None,
+            // The commonest in main lines.
+            spacing_m: 0.6,
+            sleeper_m: None,
+            wheel_radius_m: None,
+        }
+    }
+}
