@@ -31,6 +31,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, models, library, out } = arguments;
     // The recording first: it is what most often needs mending, and quickest to check.
     let recording = Recording::open(&recording).or_input()?;
+    if recording.sleepers.is_empty() {
+        let text = "recording.json: sleepers: is []; give their places, or import with --sleeper";
+        return Err(Stop::Input(anyhow::anyhow!(text)));
+    }
     let library = Library::open(&library).await.or_input()?;
     let models = Trained::load(&models).or_input()?;
     let evaluation = evaluate(&recording, &library, models, &out).await?;

@@ -6,6 +6,8 @@ mod coordinator;
 mod diagnose;
 mod evaluate;
 mod extend;
+mod import;
+mod inspect;
 mod library;
 mod progress;
 mod receptance;
@@ -66,6 +68,10 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Write a campaign that has the physics a diagnosis found in its parameter space.
     Extend(extend::Arguments),
+    /// Make a recording of CSV, Parquet, NumPy or MATLAB files.
+    Import(import::Arguments),
+    /// Say what is in a recording and what it can be used for.
+    Inspect(inspect::Arguments),
     /// Ask the model library.
     #[command(subcommand)]
     Library(library::Question),
@@ -126,6 +132,8 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Diagnose(arguments) => asynchronously(diagnose::run(arguments)),
         Command::Extend(arguments) => extend::run(arguments),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
+        Command::Import(arguments) => import::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Library(question) => asynchronously(library::run(question)),
         Command::Coordinator(arguments) => asynchronously(coordinator::run(arguments)),
         Command::Campaign(action) => asynchronously(campaign::run(action)),

@@ -13,4 +13,6 @@ pub(crate) mod testing;
 pub(crate) use background::{Background, hann, median, whitened};
 pub(crate) use energy::{Energy, by_speed, speed_m_s};
 pub(crate) use line::{Line, Ruler, Spectrum, amplitude, on_even_places};
-pub(crate) use tail::{combined, ln_even_odds_tail, ln_gamma_tail, ln_student_tail, of_best};
+pub(crate) use tail::{
+    combined, ln_binomial_tail, ln_gamma_tail, ln_normal_bound, ln_student_tail, of_best,
+};

@@ -113,16 +113,22 @@ fn beta_fraction(a: f64, b: f64, x: f64) -> f64 {
     fraction
 }
 
-/// `ln P(N >= hits)` of that many hits in `tries` where each hits with probability one half.
-pub(crate) fn ln_even_odds_tail(hits: usize, tries: usize) -> f64 {
+/// `ln P(N >= hits)` of that many hits in `tries` of probability `chance` each.
+pub(crate) fn ln_binomial_tail(hits: usize, tries: usize, chance: f64) -> f64 {
     if hits == 0 {
         return 0.0;
     }
     let (n, k) = (tries as f64, hits as f64);
     // The first term of the sum and a geometric bound on the rest.
-    let first = ln_gamma(n + 1.0) - ln_gamma(k + 1.0) - ln_gamma(n - k + 1.0) - n * 2f64.ln();
-    let falling = (n - k) / (k + 1.0);
+    let choices = ln_gamma(n + 1.0) - ln_gamma(k + 1.0) - ln_gamma(n - k + 1.0);
+    let first = choices + k * chance.ln() + (n - k) * (1.0 - chance).ln();
+    let falling = (n - k) / (k + 1.0) * chance / (1.0 - chance);
     if falling >= 1.0 { 0.0 } else { (first - (-falling).ln_1p()).min(0.0) }
+}
+
+/// A bound on `ln P(Z >= z)` of a standard normal variable, within a factor of three.
+pub(crate) fn ln_normal_bound(z: f64) -> f64 {
+    if z <= 0.0 { 0.0 } else { -0.5 * z * z - (1.0 + z).ln() }
 }
 
 /// One probability from several that may depend on each other in any way, in logarithms.
@@ -175,12 +181,20 @@ mod tests {
     }
 
     #[test]
-    fn even_odds_are_bounded_from_above_and_nearly_reached() {
+    fn normal_tails_are_bounded_from_above() {
+        for (z, tail) in [(1.0, 0.158_655), (3.0, 1.349_9e-3), (5.0, 2.866_5e-7)] {
+            let bound = ln_normal_bound(z).exp();
+            assert!(bound >= tail && bound < 3.0 * tail, "{bound} against {tail}");
+        }
+    }
+
+    #[test]
+    fn counts_are_bounded_from_above_and_nearly_reached() {
         // Nine or ten heads of ten: 11 of 1024.
-        let found = ln_even_odds_tail(9, 10).exp();
+        let found = ln_binomial_tail(9, 10, 0.5).exp();
         let exact = 11.0 / 1024.0;
         assert!(found >= exact && found < 1.02 * exact, "{found}");
-        assert_eq!(ln_even_odds_tail(5, 10), 0.0);
+        assert_eq!(ln_binomial_tail(5, 10, 0.5), 0.0);
     }
 
     #[test]

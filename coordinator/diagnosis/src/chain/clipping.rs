@@ -1,6 +1,6 @@
 //! Crests that all stop at one height.
 
-use crate::along::{ln_even_odds_tail, of_best};
+use crate::along::{ln_binomial_tail, of_best};
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Thickness of the layer below the greatest value, as a share of it.
@@ -65,6 +65,6 @@ fn side(index: usize, pass: &Pass, sign: f64) -> Clipping {
         level_m_s2: sign * greatest + mean,
         crests: high,
         share: within as f64 / samples.len() as f64,
-        ln_p: ln_even_odds_tail(high, high + next),
+        ln_p: ln_binomial_tail(high, high + next, 0.5),
     }
 }

@@ -8,12 +8,14 @@ mod clipping;
 mod gain;
 mod hum;
 mod offset;
+mod scale;
 mod trouble;
 
 pub use clipping::{Clipping, clipping};
 pub use gain::{Gain, gains};
 pub use hum::{Hum, hum};
 pub use offset::{Offset, Offsets, offsets};
+pub use scale::{Scale, scale};
 pub use trouble::{Trouble, troubles};
 
 use crate::along::Background;

@@ -1,7 +1,8 @@
 //! Where one pass's odometer stands against another's, by the surface that both ran over.
 
 use crate::along::{
-    Background, Ruler, by_speed, combined, median, of_best, on_even_places, speed_m_s, whitened,
+    Background, Ruler, by_speed, ln_normal_bound, median, of_best, on_even_places, speed_m_s,
+    whitened,
 };
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -67,8 +68,7 @@ impl Offsets {
     /// Probability of offsets as great between usual odometers, in logarithm: the normal tail
     /// beyond the usual limit.
     pub fn ln_p(&self) -> f64 {
-        let beyond = (self.greatest_m() - USUAL_M) / USUAL_DEVIATION_M;
-        if beyond <= 0.0 { 0.0 } else { -0.5 * beyond * beyond - (1.0 + beyond).ln() }
+        ln_normal_bound((self.greatest_m() - USUAL_M) / USUAL_DEVIATION_M)
     }
 }
 
@@ -103,7 +103,7 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     let mut start = reach;
     while start + length + reach <= points.min(a.len()).min(b.len()) {
         let (lag, correlation) = best_lag(&a[start..start + length], &b, start, reach);
-        let ln_p = combined(&[of_best(-freedom * correlation.powi(2), 2 * reach)]);
+        let ln_p = of_best(-freedom * correlation.powi(2), 2 * reach);
         all.stretches += 1;
         correlations.push(correlation);
         if ln_p < MATCHED {

@@ -87,6 +87,23 @@ fn a_shifted_and_stretched_odometer_is_measured() {
 }
 
 #[test]
+fn an_odometer_that_stretches_every_pass_alike_is_told_from_rounded_speeds() {
+    let stretched = measured(7, &|_, _, positions| {
+        for position in positions {
+            *position *= 1.01;
+        }
+    });
+    let found = scale(&stretched).unwrap();
+    assert!((found.scale.0 - 0.01).abs() < 1e-4 && found.ln_p < ALPHA.ln(), "{found:?}");
+    let rounded = measured(7, &|pass, _, positions| {
+        for position in positions {
+            *position *= if pass < 2 { 1.012 } else { 1.003 };
+        }
+    });
+    assert_eq!(scale(&rounded), None);
+}
+
+#[test]
 fn odometers_that_wander_as_usual_are_no_error() {
     let recording = measured(5, &|pass, _, positions| {
         for position in positions {
@@ -139,6 +156,7 @@ fn a_faultless_chain_shows_nothing() {
         assert!(hum(&recording, ALPHA).is_empty(), "seed {seed}");
         assert!(gains(&recording).iter().all(|gain| !gain.is_error(ALPHA)), "seed {seed}");
         assert!(offsets(&recording).iter().all(|pair| pair.ln_p() == 0.0), "seed {seed}");
+        assert_eq!(scale(&recording).unwrap().ln_p, 0.0, "seed {seed}");
     }
 }
 

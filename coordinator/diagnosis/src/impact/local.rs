@@ -1,6 +1,6 @@
 //! Impacts that come at the same place of the track in every pass and at every speed.
 
-use super::repeated::{Cells, cells};
+use super::repeated::{Cells, Listen, cells};
 use super::shape::{Form, Observed, Shape, fit};
 use crate::along::{combined, of_best};
 use tracktwin_signal::recording::Recording;
@@ -9,6 +9,9 @@ use tracktwin_signal::recording::Recording;
 const EACH_SPEED: f64 = 0.01;
 /// Cells that are looked at beside a cell: odometers wander by millimetres from speed to speed.
 const NEIGHBOURS: usize = 1;
+/// Share of the loudest impact's power below which another is its echo: the ringing of the track and
+/// of the band's edges, spans away.
+const ECHO: f64 = 0.02;
 /// Impacts beyond which a rail is rough rather than damaged at places.
 const IMPACTS_MAX: usize = 8;
 
@@ -29,23 +32,26 @@ pub struct Impact {
 ///
 /// Places in `except` (`[from, to]` in m) are passed over.
 pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Impact> {
-    let speeds = cells(recording, false);
-    let Some(first) = speeds.first() else { return Vec::new() };
     let allowed = |x: f64| !except.iter().any(|[from, to]| (*from..=*to).contains(&x));
-    let mut candidates: Vec<(usize, f64)> = (0..first.ratio.len())
-        .filter(|&cell| allowed(first.place_m(cell)))
-        .map(|cell| (cell, of_best(ln_p(&speeds, cell), first.ratio.len())))
-        .filter(|(_, ln_p)| *ln_p <= alpha.ln())
-        .collect();
-    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let heard = Listen::BOTH.map(|listen| cells(recording, listen, false));
+    let tries: usize = heard.iter().filter_map(|cells| Some(cells.first()?.ratio.len())).sum();
+    let mut candidates = Vec::new();
+    for speeds in heard.iter().filter(|speeds| !speeds.is_empty()) {
+        let places = (0..speeds[0].ratio.len()).filter(|&cell| allowed(speeds[0].place_m(cell)));
+        let certain = places.map(|cell| (speeds, cell, of_best(ln_p(speeds, cell), tries)));
+        candidates.extend(certain.filter(|(_, _, ln_p)| *ln_p <= alpha.ln()));
+    }
+    candidates.sort_by(|a, b| a.2.total_cmp(&b.2));
     let mut found: Vec<Impact> = Vec::new();
-    for (cell, ln_p) in candidates {
-        let x = first.place_m(cell);
+    for (speeds, cell, ln_p) in candidates {
+        let x = speeds[0].place_m(cell);
         let apart = |other: &Impact| (other.x_m.0 - x).abs() > 0.5 * recording.spacing_m;
         if found.len() < IMPACTS_MAX && found.iter().all(apart) {
-            found.push(impact(recording, &speeds, cell, ln_p));
+            found.push(impact(recording, speeds, cell, ln_p));
         }
     }
+    let loudest = found.iter().map(|impact| impact.power_ratio).fold(0.0, f64::max);
+    found.retain(|impact| impact.power_ratio > ECHO * loudest);
     found
 }
 
@@ -78,7 +84,9 @@ fn impact(recording: &Recording, speeds: &[Cells], cell: usize, ln_p: f64) -> Im
         around.map(|other| cells.ratio[other]).fold(0.0, f64::max)
     };
     let power_ratio = speeds.iter().map(power).sum::<f64>() / speeds.len() as f64;
-    let (place, deviation) = mean_and_deviation(&places).unwrap_or((x, width));
+    // A millimetre is what the ringing of the contact hides; a single pass has no other to differ.
+    let least = if places.len() > 1 { 1e-3 } else { 0.5 * width };
+    let (place, deviation) = mean_and_deviation(&places, least).unwrap_or((x, width));
     let shape = fit(&observed);
     // The loudest moment may be at either edge of a hollow.
     let edge = match &shape {
@@ -90,10 +98,9 @@ fn impact(recording: &Recording, speeds: &[Cells], cell: usize, ln_p: f64) -> Im
 
 /// Mean and standard deviation; the passes of one odometer err together, so it is not divided by
 /// the root of their number.
-fn mean_and_deviation(values: &[f64]) -> Option<(f64, f64)> {
+fn mean_and_deviation(values: &[f64], least: f64) -> Option<(f64, f64)> {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-    // A millimetre is what the ringing of the contact hides.
-    (!values.is_empty()).then(|| (mean, (square / count).sqrt().max(1e-3)))
+    (!values.is_empty()).then(|| (mean, (square / count).sqrt().max(least)))
 }

@@ -4,11 +4,14 @@ use crate::along::{Background, Energy, by_speed, ln_gamma_tail, median, speed_m_
 use std::ops::Range;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Lowest frequency in Hz of an impact's power: above it the surface's own power varies little
-/// from place to place, and the contact rings.
-const LOW_HZ: f64 = 700.0;
-/// Highest frequency in Hz, and as a share of the sample rate.
-const HIGH_HZ: f64 = 5000.0;
+/// Frequencies in Hz of a blow: above them the surface's own power varies little from place to
+/// place, and the contact rings.
+const BLOW_HZ: [f64; 2] = [700.0, 5000.0];
+/// Wave numbers in cycles/m of a hollow of 2 to 10 mm, whose sound is lower the slower the wheel.
+const HOLLOW_PER_M: [f64; 2] = [100.0, 1000.0];
+/// Lowest frequency in Hz of a hollow: below it the track rings for longer than the wheel takes.
+const HOLLOW_LOW_HZ: f64 = 200.0;
+/// Highest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
 /// Power over the noise floor up to which frequencies are used.
 const AUDIBLE: f64 = 4.0;
@@ -23,6 +26,34 @@ const STEPS: usize = 2;
 const NEAR_SPACINGS: f64 = 1.5;
 /// Quartile of the logarithm of a gamma variable over its standard deviation, for a normal one.
 const QUARTILES: f64 = 1.349;
+
+/// What is listened to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Listen {
+    /// The same frequencies at all speeds: kinks, edges, everything that rings.
+    Blows,
+    /// The same wavelengths at all speeds: hollows that a slow wheel rolls through quietly.
+    Hollows,
+}
+
+impl Listen {
+    pub(crate) const BOTH: [Self; 2] = [Self::Blows, Self::Hollows];
+
+    /// The band in Hz in a pass; none where it is empty.
+    pub(crate) fn band(self, pass: &Pass, background: &Background) -> Option<[f64; 2]> {
+        let speed = speed_m_s(pass);
+        let [low, high] = match self {
+            Self::Blows => BLOW_HZ,
+            Self::Hollows => {
+                [(HOLLOW_PER_M[0] * speed).max(HOLLOW_LOW_HZ), HOLLOW_PER_M[1] * speed]
+            }
+        };
+        let top = HIGH_SHARE * pass.signal.sample_rate_hz();
+        let audible = background.audible_hz(AUDIBLE).max(2.0 * low);
+        let (low, high) = (low.min(0.5 * top), high.min(top).min(audible));
+        (high > 1.3 * low).then_some([low, high])
+    }
+}
 
 /// Cells of one speed: power over what is normal there, mean of that speed's passes.
 #[derive(Clone, Debug)]
@@ -56,11 +87,11 @@ impl Cells {
 /// The cells of every speed (of every pass if `each`) on one grid of places.
 ///
 /// Empty where no pass has sound enough above the impacts' lowest frequency.
-pub(crate) fn cells(recording: &Recording, each: bool) -> Vec<Cells> {
+pub(crate) fn cells(recording: &Recording, listen: Listen, each: bool) -> Vec<Cells> {
     let passes = &recording.passes;
     let groups =
         if each { (0..passes.len()).map(|index| vec![index]).collect() } else { by_speed(passes) };
-    let Some(width_m) = width(recording) else { return Vec::new() };
+    let Some(width_m) = width(recording, listen) else { return Vec::new() };
     let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
     let ends = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
     // The fading ends of a pass and half a cell stay out.
@@ -71,27 +102,18 @@ pub(crate) fn cells(recording: &Recording, each: bool) -> Vec<Cells> {
         return Vec::new();
     }
     let count = ((last_m - first_m) / step_m) as usize + 1;
-    let grid = Grid { first_m, step_m, width_m, count, near: near(recording, step_m) };
+    let grid = Grid { listen, first_m, step_m, width_m, count, near: near(recording, step_m) };
     groups.into_iter().filter_map(|group| grid.cells(passes, group)).collect()
 }
 
 /// The width of a cell in m, wide enough for the fastest pass; none if nothing can be heard.
-fn width(recording: &Recording) -> Option<f64> {
+fn width(recording: &Recording, listen: Listen) -> Option<f64> {
     let mut width = CELL_SHARE * recording.spacing_m;
     for pass in &recording.passes {
-        let [low, high] = band(pass, &Background::of(&pass.signal)?)?;
+        let [low, high] = listen.band(pass, &Background::of(&pass.signal)?)?;
         width = width.max(PRODUCT_MIN * speed_m_s(pass) / (high - low));
     }
     (width < 0.5 * recording.spacing_m).then_some(width)
-}
-
-/// The impacts' band in Hz in a pass; none where it is empty.
-pub(crate) fn band(pass: &Pass, background: &Background) -> Option<[f64; 2]> {
-    let rate = pass.signal.sample_rate_hz();
-    let audible = background.audible_hz(AUDIBLE).max(2.0 * LOW_HZ);
-    let high = HIGH_HZ.min(HIGH_SHARE * rate).min(audible);
-    let low = LOW_HZ.min(0.5 * HIGH_SHARE * rate);
-    (high > 1.3 * low).then_some([low, high])
 }
 
 fn near(recording: &Recording, step_m: f64) -> usize {
@@ -99,6 +121,7 @@ fn near(recording: &Recording, step_m: f64) -> usize {
 }
 
 struct Grid {
+    listen: Listen,
     first_m: f64,
     step_m: f64,
     width_m: f64,
@@ -128,7 +151,7 @@ impl Grid {
 
     fn powers(&self, pass: &Pass) -> Option<Vec<f64>> {
         let background = Background::of(&pass.signal)?;
-        let white = whitened(&pass.signal, &background, band(pass, &background)?);
+        let white = whitened(&pass.signal, &background, self.listen.band(pass, &background)?);
         let energy = Energy::new(pass, &white);
         let power = |cell: usize| {
             let middle = self.first_m + cell as f64 * self.step_m;

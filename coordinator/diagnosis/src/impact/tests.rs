@@ -26,6 +26,14 @@ fn a_hollow_is_found_at_its_place_with_its_length_and_depth() {
 }
 
 #[test]
+fn a_long_hollow_that_a_slow_wheel_rolls_through_quietly_is_found() {
+    let found = rolled(6, &|_, x| hollow_m(3e-5, 1e-2, x - 1.7));
+    let shape = found[0].shape.clone().unwrap();
+    assert_eq!((found.len(), shape.form), (1, Form::Hollow), "{found:?}");
+    assert!((shape.length_m.0 / 1e-2 - 1.0).abs() < 0.15, "{shape:?}");
+}
+
+#[test]
 fn a_kink_is_found_with_its_change_of_slope() {
     let (depth, length) = (8e-5, 0.015);
     let found = rolled(2, &|_, x| depth * (-(x - 1.3).abs() / length).exp());
@@ -52,7 +60,8 @@ fn two_impacts_are_two_and_a_place_that_is_excepted_is_none() {
     let two = |_, x| hollow_m(2e-5, 6e-3, x - 0.9) + hollow_m(2e-5, 6e-3, x - 2.1);
     let surface = Rolled { height_m: &two, ..Rolled::faultless(4) };
     let recording = surface.recording();
-    assert_eq!(impacts(&recording, ALPHA, &[]).len(), 2);
+    let all = impacts(&recording, ALPHA, &[]);
+    assert_eq!(all.len(), 2, "{all:?}");
     assert_eq!(impacts(&recording, ALPHA, &[[0.85, 0.95]]).len(), 1);
 }
 

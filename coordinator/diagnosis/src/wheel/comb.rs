@@ -1,6 +1,6 @@
 //! The comb of a wheel whose circumference isn't known, in a long pass.
 
-use crate::along::{hann, ln_even_odds_tail, median};
+use crate::along::{hann, ln_binomial_tail, median};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::Pass;
@@ -31,8 +31,7 @@ pub struct Comb {
     pub fundamental_hz: f64,
     /// Band in Hz that was listened to.
     pub band_hz: [f64; 2],
-    /// Every block: begin in s, fundamental in Hz, share of the band's variance that the comb
-    /// explains, and what combs between its teeth explain in the median.
+    /// The blocks, in the order of time.
     pub blocks: Vec<CombBlock>,
     /// Probability of a comb this clear without one, in logarithm.
     pub ln_p: f64,
@@ -51,6 +50,8 @@ pub struct CombBlock {
     pub explained: f64,
     /// The same of a comb between the teeth, the median of several.
     pub by_chance: f64,
+    /// Whether none of those explains as much.
+    pub wins: bool,
 }
 
 /// Scores on blocks that nothing was fitted on: odd ones, with the fundamental between those of
@@ -98,10 +99,9 @@ pub fn comb(pass: &Pass, alpha: f64) -> Option<Comb> {
     let blocks: Vec<Block> =
         (0..count).map(|index| Block::of(pass, index * length, length, band_hz[1])).collect();
     let fitted: Vec<CombBlock> = blocks.iter().map(|block| block.fit(band_hz)).collect();
-    // Without a comb each of the sixteen sets of teeth is the best as often as any other, so that
-    // beating the median of the others is a toss of a coin.
-    let wins = fitted.iter().filter(|block| block.explained > 1.5 * block.by_chance).count();
-    let ln_p = ln_even_odds_tail(wins, count);
+    // Without a comb each of the sixteen sets of teeth is the best as often as any other.
+    let wins = fitted.iter().filter(|block| block.wins).count();
+    let ln_p = ln_binomial_tail(wins, count, 1.0 / (1.0 + SHIFTS as f64));
     if ln_p > alpha.ln() {
         return None;
     }
@@ -163,14 +163,13 @@ impl Block {
                 .unwrap_or((0.0, low))
         };
         let (explained, fundamental_hz) = best(0.0);
-        let by_chance = median(shifts().map(|shift| best(shift).0).collect());
-        CombBlock { start_s: self.start_s, fundamental_hz, explained, by_chance }
+        let others: Vec<f64> = shifts().map(|shift| best(shift).0).collect();
+        let wins = others.iter().all(|&other| other < explained);
+        let by_chance = median(others);
+        CombBlock { start_s: self.start_s, fundamental_hz, explained, by_chance, wins }
     }
 
-    /// Share of the band's power within half a resolution cell and a bit of the teeth
-    /// `(n + shift) f`, over that share of the band: see the return.
-    ///
-    /// The share explained by fitting one cosine and sine a tooth, minus nothing for chance.
+    /// Share of the band's power that tones at the teeth `(n + shift) f` explain.
     pub(super) fn explained(&self, fundamental: f64, shift: f64, band_hz: [f64; 2]) -> f64 {
         let bins = self.bins(band_hz);
         let total: f64 = self.power[bins].iter().sum();

@@ -1,8 +1,12 @@
 //! Wheels whose truth is known.
 
-use super::{flat, nominal_circumference_m, out_of_round};
-use crate::along::testing::{Rolled, hollow_m, shared};
+use super::{comb, flat, nominal_circumference_m, out_of_round};
+use crate::along::testing::{Rolled, hollow_m, noise, shared};
 use std::f64::consts::TAU;
+use std::path::Path;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::Pass;
+use tracktwin_signal::recording::import::{AccelerationUnit, Layout, import};
 
 const ALPHA: f64 = 0.0025;
 const TURN_M: f64 = Rolled::CIRCUMFERENCE_M;
@@ -61,22 +65,62 @@ fn the_flat_of_an_independent_recording_is_measured() {
     assert!((length / 3.5e-3 - 1.0).abs() < 0.04, "{length}");
 }
 
+/// A minute of a wheel of 2.9 m circumference at a speed that grows from 66 to 68 km/h, recorded at
+/// 2 kHz with a speed in whole kilometres per hour.
+fn long_pass(amplitude: f64) -> Pass {
+    const RATE_HZ: f64 = 2000.0;
+    let noise = noise(8, 60 * 2000);
+    let (mut way, mut position) = (0.0, 0.0);
+    let (mut samples, mut position_m) = (Vec::new(), Vec::new());
+    for (index, noise) in noise.iter().enumerate() {
+        let km_per_h = 66.0 + 2.0 * index as f64 / 120_000.0;
+        way += km_per_h / 3.6 / RATE_HZ;
+        position += km_per_h.round() / 3.6 / RATE_HZ;
+        let orders = (7..=20).map(|n| (TAU * f64::from(n) * (way / 2.9 + 0.13)).sin());
+        samples.push(noise + amplitude * orders.sum::<f64>());
+        position_m.push(position);
+    }
+    let signal = Signal::new(RATE_HZ, samples).unwrap();
+    Pass { file: String::new(), speed_km_h: 67.0, signal, position_m }
+}
+
 #[test]
-fn a_scratch() {
-    use tracktwin_signal::recording::import::*;
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/real/aba-k1/aba-k1.csv");
+fn the_circumference_of_an_unknown_wheel_is_found_and_predicts_what_was_held_out() {
+    let found = comb(&long_pass(0.1), ALPHA).unwrap();
+    // A speed in whole km/h is off by up to 0.75 %.
+    assert!((found.circumference_m.0 / 2.9 - 1.0).abs() < 0.01, "{:?}", found.circumference_m);
+    let held_out = found.held_out;
+    assert!(held_out.explained > 2.0 * held_out.by_chance, "{held_out:?}");
+    assert!(held_out.gain_nats > 0.0 && held_out.better > held_out.blocks * 3 / 4, "{held_out:?}");
+}
+
+#[test]
+fn noise_has_no_comb() {
+    assert!(comb(&long_pass(0.0), ALPHA).is_none());
+}
+
+#[test]
+fn the_wheel_of_a_real_recording_is_found_on_both_sides() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/real/aba-k1/aba-k1.csv");
+    if !file.is_file() {
+        assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "../shared is not there");
+        println!("skipped: ../shared is not there");
+        return;
+    }
     let layout = Layout {
-        acceleration: vec!["acc_left".into(), "acc_right".into()],
-        time: Some("t_s".into()),
-        speed: Some("speed_kmh".into()),
+        acceleration: vec!["acc_left".to_owned(), "acc_right".to_owned()],
+        time: Some("t_s".to_owned()),
+        speed: Some("speed_kmh".to_owned()),
         acceleration_unit: AccelerationUnit::Unknown,
         ..Layout::default()
     };
     for imported in import(&[file], &layout).unwrap() {
-        let start = std::time::Instant::now();
-        println!("{:#?} {:?}", super::comb(&imported.recording.passes[0], 0.01), start.elapsed());
-        println!("{:?} {:?}", crate::chain::hum(&imported.recording, 0.01), start.elapsed());
-        println!("{:?}", crate::first_look(&imported.recording));
+        let found = comb(&imported.recording.passes[0], ALPHA).unwrap();
+        // 6.545 Hz by hand, at 67 to 69 km/h.
+        assert!((found.fundamental_hz / 6.545 - 1.0).abs() < 5e-3, "{}", found.fundamental_hz);
+        assert!((found.circumference_m.0 / 2.86 - 1.0).abs() < 0.02, "{:?}", found.circumference_m);
+        let held_out = found.held_out;
+        assert!(held_out.explained > 2.0 * held_out.by_chance, "{held_out:?}");
+        assert!(held_out.gain_nats > 0.0, "{held_out:?}");
     }
 }

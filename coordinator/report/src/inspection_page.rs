@@ -1,0 +1,165 @@
+//! What is in a recording, before any model is asked.
+
+use crate::axis::Axis;
+use crate::chart::Chart;
+use crate::page::{figure, page};
+use maud::{Markup, html};
+
+const SIZE: [f64; 2] = [1000.0, 320.0];
+const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
+
+/// A curve and its name.
+pub struct InspectedCurve {
+    /// What the legend says.
+    pub name: String,
+    /// Its points.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// What was found in a recording by its passes alone.
+pub struct Inspected {
+    /// What it is called.
+    pub physics: String,
+    /// Where, in words.
+    pub place: String,
+    /// Probability to see as much without it.
+    pub p_value: f64,
+    /// What was seen.
+    pub evidence: String,
+}
+
+/// Everything that the page shows.
+pub struct Inspection {
+    /// The recording's name.
+    pub name: String,
+    /// One sentence that says it all.
+    pub summary: String,
+    /// Rows of the table of passes; the first has the heads.
+    pub passes: Vec<Vec<String>>,
+    /// Findings.
+    pub found: Vec<Inspected>,
+    /// What makes passes unusable.
+    pub troubles: Vec<String>,
+    /// What the recording can be used for, and for what not.
+    pub uses: Vec<String>,
+    /// Power spectral density in dB by frequency in Hz, a curve a pass.
+    pub spectra: Vec<InspectedCurve>,
+    /// Level in dB by position in m, a curve a pass.
+    pub levels: Vec<InspectedCurve>,
+    /// Unit of the accelerations.
+    pub unit: String,
+}
+
+/// The page of a recording that was inspected.
+pub fn inspection_page(inspection: &Inspection) -> String {
+    let unit = &inspection.unit;
+    let spectra = chart(
+        "Power spectral density",
+        &inspection.spectra,
+        |[low, high]| Axis::logarithmic("frequency in Hz", low.max(1.0), high),
+        &format!("dB re 1 ({unit})²/Hz"),
+    );
+    let levels = chart(
+        "Level along the track",
+        &inspection.levels,
+        |[low, high]| Axis::linear("position in m", low, high),
+        &format!("dB re 1 ({unit})²"),
+    );
+    let body = html! {
+        (figure(&[spectra, levels], "A curve a pass. Passes at one speed over the same track lie on each other, save for the noise at high frequencies."))
+        h2 { "Passes" }
+        div.scroll { (table(&inspection.passes)) }
+        h2 { "What the passes tell by themselves" }
+        (found(inspection))
+        h2 { "What it can be used for" }
+        ul { @for text in &inspection.uses { li { (text) } } }
+    };
+    page(&format!("Recording {}", inspection.name), &inspection.summary, &body)
+}
+
+fn found(inspection: &Inspection) -> Markup {
+    html! {
+        @if inspection.found.is_empty() && inspection.troubles.is_empty() {
+            p { "Nothing that a faultless chain, a round wheel and a rail without defects wouldn't show (2 % false alarms)." }
+        }
+        @for trouble in &inspection.troubles { p { strong { "Not usable: " } (trouble) } }
+        @if !inspection.found.is_empty() {
+            div.scroll { table {
+                tr { th { "what" } th.words { "where" } th { "by chance" } th.words { "seen" } }
+                @for one in &inspection.found {
+                    tr {
+                        td { code { (one.physics) } } td.words { (one.place) }
+                        td { (format!("{:.0e}", one.p_value)) }
+                        td.words style="white-space:normal" { (one.evidence) }
+                    }
+                }
+            } }
+        }
+    }
+}
+
+fn table(rows: &[Vec<String>]) -> Markup {
+    let (heads, rows) = rows.split_first().map_or((&[][..], &[][..]), |(h, r)| (&h[..], r));
+    html! {
+        table {
+            tr { @for head in heads { th { (head) } } }
+            @for row in rows { tr { @for cell in row { td { (cell) } } } }
+        }
+    }
+}
+
+fn chart(
+    title: &str,
+    curves: &[InspectedCurve],
+    x_axis: impl Fn([f64; 2]) -> Axis,
+    y_label: &str,
+) -> String {
+    let points = || curves.iter().flat_map(|curve| &curve.points);
+    let ends = points().fold([f64::INFINITY, f64::NEG_INFINITY], |ends, point| {
+        [ends[0].min(point.0), ends[1].max(point.0)]
+    });
+    if ends[0] >= ends[1] {
+        return String::new();
+    }
+    let y = Axis::around(y_label, points().map(|point| point.1));
+    let mut chart = Chart::new(title, SIZE, x_axis(ends), y);
+    for (curve, class) in curves.iter().zip(CLASSES.iter().cycle()) {
+        chart.line(&format!("{class} hair"), curve.points.iter().copied());
+    }
+    for (curve, class) in curves.iter().zip(CLASSES) {
+        chart.explain(class, &curve.name);
+    }
+    chart.into_svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_says_what_was_found_and_carries_its_pictures() {
+        let curve = |name: &str| InspectedCurve {
+            name: name.to_owned(),
+            points: vec![(10.0, -20.0), (1000.0, 3.0)],
+        };
+        let page = inspection_page(&Inspection {
+            name: "a < b".to_owned(),
+            summary: "One pass.".to_owned(),
+            passes: vec![vec!["pass".to_owned()], vec!["one.csv".to_owned()]],
+            found: vec![Inspected {
+                physics: "squat".to_owned(),
+                place: "1.7 m".to_owned(),
+                p_value: 1e-9,
+                evidence: "loud".to_owned(),
+            }],
+            troubles: vec![],
+            uses: vec!["nothing".to_owned()],
+            spectra: vec![curve("one.csv")],
+            levels: vec![curve("one.csv")],
+            unit: "m/s²".to_owned(),
+        });
+        assert!(page.contains("a &lt; b") && page.contains("<code>squat</code>"));
+        assert_eq!(page.matches("<svg xmlns").count(), 2);
+        assert!(!page.contains("http://") || !page.contains("src=\"http"));
+    }
+}

@@ -1,0 +1,228 @@
+//! `tracktwin inspect`: what is in a recording, and what it can be used for.
+
+use super::{OrInput, Stop, say};
+use anyhow::Context;
+use clap::Args;
+use std::path::PathBuf;
+use tracktwin_diagnosis::{FirstLook, Place, first_look};
+use tracktwin_report::{Inspected, InspectedCurve, Inspection, inspection_page};
+use tracktwin_signal::recording::{Pass, Recording};
+use tracktwin_signal::{PowerSpectrum, Signal};
+
+/// Distance in Hz of the lines of the drawn spectra.
+const LINES_HZ: f64 = 20.0;
+/// Points of a drawn curve.
+const POINTS: usize = 400;
+/// Samples per second that the features up to 4 kHz need.
+const FEATURES_HZ: f64 = 20_000.0;
+/// Ratio of two speeds that tells structure from geometry.
+const SPEED_RATIO: f64 = 1.25;
+
+/// What `inspect` is told.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// The recording: a folder with `recording.json` and a file a pass.
+    recording: PathBuf,
+    /// Page with pictures.
+    #[arg(long, value_name = "FILE.html")]
+    out: Option<PathBuf>,
+    /// Say it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
+    let recording = Recording::open(&arguments.recording).or_input()?;
+    let look = first_look(&recording);
+    let inspection = inspection(&recording, &look);
+    if arguments.json {
+        say(&format!("{:#}", json(&recording, &look, &inspection)));
+    } else {
+        print(&inspection);
+    }
+    if let Some(path) = &arguments.out {
+        std::fs::write(path, inspection_page(&inspection))
+            .with_context(|| format!("{}: cannot be written", path.display()))
+            .or_input()?;
+        if !arguments.json {
+            say(&format!("page: {}", path.display()));
+        }
+    }
+    Ok(())
+}
+
+fn print(inspection: &Inspection) {
+    say(&inspection.summary);
+    for row in &inspection.passes {
+        say(&row.iter().map(|cell| format!("{cell:<14}")).collect::<String>());
+    }
+    for trouble in &inspection.troubles {
+        say(&format!("not usable: {trouble}"));
+    }
+    for found in &inspection.found {
+        say(&format!(
+            "{} ({}; by chance {:.0e}): {}",
+            found.physics, found.place, found.p_value, found.evidence
+        ));
+    }
+    for text in &inspection.uses {
+        say(text);
+    }
+}
+
+fn json(recording: &Recording, look: &FirstLook, inspection: &Inspection) -> serde_json::Value {
+    let finding = |finding: &tracktwin_diagnosis::Finding| {
+        let parameters: serde_json::Map<String, serde_json::Value> = finding
+            .parameters
+            .iter()
+            .map(|(name, (mean, sd))| {
+                ((*name).to_owned(), serde_json::json!({"mean": mean, "sd": sd}))
+            })
+            .collect();
+        serde_json::json!({
+            "physics": finding.physics,
+            "p_value": finding.p_value,
+            "x_m": match finding.place {
+                Place::Everywhere => None,
+                Place::Stretch { from_m, to_m } => Some([from_m, to_m]),
+            },
+            "parameters": parameters,
+            "evidence": finding.evidence,
+        })
+    };
+    serde_json::json!({
+        "recording": recording.name,
+        "sample_rate_Hz": recording.sample_rate_hz,
+        "passes": recording.passes.len(),
+        "speeds_km_h": recording.speeds_km_h(),
+        "sleepers": recording.sleepers.len(),
+        "findings": look.findings.iter().map(finding).collect::<Vec<_>>(),
+        "not_usable": inspection.troubles,
+        "uses": inspection.uses,
+    })
+}
+
+fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
+    let speeds: Vec<String> =
+        recording.speeds_km_h().iter().map(|speed| format!("{speed:.1}")).collect();
+    let gain_known = recording.nominal.get("gain_known").and_then(serde_json::Value::as_bool);
+    let unit = if gain_known == Some(false) { "unit" } else { "m/s²" };
+    let seconds: f64 = recording.passes.iter().map(|pass| pass.signal.duration_s()).sum();
+    Inspection {
+        name: recording.name.clone(),
+        summary: format!(
+            "{} passes at {} km/h, {seconds:.1} s at {} Hz in all, {} sleepers, {} findings.",
+            recording.passes.len(),
+            speeds.join(", "),
+            recording.sample_rate_hz,
+            recording.sleepers.len(),
+            look.findings.len()
+        ),
+        passes: passes(recording, look),
+        found: look.findings.iter().map(found).collect(),
+        troubles: look.troubles.iter().map(ToString::to_string).collect(),
+        uses: uses(recording, look),
+        spectra: curves(recording, |pass| spectrum(&pass.signal)),
+        levels: curves(recording, levels),
+        unit: unit.to_owned(),
+    }
+}
+
+fn found(finding: &tracktwin_diagnosis::Finding) -> Inspected {
+    let place = match finding.place {
+        Place::Everywhere => "everywhere".to_owned(),
+        Place::Stretch { from_m, to_m } => format!("{from_m:.3} to {to_m:.3} m"),
+    };
+    let (physics, evidence) = (finding.physics.to_owned(), finding.evidence.clone());
+    Inspected { physics, place, p_value: finding.p_value, evidence }
+}
+
+fn passes(recording: &Recording, look: &FirstLook) -> Vec<Vec<String>> {
+    let heads = ["pass", "km/h", "from m", "to m", "s", "rms", "peak", "noise rms", "gain dB"];
+    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+    for (index, pass) in recording.passes.iter().enumerate() {
+        let samples = pass.signal.samples();
+        let square = samples.iter().map(|value| value * value).sum::<f64>();
+        let peak = samples.iter().map(|value| value.abs()).fold(0.0, f64::max);
+        // White noise of this density up to half the sample rate.
+        let noise = look.noise_floors[index].map_or_else(
+            || "–".to_owned(),
+            |d| format!("{:.3}", (d * 0.5 * recording.sample_rate_hz).sqrt()),
+        );
+        let gain = look.gains.iter().find(|gain| gain.pass == index);
+        rows.push(vec![
+            (index + 1).to_string(),
+            format!("{:.2}", pass.speed_km_h),
+            format!("{:.3}", pass.position_m[0]),
+            format!("{:.3}", pass.position_m[samples.len() - 1]),
+            format!("{:.2}", pass.signal.duration_s()),
+            format!("{:.3}", (square / samples.len() as f64).sqrt()),
+            format!("{peak:.2}"),
+            noise,
+            gain.map_or_else(|| "–".to_owned(), |gain| format!("{:+.2}", gain.gain_db.0)),
+        ]);
+    }
+    rows
+}
+
+fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
+    let mut uses = Vec::new();
+    let rate = recording.sample_rate_hz;
+    if recording.sleepers.is_empty() {
+        uses.push("the places of the sleepers are not known: neither `evaluate` nor `diagnose` can tell one from the other; import it with --sleeper".to_owned());
+    }
+    if rate < FEATURES_HZ {
+        uses.push(format!(
+            "sampled at {rate} Hz it says nothing above {:.0} Hz; features up to 4000 Hz need {FEATURES_HZ:.0} Hz",
+            0.4 * rate
+        ));
+    }
+    let speeds = recording.speeds_km_h();
+    let ratio = speeds.last().copied().unwrap_or(1.0) / speeds.first().copied().unwrap_or(1.0);
+    if ratio < SPEED_RATIO {
+        uses.push(format!(
+            "one speed only: what is fixed in frequency (structure) and in wavelength (surface) can't be told apart; add a pass {:.0} km/h slower",
+            0.25 * speeds.first().copied().unwrap_or(0.0)
+        ));
+    }
+    if look.offsets.is_empty() {
+        uses.push("no speed has two passes: what repeats can't be told from noise".to_owned());
+    }
+    if uses.is_empty() && look.troubles.is_empty() {
+        uses.push("fit for `evaluate` and `diagnose` with models of its speeds".to_owned());
+    }
+    uses
+}
+
+fn curves(recording: &Recording, points: impl Fn(&Pass) -> Vec<(f64, f64)>) -> Vec<InspectedCurve> {
+    let curve = |(index, pass): (usize, &Pass)| InspectedCurve {
+        name: format!("{} ({:.0} km/h)", index + 1, pass.speed_km_h),
+        points: points(pass),
+    };
+    recording.passes.iter().enumerate().map(curve).collect()
+}
+
+/// Density in dB at evenly spread places of a logarithmic axis.
+fn spectrum(signal: &Signal) -> Vec<(f64, f64)> {
+    let segment = ((signal.sample_rate_hz() / LINES_HZ) as usize).clamp(2, signal.len());
+    let Ok(spectrum) = PowerSpectrum::welch(signal, segment) else { return Vec::new() };
+    let (low, high) = (LINES_HZ, 0.5 * signal.sample_rate_hz());
+    let edge = |index: usize| low * (high / low).powf(index as f64 / POINTS as f64);
+    (0..POINTS)
+        .filter_map(|index| {
+            let density = spectrum.mean_density(edge(index), edge(index + 1))?;
+            (density > 0.0).then(|| (edge(index), 10.0 * density.log10()))
+        })
+        .collect()
+}
+
+/// Mean square in dB along the track.
+fn levels(pass: &Pass) -> Vec<(f64, f64)> {
+    let samples = pass.signal.samples();
+    let length = samples.len().div_ceil(POINTS);
+    let level = |(index, part): (usize, &[f64])| {
+        let square = part.iter().map(|value| value * value).sum::<f64>() / part.len() as f64;
+        (square > 0.0).then(|| (pass.position_m[index * length], 10.0 * square.log10()))
+    };
+    samples.chunks(length).enumerate().filter_map(level).collect()
+}
