@@ -7,7 +7,7 @@
 //! - [`farm`]: coordinator and workers in one process.
 //! - [`training`]: from a library to a training set.
 //! - [`null_campaign`]: simulations of a track with nothing left out, kept in the library.
-//! - [`provenance`]: what a library keeps of trainings and evaluations.
+//! - [`provenance`]: what a library keeps of trainings, evaluations and diagnoses.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
 //!
 //! The library, the surrogate, evaluation and reports are crates of their own beside `src`.

@@ -1,7 +1,11 @@
-//! What the library keeps of trainings and evaluations: the records made of them.
+//! What the library keeps of trainings, evaluations and diagnoses: the records made of them.
 
+use tracktwin_diagnosis::Diagnosis;
 use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
-use tracktwin_library::{EvaluationRecord, SleeperRecord, SurrogateRecord, TrainingRecord};
+use tracktwin_library::{
+    DiagnosisRecord, EvaluationRecord, HypothesisRecord, MismatchRecord, SleeperRecord,
+    SurrogateRecord, TrainingRecord,
+};
 use tracktwin_surrogate::{ModelGroup, Trained};
 use tracktwin_worker::CODE_VERSION;
 
@@ -55,4 +59,36 @@ fn sleeper(sleeper: &SleeperEvaluation) -> SleeperRecord {
         estimates: estimates.collect(),
         flags: flags.join("; "),
     }
+}
+
+/// What a library keeps of a diagnosis, whose document is `document_json`.
+///
+/// # Errors
+/// Never: a diagnosis is plain JSON.
+pub fn diagnosis(
+    diagnosis: &Diagnosis,
+    document_json: String,
+) -> Result<DiagnosisRecord, serde_json::Error> {
+    let mismatches = diagnosis.mismatches.iter().map(|mismatch| MismatchRecord {
+        x_m: mismatch.x_m,
+        frequency_hz: mismatch.frequency_hz,
+        level_db: mismatch.level_db,
+        p_value: mismatch.p_value,
+    });
+    let hypotheses = diagnosis.hypotheses.iter().map(|hypothesis| {
+        Ok(HypothesisRecord {
+            physics: hypothesis.physics.clone(),
+            probability: hypothesis.probability,
+            x_m: hypothesis.location.as_ref().map(|location| location.x_m),
+            parameters_json: serde_json::to_string(&hypothesis.parameters)?,
+        })
+    });
+    Ok(DiagnosisRecord {
+        recording: diagnosis.recording.clone(),
+        verdict: diagnosis.verdict.name().to_owned(),
+        code_version: CODE_VERSION.to_owned(),
+        document_json,
+        mismatches: mismatches.collect(),
+        hypotheses: hypotheses.collect::<Result<_, serde_json::Error>>()?,
+    })
 }

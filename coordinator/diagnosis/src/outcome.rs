@@ -20,6 +20,18 @@ pub enum Verdict {
     MeasurementChain,
 }
 
+impl Verdict {
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Consistent => "consistent",
+            Self::LeftOutPhysics => "left_out_physics",
+            Self::UnknownPhysics => "unknown_physics",
+            Self::MeasurementChain => "measurement_chain",
+        }
+    }
+}
+
 /// A diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {

@@ -2,7 +2,7 @@
 
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
-use crate::null_campaign;
+use crate::{null_campaign, provenance};
 use anyhow::Context;
 use clap::Args;
 use nalgebra::DVector;
@@ -14,9 +14,10 @@ use tracktwin_diagnosis::{
 };
 use tracktwin_library::Library;
 use tracktwin_parameters::TrackDesign;
+use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
-use tracktwin_worker::Experiment;
+use tracktwin_worker::{CODE_VERSION, Experiment};
 
 /// Steps of a stage's progress bar.
 const STEPS: u64 = 100;
@@ -41,6 +42,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    let origin = origin(&arguments);
     let Arguments { recording, models, library, out } = arguments;
     let recording = Recording::open(&recording).or_input()?;
     let library = match library {
@@ -53,12 +55,38 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         .or_input()?;
     let diagnosis = diagnose(recording, &design, library.as_ref()).await?;
     let json = serde_json::to_string_pretty(&diagnosis).context("a diagnosis is plain JSON")?;
-    std::fs::write(out.join("diagnosis.json"), json)?;
+    std::fs::write(out.join("diagnosis.json"), &json)?;
+    let page = tracktwin_report::diagnosis_page(&diagnosis, &origin);
+    std::fs::write(out.join("report.html"), page)?;
+    if let Some(library) = &library {
+        let record = provenance::diagnosis(&diagnosis, json)?;
+        if let Err(error) = library.record_diagnosis(record).await {
+            // The answer stands in the folder all the same.
+            tracing::warn!("the library does not keep this diagnosis: {error:?}");
+        }
+    }
     say(&diagnosis.sentence);
-    say(&format!("diagnosis: {}", out.join("diagnosis.json").display()));
+    say(&format!("report: {}", out.join("report.html").display()));
     match diagnosis.verdict {
         Verdict::Consistent => Ok(()),
         _ => Err(Stop::Negative),
+    }
+}
+
+/// How the diagnosis is repeated.
+fn origin(arguments: &Arguments) -> Origin {
+    let Arguments { recording, models, library, out } = arguments;
+    let mut command = format!("tracktwin diagnose {}", recording.display());
+    if let Some(models) = models {
+        command += &format!(" --models {}", models.display());
+    }
+    if let Some(library) = library {
+        command += &format!(" --library {library}");
+    }
+    Origin {
+        command: format!("{command} --out {}", out.display()),
+        version: format!("tracktwin {CODE_VERSION}"),
+        library: library.clone().unwrap_or_default(),
     }
 }
 
