@@ -1,5 +1,7 @@
 //! A table of another make becomes a recording, and what is in it is said.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::fmt::Write as _;
 use system_tests::{run, shared_data};
 

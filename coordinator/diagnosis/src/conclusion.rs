@@ -9,6 +9,7 @@ use crate::outcome::{
     Scores, SleeperValues, Verdict,
 };
 use crate::search::{Fitted, Round, Search, TEMPERATURE};
+use crate::sentence::sentence;
 use crate::subject::Subject;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -64,7 +65,8 @@ impl Evidence<'_> {
         let levels = self.levels()?;
         let fit = self.fit();
         let bias_removed = self.bias_removed(&hypotheses);
-        let sentence = self.sentence(verdict, &hypotheses, &fit, &bias_removed);
+        let sleepers = self.subject.forward.section.sleepers;
+        let sentence = sentence(verdict, &hypotheses, sleepers, &fit, &bias_removed);
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
             recording: self.recording.name.clone(),
@@ -90,7 +92,7 @@ impl Evidence<'_> {
                 });
                 match known {
                     Some(known) => {
-                        known.probability = known.probability.max(hypothesis.probability)
+                        known.probability = known.probability.max(hypothesis.probability);
                     }
                     None => all.push(hypothesis),
                 }
@@ -444,60 +446,6 @@ impl Evidence<'_> {
         }));
         notes
     }
-
-    fn sentence(
-        &self,
-        verdict: Verdict,
-        hypotheses: &[Hypothesis],
-        fit: &Fit,
-        bias: &BTreeMap<String, BeforeAfter<f64>>,
-    ) -> String {
-        let Some(first) = hypotheses.first().filter(|_| verdict != Verdict::Consistent) else {
-            return "Simulation and recording agree: with every sleeper's stiffness, level and \
-                    spectrum re-tuned, nothing that the catalogue knows improves the prediction of \
-                    speeds that were held out."
-                .to_owned();
-        };
-        let place = match &first.location {
-            Some(location) if location.sleepers.len() <= 3 => format!(
-                "At {}, {:.2} m: ",
-                location.sleepers.join(" and "),
-                0.5 * (location.x_m[0] + location.x_m[1])
-            ),
-            Some(location) if first.physics == "corrugation" => {
-                format!("From {:.2} to {:.2} m: ", location.x_m[0], location.x_m[1])
-            }
-            Some(location) if location.sleepers.len() < self.subject.forward.section.sleepers => {
-                format!("At {}: ", location.sleepers.join(", "))
-            }
-            _ => String::new(),
-        };
-        let summary = Kind::from_name(&first.physics)
-            .map_or("something that no kind in the catalogue explains", |kind| kind.summary);
-        let mut sentence =
-            format!("{place}{summary} ({}, {:.0} %).", first.physics, 100.0 * first.probability);
-        let gain: f64 = fit.held_out_gain_nats.values().sum();
-        if gain > 0.0 {
-            sentence += &format!(
-                " With it, speeds that nothing was fitted to are predicted better by {gain:.0} nats."
-            );
-        }
-        let worst = bias
-            .iter()
-            .filter(|(name, _)| !name.contains("damping"))
-            .map(|(name, pair)| (name, pair, (pair.before / pair.after).ln().abs()))
-            .max_by(|a, b| a.2.total_cmp(&b.2));
-        if let Some((name, pair, _)) = worst.filter(|(_, _, size)| *size > 0.1) {
-            let change = 100.0 * (pair.before / pair.after - 1.0);
-            let direction = if change > 0.0 { "high" } else { "low" };
-            sentence += &format!(
-                " Without it, {} comes out {:.0} % too {direction}.",
-                words(name),
-                change.abs()
-            );
-        }
-        sentence
-    }
 }
 
 fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
@@ -513,17 +461,6 @@ fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
 
 fn names(kind: &Kind) -> Vec<String> {
     kind.look_alikes.iter().map(|&name| name.to_owned()).collect()
-}
-
-/// What a parameter is called in a sentence.
-fn words(parameter: &str) -> &str {
-    match parameter {
-        "sleeper_EI_N_m2" => "the sleepers' bending stiffness",
-        "ballast_stiffness_N_m" => "ballast stiffness",
-        "railpad_stiffness_N_m" => "railpad stiffness",
-        "irregularity_level" => "the irregularity level",
-        other => other,
-    }
 }
 
 /// The stretch of entries that hold a good share of the sum.

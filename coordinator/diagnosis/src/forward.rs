@@ -41,10 +41,13 @@ pub struct Forward {
     /// knows.
     pub wheel_starts_m: Vec<Vec<f64>>,
     /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
-    windows: Vec<Vec<Vec<Vec<(usize, f64)>>>>,
+    windows: Vec<Windows>,
     /// Spectrum of the surface at level one in m2/Hz at each speed and line.
     surface: Vec<Vec<f64>>,
 }
+
+/// Nodes that are seen with their weights: `[sleeper][band]`.
+type Windows = Vec<Vec<Vec<(usize, f64)>>>;
 
 /// Change of the dynamic stiffness at the rail seats: `[line][sleeper of the track]`.
 type Variation = Vec<Vec<Complex64>>;

@@ -24,6 +24,7 @@ mod profile;
 mod screen;
 mod search;
 mod section;
+mod sentence;
 mod spectra;
 mod subject;
 mod suggestion;

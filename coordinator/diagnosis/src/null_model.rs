@@ -94,7 +94,7 @@ impl NullModel {
     ///
     /// None if they are not what a forward model of this kind has.
     pub fn from_numbers(forward: &Forward, numbers: &[f64]) -> Option<Self> {
-        let whole = !numbers.is_empty() && numbers.len() % forward.count() == 0;
+        let whole = !numbers.is_empty() && numbers.len().is_multiple_of(forward.count());
         let differences = numbers.chunks_exact(forward.count()).map(<[f64]>::to_vec).collect();
         whole.then(|| Self { per_sleeper: forward.per_sleeper(), differences })
     }

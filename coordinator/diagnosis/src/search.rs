@@ -161,7 +161,7 @@ pub fn search(
         let accepted = search.accepted.clone();
         let problem =
             Problem { forward: &subject.forward, observation: &observation, candidates: &accepted };
-        let strongest = search.rounds.iter().flat_map(|round| round.fitted.first());
+        let strongest = search.rounds.iter().filter_map(|round| round.fitted.first());
         let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
         let so_far = Reached { log_densities: &reached, strongest };
         let (mut round, mut scores) =
@@ -176,7 +176,7 @@ pub fn search(
             search.last = better;
             reached = setting.held_out(&accepted, &search.last.values)?;
             if search.accepted.is_empty() {
-                before = reached.clone();
+                before.clone_from(&reached);
             }
             let so_far = Reached { log_densities: &reached, strongest };
             (round, scores) = setting.round(&problem, &search.last, &all, so_far, progress)?;

@@ -4,7 +4,7 @@ use crate::bands::Bands;
 use crate::forward::Forward;
 use crate::null_model::NullModel;
 use crate::section::Section;
-use crate::spectra::Spectra;
+use crate::spectra::{Spectra, SpeedSpectra};
 use nalgebra::{DMatrix, DVector};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
@@ -157,9 +157,9 @@ fn log_power(forward: &Forward, spectra: &Spectra, first: usize) -> DVector<f64>
 /// surface's power.
 fn pass_variance(forward: &Forward, spectra: &Spectra) -> DVector<f64> {
     let bands = forward.bands.count();
-    let known: Vec<_> = spectra.speeds.iter().map(|speed| speed.pass_variance()).collect();
+    let known: Vec<_> = spectra.speeds.iter().map(SpeedSpectra::pass_variance).collect();
     let typical = known.iter().flatten().next().cloned().unwrap_or(vec![0.01; bands]);
-    let of_speed = |(variance, speed): (&Option<Vec<f64>>, &crate::SpeedSpectra)| {
+    let of_speed = |(variance, speed): (&Option<Vec<f64>>, &SpeedSpectra)| {
         let count = speed.passes.len() as f64;
         let variance = variance.as_ref().unwrap_or(&typical);
         variance.iter().map(|value| value / count).collect::<Vec<_>>()

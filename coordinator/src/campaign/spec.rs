@@ -276,7 +276,7 @@ impl File {
         experiment.speeds_km_h =
             self.speeds_km_h.clone().unwrap_or_else(|| self.preset.speeds_km_h());
         experiment.features = self.features.clone();
-        experiment.extensions = self.extension.clone();
+        experiment.extensions.clone_from(&self.extension);
         replace(&mut experiment.spans, simulation.spans);
         replace(&mut experiment.rail_elements_per_span, simulation.rail_elements_per_span);
         replace(&mut experiment.sleeper_elements, simulation.sleeper_elements);

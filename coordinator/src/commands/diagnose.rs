@@ -76,15 +76,12 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 /// How the diagnosis is repeated.
 fn origin(arguments: &Arguments) -> Origin {
     let Arguments { recording, models, library, out } = arguments;
-    let mut command = format!("tracktwin diagnose {}", recording.display());
-    if let Some(models) = models {
-        command += &format!(" --models {}", models.display());
-    }
-    if let Some(library) = library {
-        command += &format!(" --library {library}");
-    }
+    let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
+    command.extend(models.as_ref().map(|models| format!("--models {}", models.display())));
+    command.extend(library.as_ref().map(|library| format!("--library {library}")));
+    command.push(format!("--out {}", out.display()));
     Origin {
-        command: format!("{command} --out {}", out.display()),
+        command: command.join(" "),
         version: format!("tracktwin {CODE_VERSION}"),
         library: library.clone().unwrap_or_default(),
     }

@@ -54,7 +54,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
 fn print(inspection: &Inspection) {
     say(&inspection.summary);
     for row in &inspection.passes {
-        say(&row.iter().map(|cell| format!("{cell:<14}")).collect::<String>());
+        let cells: Vec<String> = row.iter().map(|cell| format!("{cell:<14}")).collect();
+        say(&cells.concat());
     }
     for trouble in &inspection.troubles {
         say(&format!("not usable: {trouble}"));

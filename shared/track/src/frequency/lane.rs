@@ -125,8 +125,9 @@ impl Banded {
         let stride = self.width + 1;
         for row in from + 1..self.size {
             let mut value = b[row];
-            for k in from.max(row.saturating_sub(self.width))..row {
-                value = value - self.entries[row * stride + row - k] * b[k];
+            let first = from.max(row.saturating_sub(self.width));
+            for (known, k) in b[first..row].iter().zip(first..) {
+                value = value - self.entries[row * stride + row - k] * *known;
             }
             b[row] = value;
         }
@@ -144,8 +145,9 @@ impl Banded {
         let stride = self.width + 1;
         for row in (0..self.size).rev() {
             let mut value = y[row] * self.entries[row * stride];
-            for below in row + 1..self.size.min(row + stride) {
-                value = value - self.entries[below * stride + below - row] * y[below];
+            let end = self.size.min(row + stride);
+            for (known, below) in y[row + 1..end].iter().zip(row + 1..) {
+                value = value - self.entries[below * stride + below - row] * *known;
             }
             y[row] = value;
         }

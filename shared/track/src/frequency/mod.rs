@@ -2,6 +2,11 @@
 //!
 //! Works on the matrices that the time domain runs on; draws nothing and names no resonance.
 
+#![expect(
+    clippy::inline_always,
+    reason = "what solves must be compiled into each instruction set's own copy"
+)]
+
 mod lane;
 mod peaks;
 mod rail;

@@ -49,10 +49,8 @@ impl RailReceptances {
         let layout = model.layout();
         let nodes: Vec<_> =
             (0..layout.rail_nodes_m().len()).map(|node| layout.rail_node_dofs(node)[0]).collect();
-        let seats: Vec<_> = match from_seats {
-            true => layout.sleepers().iter().map(|sleeper| nodes[sleeper.rail_node]).collect(),
-            false => Vec::new(),
-        };
+        let sleepers = if from_seats { layout.sleepers() } else { &[] };
+        let seats: Vec<_> = sleepers.iter().map(|sleeper| nodes[sleeper.rail_node]).collect();
         let solved: Vec<_> = frequencies_hz
             .par_chunks(LANES)
             .map(|chunk| {

@@ -105,7 +105,7 @@ impl Pass {
         let height =
             |x_m: f64| surface.height(x_m) + model.profile_m(x_m) + model.wheel_profile_m(x_m);
         let first = height(self.start_m);
-        (0..=self.steps()).map(|step| self.eased(step, first, &height)).collect()
+        (0..=self.steps()).map(|step| self.eased(step, first, height)).collect()
     }
 
     fn eased_in(&self, step: usize, height: impl Fn(f64) -> f64) -> f64 {
