@@ -24,6 +24,9 @@ const DECIBEL: f64 = 4.342_944_819_032_518;
 /// Share of a trace's square by which a sleeper belongs to the place of a mismatch.
 const PLACE_SHARE: f64 = 0.1;
 
+/// Error of a place on the recording's scale in sleeper spacings: odometers wander by millimetres.
+const PLACE_ERROR: f64 = 0.04;
+
 /// Probability of an unnamed alternative against a name of equal evidence: most of what goes wrong
 /// on a track is in the catalogue.
 const UNKNOWN_PRIOR: f64 = 0.1;
@@ -31,6 +34,9 @@ const UNKNOWN_PRIOR: f64 = 0.1;
 /// Probability to see such evidence for an unknown stiffness if nothing is left out, up to which it
 /// is said to be there.
 const PORT_ALARM: f64 = 0.01;
+
+/// Probability that what is left beside a named effect is something new.
+const REMAINDER_PRIOR: f64 = 0.2;
 
 /// Least prior of nothing at all.
 const NOTHING_PRIOR: f64 = 0.5;
@@ -127,6 +133,9 @@ impl Evidence<'_> {
                 self.hypothesis(fitted, weight / all, round.accepted && rank == 0)
             })
             .collect();
+        // What is left beside a named effect may be its model's error as well as something new.
+        let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
+        let alone = first && !round.accepted;
         if let Some(port) = &round.port {
             let location = port.sleeper.map(|sleeper| self.location(sleeper..sleeper + 1));
             hypotheses.push(Hypothesis {
@@ -226,7 +235,7 @@ impl Evidence<'_> {
     /// A stretch with the sleepers whose half bays it touches.
     fn location_between(&self, from_m: f64, to_m: f64) -> Location {
         let section = &self.subject.forward.section;
-        let half_m = 0.5 * section.design.sleeper.spacing_m * (1.0 + 1e-9);
+        let half_m = (0.5 + PLACE_ERROR) * section.design.sleeper.spacing_m;
         let near = |sleeper: &usize| {
             let x_m = section.x_m(*sleeper);
             from_m - half_m <= x_m && x_m <= to_m + half_m

@@ -1,6 +1,8 @@
 //! The search on log powers that the forward model itself predicts, with known scatter: what was put
 //! in must come out, and where nothing was put in, nothing.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
