@@ -140,10 +140,8 @@ impl Evidence<'_> {
             let location = port.sleeper.map(|sleeper| self.location(sleeper..sleeper + 1));
             hypotheses.push(Hypothesis {
                 physics: "unknown_physics".to_owned(),
-                probability: unknown / all,
-                accepted: !round.accepted
-                    && round.port_p_value <= PORT_ALARM
-                    && unknown / all > 0.5,
+                probability: unknown / all * if alone { 1.0 } else { REMAINDER_PRIOR },
+                accepted: alone && round.port_p_value <= PORT_ALARM && unknown / all > 0.5,
                 location,
                 parameters: BTreeMap::new(),
                 look_alikes: Vec::new(),

@@ -45,9 +45,15 @@ pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Im
     let mut found: Vec<Impact> = Vec::new();
     for (speeds, cell, ln_p) in candidates {
         let x = speeds[0].place_m(cell);
-        let apart = |other: &Impact| (other.x_m.0 - x).abs() > 0.5 * recording.spacing_m;
-        if found.len() < IMPACTS_MAX && found.iter().all(apart) {
-            found.push(impact(recording, speeds, cell, ln_p));
+        let apart = |x_m: f64| {
+            found.iter().all(|other| (other.x_m.0 - x_m).abs() > 0.5 * recording.spacing_m)
+        };
+        if found.len() < IMPACTS_MAX && apart(x) {
+            let impact = impact(recording, speeds, cell, ln_p);
+            // A loud impact's flank may lead back to its middle.
+            if apart(impact.x_m.0) {
+                found.push(impact);
+            }
         }
     }
     let loudest = found.iter().map(|impact| impact.power_ratio).fold(0.0, f64::max);
