@@ -26,7 +26,8 @@ async fn serving() -> Coordinator {
 async fn work(coordinator: &Coordinator) {
     let config = Config {
         prepare: stand_in,
-        idle_exit: Some(Duration::from_millis(700)),
+        // Longer than a busy machine takes to add a campaign.
+        idle_exit: Some(Duration::from_secs(4)),
         ..Config::new(coordinator.url.clone(), CORES)
     };
     let run = agent::run(config, CancellationToken::new());
