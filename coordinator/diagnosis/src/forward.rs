@@ -120,14 +120,33 @@ impl Forward {
         values: &DVector<f64>,
         extensions: &[Arc<dyn Extension>],
     ) -> Result<DVector<f64>, ModelError> {
-        let transfer = self.transfer(values, extensions, false)?;
+        Ok(self.levels(&self.transfer(values, extensions, false)?, values))
+    }
+
+    /// The same from a transfer.
+    pub(crate) fn levels(&self, transfer: &Transfer, values: &DVector<f64>) -> DVector<f64> {
         let mut all = DVector::zeros(self.count());
         self.fill(&mut all, |sleeper, speed, band| {
-            let power = self.power(&transfer, values, sleeper, speed, band);
+            let power = self.power(transfer, values, sleeper, speed, band);
             let floor = power + self.noise(speed, band);
-            mean(self.shape_powers(&transfer, sleeper, speed, band), |shape| (floor + shape).ln())
+            mean(self.shape_powers(transfer, sleeper, speed, band), |shape| (floor + shape).ln())
         });
-        Ok(all)
+        all
+    }
+
+    /// The transfer of a baseline with extensions, which may differ from a known one of the same
+    /// baseline in little.
+    ///
+    /// # Errors
+    /// As [`Forward::log_power`].
+    pub(crate) fn transfer_beside(
+        &self,
+        known: &Transfer,
+        values: &DVector<f64>,
+        extensions: &[Arc<dyn Extension>],
+    ) -> Result<Transfer, ModelError> {
+        let transfer = known.with_model(self.model(values, extensions)?, self.bands.lines_hz());
+        Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
     }
 
     /// Log powers of a baseline with extensions, and their derivatives by the baseline's unknowns.
@@ -212,17 +231,28 @@ impl Forward {
         });
     }
 
-    fn transfer(
+    /// The transfer of a baseline with extensions, with what derivatives need if `from_seats`.
+    ///
+    /// # Errors
+    /// As [`Forward::log_power`].
+    pub(crate) fn transfer(
         &self,
         values: &DVector<f64>,
         extensions: &[Arc<dyn Extension>],
         from_seats: bool,
     ) -> Result<Transfer, ModelError> {
-        let supports = self.unknowns.supports(&self.section, values);
-        let mesh = self.section.mesh();
-        let model = TrackModel::build(&self.section.design, &mesh, &supports, extensions)?;
+        let model = self.model(values, extensions)?;
         let transfer = Transfer::new(model, self.bands.lines_hz(), from_seats);
         Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
+    }
+
+    fn model(
+        &self,
+        values: &DVector<f64>,
+        extensions: &[Arc<dyn Extension>],
+    ) -> Result<TrackModel, ModelError> {
+        let supports = self.unknowns.supports(&self.section, values);
+        TrackModel::build(&self.section.design, &self.section.mesh(), &supports, extensions)
     }
 
     /// Derivatives of each sleeper's dynamic stiffness under the rail by the logarithms of `k_b`,

@@ -36,7 +36,8 @@ pub fn templates(
 ) -> Result<Vec<Template>, CalibrationError> {
     let Problem { forward, observation, .. } = *problem;
     let accepted = problem.extensions(&calibration.values)?;
-    let plain = forward.log_power(&calibration.values, &accepted)?;
+    let known = forward.transfer(&calibration.values, &accepted, false)?;
+    let plain = forward.levels(&known, &calibration.values);
     let trials: Vec<(usize, usize)> = candidates
         .iter()
         .enumerate()
@@ -51,7 +52,8 @@ pub fn templates(
             let built = section.in_model(&extension).build(&section.design, section.spans());
             progress();
             let extensions = [&accepted[..], &[built.ok()?]].concat();
-            let changed = forward.log_power(&calibration.values, &extensions).ok()?;
+            let transfer = forward.transfer_beside(&known, &calibration.values, &extensions);
+            let changed = forward.levels(&transfer.ok()?, &calibration.values);
             let change = observation.fitted(&observation.whiten(&(changed - &plain)));
             let felt = calibration.jacobian.tr_mul(&change);
             let imitation = calibration.precision.solve(&felt);

@@ -4,6 +4,7 @@ use crate::profile::Shape;
 use crate::section::Section;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use tracktwin_track::frequency::RailReceptances;
 use tracktwin_track::model::{HertzContact, TrackModel};
 
@@ -20,15 +21,32 @@ pub(crate) struct Transfer {
     pub(crate) rail: Option<Shape>,
     /// The shape of the wheel in each pass, `[speed][pass]`; empty for a round one.
     pub(crate) wheel: Vec<Vec<Shape>>,
+    /// Direct receptances of the rail in m/N: `[line][node]`.
+    direct: Arc<Vec<Vec<Complex64>>>,
     model: TrackModel,
 }
 
 impl Transfer {
     /// Works it out for a model at these lines in Hz, with what derivatives need if `from_seats`.
     ///
-    /// Source: mismatch design, eq. 2: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.
     pub(crate) fn new(model: TrackModel, lines_hz: &[f64], from_seats: bool) -> Self {
-        let receptances = RailReceptances::new(&model, lines_hz, from_seats);
+        let RailReceptances { direct, from_seats } =
+            RailReceptances::new(&model, lines_hz, from_seats);
+        Self { from_seats, ..Self::on_rail(model, lines_hz, Arc::new(direct)) }
+    }
+
+    /// The same for another model at the same lines. Where it differs in no matrix, as by the shape
+    /// of the rail or by the sensor, the rail's receptances stay.
+    pub(crate) fn with_model(&self, model: TrackModel, lines_hz: &[f64]) -> Self {
+        if model.matrices() == self.model.matrices() {
+            Self::on_rail(model, lines_hz, Arc::clone(&self.direct))
+        } else {
+            Self::new(model, lines_hz, false)
+        }
+    }
+
+    /// Source: mismatch design, eq. 2: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.
+    fn on_rail(model: TrackModel, lines_hz: &[f64], direct: Arc<Vec<Vec<Complex64>>>) -> Self {
         let load = model.design().wheel.load_n;
         let contact = HertzContact::new(model.design());
         // Slope of the Hertzian law at the static load.
@@ -38,14 +56,14 @@ impl Transfer {
             direct.iter().map(|rail| (vehicle + rail).inv()).collect()
         };
         let stiffness: Vec<Vec<Complex64>> =
-            lines_hz.iter().zip(&receptances.direct).map(of_line).collect();
+            lines_hz.iter().zip(direct.iter()).map(of_line).collect();
         let power_of_line = |(&hz, line): (&f64, &Vec<Complex64>)| {
             let felt = model.vehicle().acceleration_per_force(TAU * hz) * model.sensor_transfer(hz);
             line.iter().map(|k| k.norm_sqr() * felt.norm_sqr()).collect()
         };
         let power = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
-        let from_seats = receptances.from_seats;
-        Self { power, stiffness, from_seats, rail: None, wheel: Vec::new(), model }
+        let (from_seats, wheel) = (Vec::new(), Vec::new());
+        Self { power, stiffness, from_seats, rail: None, wheel, direct, model }
     }
 
     /// The same with the shapes of rail and wheel over a section; in its passes the wheel begins a

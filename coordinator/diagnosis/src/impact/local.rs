@@ -51,7 +51,7 @@ pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Im
         if found.len() < IMPACTS_MAX && apart(x) {
             let impact = impact(recording, speeds, cell, ln_p);
             // A loud impact's flank may lead back to its middle.
-            if apart(impact.x_m.0) {
+            if apart(impact.x_m.0) && allowed(impact.x_m.0) {
                 found.push(impact);
             }
         }
