@@ -6,6 +6,7 @@
 //! - [`service`]: the coordinator on a port: certificates, tokens, starting and stopping.
 //! - [`farm`]: coordinator and workers in one process.
 //! - [`training`]: from a library to a training set.
+//! - [`diagnosing`]: from a recording to its diagnosis, stage by stage.
 //! - [`null_campaign`]: simulations of a track with nothing left out, kept in the library.
 //! - [`provenance`]: what a library keeps of trainings, evaluations and diagnoses.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
@@ -15,6 +16,7 @@
 pub mod campaign;
 pub mod commands;
 pub mod dashboard;
+pub mod diagnosing;
 pub mod dispatch;
 pub mod farm;
 pub mod null_campaign;

@@ -135,6 +135,14 @@ impl Problem<'_> {
         self.candidates.iter().map(build).collect()
     }
 
+    /// The state at values that were not searched for.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when they make no track.
+    pub(crate) fn at(&self, values: &DVector<f64>) -> Result<Calibration, CalibrationError> {
+        self.linearise(&self.prior(), values)
+    }
+
     fn predict(&self, values: &DVector<f64>) -> Result<DVector<f64>, CalibrationError> {
         Ok(self.forward.log_power(values, &self.extensions(values)?)?)
     }

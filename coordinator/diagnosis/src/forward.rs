@@ -52,6 +52,15 @@ type Windows = Vec<Vec<Vec<(usize, f64)>>>;
 /// Change of the dynamic stiffness at the rail seats: `[line][sleeper of the track]`.
 type Variation = Vec<Vec<Complex64>>;
 
+/// A track with what its derivatives are made of.
+struct State {
+    transfer: Transfer,
+    /// By `k_b`, `k_p`, `EI_s`, `c_p` and `c_b`.
+    variations: Vec<Variation>,
+    /// Spectrum of the surface: `[speed][line]`.
+    excitation: Vec<Vec<f64>>,
+}
+
 /// A prediction and its derivatives by the baseline's unknowns.
 pub struct Linearised {
     /// Predicted log powers.
@@ -125,9 +134,11 @@ impl Forward {
 
     /// The same from a transfer.
     pub(crate) fn levels(&self, transfer: &Transfer, values: &DVector<f64>) -> DVector<f64> {
+        let excitation = self.excitation(transfer, values);
         let mut all = DVector::zeros(self.count());
         self.fill(&mut all, |sleeper, speed, band| {
-            let power = self.power(transfer, values, sleeper, speed, band);
+            let scale = self.scale(values, sleeper, speed);
+            let power = scale * self.power(transfer, &excitation[speed], (sleeper, speed, band));
             let floor = power + self.noise(speed, band);
             mean(self.shape_powers(transfer, sleeper, speed, band), |shape| (floor + shape).ln())
         });
@@ -160,12 +171,12 @@ impl Forward {
     ) -> Result<Linearised, ModelError> {
         let transfer = self.transfer(values, extensions, true)?;
         let variations = self.variations(values, extensions)?;
+        let excitation = self.excitation(&transfer, values);
+        let state = State { transfer, variations, excitation };
         let mut log_power = DVector::zeros(self.count());
         let mut jacobian = DMatrix::zeros(self.count(), self.unknowns.count());
-        let rows: Vec<_> = (0..self.count())
-            .into_par_iter()
-            .map(|row| self.row(&transfer, &variations, values, row))
-            .collect();
+        let rows: Vec<_> =
+            (0..self.count()).into_par_iter().map(|row| self.row(&state, values, row)).collect();
         for (row, (value, derivatives)) in rows.into_iter().enumerate() {
             log_power[row] = value;
             for (column, derivative) in derivatives {
@@ -188,6 +199,7 @@ impl Forward {
         shapes: &[Vec<Complex64>],
     ) -> Result<Vec<DMatrix<f64>>, ModelError> {
         let transfer = self.transfer(values, extensions, true)?;
+        let excitation = self.excitation(&transfer, values);
         let of_sleeper = |sleeper: usize| {
             let in_track = self.section.in_track(sleeper);
             let seat_node = self.section.seat_node(sleeper);
@@ -198,13 +210,14 @@ impl Forward {
                     continue;
                 }
                 let window = &self.windows[speed][seen_from][band];
-                let power = self.power(&transfer, values, seen_from, speed, band);
+                let excitation = &excitation[speed];
+                let scale = self.scale(values, seen_from, speed);
+                let power = scale * self.power(&transfer, excitation, (seen_from, speed, band));
                 let floor = power + self.noise(speed, band);
                 let shapes_of_rail = self.shape_powers(&transfer, seen_from, speed, band);
-                let share = mean(shapes_of_rail, |shape| (floor + shape).recip())
-                    * self.scale(values, seen_from, speed);
+                let share = scale * mean(shapes_of_rail, |shape| (floor + shape).recip());
                 for &(line, weight) in self.bands.weights(band) {
-                    let weight = share * weight * self.excitation(&transfer, values, speed, line);
+                    let weight = share * weight * excitation[line];
                     let column = &transfer.from_seats[line][in_track];
                     let own = 1.0 / column[seat_node].norm();
                     let felt = weight * own * transfer.felt(window, line, column);
@@ -329,37 +342,34 @@ impl Forward {
         wheel.iter().map(|wheel| rail + power(wheel)).collect()
     }
 
-    /// Density of the surface at a line, at level one with the baseline's spectrum, times the
-    /// line's weight.
-    fn excitation(
-        &self,
-        transfer: &Transfer,
-        values: &DVector<f64>,
-        speed: usize,
-        line: usize,
-    ) -> f64 {
-        let wave_number = TAU * self.bands.lines_hz()[line] / self.speeds_m_s[speed];
-        let shares = self.unknowns.spectrum_shares(wave_number);
-        let shape: f64 = shares.iter().map(|&(knot, share)| share * values[knot]).sum();
-        self.surface[speed][line] * shape.exp() * transfer.roughness_gain(wave_number)
+    /// Density of the surface at every line, at level one with the baseline's spectrum, in m2/Hz:
+    /// `[speed][line]`.
+    fn excitation(&self, transfer: &Transfer, values: &DVector<f64>) -> Vec<Vec<f64>> {
+        let of_line = |speed_m_s: f64, (&hz, &surface): (&f64, &f64)| {
+            let wave_number = TAU * hz / speed_m_s;
+            let shares = self.unknowns.spectrum_shares(wave_number);
+            let shape: f64 = shares.iter().map(|&(knot, share)| share * values[knot]).sum();
+            surface * shape.exp() * transfer.roughness_gain(wave_number)
+        };
+        let of_speed = |(&speed_m_s, surface): (&f64, &Vec<f64>)| {
+            let lines = self.bands.lines_hz().iter().zip(surface);
+            lines.map(|line| of_line(speed_m_s, line)).collect()
+        };
+        self.speeds_m_s.iter().zip(&self.surface).map(of_speed).collect()
     }
 
-    /// Power of the surface's excitation in m2/s4.
+    /// Power in m2/s4 of a speed's excitation in a band over a sleeper, at level one.
     fn power(
         &self,
         transfer: &Transfer,
-        values: &DVector<f64>,
-        sleeper: usize,
-        speed: usize,
-        band: usize,
+        excitation: &[f64],
+        (sleeper, speed, band): (usize, usize, usize),
     ) -> f64 {
         let window = &self.windows[speed][sleeper][band];
-        let lines = self.bands.weights(band).iter().map(|&(line, weight)| {
-            let power = &transfer.power[line];
-            let seen: f64 = window.iter().map(|&(node, share)| share * power[node]).sum();
-            weight * self.excitation(transfer, values, speed, line) * seen
-        });
-        lines.sum::<f64>() * self.scale(values, sleeper, speed)
+        let lines = self.bands.weights(band).iter();
+        lines
+            .map(|&(line, weight)| weight * excitation[line] * transfer.mean_power(window, line))
+            .sum()
     }
 
     /// Level at the sleeper and gain of the speed.
@@ -369,13 +379,8 @@ impl Forward {
     }
 
     /// One predicted log power and its derivatives.
-    fn row(
-        &self,
-        transfer: &Transfer,
-        variations: &[Variation],
-        values: &DVector<f64>,
-        row: usize,
-    ) -> (f64, Vec<(usize, f64)>) {
+    fn row(&self, state: &State, values: &DVector<f64>, row: usize) -> (f64, Vec<(usize, f64)>) {
+        let State { transfer, variations, excitation } = state;
         let (sleeper, speed, band) = self.place(row);
         let unknowns = &self.unknowns;
         let window = &self.windows[speed][sleeper][band];
@@ -385,9 +390,8 @@ impl Forward {
         let mut spectrum = Vec::new();
         let mut power = 0.0;
         for &(line, weight) in self.bands.weights(band) {
-            let weight = scale * weight * self.excitation(transfer, values, speed, line);
-            let seen: f64 =
-                window.iter().map(|&(node, share)| share * transfer.power[line][node]).sum();
+            let weight = scale * weight * excitation[speed][line];
+            let seen = transfer.mean_power(window, line);
             power += weight * seen;
             let wave_number = TAU * self.bands.lines_hz()[line] / self.speeds_m_s[speed];
             for (knot, share) in unknowns.spectrum_shares(wave_number) {

@@ -1,7 +1,7 @@
 //! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
 
 use crate::calibration::{Calibration, CalibrationError, Problem};
-use crate::candidate::{Candidate, candidates};
+use crate::candidate::Candidate;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
 use crate::port_scan::{Port, PortScan};
@@ -128,7 +128,8 @@ pub fn first_calibration(subject: &Subject) -> Result<DVector<f64>, CalibrationE
 
 /// Looks for physics that was left out.
 ///
-/// `extra` are candidates that other tests of the recording suggest.
+/// `all` is what may be left out: usually the [`crate::candidates`] of the section and what other
+/// tests of the recording suggest.
 ///
 /// # Errors
 /// [`CalibrationError`] when the model breaks down on the way.
@@ -136,7 +137,7 @@ pub fn search(
     subject: &Subject,
     null: &NullModel,
     start: DVector<f64>,
-    extra: &[Candidate],
+    all: &[Candidate],
     progress: &(impl Fn(Stage, f64) + Sync),
 ) -> Result<Search, CalibrationError> {
     progress(Stage::Baseline, 0.0);
@@ -144,8 +145,6 @@ pub fn search(
     let observation = setting.observe(|_| false)?;
     let plain = Problem { forward: &subject.forward, observation: &observation, candidates: &[] };
     let baseline = plain.calibrate(start)?;
-    let mut all = candidates(&subject.forward.section);
-    all.extend_from_slice(extra);
     let mut search = Search {
         last: baseline.clone(),
         baseline,
@@ -165,7 +164,7 @@ pub fn search(
         let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
         let so_far = Reached { log_densities: &reached, strongest };
         let (mut round, mut scores) =
-            setting.round(&problem, &search.last, &all, so_far, progress)?;
+            setting.round(&problem, &search.last, all, so_far, progress)?;
         if let Some(better) = retuned(&problem, &search.last, &round.fitted)? {
             // The candidates found a better baseline on their way: the opponent gets it too.
             let gain = better.log_evidence - search.last.log_evidence;
@@ -179,7 +178,7 @@ pub fn search(
                 before.clone_from(&reached);
             }
             let so_far = Reached { log_densities: &reached, strongest };
-            (round, scores) = setting.round(&problem, &search.last, &all, so_far, progress)?;
+            (round, scores) = setting.round(&problem, &search.last, all, so_far, progress)?;
         }
         let goes_on = round.accepted;
         if let (true, Some(best)) = (goes_on, round.fitted.first()) {

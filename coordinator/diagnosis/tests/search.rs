@@ -6,7 +6,9 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use tracktwin_diagnosis::{Bands, Forward, NullModel, Search, Section, Subject, search};
+use tracktwin_diagnosis::{
+    Bands, Forward, NullModel, Search, Section, Subject, candidates, search,
+};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_track::extension::ExtensionInstance;
 
@@ -63,7 +65,7 @@ fn searched(seed: u64, extension: Option<ExtensionInstance>) -> Search {
     let pass_variance = DVector::from_element(forward.per_sleeper(), 1e-3);
     let pass_numbers = vec![vec![0], vec![1]];
     let subject = Subject { forward, log_power, pass_variance, first_sleeper: 0, pass_numbers };
-    search(&subject, &null, values, &[], &|_, _| ()).unwrap()
+    search(&subject, &null, values, &candidates(&subject.forward.section), &|_, _| ()).unwrap()
 }
 
 #[test]

@@ -2,21 +2,20 @@
 
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
-use crate::{null_campaign, provenance};
+use crate::diagnosing::{DiagnosingError, Setting, diagnose};
+use crate::provenance;
 use anyhow::Context;
 use clap::Args;
-use nalgebra::DVector;
+use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use tracktwin_diagnosis::{
-    Candidate, Diagnosis, Evidence, NullModel, Search, Stage, Subject, Verdict, first_calibration,
-    first_look, search,
-};
+use tracktwin_diagnosis::Verdict;
 use tracktwin_library::Library;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
+use tracktwin_track::extension::KINDS;
 use tracktwin_worker::{CODE_VERSION, Experiment};
 
 /// Steps of a stage's progress bar.
@@ -39,11 +38,20 @@ pub(super) struct Arguments {
     /// Folder for diagnosis.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Leave a kind of physics out of the catalogue, to see what else explains the recording; may
+    /// be given several times.
+    #[arg(long, value_name = "PHYSICS", value_parser = PossibleValuesParser::new(names()))]
+    without: Vec<String>,
+}
+
+/// Names of the catalogue.
+fn names() -> impl Iterator<Item = &'static str> {
+    KINDS.iter().map(|kind| kind.physics)
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let origin = origin(&arguments);
-    let Arguments { recording, models, library, out } = arguments;
+    let Arguments { recording, models, library, out, without } = arguments;
     let recording = Recording::open(&recording).or_input()?;
     let library = match library {
         Some(url) => Some(Library::open(&url).await.or_input()?),
@@ -53,7 +61,11 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     std::fs::create_dir_all(&out)
         .with_context(|| format!("{}: the folder cannot be made", out.display()))
         .or_input()?;
-    let diagnosis = diagnose(recording, &design, library.as_ref()).await?;
+    let shown = Shown::default();
+    let setting = Setting { design: &design, library: library.as_ref(), without: &without };
+    let diagnosed = diagnose(&recording, setting, &|stage, share| shown.at(stage, share)).await;
+    shown.end();
+    let diagnosis = diagnosed.map_err(stop)?.diagnosis;
     let json = serde_json::to_string_pretty(&diagnosis).context("a diagnosis is plain JSON")?;
     std::fs::write(out.join("diagnosis.json"), &json)?;
     let page = tracktwin_report::diagnosis_page(&diagnosis, &origin);
@@ -73,12 +85,21 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
 }
 
+/// What a recording lacks is mended by its owner; all else is ours.
+fn stop(error: DiagnosingError) -> Stop {
+    match error {
+        DiagnosingError::Recording(error) => Stop::Input(error.into()),
+        DiagnosingError::Failure(error) => Stop::Failure(error),
+    }
+}
+
 /// How the diagnosis is repeated.
 fn origin(arguments: &Arguments) -> Origin {
-    let Arguments { recording, models, library, out } = arguments;
+    let Arguments { recording, models, library, out, without } = arguments;
     let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
     command.extend(models.as_ref().map(|models| format!("--models {}", models.display())));
     command.extend(library.as_ref().map(|library| format!("--library {library}")));
+    command.extend(without.iter().map(|physics| format!("--without {physics}")));
     command.push(format!("--out {}", out.display()));
     Origin {
         command: command.join(" "),
@@ -101,79 +122,28 @@ async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<Tr
     Ok(Experiment::from_json(&campaign.experiment_json).or_input()?.design)
 }
 
-/// Diagnoses a recording; null simulations are kept in the library if there is one.
-async fn diagnose(
-    recording: Recording,
-    design: &TrackDesign,
-    library: Option<&Library>,
-) -> Result<Diagnosis, Stop> {
-    let mut subject = Subject::new(&recording, design).or_input()?;
-    let look = stage("first look", || first_look(&recording));
-    let suggested = subject.suggested(&look);
-    let start = stage("baseline", || first_calibration(&subject)).context("no baseline fits")?;
-    let null = null_model(&subject, &start, library).await?;
-    let found = searched(&subject, &null, start, &suggested)?;
-    let evidence =
-        Evidence { recording: &recording, subject: &subject, look: &look, search: &found };
-    Ok(evidence.conclude().context("no conclusion can be drawn")?)
-}
+/// A line or bar for the stage that goes on, the last one ended when another begins.
+#[derive(Default)]
+struct Shown(Mutex<Option<(&'static str, Progress)>>);
 
-/// The null model, with its progress shown.
-async fn null_model(
-    subject: &Subject,
-    start: &DVector<f64>,
-    library: Option<&Library>,
-) -> Result<NullModel, Stop> {
-    let surfaces = u64::from(null_campaign::SURFACES);
-    let shown = Mutex::new(Progress::begin("null model", 0, surfaces));
-    let null = null_campaign::of(subject, start, library, |done| {
-        shown.lock().expect("nobody panics while holding it").at(done, "");
-    });
-    let null = null.await?;
-    shown.into_inner().expect("nobody panics while holding it").end();
-    Ok(null)
-}
-
-/// The search, with its progress shown.
-fn searched(
-    subject: &Subject,
-    null: &NullModel,
-    start: DVector<f64>,
-    suggested: &[Candidate],
-) -> Result<Search, Stop> {
-    let shown = Mutex::new(None::<(Stage, Progress)>);
-    let progress = |stage, share| {
-        show(&mut shown.lock().expect("nobody panics while holding it"), stage, share);
-    };
-    let found = tokio::task::block_in_place(|| search(subject, null, start, suggested, &progress));
-    if let Some((_, progress)) = shown.into_inner().expect("nobody panics while holding it") {
-        progress.end();
+impl Shown {
+    fn at(&self, stage: &'static str, share: f64) {
+        let mut shown = self.0.lock().expect("nobody panics while holding it");
+        if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
+            if let Some((_, progress)) = shown.take() {
+                progress.end();
+            }
+            *shown = Some((stage, Progress::begin(stage, 0, STEPS)));
+        }
+        if let Some((_, progress)) = shown.as_mut() {
+            progress.at((share * STEPS as f64) as u64, "");
+        }
     }
-    Ok(found.context("the search for left-out physics broke down")?)
-}
 
-/// Runs a stage without steps of its own.
-fn stage<T>(name: &'static str, work: impl FnOnce() -> T) -> T {
-    let progress = Progress::begin(name, 0, 1);
-    let done = work();
-    progress.end();
-    done
-}
-
-fn show(shown: &mut Option<(Stage, Progress)>, stage: Stage, share: f64) {
-    if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
-        if let Some((_, progress)) = shown.take() {
+    fn end(self) {
+        let shown = self.0.into_inner().expect("nobody panics while holding it");
+        if let Some((_, progress)) = shown {
             progress.end();
         }
-        let name = match stage {
-            Stage::Baseline => "baseline",
-            Stage::Screening => "screening",
-            Stage::Refinement => "refinement",
-            Stage::HeldOut => "held out",
-        };
-        *shown = Some((stage, Progress::begin(name, 0, STEPS)));
-    }
-    if let Some((_, progress)) = shown {
-        progress.at((share * STEPS as f64) as u64, "");
     }
 }

@@ -1,0 +1,98 @@
+//! A recording's way to its diagnosis: first look, baseline, null model, search, conclusion.
+//!
+//! Owns the order of the stages; what each does is the diagnosis crate's, where null simulations
+//! are kept the library's.
+
+use crate::null_campaign;
+use anyhow::Context;
+use tracktwin_diagnosis::{
+    Candidate, Diagnosis, Evidence, FirstLook, Search, Stage, Subject, SubjectError,
+    first_calibration, first_look, search,
+};
+use tracktwin_library::Library;
+use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::recording::Recording;
+
+/// What a diagnosis is made with.
+#[derive(Clone, Copy)]
+pub struct Setting<'a> {
+    /// The track that recordings are compared with.
+    pub design: &'a TrackDesign,
+    /// Keeps the null simulations, if there is one.
+    pub library: Option<&'a Library>,
+    /// Kinds of physics that may not be named.
+    pub without: &'a [String],
+}
+
+/// A diagnosis and what it was concluded from.
+#[derive(Debug)]
+pub struct Diagnosed {
+    /// What is written down.
+    pub diagnosis: Diagnosis,
+    /// What was compared.
+    pub subject: Subject,
+    /// What the search found.
+    pub search: Search,
+}
+
+/// Why there is no diagnosis.
+#[derive(Debug, thiserror::Error)]
+pub enum DiagnosingError {
+    /// The recording cannot be diagnosed.
+    #[error(transparent)]
+    Recording(#[from] SubjectError),
+    /// Something broke down on the way.
+    #[error(transparent)]
+    Failure(#[from] anyhow::Error),
+}
+
+/// Diagnoses a recording. `watch` hears what is going on and which share of it is done.
+///
+/// # Errors
+/// [`DiagnosingError::Recording`] says what the recording lacks; all else is a failure.
+pub async fn diagnose(
+    recording: &Recording,
+    setting: Setting<'_>,
+    watch: &(dyn Fn(&'static str, f64) + Sync),
+) -> Result<Diagnosed, DiagnosingError> {
+    let Setting { design, library, without } = setting;
+    let allowed = |physics: &str| !without.iter().any(|other| other == physics);
+    let mut subject = Subject::new(recording, design)?;
+    watch("first look", 0.0);
+    let mut look = first_look(recording);
+    look.findings.retain(|finding| allowed(finding.physics));
+    let suggested = subject.suggested(&look);
+    watch("baseline", 0.0);
+    let start = first_calibration(&subject).context("no baseline fits")?;
+    watch("null model", 0.0);
+    let surfaces = f64::from(null_campaign::SURFACES);
+    let share = |done| watch("null model", done as f64 / surfaces);
+    let null = null_campaign::of(&subject, &start, library, share).await?;
+    let mut all = tracktwin_diagnosis::candidates(&subject.forward.section);
+    all.extend(suggested);
+    all.retain(|candidate: &Candidate| allowed(candidate.kind.physics));
+    let progress = |stage, share| watch(name(stage), share);
+    let found = tokio::task::block_in_place(|| search(&subject, &null, start, &all, &progress));
+    let search = found.context("the search for left-out physics broke down")?;
+    let diagnosis = conclude(recording, &subject, &look, &search)?;
+    Ok(Diagnosed { diagnosis, subject, search })
+}
+
+fn conclude(
+    recording: &Recording,
+    subject: &Subject,
+    look: &FirstLook,
+    search: &Search,
+) -> Result<Diagnosis, anyhow::Error> {
+    let evidence = Evidence { recording, subject, look, search };
+    evidence.conclude().context("no conclusion can be drawn")
+}
+
+const fn name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Baseline => "baseline",
+        Stage::Screening => "screening",
+        Stage::Refinement => "refinement",
+        Stage::HeldOut => "held out",
+    }
+}
