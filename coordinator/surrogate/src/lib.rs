@@ -8,6 +8,7 @@
 mod cholesky;
 mod distance;
 mod error;
+mod exponential;
 mod features;
 mod fit;
 mod gaussian_process;

@@ -1,0 +1,56 @@
+//! CPU time.
+
+use std::time::Instant;
+
+/// Runs of one piece of work.
+const REPEATS: usize = 5;
+
+/// How long a run lasts at least, in s: the system counts CPU time in steps of some milliseconds.
+const RUN_S: f64 = 0.3;
+
+/// CPU seconds of one piece of work over repeated runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Cost {
+    /// The quickest run.
+    pub least_s: f64,
+    /// The middle one.
+    pub median_s: f64,
+}
+
+impl Cost {
+    /// The cost of each of `count` equal parts.
+    #[must_use]
+    pub fn of_each(self, count: usize) -> Self {
+        let count = count as f64;
+        Self { least_s: self.least_s / count, median_s: self.median_s / count }
+    }
+}
+
+/// Measures `work` a few times, after one run that warms caches and plans up; short work is done
+/// again and again in a run.
+pub fn cost<T>(mut work: impl FnMut() -> T) -> Cost {
+    let started = Instant::now();
+    std::hint::black_box(work());
+    let times = (RUN_S / started.elapsed().as_secs_f64().max(1e-6)).ceil() as usize;
+    let mut seconds: Vec<f64> = (0..REPEATS)
+        .map(|_| {
+            let before = cpu_s();
+            for _ in 0..times {
+                std::hint::black_box(work());
+            }
+            (cpu_s() - before) / times as f64
+        })
+        .collect();
+    seconds.sort_by(f64::total_cmp);
+    Cost { least_s: seconds[0], median_s: seconds[REPEATS / 2] }
+}
+
+/// CPU seconds that all threads of this process have had so far.
+fn cpu_s() -> f64 {
+    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let nanoseconds = tasks.filter_map(|task| {
+        let text = std::fs::read_to_string(task.path().join("schedstat")).ok()?;
+        text.split(' ').next()?.parse::<f64>().ok()
+    });
+    nanoseconds.sum::<f64>() * 1e-9
+}

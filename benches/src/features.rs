@@ -1,0 +1,57 @@
+//! Signals and feature vectors from fixed seeds.
+
+use faer::Mat;
+use tracktwin_signal::Signal;
+
+/// A generator of numbers between -1 and 1 (Knuth's MMIX).
+fn noise() -> impl FnMut() -> f64 {
+    let mut state = 1_u64;
+    move || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}
+
+/// About what an axle box feels, at 100 kHz: resonances at 115 and 900 Hz under white noise.
+///
+/// # Panics
+/// Never: the samples are finite.
+pub fn axle_box(samples: usize) -> Signal {
+    let mut white = noise();
+    let mut past = [[0.0; 2]; 2];
+    let feedback = [(115.0, 0.02), (900.0, 0.1)].map(|(hz, damping)| {
+        let angle = std::f64::consts::TAU * hz / 1e5;
+        let radius = f64::exp(-damping * angle);
+        [2.0 * radius * f64::cos(angle), -radius * radius]
+    });
+    let sample = || {
+        let input = white();
+        let mut sum = 0.3 * input;
+        for ([a, b], past) in feedback.iter().zip(&mut past) {
+            *past = [0.02 * input + a * past[0] + b * past[1], past[0]];
+            sum += past[0];
+        }
+        sum
+    };
+    Signal::new(1e5, std::iter::repeat_with(sample).take(samples).collect()).expect("finite")
+}
+
+/// Rows of ln-powers about as a library holds them: smooth in a few parameters, and a surface's own
+/// scatter, alike in neighbouring bins.
+pub fn feature_vectors(rows: usize, columns: usize) -> Mat<f64> {
+    let mut white = noise();
+    let mut out = Mat::zeros(rows, columns);
+    for i in 0..rows {
+        let parameters: [f64; 6] = std::array::from_fn(|_| white());
+        let mut scatter = 0.0;
+        for j in 0..columns {
+            let place = j as f64 / columns as f64;
+            scatter = 0.9 * scatter + 0.44 * white();
+            let waves = parameters.iter().zip(1..);
+            let smooth: f64 = waves.map(|(p, k)| p * (f64::from(k) * 3.0 * place + p).sin()).sum();
+            out[(i, j)] = smooth + scatter;
+        }
+    }
+    out
+}

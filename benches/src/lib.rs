@@ -1,0 +1,14 @@
+//! What measurements share: the clock, repetition, the cases and signals that are measured.
+//!
+//! The clock counts CPU time of this process, all its threads together, so that neighbours on a
+//! shared machine lengthen a figure little. Linux only.
+
+mod cases;
+mod clock;
+mod features;
+mod figure;
+
+pub use cases::{Track, cases};
+pub use clock::{Cost, cost};
+pub use features::{axle_box, feature_vectors};
+pub use figure::{Curve, figure};
