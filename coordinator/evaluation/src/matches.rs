@@ -11,12 +11,17 @@ pub const MATCHES: usize = 10;
 /// Selectors over the library, one for every set of speeds that is asked for.
 pub(crate) struct Matcher<'a> {
     library: &'a TrainingSet,
+    /// Values of every varied parameter, an entry each.
+    values: Vec<Vec<f64>>,
     selectors: HashMap<Vec<usize>, Selector>,
 }
 
 impl<'a> Matcher<'a> {
     pub(crate) fn new(library: &'a TrainingSet) -> Self {
-        Self { library, selectors: HashMap::new() }
+        let columns = library.varied.len();
+        let column = |column| library.parameters.iter().skip(column).step_by(columns).copied();
+        let values = (0..columns).map(|index| column(index).collect()).collect();
+        Self { library, values, selectors: HashMap::new() }
     }
 
     /// The best matches of a sleeper's features, all its speeds side by side.
@@ -31,16 +36,10 @@ impl<'a> Matcher<'a> {
         let selector = &self.selectors[&key];
         let nearest = selector.nearest(&observed, MATCHES)?;
         let error = |entry| mape(&observed, selector.features(entry));
-        let columns = self.library.varied.len();
-        let estimates: Estimates = self
-            .library
-            .varied
-            .iter()
-            .enumerate()
-            .map(|(column, &parameter)| {
-                let values = self.library.parameters.iter().skip(column).step_by(columns);
-                let values: Vec<f64> = values.copied().collect();
-                let Selection { mean, sd } = Selection::of(&nearest, &values);
+        let pairs = self.library.varied.iter().zip(&self.values);
+        let estimates: Estimates = pairs
+            .map(|(&parameter, values)| {
+                let Selection { mean, sd } = Selection::of(&nearest, values);
                 (parameter, Estimate { mean, sd })
             })
             .collect();

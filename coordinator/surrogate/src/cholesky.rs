@@ -11,6 +11,10 @@ use faer::linalg::triangular_solve::{
 };
 use faer::{Mat, MatRef, get_global_parallelism};
 
+/// Columns that are eliminated at once. Each block reads and writes all that is left of the matrix:
+/// faer's own 128 take a tenth longer for 5000 entries.
+const BLOCK: usize = 512;
+
 /// `A = L L'`. What stands above the diagonal of `L` has no meaning and is never read.
 pub(crate) struct Cholesky {
     lower: Mat<f64>,
@@ -20,13 +24,15 @@ impl Cholesky {
     /// Factorises a symmetric matrix of which only the lower triangle is read.
     pub(crate) fn new(mut matrix: Mat<f64>) -> Result<Self, Error> {
         let (n, par) = (matrix.nrows(), get_global_parallelism());
-        let scratch = factor::cholesky_in_place_scratch::<f64>(n, par, faer::Spec::default());
+        let mut blocks = faer::Spec::<factor::LltParams, f64>::default();
+        blocks.block_size = BLOCK;
+        let scratch = factor::cholesky_in_place_scratch::<f64>(n, par, blocks);
         factor::cholesky_in_place(
             matrix.as_mut(),
             factor::LltRegularization::default(),
             par,
             MemStack::new(&mut MemBuffer::new(scratch)),
-            faer::Spec::default(),
+            blocks,
         )
         .map_err(|_| Error::NotPositiveDefinite { entries: n })?;
         Ok(Self { lower: matrix })

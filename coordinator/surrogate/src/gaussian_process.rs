@@ -6,9 +6,10 @@
 
 use crate::Error;
 use crate::cholesky::Cholesky;
-use crate::kernel::{Hyperparameters, correlation, correlations, covariance};
+use crate::exponential::correlate;
+use crate::kernel::{Hyperparameters, correlations, covariance};
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Mat, MatRef, get_global_parallelism};
+use faer::{Accum, ColRef, Mat, MatRef, get_global_parallelism};
 use rayon::prelude::*;
 
 /// Factor of the training inputs' covariance.
@@ -161,22 +162,27 @@ impl Factor {
 
     /// What column `j` adds to `tr(Q K')` and to `a' K' a` of every target, `K'` by `ln l`: both
     /// triangles at once, the diagonal of `K'` being zero.
-    fn length_terms(
+    fn length_terms<'a>(
         &self,
-        distances: MatRef<'_, f64>,
-        projected_inverse: MatRef<'_, f64>,
-        weights: &Weights,
+        distances: MatRef<'a, f64>,
+        projected_inverse: MatRef<'a, f64>,
+        weights: &'a Weights,
         j: usize,
     ) -> Vec<f64> {
-        let mut terms = vec![0.0; 1 + weights.signal_variances.len()];
-        for i in j + 1..self.entries() {
-            let r = distances[(i, j)];
-            let change = 2.0 * correlation(r, self.at.length) * r / self.at.length;
-            terms[0] += change * projected_inverse[(i, j)];
-            for (target, term) in terms[1..].iter_mut().enumerate() {
-                *term += change * weights.weights[(i, target)] * weights.weights[(j, target)];
-            }
+        let below = j + 1..self.entries();
+        let from_here = |of: ColRef<'a, f64>| of.subrows(below.start, below.len());
+        let distances = from_here(distances.col(j));
+        let mut changes: Vec<f64> = distances.iter().copied().collect();
+        correlate(&mut changes, self.at.length);
+        for (change, r) in changes.iter_mut().zip(distances.iter()) {
+            *change *= 2.0 * r / self.at.length;
         }
-        terms
+        let changes = ColRef::from_slice(&changes).transpose();
+        let trace = changes * from_here(projected_inverse.col(j));
+        let of_target = |target| {
+            let column = weights.weights.col(target);
+            weights.weights[(j, target)] * (changes * from_here(column))
+        };
+        [trace].into_iter().chain((0..weights.signal_variances.len()).map(of_target)).collect()
     }
 }

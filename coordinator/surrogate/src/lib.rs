@@ -6,6 +6,7 @@
 //! and how windows of a recording are combined (evaluation).
 
 mod cholesky;
+mod coarse;
 mod distance;
 mod error;
 mod exponential;

@@ -1,22 +1,17 @@
 //! The model selector: the library entries whose features are nearest (paper, 2.4.3.1).
 
 use crate::Error;
-use pulp::{Arch, Simd, WithSimd};
+use crate::coarse::Coarse;
 
 /// Feature vectors of a library, searched exhaustively and exactly.
 ///
-/// All entries are measured in single precision, which halves what has to be read; those that its
-/// rounding leaves in doubt are measured again in double precision, so that the order is exact.
+/// All entries are measured in eight bits a number, which is an eighth of the bytes to read; those
+/// that rounding leaves in doubt are measured again in double precision, so that the order is exact.
 /// Trees are slower in so many dimensions.
 pub struct Selector {
     features: Vec<f64>,
     dimension: usize,
-    /// Mean feature vector: what is centred at it is small, and so is its rounding.
-    centre: Vec<f64>,
-    /// Centred features in single precision, each row filled up with zeros to whole [`STRIDE`]s.
-    rough: Vec<f32>,
-    /// Norm of every row as it is in `rough`.
-    norms: Vec<f64>,
+    coarse: Coarse,
 }
 
 /// A library entry and how far its feature vector is.
@@ -37,10 +32,6 @@ pub struct Selection {
     pub sd: f64,
 }
 
-/// Numbers that are multiplied side by side: four of the widest registers, so that no sum has to
-/// wait for the one before.
-const STRIDE: usize = 64;
-
 impl Selector {
     /// A selector over rows of `features` (n x `dimension`, row-major).
     ///
@@ -52,17 +43,8 @@ impl Selector {
             let expected = (rows + 1) * dimension;
             return Err(Error::Shape { what: "features", expected, found: features.len() });
         }
-        let centre: Vec<f64> = (0..dimension)
-            .map(|j| features.iter().skip(j).step_by(dimension).sum::<f64>() / rows as f64)
-            .collect();
-        let mut rough = Vec::with_capacity(rows * dimension.next_multiple_of(STRIDE));
-        let mut norms = Vec::with_capacity(rows);
-        for row in features.chunks_exact(dimension) {
-            let row = rounded(row, &centre);
-            norms.push(norm(&row));
-            rough.extend(row);
-        }
-        Ok(Self { features, dimension, centre, rough, norms })
+        let coarse = Coarse::new(&features, dimension);
+        Ok(Self { features, dimension, coarse })
     }
 
     /// How many entries there are.
@@ -96,74 +78,24 @@ impl Selector {
         Ok(nearest)
     }
 
-    /// Entries that may be among the `count` nearest, whatever single precision hides.
+    /// Entries that may be among the `count` nearest, whatever rounding hides.
     fn candidates(&self, observed: &[f64], count: usize) -> Vec<usize> {
-        let observed = rounded(observed, &self.centre);
-        let own_norm = norm(&observed);
-        let products = Arch::new().dispatch(Products { rows: &self.rough, vector: &observed });
-        // A sum of n products errs by n roundings, the rounded vectors themselves by two more.
-        let rounding = f64::from(f32::EPSILON) * (observed.len() + 4) as f64;
         let mut candidates: Vec<(f64, usize)> = Vec::new();
-        // The smallest squared distances that entries keep below for certain, ascending.
+        // The smallest distances that entries do not exceed for certain, ascending.
         let mut surest: Vec<f64> = Vec::with_capacity(count + 1);
-        for (entry, (product, norm)) in products.iter().zip(&self.norms).enumerate() {
-            let square = norm * norm + own_norm * own_norm - 2.0 * f64::from(*product);
-            let doubt = rounding * (norm + own_norm).powi(2);
+        for (entry, [low, high]) in self.coarse.bounds(observed).enumerate() {
             let full = surest.len() == count;
-            if full && surest.last().is_none_or(|worst| square - doubt > *worst) {
+            if full && surest.last().is_none_or(|worst| low > *worst) {
                 continue;
             }
-            candidates.push((square - doubt, entry));
-            let place = surest.partition_point(|sure| *sure < square + doubt);
-            surest.insert(place, square + doubt);
+            candidates.push((low, entry));
+            let place = surest.partition_point(|sure| *sure < high);
+            surest.insert(place, high);
             surest.truncate(count);
         }
         let worst = surest.last().copied().unwrap_or(f64::INFINITY);
-        candidates.retain(|(least, _)| *least <= worst);
+        candidates.retain(|(low, _)| *low <= worst);
         candidates.into_iter().map(|(_, entry)| entry).collect()
-    }
-}
-
-/// Centred and in single precision, filled up with zeros.
-fn rounded(row: &[f64], centre: &[f64]) -> Vec<f32> {
-    let mut out: Vec<f32> = row.iter().zip(centre).map(|(x, mean)| (x - mean) as f32).collect();
-    out.resize(row.len().next_multiple_of(STRIDE), 0.0);
-    out
-}
-
-fn norm(row: &[f32]) -> f64 {
-    row.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt()
-}
-
-/// Products of rows with a vector, compiled for every instruction set.
-struct Products<'a> {
-    rows: &'a [f32],
-    vector: &'a [f32],
-}
-
-impl WithSimd for Products<'_> {
-    type Output = Vec<f32>;
-
-    #[expect(clippy::inline_always, reason = "must be compiled for each instruction set")]
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Vec<f32> {
-        let (vector, _) = self.vector.as_chunks::<STRIDE>();
-        let mut products = Vec::with_capacity(self.rows.len() / self.vector.len());
-        // A loop: what an iterator's adapter calls would not be compiled for the instruction set.
-        for row in self.rows.chunks_exact(self.vector.len()) {
-            let mut sums = [0.0_f32; STRIDE];
-            for (a, b) in row.as_chunks::<STRIDE>().0.iter().zip(vector) {
-                for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-                    *sum = a.mul_add(*b, *sum);
-                }
-            }
-            let mut product = 0.0;
-            for sum in sums {
-                product += sum;
-            }
-            products.push(product);
-        }
-        products
     }
 }
 
@@ -216,8 +148,8 @@ mod tests {
     }
 
     #[test]
-    fn entries_closer_together_than_single_precision_tells_are_in_order() {
-        // Far from the origin, a thousandth of a rounding of single precision apart.
+    fn entries_closer_together_than_rounding_tells_are_in_order() {
+        // Far from the origin, a billionth of a rounding apart.
         let row = |entry: u32| [1e3 + f64::from((entry * 7) % 40) * 1e-8, 2e3, -1e3];
         let far = [[-1e3, 5.0, 9.0]; 3];
         let features = (0..40).flat_map(row).chain(far.into_iter().flatten()).collect();

@@ -45,6 +45,14 @@ pub fn cost<T>(mut work: impl FnMut() -> T) -> Cost {
     Cost { least_s: seconds[0], median_s: seconds[REPEATS / 2] }
 }
 
+/// Does long work once: what it returned and what it cost.
+pub fn once<T>(work: impl FnOnce() -> T) -> (T, Cost) {
+    let before = cpu_s();
+    let out = work();
+    let seconds = cpu_s() - before;
+    (out, Cost { least_s: seconds, median_s: seconds })
+}
+
 /// CPU seconds that all threads of this process have had so far.
 fn cpu_s() -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();

@@ -1,7 +1,9 @@
 //! Signals and feature vectors from fixed seeds.
 
 use faer::Mat;
-use tracktwin_signal::Signal;
+use tracktwin_parameters::Parameter;
+use tracktwin_signal::{FeatureDefinition, Signal};
+use tracktwin_surrogate::TrainingSet;
 
 /// A generator of numbers between -1 and 1 (Knuth's MMIX).
 fn noise() -> impl FnMut() -> f64 {
@@ -37,11 +39,16 @@ pub fn axle_box(samples: usize) -> Signal {
     Signal::new(1e5, std::iter::repeat_with(sample).take(samples).collect()).expect("finite")
 }
 
-/// Rows of ln-powers about as a library holds them: smooth in a few parameters, and a surface's own
+/// Rows of ln-powers about as a library holds them: smooth in six parameters, and a surface's own
 /// scatter, alike in neighbouring bins.
 pub fn feature_vectors(rows: usize, columns: usize) -> Mat<f64> {
+    entries(rows, columns).0
+}
+
+/// Such rows, and the parameters (rows x 6, between -1 and 1) that they come from.
+fn entries(rows: usize, columns: usize) -> (Mat<f64>, Mat<f64>) {
     let mut white = noise();
-    let mut out = Mat::zeros(rows, columns);
+    let (mut out, mut all) = (Mat::zeros(rows, columns), Mat::zeros(rows, Parameter::ALL.len()));
     for i in 0..rows {
         let parameters: [f64; 6] = std::array::from_fn(|_| white());
         let mut scatter = 0.0;
@@ -52,6 +59,32 @@ pub fn feature_vectors(rows: usize, columns: usize) -> Mat<f64> {
             let smooth: f64 = waves.map(|(p, k)| p * (f64::from(k) * 3.0 * place + p).sin()).sum();
             out[(i, j)] = smooth + scatter;
         }
+        all.row_mut(i).iter_mut().zip(parameters).for_each(|(to, p)| *to = p);
     }
-    out
+    (out, all)
+}
+
+/// A library of such rows at these speeds.
+///
+/// # Panics
+/// Never: the definition becomes JSON.
+pub fn library(rows: usize, speeds_km_h: &[f64]) -> TrainingSet {
+    let definition = FeatureDefinition::default();
+    let frequencies_hz = definition.frequencies_hz();
+    let bins = frequencies_hz.len();
+    let (features, parameters) = entries(rows, bins * speeds_km_h.len());
+    let table = |speed: usize| {
+        let columns = features.subcols(speed * bins, bins);
+        (0..rows).flat_map(|i| columns.row(i).iter().copied()).collect()
+    };
+    TrainingSet {
+        frequencies_hz,
+        speeds_km_h: speeds_km_h.to_vec(),
+        log_power: (0..speeds_km_h.len()).map(table).collect(),
+        varied: Parameter::ALL.to_vec(),
+        parameters: (0..rows).flat_map(|i| parameters.row(i).iter().copied()).collect(),
+        campaign: "bench".to_owned(),
+        library_digest: "bench".to_owned(),
+        feature_definition: serde_json::to_value(definition).expect("settings become JSON"),
+    }
 }

@@ -15,7 +15,7 @@ const MS: f64 = 1e3;
 
 fn main() -> Result<(), Error> {
     faer::set_global_parallelism(faer::Par::Seq);
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/figures");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/figures");
     std::fs::create_dir_all(&folder)?;
     let save = |name: &str, title: &str, x: &str, y: &str, curves: &[Curve]| {
         for Curve { name, points } in curves {
@@ -75,7 +75,8 @@ fn by_library() -> Result<Curve, Error> {
             .collect();
         let observed: Vec<f64> = rows[..304].iter().map(|x| x + 0.1).collect();
         let selector = Selector::new(rows, 304)?;
-        let each = cost(|| (0..20).map(|_| selector.nearest(&observed, 10)).last()).of_each(20);
+        let each = cost(|| (0..20).map(|_| selector.nearest(&observed, 10)).collect::<Vec<_>>())
+            .of_each(20);
         Ok((entries as f64, each.least_s * MS))
     };
     let points = [1000, 3000, 10_000, 30_000].into_iter().map(point).collect::<Result<_, _>>()?;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures the program and what else does the same work, in one run, and prints one table.
 
-    python3 benches/peers.py --peers ../shared/peers [--environment DIR]
+    python3 tests/benches/peers.py --peers ../shared/peers [--environment DIR]
 
 Installs NumPy, SciPy, numba, scikit-learn, faiss and ssqueezepy into a virtual environment (DIR,
 target/peers by default) unless they are there, runs every peer on one thread, then
@@ -17,7 +17,7 @@ import sys
 import venv
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ["numpy", "scipy", "numba", "scikit-learn", "faiss-cpu", "ssqueezepy"]
 
 # Work, our row, and for every peer: its name, its script and arguments, and how its figure in ms is
