@@ -1,0 +1,73 @@
+//! Why a scene gives no recording, in one line each.
+
+use tracktwin_signal::recording::RecordingError;
+
+/// A scene that cannot be, or a recording that cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum TruthError {
+    /// A value is no number of its kind.
+    #[error("{field} is {value}; make it {form}")]
+    Value {
+        /// The field's name in files.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        form: &'static str,
+    },
+    /// A value is beyond what can be simulated.
+    #[error("{field} is {value}; make it {most} at most")]
+    TooLarge {
+        /// The field's name in files.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// The largest that can be.
+        most: f64,
+    },
+    /// There are not as many sleepers as the spans have between them.
+    #[error("a track of {spans} spans has one sleeper fewer, not {given}")]
+    Sleepers {
+        /// Sleepers given.
+        given: usize,
+        /// Spans of the track.
+        spans: usize,
+    },
+    /// What is recorded is shorter than a span or too near to an end of the track.
+    #[error(
+        "{from_m} to {to_m} m cannot be recorded: take a span or more, {end_m} m or more from the \
+         ends of the track of {length_m} m"
+    )]
+    Recorded {
+        /// Begin in m.
+        from_m: f64,
+        /// End in m.
+        to_m: f64,
+        /// Least distance from the ends in m.
+        end_m: f64,
+        /// Length of the track in m.
+        length_m: f64,
+    },
+    /// There is nothing to record.
+    #[error("the scene has no passes; add one")]
+    NoPasses,
+    /// A hidden effect is not on the track.
+    #[error("{physics} must lie on the track of {length_m} m and {sleepers} sleepers")]
+    Place {
+        /// Name of the effect.
+        physics: &'static str,
+        /// Length of the track in m.
+        length_m: f64,
+        /// Sleepers of the track.
+        sleepers: usize,
+    },
+    /// The motion is not finite any more: something carries nothing.
+    #[error("the wheel's motion is no number any more at {position_m} m")]
+    Diverged {
+        /// Where in m.
+        position_m: f64,
+    },
+    /// The recording cannot be written.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+}

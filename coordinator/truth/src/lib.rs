@@ -1,0 +1,37 @@
+//! Recordings whose truth is known: passes over a track with hidden physics.
+//!
+//! Owns a simulator of its own, which shares neither code nor discretisation with the twin's: sine
+//! modes of the rail and Ritz modes of the sleepers instead of finite elements, steps that are exact
+//! for the modes instead of Newmark's, and an irregularity of its own making. Whether a diagnosis
+//! finds what is hidden is left to those who diagnose. How it works and what was checked stands in
+//! `docs/truth.md`.
+
+mod chain;
+mod contact;
+mod error;
+mod filter;
+mod hidden;
+mod motion;
+mod pass;
+mod port;
+mod ports;
+mod rail;
+mod record;
+mod rest;
+mod scene;
+mod seats;
+mod sleeper;
+mod surface;
+mod system;
+mod track;
+mod typical;
+mod vehicle;
+mod vtrack;
+
+pub use error::TruthError;
+pub use hidden::Hidden;
+pub use pass::{Drive, Driven, drive};
+pub use record::record;
+pub use scene::{Chain, PassPlan, Scene, SleeperTruth};
+pub use surface::WheelAngle;
+pub use vtrack::SPACING_M;

@@ -1,0 +1,83 @@
+//! One pass of the wheel: from rest at its start to its end.
+
+use crate::motion::Motion;
+use crate::scene::Scene;
+use crate::surface::{WheelAngle, shapes};
+use crate::track::Track;
+use crate::{Hidden, TruthError};
+use std::f64::consts::PI;
+
+/// Time in s over which the surface grows from nothing, so that the wheel begins without a jump.
+const EASE_S: f64 = 4e-3;
+
+/// How the wheel is driven.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// True speed in m/s.
+    pub speed_m_s: f64,
+    /// Where the wheel starts, at rest on the track, in m.
+    pub start_m: f64,
+    /// Where the pass ends in m.
+    pub end_m: f64,
+    /// Which side of the wheel is down.
+    pub angle: WheelAngle,
+}
+
+/// What the wheel did: a sample after every step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Driven {
+    /// Time between samples in s.
+    pub time_step_s: f64,
+    /// Acceleration that a sensor at the axle box feels in m/s2, positive downwards.
+    pub acceleration_m_s2: Vec<f64>,
+    /// Contact force in N.
+    pub contact_force_n: Vec<f64>,
+    /// Position in m of the wheel at every sample.
+    pub position_m: Vec<f64>,
+}
+
+/// Drives the wheel over the track of a scene and over a surface of this height in m, positive
+/// downwards, to which hidden shapes are added.
+///
+/// # Errors
+/// [`TruthError`] where the scene cannot be, or its motion does not stay finite.
+pub fn drive(
+    scene: &Scene,
+    drive: &Drive,
+    height_m: impl Fn(f64) -> f64,
+) -> Result<Driven, TruthError> {
+    scene.check()?;
+    run(&Track::new(scene), &scene.left_out, drive, height_m)
+}
+
+/// The same over a track that is made already.
+pub(crate) fn run(
+    track: &Track,
+    left_out: &[Hidden],
+    drive: &Drive,
+    height_m: impl Fn(f64) -> f64,
+) -> Result<Driven, TruthError> {
+    let step_s = track.step_s;
+    let steps = ((drive.end_m - drive.start_m) / (drive.speed_m_s * step_s)).floor() as usize;
+    let felt = |x_m: f64| height_m(x_m) + shapes(left_out, drive.angle, x_m);
+    let first_m = felt(drive.start_m);
+    let mut motion = Motion::at_rest(track, drive.start_m);
+    let mut driven = Driven {
+        time_step_s: step_s,
+        acceleration_m_s2: Vec::with_capacity(steps),
+        contact_force_n: Vec::with_capacity(steps),
+        position_m: Vec::with_capacity(steps),
+    };
+    for step in 1..=steps {
+        let time_s = step as f64 * step_s;
+        let x_m = drive.start_m + drive.speed_m_s * time_s;
+        let ease = 0.5 * (1.0 - (PI * (time_s / EASE_S).min(1.0)).cos());
+        let now = motion
+            .step(x_m, ease * (felt(x_m) - first_m))
+            .ok_or(TruthError::Diverged { position_m: x_m })?;
+        driven.acceleration_m_s2.push(now.acceleration_m_s2);
+        driven.contact_force_n.push(now.force_n);
+        driven.position_m.push(x_m);
+    }
+    Ok(driven)
+}

@@ -1,0 +1,175 @@
+//! All passes of a scene, written as a recording; nothing in it tells what is hidden.
+
+use crate::TruthError;
+use crate::chain::{measure, turn};
+use crate::pass::{self, Drive};
+use crate::scene::Scene;
+use crate::surface::{Irregularity, WheelAngle};
+use crate::track::{Track, seat_m};
+use crate::vtrack::{self, SPACING_M};
+use rand_chacha::ChaCha12Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+use std::f64::consts::TAU;
+use std::path::Path;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::{Pass, Recording, Sleeper};
+
+/// Way in m before the recorded stretch over which the wheel runs in.
+const RUN_IN_M: f64 = 3.0 * SPACING_M;
+/// Way in m behind it, so that the filter has something to hold on to.
+const RUN_OUT_M: f64 = 0.002;
+
+/// Simulates every pass of a scene and writes the recording's folder: `recording.json` and one
+/// Parquet file a pass.
+///
+/// Passes run in parallel; the scene alone, with its seed, decides every number.
+///
+/// # Errors
+/// [`TruthError`] where the scene cannot be or the folder cannot be written.
+pub fn record(scene: &Scene, folder: &Path) -> Result<(), TruthError> {
+    let recording = simulate(scene)?;
+    Ok(recording.write(folder)?)
+}
+
+/// The recording in memory.
+fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
+    scene.check()?;
+    let track = Track::new(scene);
+    let shared = irregularity(scene, 0);
+    let pass = |number: usize| one_pass(scene, &track, &shared, number);
+    let passes: Result<Vec<Pass>, TruthError> =
+        (0..scene.passes.len()).into_par_iter().map(pass).collect();
+    Ok(Recording {
+        name: String::new(),
+        sample_rate_hz: 0.5 / track.step_s,
+        channel: "vertical axle-box acceleration, positive downwards".to_owned(),
+        passes: passes?,
+        sleepers: sleepers(scene),
+        nominal: nominal(),
+        spacing_m: SPACING_M,
+    })
+}
+
+fn one_pass(
+    scene: &Scene,
+    track: &Track,
+    shared: &Irregularity,
+    number: usize,
+) -> Result<Pass, TruthError> {
+    let mut random = stream(scene, 2 * number as u64 + 2);
+    let deviation: f64 = StandardNormal.sample(&mut random);
+    let speed_km_h = scene.passes[number].speed_km_h;
+    let [from_m, to_m] = scene.recorded_m;
+    let drive = Drive {
+        speed_m_s: speed_km_h / 3.6 * (1.0 + scene.chain.speed_deviation * deviation),
+        start_m: from_m - RUN_IN_M,
+        end_m: to_m + RUN_OUT_M,
+        angle: WheelAngle { rolled_m: TAU * vtrack::WHEEL_RADIUS_M * turn(&mut random) },
+    };
+    let own = irregularity(scene, 2 * number as u64 + 1);
+    let surface = shared.blend(&own, scene.chain.unrepeated);
+    let driven = pass::run(track, &scene.left_out, &drive, |x_m| surface.height(x_m))?;
+    let measured =
+        measure(&scene.chain, &scene.left_out, number, &driven, scene.recorded_m, &mut random);
+    let signal = Signal::new(measured.sample_rate_hz, measured.acceleration_m_s2)
+        .expect("a pass whose forces are finite is");
+    Ok(Pass { file: String::new(), speed_km_h, signal, position_m: measured.position_m })
+}
+
+/// An irregularity of a scene: 0 for the one that all passes share.
+fn irregularity(scene: &Scene, number: u64) -> Irregularity {
+    Irregularity::draw(scene.irregularity_level, scene.length_m(), &mut stream(scene, number))
+}
+
+/// Random numbers of a scene: every stream is independent of the others.
+fn stream(scene: &Scene, number: u64) -> ChaCha12Rng {
+    let mut random = ChaCha12Rng::seed_from_u64(scene.seed);
+    random.set_stream(number);
+    random
+}
+
+/// The sleepers on the recorded stretch.
+fn sleepers(scene: &Scene) -> Vec<Sleeper> {
+    // Half a millimetre for the rounding of places.
+    let [from_m, to_m] = [scene.recorded_m[0] - 5e-4, scene.recorded_m[1] + 5e-4];
+    (0..scene.sleepers.len())
+        .map(|number| Sleeper { id: format!("SN{number}"), x_m: seat_m(number) })
+        .filter(|sleeper| (from_m..=to_m).contains(&sleeper.x_m))
+        .collect()
+}
+
+/// What is known of rail, sleepers and wheel without measuring.
+fn nominal() -> Map<String, Value> {
+    let nominal = json!({
+        "rail": {
+            "profile": "S7", "area_m2": vtrack::RAIL_AREA_M2,
+            "second_moment_m4": vtrack::RAIL_SECOND_MOMENT_M4, "youngs_Pa": vtrack::YOUNG_PA,
+            "density_kg_m3": vtrack::DENSITY_KG_M3, "poisson": vtrack::POISSON,
+            "shear_coefficient": vtrack::RAIL_SHEAR_COEFFICIENT,
+        },
+        "sleeper": {
+            "spacing_m": SPACING_M, "half_length_m": vtrack::SLEEPER_HALF_LENGTH_M,
+            "area_m2": vtrack::SLEEPER_AREA_M2, "density_kg_m3": vtrack::DENSITY_KG_M3,
+        },
+        "railhead_radius_m": vtrack::RAILHEAD_RADIUS_M,
+        "wheel": {
+            "mass_kg": vtrack::WHEEL_MASS_KG, "load_N": vtrack::WHEEL_LOAD_N,
+            "radius_m": vtrack::WHEEL_RADIUS_M,
+        },
+    });
+    match nominal {
+        Value::Object(fields) => fields,
+        _ => Map::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::testing::NOMINAL;
+    use crate::{Chain, Hidden, PassPlan};
+
+    fn short() -> Scene {
+        let passes = [13.0, 13.0, 10.0].map(|speed_km_h| PassPlan { speed_km_h }).into();
+        Scene { passes, chain: Chain::default(), ..Scene::uniform(16, NOMINAL) }
+    }
+
+    #[test]
+    fn a_recording_can_be_read_and_does_not_tell_what_is_hidden() {
+        let bolt = Hidden::SleeperBolt { sleepers: vec![8], stiffness_n_per_m: 3e7 };
+        let scene = Scene { left_out: vec![bolt], ..short() };
+        let folder = tempfile::tempdir().unwrap();
+        record(&scene, folder.path()).unwrap();
+        let recording = Recording::open(folder.path()).unwrap();
+        assert_eq!(recording.speeds_km_h(), [10.0, 13.0]);
+        assert_eq!(recording.sleepers.first().unwrap().id, "SN5");
+        assert_eq!(recording.sleepers.last().unwrap().x_m, 1.25);
+        let mut names: Vec<_> = std::fs::read_dir(folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        let expected = [
+            "pass-10kmh-1.parquet",
+            "pass-13kmh-1.parquet",
+            "pass-13kmh-2.parquet",
+            "recording.json",
+        ];
+        assert_eq!(names, expected);
+        let manifest = std::fs::read_to_string(folder.path().join("recording.json")).unwrap();
+        assert!(!manifest.contains("bolt") && !manifest.contains("seed"));
+    }
+
+    #[test]
+    fn the_same_scene_gives_the_same_recording_and_passes_differ() {
+        let [one, two] = [0; 2].map(|_| simulate(&short()).unwrap());
+        assert_eq!(one.passes[0].signal, two.passes[0].signal);
+        assert_eq!(one.passes[1].position_m, two.passes[1].position_m);
+        assert_ne!(one.passes[0].signal, one.passes[1].signal);
+        let other = simulate(&Scene { seed: 2, ..short() }).unwrap();
+        assert_ne!(one.passes[0].signal, other.passes[0].signal);
+    }
+}

@@ -1,0 +1,258 @@
+//! A track, its passes, its measuring chain and what is hidden: all that decides a recording.
+//!
+//! Owns the plain data and its checks; drawing a scene is `typical`'s.
+
+use crate::TruthError;
+use crate::hidden::Hidden;
+use crate::vtrack::SPACING_M;
+use serde::{Deserialize, Serialize};
+
+/// Least distance in m of what is recorded from the track's ends: room for the run-in.
+const END_M: f64 = 4.0 * SPACING_M;
+
+/// A track with its passes and what is hidden in it.
+///
+/// The same scene gives the same recording, to the bit on one machine.
+#[derive(Serialize, Deserialize, Clone, Debug, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Sleeper spans of the track, 0.125 m each.
+    pub spans: usize,
+    /// Seed of the surface, of what differs from pass to pass and of the noise.
+    pub seed: u64,
+    /// Level of the irregularity in 1e-4 m2 rad/m (eq. B.6).
+    pub irregularity_level: f64,
+    /// Every sleeper, `spans - 1` of them; sleeper `i`, from 0, stands at `(i + 1)` spacings.
+    pub sleepers: Vec<SleeperTruth>,
+    /// Damping of each railpad in N s/m.
+    #[serde(rename = "railpad_damping_N_s_m")]
+    pub railpad_damping_n_s_m: f64,
+    /// Damping of the ballast under each half sleeper in N s/m.
+    #[serde(rename = "ballast_damping_N_s_m")]
+    pub ballast_damping_n_s_m: f64,
+    /// The passes, in the order in which they are written.
+    pub passes: Vec<PassPlan>,
+    /// From where to where is recorded in m.
+    pub recorded_m: [f64; 2],
+    /// What is hidden.
+    #[serde(default)]
+    pub left_out: Vec<Hidden>,
+    /// How it is measured.
+    pub chain: Chain,
+}
+
+/// One sleeper with its railpad and its ballast.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct SleeperTruth {
+    /// Stiffness `k_p` of the railpad in N/m.
+    #[serde(rename = "railpad_stiffness_N_m")]
+    pub railpad_stiffness_n_m: f64,
+    /// Stiffness `k_b` of the ballast under the half sleeper in N/m.
+    #[serde(rename = "ballast_stiffness_N_m")]
+    pub ballast_stiffness_n_m: f64,
+    /// Bending stiffness `EI_s` of the sleeper in N m2.
+    #[serde(rename = "sleeper_EI_N_m2")]
+    pub sleeper_ei_n_m2: f64,
+}
+
+/// One run of the wheel over the track.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct PassPlan {
+    /// Speed in km/h that the recording states; the true one is a little off.
+    pub speed_km_h: f64,
+}
+
+/// The measuring chain without its faults.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Chain {
+    /// Standard deviation of the white noise in m/s2.
+    pub noise_m_s2: f64,
+    /// Steps in m/s2 in which accelerations are recorded; 0 for none.
+    pub step_m_s2: f64,
+    /// How far the odometer wanders at most in m.
+    pub wander_m: f64,
+    /// Standard deviation of true over stated speed.
+    pub speed_deviation: f64,
+    /// Share of the surface's power that differs from pass to pass, 0 to 1.
+    pub unrepeated: f64,
+}
+
+impl Default for Chain {
+    /// What a careful set-up of accelerometer and odometer reaches.
+    fn default() -> Self {
+        Self {
+            noise_m_s2: 0.05,
+            step_m_s2: 0.005,
+            wander_m: 3e-3,
+            speed_deviation: 1e-3,
+            unrepeated: 0.05,
+        }
+    }
+}
+
+impl Chain {
+    /// A chain without noise, steps, wander, and of passes that are all alike.
+    pub const fn ideal() -> Self {
+        Self {
+            noise_m_s2: 0.0,
+            step_m_s2: 0.0,
+            wander_m: 0.0,
+            speed_deviation: 0.0,
+            unrepeated: 0.0,
+        }
+    }
+}
+
+impl Scene {
+    /// A track of equal sleepers that nothing is hidden in, measured ideally.
+    pub fn uniform(spans: usize, sleeper: SleeperTruth) -> Self {
+        let length_m = spans as f64 * SPACING_M;
+        Self {
+            spans,
+            seed: 1,
+            irregularity_level: 3.0,
+            sleepers: vec![sleeper; spans.saturating_sub(1)],
+            railpad_damping_n_s_m: 6e3,
+            ballast_damping_n_s_m: 900.0,
+            passes: vec![PassPlan { speed_km_h: 13.0 }],
+            recorded_m: [6.0 * SPACING_M, length_m - 6.0 * SPACING_M],
+            left_out: Vec::new(),
+            chain: Chain::ideal(),
+        }
+    }
+
+    /// Length of the track in m.
+    pub fn length_m(&self) -> f64 {
+        self.spans as f64 * SPACING_M
+    }
+
+    /// That everything is a number that can be, and lies on the track.
+    ///
+    /// # Errors
+    /// [`TruthError`] names the field that cannot be.
+    pub fn check(&self) -> Result<(), TruthError> {
+        let length_m = self.length_m();
+        if self.sleepers.len() + 1 != self.spans {
+            return Err(TruthError::Sleepers { given: self.sleepers.len(), spans: self.spans });
+        }
+        let [from_m, to_m] = self.recorded_m;
+        if !(END_M <= from_m && from_m + SPACING_M <= to_m && to_m <= length_m - END_M) {
+            return Err(TruthError::Recorded { from_m, to_m, end_m: END_M, length_m });
+        }
+        if self.passes.is_empty() {
+            return Err(TruthError::NoPasses);
+        }
+        for sleeper in &self.sleepers {
+            positive("railpad_stiffness_N_m", sleeper.railpad_stiffness_n_m)?;
+            positive("ballast_stiffness_N_m", sleeper.ballast_stiffness_n_m)?;
+            positive("sleeper_EI_N_m2", sleeper.sleeper_ei_n_m2)?;
+        }
+        for pass in &self.passes {
+            positive("speed_km_h", pass.speed_km_h)?;
+        }
+        positive("railpad_damping_N_s_m", self.railpad_damping_n_s_m)?;
+        positive("ballast_damping_N_s_m", self.ballast_damping_n_s_m)?;
+        not_negative("irregularity_level", self.irregularity_level)?;
+        self.chain.check()?;
+        self.left_out.iter().try_for_each(|hidden| self.check_place(hidden))
+    }
+
+    fn check_place(&self, hidden: &Hidden) -> Result<(), TruthError> {
+        let on_track = |number: &usize| *number < self.sleepers.len();
+        let sleepers = hidden.sleepers().is_none_or(|sleepers| sleepers.iter().all(on_track));
+        let place = hidden
+            .place()
+            .is_none_or(|[from_m, to_m]| 0.0 < from_m && from_m <= to_m && to_m < self.length_m());
+        if sleepers && place {
+            return Ok(());
+        }
+        let length_m = self.length_m();
+        let count = self.sleepers.len();
+        Err(TruthError::Place { physics: hidden.physics(), length_m, sleepers: count })
+    }
+}
+
+impl Chain {
+    fn check(&self) -> Result<(), TruthError> {
+        not_negative("noise_m_s2", self.noise_m_s2)?;
+        not_negative("step_m_s2", self.step_m_s2)?;
+        not_negative("wander_m", self.wander_m)?;
+        not_negative("speed_deviation", self.speed_deviation)?;
+        not_negative("unrepeated", self.unrepeated)?;
+        // With more, positions would run backwards somewhere, or the speed change its sign.
+        for (field, value, most) in [
+            ("wander_m", self.wander_m, 0.05),
+            ("speed_deviation", self.speed_deviation, 0.01),
+            ("unrepeated", self.unrepeated, 1.0),
+        ] {
+            if value > most {
+                return Err(TruthError::TooLarge { field, value, most });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn positive(field: &'static str, value: f64) -> Result<(), TruthError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(TruthError::Value { field, value, form: "a positive number" })
+}
+
+fn not_negative(field: &'static str, value: f64) -> Result<(), TruthError> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(());
+    }
+    Err(TruthError::Value { field, value, form: "a number from 0 up" })
+}
+
+#[cfg(test)]
+pub(crate) mod testing {
+    use super::*;
+
+    /// The middle of Table D1.
+    pub(crate) const NOMINAL: SleeperTruth = SleeperTruth {
+        railpad_stiffness_n_m: 1.5e8,
+        ballast_stiffness_n_m: 1.2e7,
+        sleeper_ei_n_m2: 5000.0,
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::NOMINAL;
+    use super::*;
+
+    #[test]
+    fn a_scene_survives_its_file() {
+        let scene = Scene::uniform(20, NOMINAL);
+        let text = serde_json::to_string(&scene).unwrap();
+        assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), scene);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_by_its_name() {
+        let refused = |change: fn(&mut Scene)| {
+            let mut scene = Scene::uniform(20, NOMINAL);
+            change(&mut scene);
+            scene.check().unwrap_err().to_string()
+        };
+        assert!(refused(|scene| scene.sleepers[3].sleeper_ei_n_m2 = -1.0).contains("sleeper_EI"));
+        assert!(refused(|scene| scene.spans = 25).contains("25 spans"));
+        assert!(refused(|scene| scene.passes.clear()).contains("pass"));
+        assert!(refused(|scene| scene.recorded_m[1] = 2.4).contains("2.4"));
+        assert!(refused(|scene| scene.chain.wander_m = 0.2).contains("wander_m"));
+        assert!(
+            refused(|scene| {
+                let bolt = Hidden::SleeperBolt { sleepers: vec![19], stiffness_n_per_m: 1e7 };
+                scene.left_out.push(bolt);
+            })
+            .contains("sleeper_bolt")
+        );
+        assert!(Scene::uniform(20, NOMINAL).check().is_ok());
+    }
+}
