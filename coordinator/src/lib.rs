@@ -5,6 +5,7 @@
 //! - [`dashboard`]: pages and metrics for people and Prometheus.
 //! - [`service`]: the coordinator on a port: certificates, tokens, starting and stopping.
 //! - [`farm`]: coordinator and workers in one process.
+//! - [`trial`]: blind trials of the diagnosis, in a folder.
 //! - [`training`]: from a library to a training set.
 //! - [`diagnosing`]: from a recording to its diagnosis, stage by stage.
 //! - [`null_campaign`]: simulations of a track with nothing left out, kept in the library.
@@ -23,3 +24,4 @@ pub mod null_campaign;
 pub mod provenance;
 pub mod service;
 pub mod training;
+pub mod trial;

@@ -17,6 +17,7 @@ mod simulate;
 mod status;
 mod stop;
 mod train;
+mod trial;
 
 use stop::{OrInput, Stop};
 
@@ -68,6 +69,8 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Write a campaign that has the physics a diagnosis found in its parameter space.
     Extend(extend::Arguments),
+    /// Hide physics in recordings, diagnose them blindly and score the answers.
+    Trial(trial::Arguments),
     /// Make a recording of CSV, Parquet, NumPy or MATLAB files.
     Import(import::Arguments),
     /// Say what is in a recording and what it can be used for.
@@ -131,6 +134,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Train(arguments) => asynchronously(train::run(arguments)),
         Command::Diagnose(arguments) => asynchronously(diagnose::run(arguments)),
         Command::Extend(arguments) => extend::run(arguments),
+        Command::Trial(arguments) => asynchronously(trial::run(arguments)),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
         Command::Import(arguments) => import::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),

@@ -1,0 +1,21 @@
+//! Blind trials: recordings with hidden physics, diagnosed without the truth, then scored.
+//!
+//! Owns what is hidden ([`Plan`]), the seals ([`Seals`]) and the scores ([`Score`], [`Summary`]).
+//! The recordings come from a simulator that shares no discretisation with the diagnosis; diagnosing
+//! and files belong to the command.
+
+mod draw;
+mod effect;
+mod rate;
+mod score;
+mod seal;
+mod summary;
+mod table;
+mod visible;
+
+pub use draw::{Class, Plan, plan};
+pub use rate::Rate;
+pub use score::{Bias, KnockedOut, Named, Placed, Score, placed, score};
+pub use seal::{SealError, Seals};
+pub use summary::{KindRow, Row, Summary};
+pub use visible::detectability;

@@ -1,0 +1,72 @@
+//! Rates with what chance alone makes of them.
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{Beta, ContinuousCDF};
+
+/// How often something was so.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rate {
+    /// How often.
+    pub hits: u64,
+    /// Of how many.
+    pub of: u64,
+}
+
+impl Rate {
+    /// Counts what is true.
+    pub fn of(answers: impl IntoIterator<Item = bool>) -> Self {
+        answers.into_iter().fold(Self::default(), |rate, hit| Self {
+            hits: rate.hits + u64::from(hit),
+            of: rate.of + 1,
+        })
+    }
+
+    /// The share; none of nothing.
+    pub fn share(self) -> Option<f64> {
+        (self.of > 0).then(|| self.hits as f64 / self.of as f64)
+    }
+
+    /// Its 95 % interval (Clopper and Pearson, 1934): exact for a binomial count.
+    ///
+    /// # Panics
+    /// Never: counts of hits and misses plus one are shapes of a beta distribution.
+    pub fn interval_95(self) -> [f64; 2] {
+        let (hits, misses) = (self.hits as f64, (self.of - self.hits) as f64);
+        let quantile = |a: f64, b: f64, p: f64| {
+            Beta::new(a, b).expect("both shapes are positive").inverse_cdf(p)
+        };
+        let low = if self.hits == 0 { 0.0 } else { quantile(hits, misses + 1.0, 0.025) };
+        let high = if self.hits == self.of { 1.0 } else { quantile(hits + 1.0, misses, 0.975) };
+        [low, high]
+    }
+
+    /// Such as `38 of 40: 95 % (83 to 99)`.
+    pub fn to_text(self) -> String {
+        let Some(share) = self.share() else { return "none".to_owned() };
+        let [low, high] = self.interval_95().map(|limit| 100.0 * limit);
+        format!("{} of {}: {:.0} % ({low:.0} to {high:.0})", self.hits, self.of, 100.0 * share)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_those_of_published_tables() {
+        // 0 of 10: 1 - 0.025^(1/10); 5 of 10: Clopper and Pearson's chart, 0.187 to 0.813.
+        let [low, high] = Rate { hits: 0, of: 10 }.interval_95();
+        assert_eq!(low, 0.0);
+        assert!((high - (1.0 - 0.025_f64.powf(0.1))).abs() < 1e-6, "{high}");
+        let [low, high] = Rate { hits: 5, of: 10 }.interval_95();
+        assert!((low - 0.1871).abs() < 1e-3 && (high - 0.8129).abs() < 1e-3, "{low} {high}");
+        assert_eq!(Rate { hits: 7, of: 7 }.interval_95()[1], 1.0);
+    }
+
+    #[test]
+    fn of_nothing_there_is_no_share() {
+        assert_eq!(Rate::of([]).share(), None);
+        assert_eq!(Rate::of([true, false, true, true]).share(), Some(0.75));
+        assert_eq!(Rate::of([]).to_text(), "none");
+    }
+}

@@ -1,0 +1,104 @@
+//! Seals: the truth is fixed before any diagnosis runs, and anybody can check that it was.
+
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// SHA-256 of every sealed file, by its name.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Seals(BTreeMap<String, String>);
+
+/// A seal that is broken, or none.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SealError {
+    /// A file was never sealed.
+    #[error("{0}: is not sealed; the trial was begun without it")]
+    NotSealed(String),
+    /// A file is another than the one that was sealed.
+    #[error("{0}: was changed after it was sealed; start the trial anew in another folder")]
+    Broken(String),
+    /// A line of the file of seals can't be read.
+    #[error("seals: `{0}` is no line of `sha256sum`; start the trial anew in another folder")]
+    Line(String),
+}
+
+impl Seals {
+    /// Seals what a file holds.
+    pub fn seal(&mut self, name: &str, content: &[u8]) {
+        self.0.insert(name.to_owned(), sha256(content));
+    }
+
+    /// Makes sure that a file holds what was sealed.
+    ///
+    /// # Errors
+    /// [`SealError`] when it doesn't.
+    pub fn open(&self, name: &str, content: &[u8]) -> Result<(), SealError> {
+        match self.0.get(name) {
+            None => Err(SealError::NotSealed(name.to_owned())),
+            Some(sealed) if *sealed == sha256(content) => Ok(()),
+            Some(_) => Err(SealError::Broken(name.to_owned())),
+        }
+    }
+
+    /// How many files are sealed.
+    ///
+    /// # Panics
+    /// Never: a trial has no more cases than a u32 counts.
+    pub fn count(&self) -> u32 {
+        u32::try_from(self.0.len()).expect("a case's number is a u32")
+    }
+
+    /// As `sha256sum` writes and checks them: `sha256sum -c`.
+    pub fn to_text(&self) -> String {
+        self.0.iter().fold(String::new(), |text, (name, digest)| text + digest + "  " + name + "\n")
+    }
+
+    /// From such a text.
+    ///
+    /// # Errors
+    /// [`SealError::Line`] names the line that is none.
+    pub fn from_text(text: &str) -> Result<Self, SealError> {
+        let line = |line: &str| match line.split_once("  ") {
+            Some((digest, name)) if digest.len() == 64 => Ok((name.to_owned(), digest.to_owned())),
+            _ => Err(SealError::Line(line.to_owned())),
+        };
+        text.lines().map(line).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// SHA-256 of all seals: who knows it beforehand knows that no truth was changed.
+    pub fn digest(&self) -> String {
+        sha256(self.to_text().as_bytes())
+    }
+}
+
+fn sha256(content: &[u8]) -> String {
+    Sha256::digest(content).iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").expect("a string takes all that is written");
+        text
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digests_are_those_of_the_standard() {
+        // FIPS 180-4, the message "abc".
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(sha256(b"abc"), expected);
+    }
+
+    #[test]
+    fn a_changed_truth_breaks_its_seal() {
+        let mut seals = Seals::default();
+        seals.seal("sealed/0001.json", b"squat");
+        let seals = Seals::from_text(&seals.to_text()).unwrap();
+        assert_eq!(seals.open("sealed/0001.json", b"squat"), Ok(()));
+        let broken = SealError::Broken("sealed/0001.json".to_owned());
+        assert_eq!(seals.open("sealed/0001.json", b"joint"), Err(broken));
+        let unknown = SealError::NotSealed("sealed/0002.json".to_owned());
+        assert_eq!(seals.open("sealed/0002.json", b"squat"), Err(unknown));
+        assert!(Seals::from_text("deadbeef sealed").is_err());
+    }
+}

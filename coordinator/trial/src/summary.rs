@@ -1,0 +1,286 @@
+//! What a trial comes to: rates with their intervals, against what was set as a goal.
+
+use crate::draw::Class;
+use crate::rate::Rate;
+use crate::score::{KnockedOut, Named, Placed, Score};
+use serde::{Deserialize, Serialize};
+use tracktwin_diagnosis::Verdict;
+
+/// Lengths `d'` from which effects must be seen nearly always, and mostly.
+const SURE: f64 = 6.5;
+const LIKELY: f64 = 5.0;
+
+/// Bins of probabilities for the calibration error.
+const BINS: usize = 10;
+
+/// The scores of all cases together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Cases scored.
+    pub cases: usize,
+    /// A row a measure.
+    pub rows: Vec<Row>,
+    /// A row a kind of physics.
+    pub kinds: Vec<KindRow>,
+}
+
+/// A measure, its value and its goal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// What is measured.
+    pub measure: String,
+    /// What came out.
+    pub value: String,
+    /// What was asked.
+    pub goal: String,
+    /// Whether it was reached; none where nothing was measured.
+    pub reached: Option<bool>,
+}
+
+/// What became of one kind of physics.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KindRow {
+    /// Its name.
+    pub physics: String,
+    /// How often it raised an alarm.
+    pub detected: Rate,
+    /// How often it was the first name.
+    pub first: Rate,
+    /// How often it was placed within one sleeper, of those with a place.
+    pub placed: Rate,
+    /// Median of `d'`.
+    pub detectability: Option<f64>,
+    /// How often the re-tuned baseline looked well: parameters inside Table D1, no cell far out.
+    pub concealed: Rate,
+}
+
+impl Summary {
+    /// Of these scores.
+    pub fn new(scores: &[Score]) -> Self {
+        Self { cases: scores.len(), rows: rows(scores), kinds: kinds(scores) }
+    }
+}
+
+fn alarmed(score: &Score) -> bool {
+    score.verdict != Verdict::Consistent
+}
+
+fn of_class(scores: &[Score], class: Class) -> impl Iterator<Item = &Score> {
+    scores.iter().filter(move |score| score.class == class)
+}
+
+/// Effects of the catalogue that were hidden alone, with their scores.
+fn singles(scores: &[Score]) -> impl Iterator<Item = (&Score, &Named)> {
+    of_class(scores, Class::Single).filter_map(|score| Some((score, score.hidden.first()?)))
+}
+
+fn rows(scores: &[Score]) -> Vec<Row> {
+    [
+        alarms(scores),
+        names(scores),
+        places(scores),
+        vec![calibration(scores), bias(scores), cost(scores)],
+    ]
+    .concat()
+}
+
+fn visible(scores: &[Score], least: f64) -> impl Iterator<Item = (&Score, &Named)> {
+    singles(scores)
+        .filter(move |(_, named)| named.detectability.is_some_and(|length| length >= least))
+}
+
+fn alarms(scores: &[Score]) -> Vec<Row> {
+    let called_physics =
+        |score: &Score| matches!(score.verdict, Verdict::LeftOutPhysics | Verdict::UnknownPhysics);
+    let detected = |least| Rate::of(visible(scores, least).map(|(score, _)| alarmed(score)));
+    let controls = Rate::of(of_class(scores, Class::Control).map(alarmed));
+    let artefacts = Rate::of(of_class(scores, Class::Artefact).map(called_physics));
+    vec![
+        at_most("false alarms on controls", controls, 0.05),
+        at_most("artefacts called physics", artefacts, 0.02),
+        at_least("detected, d' 6.5 and more", detected(SURE), 0.95),
+        at_least("detected, d' 5 and more", detected(LIKELY), 0.75),
+    ]
+}
+
+fn names(scores: &[Score]) -> Vec<Row> {
+    let found = || visible(scores, LIKELY).filter(|(score, _)| alarmed(score));
+    let strange = || of_class(scores, Class::Unknown).filter(|score| alarmed(score));
+    let unknown = Rate::of(strange().map(|score| score.verdict == Verdict::UnknownPhysics));
+    let doubles = || of_class(scores, Class::Double);
+    let one = Rate::of(doubles().map(|score| score.hidden.iter().any(|named| named.accepted)));
+    let both = Rate::of(doubles().map(|score| score.hidden.iter().all(|named| named.accepted)));
+    let without = Rate::of(knocked_out(scores).map(|knocked_out| knocked_out.unknown));
+    let gains = scores.iter().filter_map(|score| score.held_out_gain_nats);
+    vec![
+        at_least("named first, of those detected", Rate::of(found().map(|(_, n)| n.first)), 0.85),
+        at_least(
+            "in the 0.9 set, of those detected",
+            Rate::of(found().map(|(_, n)| n.in_set)),
+            0.95,
+        ),
+        at_least("unknowns called unknown, of those detected", unknown, 0.8),
+        at_least("knocked out of the catalogue: called unknown", without, 0.8),
+        at_least("two hidden: one of them named", one, 0.9),
+        at_least("two hidden: both named", both, 0.6),
+        at_least(
+            "held-out gain positive, of what is accepted",
+            Rate::of(gains.map(|g| g > 0.0)),
+            0.95,
+        ),
+    ]
+}
+
+fn places(scores: &[Score]) -> Vec<Row> {
+    let found = singles(scores).filter(|(score, _)| alarmed(score));
+    let placed = Rate::of(found.filter_map(|(_, named)| named.place).map(Placed::within_a_sleeper));
+    let without = knocked_out(scores).filter(|knocked_out| knocked_out.unknown);
+    let without = Rate::of(without.filter_map(|k| k.place).map(Placed::within_a_sleeper));
+    vec![
+        at_least("placed within one sleeper, of those detected", placed, 0.95),
+        at_least("knocked out and called unknown: placed within one sleeper", without, 0.9),
+    ]
+}
+
+fn knocked_out(scores: &[Score]) -> impl Iterator<Item = &KnockedOut> {
+    scores.iter().filter_map(|score| score.knocked_out.as_ref())
+}
+
+fn at_least(measure: &str, rate: Rate, goal: f64) -> Row {
+    row(measure, rate, format!("{:.0} % or more", 100.0 * goal), |share| share >= goal)
+}
+
+fn at_most(measure: &str, rate: Rate, goal: f64) -> Row {
+    row(measure, rate, format!("{:.0} % at most", 100.0 * goal), |share| share <= goal)
+}
+
+fn row(measure: &str, rate: Rate, goal: String, reached: impl Fn(f64) -> bool) -> Row {
+    let reached = rate.share().map(reached);
+    Row { measure: measure.to_owned(), value: rate.to_text(), goal, reached }
+}
+
+/// Expected calibration error: by how much probabilities and frequencies differ, bin by bin.
+fn calibration(scores: &[Score]) -> Row {
+    let given: Vec<(f64, bool)> =
+        scores.iter().flat_map(|score| score.probabilities.iter().copied()).collect();
+    let error = calibration_error(&given);
+    Row {
+        measure: "expected calibration error of the probabilities".to_owned(),
+        value: error
+            .map_or("none".to_owned(), |error| format!("{error:.3} ({} given)", given.len())),
+        goal: "0.05 at most".to_owned(),
+        reached: error.map(|error| error <= 0.05),
+    }
+}
+
+fn calibration_error(given: &[(f64, bool)]) -> Option<f64> {
+    let mut bins = [(0.0, 0.0); BINS];
+    for &(probability, true_) in given {
+        let bin = &mut bins[((probability * BINS as f64) as usize).min(BINS - 1)];
+        bin.0 += probability;
+        bin.1 += f64::from(u8::from(true_));
+    }
+    let sum: f64 = bins.iter().map(|(said, so)| (said - so).abs()).sum();
+    (!given.is_empty()).then(|| sum / given.len() as f64)
+}
+
+/// Errors of the stiffnesses next to effects that were named.
+fn bias(scores: &[Score]) -> Row {
+    let named = singles(scores).filter(|(_, named)| named.accepted);
+    let biases: Vec<_> = named.filter_map(|(score, _)| score.bias).collect();
+    let count = biases.len() as f64;
+    let before = biases.iter().map(|bias| bias.before).sum::<f64>() / count;
+    let after = biases.iter().map(|bias| bias.after).sum::<f64>() / count;
+    let known = !biases.is_empty();
+    Row {
+        measure: "mean |ln error| of railpad and ballast stiffness next to what was named"
+            .to_owned(),
+        value: if known {
+            format!("{after:.3}, re-tuned baseline {before:.3}")
+        } else {
+            "none".to_owned()
+        },
+        goal: "a third of the baseline's at most".to_owned(),
+        reached: known.then_some(after <= before / 3.0),
+    }
+}
+
+fn cost(scores: &[Score]) -> Row {
+    let mut seconds: Vec<f64> = scores.iter().map(|score| score.cpu_s).collect();
+    seconds.sort_by(f64::total_cmp);
+    let value = match (seconds.get(seconds.len() / 2), seconds.last()) {
+        (Some(median), Some(most)) => format!("median {median:.0} s, most {most:.0} s"),
+        _ => "none".to_owned(),
+    };
+    let reached = seconds.last().map(|most| *most <= 600.0);
+    let measure = "CPU time of a diagnosis".to_owned();
+    Row { measure, value, goal: "5 minutes on two cores".to_owned(), reached }
+}
+
+fn kinds(scores: &[Score]) -> Vec<KindRow> {
+    let all = || {
+        let alone = scores.iter().filter(|score| score.hidden.len() == 1);
+        alone.filter_map(|score| Some((score, score.hidden.first()?)))
+    };
+    let names: std::collections::BTreeSet<&str> =
+        all().map(|(_, named)| named.physics.as_str()).collect();
+    let kind = |physics: &str| {
+        let of = || all().filter(|(_, named)| named.physics == physics);
+        let mut lengths: Vec<f64> = of().filter_map(|(_, named)| named.detectability).collect();
+        lengths.sort_by(f64::total_cmp);
+        let placed = of().filter(|(score, _)| alarmed(score)).filter_map(|(_, named)| named.place);
+        KindRow {
+            physics: physics.to_owned(),
+            detected: Rate::of(of().map(|(score, _)| alarmed(score))),
+            first: Rate::of(of().map(|(_, named)| named.first)),
+            placed: Rate::of(placed.map(Placed::within_a_sleeper)),
+            detectability: lengths.get(lengths.len() / 2).copied(),
+            concealed: Rate::of(of().map(|(s, _)| s.parameters_inside && s.cells_inside)),
+        }
+    };
+    names.into_iter().map(kind).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn probabilities_that_come_true_as_often_as_said_have_no_error() {
+        let given: Vec<_> =
+            (0..10).map(|n| (0.3, n < 3)).chain((0..4).map(|_| (1.0, true))).collect();
+        assert!(calibration_error(&given).unwrap() < 1e-12);
+        // Certain and wrong every time.
+        assert_eq!(calibration_error(&[(1.0, false), (1.0, false)]), Some(1.0));
+        assert_eq!(calibration_error(&[]), None);
+    }
+
+    fn control(number: u32, verdict: Verdict) -> Score {
+        Score {
+            number,
+            class: Class::Control,
+            verdict,
+            accepted: Vec::new(),
+            hidden: Vec::new(),
+            probabilities: Vec::new(),
+            held_out_gain_nats: None,
+            bias: None,
+            parameters_inside: true,
+            cells_inside: true,
+            cpu_s: 50.0,
+            knocked_out: None,
+        }
+    }
+
+    #[test]
+    fn one_alarm_on_ten_controls_misses_the_goal() {
+        let scores: Vec<Score> = (0..10)
+            .map(|n| control(n, if n == 4 { Verdict::LeftOutPhysics } else { Verdict::Consistent }))
+            .collect();
+        let summary = Summary::new(&scores);
+        assert!(summary.rows[0].value.starts_with("1 of 10: 10 %"), "{:?}", summary.rows[0]);
+        assert_eq!(summary.rows[0].reached, Some(false));
+        assert_eq!(Summary::new(&scores[..4]).rows[0].reached, Some(true));
+        assert_eq!(summary.rows[1].reached, None);
+    }
+}

@@ -1,0 +1,58 @@
+//! A trial's outcome as a page of Markdown.
+
+use crate::rate::Rate;
+use crate::score::Score;
+use crate::summary::{KindRow, Row, Summary};
+use std::fmt::Write;
+
+impl Summary {
+    /// The tables, with a line a case that did not come out as it should.
+    pub fn to_markdown(&self, scores: &[Score]) -> String {
+        let mut page = String::from("| measure | came out | asked | |\n|---|---|---|---|\n");
+        self.rows.iter().for_each(|row| page.push_str(&measure(row)));
+        page.push_str(
+            "\n| hidden | alarm | first name | placed within a sleeper | median d' | re-tuned \
+             baseline looks well |\n|---|---|---|---|---|---|\n",
+        );
+        self.kinds.iter().for_each(|kind| page.push_str(&of_kind(kind)));
+        page.push_str("\n| case | hidden (d') | said |\n|---|---|---|\n");
+        scores.iter().filter(|score| !score.is_right()).for_each(|score| {
+            page.push_str(&case(score));
+        });
+        page
+    }
+}
+
+fn measure(row: &Row) -> String {
+    let Row { measure, value, goal, reached } = row;
+    let reached = match reached {
+        Some(true) => "reached",
+        Some(false) => "**not reached**",
+        None => "not measured",
+    };
+    format!("| {measure} | {value} | {goal} | {reached} |\n")
+}
+
+fn of_kind(row: &KindRow) -> String {
+    let count = |rate: Rate| format!("{} of {}", rate.hits, rate.of);
+    let length = row.detectability.map_or("-".to_owned(), |length| format!("{length:.1}"));
+    let KindRow { physics, detected, first, placed, concealed, .. } = row;
+    let [detected, first, placed, concealed] =
+        [detected, first, placed, concealed].map(|r| count(*r));
+    format!("| `{physics}` | {detected} | {first} | {placed} | {length} | {concealed} |\n")
+}
+
+fn case(score: &Score) -> String {
+    let mut hidden = String::new();
+    for named in &score.hidden {
+        let length = named.detectability.map_or("-".to_owned(), |length| format!("{length:.1}"));
+        write!(hidden, "`{}` ({length}) ", named.physics).expect("a string takes all");
+    }
+    let said = if score.accepted.is_empty() {
+        score.verdict.name().to_owned()
+    } else {
+        format!("{}: {}", score.verdict.name(), score.accepted.join(", "))
+    };
+    let hidden = if hidden.is_empty() { "nothing".to_owned() } else { hidden };
+    format!("| {} | {} | {said} |\n", score.number, hidden.trim_end())
+}
