@@ -41,7 +41,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let trial = Trial { seed, cases, folder: out, knock_out, discard_recordings };
     trial.begin().map_err(stop)?;
     let own = || format!("sqlite:{}", trial.folder.join("library.sqlite").display());
-    let library = Library::open(&library.unwrap_or_else(own)).await.or_input()?;
+    let library = Library::open_or_create(&library.unwrap_or_else(own)).await.or_input()?;
 
     let mut progress = Progress::begin("hiding", 0, u64::from(cases));
     let digest = trial.hide(|done, remark| progress.at(done, remark)).map_err(stop)?;
