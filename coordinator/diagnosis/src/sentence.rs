@@ -18,11 +18,16 @@ pub(crate) fn sentence(
     fit: &Fit,
     bias: &BTreeMap<String, BeforeAfter<f64>>,
 ) -> String {
-    let Some(first) = hypotheses.first().filter(|_| verdict != Verdict::Consistent) else {
-        return "Simulation and recording agree: with every sleeper's stiffness, level and spectrum \
-                re-tuned, nothing that the catalogue knows improves the prediction of speeds that \
-                were held out."
-            .to_owned();
+    let accepted = hypotheses.iter().find(|hypothesis| hypothesis.accepted);
+    let Some(first) = accepted.filter(|_| verdict != Verdict::Consistent) else {
+        let tested = match fit.before.held_out {
+            Some(_) => "improves the prediction of speeds that were held out",
+            None => "explains it better; a second speed would make that sure",
+        };
+        return format!(
+            "Simulation and recording agree: with every sleeper's stiffness, level and spectrum \
+             re-tuned, nothing that the catalogue knows {tested}."
+        );
     };
     let summary = Kind::from_name(&first.physics)
         .map_or("something that no kind in the catalogue explains", |kind| kind.summary);

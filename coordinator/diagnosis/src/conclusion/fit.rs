@@ -1,0 +1,146 @@
+//! How well baseline and extended model agree with the recording, and what they say of the track.
+
+use super::Evidence;
+use crate::calibration::{Calibration, CalibrationError, Problem};
+use crate::candidate::Candidate;
+use crate::outcome::{
+    BeforeAfter, Estimate, Fit, Hypothesis, Levels, Score, Scores, SleeperValues,
+};
+use nalgebra::DVector;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Decibels in a neper of power.
+const DECIBEL: f64 = 4.342_944_819_032_518;
+
+impl Evidence<'_> {
+    pub(super) fn problem<'p>(&'p self, candidates: &'p [Candidate]) -> Problem<'p> {
+        let (forward, observation) = (&self.subject.forward, &self.search.observation);
+        Problem { forward, observation, candidates }
+    }
+
+    pub(super) fn levels(&self) -> Result<Levels, CalibrationError> {
+        let forward = &self.subject.forward;
+        let predicted = |candidates: &[Candidate], calibration: &Calibration| {
+            let extensions = self.problem(candidates).extensions(&calibration.values)?;
+            Ok::<_, CalibrationError>(forward.log_power(&calibration.values, &extensions)?)
+        };
+        let before = predicted(&[], &self.search.baseline)?;
+        let after = predicted(&self.search.accepted, &self.search.last)?;
+        let measured = self.search.observation.difference(&DVector::zeros(forward.count()));
+        let in_db = |values: &DVector<f64>| {
+            let bands = forward.bands.count();
+            let of = |speed: usize, sleeper: usize| {
+                let row = sleeper * forward.per_sleeper() + speed * bands;
+                values.rows(row, bands).iter().map(|value| DECIBEL * value).collect()
+            };
+            let sleepers = |speed| (0..forward.section.sleepers).map(|s| of(speed, s)).collect();
+            (0..forward.speeds_m_s.len()).map(sleepers).collect()
+        };
+        let scatter = |speed: usize| {
+            let first = speed * forward.bands.count();
+            let of_band = |band| DECIBEL * self.search.deviation[first + band];
+            (0..forward.bands.count()).map(of_band).collect()
+        };
+        Ok(Levels {
+            frequency_hz: forward.bands.centres_hz().to_vec(),
+            speeds_km_h: forward.speeds_m_s.iter().map(|speed| 3.6 * speed).collect(),
+            measured_db: in_db(&measured),
+            before_db: in_db(&before),
+            after_db: in_db(&after),
+            scatter_db: (0..forward.speeds_m_s.len()).map(scatter).collect(),
+        })
+    }
+
+    pub(super) fn fit(&self) -> Fit {
+        let search = self.search;
+        let in_sample = |calibration: &Calibration| {
+            let count = calibration.residual.len() as f64;
+            let square = calibration.residual.norm_squared() / count;
+            Score { score: -0.5 * (square + TAU.ln()) - search.observation.log_deviation() / count }
+        };
+        let held_out = |index: usize| {
+            let known = self.subject.forward.speeds_m_s.len() > 1;
+            known.then(|| Score { score: search.held_out[index] })
+        };
+        let speeds = &self.subject.forward.speeds_m_s;
+        let mut gains = BTreeMap::new();
+        for round in search.rounds.iter().filter(|round| round.accepted) {
+            for (speed, gain) in speeds.iter().zip(&round.held_out_gain) {
+                *gains.entry(format!("{:.0}", 3.6 * speed)).or_insert(0.0) += gain;
+            }
+        }
+        Fit {
+            score: "mean log predictive density per band and sleeper, nats".to_owned(),
+            before: Scores { in_sample: in_sample(&search.baseline), held_out: held_out(0) },
+            after: Scores { in_sample: in_sample(&search.last), held_out: held_out(1) },
+            held_out_gain_nats: gains,
+        }
+    }
+
+    /// Parameters at the place of what was accepted, or everywhere.
+    pub(super) fn bias_removed(
+        &self,
+        hypotheses: &[Hypothesis],
+    ) -> BTreeMap<String, BeforeAfter<f64>> {
+        let accepted = hypotheses.iter().find(|hypothesis| hypothesis.accepted);
+        if accepted.is_none() || self.search.accepted.is_empty() {
+            return BTreeMap::new();
+        }
+        let place = accepted.and_then(|hypothesis| hypothesis.location.as_ref());
+        let section = &self.subject.forward.section;
+        let half_m = section.design.sleeper.spacing_m;
+        let at_place = |sleeper: &usize| {
+            place.is_none_or(|place| {
+                let x_m = section.x_m(*sleeper);
+                place.x_m[0] - half_m <= x_m && x_m <= place.x_m[1] + half_m
+            })
+        };
+        let near: Vec<usize> = (0..section.sleepers).filter(at_place).collect();
+        let unknowns = &self.subject.forward.unknowns;
+        let mean = |calibration: &Calibration, range: Range<usize>| {
+            let values = near.iter().map(|sleeper| calibration.values[range.start + sleeper].exp());
+            values.sum::<f64>() / near.len() as f64
+        };
+        let of = |value: &dyn Fn(&Calibration) -> f64| BeforeAfter {
+            before: value(&self.search.baseline),
+            after: value(&self.search.last),
+        };
+        let global = unknowns.global().start;
+        BTreeMap::from([
+            ("sleeper_EI_N_m2".to_owned(), of(&|c| c.values[global].exp())),
+            ("railpad_damping_N_s_m".to_owned(), of(&|c| c.values[global + 1].exp())),
+            ("ballast_damping_N_s_m".to_owned(), of(&|c| c.values[global + 2].exp())),
+            ("ballast_stiffness_N_m".to_owned(), of(&|c| mean(c, unknowns.ballast()))),
+            ("railpad_stiffness_N_m".to_owned(), of(&|c| mean(c, unknowns.railpad()))),
+            ("irregularity_level".to_owned(), of(&|c| mean(c, unknowns.level()))),
+        ])
+    }
+
+    pub(super) fn track(&self) -> Vec<SleeperValues> {
+        let unknowns = &self.subject.forward.unknowns;
+        let (before, after) = (&self.search.baseline, &self.search.last);
+        let deviations = [before, after].map(|calibration| {
+            let covariance = calibration.precision.inverse();
+            covariance.diagonal().map(f64::sqrt)
+        });
+        let estimate = |calibration: &Calibration, deviation: &DVector<f64>, index: usize| {
+            let mean = calibration.values[index].exp();
+            Estimate { mean, sd: mean * deviation[index] }
+        };
+        let both = |index: usize| BeforeAfter {
+            before: estimate(before, &deviations[0], index),
+            after: estimate(after, &deviations[1], index),
+        };
+        (0..self.subject.forward.section.sleepers)
+            .map(|sleeper| SleeperValues {
+                id: self.id(sleeper),
+                x_m: self.subject.forward.section.x_m(sleeper),
+                railpad_stiffness: both(unknowns.railpad().start + sleeper),
+                ballast_stiffness: both(unknowns.ballast().start + sleeper),
+                irregularity_level: both(unknowns.level().start + sleeper),
+            })
+            .collect()
+    }
+}

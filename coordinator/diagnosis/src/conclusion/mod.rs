@@ -1,0 +1,281 @@
+//! From a search to the diagnosis that is written down.
+
+mod fit;
+mod place;
+
+use crate::calibration::CalibrationError;
+use crate::finding::{Finding, Place};
+use crate::first_look::FirstLook;
+use crate::outcome::{Diagnosis, Estimate, FORMAT, Hypothesis, Verdict};
+use crate::search::{Fitted, Round, Search, TEMPERATURE};
+use crate::sentence::sentence;
+use crate::subject::Subject;
+use std::collections::BTreeMap;
+use tracktwin_signal::recording::Recording;
+use tracktwin_track::extension::Kind;
+
+/// Probability of an unnamed alternative against a name of equal evidence: most of what goes wrong
+/// on a track is in the catalogue.
+const UNKNOWN_PRIOR: f64 = 0.1;
+
+/// Probability to see such evidence for an unknown stiffness if nothing is left out, up to which it
+/// is said to be there.
+const PORT_ALARM: f64 = 0.01;
+
+/// Probability that what is left beside a named effect is something new.
+const REMAINDER_PRIOR: f64 = 0.2;
+
+/// Least prior of nothing at all.
+const NOTHING_PRIOR: f64 = 0.5;
+
+/// Greatest probability where nothing could be tested on a speed that was not fitted: structure and
+/// geometry look alike at one speed.
+const ONE_SPEED_MAX: f64 = 0.5;
+
+/// Greatest probability where no pass repeats another: how far passes differ had to be assumed.
+const ONE_PASS_MAX: f64 = 0.9;
+
+/// Hypotheses of less probability are not worth a line.
+const PROBABILITY_MIN: f64 = 0.001;
+
+/// Everything that a conclusion is drawn from.
+pub struct Evidence<'a> {
+    /// The recording.
+    pub recording: &'a Recording,
+    /// What was compared.
+    pub subject: &'a Subject,
+    /// What the passes tell alone.
+    pub look: &'a FirstLook,
+    /// What the model tells.
+    pub search: &'a Search,
+}
+
+impl Evidence<'_> {
+    /// The diagnosis.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a calibrated track makes no model.
+    pub fn conclude(&self) -> Result<Diagnosis, CalibrationError> {
+        let mut hypotheses = self.hypotheses();
+        let most = self.probability_max();
+        hypotheses.iter_mut().for_each(|known| known.probability = known.probability.min(most));
+        hypotheses.sort_by(|a, b| {
+            b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
+        });
+        let verdict = verdict(&hypotheses);
+        if verdict == Verdict::Consistent {
+            hypotheses.clear();
+        }
+        let levels = self.levels()?;
+        let fit = self.fit();
+        let bias_removed = self.bias_removed(&hypotheses);
+        let sleepers = self.subject.forward.section.sleepers;
+        let sentence = sentence(verdict, &hypotheses, sleepers, &fit, &bias_removed);
+        Ok(Diagnosis {
+            format: FORMAT.to_owned(),
+            recording: self.recording.name.clone(),
+            verdict,
+            sentence,
+            mismatches: self.mismatches(verdict, &levels),
+            hypotheses,
+            fit,
+            bias_removed,
+            track: self.track(),
+            levels,
+            notes: self.notes(),
+        })
+    }
+
+    /// As sure as the recording lets anybody be.
+    fn probability_max(&self) -> f64 {
+        if self.speeds() == 1 {
+            ONE_SPEED_MAX
+        } else if self.repeats() {
+            1.0
+        } else {
+            ONE_PASS_MAX
+        }
+    }
+
+    fn speeds(&self) -> usize {
+        self.subject.forward.speeds_m_s.len()
+    }
+
+    /// Whether some pass repeats another at its speed.
+    fn repeats(&self) -> bool {
+        self.subject.pass_numbers.iter().any(|passes| passes.len() > 1)
+    }
+
+    fn hypotheses(&self) -> Vec<Hypothesis> {
+        let mut all: Vec<Hypothesis> = Vec::new();
+        let rounds = self.search.rounds.iter().filter(|round| round.p_value <= 0.05);
+        for round in rounds {
+            for hypothesis in self.of_round(round) {
+                let known = all.iter_mut().find(|known| {
+                    known.physics == hypothesis.physics && known.location == hypothesis.location
+                });
+                match known {
+                    Some(known) => {
+                        known.probability = known.probability.max(hypothesis.probability);
+                    }
+                    None => all.push(hypothesis),
+                }
+            }
+        }
+        for finding in &self.look.findings {
+            self.add_finding(finding, &mut all);
+        }
+        all.retain(|hypothesis| hypothesis.accepted || hypothesis.probability >= PROBABILITY_MIN);
+        all
+    }
+
+    /// Probabilities of what one search fitted: evidence, tempered, times prior.
+    fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
+        let weight = |log_evidence: f64| (log_evidence / TEMPERATURE).min(300.0).exp();
+        let kinds = tracktwin_track::extension::KINDS.len() as f64;
+        let named: Vec<f64> = round
+            .fitted
+            .iter()
+            .map(|fitted| (1.0 - NOTHING_PRIOR) / kinds * weight(fitted.log_evidence))
+            .collect();
+        let unknown = round.port.as_ref().map_or(0.0, |port| {
+            UNKNOWN_PRIOR * (1.0 - NOTHING_PRIOR) / kinds * weight(port.log_evidence)
+        });
+        let all = NOTHING_PRIOR + unknown + named.iter().sum::<f64>();
+        let mut hypotheses: Vec<Hypothesis> = round
+            .fitted
+            .iter()
+            .zip(&named)
+            .enumerate()
+            .map(|(rank, (fitted, weight))| {
+                self.hypothesis(fitted, weight / all, round.accepted && rank == 0)
+            })
+            .collect();
+        // What is left beside a named effect may be its model's error as well as something new.
+        let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
+        let alone = first && !round.accepted;
+        if let Some(port) = &round.port {
+            let location = port.sleeper.map(|sleeper| self.location(sleeper..sleeper + 1));
+            hypotheses.push(Hypothesis {
+                physics: "unknown_physics".to_owned(),
+                probability: unknown / all * if alone { 1.0 } else { REMAINDER_PRIOR },
+                accepted: alone && round.port_p_value <= PORT_ALARM && unknown / all > 0.5,
+                location,
+                parameters: BTreeMap::new(),
+                look_alikes: Vec::new(),
+                would_separate: "a hammer test at the place: its receptance names the element"
+                    .to_owned(),
+                detectability: 0.0,
+                log_evidence: port.log_evidence,
+            });
+        }
+        hypotheses
+    }
+
+    fn hypothesis(&self, fitted: &Fitted, probability: f64, accepted: bool) -> Hypothesis {
+        let Fitted { candidate, calibration, log_evidence, detectability, .. } = fitted;
+        let first = calibration.values.len() - candidate.free.len();
+        let covariance = calibration.precision.inverse();
+        let parameters = candidate.free.iter().enumerate().map(|(index, parameter)| {
+            let mean = calibration.values[first + index].exp();
+            let deviation = covariance[(first + index, first + index)].sqrt();
+            (parameter.name.to_owned(), Estimate { mean, sd: mean * deviation })
+        });
+        Hypothesis {
+            physics: candidate.kind.physics.to_owned(),
+            probability,
+            accepted,
+            location: self.location_of(candidate),
+            parameters: parameters.collect(),
+            look_alikes: names(candidate.kind),
+            would_separate: candidate.kind.would_separate.to_owned(),
+            detectability: *detectability,
+            log_evidence: *log_evidence,
+        }
+    }
+
+    /// What the passes alone show stands by itself where the model has not found it as well.
+    fn add_finding(&self, finding: &Finding, all: &mut Vec<Hypothesis>) {
+        let Some(kind) = Kind::from_name(finding.physics) else { return };
+        let probability = 1.0 - finding.p_value.clamp(1e-6, 1.0);
+        let known = all.iter_mut().find(|known| known.physics == finding.physics);
+        if let Some(known) = known {
+            known.probability = known.probability.max(probability);
+            if known.accepted {
+                return;
+            }
+        }
+        let explained = all.iter().any(|known| known.accepted && !kind.measuring_chain);
+        let location = match finding.place {
+            Place::Everywhere => None,
+            Place::Stretch { from_m, to_m } => Some(self.location_between(from_m, to_m)),
+        };
+        let estimate =
+            |(&name, &(mean, sd)): (&&str, &(f64, f64))| (name.to_owned(), Estimate { mean, sd });
+        all.retain(|known| known.accepted || known.physics != finding.physics);
+        all.push(Hypothesis {
+            physics: finding.physics.to_owned(),
+            probability: if explained { probability.min(0.5) } else { probability },
+            accepted: !explained,
+            location,
+            parameters: finding.parameters.iter().map(estimate).collect(),
+            look_alikes: names(kind),
+            would_separate: kind.would_separate.to_owned(),
+            detectability: 0.0,
+            log_evidence: -finding.p_value.max(1e-300).ln(),
+        });
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.look.troubles.iter().map(ToString::to_string).collect();
+        if self.speeds() == 1 {
+            let speed_km_h = 3.6 * self.subject.forward.speeds_m_s[0];
+            notes.push(format!(
+                "One speed only: nothing could be tested on a speed that was not fitted, so that \
+                 no name is more certain than {:.0} %. Add a pass at {:.0} km/h or at {:.0} km/h.",
+                100.0 * ONE_SPEED_MAX,
+                speed_km_h / 1.35,
+                speed_km_h * 1.35,
+            ));
+        }
+        if !self.repeats() {
+            notes.push(format!(
+                "One pass a speed: how far passes repeat each other had to be assumed, so that no \
+                 name is more certain than {:.0} %. Add a second pass at each speed.",
+                100.0 * ONE_PASS_MAX
+            ));
+        }
+        if let Some(round) = self.search.rounds.last().filter(|round| round.p_value <= 0.05) {
+            let rest = if self.search.accepted.is_empty() { "Something" } else { "A remainder" };
+            let place = round.port.as_ref().and_then(|port| port.sleeper);
+            let place =
+                place.map_or(String::new(), |sleeper| format!(" near {}", self.id(sleeper)));
+            if !round.accepted {
+                notes.push(format!(
+                    "{rest} is not explained{place} (p = {:.1e}), and nothing in the catalogue \
+                     predicts the held-out speeds better.",
+                    round.p_value
+                ));
+            }
+        }
+        notes.extend(self.look.findings.iter().map(|finding| {
+            format!("The passes alone show {}: {}.", finding.physics, finding.evidence)
+        }));
+        notes
+    }
+}
+
+fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
+    let Some(first) = hypotheses.iter().find(|hypothesis| hypothesis.accepted) else {
+        return Verdict::Consistent;
+    };
+    match Kind::from_name(&first.physics) {
+        None => Verdict::UnknownPhysics,
+        Some(kind) if kind.measuring_chain => Verdict::MeasurementChain,
+        Some(_) => Verdict::LeftOutPhysics,
+    }
+}
+
+fn names(kind: &Kind) -> Vec<String> {
+    kind.look_alikes.iter().map(|&name| name.to_owned()).collect()
+}

@@ -1,0 +1,175 @@
+//! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
+
+mod chance;
+mod round;
+
+pub(crate) use round::TEMPERATURE;
+
+use self::round::{Reached, Setting, retuned};
+use crate::calibration::{Calibration, CalibrationError, Problem};
+use crate::candidate::Candidate;
+use crate::null_model::NullModel;
+use crate::observation::Observation;
+use crate::port_scan::Port;
+use crate::subject::Subject;
+use nalgebra::{DMatrix, DVector};
+
+/// Effects that are looked for one after the other.
+const EFFECTS_MAX: usize = 3;
+
+/// What is going on, for a progress bar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// The baseline is fitted.
+    Baseline,
+    /// Candidates are screened.
+    Screening,
+    /// The best are fitted together with the baseline.
+    Refinement,
+    /// Speeds are held out and predicted.
+    HeldOut,
+}
+
+/// A candidate that was fitted together with the baseline.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// What and where.
+    pub candidate: Candidate,
+    /// Baseline and parameters.
+    pub calibration: Calibration,
+    /// Log evidence for it against the model without it, in nats.
+    pub log_evidence: f64,
+    /// Length of its trace after re-tuning, `d'`, in the trial screened.
+    pub detectability: f64,
+    /// Its trace: whitened change of the log powers.
+    pub change: DVector<f64>,
+}
+
+/// One search for an effect.
+#[derive(Clone, Debug, Default)]
+pub struct Round {
+    /// Probability to see such evidence for anything if nothing is left out.
+    pub p_value: f64,
+    /// What was fitted, best first.
+    pub fitted: Vec<Fitted>,
+    /// What an unknown dynamic stiffness under a rail seat would explain.
+    pub port: Option<Port>,
+    /// Probability to see as much evidence for one if nothing is left out.
+    pub port_p_value: f64,
+    /// Gain of the best on each speed held out, in nats.
+    pub held_out_gain: Vec<f64>,
+    /// Whether the best was accepted.
+    pub accepted: bool,
+}
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct Search {
+    /// The re-tuned baseline.
+    pub baseline: Calibration,
+    /// The baseline with all accepted extensions.
+    pub last: Calibration,
+    /// The accepted candidates.
+    pub accepted: Vec<Candidate>,
+    /// Each search, in order.
+    pub rounds: Vec<Round>,
+    /// What was observed, with its covariance.
+    pub observation: Observation,
+    /// Scatter to expect of each log power of a sleeper in the middle of the section.
+    pub deviation: DVector<f64>,
+    /// Log density of each speed when it is held out, in nats a log power: baseline, extended.
+    pub held_out: [f64; 2],
+}
+
+/// A rough covariance for the first calibration, before null simulations of that track.
+fn rough_covariance(subject: &Subject) -> DMatrix<f64> {
+    let (size, bands) = (subject.forward.per_sleeper(), subject.forward.bands.count());
+    DMatrix::from_fn(size, size, |i, j| {
+        let distance = (i as f64 - j as f64) / 1.5;
+        let together =
+            if i / bands == j / bands { (-0.5 * distance * distance).exp() } else { 0.0 };
+        0.06 * together + if i == j { 0.01 } else { 0.0 }
+    })
+}
+
+/// The track's parameters to simulate null cases with.
+///
+/// # Errors
+/// [`CalibrationError`] when no baseline is found.
+pub fn first_calibration(subject: &Subject) -> Result<DVector<f64>, CalibrationError> {
+    let covariances = vec![rough_covariance(subject); subject.forward.section.sleepers];
+    let observation = Observation::new(subject.log_power.clone(), &covariances, |_| false)
+        .ok_or(CalibrationError::NotFinite)?;
+    let problem = Problem { forward: &subject.forward, observation: &observation, candidates: &[] };
+    Ok(problem.calibrate(subject.forward.unknowns.typical())?.values)
+}
+
+/// Looks for physics that was left out.
+///
+/// `all` is what may be left out: usually the [`crate::candidates`] of the section and what other
+/// tests of the recording suggest.
+///
+/// # Errors
+/// [`CalibrationError`] when the model breaks down on the way.
+pub fn search(
+    subject: &Subject,
+    null: &NullModel,
+    start: DVector<f64>,
+    all: &[Candidate],
+    progress: &(impl Fn(Stage, f64) + Sync),
+) -> Result<Search, CalibrationError> {
+    progress(Stage::Baseline, 0.0);
+    let setting = Setting::new(subject, null, &start)?;
+    let observation = setting.observe(|_| false)?;
+    let plain = Problem { forward: &subject.forward, observation: &observation, candidates: &[] };
+    let baseline = plain.calibrate(start)?;
+    let mut search = Search {
+        last: baseline.clone(),
+        baseline,
+        accepted: Vec::new(),
+        rounds: Vec::new(),
+        observation: observation.clone(),
+        deviation: setting.covariances[setting.covariances.len() / 2].diagonal().map(f64::sqrt),
+        held_out: [0.0; 2],
+    };
+    let mut before = setting.held_out(&[], &search.baseline.values)?;
+    let mut reached = before.clone();
+    while search.accepted.len() < EFFECTS_MAX {
+        let accepted = search.accepted.clone();
+        let problem =
+            Problem { forward: &subject.forward, observation: &observation, candidates: &accepted };
+        let strongest = search.rounds.iter().filter_map(|round| round.fitted.first());
+        let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
+        let so_far = Reached { log_densities: &reached, strongest };
+        let (mut round, mut scores) =
+            setting.round(&problem, &search.last, all, so_far, progress)?;
+        if let Some(better) = retuned(&problem, &search.last, &round.fitted)? {
+            // The candidates found a better baseline on their way: the opponent gets it too.
+            let gain = better.log_evidence - search.last.log_evidence;
+            round.fitted.iter_mut().for_each(|fitted| fitted.log_evidence -= gain);
+            if search.accepted.is_empty() {
+                search.baseline = better.clone();
+            }
+            search.last = better;
+            reached = setting.held_out(&accepted, &search.last.values)?;
+            if search.accepted.is_empty() {
+                before.clone_from(&reached);
+            }
+            let so_far = Reached { log_densities: &reached, strongest };
+            (round, scores) = setting.round(&problem, &search.last, all, so_far, progress)?;
+        }
+        let goes_on = round.accepted;
+        if let (true, Some(best)) = (goes_on, round.fitted.first()) {
+            search.last = best.calibration.clone();
+            search.accepted.push(best.candidate.clone());
+            reached = scores;
+        }
+        search.rounds.push(round);
+        if !goes_on {
+            break;
+        }
+    }
+    let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
+    search.held_out = [mean(&before), mean(&reached)];
+    Ok(search)
+}

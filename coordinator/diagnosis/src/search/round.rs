@@ -1,0 +1,231 @@
+//! One search for an effect: screened, refined, held out, accepted or not.
+
+use super::chance::{excess, tail_probability, whitened};
+use super::{Fitted, Round, Stage};
+use crate::calibration::{Calibration, CalibrationError, Problem};
+use crate::candidate::Candidate;
+use crate::null_model::NullModel;
+use crate::observation::Observation;
+use crate::port_scan::PortScan;
+use crate::screen::{Template, templates};
+use crate::subject::Subject;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Probability of a false alarm on a recording without anything left out.
+const FALSE_ALARM: f64 = 0.05;
+
+/// Candidates of one kind, and in all, that are fitted together with the baseline.
+const REFINED_PER_KIND: usize = 2;
+const REFINED_MAX: usize = 8;
+
+/// Least log evidence in screening for a candidate to be fitted.
+const SCREENED_MIN: f64 = 2.0;
+
+/// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
+pub(crate) const TEMPERATURE: f64 = 3.0;
+
+/// Fitted candidates from whose values the model without them is fitted anew.
+const RESTARTS: usize = 3;
+
+/// Nats by which such a fit must be better to take its place.
+const BETTER: f64 = 3.0;
+
+/// Least log evidence for an effect beside one that was accepted before, over the first one's: what
+/// a first effect's model leaves unexplained looks like a small second one.
+const FURTHER_SHARE_MIN: f64 = 0.25;
+
+/// Least gain on held-out passes, in nats, for a name.
+const HELD_OUT_MIN: f64 = 4.0;
+
+/// How far earlier searches came.
+#[derive(Clone, Copy)]
+pub(super) struct Reached<'a> {
+    /// Log density of each speed when it is held out.
+    pub(super) log_densities: &'a [f64],
+    /// Greatest log evidence of an accepted effect in nats.
+    pub(super) strongest: f64,
+}
+
+/// What stays the same through all searches.
+pub(super) struct Setting<'a> {
+    pub(super) subject: &'a Subject,
+    pub(super) log_power: DVector<f64>,
+    pub(super) covariances: Vec<DMatrix<f64>>,
+    /// Differences of null simulations, less their offset.
+    pub(super) nulls: Vec<DVector<f64>>,
+}
+
+impl<'a> Setting<'a> {
+    pub(super) fn new(
+        subject: &'a Subject,
+        null: &NullModel,
+        values: &DVector<f64>,
+    ) -> Result<Self, CalibrationError> {
+        let offset = null.offset();
+        let repeated: Vec<f64> =
+            (0..subject.forward.section.sleepers).flat_map(|_| offset.iter().copied()).collect();
+        let offset = DVector::from_vec(repeated);
+        let nulls = null
+            .differences
+            .iter()
+            .map(|difference| DVector::from_column_slice(difference) - &offset)
+            .collect();
+        let covariances = subject.covariances(null, values)?;
+        Ok(Self { subject, log_power: &subject.log_power - offset, covariances, nulls })
+    }
+
+    pub(super) fn observe(
+        &self,
+        held_out: impl Fn(usize) -> bool,
+    ) -> Result<Observation, CalibrationError> {
+        Observation::new(self.log_power.clone(), &self.covariances, held_out)
+            .ok_or(CalibrationError::NotFinite)
+    }
+
+    /// Log density of each speed, held out in turn; empty with a single speed.
+    pub(super) fn held_out(
+        &self,
+        candidates: &[Candidate],
+        start: &DVector<f64>,
+    ) -> Result<Vec<f64>, CalibrationError> {
+        let forward = &self.subject.forward;
+        let speeds = forward.speeds_m_s.len();
+        if speeds < 2 {
+            return Ok(Vec::new());
+        }
+        (0..speeds)
+            .into_par_iter()
+            .map(|speed| {
+                let observation = self.observe(|row| row / forward.bands.count() == speed)?;
+                let problem = Problem { forward, observation: &observation, candidates };
+                Ok(problem.held_out(start.clone())?.log_density)
+            })
+            .collect()
+    }
+
+    /// One search, and the held-out log densities with its best candidate.
+    pub(super) fn round(
+        &self,
+        problem: &Problem<'_>,
+        current: &Calibration,
+        all: &[Candidate],
+        Reached { log_densities: reached, strongest }: Reached<'_>,
+        progress: &(impl Fn(Stage, f64) + Sync),
+    ) -> Result<(Round, Vec<f64>), CalibrationError> {
+        let trials: usize = all.iter().map(|candidate| candidate.trials.len()).sum();
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let templates = templates(problem, current, all, || {
+            let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            progress(Stage::Screening, done as f64 / trials as f64);
+        })?;
+        let none = DVector::zeros(current.values.len());
+        let screened: Vec<(f64, &Template)> = templates
+            .iter()
+            .map(|template| (template.log_evidence(&current.residual, &none), template))
+            .collect();
+        let highest = screened.iter().map(|(evidence, _)| *evidence).fold(f64::MIN, f64::max);
+        let nulls = whitened(&self.nulls, problem.observation, current);
+        let excess = excess(current, &nulls, self.covariances.len());
+        let p_value = tail_probability(&nulls, highest / excess, |residual, felt| {
+            let evidence = templates.iter().map(|t| t.log_evidence(residual, felt));
+            Some(evidence.fold(f64::MIN, f64::max))
+        });
+        let mut round = Round { p_value, ..Round::default() };
+        if p_value > FALSE_ALARM {
+            return Ok((round, Vec::new()));
+        }
+        let ports = PortScan::new(problem, current)?;
+        round.port = ports.best(current, &current.residual, &none);
+        if let Some(port) = &round.port {
+            round.port_p_value =
+                tail_probability(&nulls, port.log_evidence / excess, |residual, felt| {
+                    ports.best(current, residual, felt).map(|port| port.log_evidence)
+                });
+        }
+        let chosen = choose(screened, all);
+        let count = chosen.len() as f64;
+        progress(Stage::Refinement, 0.0);
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let mut fitted: Vec<Fitted> = chosen
+            .into_par_iter()
+            .filter_map(|template| {
+                let fitted = refine(problem, current, &all[template.candidate], template);
+                let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+                progress(Stage::Refinement, done as f64 / count);
+                fitted.ok()
+            })
+            .collect();
+        fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        round.fitted = fitted;
+        progress(Stage::HeldOut, 0.0);
+        let sure = (TEMPERATURE * 20_f64.ln()).max(FURTHER_SHARE_MIN * strongest);
+        let best = round.fitted.first().filter(|best| best.log_evidence >= sure);
+        let Some(best) = best else { return Ok((round, Vec::new())) };
+        let with: Vec<Candidate> =
+            problem.candidates.iter().chain([&best.candidate]).cloned().collect();
+        let scores = self.held_out(&with, &best.calibration.values)?;
+        round.held_out_gain =
+            scores.iter().zip(reached).map(|(with, without)| with - without).collect();
+        let gain: f64 = round.held_out_gain.iter().sum();
+        let lost = round.held_out_gain.iter().filter(|gain| **gain <= 0.0).count();
+        let predicted = round.held_out_gain.is_empty() || (gain >= HELD_OUT_MIN && lost <= 1);
+        round.accepted = predicted;
+        Ok((round, scores))
+    }
+}
+
+/// The best trials: of each candidate one, of each kind a few.
+fn choose<'t>(mut screened: Vec<(f64, &'t Template)>, all: &[Candidate]) -> Vec<&'t Template> {
+    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<&Template> = Vec::new();
+    for (evidence, template) in screened {
+        let kind = all[template.candidate].kind.physics;
+        let same_kind = chosen.iter().filter(|t| all[t.candidate].kind.physics == kind).count();
+        let known = chosen.iter().any(|t| t.candidate == template.candidate);
+        if evidence < SCREENED_MIN || chosen.len() == REFINED_MAX {
+            break;
+        }
+        if !known && same_kind < REFINED_PER_KIND {
+            chosen.push(template);
+        }
+    }
+    chosen
+}
+
+/// Fits a candidate together with the baseline and what was accepted before.
+fn refine(
+    problem: &Problem<'_>,
+    current: &Calibration,
+    candidate: &Candidate,
+    template: &Template,
+) -> Result<Fitted, CalibrationError> {
+    let candidates: Vec<Candidate> =
+        problem.candidates.iter().chain([candidate]).cloned().collect();
+    let with = Problem { candidates: &candidates, ..*problem };
+    let mut start: Vec<f64> = current.values.iter().copied().collect();
+    start.extend(candidate.logarithms(&candidate.trials[template.trial]));
+    let calibration = with.calibrate(DVector::from_vec(start))?;
+    let log_evidence = calibration.log_evidence - current.log_evidence;
+    let detectability = template.detectability.max(0.0).sqrt();
+    let (candidate, change) = (candidate.clone(), template.change.clone());
+    Ok(Fitted { candidate, calibration, log_evidence, detectability, change })
+}
+
+/// The model without the candidates, fitted anew from where they came out, if that is better.
+pub(super) fn retuned(
+    problem: &Problem<'_>,
+    current: &Calibration,
+    fitted: &[Fitted],
+) -> Result<Option<Calibration>, CalibrationError> {
+    let mut best: Option<Calibration> = None;
+    for fitted in fitted.iter().take(RESTARTS) {
+        let values = fitted.calibration.values.rows(0, current.values.len()).into_owned();
+        let again = problem.calibrate(values)?;
+        let known = best.as_ref().unwrap_or(current).objective;
+        if again.objective < known - BETTER {
+            best = Some(again);
+        }
+    }
+    Ok(best)
+}
