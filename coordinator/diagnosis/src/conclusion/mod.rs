@@ -58,7 +58,9 @@ impl Evidence<'_> {
     pub fn conclude(&self) -> Result<Diagnosis, CalibrationError> {
         let mut hypotheses = self.hypotheses();
         let most = self.probability_max();
-        hypotheses.iter_mut().for_each(|known| known.probability = known.probability.min(most));
+        for hypothesis in &mut hypotheses {
+            hypothesis.probability = hypothesis.probability.min(most);
+        }
         hypotheses.sort_by(|a, b| {
             b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
         });
