@@ -104,7 +104,7 @@ mod tests {
         let vehicle = Vehicle::new(left_out, STEP_S);
         let mut state = vec![0.0; vehicle.contact.len()];
         let mut free = state.clone();
-        let (omega, steps) = (TAU * frequency_hz, 200_000);
+        let (omega, steps) = (TAU * frequency_hz, 40_000);
         let force = |step: usize| (omega * STEP_S * step as f64).sin();
         // A free body drifts at a constant speed: accelerations know nothing of it.
         let mut sums = [[0.0; 2]; 2];
@@ -164,10 +164,10 @@ mod tests {
             loss_factor: 0.05,
         };
         let [contact, sensor] = driven(&[section], 2000.0);
-        let wheel = -1.0 / (WHEEL_MASS_KG * (TAU * 2000.0_f64).powi(2));
+        let wheel = 1.0 / (WHEEL_MASS_KG * (TAU * 2000.0_f64).powi(2));
         let local = 1.0 / (1e9 * (1.0 - 0.25_f64.powi(2)));
         assert!((contact / (wheel - local).abs() - 1.0).abs() < 0.01, "{contact}");
-        assert!((sensor / wheel.abs() - 1.0).abs() < 0.01, "{sensor}");
+        assert!((sensor / wheel - 1.0).abs() < 0.01, "{sensor}");
         let disc = Hidden::WheelMode { frequency_hz: 2000.0, mass_kg: 5.0, damping_ratio: 0.01 };
         let [contact, _] = driven(&[disc], 1000.0);
         let mode = |f: f64| 1.0 / (10.0 * TAU * TAU * (f * f - 1e6));
