@@ -93,7 +93,9 @@ fn record(
     for fault in faults {
         match fault {
             Hidden::GainError { factor, .. } => {
-                samples.iter_mut().for_each(|sample| *sample *= factor);
+                for sample in &mut *samples {
+                    *sample *= factor;
+                }
             }
             Hidden::ElectricalHum { frequency_hz, amplitude_m_s2 } => {
                 let phase = TAU * turn(random);

@@ -22,7 +22,7 @@ pub(crate) fn approach(force_n: f64) -> f64 {
 ///
 /// The left side is convex and grows, so that Newton's method from above cannot fail. None where
 /// the overlap is no number.
-#[inline(always)]
+#[inline]
 pub(crate) fn force(overlap_m: f64, compliance: f64) -> Option<f64> {
     if overlap_m <= 0.0 {
         return Some(0.0);

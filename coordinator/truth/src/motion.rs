@@ -69,7 +69,7 @@ impl<'a> Motion<'a> {
     /// Ports are solved for the contact force foreseen from the last two, then the contact for its
     /// force exactly: an error of second order in what the force changes from step to step. None
     /// where the force is no number.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn step(&mut self, x_m: f64, height_m: f64) -> Option<Felt> {
         let foreseen_n = (2.0 * self.force_n[0] - self.force_n[1]).max(0.0);
         self.rail.foresee(self.track, x_m, foreseen_n);
@@ -87,7 +87,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Contact force in N at the step's end; moves the vehicle.
-    #[inline(always)]
+    #[inline]
     fn touch(&mut self, height_m: f64) -> Option<f64> {
         let vehicle = &self.track.vehicle;
         let [state, next] = &mut self.vehicle;
@@ -119,7 +119,7 @@ impl RailState {
 
     /// Amplitudes and velocities at the step's end without its forces, and with the contact force
     /// that is foreseen.
-    #[inline(always)]
+    #[inline]
     fn foresee(&mut self, track: &Track, x_m: f64, foreseen_n: f64) {
         sines(track.rail.wave_numbers[0] * x_m, &mut self.shape);
         let [e_qq, e_qv, e_vq, e_vv] = &track.steps.transition;
@@ -145,7 +145,7 @@ impl RailState {
 
     /// Deflection in m of the modes under the wheel with the ports' forces but without the contact
     /// force at the step's end, and what a unit of that adds.
-    #[inline(always)]
+    #[inline]
     fn under_wheel(&self, track: &Track) -> (f64, f64) {
         let t_q = &track.steps.end[0];
         let mut sums = [[0.0; 8]; 2];
@@ -168,7 +168,7 @@ impl RailState {
     }
 
     /// Adds what the forces at the step's end do: those of the ports and that of the contact.
-    #[inline(always)]
+    #[inline]
     fn finish(&mut self, track: &Track, force_n: f64) {
         let [t_q, t_v] = &track.steps.end;
         let count = self.shape.len();
@@ -187,7 +187,7 @@ impl RailState {
 }
 
 /// `sin(n angle)` for `n` from 1, by `sin((n + 8) a) = 2 cos(8 a) sin(n a) - sin((n - 8) a)`.
-#[inline(always)]
+#[inline]
 fn sines(angle: f64, into: &mut [f64]) {
     let twice = 2.0 * (8.0 * angle).cos();
     let mut before = [0.0; 8];

@@ -78,13 +78,13 @@ impl PortState {
         state.find_links(track);
         state.links[1] = state.links[0].clone();
         state.find_gaps(track);
-        state.earlier = state.pushes.clone();
+        state.earlier.clone_from(&state.pushes);
         state
     }
 
     /// Forces of all ports at the step's end, from their free motion under the foreseen contact
     /// force with the wheel at `x_m`.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn share(&mut self, track: &Track, rail: &RailState, x_m: f64, foreseen_n: f64) {
         self.lift_off(track);
         self.find_lines(track, x_m);
@@ -105,7 +105,7 @@ impl PortState {
     }
 
     /// What a port's force would be if no port had one at the step's end.
-    #[inline(always)]
+    #[inline]
     fn ask(&self, track: &Track, port: usize, foreseen_n: f64) -> f64 {
         let law = &track.laws[port];
         let beside_m = self.lines[port] * foreseen_n;
@@ -136,7 +136,7 @@ impl PortState {
     }
 
     /// What is behind the ports moves on without their forces at the step's end.
-    #[inline(always)]
+    #[inline]
     fn lift_off(&mut self, track: &Track) {
         for (port, behind) in track.behind.iter().enumerate() {
             let Some((system, _)) = behind.system() else { continue };
@@ -158,7 +158,7 @@ impl PortState {
     }
 
     /// The ports' forces on the modes, in place of whatever stands there.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn push(&mut self, track: &Track, forces: &mut [f64]) {
         forces.fill(0.0);
         let (seats, extras) = self.forces.split_at(track.seats());
@@ -171,13 +171,13 @@ impl PortState {
     }
 
     /// Deflection in m under the wheel that the ports' forces add beyond the modes; up.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn beside_wheel(&self) -> f64 {
         dot(&self.lines, &self.forces)
     }
 
     /// Moves what is behind the ports under their forces; the rail has moved under all.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn finish(&mut self, track: &Track, rail: &RailState, force_n: f64) {
         for (port, behind) in track.behind.iter().enumerate() {
             let Some((system, _)) = behind.system() else { continue };
@@ -199,7 +199,7 @@ impl PortState {
     }
 
     /// The static lines at the wheel's place, of the ports that are near.
-    #[inline(always)]
+    #[inline]
     fn find_lines(&mut self, track: &Track, x_m: f64) {
         self.lines.fill(0.0);
         let first = ((x_m - NEAR_M) / SPACING_M).ceil() as usize;
@@ -214,7 +214,7 @@ impl PortState {
         }
     }
 
-    #[inline(always)]
+    #[inline]
     fn remember_lines(&mut self, force_n: f64) {
         for (beside_m, line) in self.beside_m.iter_mut().zip(&self.lines) {
             *beside_m = line * force_n;

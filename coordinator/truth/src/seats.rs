@@ -29,7 +29,7 @@ impl SeatTransform {
     }
 
     /// Values at the seats of amplitudes of the modes, into `seats`; `folded` is scratch.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn at_seats(&self, amplitudes: &[f64], folded: &mut [f64], seats: &mut [f64]) {
         folded.fill(0.0);
         for period in amplitudes.chunks(2 * self.spans) {
@@ -46,7 +46,7 @@ impl SeatTransform {
     }
 
     /// Generalised forces on the modes of forces at the seats, subtracted from `forces`.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn push(&self, seats: &[f64], folded: &mut [f64], forces: &mut [f64]) {
         self.transform(seats, folded);
         for period in forces.chunks_mut(2 * self.spans) {
@@ -60,7 +60,7 @@ impl SeatTransform {
         }
     }
 
-    #[inline(always)]
+    #[inline]
     fn transform(&self, from: &[f64], to: &mut [f64]) {
         for (value, row) in to.iter_mut().zip(self.sines.chunks_exact(self.spans - 1)) {
             *value = dot(row, from);

@@ -72,7 +72,7 @@ pub(crate) struct Sleeper {
 /// Ballast that a sleeper touches where it is pressed further down than the gap.
 #[derive(Clone, Debug)]
 pub(crate) struct Gap {
-    gap_m: f64,
+    depth_m: f64,
     stiffness: f64,
     damping: f64,
     along: Vec<Vec<f64>>,
@@ -88,7 +88,7 @@ impl Gap {
         let modes = state.len() / 2;
         for (shape, weight) in self.along.iter().zip(&self.weights) {
             let value = |part: &[f64]| shape.iter().zip(part).map(|(a, b)| a * b).sum::<f64>();
-            let pressed_m = value(&state[..modes]) - self.gap_m;
+            let pressed_m = value(&state[..modes]) - self.depth_m;
             if pressed_m <= 0.0 {
                 continue;
             }
@@ -171,8 +171,8 @@ impl SleeperModes {
             residual,
             pressed: pressed.as_slice().to_vec(),
             seat,
-            gap: bed.gap_m.map(|gap_m| Gap {
-                gap_m,
+            gap: bed.gap_m.map(|depth_m| Gap {
+                depth_m,
                 stiffness: bed.stiffness,
                 damping: bed.damping,
                 along: self.along.clone(),

@@ -75,10 +75,10 @@ impl Irregularity {
 
     /// Height in m at a place in m; repeats itself beyond its length.
     pub(crate) fn height(&self, x_m: f64) -> f64 {
-        let place = x_m / self.step_m;
-        let knot = place.floor();
-        let t = place - knot;
-        let index = (knot as i64).rem_euclid(self.knots.len() as i64) as usize;
+        let place = (x_m / self.step_m).rem_euclid(self.knots.len() as f64);
+        let t = place.fract();
+        // A place that rounds to the length is the origin again.
+        let index = place as usize % self.knots.len();
         let [z_0, s_0] = self.knots[index];
         let [z_1, s_1] = self.knots[(index + 1) % self.knots.len()];
         let (s_0, s_1) = (s_0 * self.step_m, s_1 * self.step_m);

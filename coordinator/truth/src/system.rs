@@ -77,7 +77,7 @@ impl LinearSystem {
     }
 
     /// The state after a step whose force at the end is zero: `E z + S f_0`, into `free`.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn free(&self, state: &[f64], start: &[f64], free: &mut [f64]) {
         let rows = self.transition.chunks_exact(self.states);
         for ((value, row), inputs) in
@@ -88,7 +88,7 @@ impl LinearSystem {
     }
 
     /// Adds what the force `input` at the step's end does to the state.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn push(&self, input: usize, force: f64, state: &mut [f64]) {
         for (value, inputs) in state.iter_mut().zip(self.from_end.chunks_exact(self.inputs)) {
             *value += inputs[input] * force;
@@ -117,7 +117,7 @@ impl LinearSystem {
 }
 
 /// Sum of products.
-#[inline(always)]
+#[inline]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
     let (heads, tails) = (a.chunks_exact(8), b.chunks_exact(8));
