@@ -31,7 +31,8 @@ fn in_recording(
     subject: &Subject,
     hidden: &Hidden,
 ) -> Option<ExtensionInstance> {
-    if !hidden.in_catalogue() {
+    let in_model = matches!(hidden, Hidden::SensorMountResonance { .. }) || !hidden.is_artefact();
+    if !hidden.in_catalogue() || !in_model {
         return None;
     }
     let json = serde_json::to_value(hidden).ok()?;

@@ -82,8 +82,8 @@ mod tests {
     fn folding_gives_the_sum_over_all_modes() {
         let transform = SeatTransform::new(SPANS);
         // Not a multiple of the period of 14, so that the last fold is cut off.
-        for count in [5, 14, 25, 31] {
-            let amplitudes: Vec<f64> = (0..count).map(|n| 1.0 / (1.0 + n as f64)).collect();
+        for count in [5_u32, 14, 25, 31] {
+            let amplitudes: Vec<f64> = (0..count).map(|n| 1.0 / (1.0 + f64::from(n))).collect();
             let (mut folded, mut seats) = (vec![0.0; SPANS - 1], vec![0.0; SPANS - 1]);
             transform.at_seats(&amplitudes, &mut folded, &mut seats);
             for (seat, value) in seats.iter().enumerate() {
