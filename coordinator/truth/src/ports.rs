@@ -76,7 +76,8 @@ impl PortState {
         state.find_lines(track, x_m);
         state.remember_lines(crate::vtrack::WHEEL_LOAD_N);
         state.find_links(track);
-        state.links[1] = state.links[0].clone();
+        let (first, second) = state.links.split_at_mut(1);
+        second[0].clone_from(&first[0]);
         state.find_gaps(track);
         state.earlier.clone_from(&state.pushes);
         state

@@ -2,6 +2,8 @@
 //!
 //! Both drive over one and the same irregularity, so that no level differs by chance.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::{PowerSpectrum, Signal};
 use tracktwin_track::model::{Mesh, Support, Surface, TrackModel};
