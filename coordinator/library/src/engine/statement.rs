@@ -66,7 +66,9 @@ impl Statement {
 
 /// Doubles in big-endian order, as bytes.
 fn big_endian(doubles: &[f64]) -> Vec<u8> {
-    doubles.iter().flat_map(|value| value.to_be_bytes()).collect()
+    let mut bytes = Vec::with_capacity(8 * doubles.len());
+    doubles.iter().for_each(|value| bytes.extend_from_slice(&value.to_be_bytes()));
+    bytes
 }
 
 impl From<&str> for Value {
