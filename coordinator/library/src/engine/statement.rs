@@ -66,9 +66,7 @@ impl Statement {
 
 /// Doubles in big-endian order, as bytes.
 fn big_endian(doubles: &[f64]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(8 * doubles.len());
-    doubles.iter().for_each(|value| bytes.extend_from_slice(&value.to_be_bytes()));
-    bytes
+    doubles.iter().map(|value| value.to_be_bytes()).collect::<Vec<_>>().into_flattened()
 }
 
 impl From<&str> for Value {
