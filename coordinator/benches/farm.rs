@@ -1,12 +1,14 @@
 //! How many cases a second the farm can pass through: durable lease, and 12 kB of results a case
 //! through gRPC into the library, by workers that compute nothing.
 //!
-//! `cargo bench -p tracktwin --bench farm -- [throughput|workers|memory] [--cases N]`
+//! `cargo bench -p tracktwin --bench farm -- [throughput|sqlite|postgres|workers|memory] [--cases N]`
 //!
-//! Everything but the PostgreSQL server runs in this process, so its CPU time is that of both sides.
+//! Coordinator and workers run in this process; CPU time is its own and that of the PostgreSQL server
+//! it has started. Libraries are made in `$TRACKTWIN_BENCH_DIR`, or here.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark reports by stopping")]
 
+use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 use test_postgres::Server;
@@ -50,11 +52,24 @@ struct Cost {
     memory_mb: f64,
 }
 
-/// CPU time of this process so far, in s (proc(5): fields 14 and 15, in hundredths).
+/// CPU time so far of this process and of all that it has started, in s.
+///
+/// Of proc(5)'s `stat`: parent (field 4) and times in hundredths, its own (14, 15) and those of
+/// children that have ended (16, 17).
 fn cpu_s() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
-    let fields: Vec<&str> = stat.rsplit_once(')').unwrap().1.split_whitespace().collect();
-    (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / 100.0
+    let mut parents = HashMap::new();
+    for entry in std::fs::read_dir("/proc").unwrap().flatten() {
+        let Ok(stat) = std::fs::read_to_string(entry.path().join("stat")) else { continue };
+        let pid: u32 = stat.split(' ').next().unwrap().parse().unwrap();
+        let fields: Vec<&str> = stat.rsplit_once(')').unwrap().1.split_whitespace().collect();
+        let time: f64 = fields[11..15].iter().map(|field| field.parse::<f64>().unwrap()).sum();
+        parents.insert(pid, (fields[1].parse::<u32>().unwrap(), time / 100.0));
+    }
+    let mine = |&pid: &u32| {
+        let parent = |&pid: &u32| parents.get(&pid).map(|(parent, _)| *parent);
+        std::iter::successors(Some(pid), parent).any(|it| it == std::process::id())
+    };
+    parents.iter().filter(|(pid, _)| mine(pid)).map(|(_, (_, time))| time).sum()
 }
 
 /// Memory this process holds now, in MB.
@@ -125,7 +140,7 @@ async fn measure(engine: &str, cases: u32, workers: usize) {
     let durable = test_postgres::Settings { durable: true };
     let Some(server) = Server::start(durable) else { return };
     let cost = pass_through(&server.database(), cases, workers).await;
-    tell("PostgreSQL, fsync (server's CPU not counted)", cases, workers, &cost);
+    tell("PostgreSQL, fsync", cases, workers, &cost);
 }
 
 fn main() {
@@ -138,6 +153,7 @@ fn main() {
     println!("|---|---|---|---|---|---|");
     runtime.block_on(async {
         match what {
+            "sqlite" | "postgres" => measure(what, cases, 2).await,
             "workers" => measure("sqlite", cases, 1000).await,
             "memory" => {
                 for cases in [cases / 10, cases] {

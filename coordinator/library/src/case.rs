@@ -3,7 +3,6 @@
 use crate::campaign::{seed_from_sql, sql_seed};
 use crate::engine::{Connection, Row, Statement, Write, sql};
 use crate::{Library, LibraryError, State};
-use std::fmt::Write as _;
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 
 /// Cases in one statement: ten values each, well below the 32,766 that `SQLite` takes.
@@ -162,27 +161,14 @@ impl Write for Insert {
     type Answer = ();
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let columns = Parameter::ALL.len() + 4;
-        let mut insert = "insert into campaign_case (campaign_id, sobol_index, ".to_owned();
-        for parameter in Parameter::ALL {
-            insert.extend([parameter.name(), ", "]);
-        }
-        insert.push_str("surface_seed, parameter_hash) values ");
-        for row in 0..self.cases.len() {
-            let numbers = row * columns + 1..=(row + 1) * columns;
-            for (column, number) in numbers.enumerate() {
-                let before = if column > 0 {
-                    ", "
-                } else if row > 0 {
-                    ", ("
-                } else {
-                    "("
-                };
-                let _ = write!(insert, "{before}${number}");
-            }
-            insert.push(')');
-        }
-        insert.push_str(" on conflict (campaign_id, sobol_index) do nothing");
+        let parameters: String =
+            Parameter::ALL.iter().flat_map(|parameter| [parameter.name(), ", "]).collect();
+        let insert = format!(
+            "insert into campaign_case (campaign_id, sobol_index, {parameters}surface_seed,
+                parameter_hash)
+            values {} on conflict (campaign_id, sobol_index) do nothing",
+            connection.dialect().rows_of_values(self.cases.len(), Parameter::ALL.len() + 4)
+        );
         let mut insert = sql(insert);
         for case in &self.cases {
             insert = insert.bind(&self.campaign).bind(case.index);

@@ -142,16 +142,21 @@ async fn insert_in_groups(
     while !rest.is_empty() {
         let largest = 1 << rest.len().ilog2();
         let (rows, after) = rest.split_at(ROWS_MAX.min(largest));
-        let mut insert = sql(insert_rows(rows.len()))
-            .bind(&report.campaign)
-            .bind(&report.worker)
-            .bind(&report.code_version)
-            .bind(&report.model_hash)
-            .bind(&report.experiment_hash)
-            .bind(&finished_at);
+        let places = Dialect::Sqlite.rows_of_values(rows.len(), 11 + LEVEL_COLUMNS.len());
+        let mut insert = sql(format!("{INSERT}, {}) values {places}", LEVEL_COLUMNS.join(", ")));
         for (case, speed_km_h, features) in rows {
-            insert = insert.bind(case.index).bind(*speed_km_h).bind(case.duration_s);
-            insert = insert.bind(&case.parameter_hash).bind(features.log_power.clone());
+            insert = insert
+                .bind(&report.campaign)
+                .bind(&report.worker)
+                .bind(&report.code_version)
+                .bind(&report.model_hash)
+                .bind(&report.experiment_hash)
+                .bind(&finished_at)
+                .bind(case.index)
+                .bind(*speed_km_h)
+                .bind(case.duration_s)
+                .bind(&case.parameter_hash)
+                .bind(features.log_power.clone());
             let levels = &features.band_levels_db;
             insert = levels.iter().fold(insert, |insert, &level| insert.bind(level));
         }
@@ -159,20 +164,6 @@ async fn insert_in_groups(
         rest = after;
     }
     Ok(())
-}
-
-/// The statement that inserts so many rows: six values for all of them, then those of each.
-fn insert_rows(rows: usize) -> String {
-    let own = 5 + LEVEL_COLUMNS.len();
-    let mut insert = format!("{INSERT}, {}) values ", LEVEL_COLUMNS.join(", "));
-    for row in 0..rows {
-        insert.push_str(if row > 0 { ", ($1" } else { "($1" });
-        for number in (2..=6).chain(7 + row * own..7 + (row + 1) * own) {
-            let _ = write!(insert, ", ${number}");
-        }
-        insert.push(')');
-    }
-    insert
 }
 
 /// Over a network, one statement for all: features and levels of all rows travel as one array each,

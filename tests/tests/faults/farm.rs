@@ -129,14 +129,24 @@ impl Farm {
 
     /// Starts a worker of one core for both coordinators.
     pub(crate) fn worker(&self) -> Process {
-        let urls = self.ports.map(|port| format!("http://127.0.0.1:{port}"));
-        Self::worker_of(&urls.join(","))
+        Self::worker_of(&self.urls())
+    }
+
+    /// Addresses of both coordinators.
+    pub(crate) fn urls(&self) -> String {
+        self.ports.map(|port| format!("http://127.0.0.1:{port}")).join(",")
     }
 
     /// Starts a worker of one core for these coordinators.
     pub(crate) fn worker_of(urls: &str) -> Process {
+        Self::worker_in(urls, &[])
+    }
+
+    /// Starts a worker of one core for these coordinators, with these environment variables.
+    pub(crate) fn worker_in(urls: &str, environment: &[(&str, String)]) -> Process {
         let child = Command::new(WORKER)
             .args(["--coordinator", urls, "--cores", "1"])
+            .envs(environment.iter().cloned())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()
@@ -155,6 +165,16 @@ impl Farm {
         assert_eq!(answer.code, Some(0), "{}", answer.err);
         let status: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
         status["campaigns"][0]["finished"].as_u64().unwrap()
+    }
+
+    /// Leases that ended without a result so far.
+    pub(crate) fn attempts(&self) -> u64 {
+        let ask = "select count(*) as attempts from attempt";
+        let answer =
+            run(PROGRAM, &["library", "sql", ask, "--format", "json", "--library", &self.library]);
+        assert_eq!(answer.code, Some(0), "{}", answer.err);
+        let rows: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
+        rows[0]["attempts"].as_u64().unwrap()
     }
 
     /// Waits until there are so many results.

@@ -43,9 +43,8 @@ fn a_worker_killed_every_second_for_long() {
     }
 }
 
-#[test]
-fn a_worker_stopped_for_longer_than_its_lease_changes_nothing_when_it_goes_on() {
-    let Some(farm) = Farm::new(Engine::Sqlite) else { return };
+fn worker_is_stopped_and_continued(engine: Engine) {
+    let Some(farm) = Farm::new(engine) else { return };
     let mut coordinator = farm.coordinator(0);
     let sleeper = farm.worker();
     farm.reach(4);
@@ -57,6 +56,16 @@ fn a_worker_stopped_for_longer_than_its_lease_changes_nothing_when_it_goes_on() 
     Farm::finish(&mut coordinator);
     drop((sleeper, other));
     farm.assert_undisturbed();
+}
+
+#[test]
+fn a_worker_stopped_for_longer_than_its_lease_changes_nothing_when_it_goes_on_sqlite() {
+    worker_is_stopped_and_continued(Engine::Sqlite);
+}
+
+#[test]
+fn a_worker_stopped_for_longer_than_its_lease_changes_nothing_when_it_goes_on_postgres() {
+    worker_is_stopped_and_continued(Engine::Postgres);
 }
 
 #[test]

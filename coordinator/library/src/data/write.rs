@@ -4,7 +4,6 @@ use super::{Cell, Column, Table, decode};
 use crate::engine::{Connection, Write, sql};
 use crate::{Library, LibraryError};
 use std::collections::HashSet;
-use std::fmt::Write as _;
 
 /// Rows in one statement: of the widest table's 38 columns well below the 32,766 values that
 /// `SQLite` takes.
@@ -138,22 +137,13 @@ impl Write for Rows {
 
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
         let columns = self.table.columns.len();
-        let mut insert =
-            format!("insert into {} ({}) values ", self.table.name, self.table.column_list());
-        for row in 0..self.rows.len() {
-            for column in 0..columns {
-                let before = if column > 0 {
-                    ", "
-                } else if row > 0 {
-                    ", ("
-                } else {
-                    "("
-                };
-                let _ = write!(insert, "{before}${}", row * columns + column + 1);
-            }
-            insert.push(')');
-        }
-        let _ = write!(insert, " on conflict ({}) do nothing", self.table.key.join(", "));
+        let insert = format!(
+            "insert into {} ({}) values {} on conflict ({}) do nothing",
+            self.table.name,
+            self.table.column_list(),
+            connection.dialect().rows_of_values(self.rows.len(), columns),
+            self.table.key.join(", ")
+        );
         let mut insert = sql(insert);
         for row in &self.rows {
             let misfit = |what: String| LibraryError::BadRow { table: self.table.name, what };

@@ -18,6 +18,12 @@ const APPLICATION_ID: i64 = 0x7477_696e;
 /// The longest write is a thousand cases; anything beyond half a minute is a stuck process.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
 
+/// Pages of the write-ahead log before it is carried over into the file: 32 MB.
+///
+/// Carrying over waits twice for the disk. With `SQLite`'s 1000 pages, 300 cases, that would come with
+/// every second group of reports.
+const LOG_PAGES: &str = "8192";
+
 /// Connections that read beside the one that writes.
 const READERS: u32 = 4;
 
@@ -33,7 +39,10 @@ pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryEr
     connection.close().await?;
 
     // Only now, since it changes the file.
-    let options = options.journal_mode(SqliteJournalMode::Wal).synchronous(SqliteSynchronous::Full);
+    let options = options
+        .journal_mode(SqliteJournalMode::Wal)
+        .synchronous(SqliteSynchronous::Full)
+        .pragma("wal_autocheckpoint", LOG_PAGES);
     let mut connection = options.connect().await?;
     migrate(&mut connection, path).await?;
     let readers = SqlitePoolOptions::new()

@@ -66,7 +66,7 @@ impl Statement {
 
 /// Doubles in big-endian order, as bytes.
 fn big_endian(doubles: &[f64]) -> Vec<u8> {
-    doubles.iter().flat_map(|value| value.to_be_bytes()).collect()
+    doubles.iter().map(|value| value.to_be_bytes()).collect::<Vec<_>>().into_flattened()
 }
 
 impl From<&str> for Value {

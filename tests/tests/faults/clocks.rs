@@ -1,0 +1,82 @@
+//! A worker whose time of day jumps by an hour, and back.
+
+use crate::farm::{Engine, Farm};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Where Debian puts the library that tells a program another time of day.
+const FAKETIME: &str = "faketime/libfaketime.so.1";
+
+/// A time of day that can be set, for those who are started under it.
+struct Clock {
+    library: PathBuf,
+    setting: tempfile::NamedTempFile,
+}
+
+impl Clock {
+    /// A clock that is right; none where libfaketime is not installed.
+    fn right() -> Option<Self> {
+        let folders = std::fs::read_dir("/usr/lib").ok()?.flatten();
+        let library = folders.map(|it| it.path().join(FAKETIME)).find(|it| it.is_file());
+        let Some(library) = library else {
+            eprintln!("skipped: libfaketime is not installed");
+            return None;
+        };
+        let clock = Self { library, setting: tempfile::NamedTempFile::new().unwrap() };
+        clock.set("+0");
+        Some(clock)
+    }
+
+    /// Sets it ahead or back, as in `+1h`.
+    fn set(&self, ahead: &str) {
+        std::fs::write(self.setting.path(), ahead).unwrap();
+    }
+
+    /// The surroundings in which it is believed. As with a real clock that is set, durations go on
+    /// as before.
+    fn environment(&self) -> [(&'static str, String); 4] {
+        let text = |path: &Path| path.display().to_string();
+        [
+            ("LD_PRELOAD", text(&self.library)),
+            ("FAKETIME_TIMESTAMP_FILE", text(self.setting.path())),
+            ("FAKETIME_NO_CACHE", "1".to_owned()),
+            ("FAKETIME_DONT_FAKE_MONOTONIC", "1".to_owned()),
+        ]
+    }
+
+    /// What a program under it takes for now, in s since 1970.
+    fn now_unix_s(&self) -> i64 {
+        let date = Command::new("date").arg("+%s").envs(self.environment()).output().unwrap();
+        String::from_utf8(date.stdout).unwrap().trim().parse().unwrap()
+    }
+}
+
+fn clock_jumps(engine: Engine) {
+    let Some(clock) = Clock::right() else { return };
+    let Some(mut farm) = Farm::new(engine) else { return };
+    // Shorter than the jumps, and longer than a busy machine may hold up a heartbeat.
+    farm.lease = "12";
+    let mut coordinator = farm.coordinator(0);
+    let worker = Farm::worker_in(&farm.urls(), &clock.environment());
+    let before = clock.now_unix_s();
+    for (ahead, finished) in [("+1h", 4), ("-1h", 16), ("+0", 28)] {
+        farm.reach(finished);
+        clock.set(ahead);
+        let jumped = clock.now_unix_s() - before;
+        assert_eq!(jumped > 3500, ahead == "+1h", "the clock did not jump: {jumped} s");
+    }
+    Farm::finish(&mut coordinator);
+    drop(worker);
+    farm.assert_undisturbed();
+    assert_eq!(farm.attempts(), 0, "no lease was lost to the jumps");
+}
+
+#[test]
+fn a_worker_whose_clock_jumps_by_an_hour_loses_nothing_sqlite() {
+    clock_jumps(Engine::Sqlite);
+}
+
+#[test]
+fn a_worker_whose_clock_jumps_by_an_hour_loses_nothing_postgres() {
+    clock_jumps(Engine::Postgres);
+}

@@ -1,0 +1,189 @@
+//! The commands on a library as a user types them: asked in SQL, exported, imported, copied, verified.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use system_tests::{Answer, run};
+use tempfile::TempDir;
+use test_postgres::Server;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+
+/// A coarse, short model: what is tested is the library.
+const CAMPAIGN: &str = "name = \"asked\"\nseed = 5\nspeeds_km_h = [7, 13]\n\
+    [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n";
+
+const CASES: usize = 8;
+const SPEEDS: usize = 2;
+
+/// A finished campaign's library, made once.
+fn finished() -> &'static Path {
+    static FINISHED: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, file) = FINISHED.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let campaign = folder.path().join("campaign.toml");
+        let file = folder.path().join("finished.sqlite");
+        fs::write(&campaign, format!("cases = {CASES}\n{CAMPAIGN}")).unwrap();
+        let campaign = campaign.display().to_string();
+        let out = folder.path().join("out").display().to_string();
+        let arguments = ["run", &campaign, "--no-train", "--out", &out, "--library", &url(&file)];
+        assert_done(&run(PROGRAM, &arguments));
+        (folder, file)
+    });
+    file
+}
+
+fn url(file: &Path) -> String {
+    format!("sqlite:{}", file.display())
+}
+
+/// A folder with a copy of the finished library in it, and that copy's URL.
+fn home() -> (TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("l.sqlite");
+    fs::copy(finished(), &file).unwrap();
+    let url = url(&file);
+    (folder, url)
+}
+
+/// Runs `tracktwin library` with these arguments.
+fn library(arguments: &[&str]) -> Answer {
+    run(PROGRAM, &[&["library"], arguments].concat())
+}
+
+fn sql(statement: &str, library: &str, format: &str) -> Answer {
+    self::library(&["sql", statement, "--library", library, "--format", format])
+}
+
+fn assert_done(answer: &Answer) {
+    assert_eq!(answer.code, Some(0), "{}{}", answer.out, answer.err);
+}
+
+fn digest(library: &str) -> String {
+    let answer = self::library(&["digest", "--library", library]);
+    assert_done(&answer);
+    answer.out
+}
+
+/// Writes over the last of the places where a text stands in a file.
+fn rot(file: &Path, text: &str, with: &str) {
+    assert_eq!(text.len(), with.len(), "what lies behind must stay where it is");
+    let mut bytes = fs::read(file).unwrap();
+    let place = bytes.windows(text.len()).rposition(|it| it == text.as_bytes()).unwrap();
+    bytes[place..place + text.len()].copy_from_slice(with.as_bytes());
+    fs::write(file, bytes).unwrap();
+}
+
+#[test]
+fn an_answer_comes_as_a_table_as_csv_and_as_json() {
+    let (_folder, library) = home();
+    let ask = "select sobol_index, speed_km_h from result where sobol_index = 3 order by 2";
+    let csv = sql(ask, &library, "csv");
+    assert_done(&csv);
+    assert_eq!(csv.out, "sobol_index,speed_km_h\n3,7\n3,13\n");
+    let json = sql(ask, &library, "json");
+    assert_done(&json);
+    let rows: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(rows[1], serde_json::json!({ "sobol_index": 3, "speed_km_h": 13.0 }));
+    let table = sql(ask, &library, "table");
+    assert_done(&table);
+    assert!(table.out.starts_with("sobol_index"), "{}", table.out);
+}
+
+#[test]
+fn a_statement_that_would_write_is_refused_in_one_line_and_changes_nothing() {
+    let (_folder, library) = home();
+    let before = digest(&library);
+    for statement in ["delete from result", "update worker set reason = 'x'", "drop view spectrum"]
+    {
+        let answer = sql(statement, &library, "table");
+        assert_eq!(answer.code, Some(2), "{statement}: {}", answer.err);
+        assert_eq!(answer.err.trim_end().lines().count(), 1, "{}", answer.err);
+        assert!(answer.err.contains("only reads"), "{}", answer.err);
+        assert!(answer.out.is_empty(), "{}", answer.out);
+    }
+    assert_eq!(digest(&library), before);
+}
+
+#[test]
+fn a_statement_that_nobody_understands_is_refused_with_what_the_database_says() {
+    let (_folder, library) = home();
+    let answer = sql("select colour from result", &library, "table");
+    assert_eq!(answer.code, Some(2), "{}", answer.err);
+    assert!(answer.err.contains("colour"), "{}", answer.err);
+}
+
+#[test]
+fn status_tells_how_many_cases_stand_where() {
+    let (_folder, library) = home();
+    let answer = self::library(&["status", "--json", "--library", &library]);
+    assert_done(&answer);
+    let status: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
+    assert_eq!(status[0]["finished"], CASES);
+    assert_eq!(status[0]["waiting"], 0);
+}
+
+#[test]
+fn exported_tables_make_the_same_library_again() {
+    let (folder, library) = home();
+    let tables = folder.path().join("tables").display().to_string();
+    assert_done(&self::library(&["export", "--out", &tables, "--library", &library]));
+    let again = url(&folder.path().join("again.sqlite"));
+    assert_done(&self::library(&["import", &tables, "--library", &again]));
+    assert_eq!(digest(&again), digest(&library));
+    assert_done(&self::library(&["verify", "--library", &again]));
+    // What is there already stays as it is.
+    let twice = self::library(&["import", &tables, "--library", &again]);
+    assert_done(&twice);
+    let results = format!("result: 0 of {} rows added", CASES * SPEEDS);
+    assert!(twice.out.contains(&results), "{}", twice.out);
+}
+
+#[test]
+fn the_training_set_is_one_row_a_case_and_speed() {
+    let (folder, library) = home();
+    let file = folder.path().join("training.csv");
+    let out = file.display().to_string();
+    assert_done(&self::library(&["export", "--out", &out, "--library", &library]));
+    let text = fs::read_to_string(file).unwrap();
+    let head = text.lines().next().unwrap();
+    for column in ["ballast_stiffness_N_m", "level_1000_Hz_dB", "log_power", "surface_seed"] {
+        assert!(head.split(',').any(|it| it == column), "{column} is not in {head}");
+    }
+    assert_eq!(text.lines().count(), 1 + CASES * SPEEDS);
+}
+
+#[test]
+fn a_copy_to_postgres_and_back_is_the_same_library() {
+    let Some(server) = Server::shared() else { return };
+    let (folder, library) = home();
+    let there = server.database();
+    let back = url(&folder.path().join("back.sqlite"));
+    for (from, to) in [(&library, &there), (&there, &back)] {
+        let copied = self::library(&["copy", "--from", from, "--to", to]);
+        assert_done(&copied);
+        assert!(copied.out.contains("the same in both"), "{}", copied.out);
+        assert_done(&self::library(&["verify", "--library", to]));
+    }
+    assert_eq!(digest(&back), digest(&library));
+    // As a user of the server would: nothing is written through `sql` there either.
+    assert_eq!(sql("delete from result", &there, "table").code, Some(2));
+    assert_eq!(digest(&there), digest(&library));
+}
+
+#[test]
+fn a_row_that_rots_on_the_disk_is_found() {
+    let (folder, library) = home();
+    let sound = self::library(&["verify", "--library", &library]);
+    assert_done(&sound);
+    assert!(sound.out.contains("nothing is wrong"), "{}", sound.out);
+    let ask = "select parameter_hash from result where sobol_index = 5 and speed_km_h = 13";
+    let hash = sql(ask, &library, "csv").out.lines().nth(1).unwrap().to_owned();
+    let rotten = format!("{}{}", &hash[..31], if hash.ends_with('0') { '1' } else { '0' });
+    rot(&folder.path().join("l.sqlite"), &hash, &rotten);
+    let answer = self::library(&["verify", "--library", &library]);
+    assert_eq!(answer.code, Some(1), "{}{}", answer.out, answer.err);
+    assert!(answer.out.contains("case 5"), "{}", answer.out);
+}
