@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Measures the program and what else does the same work, in one run, and prints one table.
 
-    python3 tests/benches/peers.py --peers ../shared/peers [--environment DIR]
+    python3 tests/benches/peers.py --peers ../shared/peers [--environment DIR] [WORD ...]
 
 Installs NumPy, SciPy, numba, scikit-learn, faiss and ssqueezepy into a virtual environment (DIR,
 target/peers by default) unless they are there, runs every peer on one thread, then
-`cargo bench -p tracktwin-benches --bench table`, and puts both side by side. Times are CPU times.
+`cargo bench -p tracktwin-benches --bench table`, and puts both side by side; with WORDs only the
+groups of rows whose name holds one of them. Times are CPU times.
 """
 
 import argparse
@@ -61,7 +62,7 @@ ROWS = [
     ("transform as features take it", [SSQUEEZEPY]),
     ("transform, every instant", [SSQUEEZEPY]),
     ("regression: likelihood and gradient, 5000", [LEAN, SKLEARN]),
-    ("prediction of one, a factor", [LEAN_ONE, SKLEARN_ONE]),
+    ("prediction of one", [LEAN_ONE, SKLEARN_ONE]),
     ("selector: ten of 10,000 x 304", [FAISS, NUMPY_TEN]),
 ]
 
@@ -93,20 +94,22 @@ def run_peer(python, peers, work, arguments):
     return done.stdout
 
 
-def ours():
+def ours(words):
     """Our rows: least and median CPU time in ms, and accuracy."""
     command = ["cargo", "bench", "--quiet", "-p", "tracktwin-benches", "--bench", "table"]
+    command += ["--", *words]
     text = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
     rows = [line.split("\t") for line in text.splitlines()[1:]]
     return {name: (float(least), float(median), accuracy) for name, least, median, accuracy in rows}
 
 
-def peer_times(python, peers, work):
+def peer_times(python, peers, work, words):
     """Every peer's figure in ms, by its name and script; a peer that fails has none."""
     if not (work / "X300.npy").exists():
         run_peer(python, peers, work, ["ml/gp_data.py"])
     printed, times = {}, {}
-    for _, others in ROWS:
+    wanted = [others for row, others in ROWS if not words or any(word in row for word in words)]
+    for others in wanted:
         for name, arguments, find in others:
             key = " ".join(arguments)
             if key not in printed:
@@ -123,11 +126,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--peers", type=Path, required=True, help="folder of the peers' scripts")
     parser.add_argument("--environment", type=Path, default=ROOT / "target" / "peers")
+    parser.add_argument("words", nargs="*", metavar="WORD", help="groups of rows to measure")
     arguments = parser.parse_args()
     folder = arguments.environment.resolve()
     python = environment(folder)
-    times = peer_times(python, arguments.peers.resolve(), folder)
-    rows = ours()
+    times = peer_times(python, arguments.peers.resolve(), folder, arguments.words)
+    rows = ours(arguments.words)
     compared = dict(ROWS)
     print("| work | least (median) | accuracy | peers, and how many times as long they take |")
     print("|---|---|---|---|")

@@ -15,8 +15,7 @@ const REACH: f64 = 4.0;
 /// How many times finer an observed vector is rounded, which is read but once.
 const FINER: f64 = 16.0;
 
-/// Numbers that are multiplied side by side: four of the widest registers, so that no sum has to
-/// wait for the one before.
+/// Rows are whole numbers of this many: no register is left half full.
 const STRIDE: usize = 64;
 
 /// What a thousand roundings of double precision come to, as a share of a vector's length.
@@ -113,19 +112,12 @@ impl WithSimd for Products<'_> {
     #[expect(clippy::inline_always, reason = "must be compiled for each instruction set")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Vec<i32> {
-        let (vector, _) = self.vector.as_chunks::<STRIDE>();
         let mut products = Vec::with_capacity(self.rows.len() / self.vector.len());
         // A loop: what an iterator's adapter calls would not be compiled for the instruction set.
         for row in self.rows.chunks_exact(self.vector.len()) {
-            let mut sums = [0_i32; STRIDE];
-            for (a, b) in row.as_chunks::<STRIDE>().0.iter().zip(vector) {
-                for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-                    *sum += i32::from(*a) * i32::from(*b);
-                }
-            }
             let mut product = 0;
-            for sum in sums {
-                product += sum;
+            for (a, b) in row.iter().zip(self.vector) {
+                product += i32::from(*a) * i32::from(*b);
             }
             products.push(product);
         }

@@ -101,12 +101,18 @@ proptest! {
         let fast = extractor.extract(&sampled(seed, 100_000.0, 0.16), 6000..9600).unwrap();
         let slow = extractor.extract(&sampled(seed, 50_000.0, 0.16), 3000..4800).unwrap();
         // Same instants, same voices; margins are cut at the same times. What is left is the
-        // fade's and the mean's sampling, and now and then a coefficient in the next bin.
+        // fade's and the mean's sampling, and now and then a coefficient in the next bin: power
+        // moves, none is gained. Over all 1000 seeds: median at most 9e-11, power kept within
+        // 4e-5, at most 45 of 303 bins touched.
         let (median, largest) = differences(&fast, &slow);
         println!("50 kHz for 100 kHz: median {median:.1e}, largest {largest:.1e}");
-        // That changes a mean over 900 instants by 1 / 900, or by 1 / 20 where only 20 fill the bin.
-        prop_assert!(median < 1e-8, "median {median}");
-        prop_assert!(largest < 0.05, "largest {largest}");
+        prop_assert!(median < 1e-9, "median {median}");
+        let power = |of: &Features| of.log_power.iter().map(|x| x.exp()).sum::<f64>();
+        let kept = power(&fast) / power(&slow) - 1.0;
+        prop_assert!(kept.abs() < 1e-4, "power changes by a share of {kept}");
+        let pairs = fast.log_power.iter().zip(&slow.log_power);
+        let touched = pairs.filter(|(a, b)| (*a - *b).abs() > 1e-6).count();
+        prop_assert!(touched < fast.log_power.len() / 5, "{touched} bins differ");
     }
 }
 
