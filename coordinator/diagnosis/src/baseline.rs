@@ -1,7 +1,8 @@
 //! The re-tuned baseline: all that may vary before any physics is said to be missing.
 //!
 //! Every sleeper has its own ballast, railpad and irregularity level, the surface its own spectrum,
-//! every speed its own gain. This is the honest opponent of every extension.
+//! every speed its own gain; the sensor is flat to two per cent, and nobody knows where the track
+//! ends. This is the honest opponent of every extension.
 
 use crate::section::Section;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -15,9 +16,11 @@ pub struct Unknowns {
     speeds: usize,
     /// Logarithms of the wave numbers in rad/m at which the surface's spectrum is free.
     knots: Vec<f64>,
+    /// Logarithms of the frequencies in Hz at which the sensor's response is free.
+    response_knots: Vec<f64>,
 }
 
-/// Distance of the spectrum's knots in the logarithm of the wave number.
+/// Distance of knots in the logarithm of the wave number or of the frequency.
 const KNOT_DISTANCE: f64 = 0.35;
 
 /// Prior of logarithms: standard deviations, and lengths in sleepers or of `ln kappa`.
@@ -37,24 +40,34 @@ mod prior {
     pub(super) const SPECTRUM_LENGTH: f64 = 0.7;
     /// Gain of a speed's passes against the others'.
     pub(super) const GAIN: f64 = 0.05;
+    /// What the sensor makes of power at a frequency, 0.2 dB: accelerometers are flat to 2 % in
+    /// amplitude, and so is a finite-element model.
+    pub(super) const RESPONSE: f64 = 0.046;
 }
+
+/// Distances in spans at which the track may end: what that changes is free to be any of them.
+pub(crate) const ENDS_SPANS: [usize; 7] = [7, 8, 9, 10, 11, 13, 24];
 
 /// Typical values about which the logarithms lie: `k_b`, `k_p`, `A_irr`, `EI_s`, `c_p`, `c_b`
 /// (paper, Table D1).
 const TYPICAL: [f64; 6] = [1.0e7, 9.0e7, 2.5, 5.0e3, 6.0e3, 8.0e2];
 
 impl Unknowns {
-    /// For a section, so many speeds, and surfaces whose wave numbers lie in a range in rad/m.
-    pub fn new(section: &Section, speeds: usize, wave_numbers: Range<f64>) -> Self {
-        let (from, to) = (wave_numbers.start.ln(), wave_numbers.end.ln());
-        let count = ((to - from) / KNOT_DISTANCE).ceil() as usize + 1;
-        let knots = (0..count).map(|knot| from + KNOT_DISTANCE * knot as f64).collect();
-        Self { sleepers: section.sleepers, speeds, knots }
+    /// For a section, so many speeds, surfaces whose wave numbers lie in a range in rad/m, and
+    /// bands whose centres lie in a range in Hz.
+    pub fn new(
+        section: &Section,
+        speeds: usize,
+        wave_numbers: Range<f64>,
+        frequencies_hz: Range<f64>,
+    ) -> Self {
+        let (knots, response_knots) = (knots(wave_numbers), knots(frequencies_hz));
+        Self { sleepers: section.sleepers, speeds, knots, response_knots }
     }
 
     /// How many unknowns there are.
     pub fn count(&self) -> usize {
-        self.gains().end
+        self.ends().end
     }
 
     /// Ballast stiffness of each sleeper.
@@ -85,6 +98,16 @@ impl Unknowns {
     /// The power gain of each speed's passes.
     pub fn gains(&self) -> Range<usize> {
         self.spectrum().end..self.spectrum().end + self.speeds
+    }
+
+    /// What the sensor makes of power, at its knots.
+    pub fn response(&self) -> Range<usize> {
+        self.gains().end..self.gains().end + self.response_knots.len()
+    }
+
+    /// How much of what each of the track's possible ends changes is there.
+    pub fn ends(&self) -> Range<usize> {
+        self.response().end..self.response().end + ENDS_SPANS.len()
     }
 
     /// The prior mean of all unknowns.
@@ -128,6 +151,13 @@ impl Unknowns {
         for index in self.gains() {
             covariance[(index, index)] = prior::GAIN.powi(2);
         }
+        for index in self.response() {
+            covariance[(index, index)] = prior::RESPONSE.powi(2);
+        }
+        // One of the ends is there, each as probable as the others.
+        for index in self.ends() {
+            covariance[(index, index)] = 1.0 / ENDS_SPANS.len() as f64;
+        }
         Cholesky::new(covariance).expect("a prior with a white part is positive definite").inverse()
     }
 
@@ -150,12 +180,27 @@ impl Unknowns {
 
     /// Knots on both sides of a wave number in rad/m, with their shares.
     pub fn spectrum_shares(&self, wave_number_rad_m: f64) -> [(usize, f64); 2] {
-        let last = self.knots.len() - 1;
-        let place = (wave_number_rad_m.ln() - self.knots[0]) / KNOT_DISTANCE;
-        let place = place.clamp(0.0, last as f64);
-        let left = (place.floor() as usize).min(last - 1);
-        let first = self.spectrum().start;
-        let share = place - left as f64;
-        [(first + left, 1.0 - share), (first + left + 1, share)]
+        shares(&self.knots, wave_number_rad_m, self.spectrum().start)
     }
+
+    /// Knots of the sensor's response on both sides of a frequency, with their shares.
+    pub fn response_shares(&self, frequency_hz: f64) -> [(usize, f64); 2] {
+        shares(&self.response_knots, frequency_hz, self.response().start)
+    }
+}
+
+/// Knots that cover a range, in logarithms.
+fn knots(range: Range<f64>) -> Vec<f64> {
+    let (from, to) = (range.start.ln(), range.end.ln());
+    let count = ((to - from) / KNOT_DISTANCE).ceil() as usize + 1;
+    (0..count).map(|knot| from + KNOT_DISTANCE * knot as f64).collect()
+}
+
+/// Knots on both sides of a value, counted from the unknown `first`, with their shares.
+fn shares(knots: &[f64], value: f64, first: usize) -> [(usize, f64); 2] {
+    let last = knots.len() - 1;
+    let place = ((value.ln() - knots[0]) / KNOT_DISTANCE).clamp(0.0, last as f64);
+    let left = (place.floor() as usize).min(last - 1);
+    let share = place - left as f64;
+    [(first + left, 1.0 - share), (first + left + 1, share)]
 }

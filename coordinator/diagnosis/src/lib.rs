@@ -46,7 +46,7 @@ pub use outcome::{
     BeforeAfter, Diagnosis, Estimate, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score,
     Scores, SleeperValues, Verdict,
 };
-pub use port_scan::{Port, PortScan};
+pub use port_scan::{Port, PortPlace, PortScan};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, Search, Stage, first_calibration, search};
 pub use section::Section;

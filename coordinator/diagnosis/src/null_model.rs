@@ -196,7 +196,8 @@ fn plain(forward: &Forward, values: &DVector<f64>) -> DVector<f64> {
     let mut plain = values.clone();
     let level = values.rows(unknowns.level().start, unknowns.level().len()).mean();
     unknowns.level().for_each(|index| plain[index] = level);
-    unknowns.spectrum().chain(unknowns.gains()).for_each(|index| plain[index] = 0.0);
+    // What follows is the recording's, not the track's.
+    (unknowns.spectrum().start..unknowns.count()).for_each(|index| plain[index] = 0.0);
     plain
 }
 

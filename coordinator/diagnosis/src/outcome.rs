@@ -90,6 +90,9 @@ pub struct Hypothesis {
     /// Where it is.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub location: Option<Location>,
+    /// Of something unknown, where in the model it acts: `rail_seat` or `wheel`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub port: Option<String>,
     /// Its parameters.
     pub parameters: BTreeMap<String, Estimate>,
     /// What looks alike.

@@ -1,13 +1,17 @@
-//! What a recording says where no name fits: an unknown dynamic stiffness under one rail seat.
+//! What a recording says where no name fits: an unknown dynamic stiffness under rail seats or at
+//! the wheel.
 //!
 //! Whatever a sleeper, its railpad or its ballast have that the model lacks acts on the rail as an
-//! additional dynamic stiffness at the rail seat, free in every frequency. Its trace is linear in
-//! that stiffness, so that the evidence for it has a closed form (mismatch design, eq. 9).
+//! additional dynamic stiffness at the rail seat, free in every frequency; whatever the vehicle has,
+//! at the wheel. Its trace is linear in that stiffness, so that the evidence for it has a closed form
+//! (mismatch design, eq. 9).
 
 use crate::calibration::{Calibration, CalibrationError, Problem};
-use nalgebra::{Cholesky, DMatrix, DVector};
+use crate::forward::PortColumns;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
+use std::ops::Range;
 
 /// Bumps over the logarithm of the frequency that the stiffness is made of.
 const BUMPS: usize = 14;
@@ -15,22 +19,53 @@ const BUMPS: usize = 14;
 /// Prior deviations of a bump's height over the track's own stiffness there.
 const SCALES: [f64; 3] = [0.1, 0.3, 1.0];
 
-/// Evidence for an unknown dynamic stiffness under a sleeper.
-#[derive(Clone, Debug)]
-pub struct Port {
-    /// The compared sleeper; none for the same stiffness under all of them.
-    pub sleeper: Option<usize>,
-    /// Logarithm of the evidence against the model without it, in nats.
-    pub log_evidence: f64,
-    /// The dynamic stiffness over the rail's own at the seat, at the bumps' frequencies.
-    pub stiffness_ratio: Vec<(f64, Complex64)>,
+/// Where an unknown dynamic stiffness acts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PortPlace {
+    /// Under the rail seats of neighbouring compared sleepers, the same under each.
+    Seats(Range<usize>),
+    /// Between wheel and ground.
+    Wheel,
 }
 
-/// Columns of all ports: the change of the whitened residual by each bump's two parts.
+impl PortPlace {
+    /// What a diagnosis calls it.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Seats(_) => "rail_seat",
+            Self::Wheel => "wheel",
+        }
+    }
+}
+
+/// Evidence for an unknown dynamic stiffness.
+#[derive(Clone, Debug)]
+pub struct Port {
+    /// Where it acts.
+    pub place: PortPlace,
+    /// Logarithm of the evidence against the model without it, in nats.
+    pub log_evidence: f64,
+    /// The dynamic stiffness over the track's or the wheel's own there, at the bumps' frequencies.
+    pub stiffness_ratio: Vec<(f64, Complex64)>,
+    /// Its trace: whitened change of the log powers.
+    pub change: DVector<f64>,
+}
+
+/// What recordings of a calibrated track are searched with for an unknown dynamic stiffness.
 pub struct PortScan {
-    /// By compared sleeper: `[row][2 × bump + part]`, whitened.
-    columns: Vec<DMatrix<f64>>,
+    filters: Vec<Filter>,
     centres_hz: Vec<f64>,
+}
+
+/// All that the evidence at one place needs of the track.
+struct Filter {
+    place: PortPlace,
+    /// Change of the whitened log powers by each bump's two parts: `[row][2 × bump + part]`.
+    columns: DMatrix<f64>,
+    /// The baseline's part in them: what it is multiplied with for a residual's projection.
+    imitated: DMatrix<f64>,
+    /// For each of [`SCALES`] the posterior precision of the bumps' heights, factored.
+    precisions: Vec<Cholesky<f64, Dyn>>,
 }
 
 impl PortScan {
@@ -54,63 +89,69 @@ impl PortScan {
                     .map(|part| shape.iter().map(|height| part * height).collect())
             })
             .collect();
-        let columns = forward.port_columns(&current.values, &extensions, &shapes)?;
+        let PortColumns { seats, wheel } =
+            forward.port_columns(&current.values, &extensions, &shapes)?;
         let whiten =
             |columns: DMatrix<f64>| observation.fitted_rows(&observation.whiten_matrix(&columns));
-        let columns = columns.into_iter().map(whiten).collect();
-        Ok(Self { columns, centres_hz: centres.into_iter().map(f64::exp).collect() })
+        let seats: Vec<DMatrix<f64>> = seats.into_iter().map(whiten).collect();
+        let sleepers = seats.len();
+        let single = (0..sleepers).map(|sleeper| sleeper..sleeper + 1);
+        let pairs = (1..sleepers).map(|sleeper| sleeper - 1..sleeper + 1);
+        let ranges = single.chain(pairs).chain((sleepers > 2).then_some(0..sleepers));
+        let together = |range: Range<usize>| {
+            let columns = seats[range.clone()].iter();
+            (PortPlace::Seats(range), columns.sum())
+        };
+        let mut places: Vec<(PortPlace, DMatrix<f64>)> = ranges.map(together).collect();
+        places.push((PortPlace::Wheel, whiten(wheel)));
+        let filter = |(place, columns)| Filter::new(place, columns, current);
+        let filters = places.into_par_iter().filter_map(filter).collect();
+        Ok(Self { filters, centres_hz: centres.into_iter().map(f64::exp).collect() })
     }
 
     /// The best port for a whitened residual; `felt` is its product with the baseline's
     /// derivatives.
-    pub fn best(
-        &self,
-        current: &Calibration,
-        residual: &DVector<f64>,
-        felt: &DVector<f64>,
-    ) -> Option<Port> {
-        let everywhere =
-            self.columns.iter().skip(1).fold(self.columns.first()?.clone(), |a, b| a + b);
-        let single = self.columns.iter().enumerate().map(|(sleeper, c)| (Some(sleeper), c));
-        let all: Vec<_> = single.chain([(None, &everywhere)]).collect();
-        let ports = all.into_par_iter().filter_map(|(sleeper, columns)| {
-            let (log_evidence, heights) = evidence(current, columns, residual, felt)?;
-            let ratio = |(pair, &hz): (&[f64], &f64)| (hz, Complex64::new(pair[0], pair[1]));
-            let stiffness_ratio =
-                heights.as_slice().chunks_exact(2).zip(&self.centres_hz).map(ratio).collect();
-            Some(Port { sleeper, log_evidence, stiffness_ratio })
-        });
-        ports.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+    pub fn best(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> Option<Port> {
+        let evidences = self.filters.par_iter().map(|filter| filter.evidence(residual, felt));
+        let evidences: Vec<(f64, DVector<f64>)> = evidences.collect();
+        let found = self.filters.iter().zip(evidences);
+        let (filter, (log_evidence, heights)) = found.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+        let ratio = |(pair, &hz): (&[f64], &f64)| (hz, Complex64::new(pair[0], pair[1]));
+        let stiffness_ratio =
+            heights.as_slice().chunks_exact(2).zip(&self.centres_hz).map(ratio).collect();
+        let change = &filter.columns * heights;
+        Some(Port { place: filter.place.clone(), log_evidence, stiffness_ratio, change })
     }
 }
 
-/// Log evidence of the columns, averaged over the prior's scales, and their most probable heights.
-fn evidence(
-    current: &Calibration,
-    columns: &DMatrix<f64>,
-    residual: &DVector<f64>,
-    felt: &DVector<f64>,
-) -> Option<(f64, DVector<f64>)> {
-    // What the baseline imitates is taken out of columns and residual.
-    let shared = current.jacobian.tr_mul(columns);
-    let imitated = current.precision.solve(&shared);
-    let square = columns.tr_mul(columns) - shared.tr_mul(&imitated);
-    let along = columns.tr_mul(residual) - imitated.tr_mul(felt);
-    let mut best: Option<(f64, DVector<f64>)> = None;
-    let mut sum = 0.0;
-    for scale in SCALES {
-        let precision =
-            &square + DMatrix::identity(square.nrows(), square.ncols()) / (scale * scale);
-        let factor = Cholesky::new(precision)?;
-        let heights = factor.solve(&along);
-        let log_evidence = 0.5 * along.dot(&heights)
-            - 0.5 * factor.ln_determinant()
-            - square.nrows() as f64 * f64::ln(scale);
-        sum += log_evidence.min(600.0).exp();
-        if best.as_ref().is_none_or(|(known, _)| log_evidence > *known) {
-            best = Some((log_evidence, heights));
-        }
+impl Filter {
+    /// None where a precision is not positive definite.
+    fn new(place: PortPlace, columns: DMatrix<f64>, current: &Calibration) -> Option<Self> {
+        // What the baseline imitates is taken out of columns and residual.
+        let shared = current.jacobian.tr_mul(&columns);
+        let imitated = current.precision.solve(&shared);
+        let square = columns.tr_mul(&columns) - shared.tr_mul(&imitated);
+        let white = DMatrix::identity(square.nrows(), square.ncols());
+        let precision = |scale: f64| Cholesky::new(&square + &white / (scale * scale));
+        let precisions = SCALES.into_iter().map(precision).collect::<Option<_>>()?;
+        Some(Self { place, columns, imitated, precisions })
     }
-    let (_, heights) = best?;
-    Some(((sum / SCALES.len() as f64).ln(), heights))
+
+    /// Log evidence averaged over the prior's scales, and the bumps' most probable heights.
+    fn evidence(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> (f64, DVector<f64>) {
+        let along = self.columns.tr_mul(residual) - self.imitated.tr_mul(felt);
+        let of_scale = |(scale, precision): (f64, &Cholesky<f64, Dyn>)| {
+            let heights = precision.solve(&along);
+            let log_evidence = 0.5 * along.dot(&heights)
+                - 0.5 * precision.ln_determinant()
+                - along.len() as f64 * f64::ln(scale);
+            (log_evidence, heights)
+        };
+        let mut all: Vec<_> = SCALES.into_iter().zip(&self.precisions).map(of_scale).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let highest = all[all.len() - 1].0;
+        let sum: f64 = all.iter().map(|(evidence, _)| (evidence - highest).exp()).sum();
+        let (_, heights) = all.swap_remove(SCALES.len() - 1);
+        (highest + (sum / SCALES.len() as f64).ln(), heights)
+    }
 }

@@ -65,6 +65,13 @@ pub fn templates(
 }
 
 impl Template {
+    /// Nats that a trial of free size gains in a calibration's residual; none for one that would
+    /// have to be negative.
+    pub fn along(&self, residual: &DVector<f64>) -> f64 {
+        let along = self.change.dot(residual).max(0.0);
+        0.5 * along.powi(2) / self.detectability.max(f64::MIN_POSITIVE)
+    }
+
     /// Logarithm of the evidence for the effect in a whitened residual, against the baseline alone:
     /// with strength `N(1, 0.3^2)` times the trial's (mismatch design, eq. 8).
     ///

@@ -48,6 +48,7 @@ fn place(hypothesis: &Hypothesis, sleepers: usize) -> String {
         Some(location) if location.sleepers.len() < sleepers => {
             format!("At {}: ", location.sleepers.join(", "))
         }
+        _ if hypothesis.port.as_deref() == Some("wheel") => "At the wheel: ".to_owned(),
         _ => String::new(),
     }
 }

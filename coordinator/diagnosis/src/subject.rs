@@ -8,7 +8,6 @@ use crate::spectra::{Spectra, SpeedSpectra};
 use nalgebra::{DMatrix, DVector};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::model::ModelError;
 
 /// Bands compared in Hz, as far as the sample rate lets them: below, a window holds hardly a
 /// wavelet; above, hardly any irregularity.
@@ -25,9 +24,6 @@ const SLEEPERS_MIN: usize = 6;
 
 /// Part of a spacing that a pass must cover beyond a sleeper's window, where low bands reach.
 const MARGIN_SPANS: f64 = 0.6;
-
-/// Distances in spans at which the track may end, for what its unknown ends change.
-const ENDS_SPANS: [usize; 6] = [7, 8, 9, 10, 11, 13];
 
 /// Why a recording cannot be diagnosed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -95,28 +91,10 @@ impl Subject {
         Ok(Self { forward, log_power, pass_variance, first_sleeper, pass_numbers })
     }
 
-    /// Covariance of each sleeper's log powers: the null model's, what the passes do not share, and
-    /// what the unknown ends of the track change.
-    ///
-    /// # Errors
-    /// [`ModelError`] when the values make no track.
-    pub fn covariances(
-        &self,
-        null: &NullModel,
-        values: &DVector<f64>,
-    ) -> Result<Vec<DMatrix<f64>>, ModelError> {
+    /// Covariance of each sleeper's log powers: the null model's, and what the passes do not share.
+    pub fn covariances(&self, null: &NullModel) -> Vec<DMatrix<f64>> {
         let common = null.covariance(self.forward.bands.count(), &self.pass_variance);
-        let mut all = vec![common; self.forward.section.sleepers];
-        let plain = self.forward.log_power(values, &[])?;
-        let size = self.forward.per_sleeper();
-        for spans in ENDS_SPANS {
-            let changed = self.forward.with_ends(spans).log_power(values, &[])? - &plain;
-            for (sleeper, covariance) in all.iter_mut().enumerate() {
-                let part = changed.rows(sleeper * size, size).into_owned();
-                covariance.ger(1.0 / ENDS_SPANS.len() as f64, &part, &part, 1.0);
-            }
-        }
-        Ok(all)
+        vec![common; self.forward.section.sleepers]
     }
 }
 

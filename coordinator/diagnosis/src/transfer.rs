@@ -17,6 +17,8 @@ pub(crate) struct Transfer {
     pub(crate) stiffness: Vec<Vec<Complex64>>,
     /// Receptances from the rail seats in m/N, `[line][sleeper][node]`; empty unless asked for.
     pub(crate) from_seats: Vec<Vec<Vec<Complex64>>>,
+    /// Receptance of the wheel in m/N at each line.
+    wheel_receptance: Vec<Complex64>,
     /// The shape that extensions give the rail, if they do.
     pub(crate) rail: Option<Shape>,
     /// The shape of the wheel in each pass, `[speed][pass]`; empty for a round one.
@@ -51,19 +53,21 @@ impl Transfer {
         let contact = HertzContact::new(model.design());
         // Slope of the Hertzian law at the static load.
         let hertz = 1.5 * load / contact.approach(load);
-        let of_line = |(&hz, direct): (&f64, &Vec<Complex64>)| {
-            let vehicle = 1.0 / hertz + model.vehicle().receptance(TAU * hz);
+        let wheel_receptance: Vec<Complex64> =
+            lines_hz.iter().map(|&hz| model.vehicle().receptance(TAU * hz)).collect();
+        let of_line = |(wheel, direct): (&Complex64, &Vec<Complex64>)| {
+            let vehicle = 1.0 / hertz + wheel;
             direct.iter().map(|rail| (vehicle + rail).inv()).collect()
         };
         let stiffness: Vec<Vec<Complex64>> =
-            lines_hz.iter().zip(direct.iter()).map(of_line).collect();
+            wheel_receptance.iter().zip(direct.iter()).map(of_line).collect();
         let power_of_line = |(&hz, line): (&f64, &Vec<Complex64>)| {
             let felt = model.vehicle().acceleration_per_force(TAU * hz) * model.sensor_transfer(hz);
             line.iter().map(|k| k.norm_sqr() * felt.norm_sqr()).collect()
         };
         let power = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
         let (from_seats, wheel) = (Vec::new(), Vec::new());
-        Self { power, stiffness, from_seats, rail: None, wheel, direct, model }
+        Self { power, stiffness, from_seats, wheel_receptance, rail: None, wheel, direct, model }
     }
 
     /// The same with the shapes of rail and wheel over a section; in its passes the wheel begins a
@@ -99,6 +103,20 @@ impl Transfer {
             2.0 * share * power[node] * stiffness[node] * column[node] * column[node]
         };
         window.iter().map(at).sum()
+    }
+
+    /// By what a change of the dynamic stiffness between wheel and ground, in parts of the wheel's
+    /// own, changes a window's mean power: its product's real part.
+    ///
+    /// `d alpha_w = -alpha_w^2 dZ` changes the series stiffness `k` and what the sensor feels of a
+    /// force, hence `d |H|^2 = -2 |H|^2 Re((1 - k alpha_w) alpha_w dZ)`.
+    pub(crate) fn felt_at_wheel(&self, window: &[(usize, f64)], line: usize) -> Complex64 {
+        let (power, stiffness) = (&self.power[line], &self.stiffness[line]);
+        let wheel = self.wheel_receptance[line];
+        let at = |&(node, share): &(usize, f64)| {
+            -2.0 * share * power[node] * (1.0 - stiffness[node] * wheel)
+        };
+        window.iter().map(at).sum::<Complex64>() * wheel / wheel.norm()
     }
 
     /// Mean of the power over a window's nodes at a line.

@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use tracktwin_diagnosis::{
-    Bands, Forward, NullModel, Search, Section, Subject, candidates, search,
+    Bands, Forward, NullModel, PortPlace, Search, Section, Subject, candidates, search,
 };
 use tracktwin_parameters::TrackDesign;
 use tracktwin_track::extension::ExtensionInstance;
@@ -48,8 +48,17 @@ impl Normal {
     }
 }
 
-/// Searches a recording of this track with an extension in it.
+/// Searches a recording of this track with an extension in it for all that the catalogue has.
 fn searched(seed: u64, extension: Option<ExtensionInstance>) -> Search {
+    searched_for(seed, extension, |_| true)
+}
+
+/// The same for some kinds only.
+fn searched_for(
+    seed: u64,
+    extension: Option<ExtensionInstance>,
+    is_known: impl Fn(&str) -> bool,
+) -> Search {
     let forward = forward();
     let mut random = Normal(ChaCha8Rng::seed_from_u64(seed));
     let numbers: Vec<f64> =
@@ -65,7 +74,9 @@ fn searched(seed: u64, extension: Option<ExtensionInstance>) -> Search {
     let pass_variance = DVector::from_element(forward.per_sleeper(), 1e-3);
     let pass_numbers = vec![vec![0], vec![1]];
     let subject = Subject { forward, log_power, pass_variance, first_sleeper: 0, pass_numbers };
-    search(&subject, &null, values, &candidates(&subject.forward.section), &|_, _| ()).unwrap()
+    let mut all = candidates(&subject.forward.section);
+    all.retain(|candidate| is_known(candidate.kind.physics));
+    search(&subject, &null, values, &all, &|_, _| ()).unwrap()
 }
 
 #[test]
@@ -87,4 +98,27 @@ fn where_nothing_is_left_out_nothing_is_named() {
         let found = searched(seed, None);
         assert!(found.accepted.is_empty(), "{:?}", found.rounds);
     }
+}
+
+#[test]
+fn a_bolt_that_the_catalogue_lacks_is_something_unknown_under_its_sleeper() {
+    let bolt = ExtensionInstance::new("sleeper_bolt").on([3]).with("stiffness_N_per_m", 3e7);
+    let surface = ["rail_joint", "squat", "corrugation"];
+    let found = searched_for(1, Some(bolt), |physics| surface.contains(&physics));
+    assert!(found.accepted.is_empty(), "{:?}", found.accepted);
+    let port = found.rounds[0].port.as_ref().unwrap();
+    assert_eq!(port.place, PortPlace::Seats(3..4), "{}", port.log_evidence);
+}
+
+#[test]
+fn an_axle_box_that_the_catalogue_lacks_is_something_unknown_at_the_wheel() {
+    let axle_box = ExtensionInstance::new("flexible_axle_box")
+        .with("mass_kg", 2.0)
+        .with("stiffness_N_per_m", 9e8)
+        .with("damping_N_s_per_m", 2e4);
+    let supports = ["sleeper_bolt", "subgrade_layer", "hanging_sleeper", "missing_railpad"];
+    let found = searched_for(5, Some(axle_box), |physics| supports.contains(&physics));
+    assert!(found.accepted.is_empty(), "{:?}", found.accepted);
+    let port = found.rounds[0].port.as_ref().unwrap();
+    assert_eq!(port.place, PortPlace::Wheel, "{}", port.log_evidence);
 }

@@ -97,6 +97,7 @@ fn hypothesis(physics: &str, probability: f64, would_separate: &str) -> Hypothes
         probability,
         accepted: false,
         location: None,
+        port: None,
         parameters: BTreeMap::new(),
         look_alikes: Vec::new(),
         would_separate: would_separate.to_owned(),

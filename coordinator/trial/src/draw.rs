@@ -2,13 +2,13 @@
 //!
 //! Owns shares of classes, places and strengths; what a track looks like is the truth simulator's.
 
-use crate::effect::{self, Effect};
+use crate::effect;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::Distribution;
 use rand_distr::uniform::Uniform;
 use serde::{Deserialize, Serialize};
-use tracktwin_truth::{Hidden, Scene};
+use tracktwin_truth::Scene;
 
 /// What kind of case it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -62,7 +62,8 @@ pub fn plan(seed: u64, number: u32) -> Plan {
     let scene_seed = Uniform::new(0, u64::MAX).expect("the range is not empty").sample(&mut rng);
     let mut scene = Scene::typical(scene_seed);
     let wanted = effects.into_iter().cycle().skip(before * class.effects()).take(class.effects());
-    scene.left_out = hidden(wanted, &mut rng);
+    let level = scene.irregularity_level;
+    scene.left_out = wanted.map(|effect| effect.draw(level, &mut rng)).collect();
     Plan { number, class, scene }
 }
 
@@ -90,10 +91,6 @@ impl Class {
 
 fn blocks() -> Vec<Class> {
     SHARES.iter().flat_map(|&(class, count)| std::iter::repeat_n(class, count)).collect()
-}
-
-fn hidden(effects: impl Iterator<Item = Effect>, rng: &mut ChaCha8Rng) -> Vec<Hidden> {
-    effects.map(|effect| effect.draw(rng)).collect()
 }
 
 /// Fisher and Yates.

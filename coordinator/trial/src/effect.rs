@@ -80,8 +80,8 @@ pub(crate) fn of(class: Class) -> Vec<Effect> {
 }
 
 impl Effect {
-    /// With a place and a strength.
-    pub(crate) fn draw(self, rng: &mut ChaCha8Rng) -> Hidden {
+    /// With a place and a strength, on a surface of this irregularity level.
+    pub(crate) fn draw(self, level: f64, rng: &mut ChaCha8Rng) -> Hidden {
         match self {
             Self::RailJoint
             | Self::Squat
@@ -100,7 +100,7 @@ impl Effect {
             | Self::Clipping
             | Self::GainError
             | Self::PositionError
-            | Self::ElectricalHum => self.chain(rng),
+            | Self::ElectricalHum => self.chain(level, rng),
             Self::RailAbsorber | Self::CrackedSleeper | Self::LinkedSleepers | Self::WheelMode => {
                 self.unknown(rng)
             }
@@ -187,13 +187,14 @@ impl Effect {
         }
     }
 
-    fn chain(self, rng: &mut ChaCha8Rng) -> Hidden {
+    fn chain(self, level: f64, rng: &mut ChaCha8Rng) -> Hidden {
         match self {
             Self::SensorMountResonance => Hidden::SensorMountResonance {
                 frequency_hz: strong(rng, 2e3, 7e3),
                 damping_ratio: strong(rng, 2e-2, 1e-1),
             },
-            Self::Clipping => Hidden::Clipping { limit_m_s2: strong(rng, 3e1, 1.5e2) },
+            // Crests at 13 km/h reach 8 m/s2 on a surface of level one.
+            Self::Clipping => Hidden::Clipping { limit_m_s2: level * strong(rng, 1.5, 6.0) },
             Self::GainError => Hidden::GainError {
                 factor: if even(rng, 0, 2) == 0 { 1.0 / 1.3 } else { 1.3 },
                 pass: Some(even(rng, 0, 6)),

@@ -17,6 +17,9 @@ const EACH_SPEED: f64 = 0.05;
 const SEGMENTS_MIN: usize = 4;
 /// Waves in a segment below which a line has no neighbours on its lower side.
 const WAVES_MIN: f64 = 10.0;
+/// Resolution cells on either side of a line up to which it must stand out as well: what a lightly
+/// damped resonance has around its peak is no background.
+const NEAR: f64 = 6.0;
 /// Resolution cells within which a line may be the sleepers'.
 const CELLS_APART: f64 = 1.5;
 
@@ -136,18 +139,24 @@ impl Heard {
         let first = &self.spectra[0];
         let bins = first.bin(frequency - reach)..=first.bin(frequency + reach);
         let tries = bins.clone().count();
-        let mean = |bin: usize| -> Option<(usize, Line)> {
+        let mean = |spectra: &[Spectrum], bin: usize| -> Option<Line> {
             let lines: Option<Vec<Line>> =
-                self.spectra.iter().map(|spectrum| spectrum.line(bin, |_| false)).collect();
-            Some((bin, Line::mean(&lines?)?))
+                spectra.iter().map(|spectrum| spectrum.line(bin, |_| false)).collect();
+            Line::mean(&lines?)
         };
-        let (bin, best) = bins.filter_map(mean).max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))?;
+        let far = bins.filter_map(|bin| Some((bin, mean(&self.spectra, bin)?)));
+        let (bin, best) = far.max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))?;
         let segments = self.spectra.len();
-        let ln_p = if segments < SEGMENTS_MIN {
-            best.ln_tail()
-        } else {
-            ln_gamma_tail(segments as f64, best.ratio)
+        let tail = |line: Line| {
+            if segments < SEGMENTS_MIN {
+                line.ln_tail()
+            } else {
+                ln_gamma_tail(segments as f64, line.ratio)
+            }
         };
+        let near: Vec<Spectrum> =
+            self.spectra.iter().map(|spectrum| spectrum.clone().reaching(NEAR)).collect();
+        let ln_p = tail(best).max(tail(mean(&near, bin)?));
         let square = |spectrum: &Spectrum| spectrum.amplitude(bin).powi(2);
         let amplitude = (self.spectra.iter().map(square).sum::<f64>() / segments as f64).sqrt();
         Some(Tone { ratio: best.ratio, amplitude, ln_p, tries })

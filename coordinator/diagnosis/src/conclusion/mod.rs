@@ -7,16 +7,13 @@ use crate::calibration::CalibrationError;
 use crate::finding::{Finding, Place};
 use crate::first_look::FirstLook;
 use crate::outcome::{Diagnosis, Estimate, FORMAT, Hypothesis, Verdict};
-use crate::search::{Fitted, Round, Search, TEMPERATURE};
+use crate::port_scan::PortPlace;
+use crate::search::{Fitted, Probabilities, Round, Search};
 use crate::sentence::sentence;
 use crate::subject::Subject;
 use std::collections::BTreeMap;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::Kind;
-
-/// Probability of an unnamed alternative against a name of equal evidence: most of what goes wrong
-/// on a track is in the catalogue.
-const UNKNOWN_PRIOR: f64 = 0.1;
 
 /// Probability to see such evidence for an unknown stiffness if nothing is left out, up to which it
 /// is said to be there.
@@ -24,9 +21,6 @@ const PORT_ALARM: f64 = 0.01;
 
 /// Probability that what is left beside a named effect is something new.
 const REMAINDER_PRIOR: f64 = 0.2;
-
-/// Least prior of nothing at all.
-const NOTHING_PRIOR: f64 = 0.5;
 
 /// Greatest probability where nothing could be tested on a speed that was not fitted: structure and
 /// geometry look alike at one speed.
@@ -131,42 +125,37 @@ impl Evidence<'_> {
         all
     }
 
-    /// Probabilities of what one search fitted: evidence, tempered, times prior.
+    /// What one search fitted, as hypotheses.
     fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
-        let weight = |log_evidence: f64| (log_evidence / TEMPERATURE).min(300.0).exp();
-        let kinds = tracktwin_track::extension::KINDS.len() as f64;
-        let named: Vec<f64> = round
-            .fitted
-            .iter()
-            .map(|fitted| (1.0 - NOTHING_PRIOR) / kinds * weight(fitted.log_evidence))
-            .collect();
-        let unknown = round.port.as_ref().map_or(0.0, |port| {
-            UNKNOWN_PRIOR * (1.0 - NOTHING_PRIOR) / kinds * weight(port.log_evidence)
-        });
-        let all = NOTHING_PRIOR + unknown + named.iter().sum::<f64>();
+        let Probabilities { named, unknown } = round.probabilities();
         let mut hypotheses: Vec<Hypothesis> = round
             .fitted
             .iter()
-            .zip(&named)
+            .zip(named)
             .enumerate()
-            .map(|(rank, (fitted, weight))| {
-                self.hypothesis(fitted, weight / all, round.accepted && rank == 0)
+            .map(|(rank, (fitted, probability))| {
+                self.hypothesis(fitted, probability, round.accepted && rank == 0)
             })
             .collect();
         // What is left beside a named effect may be its model's error as well as something new.
         let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
         let alone = first && !round.accepted;
         if let Some(port) = &round.port {
-            let location = port.sleeper.map(|sleeper| self.location(sleeper..sleeper + 1));
             hypotheses.push(Hypothesis {
                 physics: "unknown_physics".to_owned(),
-                probability: unknown / all * if alone { 1.0 } else { REMAINDER_PRIOR },
-                accepted: alone && round.port_p_value <= PORT_ALARM && unknown / all > 0.5,
-                location,
+                probability: unknown * if alone { 1.0 } else { REMAINDER_PRIOR },
+                accepted: alone && round.port_p_value <= PORT_ALARM && unknown > 0.5,
+                location: self.location_of_port(&port.place),
+                port: Some(port.place.name().to_owned()),
                 parameters: BTreeMap::new(),
                 look_alikes: Vec::new(),
-                would_separate: "a hammer test at the place: its receptance names the element"
-                    .to_owned(),
+                would_separate: match port.place {
+                    PortPlace::Seats(_) => {
+                        "a hammer test at the place: its receptance names the element"
+                    }
+                    PortPlace::Wheel => "a tap test on the wheel: its receptance names the element",
+                }
+                .to_owned(),
                 detectability: 0.0,
                 log_evidence: port.log_evidence,
             });
@@ -188,6 +177,7 @@ impl Evidence<'_> {
             probability,
             accepted,
             location: self.location_of(candidate),
+            port: None,
             parameters: parameters.collect(),
             look_alikes: names(candidate.kind),
             would_separate: candidate.kind.would_separate.to_owned(),
@@ -220,6 +210,7 @@ impl Evidence<'_> {
             probability: if explained { probability.min(0.5) } else { probability },
             accepted: !explained,
             location,
+            port: None,
             parameters: finding.parameters.iter().map(estimate).collect(),
             look_alikes: names(kind),
             would_separate: kind.would_separate.to_owned(),
@@ -249,9 +240,13 @@ impl Evidence<'_> {
         }
         if let Some(round) = self.search.rounds.last().filter(|round| round.p_value <= 0.05) {
             let rest = if self.search.accepted.is_empty() { "Something" } else { "A remainder" };
-            let place = round.port.as_ref().and_then(|port| port.sleeper);
-            let place =
-                place.map_or(String::new(), |sleeper| format!(" near {}", self.id(sleeper)));
+            let place = round.port.as_ref().map_or(String::new(), |port| match &port.place {
+                PortPlace::Wheel => " at the wheel".to_owned(),
+                PortPlace::Seats(seats) if seats.len() <= 2 => {
+                    format!(" near {}", self.id(seats.start))
+                }
+                PortPlace::Seats(_) => String::new(),
+            });
             if !round.accepted {
                 notes.push(format!(
                     "{rest} is not explained{place} (p = {:.1e}), and nothing in the catalogue \

@@ -3,7 +3,8 @@
 use super::Evidence;
 use crate::candidate::Candidate;
 use crate::outcome::{Levels, Location, Mismatch, Verdict};
-use crate::search::Fitted;
+use crate::port_scan::PortPlace;
+use nalgebra::DVector;
 use std::ops::Range;
 use tracktwin_track::extension::PlaceKind;
 
@@ -25,6 +26,17 @@ impl Evidence<'_> {
                 Some(Location { x_m: [section.x_m(*first), section.x_m(*last)], sleepers: ids })
             }
             (_, None, None) => Some(self.location(0..section.sleepers)),
+        }
+    }
+
+    /// None at the wheel or where it is everywhere.
+    pub(super) fn location_of_port(&self, place: &PortPlace) -> Option<Location> {
+        let everywhere = self.subject.forward.section.sleepers;
+        match place {
+            PortPlace::Seats(seats) if seats.len() < everywhere => {
+                Some(self.location(seats.clone()))
+            }
+            PortPlace::Seats(_) | PortPlace::Wheel => None,
         }
     }
 
@@ -58,16 +70,18 @@ impl Evidence<'_> {
         }
         let rounds = self.search.rounds.iter().filter(|round| round.p_value <= 0.05);
         let found = rounds.filter_map(|round| {
-            let best = round.fitted.first()?;
-            Some(self.mismatch(best, round.p_value, levels))
+            let named = round.fitted.first().map(|fitted| &fitted.change);
+            let unknown = round.port.as_ref().map(|port| &port.change);
+            let change = if round.accepted { named } else { unknown.or(named) }?;
+            Some(self.mismatch(change, round.p_value, levels))
         });
         found.take(self.search.accepted.len().max(1)).collect()
     }
 
-    /// Sleepers and bands where the best candidate changes the prediction most.
-    pub(super) fn mismatch(&self, fitted: &Fitted, p_value: f64, levels: &Levels) -> Mismatch {
+    /// Sleepers and bands where a whitened change of the prediction is greatest.
+    fn mismatch(&self, change: &DVector<f64>, p_value: f64, levels: &Levels) -> Mismatch {
         let forward = &self.subject.forward;
-        let square = |row: usize| fitted.change[row].powi(2);
+        let square = |row: usize| change[row].powi(2);
         let (mut by_sleeper, mut by_band) =
             (vec![0.0; forward.section.sleepers], vec![0.0; forward.bands.count()]);
         for row in 0..forward.count() {

@@ -29,6 +29,15 @@ pub struct Linearised {
     pub jacobian: DMatrix<f64>,
 }
 
+/// Changes of the log powers by unknown dynamic stiffnesses, in parts of the stiffness that is
+/// there: a row for each log power, a column for each shape over the lines.
+pub(crate) struct PortColumns {
+    /// Under each compared sleeper's rail seat.
+    pub(crate) seats: Vec<DMatrix<f64>>,
+    /// Between wheel and ground.
+    pub(crate) wheel: DMatrix<f64>,
+}
+
 /// A track with what its derivatives are made of.
 struct State {
     transfer: Transfer,
@@ -66,8 +75,7 @@ impl Forward {
     }
 
     /// Changes of the log powers by dynamic stiffnesses added under each compared sleeper's rail
-    /// seat: a matrix a sleeper, a column for each shape over the lines, in parts of the track's own
-    /// stiffness there.
+    /// seat, and between wheel and ground.
     ///
     /// # Errors
     /// As [`Forward::log_power`].
@@ -76,38 +84,65 @@ impl Forward {
         values: &DVector<f64>,
         extensions: &[Arc<dyn Extension>],
         shapes: &[Vec<Complex64>],
-    ) -> Result<Vec<DMatrix<f64>>, ModelError> {
+    ) -> Result<PortColumns, ModelError> {
         let transfer = self.transfer(values, extensions, true)?;
         let excitation = self.excitation(&transfer, values);
-        let of_sleeper = |sleeper: usize| {
+        let shares: Vec<f64> =
+            (0..self.count()).map(|row| self.share(&transfer, &excitation, values, row)).collect();
+        let seat = |sleeper: usize| {
             let in_track = self.section.in_track(sleeper);
             let seat_node = self.section.seat_node(sleeper);
-            let mut columns = DMatrix::zeros(self.count(), shapes.len());
-            for row in 0..self.count() {
-                let (seen_from, speed, band) = self.place(row);
-                if seen_from.abs_diff(sleeper) > NEIGHBOURS {
-                    continue;
-                }
-                let window = &self.windows[speed][seen_from][band];
-                let excitation = &excitation[speed];
-                let scale = self.scale(values, seen_from, speed);
-                let power = scale * self.power(&transfer, excitation, (seen_from, speed, band));
-                let floor = power + self.noise(speed, band);
-                let shapes_of_rail = self.shape_powers(&transfer, seen_from, speed, band);
-                let share = scale * mean(shapes_of_rail, |shape| (floor + shape).recip());
-                for &(line, weight) in self.bands.weights(band) {
-                    let weight = share * weight * excitation[line];
-                    let column = &transfer.from_seats[line][in_track];
-                    let own = 1.0 / column[seat_node].norm();
-                    let felt = weight * own * transfer.felt(window, line, column);
-                    for (shape, lines) in shapes.iter().enumerate() {
-                        columns[(row, shape)] += (felt * lines[line]).re;
-                    }
+            self.columns(&shares, &excitation, shapes, |seen_from, window, line| {
+                let column = &transfer.from_seats[line][in_track];
+                let is_near = seen_from.abs_diff(sleeper) <= NEIGHBOURS;
+                is_near.then(|| transfer.felt(window, line, column) / column[seat_node].norm())
+            })
+        };
+        let seats = (0..self.section.sleepers).into_par_iter().map(seat).collect();
+        let wheel = self.columns(&shares, &excitation, shapes, |_, window, line| {
+            Some(transfer.felt_at_wheel(window, line))
+        });
+        Ok(PortColumns { seats, wheel })
+    }
+
+    /// Changes of the log powers by a stiffness of the given shapes; `felt` says by what one of its
+    /// own size changes the mean power over a sleeper's window at a line, if it is felt there.
+    fn columns(
+        &self,
+        shares: &[f64],
+        excitation: &[Vec<f64>],
+        shapes: &[Vec<Complex64>],
+        felt: impl Fn(usize, &[(usize, f64)], usize) -> Option<Complex64>,
+    ) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(self.count(), shapes.len());
+        for (row, share) in shares.iter().enumerate() {
+            let (sleeper, speed, band) = self.place(row);
+            let window = &self.windows[speed][sleeper][band];
+            for &(line, weight) in self.bands.weights(band) {
+                let Some(felt) = felt(sleeper, window, line) else { break };
+                let felt = share * weight * excitation[speed][line] * felt;
+                for (shape, lines) in shapes.iter().enumerate() {
+                    columns[(row, shape)] += (felt * lines[line]).re;
                 }
             }
-            columns
-        };
-        Ok((0..self.section.sleepers).into_par_iter().map(of_sleeper).collect())
+        }
+        columns
+    }
+
+    /// Part of a row's power that a change of the random power is divided by, times its scale.
+    fn share(
+        &self,
+        transfer: &Transfer,
+        excitation: &[Vec<f64>],
+        values: &DVector<f64>,
+        row: usize,
+    ) -> f64 {
+        let (sleeper, speed, band) = self.place(row);
+        let scale = self.scale(values, sleeper, speed);
+        let power = scale * self.power(transfer, &excitation[speed], (sleeper, speed, band));
+        let floor = power + self.noise(speed, band);
+        let shapes = self.shape_powers(transfer, sleeper, speed, band);
+        scale * mean(shapes, |shape| (floor + shape).recip())
     }
 
     /// Derivatives of each sleeper's dynamic stiffness under the rail by the logarithms of `k_b`,
@@ -175,13 +210,18 @@ impl Forward {
         }
         let floor = power + self.noise(speed, band);
         let shapes = self.shape_powers(transfer, sleeper, speed, band);
-        let log_power = mean(shapes.clone(), |shape| (floor + shape).ln());
+        let ends = unknowns.ends().enumerate().map(|(end, index)| (index, self.ends[(row, end)]));
+        let log_power = self.response(values, band)
+            + mean(shapes.clone(), |shape| (floor + shape).ln())
+            + ends.clone().map(|(index, change)| values[index] * change).sum::<f64>();
         // What a change of the random power is divided by.
         let total = 1.0 / mean(shapes, |shape| (floor + shape).recip());
         let mut derivatives: Vec<_> =
             spectrum.into_iter().map(|(knot, sum)| (knot, sum / total)).collect();
         derivatives.push((unknowns.level().start + sleeper, power / total));
         derivatives.push((unknowns.gains().start + speed, power / total));
+        derivatives.extend(ends);
+        derivatives.extend(unknowns.response_shares(self.bands.centres_hz()[band]));
         let global = unknowns.global().start;
         for (sums, (_, compared)) in supports.iter().zip(near) {
             let columns = [
@@ -205,5 +245,78 @@ impl Forward {
             .enumerate()
             .filter(|(in_track, _)| in_track.abs_diff(middle) <= NEIGHBOURS)
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bands::Bands;
+    use crate::baseline::ENDS_SPANS;
+    use crate::section::Section;
+    use tracktwin_parameters::TrackDesign;
+
+    fn forward(design: TrackDesign) -> Forward {
+        let section = Section::new(design, 3, 1.0);
+        Forward::new(section, Bands::new(200.0, 3000.0), &[10.0], vec![0.0])
+    }
+
+    #[test]
+    fn a_stiffness_at_the_wheel_that_is_mass_changes_levels_as_a_heavier_wheel_does() {
+        let design = TrackDesign::v_track();
+        let plain = forward(design.clone());
+        let values = plain.unknowns.typical();
+        // `-omega^2 m` is the wheel's own stiffness: a share of it is the same at all frequencies.
+        let mass = vec![-Complex64::ONE; plain.bands.lines_hz().len()];
+        let columns = plain.port_columns(&values, &[], &[mass]).unwrap().wheel;
+        let share = 1e-4;
+        let mut heavier = design;
+        heavier.wheel.mass_kg *= 1.0 + share;
+        let [heavier, plain] =
+            [forward(heavier), plain].map(|forward| forward.log_power(&values, &[]).unwrap());
+        let expected = (heavier - plain) / share;
+        let error = (columns.column(0) - &expected).amax() / expected.amax();
+        // The second order of a share of 1e-4.
+        assert!(error < 2e-3, "{error}");
+    }
+
+    #[test]
+    fn derivatives_are_the_differences_of_predictions() {
+        let mut forward = forward(TrackDesign::v_track());
+        let values = forward.unknowns.typical();
+        forward.allow_ends(&values).unwrap();
+        let Linearised { log_power, jacobian } = forward.linearised(&values, &[]).unwrap();
+        assert!((forward.log_power(&values, &[]).unwrap() - log_power).amax() < 1e-9);
+        let step = 1e-4;
+        // The outer sleepers stand for all beyond, of which only near ones are taken; so do those
+        // that all sleepers share.
+        let unknowns = &forward.unknowns;
+        let supports = [unknowns.ballast().start + 1, unknowns.railpad().start + 1];
+        let others = unknowns.level().chain(unknowns.spectrum().start..unknowns.count());
+        for unknown in supports.into_iter().chain(others) {
+            let [below, above] = [-step, step].map(|change| {
+                let mut varied = values.clone();
+                varied[unknown] += change;
+                forward.log_power(&varied, &[]).unwrap()
+            });
+            let difference = (above - below) / (2.0 * step);
+            let error = (jacobian.column(unknown) - &difference).amax();
+            // The second order of the step, and of that by which stiffnesses are varied.
+            assert!(error < 2e-3 * difference.amax().max(1.0), "{unknown}: {error}");
+        }
+    }
+
+    #[test]
+    fn one_of_the_possible_ends_is_predicted_as_if_it_were_there() {
+        let mut forward = forward(TrackDesign::v_track());
+        let mut values = forward.unknowns.typical();
+        let ended = forward.with_ends(8).log_power(&values, &[]).unwrap();
+        let plain = forward.log_power(&values, &[]).unwrap();
+        forward.allow_ends(&values).unwrap();
+        let eight = ENDS_SPANS.iter().position(|spans| *spans == 8).unwrap();
+        values[forward.unknowns.ends().start + eight] = 1.0;
+        let error = (forward.log_power(&values, &[]).unwrap() - &ended).amax();
+        assert!(error < 1e-9, "{error}");
+        assert!((plain - ended).amax() > 0.01);
     }
 }

@@ -7,13 +7,14 @@
 mod derivatives;
 
 pub use derivatives::Linearised;
+pub(crate) use derivatives::PortColumns;
 
 use crate::bands::Bands;
-use crate::baseline::Unknowns;
+use crate::baseline::{ENDS_SPANS, Unknowns};
 use crate::profile::Shape;
 use crate::section::Section;
 use crate::transfer::Transfer;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -36,6 +37,9 @@ pub struct Forward {
     /// Where on the model's track the wheel begins a turn, in m: `[speed][pass]`; empty if nobody
     /// knows.
     pub wheel_starts_m: Vec<Vec<f64>>,
+    /// Changes of the log powers where the track ends at each of the distances that it may end at: a
+    /// column each, zero until [`Forward::allow_ends`].
+    ends: DMatrix<f64>,
     /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
     windows: Vec<Windows>,
     /// Spectrum of the surface at level one in m2/Hz at each speed and line.
@@ -59,13 +63,16 @@ impl Forward {
         let fastest = speeds_m_s.iter().copied().fold(0.0, f64::max);
         let wave_numbers = TAU * bands.centres_hz()[0] / fastest
             ..TAU * bands.centres_hz()[bands.count() - 1] / slowest;
-        let unknowns = Unknowns::new(&section, speeds_m_s.len(), wave_numbers);
+        let frequencies_hz = bands.centres_hz()[0]..bands.centres_hz()[bands.count() - 1];
+        let unknowns = Unknowns::new(&section, speeds_m_s.len(), wave_numbers, frequencies_hz);
         let windows = speeds_m_s.iter().map(|&v| section.all_weights(v, &bands)).collect();
         // A density per rad/m becomes one per Hz at this speed.
         let density = |v: f64, hz: f64| Roughness::new(1.0).density(TAU * hz / v) * TAU / v;
         let surface =
             speeds_m_s.iter().map(|&v| lines.iter().map(|&hz| density(v, hz)).collect()).collect();
         let wheel_starts_m = Vec::new();
+        let rows = section.sleepers * speeds_m_s.len() * bands.count();
+        let ends = DMatrix::zeros(rows, ENDS_SPANS.len());
         Self {
             section,
             bands,
@@ -73,9 +80,26 @@ impl Forward {
             unknowns,
             noise_density,
             wheel_starts_m,
+            ends,
             windows,
             surface,
         }
+    }
+
+    /// Lets the track end at any of the distances that it may end at: what that changes is taken from
+    /// a track of these values.
+    ///
+    /// # Errors
+    /// As [`Forward::log_power`].
+    pub fn allow_ends(&mut self, values: &DVector<f64>) -> Result<(), ModelError> {
+        let plain = self.log_power(values, &[])?;
+        let changes = ENDS_SPANS.into_par_iter().map(|spans| {
+            let ended = self.with_ends(spans).log_power(values, &[])?;
+            Ok(ended - &plain)
+        });
+        let changes: Vec<DVector<f64>> = changes.collect::<Result<_, ModelError>>()?;
+        self.ends = DMatrix::from_columns(&changes);
+        Ok(())
     }
 
     /// The same for a track that ends so many spans beyond the sleepers compared.
@@ -116,9 +140,11 @@ impl Forward {
             let scale = self.scale(values, sleeper, speed);
             let power = scale * self.power(transfer, &excitation[speed], (sleeper, speed, band));
             let floor = power + self.noise(speed, band);
-            mean(self.shape_powers(transfer, sleeper, speed, band), |shape| (floor + shape).ln())
+            let shapes = self.shape_powers(transfer, sleeper, speed, band);
+            self.response(values, band) + mean(shapes, |shape| (floor + shape).ln())
         });
-        all
+        let ends = self.unknowns.ends();
+        all + &self.ends * values.rows(ends.start, ends.len())
     }
 
     /// The transfer of a baseline with extensions, which may differ from a known one of the same
@@ -239,6 +265,12 @@ impl Forward {
         lines
             .map(|&(line, weight)| weight * excitation[line] * transfer.mean_power(window, line))
             .sum()
+    }
+
+    /// Logarithm of what the sensor makes of the power in a band.
+    fn response(&self, values: &DVector<f64>, band: usize) -> f64 {
+        let shares = self.unknowns.response_shares(self.bands.centres_hz()[band]);
+        shares.iter().map(|&(knot, share)| share * values[knot]).sum()
     }
 
     /// Level at the sleeper and gain of the speed.

@@ -1,9 +1,10 @@
 //! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
 
 mod chance;
+mod probability;
 mod round;
 
-pub(crate) use round::TEMPERATURE;
+pub(crate) use probability::Probabilities;
 
 use self::round::{Reached, Setting, retuned};
 use crate::calibration::{Calibration, CalibrationError, Problem};
@@ -119,7 +120,7 @@ pub fn search(
     progress: &(impl Fn(Stage, f64) + Sync),
 ) -> Result<Search, CalibrationError> {
     progress(Stage::Baseline, 0.0);
-    let setting = Setting::new(subject, null, &start)?;
+    let setting = Setting::new(subject, null);
     let observation = setting.observe(|_| false)?;
     let plain = Problem { forward: &subject.forward, observation: &observation, candidates: &[] };
     let baseline = plain.calibrate(start)?;

@@ -1,16 +1,19 @@
 //! One search for an effect: screened, refined, held out, accepted or not.
 
 use super::chance::{excess, tail_probability, whitened};
+use super::probability::{Probabilities, TEMPERATURE};
 use super::{Fitted, Round, Stage};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
-use crate::port_scan::PortScan;
+use crate::port_scan::{Port, PortPlace, PortScan};
 use crate::screen::{Template, templates};
+use crate::section::Section;
 use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use tracktwin_track::extension::Class;
 
 /// Probability of a false alarm on a recording without anything left out.
 const FALSE_ALARM: f64 = 0.05;
@@ -22,8 +25,8 @@ const REFINED_MAX: usize = 8;
 /// Least log evidence in screening for a candidate to be fitted.
 const SCREENED_MIN: f64 = 2.0;
 
-/// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
-pub(crate) const TEMPERATURE: f64 = 3.0;
+/// Share of the greatest gain by a trial of free size from which a kind is fitted.
+const ALONG_SHARE_MIN: f64 = 0.25;
 
 /// Fitted candidates from whose values the model without them is fitted anew.
 const RESTARTS: usize = 3;
@@ -57,11 +60,7 @@ pub(super) struct Setting<'a> {
 }
 
 impl<'a> Setting<'a> {
-    pub(super) fn new(
-        subject: &'a Subject,
-        null: &NullModel,
-        values: &DVector<f64>,
-    ) -> Result<Self, CalibrationError> {
+    pub(super) fn new(subject: &'a Subject, null: &NullModel) -> Self {
         let offset = null.offset();
         let repeated: Vec<f64> =
             (0..subject.forward.section.sleepers).flat_map(|_| offset.iter().copied()).collect();
@@ -71,8 +70,8 @@ impl<'a> Setting<'a> {
             .iter()
             .map(|difference| DVector::from_column_slice(difference) - &offset)
             .collect();
-        let covariances = subject.covariances(null, values)?;
-        Ok(Self { subject, log_power: &subject.log_power - offset, covariances, nulls })
+        let covariances = subject.covariances(null);
+        Self { subject, log_power: &subject.log_power - offset, covariances, nulls }
     }
 
     pub(super) fn observe(
@@ -131,19 +130,20 @@ impl<'a> Setting<'a> {
             let evidence = templates.iter().map(|t| t.log_evidence(residual, felt));
             Some(evidence.fold(f64::MIN, f64::max))
         });
-        let mut round = Round { p_value, ..Round::default() };
+        let ports = PortScan::new(problem, current)?;
+        let port = ports.best(&current.residual, &none);
+        let port_p_value = port.as_ref().map_or(1.0, |port| {
+            tail_probability(&nulls, port.log_evidence / excess, |residual, felt| {
+                ports.best(residual, felt).map(|port| port.log_evidence)
+            })
+        });
+        // The better of two tests.
+        let p_value = (2.0 * p_value.min(port_p_value)).min(1.0);
+        let mut round = Round { p_value, port, port_p_value, ..Round::default() };
         if p_value > FALSE_ALARM {
             return Ok((round, Vec::new()));
         }
-        let ports = PortScan::new(problem, current)?;
-        round.port = ports.best(current, &current.residual, &none);
-        if let Some(port) = &round.port {
-            round.port_p_value =
-                tail_probability(&nulls, port.log_evidence / excess, |residual, felt| {
-                    ports.best(current, residual, felt).map(|port| port.log_evidence)
-                });
-        }
-        let chosen = choose(screened, all);
+        let chosen = choose(screened, all, &current.residual);
         let count = chosen.len() as f64;
         progress(Stage::Refinement, 0.0);
         let done = std::sync::atomic::AtomicUsize::new(0);
@@ -159,9 +159,9 @@ impl<'a> Setting<'a> {
         fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         round.fitted = fitted;
         progress(Stage::HeldOut, 0.0);
-        let sure = (TEMPERATURE * 20_f64.ln()).max(FURTHER_SHARE_MIN * strongest);
-        let best = round.fitted.first().filter(|best| best.log_evidence >= sure);
-        let Some(best) = best else { return Ok((round, Vec::new())) };
+        let Some(best) = sure(&round, &self.subject.forward.section, strongest) else {
+            return Ok((round, Vec::new()));
+        };
         let with: Vec<Candidate> =
             problem.candidates.iter().chain([&best.candidate]).cloned().collect();
         let scores = self.held_out(&with, &best.calibration.values)?;
@@ -175,18 +175,50 @@ impl<'a> Setting<'a> {
     }
 }
 
-/// The best trials: of each candidate one, of each kind a few.
-fn choose<'t>(mut screened: Vec<(f64, &'t Template)>, all: &[Candidate]) -> Vec<&'t Template> {
-    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+/// The best candidate, if something unknown does not speak against it and it is sure enough beside
+/// an earlier effect of that log evidence.
+fn sure<'r>(round: &'r Round, section: &Section, strongest: f64) -> Option<&'r Fitted> {
+    let least = (TEMPERATURE * 20_f64.ln()).max(FURTHER_SHARE_MIN * strongest);
+    let Probabilities { named, unknown } = round.probabilities();
+    let best = round.fitted.first()?;
+    let leads = named[0] > unknown || is_shape_at_port(&best.candidate, round, section);
+    (leads && best.log_evidence >= least).then_some(best)
+}
+
+/// Whether a candidate is a shape of the rail where the unknown is: the force of a shape adds to the
+/// surface's with a phase that mean powers leave out, so that an unknown fits better beside it.
+fn is_shape_at_port(candidate: &Candidate, round: &Round, section: &Section) -> bool {
+    let is_shape = candidate.kind.classes.contains(&Class::Wavelength);
+    let Some(Port { place: PortPlace::Seats(seats), .. }) = &round.port else { return false };
+    let Some([from_m, to_m]) = candidate.extension.x_m else { return false };
+    let spacing_m = section.design.sleeper.spacing_m;
+    let seats_m = [section.x_m(seats.start) - spacing_m, section.x_m(seats.end - 1) + spacing_m];
+    is_shape && seats.len() <= 2 && seats_m[0] <= from_m && to_m <= seats_m[1]
+}
+
+/// The best trials: of each candidate one, of each kind a few; then of each kind without any the
+/// one that points best along the residual, for a large effect's trials may miss its size.
+fn choose<'t>(
+    mut screened: Vec<(f64, &'t Template)>,
+    all: &[Candidate],
+    residual: &DVector<f64>,
+) -> Vec<&'t Template> {
+    let kind = |template: &Template| all[template.candidate].kind.physics;
     let mut chosen: Vec<&Template> = Vec::new();
-    for (evidence, template) in screened {
-        let kind = all[template.candidate].kind.physics;
-        let same_kind = chosen.iter().filter(|t| all[t.candidate].kind.physics == kind).count();
-        let known = chosen.iter().any(|t| t.candidate == template.candidate);
-        if evidence < SCREENED_MIN || chosen.len() == REFINED_MAX {
-            break;
+    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for &(_, template) in screened.iter().take_while(|(evidence, _)| *evidence >= SCREENED_MIN) {
+        let same_kind = chosen.iter().filter(|known| kind(known) == kind(template)).count();
+        let known = chosen.iter().any(|known| known.candidate == template.candidate);
+        if !known && same_kind < REFINED_PER_KIND && chosen.len() < REFINED_MAX {
+            chosen.push(template);
         }
-        if !known && same_kind < REFINED_PER_KIND {
+    }
+    let mut along: Vec<(f64, &Template)> =
+        screened.iter().map(|(_, template)| (template.along(residual), *template)).collect();
+    along.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let least = along.first().map_or(f64::INFINITY, |(most, _)| ALONG_SHARE_MIN * most);
+    for (_, template) in along.into_iter().take_while(|(gain, _)| *gain > least.max(SCREENED_MIN)) {
+        if chosen.iter().all(|known| kind(known) != kind(template)) && chosen.len() < REFINED_MAX {
             chosen.push(template);
         }
     }
