@@ -20,6 +20,11 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// Whether it is nowhere in particular: all along the track, at the wheel or in the sensor.
+    pub fn is_everywhere(&self) -> bool {
+        self.extension.sleepers.is_none() && self.extension.x_m.is_none()
+    }
+
     /// The extension with values for the free parameters.
     pub fn with(&self, values: &[f64]) -> ExtensionInstance {
         let pairs = self.free.iter().zip(values);

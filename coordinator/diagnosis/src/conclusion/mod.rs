@@ -19,6 +19,10 @@ use tracktwin_track::extension::Kind;
 /// is said to be there.
 const PORT_ALARM: f64 = 0.01;
 
+/// Probability of nothing at all below which something is left out even if no name predicts a
+/// withheld speed better.
+const NOTHING_LEFT: f64 = 0.02;
+
 /// Probability that what is left beside a named effect is something new.
 const REMAINDER_PRIOR: f64 = 0.2;
 
@@ -28,6 +32,12 @@ const ONE_SPEED_MAX: f64 = 0.5;
 
 /// Greatest probability where no pass repeats another: how far passes differ had to be assumed.
 const ONE_PASS_MAX: f64 = 0.9;
+
+/// What is left of a name's probability when it does not predict withheld speeds better.
+const FAILED_SHARE: f64 = 0.1;
+
+/// Names that are given beside something unknown.
+const NEAREST_MAX: usize = 3;
 
 /// Hypotheses of less probability are not worth a line.
 const PROBABILITY_MIN: f64 = 0.001;
@@ -128,27 +138,34 @@ impl Evidence<'_> {
     /// What one search fitted, as hypotheses.
     fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
         let Probabilities { named, unknown } = round.probabilities();
+        // What is left beside a named effect may be its model's error as well as something new.
+        let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
+        let alone = first && !round.accepted;
+        let is_port = alone && round.port_p_value <= PORT_ALARM && unknown > 0.5;
+        // Something is there, but the names that come near failed on withheld speeds.
+        let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
+        let nothing = 1.0 - unknown - named.iter().sum::<f64>();
+        let unnamed = alone && !is_port && nothing < NOTHING_LEFT;
+        let (kept, unknown) =
+            if unnamed { (FAILED_SHARE, unknown + failed) } else { (1.0, unknown) };
         let mut hypotheses: Vec<Hypothesis> = round
             .fitted
             .iter()
             .zip(named)
             .enumerate()
             .map(|(rank, (fitted, probability))| {
-                self.hypothesis(fitted, probability, round.accepted && rank == 0)
+                self.hypothesis(fitted, kept * probability, round.accepted && rank == 0)
             })
             .collect();
-        // What is left beside a named effect may be its model's error as well as something new.
-        let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
-        let alone = first && !round.accepted;
         if let Some(port) = &round.port {
             hypotheses.push(Hypothesis {
                 physics: "unknown_physics".to_owned(),
                 probability: unknown * if alone { 1.0 } else { REMAINDER_PRIOR },
-                accepted: alone && round.port_p_value <= PORT_ALARM && unknown > 0.5,
+                accepted: is_port || unnamed,
                 location: self.location_of_port(&port.place),
                 port: Some(port.place.name().to_owned()),
                 parameters: BTreeMap::new(),
-                look_alikes: Vec::new(),
+                look_alikes: if unnamed { nearest(round) } else { Vec::new() },
                 would_separate: match port.place {
                     PortPlace::Seats(_) => {
                         "a hammer test at the place: its receptance names the element"
@@ -271,6 +288,18 @@ fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
         Some(kind) if kind.measuring_chain => Verdict::MeasurementChain,
         Some(_) => Verdict::LeftOutPhysics,
     }
+}
+
+/// Names that what a search found may have, though none predicts withheld speeds better.
+fn nearest(round: &Round) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for fitted in &round.fitted {
+        let name = fitted.candidate.kind.physics;
+        if names.len() < NEAREST_MAX && names.iter().all(|known| known != name) {
+            names.push(name.to_owned());
+        }
+    }
+    names
 }
 
 fn names(kind: &Kind) -> Vec<String> {

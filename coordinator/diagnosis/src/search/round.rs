@@ -143,21 +143,21 @@ impl<'a> Setting<'a> {
         if p_value > FALSE_ALARM {
             return Ok((round, Vec::new()));
         }
-        let chosen = choose(screened, all, &current.residual);
-        let count = chosen.len() as f64;
+        let starts = starts(problem, current, all, &templates, screened);
+        let count = starts.len() as f64;
         progress(Stage::Refinement, 0.0);
         let done = std::sync::atomic::AtomicUsize::new(0);
-        let mut fitted: Vec<Fitted> = chosen
+        let mut fitted: Vec<Fitted> = starts
             .into_par_iter()
-            .filter_map(|template| {
-                let fitted = refine(problem, current, &all[template.candidate], template);
+            .filter_map(|(template, start)| {
+                let fitted = refine(problem, current, &all[template.candidate], template, &start);
                 let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
                 progress(Stage::Refinement, done as f64 / count);
                 fitted.ok()
             })
             .collect();
         fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        round.fitted = fitted;
+        round.fitted = once_each(fitted);
         progress(Stage::HeldOut, 0.0);
         let Some(best) = sure(&round, &self.subject.forward.section, strongest) else {
             return Ok((round, Vec::new()));
@@ -225,17 +225,62 @@ fn choose<'t>(
     chosen
 }
 
-/// Fits a candidate together with the baseline and what was accepted before.
+/// Trials to be fitted, each with the values that it is fitted from.
+fn starts<'t>(
+    problem: &Problem<'_>,
+    current: &Calibration,
+    all: &[Candidate],
+    templates: &'t [Template],
+    screened: Vec<(f64, &'t Template)>,
+) -> Vec<(&'t Template, DVector<f64>)> {
+    let chosen = choose(screened, all, &current.residual);
+    let mut starts: Vec<(&Template, DVector<f64>)> =
+        chosen.into_iter().map(|template| (template, current.values.clone())).collect();
+    if problem.candidates.is_empty() {
+        // The baseline imitates what is everywhere by values far from the track's.
+        let typical = problem.forward.unknowns.typical();
+        let everywhere = everywhere(templates, all, &current.residual);
+        starts.extend(everywhere.into_iter().map(|template| (template, typical.clone())));
+    }
+    starts
+}
+
+/// Of each candidate that is everywhere the trial that points best along the residual.
+fn everywhere<'t>(
+    templates: &'t [Template],
+    all: &[Candidate],
+    residual: &DVector<f64>,
+) -> Vec<&'t Template> {
+    let of = |number: usize| {
+        let trials = templates.iter().filter(|template| template.candidate == number);
+        trials.max_by(|a, b| a.along(residual).total_cmp(&b.along(residual)))
+    };
+    (0..all.len()).filter(|number| all[*number].is_everywhere()).filter_map(of).collect()
+}
+
+/// The better fit of each candidate, from fits in order.
+fn once_each(fitted: Vec<Fitted>) -> Vec<Fitted> {
+    let mut kept: Vec<Fitted> = Vec::new();
+    for fitted in fitted {
+        if kept.iter().all(|known| known.candidate.extension != fitted.candidate.extension) {
+            kept.push(fitted);
+        }
+    }
+    kept
+}
+
+/// Fits a candidate together with the baseline, from these values, and what was accepted before.
 fn refine(
     problem: &Problem<'_>,
     current: &Calibration,
     candidate: &Candidate,
     template: &Template,
+    start: &DVector<f64>,
 ) -> Result<Fitted, CalibrationError> {
     let candidates: Vec<Candidate> =
         problem.candidates.iter().chain([candidate]).cloned().collect();
     let with = Problem { candidates: &candidates, ..*problem };
-    let mut start: Vec<f64> = current.values.iter().copied().collect();
+    let mut start: Vec<f64> = start.iter().copied().collect();
     start.extend(candidate.logarithms(&candidate.trials[template.trial]));
     let calibration = with.calibrate(DVector::from_vec(start))?;
     let log_evidence = calibration.log_evidence - current.log_evidence;
