@@ -131,6 +131,15 @@ impl Evidence<'_> {
         for finding in &self.look.findings {
             self.add_finding(finding, &mut all);
         }
+        // What a faulty chain makes of the recording is not unknown physics.
+        let is_chain = |known: &Hypothesis| {
+            known.accepted
+                && Kind::from_name(&known.physics).is_some_and(|kind| kind.measuring_chain)
+        };
+        if all.iter().any(is_chain) {
+            let unknown = all.iter_mut().filter(|known| Kind::from_name(&known.physics).is_none());
+            unknown.for_each(|unknown| unknown.accepted = false);
+        }
         all.retain(|hypothesis| hypothesis.accepted || hypothesis.probability >= PROBABILITY_MIN);
         all
     }

@@ -10,6 +10,10 @@ pub(super) const TEMPERATURE: f64 = 3.0;
 /// on a track is in the catalogue.
 const UNKNOWN_PRIOR: f64 = 0.1;
 
+/// Share of the unknown's evidence from which a name explains what it does: the unknown is free at
+/// every frequency, and fits what is not exact in a name's model as well.
+const EXPLAINED_SHARE: f64 = 2.0 / 3.0;
+
 /// Least prior of nothing at all.
 const NOTHING_PRIOR: f64 = 0.5;
 
@@ -33,8 +37,13 @@ impl Round {
 /// Log evidences of names and of the unknown against nothing, in nats.
 fn of(named: impl Iterator<Item = f64>, unknown: Option<f64>) -> Probabilities {
     let prior = (1.0 - NOTHING_PRIOR) / KINDS.len() as f64;
-    let named: Vec<f64> = named.map(|evidence| prior.ln() + evidence / TEMPERATURE).collect();
+    let named: Vec<f64> = named.collect();
+    let best = named.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let named: Vec<f64> =
+        named.into_iter().map(|evidence| prior.ln() + evidence / TEMPERATURE).collect();
     let unknown = unknown.map_or(f64::NEG_INFINITY, |evidence| {
+        let is_explained = best >= EXPLAINED_SHARE * evidence;
+        let evidence = if is_explained { evidence.min(best) } else { evidence };
         (UNKNOWN_PRIOR * prior).ln() + evidence / TEMPERATURE
     });
     let nothing = NOTHING_PRIOR.ln();
@@ -70,7 +79,10 @@ mod tests {
     fn the_unknown_needs_more_evidence_than_a_name() {
         let equal = of([100.0].into_iter(), Some(100.0));
         assert!((equal.unknown / equal.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
-        let more = of([100.0].into_iter(), Some(110.0));
-        assert!(more.unknown > more.named[0]);
+        // What a name explains for the most part is not unknown.
+        let little_more = of([100.0].into_iter(), Some(140.0));
+        assert!((little_more.unknown / little_more.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
+        let much_more = of([100.0].into_iter(), Some(160.0));
+        assert!(much_more.unknown > much_more.named[0]);
     }
 }
