@@ -9,6 +9,6 @@ mod features;
 mod figure;
 
 pub use cases::{Track, cases};
-pub use clock::{Cost, cost, once};
+pub use clock::{Cost, by_the_clock, cost, once};
 pub use features::{axle_box, feature_vectors, library};
 pub use figure::{Curve, figure};

@@ -2,7 +2,7 @@
 
 use super::{ENTRIES, Error, Line};
 use faer::Mat;
-use tracktwin_benches::{cost, feature_vectors, library, once};
+use tracktwin_benches::{by_the_clock, cost, feature_vectors, library, once};
 use tracktwin_surrogate::{
     Factor, FeatureColumns, Hyperparameters, ModelGroup, TrainOptions, distances_within, train,
 };
@@ -30,7 +30,15 @@ pub(crate) fn likelihood() -> Result<Vec<Line>, Error> {
     let off = (both()?[0] / quotient - 1.0).abs();
     let apart = |i: usize, j: usize| (features.row(i) - features.row(j)).norm_l2();
     let worst = (1..100).map(|i| (away[(i, 0)] / apart(i, 0) - 1.0).abs()).fold(0.0, f64::max);
+    faer::set_global_parallelism(faer::Par::rayon(2));
+    let together = by_the_clock(both);
+    faer::set_global_parallelism(faer::Par::Seq);
     Ok(vec![
+        Line::new(
+            "regression: likelihood and gradient, 5000, two cores by the clock",
+            together,
+            "",
+        ),
         Line::new(
             "regression: distances, 5000 x 300",
             cost(|| distances_within(features.as_ref())),
