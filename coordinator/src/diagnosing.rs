@@ -60,7 +60,10 @@ pub async fn diagnose(
     let mut subject = Subject::new(recording, design)?;
     watch("first look", 0.0);
     let mut look = first_look(recording);
-    look.findings.retain(|finding| allowed(finding.physics));
+    if let Some(trouble) = look.refusal() {
+        return Err(SubjectError::Unusable(trouble.clone()).into());
+    }
+    look.forget(allowed);
     let suggested = subject.suggested(&look);
     watch("baseline", 0.0);
     let start = first_calibration(&subject).context("no baseline fits")?;

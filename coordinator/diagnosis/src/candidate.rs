@@ -6,6 +6,10 @@ use tracktwin_track::extension::{ExtensionInstance, KINDS, Kind, KindParameter};
 /// Of a parameter that may be zero, the least part of its greatest value that counts.
 const LEAST: f64 = 1e-2;
 
+/// How sharply a confined parameter's range ends, in its logarithm: resonances are known to a
+/// hundredth.
+const EDGE: f64 = 1e-2;
+
 /// A piece of physics at a place, in terms of the recording, with the parameters to be found.
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -39,6 +43,17 @@ impl Candidate {
             value.max(LEAST * parameter.v_track[1]).ln()
         };
         self.free.iter().zip(values).map(logarithm).collect()
+    }
+
+    /// Nats that free parameters cost, given by their logarithms, where they lie beyond a range that
+    /// they are confined to.
+    pub fn beyond_range(&self, logarithms: &[f64]) -> f64 {
+        let cost = |(parameter, &value): (&&KindParameter, &f64)| {
+            let [low, high] = parameter.v_track.map(f64::ln);
+            let beyond = (low - value).max(value - high).max(0.0);
+            if parameter.confined { 0.5 * (beyond / EDGE).powi(2) } else { 0.0 }
+        };
+        self.free.iter().zip(logarithms).map(cost).sum()
     }
 
     /// Middle and standard deviation of a parameter's logarithm before anything is measured: its

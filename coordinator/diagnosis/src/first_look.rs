@@ -28,6 +28,8 @@ const AROUND_BLOW: f64 = 0.4;
 pub struct FirstLook {
     /// What was found: chain first, then wheel, then the rail's surface.
     pub findings: Vec<Finding>,
+    /// What was found too, but has a name that the catalogue lacks; see [`FirstLook::forget`].
+    pub nameless: Vec<Finding>,
     /// The wheel's flat with the places of its blows, if it has one.
     pub flat: Option<Flat>,
     /// Passes that can't be used, and why.
@@ -40,6 +42,25 @@ pub struct FirstLook {
     pub offsets: Vec<Offsets>,
     /// The comb of a wheel of unknown circumference, of the first pass that has one.
     pub comb: Option<Comb>,
+}
+
+impl FirstLook {
+    /// Takes from the findings the names that are not known.
+    pub fn forget(&mut self, is_known: impl Fn(&str) -> bool) {
+        let forgotten = self.findings.extract_if(.., |finding| !is_known(finding.physics));
+        self.nameless.extend(forgotten);
+    }
+
+    /// What keeps everybody from saying anything of the track: a pass without a signal, or passes
+    /// that nowhere repeat each other, unless their odometers are to blame.
+    pub fn refusal(&self) -> Option<&Trouble> {
+        let dead = |trouble: &&Trouble| matches!(trouble, Trouble::Dead { .. });
+        let unlike = |trouble: &&Trouble| matches!(trouble, Trouble::Unlike { .. });
+        let is_misplaced = self.findings.iter().any(|found| found.physics == "position_error");
+        let is_noise = self.troubles.iter().filter(unlike).count() == self.offsets.len();
+        let noise = self.troubles.iter().find(unlike).filter(|_| is_noise && !is_misplaced);
+        self.troubles.iter().find(dead).or(noise)
+    }
 }
 
 /// Tests a recording for everything that its passes show without a model of the track.
@@ -65,6 +86,7 @@ pub fn first_look(recording: &Recording) -> FirstLook {
     findings.extend(on_surface);
     FirstLook {
         findings,
+        nameless: Vec::new(),
         flat,
         troubles: chain::troubles(recording, &offsets),
         noise_floors: chain::noise_floors(recording),

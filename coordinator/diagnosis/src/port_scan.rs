@@ -11,7 +11,6 @@ use crate::forward::PortColumns;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
-use std::ops::Range;
 
 /// Bumps over the logarithm of the frequency that the stiffness is made of.
 const BUMPS: usize = 14;
@@ -19,11 +18,15 @@ const BUMPS: usize = 14;
 /// Prior deviations of a bump's height over the track's own stiffness there.
 const SCALES: [f64; 3] = [0.1, 0.3, 1.0];
 
+/// Longest period of a pattern of sleepers, in sleepers.
+const EVERY_MAX: usize = 5;
+
 /// Where an unknown dynamic stiffness acts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PortPlace {
-    /// Under the rail seats of neighbouring compared sleepers, the same under each.
-    Seats(Range<usize>),
+    /// Under the rail seats of these compared sleepers, the same under each: one, two neighbours,
+    /// every second to fifth, or all.
+    Seats(Vec<usize>),
     /// Between wheel and ground.
     Wheel,
 }
@@ -94,15 +97,12 @@ impl PortScan {
         let whiten =
             |columns: DMatrix<f64>| observation.fitted_rows(&observation.whiten_matrix(&columns));
         let seats: Vec<DMatrix<f64>> = seats.into_iter().map(whiten).collect();
-        let sleepers = seats.len();
-        let single = (0..sleepers).map(|sleeper| sleeper..sleeper + 1);
-        let pairs = (1..sleepers).map(|sleeper| sleeper - 1..sleeper + 1);
-        let ranges = single.chain(pairs).chain((sleepers > 2).then_some(0..sleepers));
-        let together = |range: Range<usize>| {
-            let columns = seats[range.clone()].iter();
-            (PortPlace::Seats(range), columns.sum())
+        let together = |together: Vec<usize>| {
+            let columns = together.iter().map(|&sleeper| &seats[sleeper]).sum();
+            (PortPlace::Seats(together), columns)
         };
-        let mut places: Vec<(PortPlace, DMatrix<f64>)> = ranges.map(together).collect();
+        let mut places: Vec<(PortPlace, DMatrix<f64>)> =
+            seats_together(seats.len()).into_iter().map(together).collect();
         places.push((PortPlace::Wheel, whiten(wheel)));
         let filter = |(place, columns)| Filter::new(place, columns, current);
         let filters = places.into_par_iter().filter_map(filter).collect();
@@ -122,6 +122,21 @@ impl PortScan {
         let change = &filter.columns * heights;
         Some(Port { place: filter.place.clone(), log_evidence, stiffness_ratio, change })
     }
+}
+
+/// Sleepers under which something unknown may be the same.
+fn seats_together(sleepers: usize) -> Vec<Vec<usize>> {
+    let single = (0..sleepers).map(|sleeper| vec![sleeper]);
+    let pairs = (1..sleepers).map(|sleeper| vec![sleeper - 1, sleeper]);
+    let mut all: Vec<Vec<usize>> = single.chain(pairs).collect();
+    if sleepers > 2 {
+        all.push((0..sleepers).collect());
+    }
+    // A pattern is one where it comes back twice.
+    for every in (2..=EVERY_MAX).filter(|every| 3 * every <= sleepers) {
+        all.extend((0..every).map(|first| (first..sleepers).step_by(every).collect::<Vec<_>>()));
+    }
+    all
 }
 
 impl Filter {

@@ -48,8 +48,11 @@ fn place(hypothesis: &Hypothesis, sleepers: usize) -> String {
         Some(location) if location.sleepers.len() < sleepers => {
             format!("At {}: ", location.sleepers.join(", "))
         }
-        _ if hypothesis.port.as_deref() == Some("wheel") => "At the wheel: ".to_owned(),
-        _ => String::new(),
+        _ => match hypothesis.port.as_deref() {
+            Some("wheel") => "At the wheel: ".to_owned(),
+            Some("wheel_surface") => "On the wheel's tread: ".to_owned(),
+            _ => String::new(),
+        },
     }
 }
 

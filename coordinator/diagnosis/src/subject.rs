@@ -1,6 +1,7 @@
 //! A recording made ready for diagnosis, or the reason why it can't be.
 
 use crate::bands::Bands;
+use crate::chain::Trouble;
 use crate::forward::Forward;
 use crate::null_model::NullModel;
 use crate::section::Section;
@@ -45,6 +46,9 @@ pub enum SubjectError {
          of this track", high = SAMPLE_RATE_SHARE * .0
     )]
     SampleRate(f64),
+    /// Passes without a track in them.
+    #[error("passes: nothing can be said of the track from {0}")]
+    Unusable(Trouble),
 }
 
 /// A recording in the terms of the forward model.

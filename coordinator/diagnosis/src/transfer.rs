@@ -15,8 +15,9 @@ pub(crate) struct Transfer {
     pub(crate) power: Vec<Vec<f64>>,
     /// Dynamic stiffness of contact, rail and vehicle in series in N/m: `[line][node]`.
     pub(crate) stiffness: Vec<Vec<Complex64>>,
-    /// Receptances from the rail seats in m/N, `[line][sleeper][node]`; empty unless asked for.
-    pub(crate) from_seats: Vec<Vec<Vec<Complex64>>>,
+    /// By what a change of the dynamic stiffness at a rail seat changes the power at a node: its
+    /// product's real part, `[line][sleeper][node]`. Empty unless asked for.
+    by_seats: Vec<Vec<Vec<Complex64>>>,
     /// Receptance of the wheel in m/N at each line.
     wheel_receptance: Vec<Complex64>,
     /// The shape that extensions give the rail, if they do.
@@ -30,11 +31,26 @@ pub(crate) struct Transfer {
 
 impl Transfer {
     /// Works it out for a model at these lines in Hz, with what derivatives need if `from_seats`.
-    ///
     pub(crate) fn new(model: TrackModel, lines_hz: &[f64], from_seats: bool) -> Self {
         let RailReceptances { direct, from_seats } =
             RailReceptances::new(&model, lines_hz, from_seats);
-        Self { from_seats, ..Self::on_rail(model, lines_hz, Arc::new(direct)) }
+        Self::on_rail(model, lines_hz, Arc::new(direct)).with_seats(from_seats)
+    }
+
+    /// With receptances from the rail seats in m/N, `[line][sleeper][node]`.
+    ///
+    /// `d alpha = -alpha_seat^2 dZ`, hence `d |H|^2 = 2 |H|^2 Re(k alpha_seat^2 dZ)`.
+    fn with_seats(self, mut from_seats: Vec<Vec<Vec<Complex64>>>) -> Self {
+        for (line, columns) in from_seats.iter_mut().enumerate() {
+            let nodes = self.power[line].iter().zip(&self.stiffness[line]);
+            let by_node: Vec<Complex64> = nodes.map(|(power, k)| 2.0 * power * k).collect();
+            for column in columns {
+                for (receptance, by_node) in column.iter_mut().zip(&by_node) {
+                    *receptance *= *receptance * by_node;
+                }
+            }
+        }
+        Self { by_seats: from_seats, ..self }
     }
 
     /// The same for another model at the same lines. Where it differs in no matrix, as by the shape
@@ -66,8 +82,8 @@ impl Transfer {
             line.iter().map(|k| k.norm_sqr() * felt.norm_sqr()).collect()
         };
         let power = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
-        let (from_seats, wheel) = (Vec::new(), Vec::new());
-        Self { power, stiffness, from_seats, wheel_receptance, rail: None, wheel, direct, model }
+        let (by_seats, wheel) = (Vec::new(), Vec::new());
+        Self { power, stiffness, by_seats, wheel_receptance, rail: None, wheel, direct, model }
     }
 
     /// The same with the shapes of rail and wheel over a section; in its passes the wheel begins a
@@ -88,21 +104,16 @@ impl Transfer {
         self.model.roughness_gain(wave_number_rad_m)
     }
 
-    /// By what a change of the dynamic stiffness at a seat, whose receptances to all nodes are
-    /// `column`, changes a window's mean power: its product's real part.
-    ///
-    /// `d alpha = -alpha_seat^2 dZ`, hence `d |H|^2 = 2 |H|^2 Re(k alpha_seat^2 dZ)`.
-    pub(crate) fn felt(
-        &self,
-        window: &[(usize, f64)],
-        line: usize,
-        column: &[Complex64],
-    ) -> Complex64 {
-        let (power, stiffness) = (&self.power[line], &self.stiffness[line]);
-        let at = |&(node, share): &(usize, f64)| {
-            2.0 * share * power[node] * stiffness[node] * column[node] * column[node]
-        };
-        window.iter().map(at).sum()
+    /// By what a change of the dynamic stiffness under a sleeper's rail seat changes a window's mean
+    /// power: its product's real part.
+    pub(crate) fn felt(&self, window: &[(usize, f64)], line: usize, sleeper: usize) -> Complex64 {
+        let by_seat = &self.by_seats[line][sleeper];
+        window.iter().map(|&(node, share)| share * by_seat[node]).sum()
+    }
+
+    /// Magnitude of the rail's direct receptance at a node in m/N.
+    pub(crate) fn receptance(&self, line: usize, node: usize) -> f64 {
+        self.direct[line][node].norm()
     }
 
     /// By what a change of the dynamic stiffness between wheel and ground, in parts of the wheel's

@@ -77,7 +77,7 @@ impl fmt::Display for Trouble {
             ),
             Self::Unlike { passes: [first, second], correlation } => write!(
                 f,
-                "passes {} and {}: at one speed, but their correlation above 500 Hz is {correlation:.2}: noise, another track, or positions off by more than half a sleeper spacing",
+                "passes {} and {}, at one speed: their correlation above 500 Hz is {correlation:.2}; noise, another track, or positions off by more than half a sleeper spacing",
                 first + 1,
                 second + 1
             ),

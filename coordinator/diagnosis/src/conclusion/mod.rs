@@ -1,8 +1,10 @@
 //! From a search to the diagnosis that is written down.
 
 mod fit;
+mod nameless;
 mod place;
 
+use self::nameless::UNKNOWN;
 use crate::calibration::CalibrationError;
 use crate::finding::{Finding, Place};
 use crate::first_look::FirstLook;
@@ -33,7 +35,8 @@ const ONE_SPEED_MAX: f64 = 0.5;
 /// Greatest probability where no pass repeats another: how far passes differ had to be assumed.
 const ONE_PASS_MAX: f64 = 0.9;
 
-/// What is left of a name's probability when it does not predict withheld speeds better.
+/// What is left of a name's probability when it does not predict withheld speeds better, or a shape
+/// that it does not have shows.
 const FAILED_SHARE: f64 = 0.1;
 
 /// Names that are given beside something unknown.
@@ -131,6 +134,9 @@ impl Evidence<'_> {
         for finding in &self.look.findings {
             self.add_finding(finding, &mut all);
         }
+        for finding in &self.look.nameless {
+            self.add_nameless(finding, &mut all);
+        }
         // What a faulty chain makes of the recording is not unknown physics.
         let is_chain = |known: &Hypothesis| {
             known.accepted
@@ -168,7 +174,7 @@ impl Evidence<'_> {
             .collect();
         if let Some(port) = &round.port {
             hypotheses.push(Hypothesis {
-                physics: "unknown_physics".to_owned(),
+                physics: UNKNOWN.to_owned(),
                 probability: unknown * if alone { 1.0 } else { REMAINDER_PRIOR },
                 accepted: is_port || unnamed,
                 location: self.location_of_port(&port.place),
@@ -269,7 +275,7 @@ impl Evidence<'_> {
             let place = round.port.as_ref().map_or(String::new(), |port| match &port.place {
                 PortPlace::Wheel => " at the wheel".to_owned(),
                 PortPlace::Seats(seats) if seats.len() <= 2 => {
-                    format!(" near {}", self.id(seats.start))
+                    format!(" near {}", self.id(seats[0]))
                 }
                 PortPlace::Seats(_) => String::new(),
             });

@@ -20,12 +20,8 @@ impl Evidence<'_> {
         match (candidate.kind.place, candidate.extension.x_m, &candidate.extension.sleepers) {
             (PlaceKind::Nowhere, _, _) => None,
             (_, Some([from_m, to_m]), _) => Some(self.location_between(from_m, to_m)),
-            (_, None, Some(sleepers)) => {
-                let ids = sleepers.iter().map(|&sleeper| self.id(sleeper)).collect();
-                let (first, last) = (sleepers.first()?, sleepers.last()?);
-                Some(Location { x_m: [section.x_m(*first), section.x_m(*last)], sleepers: ids })
-            }
-            (_, None, None) => Some(self.location(0..section.sleepers)),
+            (_, None, Some(sleepers)) => (!sleepers.is_empty()).then(|| self.location(sleepers)),
+            (_, None, None) => Some(self.location(&(0..section.sleepers).collect::<Vec<_>>())),
         }
     }
 
@@ -33,18 +29,18 @@ impl Evidence<'_> {
     pub(super) fn location_of_port(&self, place: &PortPlace) -> Option<Location> {
         let everywhere = self.subject.forward.section.sleepers;
         match place {
-            PortPlace::Seats(seats) if seats.len() < everywhere => {
-                Some(self.location(seats.clone()))
-            }
+            PortPlace::Seats(seats) if seats.len() < everywhere => Some(self.location(seats)),
             PortPlace::Seats(_) | PortPlace::Wheel => None,
         }
     }
 
-    pub(super) fn location(&self, sleepers: Range<usize>) -> Location {
+    /// From the first of some sleepers, of which there is one at least, to the last.
+    pub(super) fn location(&self, sleepers: &[usize]) -> Location {
         let section = &self.subject.forward.section;
+        let [first, last] = [sleepers[0], sleepers[sleepers.len() - 1]];
         Location {
-            x_m: [section.x_m(sleepers.start), section.x_m(sleepers.end - 1)],
-            sleepers: sleepers.map(|sleeper| self.id(sleeper)).collect(),
+            x_m: [section.x_m(first), section.x_m(last)],
+            sleepers: sleepers.iter().map(|&sleeper| self.id(sleeper)).collect(),
         }
     }
 
@@ -100,7 +96,7 @@ impl Evidence<'_> {
                 }
             }
         }
-        let Location { x_m, sleepers } = self.location(sleepers);
+        let Location { x_m, sleepers } = self.location(&sleepers.collect::<Vec<_>>());
         let centres = forward.bands.centres_hz();
         Mismatch {
             x_m,

@@ -93,9 +93,9 @@ impl Forward {
             let in_track = self.section.in_track(sleeper);
             let seat_node = self.section.seat_node(sleeper);
             self.columns(&shares, &excitation, shapes, |seen_from, window, line| {
-                let column = &transfer.from_seats[line][in_track];
                 let is_near = seen_from.abs_diff(sleeper) <= NEIGHBOURS;
-                is_near.then(|| transfer.felt(window, line, column) / column[seat_node].norm())
+                let felt = || transfer.felt(window, line, in_track);
+                is_near.then(|| felt() / transfer.receptance(line, seat_node))
             })
         };
         let seats = (0..self.section.sleepers).into_par_iter().map(seat).collect();
@@ -201,8 +201,7 @@ impl Forward {
                 spectrum.push((knot, share * weight * seen));
             }
             for (sums, &(in_track, _)) in supports.iter_mut().zip(&near) {
-                let column = &transfer.from_seats[line][in_track];
-                let felt = transfer.felt(window, line, column);
+                let felt = transfer.felt(window, line, in_track);
                 for (sum, variation) in sums.iter_mut().zip(variations) {
                     *sum += weight * (felt * variation[line][in_track]).re;
                 }

@@ -192,7 +192,8 @@ fn is_shape_at_port(candidate: &Candidate, round: &Round, section: &Section) -> 
     let Some(Port { place: PortPlace::Seats(seats), .. }) = &round.port else { return false };
     let Some([from_m, to_m]) = candidate.extension.x_m else { return false };
     let spacing_m = section.design.sleeper.spacing_m;
-    let seats_m = [section.x_m(seats.start) - spacing_m, section.x_m(seats.end - 1) + spacing_m];
+    let [first, last] = [seats[0], seats[seats.len() - 1]];
+    let seats_m = [section.x_m(first) - spacing_m, section.x_m(last) + spacing_m];
     is_shape && seats.len() <= 2 && seats_m[0] <= from_m && to_m <= seats_m[1]
 }
 
@@ -283,7 +284,10 @@ fn refine(
     let mut start: Vec<f64> = start.iter().copied().collect();
     start.extend(candidate.logarithms(&candidate.trials[template.trial]));
     let calibration = with.calibrate(DVector::from_vec(start))?;
-    let log_evidence = calibration.log_evidence - current.log_evidence;
+    let count = calibration.values.len();
+    let found = &calibration.values.as_slice()[count - candidate.free.len()..];
+    let log_evidence =
+        calibration.log_evidence - current.log_evidence - candidate.beyond_range(found);
     let detectability = template.detectability.max(0.0).sqrt();
     let (candidate, change) = (candidate.clone(), template.change.clone());
     Ok(Fitted { candidate, calibration, log_evidence, detectability, change })

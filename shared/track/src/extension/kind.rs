@@ -144,6 +144,8 @@ pub struct KindParameter {
     pub default: Option<f64>,
     /// Which values make sense at all.
     pub bound: Bound,
+    /// Whether values beyond the range are another kind's.
+    pub confined: bool,
 }
 
 impl KindParameter {
@@ -158,6 +160,7 @@ impl KindParameter {
             typical: 0.0,
             default: None,
             bound: Bound::Positive,
+            confined: false,
         }
     }
 
@@ -171,6 +174,12 @@ impl KindParameter {
         self.v_track = v_track;
         self.real_scale = real_scale;
         self.typical = typical;
+        self
+    }
+
+    /// With a range that nothing of this kind lies beyond: what resonates there is something else.
+    pub(super) const fn confined(mut self) -> Self {
+        self.confined = true;
         self
     }
 

@@ -1,0 +1,123 @@
+//! What is hidden in a recording is found, named and placed by the program as its user calls it;
+//! what cannot be diagnosed is refused.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+use serde_json::Value;
+use std::path::Path;
+use system_tests::{Answer, run};
+use tempfile::TempDir;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::Recording;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+
+/// A folder with a recording of thirteen sleepers at these speeds in km/h, two passes each, over a
+/// track with an extension in it.
+fn recorded(speeds: &[&str], extension: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("extension.toml");
+    std::fs::write(&file, extension).unwrap();
+    let [file, out] = [file, folder.path().join("recording")].map(|p| p.display().to_string());
+    let speeds = speeds.iter().flat_map(|speed| ["--speed", speed]);
+    let mut arguments = vec!["simulate", "--passes", "2", "--spans", "25", "--seed", "3"];
+    arguments.extend(speeds);
+    arguments.extend(["--extension", &file, "--out", &out]);
+    assert_eq!(run(PROGRAM, &arguments).code, Some(0));
+    folder
+}
+
+/// The program's answer and what it has written.
+fn diagnosed(folder: &Path, further: &[&str]) -> (Answer, Option<Value>) {
+    let [recording, out] = ["recording", "out"].map(|name| folder.join(name));
+    let [recording, folder] = [recording, out.clone()].map(|path| path.display().to_string());
+    let arguments = [&["diagnose", &recording, "--out", &folder], further].concat();
+    let answer = run(PROGRAM, &arguments);
+    let text = std::fs::read_to_string(out.join("diagnosis.json"));
+    (answer, text.ok().map(|text| serde_json::from_str(&text).unwrap()))
+}
+
+/// What was accepted, with the sleepers it was placed at.
+fn accepted(diagnosis: &Value) -> Vec<(&str, Vec<&str>)> {
+    let all = diagnosis["hypotheses"].as_array().unwrap();
+    all.iter()
+        .filter(|found| found["accepted"] == true)
+        .map(|found| {
+            let sleepers = found["location"]["sleepers"].as_array();
+            let sleepers = sleepers.into_iter().flatten().filter_map(Value::as_str);
+            (found["physics"].as_str().unwrap(), sleepers.collect())
+        })
+        .collect()
+}
+
+const JOINT: &str = "[[extension]]\nphysics = \"rail_joint\"\nx_m = [1.5625, 1.5625]\n\
+                     dip_m = 6e-5\nbending_factor = 0.2\n";
+
+#[test]
+fn a_joint_is_named_between_its_sleepers_and_unknown_there_where_it_has_no_name() {
+    let folder = recorded(&["13", "10"], JOINT);
+    let (answer, diagnosis) = diagnosed(folder.path(), &[]);
+    let diagnosis = diagnosis.unwrap();
+    assert_eq!(answer.code, Some(1), "{}", answer.err);
+    assert!(answer.out.starts_with("At SN11 and SN12, 1.56 m: a rail joint"), "{}", answer.out);
+    assert_eq!(diagnosis["verdict"], "left_out_physics");
+    assert_eq!(accepted(&diagnosis), [("rail_joint", vec!["SN11", "SN12"])]);
+    let gains = diagnosis["fit"]["held_out_gain_nats"].as_object().unwrap();
+    assert!(gains.len() == 2 && gains.values().all(|gain| gain.as_f64().unwrap() > 0.0));
+
+    let (_, diagnosis) = diagnosed(folder.path(), &["--without", "rail_joint"]);
+    let diagnosis = diagnosis.unwrap();
+    assert_eq!(diagnosis["verdict"], "unknown_physics");
+    assert_eq!(accepted(&diagnosis), [("unknown_physics", vec!["SN11", "SN12"])]);
+    assert_eq!(diagnosis["hypotheses"][0]["port"], "rail_surface");
+}
+
+#[test]
+fn a_flat_is_named_and_unknown_on_the_tread_where_it_has_no_name() {
+    let flat = "[[extension]]\nphysics = \"wheel_flat\"\nlength_m = 3e-3\n";
+    let folder = recorded(&["13", "10"], flat);
+    let (_, diagnosis) = diagnosed(folder.path(), &[]);
+    assert_eq!(accepted(&diagnosis.unwrap()), [("wheel_flat", Vec::new())]);
+    let (_, diagnosis) = diagnosed(folder.path(), &["--without", "wheel_flat"]);
+    let diagnosis = diagnosis.unwrap();
+    assert_eq!(accepted(&diagnosis), [("unknown_physics", Vec::new())]);
+    assert_eq!(diagnosis["hypotheses"][0]["port"], "wheel_surface");
+}
+
+#[test]
+fn with_one_speed_nothing_is_more_certain_than_a_half() {
+    let folder = recorded(&["13"], JOINT);
+    let (_, diagnosis) = diagnosed(folder.path(), &[]);
+    let diagnosis = diagnosis.unwrap();
+    let most = diagnosis["hypotheses"][0]["probability"].as_f64().unwrap();
+    assert!(most <= 0.5, "{most}");
+    let notes = diagnosis["notes"].to_string();
+    assert!(notes.contains("One speed only") && notes.contains("Add a pass at 10 km/h"), "{notes}");
+}
+
+#[test]
+fn passes_without_a_track_in_them_are_refused() {
+    let folder = recorded(&["13"], JOINT);
+    let path = folder.path().join("recording");
+    let plain = Recording::open(&path).unwrap();
+    let refused = |change: &mut dyn FnMut(f64) -> f64, words: &[&str]| {
+        let mut recording = plain.clone();
+        for pass in &mut recording.passes {
+            let samples = pass.signal.samples().iter().map(|&sample| change(sample)).collect();
+            pass.signal = Signal::new(pass.signal.sample_rate_hz(), samples).unwrap();
+        }
+        std::fs::remove_dir_all(&path).unwrap();
+        recording.write(&path).unwrap();
+        let (Answer { code, err, .. }, diagnosis) = diagnosed(folder.path(), &[]);
+        let line = err.lines().last().unwrap();
+        assert!(code == Some(2) && diagnosis.is_none(), "{code:?}: {err}");
+        assert!(words.iter().all(|word| line.contains(word)), "{line}");
+    };
+    refused(&mut |_| 0.0, &["pass 1", "check sensor and cable"]);
+    let mut state = 1_u32;
+    let mut noise = |_| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+    };
+    refused(&mut noise, &["passes 1 and 2", "correlation", "noise"]);
+}
