@@ -6,9 +6,12 @@ use tracktwin_track::extension::{ExtensionInstance, KINDS, Kind, KindParameter};
 /// Of a parameter that may be zero, the least part of its greatest value that counts.
 const LEAST: f64 = 1e-2;
 
-/// How sharply a confined parameter's range ends, in its logarithm: resonances are known to a
-/// hundredth.
-const EDGE: f64 = 1e-2;
+/// Logarithm of a parameter over the end of its range up to which a kind may have it: what is
+/// further off acts alike and is something else.
+const BEYOND_MAX: f64 = 1.0;
+
+/// The same for a range that nothing of the kind lies beyond: what resonates is known to a hundredth.
+const BEYOND_CONFINED: f64 = 0.03;
 
 /// A piece of physics at a place, in terms of the recording, with the parameters to be found.
 #[derive(Clone, Debug)]
@@ -45,15 +48,14 @@ impl Candidate {
         self.free.iter().zip(values).map(logarithm).collect()
     }
 
-    /// Nats that free parameters cost, given by their logarithms, where they lie beyond a range that
-    /// they are confined to.
-    pub fn beyond_range(&self, logarithms: &[f64]) -> f64 {
-        let cost = |(parameter, &value): (&&KindParameter, &f64)| {
+    /// Whether what was found, by the logarithms of the free parameters, may be of this kind.
+    pub fn is_plausible(&self, logarithms: &[f64]) -> bool {
+        let plausible = |(parameter, &value): (&&KindParameter, &f64)| {
             let [low, high] = parameter.v_track.map(f64::ln);
-            let beyond = (low - value).max(value - high).max(0.0);
-            if parameter.confined { 0.5 * (beyond / EDGE).powi(2) } else { 0.0 }
+            let beyond = (low - value).max(value - high);
+            beyond <= if parameter.confined { BEYOND_CONFINED } else { BEYOND_MAX }
         };
-        self.free.iter().zip(logarithms).map(cost).sum()
+        self.free.iter().zip(logarithms).all(plausible)
     }
 
     /// Middle and standard deviation of a parameter's logarithm before anything is measured: its

@@ -150,6 +150,7 @@ async fn lease(
         now_unix_ms: library.now_unix_ms(),
         lease_ms: 3_600_000,
         after_loss: |_, _| State::Waiting,
+        alone_after: u32::MAX,
     };
     Ok(library.lease(request).await?.map(|lease| lease.cases).unwrap_or_default())
 }

@@ -32,6 +32,9 @@ pub struct LeaseRequest {
     pub lease_ms: i64,
     /// What becomes of cases whose lease has expired.
     pub after_loss: Policy,
+    /// Attempts without result after which a case is handed out alone: if it is what ends its
+    /// workers, it takes no other case with it.
+    pub alone_after: u32,
 }
 
 /// Cases handed to a worker, all of one campaign.
@@ -148,17 +151,38 @@ impl LeaseRequest {
         connection.rows(ask).await?.iter().map(|row| row.get("id")).collect()
     }
 
+    /// How many cases to take, of those with at most so many attempts without result.
+    async fn share(
+        &self,
+        connection: &mut Connection,
+        campaign: &str,
+    ) -> Result<(u32, u32), LibraryError> {
+        let ask = "select attempts from campaign_case
+            where campaign_id = $1 and state = 'waiting' and sobol_index < $2
+            order by sobol_index limit 1";
+        let ask = sql(ask.to_owned()).bind(campaign).bind(self.indices_below);
+        let first = connection.rows(ask).await?;
+        let attempts = first.first().map_or(Ok(0), |row| row.get_u32("attempts"))?;
+        Ok(if attempts > self.alone_after {
+            (1, u32::MAX)
+        } else {
+            (self.cases_max, self.alone_after)
+        })
+    }
+
     /// Leases the first waiting cases of a campaign.
     async fn take(
         &self,
         connection: &mut Connection,
         campaign: &str,
     ) -> Result<Vec<Leased>, LibraryError> {
+        let (cases_max, attempts_max) = self.share(connection, campaign).await?;
         // The limit stands in a CTE of its own: it is evaluated once, whatever the planner does.
         let take = format!(
             "with next as (
                 select campaign_id as next_campaign, sobol_index as next_index from campaign_case
                 where campaign_id = $1 and state = 'waiting' and sobol_index < $2
+                    and attempts <= $7
                 order by sobol_index limit $3 {})
             update campaign_case set state = 'leased', epoch = epoch + 1, worker = $4,
                 leased_unix_ms = $5, lease_expires_unix_ms = $6
@@ -171,10 +195,11 @@ impl LeaseRequest {
         let take = sql(take)
             .bind(campaign)
             .bind(self.indices_below)
-            .bind(self.cases_max)
+            .bind(cases_max)
             .bind(&self.worker)
             .bind(self.now_unix_ms)
-            .bind(self.now_unix_ms.saturating_add(self.lease_ms));
+            .bind(self.now_unix_ms.saturating_add(self.lease_ms))
+            .bind(attempts_max);
         let leased = |row: &Row| Ok(Leased { case: case_of(row)?, epoch: row.get_u32("epoch")? });
         let rows = connection.rows(take).await?;
         let mut cases = rows.iter().map(leased).collect::<Result<Vec<_>, LibraryError>>()?;

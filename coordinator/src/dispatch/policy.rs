@@ -15,6 +15,10 @@ pub const FAILURES_MAX: u32 = 3;
 /// a case that kills its workers stops after so many.
 pub const LOSSES_MAX: u32 = 20;
 
+/// Attempts without result after which a case is handed out alone, so that it takes no other case
+/// with it if it is what ends its workers, and is soon done if it isn't.
+pub const SUSPECT_AFTER: u32 = 4;
+
 /// Where a case goes after so many attempts without result, the last of which ended so.
 pub const fn after_attempt(ending: Ending, attempts: u32) -> State {
     match ending {

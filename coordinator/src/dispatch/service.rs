@@ -5,7 +5,7 @@ use super::campaigns::{Campaigns, DispatchError, Served};
 use super::messages::{held, library_report, malformed, unavailable, unfit, verdict_message};
 use super::roster::{Roster, Standing};
 use super::settings::Settings;
-use super::{Counts, after_attempt};
+use super::{Counts, SUSPECT_AFTER, after_attempt};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::time::Instant;
@@ -98,6 +98,7 @@ impl Dispatch {
             now_unix_ms: self.now_unix_ms(),
             lease_ms: unix_ms(self.settings.timing.lease),
             after_loss: after_attempt,
+            alone_after: SUSPECT_AFTER,
         };
         let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
         let Some(leased) = leased else {

@@ -156,10 +156,11 @@ impl Evidence<'_> {
         // What is left beside a named effect may be its model's error as well as something new.
         let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
         let alone = first && !round.accepted;
-        let is_port = alone && round.port_p_value <= PORT_ALARM && unknown > 0.5;
+        let nothing = 1.0 - unknown - named.iter().sum::<f64>();
+        let others = named.iter().copied().fold(nothing, f64::max);
+        let is_port = alone && round.port_p_value <= PORT_ALARM && unknown > others;
         // Something is there, but the names that come near failed on withheld speeds.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
-        let nothing = 1.0 - unknown - named.iter().sum::<f64>();
         let unnamed = alone && !is_port && nothing < NOTHING_LEFT;
         let (kept, unknown) =
             if unnamed { (FAILED_SHARE, unknown + failed) } else { (1.0, unknown) };
@@ -229,7 +230,8 @@ impl Evidence<'_> {
                 return;
             }
         }
-        let explained = all.iter().any(|known| known.accepted && !kind.measuring_chain);
+        let explains = |known: &Hypothesis| known.accepted && known.physics != UNKNOWN;
+        let explained = !kind.measuring_chain && all.iter().any(explains);
         let location = match finding.place {
             Place::Everywhere => None,
             Place::Stretch { from_m, to_m } => Some(self.location_between(from_m, to_m)),

@@ -46,6 +46,14 @@ pub struct Fitted {
     pub change: DVector<f64>,
 }
 
+impl Fitted {
+    /// Whether the parameters are such as this kind may have.
+    fn is_plausible(&self) -> bool {
+        let values = self.calibration.values.as_slice();
+        self.candidate.is_plausible(&values[values.len() - self.candidate.free.len()..])
+    }
+}
+
 /// One search for an effect.
 #[derive(Clone, Debug, Default)]
 pub struct Round {

@@ -35,7 +35,8 @@ const RESTARTS: usize = 3;
 const BETTER: f64 = 3.0;
 
 /// Least log evidence for an effect beside one that was accepted before, over the first one's: what
-/// a first effect's model leaves unexplained looks like a small second one.
+/// a first effect's model leaves unexplained looks like a small second one, if not like one that is
+/// everywhere beside a first at a place.
 const FURTHER_SHARE_MIN: f64 = 0.25;
 
 /// Least gain on held-out passes, in nats, for a name.
@@ -153,13 +154,14 @@ impl<'a> Setting<'a> {
                 let fitted = refine(problem, current, &all[template.candidate], template, &start);
                 let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
                 progress(Stage::Refinement, done as f64 / count);
-                fitted.ok()
+                fitted.ok().filter(Fitted::is_plausible)
             })
             .collect();
         fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         round.fitted = once_each(fitted);
         progress(Stage::HeldOut, 0.0);
-        let Some(best) = sure(&round, &self.subject.forward.section, strongest) else {
+        let Some(best) = sure(&round, &self.subject.forward.section, problem.candidates, strongest)
+        else {
             return Ok((round, Vec::new()));
         };
         let with: Vec<Candidate> =
@@ -177,10 +179,17 @@ impl<'a> Setting<'a> {
 
 /// The best candidate, if something unknown does not speak against it and it is sure enough beside
 /// an earlier effect of that log evidence.
-fn sure<'r>(round: &'r Round, section: &Section, strongest: f64) -> Option<&'r Fitted> {
-    let least = (TEMPERATURE * 20_f64.ln()).max(FURTHER_SHARE_MIN * strongest);
+fn sure<'r>(
+    round: &'r Round,
+    section: &Section,
+    accepted: &[Candidate],
+    strongest: f64,
+) -> Option<&'r Fitted> {
     let Probabilities { named, unknown } = round.probabilities();
     let best = round.fitted.first()?;
+    let is_apart = best.candidate.is_everywhere() && !accepted.iter().any(Candidate::is_everywhere);
+    let further = if is_apart { 0.0 } else { FURTHER_SHARE_MIN * strongest };
+    let least = (TEMPERATURE * 20_f64.ln()).max(further);
     let leads = named[0] > unknown || is_shape_at_port(&best.candidate, round, section);
     (leads && best.log_evidence >= least).then_some(best)
 }
@@ -237,12 +246,12 @@ fn starts<'t>(
     let chosen = choose(screened, all, &current.residual);
     let mut starts: Vec<(&Template, DVector<f64>)> =
         chosen.into_iter().map(|template| (template, current.values.clone())).collect();
-    if problem.candidates.is_empty() {
-        // The baseline imitates what is everywhere by values far from the track's.
-        let typical = problem.forward.unknowns.typical();
-        let everywhere = everywhere(templates, all, &current.residual);
-        starts.extend(everywhere.into_iter().map(|template| (template, typical.clone())));
-    }
+    // The baseline imitates what is everywhere by values far from the track's.
+    let unknowns = &problem.forward.unknowns;
+    let mut typical = current.values.clone();
+    typical.rows_mut(0, unknowns.count()).copy_from(&unknowns.typical());
+    let everywhere = everywhere(templates, all, &current.residual);
+    starts.extend(everywhere.into_iter().map(|template| (template, typical.clone())));
     starts
 }
 
@@ -284,10 +293,7 @@ fn refine(
     let mut start: Vec<f64> = start.iter().copied().collect();
     start.extend(candidate.logarithms(&candidate.trials[template.trial]));
     let calibration = with.calibrate(DVector::from_vec(start))?;
-    let count = calibration.values.len();
-    let found = &calibration.values.as_slice()[count - candidate.free.len()..];
-    let log_evidence =
-        calibration.log_evidence - current.log_evidence - candidate.beyond_range(found);
+    let log_evidence = calibration.log_evidence - current.log_evidence;
     let detectability = template.detectability.max(0.0).sqrt();
     let (candidate, change) = (candidate.clone(), template.change.clone());
     Ok(Fitted { candidate, calibration, log_evidence, detectability, change })

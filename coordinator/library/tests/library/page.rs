@@ -55,6 +55,7 @@ async fn work(library: &Library) {
         now_unix_ms,
         lease_ms: 1000,
         after_loss: policy,
+        alone_after: u32::MAX,
     };
     let lease = library.lease(request).await.unwrap().unwrap();
     let campaign = library.campaign(CAMPAIGN).await.unwrap();

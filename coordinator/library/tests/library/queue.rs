@@ -1,9 +1,11 @@
 //! Leases: nobody's case is another's, and none is forgotten.
 
-use crate::support::{CAMPAIGN, Home, failed, finished, held, lease, on_both_databases, report};
+use crate::support::{
+    CAMPAIGN, Home, failed, finished, held, lease, on_both_databases, report, request,
+};
 use std::collections::HashSet;
 use tokio::task::JoinSet;
-use tracktwin_library::{Held, State, Status, Verdict};
+use tracktwin_library::{Held, LeaseRequest, State, Status, Verdict};
 
 fn first_lease(index: u32) -> Held {
     Held { index, epoch: 1 }
@@ -52,6 +54,21 @@ on_both_databases! {
         let failures = library.failures(CAMPAIGN, 10).await.unwrap();
         assert_eq!(failures[0].attempts, 3);
         assert_eq!(failures[0].error.as_deref(), Some("the lease expired: its worker fell silent"));
+    }
+
+    async fn a_case_that_has_lost_workers_twice_goes_alone(home: &Home) {
+        let library = home.library(4).await;
+        // Case 1 takes its worker with it twice, the others are handed back.
+        for now in [0, 1000] {
+            let leased = lease(&library, "w", 4, now).await;
+            let others = leased.iter().filter(|it| it.case.index != 1).map(held).collect();
+            library.release(CAMPAIGN, "w", others).await.unwrap();
+        }
+        for (worker, indices) in [("a", vec![0, 2, 3]), ("b", vec![1])] {
+            let request = LeaseRequest { alone_after: 1, ..request(worker, 4, 2000) };
+            let cases = library.lease(request).await.unwrap().unwrap().cases;
+            assert_eq!(cases.iter().map(|it| it.case.index).collect::<Vec<_>>(), indices);
+        }
     }
 
     async fn a_case_that_fails_is_tried_again_and_then_given_up(home: &Home) {

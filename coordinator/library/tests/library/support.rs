@@ -139,6 +139,7 @@ pub(crate) fn request(worker: &str, max: u32, now: i64) -> LeaseRequest {
         now_unix_ms: now,
         lease_ms: 1000,
         after_loss: policy,
+        alone_after: u32::MAX,
     }
 }
 

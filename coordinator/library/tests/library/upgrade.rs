@@ -45,6 +45,7 @@ async fn a_library_of_the_first_schema_is_gone_on_with() {
         now_unix_ms: library.now_unix_ms(),
         lease_ms: 1000,
         after_loss: policy,
+        alone_after: u32::MAX,
     };
     let lease = library.lease(request).await.unwrap().unwrap();
     assert_eq!((lease.campaign.as_str(), lease.cases.len()), (CAMPAIGN, 1));
