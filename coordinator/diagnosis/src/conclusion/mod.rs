@@ -124,9 +124,11 @@ impl Evidence<'_> {
                     known.physics == hypothesis.physics && known.location == hypothesis.location
                 });
                 match known {
-                    Some(known) => {
+                    Some(known) if known.accepted => {
                         known.probability = known.probability.max(hypothesis.probability);
                     }
+                    Some(known) if known.probability >= hypothesis.probability => {}
+                    Some(known) => *known = hypothesis,
                     None => all.push(hypothesis),
                 }
             }

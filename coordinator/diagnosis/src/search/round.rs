@@ -246,6 +246,9 @@ fn starts<'t>(
     let chosen = choose(screened, all, &current.residual);
     let mut starts: Vec<(&Template, DVector<f64>)> =
         chosen.into_iter().map(|template| (template, current.values.clone())).collect();
+    if problem.candidates.iter().any(Candidate::is_everywhere) {
+        return starts;
+    }
     // The baseline imitates what is everywhere by values far from the track's.
     let unknowns = &problem.forward.unknowns;
     let mut typical = current.values.clone();
