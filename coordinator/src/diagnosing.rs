@@ -7,7 +7,7 @@ use crate::null_campaign;
 use anyhow::Context;
 use tracktwin_diagnosis::{
     Candidate, Diagnosis, Evidence, FirstLook, Search, Stage, Subject, SubjectError,
-    first_calibration, first_look, search,
+    first_calibration, first_look, passes_alone, search,
 };
 use tracktwin_library::Library;
 use tracktwin_parameters::TrackDesign;
@@ -29,6 +29,13 @@ pub struct Setting<'a> {
 pub struct Diagnosed {
     /// What is written down.
     pub diagnosis: Diagnosis,
+    /// The comparison; none where the passes spoke for themselves alone.
+    pub compared: Option<Compared>,
+}
+
+/// A recording's comparison with the model.
+#[derive(Debug)]
+pub struct Compared {
     /// What was compared.
     pub subject: Subject,
     /// What the search found.
@@ -57,9 +64,15 @@ pub async fn diagnose(
 ) -> Result<Diagnosed, DiagnosingError> {
     let Setting { design, library, without } = setting;
     let allowed = |physics: &str| !without.iter().any(|other| other == physics);
-    let mut subject = Subject::new(recording, design)?;
     watch("first look", 0.0);
     let mut look = first_look(recording);
+    let mut subject = match Subject::new(recording, design) {
+        Ok(subject) => subject,
+        Err(reason) => {
+            let diagnosis = passes_alone(recording, &look, &reason).ok_or(reason)?;
+            return Ok(Diagnosed { diagnosis, compared: None });
+        }
+    };
     if let Some(trouble) = look.refusal() {
         return Err(SubjectError::Unusable(trouble.clone()).into());
     }
@@ -79,7 +92,7 @@ pub async fn diagnose(
     let found = tokio::task::block_in_place(|| search(&subject, &null, start, &all, &progress));
     let search = found.context("the search for left-out physics broke down")?;
     let diagnosis = conclude(recording, &subject, &look, &search)?;
-    Ok(Diagnosed { diagnosis, subject, search })
+    Ok(Diagnosed { diagnosis, compared: Some(Compared { subject, search }) })
 }
 
 fn conclude(

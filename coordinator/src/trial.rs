@@ -3,7 +3,8 @@
 //! Owns the order of things and the files; what is hidden and how answers are scored is the trial
 //! crate's. Every step leaves a file, so that an interrupted trial goes on.
 
-use crate::diagnosing::{self, Diagnosed, DiagnosingError, Setting};
+use crate::diagnosing::{self, Compared, Diagnosed, DiagnosingError, Setting};
+use anyhow::Context;
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -205,7 +206,7 @@ impl Trial {
         let recording = Recording::open(self.recording(number))?;
         let before = cpu_s();
         let setting = Setting { design, library: Some(library), without: &[] };
-        let Diagnosed { diagnosis, subject, search } =
+        let (diagnosis, Compared { subject, search }) =
             self.diagnose(number, &recording, setting).await?;
         let cpu_s = cpu_s() - before;
         let path = self.folder.join(format!("diagnoses/{number:04}.json"));
@@ -234,9 +235,13 @@ impl Trial {
         number: u32,
         recording: &Recording,
         setting: Setting<'_>,
-    ) -> Result<Diagnosed, TrialError> {
+    ) -> Result<(Diagnosis, Compared), TrialError> {
         let diagnosed = diagnosing::diagnose(recording, setting, &|_, _| ()).await;
-        diagnosed.map_err(|source| TrialError::Diagnosis { number, source })
+        let compared = diagnosed.and_then(|Diagnosed { diagnosis, compared }| {
+            let compared = compared.context("the recording has no track to compare with")?;
+            Ok((diagnosis, compared))
+        });
+        compared.map_err(|source| TrialError::Diagnosis { number, source })
     }
 
     /// The same recording without the hidden effect's kind in the catalogue.
@@ -249,7 +254,7 @@ impl Trial {
         let without: Vec<String> =
             plan.scene.left_out.iter().map(|hidden| hidden.physics().to_owned()).collect();
         let setting = Setting { without: &without, ..setting };
-        let diagnosis: Diagnosis = self.diagnose(plan.number, recording, setting).await?.diagnosis;
+        let (diagnosis, _) = self.diagnose(plan.number, recording, setting).await?;
         let path = self.folder.join(format!("diagnoses/{:04}-knocked-out.json", plan.number));
         write(&path, &diagnosis)?;
         let unknown = diagnosis.verdict == Verdict::UnknownPhysics;

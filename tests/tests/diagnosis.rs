@@ -5,7 +5,7 @@
 
 use serde_json::Value;
 use std::path::Path;
-use system_tests::{Answer, run};
+use system_tests::{Answer, run, shared_data};
 use tempfile::TempDir;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Recording;
@@ -120,4 +120,28 @@ fn passes_without_a_track_in_them_are_refused() {
         f64::from(state >> 8) / f64::from(1 << 24) - 0.5
     };
     refused(&mut noise, &["passes 1 and 2", "correlation", "noise"]);
+}
+
+#[test]
+fn a_running_train_without_known_sleepers_is_diagnosed_by_its_wheel() {
+    let Some(shared) = shared_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = shared.join("real/aba-k1/aba-k1.csv").display().to_string();
+    let out = folder.path().join("recording").display().to_string();
+    let columns = ["acceleration=acc_left", "time=t_s", "speed=speed_kmh"];
+    let columns = columns.into_iter().flat_map(|column| ["--column", column]);
+    let mut arguments = vec!["import", &file, "--out", &out, "--unit", "unknown"];
+    arguments.extend(columns);
+    assert_eq!(run(PROGRAM, &arguments).code, Some(0));
+    let (answer, diagnosis) = diagnosed(folder.path(), &[]);
+    let diagnosis = diagnosis.unwrap();
+    assert_eq!(answer.code, Some(1), "{}", answer.err);
+    assert_eq!(accepted(&diagnosis)[0].0, "wheel_out_of_round");
+    let turn_m = &diagnosis["hypotheses"][0]["parameters"]["circumference_m"]["mean"];
+    // By hand: 6.545 Hz at 67.38 km/h.
+    assert!((turn_m.as_f64().unwrap() / 2.86 - 1.0).abs() < 0.02, "{turn_m}");
+    let held_out = |side: &str| diagnosis["fit"][side]["held_out"]["score"].as_f64().unwrap();
+    assert!(held_out("after") > 0.5 && held_out("before") < 0.1);
+    let notes = diagnosis["notes"].to_string();
+    assert!(notes.contains("sleepers: their places are not known"), "{notes}");
 }

@@ -36,7 +36,7 @@ pub use bands::Bands;
 pub use baseline::Unknowns;
 pub use calibration::{Calibration, CalibrationError, Problem};
 pub use candidate::{Candidate, candidates};
-pub use conclusion::Evidence;
+pub use conclusion::{Evidence, passes_alone};
 pub use finding::{Finding, Place};
 pub use first_look::{FALSE_ALARMS, FirstLook, first_look};
 pub use forward::{Forward, Linearised};

@@ -29,6 +29,11 @@ const MARGIN_SPANS: f64 = 0.6;
 /// Why a recording cannot be diagnosed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SubjectError {
+    /// No sleepers.
+    #[error(
+        "sleepers: their places are not known; give recording.json theirs, or import with --sleeper"
+    )]
+    NoSleepers,
     /// Too few sleepers.
     #[error(
         "passes: only {sleepers} neighbouring sleepers lie inside every pass with a margin of \
@@ -76,6 +81,9 @@ impl Subject {
         let bands = Bands::new(BANDS_HZ[0], highest_hz.max(BANDS_HZ[0]));
         if bands.count() < BANDS_MIN {
             return Err(SubjectError::SampleRate(recording.sample_rate_hz));
+        }
+        if recording.sleepers.is_empty() {
+            return Err(SubjectError::NoSleepers);
         }
         let sleepers = covered(recording);
         if sleepers.len() < SLEEPERS_MIN {

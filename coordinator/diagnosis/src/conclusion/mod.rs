@@ -1,9 +1,11 @@
 //! From a search to the diagnosis that is written down.
 
+mod alone;
 mod fit;
 mod nameless;
 mod place;
 
+pub use self::alone::passes_alone;
 use self::nameless::UNKNOWN;
 use crate::calibration::CalibrationError;
 use crate::finding::{Finding, Place};
@@ -31,6 +33,9 @@ const REMAINDER_PRIOR: f64 = 0.2;
 /// Greatest probability where nothing could be tested on a speed that was not fitted: structure and
 /// geometry look alike at one speed.
 const ONE_SPEED_MAX: f64 = 0.5;
+
+/// Ratio of two speeds that tells structure from geometry well.
+const SPEED_RATIO: f64 = 1.35;
 
 /// Greatest probability where no pass repeats another: how far passes differ had to be assumed.
 const ONE_PASS_MAX: f64 = 0.9;
@@ -241,6 +246,16 @@ impl Evidence<'_> {
         let estimate =
             |(&name, &(mean, sd)): (&&str, &(f64, f64))| (name.to_owned(), Estimate { mean, sd });
         all.retain(|known| known.accepted || known.physics != finding.physics);
+        if !explained {
+            // The name that came near it is right after all.
+            let is_it = |known: &&mut Hypothesis| {
+                known.physics == UNKNOWN && known.look_alikes.iter().any(|it| it == finding.physics)
+            };
+            for unknown in all.iter_mut().filter(is_it) {
+                unknown.accepted = false;
+                unknown.probability *= FAILED_SHARE;
+            }
+        }
         all.push(Hypothesis {
             physics: finding.physics.to_owned(),
             probability: if explained { probability.min(0.5) } else { probability },
@@ -258,14 +273,7 @@ impl Evidence<'_> {
     fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.look.troubles.iter().map(ToString::to_string).collect();
         if self.speeds() == 1 {
-            let speed_km_h = 3.6 * self.subject.forward.speeds_m_s[0];
-            notes.push(format!(
-                "One speed only: nothing could be tested on a speed that was not fitted, so that \
-                 no name is more certain than {:.0} %. Add a pass at {:.0} km/h or at {:.0} km/h.",
-                100.0 * ONE_SPEED_MAX,
-                speed_km_h / 1.35,
-                speed_km_h * 1.35,
-            ));
+            notes.push(one_speed(3.6 * self.subject.forward.speeds_m_s[0]));
         }
         if !self.repeats() {
             notes.push(format!(
@@ -296,6 +304,16 @@ impl Evidence<'_> {
         }));
         notes
     }
+}
+
+fn one_speed(speed_km_h: f64) -> String {
+    format!(
+        "One speed only: nothing could be tested on a speed that was not fitted, so that no name is \
+         more certain than {:.0} %. Add a pass at {:.0} km/h or at {:.0} km/h.",
+        100.0 * ONE_SPEED_MAX,
+        speed_km_h / SPEED_RATIO,
+        speed_km_h * SPEED_RATIO,
+    )
 }
 
 fn verdict(hypotheses: &[Hypothesis]) -> Verdict {

@@ -3,21 +3,29 @@
 use super::levels::{Side, cells, rms};
 use super::place::Site;
 use super::quantity::{digits, signed};
-use super::words::{addition, speeds};
+use super::words::{accepted, addition, physics, speeds};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Score, Scores};
 
 /// Scores, and differences and gains by speed.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let fit = &diagnosis.fit;
-    let with = addition(diagnosis);
+    // Where no track was compared the first that was found is what the scores are about.
+    let alone = || accepted(diagnosis).next().map(|found| physics(&found.physics));
+    let with = addition(diagnosis).or_else(|| alone().filter(|_| diagnosis.track.is_empty()));
+    let without = if diagnosis.track.is_empty() { "without it" } else { "re-tuned track" };
+    let withheld = if diagnosis.track.is_empty() {
+        "on blocks withheld from it"
+    } else {
+        "on speeds withheld from it"
+    };
     html! {
         h2 { "How well it fits" }
         p { (meaning(diagnosis)) }
         div.scroll { table {
-            thead { tr { th { "model" } th { "score" small { "on what it was fitted to" } } th { "score" small { "on speeds withheld from it" } } } }
+            thead { tr { th { "model" } th { "score" small { "on what it was fitted to" } } th { "score" small { (withheld) } } } }
             tbody {
-                (scores("re-tuned track", &fit.before, false))
+                (scores(without, &fit.before, false))
                 @if let Some(with) = &with { (scores(&format!("with {with}"), &fit.after, true)) }
             }
         } }
@@ -41,6 +49,7 @@ fn meaning(diagnosis: &Diagnosis) -> String {
     let fit = &diagnosis.fit;
     let single = "With a single speed nothing could be withheld, so no model was tested on passes that it had not seen; a second speed would make up for that.";
     match (fit.before.held_out, fit.after.held_out) {
+        _ if diagnosis.track.is_empty() => "No model of a track was compared. Every other block of the recording was withheld, and what was fitted on its neighbours was tried on it.".to_owned(),
         (Some(before), Some(after)) if addition(diagnosis).is_some() => {
             let factor = (after.score - before.score).exp();
             let change = if factor >= 1.0 { "more" } else { "less" };
