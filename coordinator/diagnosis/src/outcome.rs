@@ -90,7 +90,8 @@ pub struct Hypothesis {
     /// Where it is.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub location: Option<Location>,
-    /// Of something unknown, where in the model it acts: `rail_seat` or `wheel`.
+    /// Of something unknown, where in the model it acts: `rail_seat`, `wheel`, `rail_surface` or
+    /// `wheel_surface`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub port: Option<String>,
     /// Its parameters.
