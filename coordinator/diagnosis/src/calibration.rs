@@ -55,6 +55,8 @@ pub struct Calibration {
     pub residual: DVector<f64>,
     /// Whitened derivatives.
     pub jacobian: DMatrix<f64>,
+    /// Derivatives of the log posterior by the values: none where the search came to its end.
+    pub gradient: DVector<f64>,
     /// Posterior precision of the values, factored.
     pub precision: Cholesky<f64, Dyn>,
     /// Half the sum of squares of residual and prior: minus the log posterior, in nats.
@@ -79,27 +81,54 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] when the model breaks down on the way.
     pub fn calibrate(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
+        self.calibrate_among(start, |_| ())
+    }
+
+    /// The same among values that have the last candidate's parameters inside their ranges.
+    ///
+    /// # Errors
+    /// As [`Problem::calibrate`].
+    pub fn calibrate_in_range(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
+        let free = self.candidates.last().map_or(&[][..], |candidate| &candidate.free);
+        self.calibrate_among(start, |values| {
+            let first = values.len() - free.len();
+            for (value, parameter) in values.as_mut_slice()[first..].iter_mut().zip(free) {
+                let [low, high] = Candidate::range(parameter);
+                *value = value.clamp(low, high);
+            }
+        })
+    }
+
+    fn calibrate_among(
+        &self,
+        start: DVector<f64>,
+        confine: impl Fn(&mut DVector<f64>),
+    ) -> Result<Calibration, CalibrationError> {
+        let stepped = |values: &DVector<f64>, step: &DVector<f64>| {
+            let mut stepped = values + step;
+            confine(&mut stepped);
+            stepped
+        };
         let prior = self.prior();
         let mut values = start;
+        confine(&mut values);
         let mut state = self.linearise(&prior, &values)?;
         for _ in 0..STEPS_MAX {
-            let gradient =
-                state.jacobian.tr_mul(&state.residual) - &prior.precision * (&values - &prior.mean);
-            let mut step = state.precision.solve(&gradient);
+            let mut step = state.precision.solve(&state.gradient);
             let longest = step.amax();
             if longest > STEP_MAX {
                 step *= STEP_MAX / longest;
             }
-            let mut objective = self.objective(&prior, &(&values + &step))?;
+            let mut objective = self.objective(&prior, &stepped(&values, &step))?;
             while objective > state.objective && step.amax() > 1e-3 {
                 step *= 0.5;
-                objective = self.objective(&prior, &(&values + &step))?;
+                objective = self.objective(&prior, &stepped(&values, &step))?;
             }
             let gain = state.objective - objective;
             if gain <= 0.0 {
                 break;
             }
-            values += step;
+            values = stepped(&values, &step);
             state = self.linearise(&prior, &values)?;
             if gain < TOLERANCE {
                 break;
@@ -203,8 +232,9 @@ impl Problem<'_> {
         let (residual, jacobian) =
             (self.observation.fitted(&residual), self.observation.fitted_rows(&jacobian));
         let from_prior = values - &prior.mean;
-        let objective =
-            0.5 * (residual.norm_squared() + from_prior.dot(&(&prior.precision * &from_prior)));
+        let pull = &prior.precision * &from_prior;
+        let objective = 0.5 * (residual.norm_squared() + from_prior.dot(&pull));
+        let gradient = jacobian.tr_mul(&residual) - pull;
         let precision = jacobian.tr_mul(&jacobian) + &prior.precision;
         let precision = Cholesky::new(precision).ok_or(CalibrationError::NotFinite)?;
         if !objective.is_finite() {
@@ -214,6 +244,6 @@ impl Problem<'_> {
         let log_evidence =
             -objective + prior.half_log_determinant - 0.5 * precision.ln_determinant();
         let values = values.clone();
-        Ok(Calibration { values, residual, jacobian, precision, objective, log_evidence })
+        Ok(Calibration { values, residual, jacobian, gradient, precision, objective, log_evidence })
     }
 }

@@ -61,9 +61,15 @@ impl Candidate {
     /// Middle and standard deviation of a parameter's logarithm before anything is measured: its
     /// range holds two deviations.
     pub fn prior(parameter: &KindParameter) -> (f64, f64) {
-        let [low, high] = parameter.v_track;
-        let (low, high) = (low.max(LEAST * high).ln(), high.ln());
+        let [low, high] = Self::range(parameter);
         (0.5 * (low + high), 0.5 * (high - low) + 0.1)
+    }
+
+    /// Logarithms of the ends of a parameter's range; of one that may be zero the lower end is a
+    /// hundredth of the upper.
+    pub fn range(parameter: &KindParameter) -> [f64; 2] {
+        let [low, high] = parameter.v_track;
+        [low.max(LEAST * high).ln(), high.ln()]
     }
 }
 

@@ -1,6 +1,7 @@
 //! What was measured, and how well it is known.
 
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// Log powers over the compared sleepers with their covariance, in the order of
 /// [`crate::Forward`]; some of them may be held out from fitting.
@@ -12,28 +13,25 @@ pub struct Observation {
     order: Vec<usize>,
     /// How many of a sleeper's log powers are fitted.
     fitted: usize,
-    /// Inverse Cholesky factor of each sleeper's covariance, in that order.
-    whitening: Vec<DMatrix<f64>>,
+    /// Inverse Cholesky factor of a sleeper's covariance, in that order.
+    whitening: DMatrix<f64>,
 }
 
 impl Observation {
-    /// Log powers with the covariance of each sleeper's; rows for which `held_out` is true are not
-    /// fitted. None if a covariance is none.
+    /// Log powers with the covariance of any one sleeper's; a sleeper's rows for which `held_out` is
+    /// true are not fitted. None if the covariance is none.
     pub fn new(
         log_power: DVector<f64>,
-        covariances: &[DMatrix<f64>],
+        covariance: &DMatrix<f64>,
         held_out: impl Fn(usize) -> bool,
     ) -> Option<Self> {
-        let size = log_power.len() / covariances.len();
+        let size = covariance.nrows();
         let (last, first): (Vec<usize>, Vec<usize>) = (0..size).partition(|&row| held_out(row));
         let fitted = first.len();
         let order = [first, last].concat();
-        let whitening = covariances.iter().map(|covariance| {
-            let ordered = DMatrix::from_fn(size, size, |i, j| covariance[(order[i], order[j])]);
-            let factor = nalgebra::Cholesky::new(ordered)?;
-            factor.l().solve_lower_triangular(&DMatrix::identity(size, size))
-        });
-        let whitening = whitening.collect::<Option<_>>()?;
+        let ordered = DMatrix::from_fn(size, size, |i, j| covariance[(order[i], order[j])]);
+        let factor = nalgebra::Cholesky::new(ordered)?;
+        let whitening = factor.l().solve_lower_triangular(&DMatrix::identity(size, size))?;
         Some(Self { log_power, order, fitted, whitening })
     }
 
@@ -57,10 +55,10 @@ impl Observation {
     pub fn whiten_matrix(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let size = self.order.len();
         let mut whitened = DMatrix::zeros(matrix.nrows(), matrix.ncols());
-        for (sleeper, whitening) in self.whitening.iter().enumerate() {
-            let rows: Vec<usize> = self.order.iter().map(|row| sleeper * size + row).collect();
-            let part = whitening * matrix.select_rows(&rows);
-            whitened.rows_mut(sleeper * size, size).copy_from(&part);
+        for first in (0..matrix.nrows()).step_by(size) {
+            let rows: Vec<usize> = self.order.iter().map(|row| first + row).collect();
+            let part = &self.whitening * matrix.select_rows(&rows);
+            whitened.rows_mut(first, size).copy_from(&part);
         }
         whitened
     }
@@ -87,22 +85,27 @@ impl Observation {
 
     /// Sum over all log powers of the logarithms of their conditional standard deviations.
     pub fn log_deviation(&self) -> f64 {
-        let of = |whitening: &DMatrix<f64>| -whitening.diagonal().map(f64::ln).sum();
-        self.whitening.iter().map(of).sum()
+        self.log_deviation_of(0..self.order.len())
     }
 
     /// Sum over what was held out of the logarithms of its conditional standard deviations.
     pub fn held_out_log_deviation(&self) -> f64 {
-        let of = |whitening: &DMatrix<f64>| -> f64 {
-            (self.fitted..self.order.len()).map(|row| -whitening[(row, row)].ln()).sum()
-        };
-        self.whitening.iter().map(of).sum()
+        self.log_deviation_of(self.fitted..self.order.len())
+    }
+
+    /// Over these of each sleeper's rows, in the order in which they are whitened.
+    fn log_deviation_of(&self, rows: Range<usize>) -> f64 {
+        self.sleepers() as f64 * rows.map(|row| -self.whitening[(row, row)].ln()).sum::<f64>()
+    }
+
+    fn sleepers(&self) -> usize {
+        self.log_power.len() / self.order.len()
     }
 
     fn rows(&self, fitted: bool) -> Vec<usize> {
         let size = self.order.len();
         let part = if fitted { 0..self.fitted } else { self.fitted..size };
-        (0..self.whitening.len())
+        (0..self.sleepers())
             .flat_map(|sleeper| part.clone().map(move |row| sleeper * size + row))
             .collect()
     }

@@ -75,8 +75,8 @@ impl Template {
     /// Logarithm of the evidence for the effect in a whitened residual, against the baseline alone:
     /// with strength `N(1, 0.3^2)` times the trial's (mismatch design, eq. 8).
     ///
-    /// `felt` is the residual's product with the baseline's derivatives, zero for the residual of
-    /// a calibration (up to its prior).
+    /// `felt` is the residual's product with the baseline's derivatives; for the residual of a
+    /// calibration its gradient, which is zero where it came to its end.
     pub fn log_evidence(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> f64 {
         let along = self.change.dot(residual) - self.imitation.dot(felt);
         let square = self.detectability;

@@ -103,10 +103,9 @@ impl Subject {
         Ok(Self { forward, log_power, pass_variance, first_sleeper, pass_numbers })
     }
 
-    /// Covariance of each sleeper's log powers: the null model's, and what the passes do not share.
-    pub fn covariances(&self, null: &NullModel) -> Vec<DMatrix<f64>> {
-        let common = null.covariance(self.forward.bands.count(), &self.pass_variance);
-        vec![common; self.forward.section.sleepers]
+    /// Covariance of any one sleeper's log powers: the null model's, and what the passes do not share.
+    pub fn covariance(&self, null: &NullModel) -> DMatrix<f64> {
+        null.covariance(self.forward.bands.count(), &self.pass_variance)
     }
 }
 

@@ -6,7 +6,7 @@ mod round;
 
 pub(crate) use probability::Probabilities;
 
-use self::round::{Reached, Setting, retuned};
+use self::round::{Setting, is_predicted, retuned, sure};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
@@ -46,14 +46,6 @@ pub struct Fitted {
     pub change: DVector<f64>,
 }
 
-impl Fitted {
-    /// Whether the parameters are such as this kind may have.
-    fn is_plausible(&self) -> bool {
-        let values = self.calibration.values.as_slice();
-        self.candidate.is_plausible(&values[values.len() - self.candidate.free.len()..])
-    }
-}
-
 /// One search for an effect.
 #[derive(Clone, Debug, Default)]
 pub struct Round {
@@ -84,7 +76,7 @@ pub struct Search {
     pub rounds: Vec<Round>,
     /// What was observed, with its covariance.
     pub observation: Observation,
-    /// Scatter to expect of each log power of a sleeper in the middle of the section.
+    /// Scatter to expect of each log power of a sleeper.
     pub deviation: DVector<f64>,
     /// Log density of each speed when it is held out, in nats a log power: baseline, extended.
     pub held_out: [f64; 2],
@@ -106,8 +98,8 @@ fn rough_covariance(subject: &Subject) -> DMatrix<f64> {
 /// # Errors
 /// [`CalibrationError`] when no baseline is found.
 pub fn first_calibration(subject: &Subject) -> Result<DVector<f64>, CalibrationError> {
-    let covariances = vec![rough_covariance(subject); subject.forward.section.sleepers];
-    let observation = Observation::new(subject.log_power.clone(), &covariances, |_| false)
+    let covariance = rough_covariance(subject);
+    let observation = Observation::new(subject.log_power.clone(), &covariance, |_| false)
         .ok_or(CalibrationError::NotFinite)?;
     let problem = Problem { forward: &subject.forward, observation: &observation, candidates: &[] };
     Ok(problem.calibrate(subject.forward.unknowns.typical())?.values)
@@ -137,48 +129,69 @@ pub fn search(
         baseline,
         accepted: Vec::new(),
         rounds: Vec::new(),
-        observation: observation.clone(),
-        deviation: setting.covariances[setting.covariances.len() / 2].diagonal().map(f64::sqrt),
+        observation,
+        deviation: setting.covariance.diagonal().map(f64::sqrt),
         held_out: [0.0; 2],
     };
-    let mut before = setting.held_out(&[], &search.baseline.values)?;
-    let mut reached = before.clone();
-    while search.accepted.len() < EFFECTS_MAX {
-        let accepted = search.accepted.clone();
-        let problem =
-            Problem { forward: &subject.forward, observation: &observation, candidates: &accepted };
-        let strongest = search.rounds.iter().filter_map(|round| round.fitted.first());
-        let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
-        let so_far = Reached { log_densities: &reached, strongest };
-        let (mut round, mut scores) =
-            setting.round(&problem, &search.last, all, so_far, progress)?;
-        if let Some(better) = retuned(&problem, &search.last, &round.fitted)? {
+    let before = setting.held_out(&[], &search.baseline.values)?;
+    let mut densities = Densities { reached: before.clone(), before };
+    while search.accepted.len() < EFFECTS_MAX
+        && search.goes_on(&setting, all, &mut densities, progress)?
+    {}
+    let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
+    search.held_out = [mean(&densities.before), mean(&densities.reached)];
+    Ok(search)
+}
+
+/// Log density of each speed when it is held out.
+struct Densities {
+    /// By the baseline.
+    before: Vec<f64>,
+    /// With all that is accepted so far.
+    reached: Vec<f64>,
+}
+
+impl Search {
+    /// Looks for one effect more; whether one was accepted.
+    fn goes_on(
+        &mut self,
+        setting: &Setting<'_>,
+        all: &[Candidate],
+        densities: &mut Densities,
+        progress: &(impl Fn(Stage, f64) + Sync),
+    ) -> Result<bool, CalibrationError> {
+        let (accepted, observation) = (self.accepted.clone(), self.observation.clone());
+        let forward = &setting.subject.forward;
+        let problem = Problem { forward, observation: &observation, candidates: &accepted };
+        let mut round = setting.round(&problem, &self.last, all, progress)?;
+        if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
             // The candidates found a better baseline on their way: the opponent gets it too.
-            let gain = better.log_evidence - search.last.log_evidence;
-            round.fitted.iter_mut().for_each(|fitted| fitted.log_evidence -= gain);
-            if search.accepted.is_empty() {
-                search.baseline = better.clone();
+            self.last = better;
+            densities.reached = setting.held_out(&accepted, &self.last.values)?;
+            if accepted.is_empty() {
+                self.baseline = self.last.clone();
+                densities.before.clone_from(&densities.reached);
             }
-            search.last = better;
-            reached = setting.held_out(&accepted, &search.last.values)?;
-            if search.accepted.is_empty() {
-                before.clone_from(&reached);
+            round = setting.round(&problem, &self.last, all, progress)?;
+        }
+        progress(Stage::HeldOut, 0.0);
+        let strongest = self.rounds.iter().filter_map(|round| round.fitted.first());
+        let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
+        if let Some(best) = sure(&round, &forward.section, &accepted, strongest) {
+            let with = [&accepted[..], std::slice::from_ref(&best.candidate)].concat();
+            let scores = setting.held_out(&with, &best.calibration.values)?;
+            let pairs = scores.iter().zip(&densities.reached);
+            let gains: Vec<f64> = pairs.map(|(with, without)| with - without).collect();
+            if is_predicted(&gains) {
+                self.last = best.calibration.clone();
+                self.accepted = with;
+                densities.reached = scores;
+                round.accepted = true;
             }
-            let so_far = Reached { log_densities: &reached, strongest };
-            (round, scores) = setting.round(&problem, &search.last, all, so_far, progress)?;
+            round.held_out_gain = gains;
         }
         let goes_on = round.accepted;
-        if let (true, Some(best)) = (goes_on, round.fitted.first()) {
-            search.last = best.calibration.clone();
-            search.accepted.push(best.candidate.clone());
-            reached = scores;
-        }
-        search.rounds.push(round);
-        if !goes_on {
-            break;
-        }
+        self.rounds.push(round);
+        Ok(goes_on)
     }
-    let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
-    search.held_out = [mean(&before), mean(&reached)];
-    Ok(search)
 }

@@ -13,6 +13,7 @@ use crate::section::Section;
 use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_track::extension::Class;
 
 /// Probability of a false alarm on a recording without anything left out.
@@ -42,20 +43,11 @@ const FURTHER_SHARE_MIN: f64 = 0.25;
 /// Least gain on held-out passes, in nats, for a name.
 const HELD_OUT_MIN: f64 = 4.0;
 
-/// How far earlier searches came.
-#[derive(Clone, Copy)]
-pub(super) struct Reached<'a> {
-    /// Log density of each speed when it is held out.
-    pub(super) log_densities: &'a [f64],
-    /// Greatest log evidence of an accepted effect in nats.
-    pub(super) strongest: f64,
-}
-
 /// What stays the same through all searches.
 pub(super) struct Setting<'a> {
     pub(super) subject: &'a Subject,
     pub(super) log_power: DVector<f64>,
-    pub(super) covariances: Vec<DMatrix<f64>>,
+    pub(super) covariance: DMatrix<f64>,
     /// Differences of null simulations, less their offset.
     pub(super) nulls: Vec<DVector<f64>>,
 }
@@ -71,15 +63,15 @@ impl<'a> Setting<'a> {
             .iter()
             .map(|difference| DVector::from_column_slice(difference) - &offset)
             .collect();
-        let covariances = subject.covariances(null);
-        Self { subject, log_power: &subject.log_power - offset, covariances, nulls }
+        let covariance = subject.covariance(null);
+        Self { subject, log_power: &subject.log_power - offset, covariance, nulls }
     }
 
     pub(super) fn observe(
         &self,
         held_out: impl Fn(usize) -> bool,
     ) -> Result<Observation, CalibrationError> {
-        Observation::new(self.log_power.clone(), &self.covariances, held_out)
+        Observation::new(self.log_power.clone(), &self.covariance, held_out)
             .ok_or(CalibrationError::NotFinite)
     }
 
@@ -104,35 +96,48 @@ impl<'a> Setting<'a> {
             .collect()
     }
 
-    /// One search, and the held-out log densities with its best candidate.
+    /// One search: all candidates screened and, if there is anything, the best fitted.
     pub(super) fn round(
         &self,
         problem: &Problem<'_>,
         current: &Calibration,
         all: &[Candidate],
-        Reached { log_densities: reached, strongest }: Reached<'_>,
         progress: &(impl Fn(Stage, f64) + Sync),
-    ) -> Result<(Round, Vec<f64>), CalibrationError> {
+    ) -> Result<Round, CalibrationError> {
         let trials: usize = all.iter().map(|candidate| candidate.trials.len()).sum();
-        let done = std::sync::atomic::AtomicUsize::new(0);
+        let done = AtomicUsize::new(0);
         let templates = templates(problem, current, all, || {
-            let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            let done = done.fetch_add(1, Ordering::Relaxed);
             progress(Stage::Screening, done as f64 / trials as f64);
         })?;
-        let none = DVector::zeros(current.values.len());
         let screened: Vec<(f64, &Template)> = templates
             .iter()
-            .map(|template| (template.log_evidence(&current.residual, &none), template))
+            .map(|template| (template.log_evidence(&current.residual, &current.gradient), template))
             .collect();
+        let mut round = self.alarm(problem, current, &screened)?;
+        if round.p_value <= FALSE_ALARM {
+            let starts = starts(problem, current, all, &templates, screened);
+            round.fitted = fit(problem, current, all, starts, progress);
+        }
+        Ok(round)
+    }
+
+    /// How probable the greatest evidence among candidates and ports is if nothing is left out.
+    fn alarm(
+        &self,
+        problem: &Problem<'_>,
+        current: &Calibration,
+        screened: &[(f64, &Template)],
+    ) -> Result<Round, CalibrationError> {
         let highest = screened.iter().map(|(evidence, _)| *evidence).fold(f64::MIN, f64::max);
         let nulls = whitened(&self.nulls, problem.observation, current);
-        let excess = excess(current, &nulls, self.covariances.len());
+        let excess = excess(current, &nulls, self.subject.forward.section.sleepers);
         let p_value = tail_probability(&nulls, highest / excess, |residual, felt| {
-            let evidence = templates.iter().map(|t| t.log_evidence(residual, felt));
+            let evidence = screened.iter().map(|(_, t)| t.log_evidence(residual, felt));
             Some(evidence.fold(f64::MIN, f64::max))
         });
         let ports = PortScan::new(problem, current)?;
-        let port = ports.best(&current.residual, &none);
+        let port = ports.best(&current.residual, &current.gradient);
         let port_p_value = port.as_ref().map_or(1.0, |port| {
             tail_probability(&nulls, port.log_evidence / excess, |residual, felt| {
                 ports.best(residual, felt).map(|port| port.log_evidence)
@@ -140,46 +145,20 @@ impl<'a> Setting<'a> {
         });
         // The better of two tests.
         let p_value = (2.0 * p_value.min(port_p_value)).min(1.0);
-        let mut round = Round { p_value, port, port_p_value, ..Round::default() };
-        if p_value > FALSE_ALARM {
-            return Ok((round, Vec::new()));
-        }
-        let starts = starts(problem, current, all, &templates, screened);
-        let count = starts.len() as f64;
-        progress(Stage::Refinement, 0.0);
-        let done = std::sync::atomic::AtomicUsize::new(0);
-        let mut fitted: Vec<Fitted> = starts
-            .into_par_iter()
-            .filter_map(|(template, start)| {
-                let fitted = refine(problem, current, &all[template.candidate], template, &start);
-                let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-                progress(Stage::Refinement, done as f64 / count);
-                fitted.ok().filter(Fitted::is_plausible)
-            })
-            .collect();
-        fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        round.fitted = once_each(fitted);
-        progress(Stage::HeldOut, 0.0);
-        let Some(best) = sure(&round, &self.subject.forward.section, problem.candidates, strongest)
-        else {
-            return Ok((round, Vec::new()));
-        };
-        let with: Vec<Candidate> =
-            problem.candidates.iter().chain([&best.candidate]).cloned().collect();
-        let scores = self.held_out(&with, &best.calibration.values)?;
-        round.held_out_gain =
-            scores.iter().zip(reached).map(|(with, without)| with - without).collect();
-        let gain: f64 = round.held_out_gain.iter().sum();
-        let lost = round.held_out_gain.iter().filter(|gain| **gain <= 0.0).count();
-        let predicted = round.held_out_gain.is_empty() || (gain >= HELD_OUT_MIN && lost <= 1);
-        round.accepted = predicted;
-        Ok((round, scores))
+        Ok(Round { p_value, port, port_p_value, ..Round::default() })
     }
+}
+
+/// Whether gains on held-out speeds in nats are those of a name; without a second speed nothing
+/// speaks against one.
+pub(super) fn is_predicted(gains: &[f64]) -> bool {
+    let lost = gains.iter().filter(|gain| **gain <= 0.0).count();
+    gains.is_empty() || (gains.iter().sum::<f64>() >= HELD_OUT_MIN && lost <= 1)
 }
 
 /// The best candidate, if something unknown does not speak against it and it is sure enough beside
 /// an earlier effect of that log evidence.
-fn sure<'r>(
+pub(super) fn sure<'r>(
     round: &'r Round,
     section: &Section,
     accepted: &[Candidate],
@@ -282,7 +261,32 @@ fn once_each(fitted: Vec<Fitted>) -> Vec<Fitted> {
     kept
 }
 
-/// Fits a candidate together with the baseline, from these values, and what was accepted before.
+/// Fits candidates one by one from these values; the fits, best first.
+fn fit(
+    problem: &Problem<'_>,
+    current: &Calibration,
+    all: &[Candidate],
+    starts: Vec<(&Template, DVector<f64>)>,
+    progress: &(impl Fn(Stage, f64) + Sync),
+) -> Vec<Fitted> {
+    let count = starts.len() as f64;
+    progress(Stage::Refinement, 0.0);
+    let done = AtomicUsize::new(0);
+    let mut fitted: Vec<Fitted> = starts
+        .into_par_iter()
+        .filter_map(|(template, start)| {
+            let fitted = refine(problem, current, &all[template.candidate], template, &start);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress(Stage::Refinement, done as f64 / count);
+            fitted.ok()
+        })
+        .collect();
+    fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    once_each(fitted)
+}
+
+/// Fits a candidate together with the baseline, from these values, and what was accepted before; in
+/// its parameters' ranges if it would end far beyond.
 fn refine(
     problem: &Problem<'_>,
     current: &Calibration,
@@ -295,7 +299,12 @@ fn refine(
     let with = Problem { candidates: &candidates, ..*problem };
     let mut start: Vec<f64> = start.iter().copied().collect();
     start.extend(candidate.logarithms(&candidate.trials[template.trial]));
-    let calibration = with.calibrate(DVector::from_vec(start))?;
+    let start = DVector::from_vec(start);
+    let mut calibration = with.calibrate(start.clone())?;
+    let count = calibration.values.len();
+    if !candidate.is_plausible(&calibration.values.as_slice()[count - candidate.free.len()..]) {
+        calibration = with.calibrate_in_range(start)?;
+    }
     let log_evidence = calibration.log_evidence - current.log_evidence;
     let detectability = template.detectability.max(0.0).sqrt();
     let (candidate, change) = (candidate.clone(), template.change.clone());
