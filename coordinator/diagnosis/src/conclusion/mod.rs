@@ -8,6 +8,7 @@ mod place;
 pub use self::alone::passes_alone;
 use self::nameless::UNKNOWN;
 use crate::calibration::CalibrationError;
+use crate::chain::Trouble;
 use crate::finding::{Finding, Place};
 use crate::first_look::FirstLook;
 use crate::outcome::{Diagnosis, Estimate, FORMAT, Hypothesis, Verdict};
@@ -144,14 +145,17 @@ impl Evidence<'_> {
         for finding in &self.look.nameless {
             self.add_nameless(finding, &mut all);
         }
-        // What a faulty chain makes of the recording is not unknown physics.
+        // What a faulty chain makes of the recording is not unknown physics, and what is left of a
+        // saturated one no physics at all.
         let is_chain = |known: &Hypothesis| {
-            known.accepted
-                && Kind::from_name(&known.physics).is_some_and(|kind| kind.measuring_chain)
+            Kind::from_name(&known.physics).is_some_and(|kind| kind.measuring_chain)
         };
-        if all.iter().any(is_chain) {
-            let unknown = all.iter_mut().filter(|known| Kind::from_name(&known.physics).is_none());
-            unknown.for_each(|unknown| unknown.accepted = false);
+        if all.iter().any(|known| known.accepted && is_chain(known)) {
+            let saturated = |trouble: &Trouble| matches!(trouble, Trouble::Saturated { .. });
+            let is_saturated = self.look.troubles.iter().any(saturated);
+            for known in &mut all {
+                known.accepted &= is_chain(known) || (known.physics != UNKNOWN && !is_saturated);
+            }
         }
         all.retain(|hypothesis| hypothesis.accepted || hypothesis.probability >= PROBABILITY_MIN);
         all

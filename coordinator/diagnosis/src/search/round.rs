@@ -37,7 +37,7 @@ const BETTER: f64 = 3.0;
 
 /// Least log evidence for an effect beside one that was accepted before, over the first one's: what
 /// a first effect's model leaves unexplained looks like a small second one, if not like one that is
-/// everywhere beside a first at a place.
+/// everywhere beside a shape at a place.
 const FURTHER_SHARE_MIN: f64 = 0.25;
 
 /// Least gain on held-out passes, in nats, for a name.
@@ -166,17 +166,23 @@ pub(super) fn sure<'r>(
 ) -> Option<&'r Fitted> {
     let Probabilities { named, unknown } = round.probabilities();
     let best = round.fitted.first()?;
-    let is_apart = best.candidate.is_everywhere() && !accepted.iter().any(Candidate::is_everywhere);
+    let is_apart = best.candidate.is_everywhere() && accepted.iter().all(is_local_shape);
     let further = if is_apart { 0.0 } else { FURTHER_SHARE_MIN * strongest };
     let least = (TEMPERATURE * 20_f64.ln()).max(further);
     let leads = named[0] > unknown || is_shape_at_port(&best.candidate, round, section);
     (leads && best.log_evidence >= least).then_some(best)
 }
 
+/// Whether it is a shape of the rail at a place: it adds power there, and what its model lacks does
+/// not look like another track.
+fn is_local_shape(candidate: &Candidate) -> bool {
+    candidate.kind.classes.contains(&Class::Wavelength) && !candidate.is_everywhere()
+}
+
 /// Whether a candidate is a shape of the rail where the unknown is: the force of a shape adds to the
 /// surface's with a phase that mean powers leave out, so that an unknown fits better beside it.
 fn is_shape_at_port(candidate: &Candidate, round: &Round, section: &Section) -> bool {
-    let is_shape = candidate.kind.classes.contains(&Class::Wavelength);
+    let is_shape = is_local_shape(candidate);
     let Some(Port { place: PortPlace::Seats(seats), .. }) = &round.port else { return false };
     let Some([from_m, to_m]) = candidate.extension.x_m else { return false };
     let spacing_m = section.design.sleeper.spacing_m;
@@ -225,7 +231,7 @@ fn starts<'t>(
     let chosen = choose(screened, all, &current.residual);
     let mut starts: Vec<(&Template, DVector<f64>)> =
         chosen.into_iter().map(|template| (template, current.values.clone())).collect();
-    if problem.candidates.iter().any(Candidate::is_everywhere) {
+    if !problem.candidates.iter().all(is_local_shape) {
         return starts;
     }
     // The baseline imitates what is everywhere by values far from the track's.
