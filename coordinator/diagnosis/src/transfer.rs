@@ -46,7 +46,7 @@ impl Transfer {
             let by_node: Vec<Complex64> = nodes.map(|(power, k)| 2.0 * power * k).collect();
             for column in columns {
                 for (receptance, by_node) in column.iter_mut().zip(&by_node) {
-                    *receptance *= *receptance * by_node;
+                    *receptance = receptance.powi(2) * by_node;
                 }
             }
         }
