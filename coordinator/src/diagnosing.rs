@@ -69,6 +69,7 @@ pub async fn diagnose(
     let mut subject = match Subject::new(recording, design) {
         Ok(subject) => subject,
         Err(reason) => {
+            look.forget(allowed);
             let diagnosis = passes_alone(recording, &look, &reason).ok_or(reason)?;
             return Ok(Diagnosed { diagnosis, compared: None });
         }

@@ -180,7 +180,7 @@ pub struct SleeperValues {
 }
 
 /// Levels in dB re 1 (m/s2)2: `[speed][sleeper][band]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Levels {
     /// Centres of the bands.
     #[serde(rename = "frequency_Hz")]

@@ -413,14 +413,7 @@ fn missing_levels_leave_gaps_and_no_levels_leave_out_the_pictures() {
     gaps.levels.measured_db[1][13][5] = f64::NAN;
     gaps.levels.after_db[0].truncate(20);
     page("gaps", &gaps);
-    let nothing = Levels {
-        frequency_hz: Vec::new(),
-        speeds_km_h: Vec::new(),
-        measured_db: Vec::new(),
-        before_db: Vec::new(),
-        after_db: Vec::new(),
-        scatter_db: Vec::new(),
-    };
-    let page = page("nothing", &Diagnosis { levels: nothing, track: Vec::new(), ..unknown() });
+    let page =
+        page("nothing", &Diagnosis { levels: Levels::default(), track: Vec::new(), ..unknown() });
     assert_reads(&page, &["unknown physics", "800 to 1425 Hz"]);
 }

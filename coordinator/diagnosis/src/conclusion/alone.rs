@@ -1,11 +1,9 @@
 //! What the passes tell by themselves where no model of the track can be compared with them.
 
-use super::{ONE_PASS_MAX, ONE_SPEED_MAX, names, one_speed, verdict};
+use super::{ONE_PASS_MAX, ONE_SPEED_MAX, one_speed, probability, seen, shown, verdict};
 use crate::finding::{Finding, Place};
 use crate::first_look::FirstLook;
-use crate::outcome::{
-    Diagnosis, Estimate, FORMAT, Fit, Hypothesis, Levels, Location, Score, Scores,
-};
+use crate::outcome::{Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Score, Scores};
 use crate::subject::SubjectError;
 use crate::wheel::{Comb, CombBlock};
 use std::collections::BTreeMap;
@@ -48,9 +46,7 @@ pub fn passes_alone(
         notes.push("The unit of the signal is not known: amplitudes are relative.".to_owned());
     }
     notes.extend(look.troubles.iter().map(ToString::to_string));
-    notes.extend(look.findings.iter().map(|finding| {
-        format!("The passes alone show {}: {}.", finding.physics, finding.evidence)
-    }));
+    notes.extend(look.findings.iter().map(shown));
     Some(Diagnosis {
         format: FORMAT.to_owned(),
         recording: recording.name.clone(),
@@ -58,17 +54,10 @@ pub fn passes_alone(
         sentence,
         mismatches: Vec::new(),
         hypotheses,
-        fit: fit(recording, look.comb.as_ref()),
+        fit: fit(recording, look.comb.as_ref().filter(|_| is_comb(&best.physics, look))),
         bias_removed: BTreeMap::new(),
         track: Vec::new(),
-        levels: Levels {
-            frequency_hz: Vec::new(),
-            speeds_km_h: Vec::new(),
-            measured_db: Vec::new(),
-            before_db: Vec::new(),
-            after_db: Vec::new(),
-            scatter_db: Vec::new(),
-        },
+        levels: Levels::default(),
         notes,
     })
 }
@@ -96,19 +85,10 @@ fn hypothesis(recording: &Recording, look: &FirstLook, finding: &Finding) -> Opt
             Some(Location { x_m: [from_m, to_m], sleepers })
         }
     };
-    let estimate =
-        |(&name, &(mean, sd)): (&&str, &(f64, f64))| (name.to_owned(), Estimate { mean, sd });
     Some(Hypothesis {
-        physics: finding.physics.to_owned(),
-        probability: (1.0 - finding.p_value.clamp(1e-6, 1.0)).min(most),
+        probability: probability(finding).min(most),
         accepted: is_tested || kind.measuring_chain,
-        location,
-        port: None,
-        parameters: finding.parameters.iter().map(estimate).collect(),
-        look_alikes: names(kind),
-        would_separate: kind.would_separate.to_owned(),
-        detectability: 0.0,
-        log_evidence: -finding.p_value.max(1e-300).ln(),
+        ..seen(finding, kind, location)
     })
 }
 

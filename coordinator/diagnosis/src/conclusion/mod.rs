@@ -9,9 +9,9 @@ pub use self::alone::passes_alone;
 use self::nameless::UNKNOWN;
 use crate::calibration::CalibrationError;
 use crate::chain::Trouble;
-use crate::finding::{Finding, Place};
+use crate::finding::Finding;
 use crate::first_look::FirstLook;
-use crate::outcome::{Diagnosis, Estimate, FORMAT, Hypothesis, Verdict};
+use crate::outcome::{Diagnosis, Estimate, FORMAT, Hypothesis, Location, Verdict};
 use crate::port_scan::PortPlace;
 use crate::search::{Fitted, Probabilities, Round, Search};
 use crate::sentence::sentence;
@@ -233,7 +233,7 @@ impl Evidence<'_> {
     /// What the passes alone show stands by itself where the model has not found it as well.
     fn add_finding(&self, finding: &Finding, all: &mut Vec<Hypothesis>) {
         let Some(kind) = Kind::from_name(finding.physics) else { return };
-        let probability = 1.0 - finding.p_value.clamp(1e-6, 1.0);
+        let probability = probability(finding);
         let known = all.iter_mut().find(|known| known.physics == finding.physics);
         if let Some(known) = known {
             known.probability = known.probability.max(probability);
@@ -243,12 +243,6 @@ impl Evidence<'_> {
         }
         let explains = |known: &Hypothesis| known.accepted && known.physics != UNKNOWN;
         let explained = !kind.measuring_chain && all.iter().any(explains);
-        let location = match finding.place {
-            Place::Everywhere => None,
-            Place::Stretch { from_m, to_m } => Some(self.location_between(from_m, to_m)),
-        };
-        let estimate =
-            |(&name, &(mean, sd)): (&&str, &(f64, f64))| (name.to_owned(), Estimate { mean, sd });
         all.retain(|known| known.accepted || known.physics != finding.physics);
         if !explained {
             // The name that came near it is right after all.
@@ -261,16 +255,9 @@ impl Evidence<'_> {
             }
         }
         all.push(Hypothesis {
-            physics: finding.physics.to_owned(),
             probability: if explained { probability.min(0.5) } else { probability },
             accepted: !explained,
-            location,
-            port: None,
-            parameters: finding.parameters.iter().map(estimate).collect(),
-            look_alikes: names(kind),
-            would_separate: kind.would_separate.to_owned(),
-            detectability: 0.0,
-            log_evidence: -finding.p_value.max(1e-300).ln(),
+            ..seen(finding, kind, self.location_of_finding(finding))
         });
     }
 
@@ -303,17 +290,42 @@ impl Evidence<'_> {
                 ));
             }
         }
-        notes.extend(self.look.findings.iter().map(|finding| {
-            format!("The passes alone show {}: {}.", finding.physics, finding.evidence)
-        }));
+        notes.extend(self.look.findings.iter().map(shown));
         notes
     }
 }
 
+/// What a finding says as a hypothesis: accepted, as probable as it says.
+fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -> Hypothesis {
+    let estimate =
+        |(&name, &(mean, sd)): (&&str, &(f64, f64))| (name.to_owned(), Estimate { mean, sd });
+    Hypothesis {
+        physics: finding.physics.to_owned(),
+        probability: probability(finding),
+        accepted: true,
+        location,
+        port: None,
+        parameters: finding.parameters.iter().map(estimate).collect(),
+        look_alikes: names(kind),
+        would_separate: kind.would_separate.to_owned(),
+        detectability: 0.0,
+        log_evidence: -finding.p_value.max(1e-300).ln(),
+    }
+}
+
+fn probability(finding: &Finding) -> f64 {
+    1.0 - finding.p_value.clamp(1e-6, 1.0)
+}
+
+/// A finding as a sentence.
+fn shown(finding: &Finding) -> String {
+    format!("The passes alone show {}: {}.", finding.physics, finding.evidence)
+}
+
 fn one_speed(speed_km_h: f64) -> String {
     format!(
-        "One speed only: nothing could be tested on a speed that was not fitted, so that no name is \
-         more certain than {:.0} %. Add a pass at {:.0} km/h or at {:.0} km/h.",
+        "One speed only: nothing could be tested on a speed that was not fitted, so that no name \
+         that needs such a test is more certain than {:.0} %. Add a pass at {:.0} km/h or at {:.0} km/h.",
         100.0 * ONE_SPEED_MAX,
         speed_km_h / SPEED_RATIO,
         speed_km_h * SPEED_RATIO,

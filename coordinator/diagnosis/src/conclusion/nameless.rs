@@ -1,7 +1,7 @@
 //! What shows in the passes themselves, but has no name in the catalogue.
 
-use super::{Evidence, FAILED_SHARE};
-use crate::finding::{Finding, Place};
+use super::{Evidence, FAILED_SHARE, seen};
+use crate::finding::Finding;
 use crate::outcome::{Hypothesis, Location};
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{Class, Kind};
@@ -17,10 +17,7 @@ impl Evidence<'_> {
         else {
             return;
         };
-        let location = match finding.place {
-            Place::Everywhere => None,
-            Place::Stretch { from_m, to_m } => Some(self.location_between(from_m, to_m)),
-        };
+        let location = self.location_of_finding(finding);
         let there = |other: &&mut Hypothesis| {
             is_shape(&other.physics) && meet(location.as_ref(), other.location.as_ref())
         };
@@ -40,15 +37,11 @@ impl Evidence<'_> {
         all.retain(|other| other.physics != UNKNOWN);
         all.push(Hypothesis {
             physics: UNKNOWN.to_owned(),
-            probability: 1.0 - finding.p_value.clamp(1e-6, 1.0),
-            accepted: true,
-            location,
             port: Some(port.to_owned()),
             parameters: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: would_separate.to_owned(),
-            detectability: 0.0,
-            log_evidence: -finding.p_value.max(1e-300).ln(),
+            ..seen(finding, kind, location)
         });
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Evidence;
 use crate::candidate::Candidate;
+use crate::finding::{Finding, Place};
 use crate::outcome::{Levels, Location, Mismatch, Verdict};
 use crate::port_scan::PortPlace;
 use nalgebra::DVector;
@@ -54,6 +55,13 @@ impl Evidence<'_> {
         };
         let sleepers = (0..section.sleepers).filter(near).map(|sleeper| self.id(sleeper));
         Location { x_m: [from_m, to_m], sleepers: sleepers.collect() }
+    }
+
+    pub(super) fn location_of_finding(&self, finding: &Finding) -> Option<Location> {
+        match finding.place {
+            Place::Everywhere => None,
+            Place::Stretch { from_m, to_m } => Some(self.location_between(from_m, to_m)),
+        }
     }
 
     pub(super) fn id(&self, sleeper: usize) -> String {

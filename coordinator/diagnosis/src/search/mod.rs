@@ -174,10 +174,10 @@ impl Search {
             }
             round = setting.round(&problem, &self.last, all, progress)?;
         }
-        progress(Stage::HeldOut, 0.0);
         let strongest = self.rounds.iter().filter_map(|round| round.fitted.first());
         let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
         if let Some(best) = sure(&round, &forward.section, &accepted, strongest) {
+            progress(Stage::HeldOut, 0.0);
             let with = [&accepted[..], std::slice::from_ref(&best.candidate)].concat();
             let scores = setting.held_out(&with, &best.calibration.values)?;
             let pairs = scores.iter().zip(&densities.reached);
