@@ -22,6 +22,9 @@ pub struct Setting<'a> {
     pub library: Option<&'a Library>,
     /// Kinds of physics that may not be named.
     pub without: &'a [String],
+    /// Seed by which sleepers are shuffled, at each speed otherwise: a control in which nothing has
+    /// a place, and the passes don't speak for themselves.
+    pub shuffle: Option<u64>,
 }
 
 /// A diagnosis and what it was concluded from.
@@ -62,7 +65,7 @@ pub async fn diagnose(
     setting: Setting<'_>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Diagnosed, DiagnosingError> {
-    let Setting { design, library, without } = setting;
+    let Setting { design, library, without, shuffle } = setting;
     let allowed = |physics: &str| !without.iter().any(|other| other == physics);
     watch("first look", 0.0);
     let mut look = first_look(recording);
@@ -78,6 +81,11 @@ pub async fn diagnose(
         return Err(SubjectError::Unusable(trouble.clone()).into());
     }
     look.forget(allowed);
+    if let Some(seed) = shuffle {
+        look.ignore();
+        let (speeds, sleepers) = (subject.pass_numbers.len(), subject.forward.section.sleepers);
+        subject.shuffle(&tracktwin_trial::orders(seed, speeds, sleepers));
+    }
     let suggested = subject.suggested(&look);
     watch("baseline", 0.0);
     let start = first_calibration(&subject).context("no baseline fits")?;

@@ -30,6 +30,8 @@ pub struct Trial {
     pub folder: PathBuf,
     /// Whether single effects are diagnosed again without their kind.
     pub knock_out: bool,
+    /// Whether local effects that were found are diagnosed again with shuffled sleepers.
+    pub shuffle: bool,
     /// Whether recordings are removed once they are scored.
     pub discard_recordings: bool,
 }
@@ -170,11 +172,12 @@ impl Trial {
         let design = Preset::VTrack.design();
         let mut scores = Vec::new();
         for number in 0..self.cases {
-            let known = Self::read::<Score>(&self.score_path(number))?;
-            let score = match known {
-                Some(score) if score.knocked_out.is_some() || !self.to_knock_out(&score) => score,
-                _ => self.case(number, &design, library).await?,
+            let score = match Self::read::<Score>(&self.score_path(number))? {
+                Some(score) => score,
+                None => self.case(number, &design, library).await?,
             };
+            let score = self.controlled(score, &design, library).await?;
+            self.discard(number)?;
             let said = if score.is_right() { "right" } else { "not as it should be" };
             progress(u64::from(number) + 1, &format!("case {number}: {said}"));
             scores.push(score);
@@ -192,8 +195,52 @@ impl Trial {
         Ok(summary)
     }
 
-    fn to_knock_out(&self, score: &Score) -> bool {
-        self.knock_out && score.can_be_knocked_out()
+    /// A score with the controls that are wanted and not made yet.
+    async fn controlled(
+        &self,
+        mut score: Score,
+        design: &TrackDesign,
+        library: &Library,
+    ) -> Result<Score, TrialError> {
+        let knock_out = self.knock_out && score.can_be_knocked_out() && score.knocked_out.is_none();
+        let shuffle = self.shuffle && score.can_be_shuffled() && score.shuffled.is_none();
+        if !knock_out && !shuffle {
+            return Ok(score);
+        }
+        let plan = self.opened(score.number)?;
+        let recording = self.again(&plan)?;
+        let setting = Setting { design, library: Some(library), without: &[], shuffle: None };
+        if knock_out {
+            score.knocked_out = Some(self.knocked_out(&plan, &recording, setting).await?);
+        }
+        if shuffle {
+            let setting = Setting { shuffle: Some(self.seed), ..setting };
+            let (diagnosis, _) = self.diagnose(score.number, &recording, setting).await?;
+            write(
+                &self.folder.join(format!("diagnoses/{:04}-shuffled.json", score.number)),
+                &diagnosis,
+            )?;
+            score.shuffled = Some(diagnosis.verdict);
+        }
+        write(&self.score_path(score.number), &score)?;
+        Ok(score)
+    }
+
+    /// A case's recording, made once more if it was discarded.
+    fn again(&self, plan: &Plan) -> Result<Recording, TrialError> {
+        let folder = self.recording(plan.number);
+        if !folder.exists() {
+            tracktwin_truth::record(&plan.scene, &folder)?;
+        }
+        Ok(Recording::open(folder)?)
+    }
+
+    fn discard(&self, number: u32) -> Result<(), TrialError> {
+        let folder = self.recording(number);
+        if !self.discard_recordings || !folder.exists() {
+            return Ok(());
+        }
+        std::fs::remove_dir_all(&folder).map_err(|source| file(&folder, source))
     }
 
     /// One case: diagnosed, written down, opened, scored.
@@ -205,7 +252,7 @@ impl Trial {
     ) -> Result<Score, TrialError> {
         let recording = Recording::open(self.recording(number))?;
         let before = cpu_s();
-        let setting = Setting { design, library: Some(library), without: &[] };
+        let setting = Setting { design, library: Some(library), without: &[], shuffle: None };
         let (diagnosis, Compared { subject, search }) =
             self.diagnose(number, &recording, setting).await?;
         let cpu_s = cpu_s() - before;
@@ -218,15 +265,8 @@ impl Trial {
             .iter()
             .map(|hidden| detectability(&recording, &subject, &search, &plan.scene, hidden))
             .collect::<Result<_, _>>()?;
-        let mut score = score(&plan, &diagnosis, &lengths, cpu_s);
-        if self.to_knock_out(&score) {
-            score.knocked_out = Some(self.knocked_out(&plan, &recording, setting).await?);
-        }
+        let score = score(&plan, &diagnosis, &lengths, cpu_s);
         write(&self.score_path(number), &score)?;
-        if self.discard_recordings {
-            let folder = self.recording(number);
-            std::fs::remove_dir_all(&folder).map_err(|source| file(&folder, source))?;
-        }
         Ok(score)
     }
 

@@ -15,11 +15,17 @@ const STEPS_MAX: usize = 10;
 /// Largest change of a logarithm in one step: further the linearisation does not carry.
 const STEP_MAX: f64 = 0.7;
 
+/// Steps shorter than this lead nowhere.
+const STEP_MIN: f64 = 1e-3;
+
 /// The search ends when the objective falls by less, in nats.
 const TOLERANCE: f64 = 0.2;
 
+/// A logarithm so near to the end of its range is at it.
+const AT_END: f64 = 1e-9;
+
 /// Step of a logarithm by which extensions' parameters are varied for derivatives.
-const VARIATION: f64 = 1e-2;
+const VARIATION: f64 = 1e-3;
 
 /// Why no calibration is found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -65,6 +71,61 @@ pub struct Calibration {
     pub log_evidence: f64,
 }
 
+/// Ranges of the last values; all others are free.
+#[derive(Default)]
+struct Ranges {
+    first: usize,
+    each: Vec<[f64; 2]>,
+}
+
+impl Ranges {
+    fn confine(&self, values: &mut DVector<f64>) {
+        for (offset, [low, high]) in self.each.iter().enumerate() {
+            let value = &mut values[self.first + offset];
+            *value = value.clamp(*low, *high);
+        }
+    }
+
+    /// The step to where a state's gradient vanishes, as far as it stays inside: what is at its
+    /// range's end and would leave is kept there, and the others' step is found without it.
+    fn step(&self, state: &Calibration) -> Option<DVector<f64>> {
+        let mut step = state.precision.solve(&state.gradient);
+        let factor = state.precision.l();
+        let mut precision = &factor * factor.transpose();
+        let mut gradient = state.gradient.clone();
+        while let Some(kept) = self.leaving(&state.values, &step) {
+            precision.row_mut(kept).fill(0.0);
+            precision.column_mut(kept).fill(0.0);
+            precision[(kept, kept)] = 1.0;
+            gradient[kept] = 0.0;
+            step = Cholesky::new(precision.clone())?.solve(&gradient);
+        }
+        let inside = self.each.iter().enumerate().map(|(offset, range)| {
+            let index = self.first + offset;
+            part_inside(*range, state.values[index], step[index])
+        });
+        Some(&step * inside.fold(1.0, f64::min))
+    }
+
+    /// A value at its range's end that a step would take out of it.
+    fn leaving(&self, values: &DVector<f64>, step: &DVector<f64>) -> Option<usize> {
+        let leaves = |(offset, [low, high]): (usize, &[f64; 2])| {
+            let index = self.first + offset;
+            let (value, step) = (values[index], step[index]);
+            let is_out =
+                (value - low < AT_END && step < 0.0) || (high - value < AT_END && step > 0.0);
+            is_out.then_some(index)
+        };
+        self.each.iter().enumerate().find_map(leaves)
+    }
+}
+
+/// The part of a step after which a value comes to the end of its range, at most one.
+fn part_inside([low, high]: [f64; 2], value: f64, step: f64) -> f64 {
+    let room = if step < 0.0 { low - value } else { high - value };
+    if step == 0.0 { 1.0 } else { (room / step).min(1.0) }
+}
+
 struct Prior {
     mean: DVector<f64>,
     precision: DMatrix<f64>,
@@ -81,7 +142,7 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] when the model breaks down on the way.
     pub fn calibrate(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
-        self.calibrate_among(start, |_| ())
+        self.calibrate_among(start, &Ranges::default())
     }
 
     /// The same among values that have the last candidate's parameters inside their ranges.
@@ -90,45 +151,36 @@ impl Problem<'_> {
     /// As [`Problem::calibrate`].
     pub fn calibrate_in_range(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
         let free = self.candidates.last().map_or(&[][..], |candidate| &candidate.free);
-        self.calibrate_among(start, |values| {
-            let first = values.len() - free.len();
-            for (value, parameter) in values.as_mut_slice()[first..].iter_mut().zip(free) {
-                let [low, high] = Candidate::range(parameter);
-                *value = value.clamp(low, high);
-            }
-        })
+        let first = start.len() - free.len();
+        let each = free.iter().map(|parameter| Candidate::range(parameter)).collect();
+        self.calibrate_among(start, &Ranges { first, each })
     }
 
     fn calibrate_among(
         &self,
         start: DVector<f64>,
-        confine: impl Fn(&mut DVector<f64>),
+        ranges: &Ranges,
     ) -> Result<Calibration, CalibrationError> {
-        let stepped = |values: &DVector<f64>, step: &DVector<f64>| {
-            let mut stepped = values + step;
-            confine(&mut stepped);
-            stepped
-        };
         let prior = self.prior();
         let mut values = start;
-        confine(&mut values);
+        ranges.confine(&mut values);
         let mut state = self.linearise(&prior, &values)?;
         for _ in 0..STEPS_MAX {
-            let mut step = state.precision.solve(&state.gradient);
+            let mut step = ranges.step(&state).ok_or(CalibrationError::NotFinite)?;
             let longest = step.amax();
             if longest > STEP_MAX {
                 step *= STEP_MAX / longest;
             }
-            let mut objective = self.objective(&prior, &stepped(&values, &step))?;
-            while objective > state.objective && step.amax() > 1e-3 {
+            let mut objective = self.objective(&prior, &(&values + &step))?;
+            while objective > state.objective && step.amax() > STEP_MIN {
                 step *= 0.5;
-                objective = self.objective(&prior, &stepped(&values, &step))?;
+                objective = self.objective(&prior, &(&values + &step))?;
             }
             let gain = state.objective - objective;
             if gain <= 0.0 {
                 break;
             }
-            values = stepped(&values, &step);
+            values += step;
             state = self.linearise(&prior, &values)?;
             if gain < TOLERANCE {
                 break;

@@ -51,6 +51,12 @@ impl FirstLook {
         self.nameless.extend(forgotten);
     }
 
+    /// Forgets what was found and where, without a word of it later.
+    pub fn ignore(&mut self) {
+        self.findings.clear();
+        self.flat = None;
+    }
+
     /// What keeps everybody from saying anything of the track: a pass without a signal, or passes
     /// that nowhere repeat each other, unless their odometers are to blame.
     pub fn refusal(&self) -> Option<&Trouble> {

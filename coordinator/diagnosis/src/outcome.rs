@@ -43,6 +43,9 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The verdict in a sentence that needs no further reading.
     pub sentence: String,
+    /// Probability that nothing is left out; none where no model of the track was compared.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub nothing_left_out: Option<f64>,
     /// Where recording and re-tuned baseline differ.
     pub mismatches: Vec<Mismatch>,
     /// What may be left out, most probable first.
@@ -90,8 +93,8 @@ pub struct Hypothesis {
     /// Where it is.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub location: Option<Location>,
-    /// Of something unknown, where in the model it acts: `rail_seat`, `wheel`, `rail_surface` or
-    /// `wheel_surface`.
+    /// Of something unknown, where in the model it acts: `rail_seat`, `between_rail_seats`, `wheel`,
+    /// `rail_surface` or `wheel_surface`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub port: Option<String>,
     /// Its parameters.

@@ -1,9 +1,9 @@
-//! What a recording says where no name fits: an unknown dynamic stiffness under rail seats or at
-//! the wheel.
+//! What a recording says where no name fits: an unknown dynamic stiffness under rail seats, between
+//! two of them or at the wheel.
 //!
 //! Whatever a sleeper, its railpad or its ballast have that the model lacks acts on the rail as an
-//! additional dynamic stiffness at the rail seat, free in every frequency; whatever the vehicle has,
-//! at the wheel. Its trace is linear in that stiffness, so that the evidence for it has a closed form
+//! additional dynamic stiffness at the rail seat, free in every frequency; whatever links two
+//! sleepers, between their seats; whatever the vehicle has, at the wheel. Its trace is linear in that stiffness, so that the evidence for it has a closed form
 //! (mismatch design, eq. 9).
 
 use crate::calibration::{Calibration, CalibrationError, Problem};
@@ -27,6 +27,8 @@ pub enum PortPlace {
     /// Under the rail seats of these compared sleepers, the same under each: one, two neighbours,
     /// every second to fifth, or all.
     Seats(Vec<usize>),
+    /// Between the rail seats of two neighbours.
+    Between([usize; 2]),
     /// Between wheel and ground.
     Wheel,
 }
@@ -36,6 +38,7 @@ impl PortPlace {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Seats(_) => "rail_seat",
+            Self::Between(_) => "between_rail_seats",
             Self::Wheel => "wheel",
         }
     }
@@ -92,7 +95,7 @@ impl PortScan {
                     .map(|part| shape.iter().map(|height| part * height).collect())
             })
             .collect();
-        let PortColumns { seats, wheel } =
+        let PortColumns { seats, between, wheel } =
             forward.port_columns(&current.values, &extensions, &shapes)?;
         let whiten =
             |columns: DMatrix<f64>| observation.fitted_rows(&observation.whiten_matrix(&columns));
@@ -103,6 +106,11 @@ impl PortScan {
         };
         let mut places: Vec<(PortPlace, DMatrix<f64>)> =
             seats_together(seats.len()).into_iter().map(together).collect();
+        let between = between.into_iter().enumerate();
+        places.extend(
+            between
+                .map(|(first, columns)| (PortPlace::Between([first, first + 1]), whiten(columns))),
+        );
         places.push((PortPlace::Wheel, whiten(wheel)));
         let filter = |(place, columns)| Filter::new(place, columns, current);
         let filters = places.into_par_iter().filter_map(filter).collect();

@@ -8,6 +8,10 @@ use rayon::prelude::*;
 /// Prior deviation of an effect's strength about each trial value.
 const STRENGTH_DEVIATION: f64 = 0.3;
 
+/// Strengths in parts of a trial's at which it is asked whether it would show: an effect's range is
+/// about a decade, and trials are in its upper half.
+pub(crate) const STRENGTHS: [f64; 5] = [0.125, 0.25, 0.5, 1.0, 2.0];
+
 /// The trace of a candidate with certain values, as far as the baseline cannot imitate it.
 #[derive(Clone, Debug)]
 pub struct Template {
@@ -70,6 +74,16 @@ impl Template {
     pub fn along(&self, residual: &DVector<f64>) -> f64 {
         let along = self.change.dot(residual).max(0.0);
         0.5 * along.powi(2) / self.detectability.max(f64::MIN_POSITIVE)
+    }
+
+    /// Logarithms of the evidence for the trial at each of [`STRENGTHS`].
+    pub(crate) fn at_strengths(
+        &self,
+        residual: &DVector<f64>,
+        felt: &DVector<f64>,
+    ) -> [f64; STRENGTHS.len()] {
+        let along = self.change.dot(residual) - self.imitation.dot(felt);
+        STRENGTHS.map(|part| part * along - 0.5 * part * part * self.detectability)
     }
 
     /// Logarithm of the evidence for the effect in a whitened residual, against the baseline alone:

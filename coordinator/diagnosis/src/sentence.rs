@@ -10,10 +10,12 @@ const BIAS_MIN: f64 = 0.1;
 /// Sleepers that are named one by one.
 const NAMED_MAX: usize = 3;
 
-/// What was found, where, how sure, and what it changes; for a section of so many sleepers.
+/// What was found, where, how sure, and what it changes; for a section of so many sleepers, and a
+/// recording to which nothing is left out with this probability.
 pub(crate) fn sentence(
     verdict: Verdict,
     hypotheses: &[Hypothesis],
+    nothing_left_out: f64,
     sleepers: usize,
     fit: &Fit,
     bias: &BTreeMap<String, BeforeAfter<f64>>,
@@ -25,8 +27,9 @@ pub(crate) fn sentence(
             None => "explains it better; a second speed would make that sure",
         };
         return format!(
-            "Simulation and recording agree: with every sleeper's stiffness, level and spectrum \
-             re-tuned, nothing that the catalogue knows {tested}."
+            "Simulation and recording agree ({:.0} %): with every sleeper's stiffness, level and \
+             spectrum re-tuned, nothing that the catalogue knows {tested}.",
+            100.0 * nothing_left_out
         );
     };
     let summary = Kind::from_name(&first.physics)

@@ -103,6 +103,20 @@ impl Subject {
         Ok(Self { forward, log_power, pass_variance, first_sleeper, pass_numbers })
     }
 
+    /// The same powers at other sleepers: those of each speed in an order of its own, `[speed][sleeper]`,
+    /// so that speeds have no place in common. A control: what is somewhere can't be found.
+    pub fn shuffle(&mut self, orders: &[Vec<usize>]) {
+        let (bands, per_sleeper) = (self.forward.bands.count(), self.forward.per_sleeper());
+        let measured = self.log_power.clone();
+        for (speed, order) in orders.iter().enumerate() {
+            for (sleeper, &from) in order.iter().enumerate() {
+                let row = |sleeper: usize| sleeper * per_sleeper + speed * bands;
+                let moved = measured.rows(row(from), bands);
+                self.log_power.rows_mut(row(sleeper), bands).copy_from(&moved);
+            }
+        }
+    }
+
     /// Covariance of any one sleeper's log powers: the null model's, and what the passes do not share.
     pub fn covariance(&self, null: &NullModel) -> DMatrix<f64> {
         null.covariance(self.forward.bands.count(), &self.pass_variance)

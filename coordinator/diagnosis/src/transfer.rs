@@ -15,8 +15,8 @@ pub(crate) struct Transfer {
     pub(crate) power: Vec<Vec<f64>>,
     /// Dynamic stiffness of contact, rail and vehicle in series in N/m: `[line][node]`.
     pub(crate) stiffness: Vec<Vec<Complex64>>,
-    /// By what a change of the dynamic stiffness at a rail seat changes the power at a node: its
-    /// product's real part, `[line][sleeper][node]`. Empty unless asked for.
+    /// Root of that by which a change of the dynamic stiffness at a rail seat changes the power at a
+    /// node: the square's and its product's real part, `[line][sleeper][node]`. Empty unless asked for.
     by_seats: Vec<Vec<Vec<Complex64>>>,
     /// Receptance of the wheel in m/N at each line.
     wheel_receptance: Vec<Complex64>,
@@ -39,14 +39,15 @@ impl Transfer {
 
     /// With receptances from the rail seats in m/N, `[line][sleeper][node]`.
     ///
-    /// `d alpha = -alpha_seat^2 dZ`, hence `d |H|^2 = 2 |H|^2 Re(k alpha_seat^2 dZ)`.
+    /// `d alpha = -alpha_seat^2 dZ`, hence `d |H|^2 = 2 |H|^2 Re(k alpha_seat^2 dZ)`; between two
+    /// seats it is the difference of their receptances.
     fn with_seats(self, mut from_seats: Vec<Vec<Vec<Complex64>>>) -> Self {
         for (line, columns) in from_seats.iter_mut().enumerate() {
             let nodes = self.power[line].iter().zip(&self.stiffness[line]);
-            let by_node: Vec<Complex64> = nodes.map(|(power, k)| 2.0 * power * k).collect();
+            let roots: Vec<Complex64> = nodes.map(|(power, k)| (2.0 * power * k).sqrt()).collect();
             for column in columns {
-                for (receptance, by_node) in column.iter_mut().zip(&by_node) {
-                    *receptance = receptance.powi(2) * by_node;
+                for (receptance, root) in column.iter_mut().zip(&roots) {
+                    *receptance *= root;
                 }
             }
         }
@@ -108,7 +109,22 @@ impl Transfer {
     /// power: its product's real part.
     pub(crate) fn felt(&self, window: &[(usize, f64)], line: usize, sleeper: usize) -> Complex64 {
         let by_seat = &self.by_seats[line][sleeper];
-        window.iter().map(|&(node, share)| share * by_seat[node]).sum()
+        window.iter().map(|&(node, share)| share * by_seat[node] * by_seat[node]).sum()
+    }
+
+    /// The same for a dynamic stiffness between two sleepers' rail seats.
+    pub(crate) fn felt_between(
+        &self,
+        window: &[(usize, f64)],
+        line: usize,
+        sleepers: [usize; 2],
+    ) -> Complex64 {
+        let [first, second] = sleepers.map(|sleeper| &self.by_seats[line][sleeper]);
+        let at = |&(node, share): &(usize, f64)| {
+            let apart = first[node] - second[node];
+            share * apart * apart
+        };
+        window.iter().map(at).sum()
     }
 
     /// Magnitude of the rail's direct receptance at a node in m/N.

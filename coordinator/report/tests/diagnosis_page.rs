@@ -117,6 +117,7 @@ fn consistent() -> Diagnosis {
         recording: "dev-01".to_owned(),
         verdict: Verdict::Consistent,
         sentence: "The track model with its own stiffness at every sleeper explains the recording; nothing is left out that would show at 7 to 13 km/h.".to_owned(),
+        nothing_left_out: None,
         mismatches: Vec::new(),
         hypotheses: Vec::new(),
         fit: fit(-1.31, -1.31, &[]),
@@ -168,6 +169,7 @@ fn left_out() -> Diagnosis {
         recording: "dev-02".to_owned(),
         verdict: Verdict::LeftOutPhysics,
         sentence: "Between SN18 and SN19, at 2.438 m: a dipped rail joint, 93 %. With it the withheld 10 km/h passes fit 6 dB better; without it the railpads there come out 45 % too soft.".to_owned(),
+        nothing_left_out: None,
         mismatches: vec![mismatch],
         hypotheses: vec![accepted, squat, hypothesis("missing_railpad", 0.008, ""), hypothesis("sleeper_bolt", 0.001, "")],
         fit: fit(-1.62, -1.35, &[("13", 38.2), ("10", 41.7), ("7", 22.9)]),
@@ -194,6 +196,7 @@ fn unknown() -> Diagnosis {
         recording: "blind-07".to_owned(),
         verdict: Verdict::UnknownPhysics,
         sentence: "At SN12, 1.625 m, between 800 and 1600 Hz: the rail vibrates 7 dB less than any known kind of physics explains.".to_owned(),
+        nothing_left_out: None,
         mismatches: vec![Mismatch {
             x_m: [1.5625, 1.6875],
             sleepers: vec!["SN12".to_owned()],
@@ -222,6 +225,7 @@ fn chain() -> Diagnosis {
         recording: "dev-08".to_owned(),
         verdict: Verdict::MeasurementChain,
         sentence: "The sensor resonates on its mounting at 3213 Hz (over 99 %): a fault of the measurement, not of the track.".to_owned(),
+        nothing_left_out: None,
         mismatches: vec![Mismatch {
             x_m: [0.75, 4.25],
             sleepers: (0..SLEEPERS).map(|index| format!("SN{}", index + FIRST)).collect(),

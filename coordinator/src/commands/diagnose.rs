@@ -62,7 +62,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         .with_context(|| format!("{}: the folder cannot be made", out.display()))
         .or_input()?;
     let shown = Shown::default();
-    let setting = Setting { design: &design, library: library.as_ref(), without: &without };
+    let setting =
+        Setting { design: &design, library: library.as_ref(), without: &without, shuffle: None };
     let diagnosed = diagnose(&recording, setting, &|stage, share| shown.at(stage, share)).await;
     shown.end();
     let diagnosis = diagnosed.map_err(stop)?.diagnosis;

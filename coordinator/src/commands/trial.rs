@@ -31,14 +31,18 @@ pub(super) struct Arguments {
     /// should then be "unknown".
     #[arg(long)]
     knock_out: bool,
+    /// Diagnose every local effect that was found once more with the sleepers of each speed shuffled:
+    /// the alarm should then cease.
+    #[arg(long)]
+    shuffle: bool,
     /// Remove a recording's passes once it is scored; its seal and diagnosis stay.
     #[arg(long)]
     discard_recordings: bool,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { cases, seed, out, library, knock_out, discard_recordings } = arguments;
-    let trial = Trial { seed, cases, folder: out, knock_out, discard_recordings };
+    let Arguments { cases, seed, out, library, knock_out, shuffle, discard_recordings } = arguments;
+    let trial = Trial { seed, cases, folder: out, knock_out, shuffle, discard_recordings };
     trial.begin().map_err(stop)?;
     let own = || format!("sqlite:{}", trial.folder.join("library.sqlite").display());
     let library = Library::open_or_create(&library.unwrap_or_else(own)).await.or_input()?;

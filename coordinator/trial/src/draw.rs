@@ -93,6 +93,12 @@ fn blocks() -> Vec<Class> {
     SHARES.iter().flat_map(|&(class, count)| std::iter::repeat_n(class, count)).collect()
 }
 
+/// Another order of a track's sleepers for each speed: `[speed][sleeper]`.
+pub fn orders(seed: u64, speeds: usize, sleepers: usize) -> Vec<Vec<usize>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..speeds).map(|_| shuffled((0..sleepers).collect(), &mut rng)).collect()
+}
+
 /// Fisher and Yates.
 fn shuffled<T>(mut items: Vec<T>, rng: &mut ChaCha8Rng) -> Vec<T> {
     for last in (1..items.len()).rev() {
@@ -122,6 +128,17 @@ mod tests {
         for (class, count) in SHARES {
             assert_eq!(first.iter().filter(|&&c| c == class).count(), count, "{class:?}");
         }
+    }
+
+    #[test]
+    fn each_speed_has_all_sleepers_in_an_order_of_its_own() {
+        let orders = orders(1, 3, 24);
+        for order in &orders {
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..24).collect::<Vec<_>>());
+        }
+        assert!(orders[0] != orders[1] && orders[1] != orders[2]);
     }
 
     #[test]

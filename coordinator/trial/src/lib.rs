@@ -13,7 +13,7 @@ mod summary;
 mod table;
 mod visible;
 
-pub use draw::{Class, Plan, plan};
+pub use draw::{Class, Plan, orders, plan};
 pub use rate::Rate;
 pub use score::{Bias, KnockedOut, Named, Placed, Score, placed, score};
 pub use seal::{SealError, Seals};

@@ -45,6 +45,9 @@ pub struct Score {
     pub cpu_s: f64,
     /// What was said without the hidden kind in the catalogue; none if nobody asked.
     pub knocked_out: Option<KnockedOut>,
+    /// What was said with its sleepers shuffled; none if nobody asked.
+    #[serde(default)]
+    pub shuffled: Option<Verdict>,
 }
 
 /// What is said of an effect when the catalogue does not have it.
@@ -105,6 +108,13 @@ impl Score {
         self.class == Class::Single && self.hidden.iter().all(|named| named.accepted)
     }
 
+    /// Whether it can be asked what is said with shuffled sleepers: one effect with a place, found.
+    pub fn can_be_shuffled(&self) -> bool {
+        self.class == Class::Single
+            && self.verdict != Verdict::Consistent
+            && self.hidden.iter().all(|named| named.place.is_some())
+    }
+
     /// Whether nobody could have said it better: hidden effects are the accepted names, faults of
     /// the chain are not called physics, and where nothing is hidden nothing is said.
     pub fn is_right(&self) -> bool {
@@ -145,6 +155,7 @@ pub fn score(
         cells_inside: cells_inside(diagnosis),
         cpu_s,
         knocked_out: None,
+        shuffled: None,
     }
 }
 
@@ -209,7 +220,7 @@ fn set(hypotheses: &[Hypothesis]) -> &[Hypothesis] {
     &hypotheses[..enough.map_or(hypotheses.len(), |last| last + 1)]
 }
 
-/// Every probability given, with whether it was so; "nothing" has the rest.
+/// Every probability given, with whether it was so; that of nothing where nothing is said.
 fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Vec<(f64, bool)> {
     let is_there =
         |hypothesis: &Hypothesis| left_out.iter().any(|hidden| is_it(hidden, &hypothesis.physics));
@@ -217,7 +228,7 @@ fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Ve
     let mut all: Vec<_> =
         given.map(|hypothesis| (hypothesis.probability, is_there(hypothesis))).collect();
     if diagnosis.verdict == Verdict::Consistent {
-        all.push((1.0, class == Class::Control));
+        all.push((diagnosis.nothing_left_out.unwrap_or(1.0), class == Class::Control));
     }
     all
 }

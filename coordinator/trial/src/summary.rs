@@ -95,11 +95,14 @@ fn alarms(scores: &[Score]) -> Vec<Row> {
     let detected = |least| Rate::of(visible(scores, least).map(|(score, _)| alarmed(score)));
     let controls = Rate::of(of_class(scores, Class::Control).map(alarmed));
     let artefacts = Rate::of(of_class(scores, Class::Artefact).map(called_physics));
+    let shuffled = scores.iter().filter_map(|score| score.shuffled);
+    let shuffled = Rate::of(shuffled.map(|verdict| verdict != Verdict::Consistent));
     vec![
         at_most("false alarms on controls", controls, 0.05),
         at_most("artefacts called physics", artefacts, 0.02),
         at_least("detected, d' 6.5 and more", detected(SURE), 0.95),
         at_least("detected, d' 5 and more", detected(LIKELY), 0.75),
+        at_most("of local effects found, alarms with sleepers shuffled", shuffled, 0.05),
     ]
 }
 
@@ -269,6 +272,7 @@ mod tests {
             cells_inside: true,
             cpu_s: 50.0,
             knocked_out: None,
+            shuffled: None,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Lines of the mains: at a fixed frequency whatever the speed, narrower than any structure.
 
-use crate::along::{Line, Spectrum, by_speed, combined, ln_gamma_tail, of_best, speed_m_s};
+use crate::along::{Line, Spectrum, by_speed, ln_gamma_tail, of_best, speed_m_s};
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
 
@@ -13,6 +13,10 @@ const SEGMENT_S: f64 = 4.0;
 const DRIFT_HZ: f64 = 0.1;
 /// Probability of one speed's line without hum above which it isn't heard at that speed.
 const EACH_SPEED: f64 = 0.05;
+/// Speeds that must hear it, if there are so many; at others it may be drowned.
+const HEARD_MIN: usize = 2;
+/// Greatest ratio of a line's amplitudes at two speeds: the mains do not know the train's.
+const APART_MAX: f64 = 2.0;
 /// Segments from which their mean follows a gamma distribution well enough.
 const SEGMENTS_MIN: usize = 4;
 /// Waves in a segment below which a line has no neighbours on its lower side.
@@ -62,7 +66,8 @@ pub fn hum(recording: &Recording, alpha: f64) -> Vec<Hum> {
 /// The line nearest to a mains frequency, and how many bins were looked at.
 fn line(speeds: &[Vec<Heard>], spacing_m: f64, frequency: f64) -> (Option<Hum>, usize) {
     let mut tries = 0;
-    let (mut each, mut ratios, mut amplitudes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut each, mut ratios) = (Vec::new(), Vec::new());
+    let (mut amplitudes, mut by_speed) = (Vec::new(), Vec::new());
     for passes in speeds {
         let lines: Option<Vec<Tone>> = passes.iter().map(|pass| pass.line(frequency)).collect();
         let Some(lines) = lines else { return (None, 0) };
@@ -73,9 +78,11 @@ fn line(speeds: &[Vec<Heard>], spacing_m: f64, frequency: f64) -> (Option<Hum>, 
         // Where it may be the sleepers' a line says nothing either way.
         if !passes.iter().any(|pass| pass.may_be_sleepers(frequency, spacing_m)) {
             each.push(mean(|line| line.ln_p));
+            by_speed.push(mean(|line| line.amplitude));
         }
     }
-    if each.is_empty() || each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) {
+    let heard = each.iter().filter(|ln_p| **ln_p <= EACH_SPEED.ln()).count();
+    if each.is_empty() || heard < HEARD_MIN.min(each.len()) || !are_alike(&by_speed) {
         return (None, tries);
     }
     let count = amplitudes.len() as f64;
@@ -85,9 +92,23 @@ fn line(speeds: &[Vec<Heard>], spacing_m: f64, frequency: f64) -> (Option<Hum>, 
         frequency_hz: frequency,
         amplitude_m_s2: (mean, square.sqrt().max(0.05 * mean)),
         ratio: ratios.iter().sum::<f64>() / ratios.len() as f64,
-        ln_p: combined(&each),
+        ln_p: of_all(&each),
     };
     (Some(hum), tries)
+}
+
+/// One probability of all speeds' (Fisher): at one frequency each hears waves of its own length, and
+/// they don't depend on each other.
+fn of_all(ln_probabilities: &[f64]) -> f64 {
+    let count = ln_probabilities.len() as f64;
+    ln_gamma_tail(count, -ln_probabilities.iter().sum::<f64>() / count)
+}
+
+/// Whether amplitudes may be those of one line.
+fn are_alike(amplitudes: &[f64]) -> bool {
+    let [least, most] =
+        amplitudes.iter().fold([f64::MAX, 0.0], |[l, m]: [f64; 2], &a| [l.min(a), m.max(a)]);
+    most <= APART_MAX * least
 }
 
 /// The spectra of a pass's segments.

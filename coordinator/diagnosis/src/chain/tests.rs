@@ -46,6 +46,30 @@ fn the_mains_are_found_at_every_speed_but_not_at_one_only() {
 }
 
 #[test]
+fn a_speed_at_which_hum_is_drowned_does_not_speak_against_it() {
+    let hums = |amplitude: f64| {
+        let mut recording = measured(2, &|_, samples, _| {
+            for (index, sample) in samples.iter_mut().enumerate() {
+                *sample += 2.0 * (TAU * 50.0 * index as f64 / Rolled::RATE_HZ).sin();
+            }
+        });
+        // At a third speed a line of that amplitude in noise about as loud.
+        let mut third = recording.passes[1].clone();
+        third.speed_km_h = 10.0;
+        let count = third.signal.samples().len();
+        let noise = noise(99, count).into_iter().enumerate();
+        let line = |index: usize| (TAU * 50.0 * index as f64 / Rolled::RATE_HZ).sin();
+        let samples = noise.map(|(index, n)| amplitude * line(index) + 60.0 * n).collect();
+        third.signal = tracktwin_signal::Signal::new(Rolled::RATE_HZ, samples).unwrap();
+        recording.passes.push(third);
+        hum(&recording, ALPHA)
+    };
+    assert_eq!(hums(2.0)[0].frequency_hz, 50.0);
+    // Four times as much there is not the mains'.
+    assert!(hums(8.0).is_empty());
+}
+
+#[test]
 fn a_lightly_damped_resonance_at_a_frequency_of_the_mains_is_no_hum() {
     for seed in 0..6 {
         let recording = measured(seed, &|_, samples, _| {

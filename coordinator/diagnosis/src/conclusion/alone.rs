@@ -52,6 +52,7 @@ pub fn passes_alone(
         recording: recording.name.clone(),
         verdict: verdict(&hypotheses),
         sentence,
+        nothing_left_out: None,
         mismatches: Vec::new(),
         hypotheses,
         fit: fit(recording, look.comb.as_ref().filter(|_| is_comb(&best.physics, look))),

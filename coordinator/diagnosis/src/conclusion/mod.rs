@@ -85,12 +85,15 @@ impl Evidence<'_> {
         let fit = self.fit();
         let bias_removed = self.bias_removed(&hypotheses);
         let sleepers = self.subject.forward.section.sleepers;
-        let sentence = sentence(verdict, &hypotheses, sleepers, &fit, &bias_removed);
+        let nothing_left_out = self.nothing(&hypotheses).min(most);
+        let sentence =
+            sentence(verdict, &hypotheses, nothing_left_out, sleepers, &fit, &bias_removed);
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
             recording: self.recording.name.clone(),
             verdict,
             sentence,
+            nothing_left_out: Some(nothing_left_out),
             mismatches: self.mismatches(verdict, &levels),
             hypotheses,
             fit,
@@ -110,6 +113,13 @@ impl Evidence<'_> {
         } else {
             ONE_PASS_MAX
         }
+    }
+
+    /// Probability that nothing is left out, beside these hypotheses.
+    fn nothing(&self, hypotheses: &[Hypothesis]) -> f64 {
+        let first = self.search.rounds.first().map_or(1.0, |round| round.probabilities().nothing);
+        let accepted = hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
+        first * accepted.map(|hypothesis| 1.0 - hypothesis.probability).product::<f64>()
     }
 
     fn speeds(&self) -> usize {
@@ -153,8 +163,12 @@ impl Evidence<'_> {
         if all.iter().any(|known| known.accepted && is_chain(known)) {
             let saturated = |trouble: &Trouble| matches!(trouble, Trouble::Saturated { .. });
             let is_saturated = self.look.troubles.iter().any(saturated);
-            for known in &mut all {
-                known.accepted &= is_chain(known) || (known.physics != UNKNOWN && !is_saturated);
+            let made_by_chain = |known: &&mut Hypothesis| {
+                !is_chain(known) && (known.physics == UNKNOWN || is_saturated)
+            };
+            for known in all.iter_mut().filter(made_by_chain) {
+                known.accepted = false;
+                known.probability *= FAILED_SHARE;
             }
         }
         all.retain(|hypothesis| hypothesis.accepted || hypothesis.probability >= PROBABILITY_MIN);
@@ -163,18 +177,18 @@ impl Evidence<'_> {
 
     /// What one search fitted, as hypotheses.
     fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
-        let Probabilities { named, unknown } = round.probabilities();
+        let Probabilities { named, unknown, nothing } = round.probabilities();
         // What is left beside a named effect may be its model's error as well as something new.
         let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
         let alone = first && !round.accepted;
-        let nothing = 1.0 - unknown - named.iter().sum::<f64>();
+        let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
         let others = named.iter().copied().fold(nothing, f64::max);
         let is_port = alone && round.port_p_value <= PORT_ALARM && unknown > others;
         // Something is there, but the names that come near failed on withheld speeds.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
         let unnamed = alone && !is_port && nothing < NOTHING_LEFT;
         let (kept, unknown) =
-            if unnamed { (FAILED_SHARE, unknown + failed) } else { (1.0, unknown) };
+            if unnamed { (FAILED_SHARE, unknown + failed) } else { (is_new, unknown) };
         let mut hypotheses: Vec<Hypothesis> = round
             .fitted
             .iter()
@@ -196,6 +210,9 @@ impl Evidence<'_> {
                 would_separate: match port.place {
                     PortPlace::Seats(_) => {
                         "a hammer test at the place: its receptance names the element"
+                    }
+                    PortPlace::Between(_) => {
+                        "a hammer test from one sleeper to the other: its receptance names the element"
                     }
                     PortPlace::Wheel => "a tap test on the wheel: its receptance names the element",
                 }
@@ -279,6 +296,9 @@ impl Evidence<'_> {
                 PortPlace::Wheel => " at the wheel".to_owned(),
                 PortPlace::Seats(seats) if seats.len() <= 2 => {
                     format!(" near {}", self.id(seats[0]))
+                }
+                PortPlace::Between([first, second]) => {
+                    format!(" between {} and {}", self.id(*first), self.id(*second))
                 }
                 PortPlace::Seats(_) => String::new(),
             });

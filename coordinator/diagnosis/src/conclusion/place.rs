@@ -31,6 +31,7 @@ impl Evidence<'_> {
         let everywhere = self.subject.forward.section.sleepers;
         match place {
             PortPlace::Seats(seats) if seats.len() < everywhere => Some(self.location(seats)),
+            PortPlace::Between(pair) => Some(self.location(pair)),
             PortPlace::Seats(_) | PortPlace::Wheel => None,
         }
     }

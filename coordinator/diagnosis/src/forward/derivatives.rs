@@ -34,6 +34,8 @@ pub struct Linearised {
 pub(crate) struct PortColumns {
     /// Under each compared sleeper's rail seat.
     pub(crate) seats: Vec<DMatrix<f64>>,
+    /// Between the rail seats of each compared sleeper but the first and the one before it.
+    pub(crate) between: Vec<DMatrix<f64>>,
     /// Between wheel and ground.
     pub(crate) wheel: DMatrix<f64>,
 }
@@ -75,7 +77,7 @@ impl Forward {
     }
 
     /// Changes of the log powers by dynamic stiffnesses added under each compared sleeper's rail
-    /// seat, and between wheel and ground.
+    /// seat, between the seats of neighbours, and between wheel and ground.
     ///
     /// # Errors
     /// As [`Forward::log_power`].
@@ -98,11 +100,22 @@ impl Forward {
                 is_near.then(|| felt() / transfer.receptance(line, seat_node))
             })
         };
+        let between = |sleeper: usize| {
+            let pair = [sleeper - 1, sleeper];
+            let in_track = pair.map(|sleeper| self.section.in_track(sleeper));
+            let seat_node = self.section.seat_node(sleeper);
+            self.columns(&shares, &excitation, shapes, |seen_from, window, line| {
+                let is_near = pair.iter().any(|sleeper| seen_from.abs_diff(*sleeper) <= NEIGHBOURS);
+                let felt = || transfer.felt_between(window, line, in_track);
+                is_near.then(|| felt() / transfer.receptance(line, seat_node))
+            })
+        };
         let seats = (0..self.section.sleepers).into_par_iter().map(seat).collect();
+        let between = (1..self.section.sleepers).into_par_iter().map(between).collect();
         let wheel = self.columns(&shares, &excitation, shapes, |_, window, line| {
             Some(transfer.felt_at_wheel(window, line))
         });
-        Ok(PortColumns { seats, wheel })
+        Ok(PortColumns { seats, between, wheel })
     }
 
     /// Changes of the log powers by a stiffness of the given shapes; `felt` says by what one of its
@@ -254,6 +267,8 @@ mod tests {
     use crate::baseline::ENDS_SPANS;
     use crate::section::Section;
     use tracktwin_parameters::TrackDesign;
+    use tracktwin_track::element::SpringDamper;
+    use tracktwin_track::model::Assembly;
 
     fn forward(design: TrackDesign) -> Forward {
         let section = Section::new(design, 3, 1.0);
@@ -276,6 +291,41 @@ mod tests {
         let expected = (heavier - plain) / share;
         let error = (columns.column(0) - &expected).amax() / expected.amax();
         // The second order of a share of 1e-4.
+        assert!(error < 2e-3, "{error}");
+    }
+
+    /// A spring between the rail seats of two sleepers of the track.
+    #[derive(Debug)]
+    struct Link([usize; 2], f64);
+
+    impl Extension for Link {
+        fn assemble(&self, assembly: &mut Assembly) {
+            let layout = assembly.layout();
+            let [one, other] = self.0.map(|sleeper| {
+                layout.rail_port(layout.rail_nodes_m()[layout.sleepers()[sleeper].rail_node])
+            });
+            let spring = SpringDamper { stiffness: self.1, damping: 0.0 };
+            assembly.add_spring_damper(&one.minus(&other), spring);
+        }
+    }
+
+    #[test]
+    fn a_stiffness_between_two_seats_changes_levels_as_a_spring_between_them_does() {
+        let forward = forward(TrackDesign::v_track());
+        let values = forward.unknowns.typical();
+        let transfer = forward.transfer(&values, &[], true).unwrap();
+        let node = forward.section.seat_node(1);
+        let lines = 0..forward.bands.lines_hz().len();
+        // One newton in a metre, in parts of the track's own stiffness.
+        let unit = lines.map(|line| transfer.receptance(line, node).into()).collect();
+        let columns = forward.port_columns(&values, &[], &[unit]).unwrap().between;
+        let pair = [0, 1].map(|sleeper| forward.section.in_track(sleeper));
+        let stiffness = 1e3;
+        let link: Arc<dyn Extension> = Arc::new(Link(pair, stiffness));
+        let [linked, plain] =
+            [vec![link], Vec::new()].map(|links| forward.log_power(&values, &links).unwrap());
+        let expected = (linked - plain) / stiffness;
+        let error = (columns[0].column(0) - &expected).amax() / expected.amax();
         assert!(error < 2e-3, "{error}");
     }
 

@@ -6,7 +6,7 @@ mod round;
 
 pub(crate) use probability::Probabilities;
 
-use self::round::{Setting, is_predicted, retuned, sure};
+use self::round::{Least, Setting, is_predicted, retuned, sure};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
@@ -51,6 +51,8 @@ pub struct Fitted {
 pub struct Round {
     /// Probability to see such evidence for anything if nothing is left out.
     pub p_value: f64,
+    /// Share of the catalogue that would not be seen in this recording.
+    pub unseen: f64,
     /// What was fitted, best first.
     pub fitted: Vec<Fitted>,
     /// What an unknown dynamic stiffness under a rail seat would explain.
@@ -163,7 +165,10 @@ impl Search {
         let (accepted, observation) = (self.accepted.clone(), self.observation.clone());
         let forward = &setting.subject.forward;
         let problem = Problem { forward, observation: &observation, candidates: &accepted };
-        let mut round = setting.round(&problem, &self.last, all, progress)?;
+        let strongest = self.rounds.iter().filter_map(|round| round.fitted.first());
+        let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
+        let least = Least { accepted: &accepted, strongest };
+        let mut round = setting.round(&problem, &self.last, all, least, progress)?;
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
             // The candidates found a better baseline on their way: the opponent gets it too.
             self.last = better;
@@ -172,11 +177,9 @@ impl Search {
                 self.baseline = self.last.clone();
                 densities.before.clone_from(&densities.reached);
             }
-            round = setting.round(&problem, &self.last, all, progress)?;
+            round = setting.round(&problem, &self.last, all, least, progress)?;
         }
-        let strongest = self.rounds.iter().filter_map(|round| round.fitted.first());
-        let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
-        if let Some(best) = sure(&round, &forward.section, &accepted, strongest) {
+        if let Some(best) = sure(&round, &forward.section, least) {
             progress(Stage::HeldOut, 0.0);
             let with = [&accepted[..], std::slice::from_ref(&best.candidate)].concat();
             let scores = setting.held_out(&with, &best.calibration.values)?;

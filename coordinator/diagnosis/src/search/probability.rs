@@ -1,6 +1,8 @@
 //! How probable each explanation of a search is: evidence, tempered, times prior.
 
 use super::Round;
+use crate::screen::STRENGTHS;
+use std::collections::BTreeMap;
 use tracktwin_track::extension::KINDS;
 
 /// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
@@ -24,18 +26,37 @@ pub(crate) struct Probabilities {
     pub(crate) named: Vec<f64>,
     /// Of an unknown dynamic stiffness.
     pub(crate) unknown: f64,
+    /// Of nothing at all.
+    pub(crate) nothing: f64,
 }
 
 impl Round {
-    /// Probabilities of what was fitted, of something unknown and of nothing at all.
+    /// Probabilities of what was fitted, of something unknown and of nothing at all; the rest is
+    /// that of something too weak to show.
     pub(crate) fn probabilities(&self) -> Probabilities {
         let named = self.fitted.iter().map(|fitted| fitted.log_evidence);
-        of(named, self.port.as_ref().map(|port| port.log_evidence))
+        of(named, self.port.as_ref().map(|port| port.log_evidence), self.unseen)
     }
 }
 
-/// Log evidences of names and of the unknown against nothing, in nats.
-fn of(named: impl Iterator<Item = f64>, unknown: Option<f64>) -> Probabilities {
+/// Share of the catalogue that a recording would not show: what its effects are worth against
+/// nothing, none more than nothing, in the mean of all kinds, places and strengths.
+///
+/// Each trial comes with its kind and its log evidences at several strengths in nats.
+pub(super) fn unseen(trials: impl Iterator<Item = (&'static str, [f64; STRENGTHS.len()])>) -> f64 {
+    let mut kinds: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+    for (kind, evidences) in trials {
+        let (sum, count) = kinds.entry(kind).or_default();
+        *sum +=
+            evidences.map(|evidence| (evidence.min(0.0) / TEMPERATURE).exp()).iter().sum::<f64>();
+        *count += evidences.len() as f64;
+    }
+    kinds.values().map(|(sum, count)| sum / count).sum::<f64>() / kinds.len().max(1) as f64
+}
+
+/// Log evidences of names and of the unknown against nothing, in nats, and the share of all names
+/// that would not be seen.
+fn of(named: impl Iterator<Item = f64>, unknown: Option<f64>, unseen: f64) -> Probabilities {
     let prior = (1.0 - NOTHING_PRIOR) / KINDS.len() as f64;
     let named: Vec<f64> = named.collect();
     let best = named.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -49,10 +70,15 @@ fn of(named: impl Iterator<Item = f64>, unknown: Option<f64>) -> Probabilities {
     let nothing = NOTHING_PRIOR.ln();
     let highest = named.iter().copied().fold(unknown.max(nothing), f64::max);
     let weight = |logarithm: f64| (logarithm - highest).exp();
-    let all = weight(nothing) + weight(unknown) + named.iter().copied().map(weight).sum::<f64>();
+    let too_weak = (1.0 - NOTHING_PRIOR) * unseen * (-highest).exp();
+    let all = weight(nothing)
+        + too_weak
+        + weight(unknown)
+        + named.iter().copied().map(weight).sum::<f64>();
     Probabilities {
         named: named.iter().map(|&logarithm| weight(logarithm) / all).collect(),
         unknown: weight(unknown) / all,
+        nothing: weight(nothing) / all,
     }
 }
 
@@ -62,14 +88,15 @@ mod tests {
 
     #[test]
     fn of_two_names_far_above_nothing_the_better_one_is_sure() {
-        let Probabilities { named, unknown } = of([12_797.0, 1201.0].into_iter(), Some(600.0));
+        let Probabilities { named, unknown, .. } =
+            of([12_797.0, 1201.0].into_iter(), Some(600.0), 0.3);
         assert!((named[0] - 1.0).abs() < 1e-12);
         assert!(named[1] < 1e-12 && unknown < 1e-12);
     }
 
     #[test]
     fn without_evidence_a_name_has_its_prior() {
-        let Probabilities { named, unknown } = of([0.0].into_iter(), None);
+        let Probabilities { named, unknown, .. } = of([0.0].into_iter(), None, 0.0);
         let prior = 0.5 / KINDS.len() as f64;
         assert!((named[0] - prior / (0.5 + prior)).abs() < 1e-12);
         assert_eq!(unknown, 0.0);
@@ -77,12 +104,26 @@ mod tests {
 
     #[test]
     fn the_unknown_needs_more_evidence_than_a_name() {
-        let equal = of([100.0].into_iter(), Some(100.0));
+        let equal = of([100.0].into_iter(), Some(100.0), 0.0);
         assert!((equal.unknown / equal.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
         // What a name explains for the most part is not unknown.
-        let little_more = of([100.0].into_iter(), Some(140.0));
+        let little_more = of([100.0].into_iter(), Some(140.0), 0.0);
         assert!((little_more.unknown / little_more.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
-        let much_more = of([100.0].into_iter(), Some(160.0));
+        let much_more = of([100.0].into_iter(), Some(160.0), 0.0);
         assert!(much_more.unknown > much_more.named[0]);
+    }
+
+    #[test]
+    fn nothing_is_as_sure_as_what_is_hidden_would_show() {
+        let certain = of([].into_iter(), None, 0.0).nothing;
+        let blind = of([].into_iter(), None, 1.0).nothing;
+        assert_eq!((certain, blind), (1.0, NOTHING_PRIOR));
+    }
+
+    #[test]
+    fn half_of_two_kinds_is_unseen_if_one_shows_at_every_strength_and_one_at_none() {
+        let shows = ("rail_joint", [-500.0; STRENGTHS.len()]);
+        let hides = ("squat", [0.3; STRENGTHS.len()]);
+        assert!((unseen([shows, shows, hides].into_iter()) - 0.5).abs() < 1e-12);
     }
 }

@@ -1,13 +1,13 @@
 //! One search for an effect: screened, refined, held out, accepted or not.
 
 use super::chance::{excess, tail_probability, whitened};
-use super::probability::{Probabilities, TEMPERATURE};
+use super::probability::{Probabilities, TEMPERATURE, unseen};
 use super::{Fitted, Round, Stage};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
-use crate::port_scan::{Port, PortPlace, PortScan};
+use crate::port_scan::{PortPlace, PortScan};
 use crate::screen::{Template, templates};
 use crate::section::Section;
 use crate::subject::Subject;
@@ -32,6 +32,11 @@ const ALONG_SHARE_MIN: f64 = 0.25;
 /// Fitted candidates from whose values the model without them is fitted anew.
 const RESTARTS: usize = 3;
 
+/// Share of the best name's log evidence from which another kind may still be better, and how often
+/// such fits are taken up again.
+const RIVAL_SHARE: f64 = 0.7;
+const RIVAL_FITS: usize = 3;
+
 /// Nats by which such a fit must be better to take its place.
 const BETTER: f64 = 3.0;
 
@@ -39,6 +44,10 @@ const BETTER: f64 = 3.0;
 /// a first effect's model leaves unexplained looks like a small second one, if not like one that is
 /// everywhere beside a shape at a place.
 const FURTHER_SHARE_MIN: f64 = 0.25;
+
+/// By how much a candidate may gain more when it is fitted, with all of the baseline, than its best
+/// trial of free size: beside an effect that is accepted what can't get far enough is not fitted.
+const FITTED_GAIN: f64 = 3.0;
 
 /// Least gain on held-out passes, in nats, for a name.
 const HELD_OUT_MIN: f64 = 4.0;
@@ -102,6 +111,7 @@ impl<'a> Setting<'a> {
         problem: &Problem<'_>,
         current: &Calibration,
         all: &[Candidate],
+        least: Least<'_>,
         progress: &(impl Fn(Stage, f64) + Sync),
     ) -> Result<Round, CalibrationError> {
         let trials: usize = all.iter().map(|candidate| candidate.trials.len()).sum();
@@ -115,8 +125,16 @@ impl<'a> Setting<'a> {
             .map(|template| (template.log_evidence(&current.residual, &current.gradient), template))
             .collect();
         let mut round = self.alarm(problem, current, &screened)?;
+        round.unseen = unseen(templates.iter().map(|template| {
+            let kind = all[template.candidate].kind.physics;
+            (kind, template.at_strengths(&current.residual, &current.gradient))
+        }));
         if round.p_value <= FALSE_ALARM {
-            let starts = starts(problem, current, all, &templates, screened);
+            let mut starts = starts(problem, current, all, &templates, screened);
+            starts.retain(|(template, _)| {
+                let gain = template.along(&current.residual);
+                least.may_be_reached(&all[template.candidate], gain)
+            });
             round.fitted = fit(problem, current, all, starts, progress);
         }
         Ok(round)
@@ -156,21 +174,39 @@ pub(super) fn is_predicted(gains: &[f64]) -> bool {
     gains.is_empty() || (gains.iter().sum::<f64>() >= HELD_OUT_MIN && lost <= 1)
 }
 
+/// The least log evidence for a name: what is accepted already, and the log evidence of the
+/// strongest of it in nats.
+#[derive(Clone, Copy)]
+pub(super) struct Least<'a> {
+    pub(super) accepted: &'a [Candidate],
+    pub(super) strongest: f64,
+}
+
+impl Least<'_> {
+    fn of(self, candidate: &Candidate) -> f64 {
+        let is_apart = candidate.is_everywhere() && self.accepted.iter().all(is_local_shape);
+        let further = if is_apart { 0.0 } else { FURTHER_SHARE_MIN * self.strongest };
+        (TEMPERATURE * 20_f64.ln()).max(further)
+    }
+
+    /// Whether fitting a candidate may give it that much, from the gain in nats of a trial of free
+    /// size.
+    fn may_be_reached(self, candidate: &Candidate, gain: f64) -> bool {
+        self.accepted.is_empty() || FITTED_GAIN * gain >= self.of(candidate)
+    }
+}
+
 /// The best candidate, if something unknown does not speak against it and it is sure enough beside
-/// an earlier effect of that log evidence.
+/// earlier effects.
 pub(super) fn sure<'r>(
     round: &'r Round,
     section: &Section,
-    accepted: &[Candidate],
-    strongest: f64,
+    least: Least<'_>,
 ) -> Option<&'r Fitted> {
-    let Probabilities { named, unknown } = round.probabilities();
+    let Probabilities { named, unknown, .. } = round.probabilities();
     let best = round.fitted.first()?;
-    let is_apart = best.candidate.is_everywhere() && accepted.iter().all(is_local_shape);
-    let further = if is_apart { 0.0 } else { FURTHER_SHARE_MIN * strongest };
-    let least = (TEMPERATURE * 20_f64.ln()).max(further);
     let leads = named[0] > unknown || is_shape_at_port(&best.candidate, round, section);
-    (leads && best.log_evidence >= least).then_some(best)
+    (leads && best.log_evidence >= least.of(&best.candidate)).then_some(best)
 }
 
 /// Whether it is a shape of the rail at a place: it adds power there, and what its model lacks does
@@ -183,7 +219,11 @@ fn is_local_shape(candidate: &Candidate) -> bool {
 /// surface's with a phase that mean powers leave out, so that an unknown fits better beside it.
 fn is_shape_at_port(candidate: &Candidate, round: &Round, section: &Section) -> bool {
     let is_shape = is_local_shape(candidate);
-    let Some(Port { place: PortPlace::Seats(seats), .. }) = &round.port else { return false };
+    let seats = match round.port.as_ref().map(|port| &port.place) {
+        Some(PortPlace::Seats(seats)) => &seats[..],
+        Some(PortPlace::Between(pair)) => pair,
+        Some(PortPlace::Wheel) | None => return false,
+    };
     let Some([from_m, to_m]) = candidate.extension.x_m else { return false };
     let spacing_m = section.design.sleeper.spacing_m;
     let [first, last] = [seats[0], seats[seats.len() - 1]];
@@ -288,7 +328,43 @@ fn fit(
         })
         .collect();
     fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-    once_each(fitted)
+    to_the_end(problem, current, once_each(fitted))
+}
+
+/// Fits the best candidate and what comes near it once more, from where they came out, if that is of
+/// another kind: between look-alikes the last nats decide.
+fn to_the_end(problem: &Problem<'_>, current: &Calibration, fitted: Vec<Fitted>) -> Vec<Fitted> {
+    let Some(best) = fitted.first() else { return fitted };
+    let (kind, least) = (best.candidate.kind, RIVAL_SHARE * best.log_evidence);
+    let comes_near = |fitted: &Fitted| fitted.log_evidence >= least;
+    let is_other = |fitted: &Fitted| fitted.candidate.kind.physics != kind.physics;
+    if !fitted.iter().any(|rival| comes_near(rival) && is_other(rival)) {
+        return fitted;
+    }
+    let again = |fitted: Fitted| {
+        if comes_near(&fitted) { further(problem, current, fitted) } else { fitted }
+    };
+    let mut fitted: Vec<Fitted> = fitted.into_par_iter().map(again).collect();
+    fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    fitted
+}
+
+/// Takes a fit up again until it gains no more, in its parameters' ranges.
+fn further(problem: &Problem<'_>, current: &Calibration, mut fitted: Fitted) -> Fitted {
+    let candidates = [problem.candidates, std::slice::from_ref(&fitted.candidate)].concat();
+    let with = Problem { candidates: &candidates, ..*problem };
+    for _ in 0..RIVAL_FITS {
+        let Ok(again) = with.calibrate_in_range(fitted.calibration.values.clone()) else { break };
+        let gain = fitted.calibration.objective - again.objective;
+        if gain > 0.0 {
+            fitted.log_evidence = again.log_evidence - current.log_evidence;
+            fitted.calibration = again;
+        }
+        if gain < BETTER {
+            break;
+        }
+    }
+    fitted
 }
 
 /// Fits a candidate together with the baseline, from these values, and what was accepted before; in
