@@ -19,6 +19,10 @@ const REFUSED: u8 = 2;
 /// Exit code when something failed that may pass.
 const FAILED: u8 = 3;
 
+/// How long a worker that is to end without work waits for a coordinator to answer: longer than one
+/// takes to be started again.
+const SILENCE: Duration = Duration::from_mins(10);
+
 /// How long a computation that no longer matters may hold up the end.
 const END: Duration = Duration::from_millis(100);
 
@@ -56,7 +60,8 @@ struct Arguments {
     /// End, with exit code 0, when there was no work for so long.
     #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_IDLE_EXIT")]
     idle_exit: Option<u64>,
-    /// End, with exit code 3, when no coordinator has answered for so long [default: never].
+    /// End, with exit code 3, when no coordinator has answered for so long [default: never; with
+    /// --idle-exit after ten minutes, or as many seconds as that says if they are more].
     #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_GIVE_UP_AFTER")]
     give_up_after: Option<u64>,
     /// File with the farm's token.
@@ -133,9 +138,16 @@ fn config(arguments: &Arguments) -> anyhow::Result<Config> {
             insecure: arguments.insecure,
         },
         idle_exit: arguments.idle_exit.map(Duration::from_secs),
-        give_up_after: arguments.give_up_after.map(Duration::from_secs),
+        give_up_after: patience(arguments.idle_exit, arguments.give_up_after),
         ..Config::new(String::new(), cores)
     })
+}
+
+/// How long no coordinator may answer, in s as it is told: a worker that is to end when there is no work
+/// doesn't wait for ever for somebody to give it some.
+fn patience(idle_exit: Option<u64>, give_up_after: Option<u64>) -> Option<Duration> {
+    let idle = idle_exit.map(|idle| Duration::from_secs(idle).max(SILENCE));
+    give_up_after.map(Duration::from_secs).or(idle)
 }
 
 fn token(path: &Path) -> anyhow::Result<Token> {
@@ -191,5 +203,20 @@ fn log_to_stderr(format: LogFormat) {
     match format {
         LogFormat::Text => log.init(),
         LogFormat::Json => log.json().init(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_worker_that_ends_when_idle_does_not_wait_for_ever_for_its_coordinator() {
+        let seconds = |s| Some(Duration::from_secs(s));
+        assert_eq!(patience(None, None), None);
+        assert_eq!(patience(Some(30), None), seconds(600));
+        assert_eq!(patience(Some(900), None), seconds(900));
+        assert_eq!(patience(Some(900), Some(60)), seconds(60));
+        assert_eq!(patience(None, Some(0)), seconds(0));
     }
 }
