@@ -18,7 +18,7 @@ use crate::sentence::sentence;
 use crate::subject::Subject;
 use std::collections::BTreeMap;
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::extension::Kind;
+use tracktwin_track::extension::{Class, Kind};
 
 /// Probability to see such evidence for an unknown stiffness if nothing is left out, up to which it
 /// is said to be there.
@@ -258,7 +258,12 @@ impl Evidence<'_> {
                 return;
             }
         }
-        let explains = |known: &Hypothesis| known.accepted && known.physics != UNKNOWN;
+        let at_wheel = |kind: &Kind| kind.classes.contains(&Class::WheelAngle);
+        // What comes back with every turn is the wheel's, whatever else there is.
+        let explains = |known: &Hypothesis| {
+            let known_at_wheel = Kind::from_name(&known.physics).is_some_and(at_wheel);
+            known.accepted && known.physics != UNKNOWN && (known_at_wheel || !at_wheel(kind))
+        };
         let explained = !kind.measuring_chain && all.iter().any(explains);
         all.retain(|known| known.accepted || known.physics != finding.physics);
         if !explained {
@@ -304,8 +309,9 @@ impl Evidence<'_> {
             });
             if !round.accepted {
                 notes.push(format!(
-                    "{rest} is not explained{place} (p = {:.1e}), and nothing in the catalogue \
-                     predicts the held-out speeds better.",
+                    "{rest} is left{place} that chance does not explain (p = {:.1e}); it may be the \
+                     model's own error, for nothing in the catalogue predicts the held-out speeds \
+                     better.",
                     round.p_value
                 ));
             }

@@ -165,9 +165,10 @@ impl Search {
         let (accepted, observation) = (self.accepted.clone(), self.observation.clone());
         let forward = &setting.subject.forward;
         let problem = Problem { forward, observation: &observation, candidates: &accepted };
-        let strongest = self.rounds.iter().filter_map(|round| round.fitted.first());
-        let strongest = strongest.map(|fitted| fitted.log_evidence).fold(0.0, f64::max);
-        let least = Least { accepted: &accepted, strongest };
+        // The rounds so far are those whose best was accepted.
+        let known: Vec<Fitted> =
+            self.rounds.iter().filter_map(|round| round.fitted.first().cloned()).collect();
+        let least = Least { accepted: &known, section: &forward.section };
         let mut round = setting.round(&problem, &self.last, all, least, progress)?;
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
             // The candidates found a better baseline on their way: the opponent gets it too.

@@ -40,10 +40,13 @@ const RIVAL_FITS: usize = 3;
 /// Nats by which such a fit must be better to take its place.
 const BETTER: f64 = 3.0;
 
-/// Least log evidence for an effect beside one that was accepted before, over the first one's: what
-/// a first effect's model leaves unexplained looks like a small second one, if not like one that is
-/// everywhere beside a shape at a place.
+/// Least log evidence for an effect beside one that was accepted before, over the part of that one's
+/// that falls to its place: what a model leaves unexplained looks like a small second effect there, if
+/// not like one that is everywhere beside a shape at a place.
 const FURTHER_SHARE_MIN: f64 = 0.25;
+
+/// Spans on either side in which an effect at a place is felt.
+const FELT_SPANS: f64 = 2.0;
 
 /// By how much a candidate may gain more when it is fitted, with all of the baseline, than its best
 /// trial of free size: beside an effect that is accepted what can't get far enough is not fitted.
@@ -130,11 +133,7 @@ impl<'a> Setting<'a> {
             (kind, template.at_strengths(&current.residual, &current.gradient))
         }));
         if round.p_value <= FALSE_ALARM {
-            let mut starts = starts(problem, current, all, &templates, screened);
-            starts.retain(|(template, _)| {
-                let gain = template.along(&current.residual);
-                least.may_be_reached(&all[template.candidate], gain)
-            });
+            let starts = starts(problem, current, all, &templates, screened, least);
             round.fitted = fit(problem, current, all, starts, progress);
         }
         Ok(round)
@@ -174,19 +173,47 @@ pub(super) fn is_predicted(gains: &[f64]) -> bool {
     gains.is_empty() || (gains.iter().sum::<f64>() >= HELD_OUT_MIN && lost <= 1)
 }
 
-/// The least log evidence for a name: what is accepted already, and the log evidence of the
-/// strongest of it in nats.
+/// The least log evidence for a name, beside what is accepted already.
 #[derive(Clone, Copy)]
 pub(super) struct Least<'a> {
-    pub(super) accepted: &'a [Candidate],
-    pub(super) strongest: f64,
+    pub(super) accepted: &'a [Fitted],
+    pub(super) section: &'a Section,
 }
 
 impl Least<'_> {
     fn of(self, candidate: &Candidate) -> f64 {
-        let is_apart = candidate.is_everywhere() && self.accepted.iter().all(is_local_shape);
-        let further = if is_apart { 0.0 } else { FURTHER_SHARE_MIN * self.strongest };
-        (TEMPERATURE * 20_f64.ln()).max(further)
+        let beside = self.accepted.iter().map(|known| self.beside(known, candidate));
+        beside.fold(TEMPERATURE * 20_f64.ln(), f64::max)
+    }
+
+    /// That beside one effect.
+    fn beside(self, known: &Fitted, candidate: &Candidate) -> f64 {
+        if candidate.is_everywhere() && is_local_shape(&known.candidate) {
+            return 0.0;
+        }
+        let [one, other] = [&known.candidate, candidate].map(|candidate| self.felt(candidate));
+        if other[1] < one[0] || one[1] < other[0] {
+            return 0.0;
+        }
+        let part = ((other[1] - other[0]) / (one[1] - one[0])).min(1.0);
+        FURTHER_SHARE_MIN * part * known.log_evidence
+    }
+
+    /// From which sleeper to which a candidate is felt, in spacings.
+    fn felt(self, candidate: &Candidate) -> [f64; 2] {
+        let last = (self.section.sleepers - 1) as f64;
+        let place = match (&candidate.extension.sleepers, candidate.extension.x_m) {
+            (Some(sleepers), _) => sleepers
+                .iter()
+                .map(|&sleeper| sleeper as f64)
+                .fold([last, 0.0], |[from, to], s| [from.min(s), to.max(s)]),
+            (None, Some(x_m)) => {
+                let spacing_m = self.section.design.sleeper.spacing_m;
+                x_m.map(|x_m| (x_m - self.section.first_x_m) / spacing_m)
+            }
+            (None, None) => [0.0, last],
+        };
+        [place[0] - FELT_SPANS, place[1] + FELT_SPANS]
     }
 
     /// Whether fitting a candidate may give it that much, from the gain in nats of a trial of free
@@ -267,8 +294,12 @@ fn starts<'t>(
     all: &[Candidate],
     templates: &'t [Template],
     screened: Vec<(f64, &'t Template)>,
+    least: Least<'_>,
 ) -> Vec<(&'t Template, DVector<f64>)> {
-    let chosen = choose(screened, all, &current.residual);
+    let mut chosen = choose(screened, all, &current.residual);
+    chosen.retain(|template| {
+        least.may_be_reached(&all[template.candidate], template.along(&current.residual))
+    });
     let mut starts: Vec<(&Template, DVector<f64>)> =
         chosen.into_iter().map(|template| (template, current.values.clone())).collect();
     if !problem.candidates.iter().all(is_local_shape) {
@@ -283,17 +314,24 @@ fn starts<'t>(
     starts
 }
 
+/// A candidate's trial that points best along the residual.
+fn best_trial<'t>(
+    templates: &'t [Template],
+    number: usize,
+    residual: &DVector<f64>,
+) -> Option<&'t Template> {
+    let trials = templates.iter().filter(|template| template.candidate == number);
+    trials.max_by(|a, b| a.along(residual).total_cmp(&b.along(residual)))
+}
+
 /// Of each candidate that is everywhere the trial that points best along the residual.
 fn everywhere<'t>(
     templates: &'t [Template],
     all: &[Candidate],
     residual: &DVector<f64>,
 ) -> Vec<&'t Template> {
-    let of = |number: usize| {
-        let trials = templates.iter().filter(|template| template.candidate == number);
-        trials.max_by(|a, b| a.along(residual).total_cmp(&b.along(residual)))
-    };
-    (0..all.len()).filter(|number| all[*number].is_everywhere()).filter_map(of).collect()
+    let everywhere = (0..all.len()).filter(|number| all[*number].is_everywhere());
+    everywhere.filter_map(|number| best_trial(templates, number, residual)).collect()
 }
 
 /// The better fit of each candidate, from fits in order.
