@@ -117,7 +117,7 @@ fn consistent() -> Diagnosis {
         recording: "dev-01".to_owned(),
         verdict: Verdict::Consistent,
         sentence: "The track model with its own stiffness at every sleeper explains the recording; nothing is left out that would show at 7 to 13 km/h.".to_owned(),
-        nothing_left_out: None,
+        nothing_left_out: Some(0.84),
         mismatches: Vec::new(),
         hypotheses: Vec::new(),
         fit: fit(-1.31, -1.31, &[]),
@@ -310,7 +310,11 @@ fn left_out_physics_is_named_placed_measured_and_its_bias_shown() {
 fn a_consistent_recording_reads_well_and_has_no_empty_tables() {
     let diagnosis = consistent();
     let page = page("consistent", &diagnosis);
-    assert_reads(&page, &[&diagnosis.sentence, "tag consistent", &diagnosis.notes[0]]);
+    let sure = "probability that nothing is left out";
+    assert_reads(
+        &page,
+        &[&diagnosis.sentence, "tag consistent", "84 %", sure, &diagnosis.notes[0]],
+    );
     assert_reads(
         &page,
         &["Nowhere is the difference larger than chance explains", "doesn't exclude"],

@@ -166,8 +166,9 @@ impl Search {
         let forward = &setting.subject.forward;
         let problem = Problem { forward, observation: &observation, candidates: &accepted };
         // The rounds so far are those whose best was accepted.
-        let known: Vec<Fitted> =
-            self.rounds.iter().filter_map(|round| round.fitted.first().cloned()).collect();
+        let best = self.rounds.iter().filter_map(|round| round.fitted.first());
+        let known: Vec<(Candidate, f64)> =
+            best.map(|fitted| (fitted.candidate.clone(), fitted.log_evidence)).collect();
         let least = Least { accepted: &known, section: &forward.section };
         let mut round = setting.round(&problem, &self.last, all, least, progress)?;
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {

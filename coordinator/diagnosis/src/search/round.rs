@@ -173,30 +173,30 @@ pub(super) fn is_predicted(gains: &[f64]) -> bool {
     gains.is_empty() || (gains.iter().sum::<f64>() >= HELD_OUT_MIN && lost <= 1)
 }
 
-/// The least log evidence for a name, beside what is accepted already.
+/// The least log evidence for a name, beside what is accepted already with its own log evidence.
 #[derive(Clone, Copy)]
 pub(super) struct Least<'a> {
-    pub(super) accepted: &'a [Fitted],
+    pub(super) accepted: &'a [(Candidate, f64)],
     pub(super) section: &'a Section,
 }
 
 impl Least<'_> {
     fn of(self, candidate: &Candidate) -> f64 {
-        let beside = self.accepted.iter().map(|known| self.beside(known, candidate));
+        let known = self.accepted.iter();
+        let beside = known.map(|(known, evidence)| self.share(known, candidate) * evidence);
         beside.fold(TEMPERATURE * 20_f64.ln(), f64::max)
     }
 
-    /// That beside one effect.
-    fn beside(self, known: &Fitted, candidate: &Candidate) -> f64 {
-        if candidate.is_everywhere() && is_local_shape(&known.candidate) {
+    /// Share of an effect's log evidence that a candidate needs beside it.
+    fn share(self, known: &Candidate, candidate: &Candidate) -> f64 {
+        if candidate.is_everywhere() && is_local_shape(known) {
             return 0.0;
         }
-        let [one, other] = [&known.candidate, candidate].map(|candidate| self.felt(candidate));
+        let [one, other] = [known, candidate].map(|candidate| self.felt(candidate));
         if other[1] < one[0] || one[1] < other[0] {
             return 0.0;
         }
-        let part = ((other[1] - other[0]) / (one[1] - one[0])).min(1.0);
-        FURTHER_SHARE_MIN * part * known.log_evidence
+        FURTHER_SHARE_MIN * ((other[1] - other[0]) / (one[1] - one[0])).min(1.0)
     }
 
     /// From which sleeper to which a candidate is felt, in spacings.
@@ -447,4 +447,43 @@ pub(super) fn retuned(
         }
     }
     Ok(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidate::candidates;
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn beside_an_effect_a_candidate_needs_a_quarter_of_what_falls_to_its_place() {
+        let section = Section::new(TrackDesign::v_track(), 24, 1.0);
+        let all = candidates(&section);
+        let of = |physics: &str, sleepers: Option<&[usize]>| {
+            let found = all.iter().find(|candidate| {
+                candidate.kind.physics == physics
+                    && candidate.extension.x_m.is_none()
+                    && candidate.extension.sleepers.as_deref() == sleepers
+            });
+            found.unwrap()
+        };
+        let joint_at = |span: f64| {
+            let x_m = section.first_x_m + span * section.design.sleeper.spacing_m;
+            let is_there = |at: [f64; 2]| (at[0] - x_m).abs() < 1e-9;
+            let joints = all.iter().filter(|candidate| candidate.kind.physics == "rail_joint");
+            joints.filter(|joint| joint.extension.x_m.is_some_and(is_there)).next().unwrap()
+        };
+        let least = Least { accepted: &[], section: &section };
+        let (bolts, axle_box) = (of("sleeper_bolt", None), of("flexible_axle_box", None));
+        let (gap, far) = (of("hanging_sleeper", Some(&[3])), of("sleeper_bolt", Some(&[20])));
+        let near = of("missing_railpad", Some(&[4]));
+        assert_eq!(least.share(gap, near), 0.25);
+        assert_eq!(least.share(gap, far), 0.0);
+        // Two spans on either side of one sleeper, and of twenty-four.
+        assert_eq!(least.share(axle_box, gap), 0.25 * 4.0 / 27.0);
+        assert_eq!(least.share(axle_box, bolts), 0.25);
+        assert_eq!(least.share(gap, bolts), 0.25);
+        assert_eq!(least.share(joint_at(10.0), bolts), 0.0);
+        assert_eq!(least.share(joint_at(10.0), joint_at(10.5)), 0.25);
+    }
 }

@@ -52,9 +52,17 @@ fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
             (per_cent(hypothesis.probability), format!("probability of this {of}: {name}"))
         })
         .collect();
+    facts.extend(nothing(diagnosis));
     facts.extend(agreement(diagnosis));
     facts.extend(held_out(diagnosis));
     facts
+}
+
+/// How sure it is that nothing is left out, where nothing was found.
+fn nothing(diagnosis: &Diagnosis) -> Option<(String, String)> {
+    let probability = diagnosis.nothing_left_out?;
+    let what = "probability that nothing is left out; the rest is what would be too weak to show";
+    (diagnosis.verdict == Verdict::Consistent).then(|| (per_cent(probability), what.to_owned()))
 }
 
 /// How far measured and predicted levels are apart.
