@@ -4,23 +4,29 @@
 //! crate's. Every step leaves a file, so that an interrupted trial goes on.
 
 use crate::diagnosing::{self, Compared, Diagnosed, DiagnosingError, Setting};
+use crate::training;
 use anyhow::Context;
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{CalibrationError, Diagnosis, Verdict};
+use tracktwin_evaluation::Twin;
 use tracktwin_library::Library;
 use tracktwin_parameters::{Preset, TrackDesign};
+use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::{Recording, RecordingError};
-use tracktwin_trial::{KnockedOut, Plan, Score, SealError, Seals, Summary, detectability, score};
-use tracktwin_truth::TruthError;
+use tracktwin_surrogate::{Trained, TrainingSet};
+use tracktwin_trial::{
+    KnockedOut, Paper, Plan, Score, SealError, Seals, Summary, detectability, score,
+};
+use tracktwin_truth::{Scene, TruthError};
 use tracktwin_worker::CODE_VERSION;
 
 /// File of the seals.
 const SEALS: &str = "seals.sha256";
 
 /// A trial and its folder.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Trial {
     /// Decides what is hidden.
     pub seed: u64,
@@ -32,8 +38,51 @@ pub struct Trial {
     pub knock_out: bool,
     /// Whether local effects that were found are diagnosed again with shuffled sleepers.
     pub shuffle: bool,
+    /// The models of the paper's pipeline, if it is to be asked too.
+    pub paper: Option<PaperModels>,
     /// Whether recordings are removed once they are scored.
     pub discard_recordings: bool,
+}
+
+/// Surrogates and model selector of one library.
+pub struct PaperModels {
+    extractor: Extractor,
+    models: Trained,
+    set: TrainingSet,
+}
+
+impl std::fmt::Debug for PaperModels {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PaperModels")
+            .field("campaign", &self.models.campaign())
+            .finish_non_exhaustive()
+    }
+}
+
+impl PaperModels {
+    /// Models of a folder with the library that they were trained on.
+    ///
+    /// # Errors
+    /// When the folder has no models, or none of this library.
+    pub async fn load(folder: &Path, library: &Library) -> Result<Self, anyhow::Error> {
+        let models = Trained::load(folder)?;
+        let campaign = library
+            .campaign(models.campaign())
+            .await
+            .context("the models belong to another library")?;
+        let set = training::set(library, &campaign).await?;
+        let extractor = Extractor::new(&training::feature_definition(&campaign)?)?;
+        Ok(Self { extractor, models, set })
+    }
+
+    fn look_at(
+        &self,
+        recording: &Recording,
+        scene: &Scene,
+    ) -> Result<Option<Paper>, anyhow::Error> {
+        let twin = Twin { extractor: &self.extractor, models: &self.models, library: &self.set };
+        Ok(Paper::of(scene, &tracktwin_evaluation::evaluate(recording, &twin)?))
+    }
 }
 
 /// What a folder's trial is.
@@ -74,6 +123,14 @@ pub enum TrialError {
         number: u32,
         /// Why.
         source: DiagnosingError,
+    },
+    /// The paper's pipeline can't be asked.
+    #[error("case {number}: {source}")]
+    Paper {
+        /// Number of the case.
+        number: u32,
+        /// Why.
+        source: anyhow::Error,
     },
     /// The truth makes no track.
     #[error(transparent)]
@@ -204,12 +261,18 @@ impl Trial {
     ) -> Result<Score, TrialError> {
         let knock_out = self.knock_out && score.can_be_knocked_out() && score.knocked_out.is_none();
         let shuffle = self.shuffle && score.can_be_shuffled() && score.shuffled.is_none();
-        if !knock_out && !shuffle {
+        let paper = self.paper.as_ref().filter(|_| score.paper.is_none());
+        if !knock_out && !shuffle && paper.is_none() {
             return Ok(score);
         }
         let plan = self.opened(score.number)?;
         let recording = self.again(&plan)?;
         let setting = Setting { design, library: Some(library), without: &[], shuffle: None };
+        if let Some(models) = paper {
+            let looked = models.look_at(&recording, &plan.scene);
+            score.paper =
+                looked.map_err(|source| TrialError::Paper { number: score.number, source })?;
+        }
         if knock_out {
             score.knocked_out = Some(self.knocked_out(&plan, &recording, setting).await?);
         }

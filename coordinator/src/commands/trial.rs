@@ -2,7 +2,8 @@
 
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
-use crate::trial::{Trial, TrialError};
+use crate::trial::{PaperModels, Trial, TrialError};
+use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_library::Library;
@@ -35,17 +36,30 @@ pub(super) struct Arguments {
     /// the alarm should then cease.
     #[arg(long)]
     shuffle: bool,
+    /// Folder of models trained on the library: asks the paper's own pipeline too whether it looks
+    /// content with each recording.
+    #[arg(long, value_name = "DIR", requires = "library")]
+    models: Option<PathBuf>,
     /// Remove a recording's passes once it is scored; its seal and diagnosis stay.
     #[arg(long)]
     discard_recordings: bool,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { cases, seed, out, library, knock_out, shuffle, discard_recordings } = arguments;
-    let trial = Trial { seed, cases, folder: out, knock_out, shuffle, discard_recordings };
+    let Arguments { cases, seed, out, library, knock_out, shuffle, models, discard_recordings } =
+        arguments;
+    let own = || format!("sqlite:{}", out.join("library.sqlite").display());
+    let url = library.unwrap_or_else(own);
+    std::fs::create_dir_all(&out)
+        .with_context(|| format!("{}: the folder cannot be made", out.display()))
+        .or_input()?;
+    let library = Library::open_or_create(&url).await.or_input()?;
+    let paper = match models {
+        Some(folder) => Some(PaperModels::load(&folder, &library).await.or_input()?),
+        None => None,
+    };
+    let trial = Trial { seed, cases, folder: out, knock_out, shuffle, paper, discard_recordings };
     trial.begin().map_err(stop)?;
-    let own = || format!("sqlite:{}", trial.folder.join("library.sqlite").display());
-    let library = Library::open_or_create(&library.unwrap_or_else(own)).await.or_input()?;
 
     let mut progress = Progress::begin("hiding", 0, u64::from(cases));
     let digest = trial.hide(|done, remark| progress.at(done, remark)).map_err(stop)?;

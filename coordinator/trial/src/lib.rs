@@ -6,6 +6,7 @@
 
 mod draw;
 mod effect;
+mod paper;
 mod rate;
 mod score;
 mod seal;
@@ -14,6 +15,7 @@ mod table;
 mod visible;
 
 pub use draw::{Class, Plan, orders, plan};
+pub use paper::Paper;
 pub use rate::Rate;
 pub use score::{Bias, KnockedOut, Named, Placed, Score, placed, score};
 pub use seal::{SealError, Seals};

@@ -1,6 +1,7 @@
 //! One diagnosis against its truth.
 
 use crate::draw::{Class, Plan};
+use crate::paper::Paper;
 use serde::{Deserialize, Serialize};
 use tracktwin_diagnosis::{Diagnosis, Hypothesis, Verdict};
 use tracktwin_parameters::{Axis, Parameter, Preset};
@@ -48,6 +49,9 @@ pub struct Score {
     /// What was said with its sleepers shuffled; none if nobody asked.
     #[serde(default)]
     pub shuffled: Option<Verdict>,
+    /// What the paper's own pipeline says of it; none if nobody asked.
+    #[serde(default)]
+    pub paper: Option<Paper>,
 }
 
 /// What is said of an effect when the catalogue does not have it.
@@ -156,6 +160,7 @@ pub fn score(
         cpu_s,
         knocked_out: None,
         shuffled: None,
+        paper: None,
     }
 }
 
@@ -233,21 +238,25 @@ fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Ve
     all
 }
 
-/// Errors at the sleepers next to all that is hidden; everywhere if it is everywhere.
-fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
-    let physical: Vec<&Hidden> = scene.left_out.iter().filter(|h| !h.is_artefact()).collect();
-    if physical.is_empty() {
-        return None;
-    }
-    let near = |x_m: f64| {
-        physical.iter().any(|hidden| {
-            hidden.place().is_none_or(|[from_m, to_m]| {
-                from_m - 1.01 * SPACING_M <= x_m && x_m <= to_m + 1.01 * SPACING_M
-            })
+/// Whether a place is next to physics that is hidden; all places are if it is everywhere, or none is
+/// hidden.
+pub(crate) fn near(scene: &Scene, x_m: f64) -> bool {
+    let mut physical = scene.left_out.iter().filter(|hidden| !hidden.is_artefact()).peekable();
+    let is_near = |hidden: &Hidden| {
+        hidden.place().is_none_or(|[from_m, to_m]| {
+            from_m - 1.01 * SPACING_M <= x_m && x_m <= to_m + 1.01 * SPACING_M
         })
     };
+    physical.peek().is_none() || physical.any(is_near)
+}
+
+/// Errors at the sleepers next to all that is hidden; everywhere if it is everywhere.
+fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
+    if scene.left_out.iter().all(Hidden::is_artefact) {
+        return None;
+    }
     let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
-    for sleeper in diagnosis.track.iter().filter(|sleeper| near(sleeper.x_m)) {
+    for sleeper in diagnosis.track.iter().filter(|sleeper| near(scene, sleeper.x_m)) {
         let number = (sleeper.x_m / SPACING_M).round() as usize;
         let Some(truth) = number.checked_sub(1).and_then(|n| scene.sleepers.get(n)) else {
             continue;

@@ -1,6 +1,7 @@
 //! What a trial comes to: rates with their intervals, against what was set as a goal.
 
 use crate::draw::Class;
+use crate::paper::Paper;
 use crate::rate::Rate;
 use crate::score::{KnockedOut, Named, Placed, Score};
 use serde::{Deserialize, Serialize};
@@ -9,6 +10,10 @@ use tracktwin_diagnosis::Verdict;
 /// Lengths `d'` from which effects must be seen nearly always, and mostly.
 const SURE: f64 = 6.5;
 const LIKELY: f64 = 5.0;
+
+/// Share of the controls on which the selector's error is usual, and controls that it takes to say.
+const MOST_CONTROLS: f64 = 0.95;
+const CONTROLS_MIN: usize = 5;
 
 /// Bins of probabilities for the calibration error.
 const BINS: usize = 10;
@@ -52,6 +57,9 @@ pub struct KindRow {
     pub detectability: Option<f64>,
     /// How often the re-tuned baseline looked well: parameters inside Table D1, no cell far out.
     pub concealed: Rate,
+    /// How often the paper's own pipeline looked content: parameters inside Table D1, the selector's
+    /// error no greater than on most controls; of none where it was not asked.
+    pub content: Rate,
 }
 
 impl Summary {
@@ -220,7 +228,18 @@ fn cost(scores: &[Score]) -> Row {
     Row { measure, value, goal: "5 minutes on two cores".to_owned(), reached }
 }
 
+/// The selector's error that most controls keep below; none if there are too few to say.
+fn usual_error(scores: &[Score]) -> Option<f64> {
+    let controls = of_class(scores, Class::Control);
+    let mut errors: Vec<f64> =
+        controls.filter_map(|score| score.paper).map(|paper| paper.mape).collect();
+    errors.sort_by(f64::total_cmp);
+    let most = (MOST_CONTROLS * errors.len() as f64).ceil() as usize;
+    (errors.len() >= CONTROLS_MIN).then(|| errors[most - 1])
+}
+
 fn kinds(scores: &[Score]) -> Vec<KindRow> {
+    let usual = usual_error(scores);
     let all = || {
         let alone = scores.iter().filter(|score| score.hidden.len() == 1);
         alone.filter_map(|score| Some((score, score.hidden.first()?)))
@@ -239,6 +258,10 @@ fn kinds(scores: &[Score]) -> Vec<KindRow> {
             placed: Rate::of(placed.map(Placed::within_a_sleeper)),
             detectability: lengths.get(lengths.len() / 2).copied(),
             concealed: Rate::of(of().map(|(s, _)| s.parameters_inside && s.cells_inside)),
+            content: Rate::of(of().filter_map(|(score, _)| {
+                let Paper { mape, inside } = score.paper?;
+                Some(inside && mape <= usual?)
+            })),
         }
     };
     names.into_iter().map(kind).collect()
@@ -273,7 +296,36 @@ mod tests {
             cpu_s: 50.0,
             knocked_out: None,
             shuffled: None,
+            paper: None,
         }
+    }
+
+    #[test]
+    fn the_papers_pipeline_is_content_where_its_error_is_that_of_controls() {
+        let paper = |mape| Some(Paper { mape, inside: true });
+        let mut scores: Vec<Score> = (1..=20)
+            .map(|n| Score { paper: paper(0.01 * f64::from(n)), ..control(n, Verdict::Consistent) })
+            .collect();
+        // Nineteen of twenty are below.
+        assert_eq!(usual_error(&scores), Some(0.19));
+        assert_eq!(usual_error(&scores[..4]), None);
+        let hidden = Named {
+            physics: "squat".to_owned(),
+            detectability: None,
+            first: true,
+            in_set: true,
+            accepted: true,
+            place: None,
+        };
+        let single = |number, mape| Score {
+            class: Class::Single,
+            hidden: vec![hidden.clone()],
+            paper: paper(mape),
+            ..control(number, Verdict::LeftOutPhysics)
+        };
+        scores.extend([single(21, 0.18), single(22, 0.3)]);
+        let kinds = Summary::new(&scores).kinds;
+        assert_eq!(kinds[0].content, Rate { hits: 1, of: 2 });
     }
 
     #[test]

@@ -12,7 +12,7 @@ impl Summary {
         self.rows.iter().for_each(|row| page.push_str(&measure(row)));
         page.push_str(
             "\n| hidden | alarm | first name | placed within a sleeper | median d' | re-tuned \
-             baseline looks well |\n|---|---|---|---|---|---|\n",
+             baseline looks well | paper's pipeline content |\n|---|---|---|---|---|---|---|\n",
         );
         self.kinds.iter().for_each(|kind| page.push_str(&of_kind(kind)));
         page.push_str("\n| case | hidden (d') | said |\n|---|---|---|\n");
@@ -36,10 +36,12 @@ fn measure(row: &Row) -> String {
 fn of_kind(row: &KindRow) -> String {
     let count = |rate: Rate| format!("{} of {}", rate.hits, rate.of);
     let length = row.detectability.map_or("-".to_owned(), |length| format!("{length:.1}"));
-    let KindRow { physics, detected, first, placed, concealed, .. } = row;
-    let [detected, first, placed, concealed] =
-        [detected, first, placed, concealed].map(|r| count(*r));
-    format!("| `{physics}` | {detected} | {first} | {placed} | {length} | {concealed} |\n")
+    let KindRow { physics, detected, first, placed, concealed, content, .. } = row;
+    let [detected, first, placed, concealed, content] =
+        [detected, first, placed, concealed, content].map(|r| count(*r));
+    format!(
+        "| `{physics}` | {detected} | {first} | {placed} | {length} | {concealed} | {content} |\n"
+    )
 }
 
 fn case(score: &Score) -> String {
