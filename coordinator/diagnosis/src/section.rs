@@ -2,6 +2,7 @@
 
 use crate::bands::{Bands, CENTRE_RAD};
 use std::f64::consts::{SQRT_2, TAU};
+use std::ops::Range;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::model::Mesh;
@@ -14,6 +15,28 @@ const ELEMENTS: usize = 8;
 
 /// A window reaches so many standard deviations of its blur beyond its ends.
 const BLUR_REACH: f64 = 3.5;
+
+/// The rail's nodes that are seen, with shares that sum to one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Window {
+    /// The first node.
+    pub first: usize,
+    /// Its share and those of the nodes after it.
+    pub shares: Vec<f64>,
+}
+
+impl Window {
+    /// The nodes.
+    pub fn nodes(&self) -> Range<usize> {
+        self.first..self.first + self.shares.len()
+    }
+
+    /// Mean of values at the nodes of a rail, of which the first has this number.
+    pub fn mean(&self, values: &[f64], first: usize) -> f64 {
+        let seen = &values[self.first - first..][..self.shares.len()];
+        self.shares.iter().zip(seen).map(|(share, value)| share * value).sum()
+    }
+}
 
 /// A stretch of sleepers and the track around it.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,11 +111,11 @@ impl Section {
         placed
     }
 
-    /// Rail nodes that a sleeper's window sees at a speed in a band, with weights that sum to one.
+    /// What a sleeper's window sees of the rail at a speed in a band.
     ///
     /// The wavelet smears the window: at position `x` it holds power from around `x`, by a
     /// Gaussian whose deviation is the way rolled in `6 / (2 pi f sqrt 2)`.
-    pub fn weights(&self, sleeper: usize, speed_m_s: f64, centre_hz: f64) -> Vec<(usize, f64)> {
+    pub fn window(&self, sleeper: usize, speed_m_s: f64, centre_hz: f64) -> Window {
         let spacing_m = self.design.sleeper.spacing_m;
         let blur_m = speed_m_s * CENTRE_RAD / (TAU * centre_hz * SQRT_2);
         let node_m = spacing_m / ELEMENTS as f64;
@@ -107,14 +130,14 @@ impl Section {
         let last = self.spans() * ELEMENTS;
         let nodes = middle - reach..=(middle + reach).min(last);
         let sum: f64 = nodes.clone().map(weight).sum();
-        nodes.map(|node| (node, weight(node) / sum)).collect()
+        Window { first: *nodes.start(), shares: nodes.map(|node| weight(node) / sum).collect() }
     }
 
-    /// The weights for every compared sleeper and band at a speed: `[sleeper][band]`.
-    pub fn all_weights(&self, speed_m_s: f64, bands: &Bands) -> Vec<Vec<Vec<(usize, f64)>>> {
+    /// The windows of every compared sleeper and band at a speed: `[sleeper][band]`.
+    pub fn windows(&self, speed_m_s: f64, bands: &Bands) -> Vec<Vec<Window>> {
         let of = |sleeper| {
             let bands = bands.centres_hz().iter();
-            bands.map(|&hz| self.weights(sleeper, speed_m_s, hz)).collect()
+            bands.map(|&hz| self.window(sleeper, speed_m_s, hz)).collect()
         };
         (0..self.sleepers).map(of).collect()
     }

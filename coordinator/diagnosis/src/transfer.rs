@@ -1,7 +1,7 @@
 //! From the surface under the wheel to the acceleration that is recorded.
 
 use crate::profile::Shape;
-use crate::section::Section;
+use crate::section::{Section, Window};
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -105,26 +105,29 @@ impl Transfer {
         self.model.roughness_gain(wave_number_rad_m)
     }
 
+    /// Roots of that by which a change of the dynamic stiffness under a sleeper's rail seat changes the
+    /// power at each node.
+    pub(crate) fn by_seat(&self, line: usize, sleeper: usize) -> &[Complex64] {
+        &self.by_seats[line][sleeper]
+    }
+
     /// By what a change of the dynamic stiffness under a sleeper's rail seat changes a window's mean
     /// power: its product's real part.
-    pub(crate) fn felt(&self, window: &[(usize, f64)], line: usize, sleeper: usize) -> Complex64 {
-        let by_seat = &self.by_seats[line][sleeper];
-        window.iter().map(|&(node, share)| share * by_seat[node] * by_seat[node]).sum()
+    pub(crate) fn felt(&self, window: &Window, line: usize, sleeper: usize) -> Complex64 {
+        let by_seat = &self.by_seats[line][sleeper][window.nodes()];
+        window.shares.iter().zip(by_seat).map(|(share, root)| share * root * root).sum()
     }
 
     /// The same for a dynamic stiffness between two sleepers' rail seats.
     pub(crate) fn felt_between(
         &self,
-        window: &[(usize, f64)],
+        window: &Window,
         line: usize,
         sleepers: [usize; 2],
     ) -> Complex64 {
-        let [first, second] = sleepers.map(|sleeper| &self.by_seats[line][sleeper]);
-        let at = |&(node, share): &(usize, f64)| {
-            let apart = first[node] - second[node];
-            share * apart * apart
-        };
-        window.iter().map(at).sum()
+        let [first, second] = sleepers.map(|sleeper| &self.by_seats[line][sleeper][window.nodes()]);
+        let apart = first.iter().zip(second).map(|(first, second)| first - second);
+        window.shares.iter().zip(apart).map(|(share, apart)| share * apart * apart).sum()
     }
 
     /// Magnitude of the rail's direct receptance at a node in m/N.
@@ -137,17 +140,17 @@ impl Transfer {
     ///
     /// `d alpha_w = -alpha_w^2 dZ` changes the series stiffness `k` and what the sensor feels of a
     /// force, hence `d |H|^2 = -2 |H|^2 Re((1 - k alpha_w) alpha_w dZ)`.
-    pub(crate) fn felt_at_wheel(&self, window: &[(usize, f64)], line: usize) -> Complex64 {
+    pub(crate) fn felt_at_wheel(&self, window: &Window, line: usize) -> Complex64 {
         let (power, stiffness) = (&self.power[line], &self.stiffness[line]);
         let wheel = self.wheel_receptance[line];
-        let at = |&(node, share): &(usize, f64)| {
+        let at = |(node, share): (usize, &f64)| {
             -2.0 * share * power[node] * (1.0 - stiffness[node] * wheel)
         };
-        window.iter().map(at).sum::<Complex64>() * wheel / wheel.norm()
+        window.nodes().zip(&window.shares).map(at).sum::<Complex64>() * wheel / wheel.norm()
     }
 
     /// Mean of the power over a window's nodes at a line.
-    pub(crate) fn mean_power(&self, window: &[(usize, f64)], line: usize) -> f64 {
-        window.iter().map(|&(node, share)| share * self.power[line][node]).sum()
+    pub(crate) fn mean_power(&self, window: &Window, line: usize) -> f64 {
+        window.mean(&self.power[line], 0)
     }
 }

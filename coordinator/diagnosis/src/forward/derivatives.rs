@@ -1,7 +1,9 @@
 //! How predicted log powers change with the baseline's unknowns, and with whatever hangs under a
 //! rail seat: exact in the receptances, without predicting anew for each unknown.
 
+use super::supports::{SupportChanges, VARIED};
 use super::{Forward, mean};
+use crate::section::Window;
 use crate::transfer::Transfer;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -16,10 +18,10 @@ use tracktwin_track::model::{ModelError, Support, TrackModel};
 const STEP: f64 = 1e-4;
 
 /// Sleepers on either side whose supports are felt in a sleeper's window.
-const NEIGHBOURS: usize = 9;
+pub(super) const NEIGHBOURS: usize = 9;
 
 /// Change of the dynamic stiffness at the rail seats: `[line][sleeper of the track]`.
-type Variation = Vec<Vec<Complex64>>;
+pub(super) type Variation = Vec<Vec<Complex64>>;
 
 /// A prediction and its derivatives by the baseline's unknowns.
 pub struct Linearised {
@@ -44,7 +46,7 @@ pub(crate) struct PortColumns {
 struct State {
     transfer: Transfer,
     /// By `k_b`, `k_p`, `EI_s`, `c_p` and `c_b`.
-    variations: Vec<Variation>,
+    supports: SupportChanges,
     /// Spectrum of the surface: `[speed][line]`.
     excitation: Vec<Vec<f64>>,
 }
@@ -62,7 +64,8 @@ impl Forward {
         let transfer = self.transfer(values, extensions, true)?;
         let variations = self.variations(values, extensions)?;
         let excitation = self.excitation(&transfer, values);
-        let state = State { transfer, variations, excitation };
+        let supports = SupportChanges::new(self, &transfer, &variations, &excitation);
+        let state = State { transfer, supports, excitation };
         let mut log_power = DVector::zeros(self.count());
         let mut jacobian = DMatrix::zeros(self.count(), self.unknowns.count());
         let rows: Vec<_> =
@@ -125,7 +128,7 @@ impl Forward {
         shares: &[f64],
         excitation: &[Vec<f64>],
         shapes: &[Vec<Complex64>],
-        felt: impl Fn(usize, &[(usize, f64)], usize) -> Option<Complex64>,
+        felt: impl Fn(usize, &Window, usize) -> Option<Complex64>,
     ) -> DMatrix<f64> {
         let mut columns = DMatrix::zeros(self.count(), shapes.len());
         for (row, share) in shares.iter().enumerate() {
@@ -166,7 +169,7 @@ impl Forward {
         &self,
         values: &DVector<f64>,
         extensions: &[Arc<dyn Extension>],
-    ) -> Result<Vec<Variation>, ModelError> {
+    ) -> Result<[Variation; VARIED], ModelError> {
         let lines = self.bands.lines_hz();
         let supports = self.unknowns.supports(&self.section, values);
         let stiffness = |vary: fn(&mut Support)| {
@@ -184,25 +187,27 @@ impl Forward {
             }
             Ok(changed)
         };
-        let vary: [fn(&mut Support); 5] = [
+        let vary: [fn(&mut Support); VARIED] = [
             |support| support.ballast_stiffness *= 1.0 + STEP,
             |support| support.railpad_stiffness *= 1.0 + STEP,
             |support| support.sleeper_bending_stiffness *= 1.0 + STEP,
             |support| support.railpad_damping *= 1.0 + STEP,
             |support| support.ballast_damping *= 1.0 + STEP,
         ];
-        vary.into_iter().map(derivative).collect()
+        let mut varied = std::array::from_fn(|_| Variation::new());
+        for (variation, vary) in varied.iter_mut().zip(vary) {
+            *variation = derivative(vary)?;
+        }
+        Ok(varied)
     }
 
     /// One predicted log power and its derivatives.
     fn row(&self, state: &State, values: &DVector<f64>, row: usize) -> (f64, Vec<(usize, f64)>) {
-        let State { transfer, variations, excitation } = state;
+        let State { transfer, supports, excitation } = state;
         let (sleeper, speed, band) = self.place(row);
         let unknowns = &self.unknowns;
         let window = &self.windows[speed][sleeper][band];
         let scale = self.scale(values, sleeper, speed);
-        let near = self.near(sleeper);
-        let mut supports = vec![[0.0; 5]; near.len()];
         let mut spectrum = Vec::new();
         let mut power = 0.0;
         for &(line, weight) in self.bands.weights(band) {
@@ -212,12 +217,6 @@ impl Forward {
             let wave_number = TAU * self.bands.lines_hz()[line] / self.speeds_m_s[speed];
             for (knot, share) in unknowns.spectrum_shares(wave_number) {
                 spectrum.push((knot, share * weight * seen));
-            }
-            for (sums, &(in_track, _)) in supports.iter_mut().zip(&near) {
-                let felt = transfer.felt(window, line, in_track);
-                for (sum, variation) in sums.iter_mut().zip(variations) {
-                    *sum += weight * (felt * variation[line][in_track]).re;
-                }
             }
         }
         let floor = power + self.noise(speed, band);
@@ -235,7 +234,7 @@ impl Forward {
         derivatives.extend(ends);
         derivatives.extend(unknowns.response_shares(self.bands.centres_hz()[band]));
         let global = unknowns.global().start;
-        for (sums, (_, compared)) in supports.iter().zip(near) {
+        for (in_track, compared) in self.near(sleeper) {
             let columns = [
                 unknowns.ballast().start + compared,
                 unknowns.railpad().start + compared,
@@ -243,7 +242,8 @@ impl Forward {
                 global + 1,
                 global + 2,
             ];
-            derivatives.extend(columns.into_iter().zip(sums.iter().map(|sum| sum / total)));
+            let changes = supports.at(in_track, sleeper, row % self.per_sleeper());
+            derivatives.extend(columns.into_iter().zip(changes.map(|c| scale * c / total)));
         }
         (log_power, derivatives)
     }

@@ -5,6 +5,7 @@
 //! the surface's spectrum times `|H|^2`, averaged over band and window (mismatch design, eq. 2, 3).
 
 mod derivatives;
+mod supports;
 
 pub use derivatives::Linearised;
 pub(crate) use derivatives::PortColumns;
@@ -12,7 +13,7 @@ pub(crate) use derivatives::PortColumns;
 use crate::bands::Bands;
 use crate::baseline::{ENDS_SPANS, Unknowns};
 use crate::profile::Shape;
-use crate::section::Section;
+use crate::section::{Section, Window};
 use crate::transfer::Transfer;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -41,13 +42,10 @@ pub struct Forward {
     /// column each, zero until [`Forward::allow_ends`].
     ends: DMatrix<f64>,
     /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
-    windows: Vec<Windows>,
+    windows: Vec<Vec<Vec<Window>>>,
     /// Spectrum of the surface at level one in m2/Hz at each speed and line.
     surface: Vec<Vec<f64>>,
 }
-
-/// Nodes that are seen with their weights: `[sleeper][band]`.
-type Windows = Vec<Vec<Vec<(usize, f64)>>>;
 
 impl Forward {
     /// A predictor for these speeds in km/h with the sensor's noise densities.
@@ -65,7 +63,7 @@ impl Forward {
             ..TAU * bands.centres_hz()[bands.count() - 1] / slowest;
         let frequencies_hz = bands.centres_hz()[0]..bands.centres_hz()[bands.count() - 1];
         let unknowns = Unknowns::new(&section, speeds_m_s.len(), wave_numbers, frequencies_hz);
-        let windows = speeds_m_s.iter().map(|&v| section.all_weights(v, &bands)).collect();
+        let windows = speeds_m_s.iter().map(|&v| section.windows(v, &bands)).collect();
         // A density per rad/m becomes one per Hz at this speed.
         let density = |v: f64, hz: f64| Roughness::new(1.0).density(TAU * hz / v) * TAU / v;
         let surface =

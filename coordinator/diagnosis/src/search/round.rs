@@ -470,8 +470,11 @@ mod tests {
         let joint_at = |span: f64| {
             let x_m = section.first_x_m + span * section.design.sleeper.spacing_m;
             let is_there = |at: [f64; 2]| (at[0] - x_m).abs() < 1e-9;
-            let joints = all.iter().filter(|candidate| candidate.kind.physics == "rail_joint");
-            joints.filter(|joint| joint.extension.x_m.is_some_and(is_there)).next().unwrap()
+            let is_it = |candidate: &&Candidate| {
+                candidate.kind.physics == "rail_joint"
+                    && candidate.extension.x_m.is_some_and(is_there)
+            };
+            all.iter().find(is_it).unwrap()
         };
         let least = Least { accepted: &[], section: &section };
         let (bolts, axle_box) = (of("sleeper_bolt", None), of("flexible_axle_box", None));

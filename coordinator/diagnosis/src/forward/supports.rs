@@ -1,0 +1,158 @@
+//! How the power over every window changes with the support under every sleeper near it.
+//!
+//! The sum over a window's nodes and a band's lines is taken lines first, on stretches of the rail:
+//! node by node, as [`Transfer::felt`] has it, it takes several times as long.
+
+use super::Forward;
+use super::derivatives::{NEIGHBOURS, Variation};
+use crate::section::Window;
+use crate::transfer::Transfer;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Values of a support that vary.
+pub(super) const VARIED: usize = 5;
+
+/// Changes of the power at level one: by sleeper of the track.
+pub(super) struct SupportChanges {
+    by_sleeper: Vec<FromSleeper>,
+    /// Powers of one window: speeds times bands.
+    per_sleeper: usize,
+}
+
+/// Those by one sleeper's support, over the windows near it.
+struct FromSleeper {
+    near: Range<usize>,
+    /// `[compared sleeper near][speed and band][value]`.
+    changes: Vec<[f64; VARIED]>,
+}
+
+impl SupportChanges {
+    /// Of a track whose seats' stiffness varies so, under this spectrum of the surface,
+    /// `[speed][line]`.
+    pub(super) fn new(
+        forward: &Forward,
+        transfer: &Transfer,
+        variations: &[Variation; VARIED],
+        excitation: &[Vec<f64>],
+    ) -> Self {
+        let of = |in_track| FromSleeper::new(forward, transfer, variations, excitation, in_track);
+        let sleepers = forward.section.spans() - 1;
+        let by_sleeper = (0..sleepers).into_par_iter().map(of).collect();
+        Self { by_sleeper, per_sleeper: forward.per_sleeper() }
+    }
+
+    /// Over a compared sleeper's window, at a speed and band counted together, by the support of a
+    /// sleeper of the track near it.
+    pub(super) fn at(&self, in_track: usize, compared: usize, row: usize) -> &[f64; VARIED] {
+        let FromSleeper { near, changes } = &self.by_sleeper[in_track];
+        &changes[(compared - near.start) * self.per_sleeper + row]
+    }
+}
+
+impl FromSleeper {
+    fn new(
+        forward: &Forward,
+        transfer: &Transfer,
+        variations: &[Variation; VARIED],
+        excitation: &[Vec<f64>],
+        in_track: usize,
+    ) -> Self {
+        let section = &forward.section;
+        let is_near =
+            |&compared: &usize| section.in_track(compared).abs_diff(in_track) <= NEIGHBOURS;
+        let first = (0..section.sleepers).find(is_near).unwrap_or(section.sleepers);
+        let near =
+            first..(first..section.sleepers).take_while(is_near).last().map_or(first, |c| c + 1);
+        let nodes = nodes(forward, near.clone());
+        let (bands, lines) = (forward.bands.count(), forward.bands.lines_hz().len());
+        let length = VARIED * nodes.len();
+        let mut changes = vec![[0.0; VARIED]; near.len() * forward.per_sleeper()];
+        pulp::Arch::new().dispatch(|| {
+            let mut by_line = vec![0.0; lines * length];
+            for (line, changes) in by_line.chunks_exact_mut(length.max(1)).enumerate() {
+                let roots = &transfer.by_seat(line, in_track)[nodes.clone()];
+                for (variation, changes) in
+                    variations.iter().zip(changes.chunks_exact_mut(nodes.len()))
+                {
+                    let varied = variation[line][in_track];
+                    for (change, root) in changes.iter_mut().zip(roots) {
+                        *change = (root * root * varied).re;
+                    }
+                }
+            }
+            let mut sums = vec![0.0; length];
+            for row in 0..forward.per_sleeper() {
+                let (speed, band) = (row / bands, row % bands);
+                sums.fill(0.0);
+                for &(line, weight) in forward.bands.weights(band) {
+                    let weight = weight * excitation[speed][line];
+                    let changes = &by_line[line * length..(line + 1) * length];
+                    for (sum, change) in sums.iter_mut().zip(changes) {
+                        *sum += weight * change;
+                    }
+                }
+                for compared in near.clone() {
+                    let window = &forward.windows[speed][compared][band];
+                    let at = (compared - near.start) * forward.per_sleeper() + row;
+                    changes[at] = std::array::from_fn(|value| {
+                        window.mean(&sums[value * nodes.len()..], nodes.start)
+                    });
+                }
+            }
+        });
+        Self { near, changes }
+    }
+}
+
+/// All nodes that some sleepers' windows see.
+fn nodes(forward: &Forward, sleepers: Range<usize>) -> Range<usize> {
+    let speeds = forward.windows.iter();
+    let seen = speeds.flat_map(|speed| speed[sleepers.clone()].iter().flatten().map(Window::nodes));
+    let all = seen.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
+    all.unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bands::Bands;
+    use crate::section::Section;
+    use rustfft::num_complex::Complex64;
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn sums_by_lines_first_are_those_node_by_node() {
+        let section = Section::new(TrackDesign::v_track(), 3, 1.0);
+        let forward = Forward::new(section, Bands::new(300.0, 2000.0), &[13.0, 7.0], vec![0.0; 2]);
+        let values = forward.unknowns.typical();
+        let transfer = forward.transfer(&values, &[], true).unwrap();
+        let excitation = forward.excitation(&transfer, &values);
+        let lines = forward.bands.lines_hz().len();
+        let sleepers = forward.section.spans() - 1;
+        let variations: [Variation; VARIED] = std::array::from_fn(|value| {
+            let at = |line: usize, sleeper: usize| {
+                Complex64::from_polar(1.0 + value as f64, (line * sleeper) as f64)
+            };
+            (0..lines).map(|line| (0..sleepers).map(|s| at(line, s)).collect()).collect()
+        });
+        let changes = SupportChanges::new(&forward, &transfer, &variations, &excitation);
+        let (compared, speed, band) = (2, 1, 7);
+        let row = speed * forward.bands.count() + band;
+        let window = &forward.windows[speed][compared][band];
+        let middle = forward.section.in_track(compared);
+        for in_track in [middle - NEIGHBOURS, middle, middle + NEIGHBOURS] {
+            let plain: [f64; VARIED] = std::array::from_fn(|value| {
+                let of_line = |&(line, weight): &(usize, f64)| {
+                    let felt = transfer.felt(window, line, in_track);
+                    weight * excitation[speed][line] * (felt * variations[value][line][in_track]).re
+                };
+                forward.bands.weights(band).iter().map(of_line).sum()
+            });
+            for (quick, plain) in changes.at(in_track, compared, row).iter().zip(plain) {
+                // Rounding of some hundred terms, of which some cancel.
+                assert!((quick / plain - 1.0).abs() < 1e-10, "{quick} {plain}");
+            }
+        }
+    }
+}
