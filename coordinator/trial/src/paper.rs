@@ -8,10 +8,11 @@ use tracktwin_truth::Scene;
 
 /// What surrogates and model selector say next to what is hidden; everywhere if it is everywhere, or
 /// nothing is hidden.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Paper {
-    /// Median of the best matches' mean absolute percentage error (paper, eq. 10; 0.05 is 5 %).
-    pub mape: f64,
+    /// Mean absolute percentage error of each sleeper's best match (paper, eq. 10; 0.05 is 5 %),
+    /// ascending; of one sleeper at least.
+    pub mape: Vec<f64>,
     /// Whether all six parameters of every sleeper lie inside Table D1 of the paper.
     pub inside: bool,
 }
@@ -22,10 +23,14 @@ impl Paper {
         let near: Vec<&SleeperEvaluation> =
             evaluation.sleepers.iter().filter(|sleeper| near(scene, sleeper.x_m)).collect();
         let best = near.iter().filter_map(|sleeper| sleeper.selector.mape.first().copied());
-        let mut errors: Vec<f64> = best.collect();
-        errors.sort_by(f64::total_cmp);
-        let mape = *errors.get(errors.len() / 2)?;
-        Some(Self { mape, inside: near.into_iter().all(is_inside) })
+        let mut mape: Vec<f64> = best.collect();
+        mape.sort_by(f64::total_cmp);
+        (!mape.is_empty()).then(|| Self { mape, inside: near.into_iter().all(is_inside) })
+    }
+
+    /// Whether it looks content where an error of a single sleeper is usual up to this.
+    pub fn is_content(&self, usual: f64) -> bool {
+        self.inside && self.mape[self.mape.len() / 2] <= usual
     }
 }
 

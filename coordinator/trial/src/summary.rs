@@ -1,7 +1,6 @@
 //! What a trial comes to: rates with their intervals, against what was set as a goal.
 
 use crate::draw::Class;
-use crate::paper::Paper;
 use crate::rate::Rate;
 use crate::score::{KnockedOut, Named, Placed, Score};
 use serde::{Deserialize, Serialize};
@@ -11,9 +10,9 @@ use tracktwin_diagnosis::Verdict;
 const SURE: f64 = 6.5;
 const LIKELY: f64 = 5.0;
 
-/// Share of the controls on which the selector's error is usual, and controls that it takes to say.
-const MOST_CONTROLS: f64 = 0.95;
-const CONTROLS_MIN: usize = 5;
+/// Share of the controls' sleepers on which the selector's error is usual, and how many it takes to say.
+const MOST_SLEEPERS: f64 = 0.95;
+const SLEEPERS_MIN: usize = 20;
 
 /// Bins of probabilities for the calibration error.
 const BINS: usize = 10;
@@ -58,7 +57,7 @@ pub struct KindRow {
     /// How often the re-tuned baseline looked well: parameters inside Table D1, no cell far out.
     pub concealed: Rate,
     /// How often the paper's own pipeline looked content: parameters inside Table D1, the selector's
-    /// error no greater than on most controls; of none where it was not asked.
+    /// error no greater than at most sleepers of controls; of none where it was not asked.
     pub content: Rate,
 }
 
@@ -228,14 +227,13 @@ fn cost(scores: &[Score]) -> Row {
     Row { measure, value, goal: "5 minutes on two cores".to_owned(), reached }
 }
 
-/// The selector's error that most controls keep below; none if there are too few to say.
+/// The selector's error that most sleepers of controls keep below; none if there are too few to say.
 fn usual_error(scores: &[Score]) -> Option<f64> {
-    let controls = of_class(scores, Class::Control);
-    let mut errors: Vec<f64> =
-        controls.filter_map(|score| score.paper).map(|paper| paper.mape).collect();
+    let controls = of_class(scores, Class::Control).filter_map(|score| score.paper.as_ref());
+    let mut errors: Vec<f64> = controls.flat_map(|paper| paper.mape.iter().copied()).collect();
     errors.sort_by(f64::total_cmp);
-    let most = (MOST_CONTROLS * errors.len() as f64).ceil() as usize;
-    (errors.len() >= CONTROLS_MIN).then(|| errors[most - 1])
+    let most = (MOST_SLEEPERS * errors.len() as f64).ceil() as usize;
+    (errors.len() >= SLEEPERS_MIN).then(|| errors[most - 1])
 }
 
 fn kinds(scores: &[Score]) -> Vec<KindRow> {
@@ -258,10 +256,9 @@ fn kinds(scores: &[Score]) -> Vec<KindRow> {
             placed: Rate::of(placed.map(Placed::within_a_sleeper)),
             detectability: lengths.get(lengths.len() / 2).copied(),
             concealed: Rate::of(of().map(|(s, _)| s.parameters_inside && s.cells_inside)),
-            content: Rate::of(of().filter_map(|(score, _)| {
-                let Paper { mape, inside } = score.paper?;
-                Some(inside && mape <= usual?)
-            })),
+            content: Rate::of(
+                of().filter_map(|(score, _)| Some(score.paper.as_ref()?.is_content(usual?))),
+            ),
         }
     };
     names.into_iter().map(kind).collect()
@@ -270,6 +267,7 @@ fn kinds(scores: &[Score]) -> Vec<KindRow> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::paper::Paper;
 
     #[test]
     fn probabilities_that_come_true_as_often_as_said_have_no_error() {
@@ -302,13 +300,13 @@ mod tests {
 
     #[test]
     fn the_papers_pipeline_is_content_where_its_error_is_that_of_controls() {
-        let paper = |mape| Some(Paper { mape, inside: true });
+        let paper = |mape| Some(Paper { mape: vec![mape], inside: true });
         let mut scores: Vec<Score> = (1..=20)
             .map(|n| Score { paper: paper(0.01 * f64::from(n)), ..control(n, Verdict::Consistent) })
             .collect();
         // Nineteen of twenty are below.
         assert_eq!(usual_error(&scores), Some(0.19));
-        assert_eq!(usual_error(&scores[..4]), None);
+        assert_eq!(usual_error(&scores[..19]), None);
         let hidden = Named {
             physics: "squat".to_owned(),
             detectability: None,
