@@ -1,6 +1,7 @@
 //! What a trial comes to: rates with their intervals, against what was set as a goal.
 
 use crate::draw::Class;
+use crate::paper::Usual;
 use crate::rate::Rate;
 use crate::score::{KnockedOut, Named, Placed, Score};
 use serde::{Deserialize, Serialize};
@@ -9,10 +10,6 @@ use tracktwin_diagnosis::Verdict;
 /// Lengths `d'` from which effects must be seen nearly always, and mostly.
 const SURE: f64 = 6.5;
 const LIKELY: f64 = 5.0;
-
-/// Share of the controls' sleepers on which the selector's error is usual, and how many it takes to say.
-const MOST_SLEEPERS: f64 = 0.95;
-const SLEEPERS_MIN: usize = 20;
 
 /// Bins of probabilities for the calibration error.
 const BINS: usize = 10;
@@ -57,7 +54,7 @@ pub struct KindRow {
     /// How often the re-tuned baseline looked well: parameters inside Table D1, no cell far out.
     pub concealed: Rate,
     /// How often the paper's own pipeline looked content: parameters inside Table D1, the selector's
-    /// error no greater than at most sleepers of controls; of none where it was not asked.
+    /// error usual on controls; of none where it was not asked.
     pub content: Rate,
 }
 
@@ -227,17 +224,9 @@ fn cost(scores: &[Score]) -> Row {
     Row { measure, value, goal: "5 minutes on two cores".to_owned(), reached }
 }
 
-/// The selector's error that most sleepers of controls keep below; none if there are too few to say.
-fn usual_error(scores: &[Score]) -> Option<f64> {
-    let controls = of_class(scores, Class::Control).filter_map(|score| score.paper.as_ref());
-    let mut errors: Vec<f64> = controls.flat_map(|paper| paper.mape.iter().copied()).collect();
-    errors.sort_by(f64::total_cmp);
-    let most = (MOST_SLEEPERS * errors.len() as f64).ceil() as usize;
-    (errors.len() >= SLEEPERS_MIN).then(|| errors[most - 1])
-}
-
 fn kinds(scores: &[Score]) -> Vec<KindRow> {
-    let usual = usual_error(scores);
+    let controls = of_class(scores, Class::Control).filter_map(|score| score.paper.as_ref());
+    let usual = Usual::of(&controls.collect::<Vec<_>>());
     let all = || {
         let alone = scores.iter().filter(|score| score.hidden.len() == 1);
         alone.filter_map(|score| Some((score, score.hidden.first()?)))
@@ -257,7 +246,7 @@ fn kinds(scores: &[Score]) -> Vec<KindRow> {
             detectability: lengths.get(lengths.len() / 2).copied(),
             concealed: Rate::of(of().map(|(s, _)| s.parameters_inside && s.cells_inside)),
             content: Rate::of(
-                of().filter_map(|(score, _)| Some(score.paper.as_ref()?.is_content(usual?))),
+                of().filter_map(|(score, _)| Some(usual?.is_content(score.paper.as_ref()?))),
             ),
         }
     };
@@ -267,7 +256,6 @@ fn kinds(scores: &[Score]) -> Vec<KindRow> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paper::Paper;
 
     #[test]
     fn probabilities_that_come_true_as_often_as_said_have_no_error() {
@@ -296,34 +284,6 @@ mod tests {
             shuffled: None,
             paper: None,
         }
-    }
-
-    #[test]
-    fn the_papers_pipeline_is_content_where_its_error_is_that_of_controls() {
-        let paper = |mape| Some(Paper { mape: vec![mape], inside: true });
-        let mut scores: Vec<Score> = (1..=20)
-            .map(|n| Score { paper: paper(0.01 * f64::from(n)), ..control(n, Verdict::Consistent) })
-            .collect();
-        // Nineteen of twenty are below.
-        assert_eq!(usual_error(&scores), Some(0.19));
-        assert_eq!(usual_error(&scores[..19]), None);
-        let hidden = Named {
-            physics: "squat".to_owned(),
-            detectability: None,
-            first: true,
-            in_set: true,
-            accepted: true,
-            place: None,
-        };
-        let single = |number, mape| Score {
-            class: Class::Single,
-            hidden: vec![hidden.clone()],
-            paper: paper(mape),
-            ..control(number, Verdict::LeftOutPhysics)
-        };
-        scores.extend([single(21, 0.18), single(22, 0.3)]);
-        let kinds = Summary::new(&scores).kinds;
-        assert_eq!(kinds[0].content, Rate { hits: 1, of: 2 });
     }
 
     #[test]
