@@ -206,6 +206,9 @@ impl Trial {
                     text(&tracktwin_trial::plan(self.seed, number).scene).as_bytes(),
                 )?;
             }
+            if known.count() > self.cases {
+                return Ok(known.digest());
+            }
         }
         std::fs::write(&path, seals.to_text()).map_err(|source| file(&path, source))?;
         Ok(seals.digest())

@@ -10,8 +10,8 @@ const BIAS_MIN: f64 = 0.1;
 /// Sleepers that are named one by one.
 const NAMED_MAX: usize = 3;
 
-/// What was found, where, how sure, and what it changes; for a section of so many sleepers, and a
-/// recording to which nothing is left out with this probability.
+/// What was found, where, how sure, and what it changes; for a section of so many sleepers, of
+/// which nothing is left out with this probability.
 pub(crate) fn sentence(
     verdict: Verdict,
     hypotheses: &[Hypothesis],

@@ -45,7 +45,7 @@ pub(crate) struct PortColumns {
 /// A track with what its derivatives are made of.
 struct State {
     transfer: Transfer,
-    /// By `k_b`, `k_p`, `EI_s`, `c_p` and `c_b`.
+    /// Changes by `k_b`, `k_p`, `EI_s`, `c_p` and `c_b` of each support.
     supports: SupportChanges,
     /// Spectrum of the surface: `[speed][line]`.
     excitation: Vec<Vec<f64>>,

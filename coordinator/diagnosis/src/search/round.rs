@@ -314,24 +314,17 @@ fn starts<'t>(
     starts
 }
 
-/// A candidate's trial that points best along the residual.
-fn best_trial<'t>(
-    templates: &'t [Template],
-    number: usize,
-    residual: &DVector<f64>,
-) -> Option<&'t Template> {
-    let trials = templates.iter().filter(|template| template.candidate == number);
-    trials.max_by(|a, b| a.along(residual).total_cmp(&b.along(residual)))
-}
-
 /// Of each candidate that is everywhere the trial that points best along the residual.
 fn everywhere<'t>(
     templates: &'t [Template],
     all: &[Candidate],
     residual: &DVector<f64>,
 ) -> Vec<&'t Template> {
-    let everywhere = (0..all.len()).filter(|number| all[*number].is_everywhere());
-    everywhere.filter_map(|number| best_trial(templates, number, residual)).collect()
+    let best = |number: usize| {
+        let trials = templates.iter().filter(|template| template.candidate == number);
+        trials.max_by(|a, b| a.along(residual).total_cmp(&b.along(residual)))
+    };
+    (0..all.len()).filter(|number| all[*number].is_everywhere()).filter_map(best).collect()
 }
 
 /// The better fit of each candidate, from fits in order.
