@@ -65,44 +65,65 @@ impl FromSleeper {
         let near =
             first..(first..section.sleepers).take_while(is_near).last().map_or(first, |c| c + 1);
         let nodes = nodes(forward, near.clone());
-        let (bands, lines) = (forward.bands.count(), forward.bands.lines_hz().len());
-        let length = VARIED * nodes.len();
-        let mut changes = vec![[0.0; VARIED]; near.len() * forward.per_sleeper()];
-        pulp::Arch::new().dispatch(|| {
-            let mut by_line = vec![0.0; lines * length];
-            for (line, changes) in by_line.chunks_exact_mut(length.max(1)).enumerate() {
-                let roots = &transfer.by_seat(line, in_track)[nodes.clone()];
-                for (variation, changes) in
-                    variations.iter().zip(changes.chunks_exact_mut(nodes.len()))
-                {
-                    let varied = variation[line][in_track];
-                    for (change, root) in changes.iter_mut().zip(roots) {
-                        *change = (root * root * varied).re;
-                    }
-                }
-            }
-            let mut sums = vec![0.0; length];
-            for row in 0..forward.per_sleeper() {
-                let (speed, band) = (row / bands, row % bands);
-                sums.fill(0.0);
-                for &(line, weight) in forward.bands.weights(band) {
-                    let weight = weight * excitation[speed][line];
-                    let changes = &by_line[line * length..(line + 1) * length];
-                    for (sum, change) in sums.iter_mut().zip(changes) {
-                        *sum += weight * change;
-                    }
-                }
-                for compared in near.clone() {
-                    let window = &forward.windows[speed][compared][band];
-                    let at = (compared - near.start) * forward.per_sleeper() + row;
-                    changes[at] = std::array::from_fn(|value| {
-                        window.mean(&sums[value * nodes.len()..], nodes.start)
-                    });
-                }
-            }
+        let changes = pulp::Arch::new().dispatch(|| {
+            let by_line = by_line(transfer, variations, in_track, &nodes);
+            over_windows(forward, excitation, &by_line, &near, &nodes)
         });
         Self { near, changes }
     }
+}
+
+/// Changes of the power at each node by a sleeper's support: `[line][value][node]`.
+#[expect(clippy::inline_always, reason = "must be compiled for each instruction set")]
+#[inline(always)]
+fn by_line(
+    transfer: &Transfer,
+    variations: &[Variation; VARIED],
+    in_track: usize,
+    nodes: &Range<usize>,
+) -> Vec<f64> {
+    let lines = variations[0].len();
+    let mut changes = vec![0.0; lines * VARIED * nodes.len()];
+    for (index, changes) in changes.chunks_exact_mut(nodes.len().max(1)).enumerate() {
+        let (line, value) = (index / VARIED, index % VARIED);
+        let varied = variations[value][line][in_track];
+        let roots = &transfer.by_seat(line, in_track)[nodes.clone()];
+        for (change, root) in changes.iter_mut().zip(roots) {
+            *change = (root * root * varied).re;
+        }
+    }
+    changes
+}
+
+/// Their sums over the windows of sleepers near: `[sleeper near][speed and band][value]`.
+#[expect(clippy::inline_always, reason = "must be compiled for each instruction set")]
+#[inline(always)]
+fn over_windows(
+    forward: &Forward,
+    excitation: &[Vec<f64>],
+    by_line: &[f64],
+    near: &Range<usize>,
+    nodes: &Range<usize>,
+) -> Vec<[f64; VARIED]> {
+    let (bands, length) = (forward.bands.count(), VARIED * nodes.len());
+    let mut changes = vec![[0.0; VARIED]; near.len() * forward.per_sleeper()];
+    let mut sums = vec![0.0; length];
+    for row in 0..forward.per_sleeper() {
+        let (speed, band) = (row / bands, row % bands);
+        sums.fill(0.0);
+        for &(line, weight) in forward.bands.weights(band) {
+            let weight = weight * excitation[speed][line];
+            for (sum, change) in sums.iter_mut().zip(&by_line[line * length..][..length]) {
+                *sum += weight * change;
+            }
+        }
+        for (index, compared) in near.clone().enumerate() {
+            let window = &forward.windows[speed][compared][band];
+            changes[index * forward.per_sleeper() + row] =
+                std::array::from_fn(|value| window.mean(&sums[value * nodes.len()..], nodes.start));
+        }
+    }
+    changes
 }
 
 /// All nodes that some sleepers' windows see.

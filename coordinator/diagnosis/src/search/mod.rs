@@ -1,12 +1,16 @@
 //! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
 
 mod chance;
+mod fit;
+mod least;
 mod probability;
 mod round;
 
 pub(crate) use probability::Probabilities;
 
-use self::round::{Least, Setting, is_predicted, retuned, sure};
+use self::fit::retuned;
+use self::least::Least;
+use self::round::{Setting, is_predicted, sure};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;

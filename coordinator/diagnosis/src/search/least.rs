@@ -1,0 +1,116 @@
+//! How much evidence a name needs, alone and beside what is accepted already.
+
+use super::probability::TEMPERATURE;
+use crate::candidate::Candidate;
+use crate::section::Section;
+use tracktwin_track::extension::Class;
+
+/// Least log evidence for an effect beside one that was accepted before, over the part of that one's
+/// that falls to its place: what a model leaves unexplained looks like a small second effect there, if
+/// not like one that is everywhere beside a shape at a place.
+const FURTHER_SHARE_MIN: f64 = 0.25;
+
+/// Spans on either side in which an effect at a place is felt.
+const FELT_SPANS: f64 = 2.0;
+
+/// By how much a candidate may gain more when it is fitted, with all of the baseline, than its best
+/// trial of free size: beside an effect that is accepted what can't get far enough is not fitted.
+const FITTED_GAIN: f64 = 3.0;
+
+/// The least log evidence for a name, beside what is accepted already with its own log evidence.
+#[derive(Clone, Copy)]
+pub(super) struct Least<'a> {
+    pub(super) accepted: &'a [(Candidate, f64)],
+    pub(super) section: &'a Section,
+}
+
+impl Least<'_> {
+    pub(super) fn of(self, candidate: &Candidate) -> f64 {
+        let known = self.accepted.iter();
+        let beside = known.map(|(known, evidence)| self.share(known, candidate) * evidence);
+        beside.fold(TEMPERATURE * 20_f64.ln(), f64::max)
+    }
+
+    /// Share of an effect's log evidence that a candidate needs beside it.
+    fn share(self, known: &Candidate, candidate: &Candidate) -> f64 {
+        if candidate.is_everywhere() && is_local_shape(known) {
+            return 0.0;
+        }
+        let [one, other] = [known, candidate].map(|candidate| self.felt(candidate));
+        if other[1] < one[0] || one[1] < other[0] {
+            return 0.0;
+        }
+        FURTHER_SHARE_MIN * ((other[1] - other[0]) / (one[1] - one[0])).min(1.0)
+    }
+
+    /// From which sleeper to which a candidate is felt, in spacings.
+    fn felt(self, candidate: &Candidate) -> [f64; 2] {
+        let last = (self.section.sleepers - 1) as f64;
+        let place = match (&candidate.extension.sleepers, candidate.extension.x_m) {
+            (Some(sleepers), _) => sleepers
+                .iter()
+                .map(|&sleeper| sleeper as f64)
+                .fold([last, 0.0], |[from, to], s| [from.min(s), to.max(s)]),
+            (None, Some(x_m)) => {
+                let spacing_m = self.section.design.sleeper.spacing_m;
+                x_m.map(|x_m| (x_m - self.section.first_x_m) / spacing_m)
+            }
+            (None, None) => [0.0, last],
+        };
+        [place[0] - FELT_SPANS, place[1] + FELT_SPANS]
+    }
+
+    /// Whether fitting a candidate may give it that much, from the gain in nats of a trial of free
+    /// size.
+    pub(super) fn may_be_reached(self, candidate: &Candidate, gain: f64) -> bool {
+        self.accepted.is_empty() || FITTED_GAIN * gain >= self.of(candidate)
+    }
+}
+
+/// Whether it is a shape of the rail at a place: it adds power there, and what its model lacks does
+/// not look like another track.
+pub(super) fn is_local_shape(candidate: &Candidate) -> bool {
+    candidate.kind.classes.contains(&Class::Wavelength) && !candidate.is_everywhere()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidate::candidates;
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn beside_an_effect_a_candidate_needs_a_quarter_of_what_falls_to_its_place() {
+        let section = Section::new(TrackDesign::v_track(), 24, 1.0);
+        let all = candidates(&section);
+        let of = |physics: &str, sleepers: Option<&[usize]>| {
+            let found = all.iter().find(|candidate| {
+                candidate.kind.physics == physics
+                    && candidate.extension.x_m.is_none()
+                    && candidate.extension.sleepers.as_deref() == sleepers
+            });
+            found.unwrap()
+        };
+        let joint_at = |span: f64| {
+            let x_m = section.first_x_m + span * section.design.sleeper.spacing_m;
+            let is_there = |at: [f64; 2]| (at[0] - x_m).abs() < 1e-9;
+            let is_it = |candidate: &&Candidate| {
+                candidate.kind.physics == "rail_joint"
+                    && candidate.extension.x_m.is_some_and(is_there)
+            };
+            all.iter().find(is_it).unwrap()
+        };
+        let least = Least { accepted: &[], section: &section };
+        let (bolts, axle_box) = (of("sleeper_bolt", None), of("flexible_axle_box", None));
+        let (gap, far) = (of("hanging_sleeper", Some(&[3])), of("sleeper_bolt", Some(&[20])));
+        let near = of("missing_railpad", Some(&[4]));
+        assert_eq!(least.share(gap, near), 0.25);
+        assert_eq!(least.share(gap, far), 0.0);
+        // Two spans on either side of one sleeper, and of twenty-four.
+        assert_eq!(least.share(axle_box, gap), 0.25 * 4.0 / 27.0);
+        assert_eq!(least.share(axle_box, bolts), 0.25);
+        assert_eq!(least.share(gap, bolts), 0.25);
+        assert_eq!(least.share(joint_at(10.0), bolts), 0.0);
+        assert_eq!(least.share(joint_at(10.0), joint_at(10.5)), 0.25);
+    }
+}
