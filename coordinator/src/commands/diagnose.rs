@@ -32,7 +32,8 @@ pub(super) struct Arguments {
     /// Folder of the models, as `train` or `run` wrote it: their campaign says what track it is.
     #[arg(long, value_name = "DIR", requires = "library")]
     models: Option<PathBuf>,
-    /// The library that keeps null simulations and diagnoses: sqlite:PATH or postgres://...
+    /// The library that keeps null simulations and diagnoses, made if it is not there:
+    /// sqlite:PATH or postgres://...
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
     library: Option<String>,
     /// Folder for diagnosis.json and report.html.
@@ -54,7 +55,9 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, models, library, out, without } = arguments;
     let recording = Recording::open(&recording).or_input()?;
     let library = match library {
-        Some(url) => Some(Library::open(&url).await.or_input()?),
+        // Models belong to a library that is there already.
+        Some(url) if models.is_some() => Some(Library::open(&url).await.or_input()?),
+        Some(url) => Some(Library::open_or_create(&url).await.or_input()?),
         None => None,
     };
     let design = design(models, library.as_ref()).await?;

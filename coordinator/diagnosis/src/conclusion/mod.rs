@@ -7,6 +7,7 @@ mod place;
 
 pub use self::alone::passes_alone;
 use self::nameless::UNKNOWN;
+use self::place::are_neighbours;
 use crate::calibration::CalibrationError;
 use crate::chain::Trouble;
 use crate::finding::Finding;
@@ -136,9 +137,7 @@ impl Evidence<'_> {
         let rounds = self.search.rounds.iter().filter(|round| round.p_value <= 0.05);
         for round in rounds {
             for hypothesis in self.of_round(round) {
-                let known = all.iter_mut().find(|known| {
-                    known.physics == hypothesis.physics && known.location == hypothesis.location
-                });
+                let known = all.iter_mut().find(|known| self.is_same(known, &hypothesis));
                 match known {
                     Some(known) if known.accepted => {
                         known.probability = known.probability.max(hypothesis.probability);
@@ -221,7 +220,31 @@ impl Evidence<'_> {
                 log_evidence: port.log_evidence,
             });
         }
+        if round.accepted {
+            self.gather(&mut hypotheses);
+        }
         hypotheses
+    }
+
+    /// Gives the accepted one, which is the first, what the same name has at its place: another
+    /// fit of the same thing.
+    fn gather(&self, hypotheses: &mut Vec<Hypothesis>) {
+        let mut accepted = hypotheses.remove(0);
+        let others = std::mem::take(hypotheses).into_iter();
+        let (same, different): (Vec<_>, Vec<_>) =
+            others.partition(|other| self.is_same(&accepted, other));
+        accepted.probability += same.iter().map(|other| other.probability).sum::<f64>();
+        hypotheses.push(accepted);
+        hypotheses.extend(different);
+    }
+
+    /// Whether two hypotheses are one: the same name at the same place, or beside an accepted one.
+    fn is_same(&self, known: &Hypothesis, other: &Hypothesis) -> bool {
+        let is_fit = known.accepted && !other.accepted;
+        let places = [known, other].map(|hypothesis| hypothesis.location.as_ref());
+        let spacing_m = self.subject.forward.section.design.sleeper.spacing_m;
+        let together = || are_neighbours(places[0], places[1], spacing_m);
+        known.physics == other.physics && (known.location == other.location || is_fit && together())
     }
 
     fn hypothesis(&self, fitted: &Fitted, probability: f64, accepted: bool) -> Hypothesis {

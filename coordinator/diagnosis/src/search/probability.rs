@@ -8,6 +8,10 @@ use tracktwin_track::extension::KINDS;
 /// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
 pub(super) const TEMPERATURE: f64 = 3.0;
 
+/// By how much more it is tempered for each nat of the greatest evidence: what is not exact in the
+/// model of an effect grows with the effect.
+const INEXACT_SHARE: f64 = 1e-3;
+
 /// Probability of an unnamed alternative against a name of equal evidence: most of what goes wrong
 /// on a track is in the catalogue.
 const UNKNOWN_PRIOR: f64 = 0.1;
@@ -60,12 +64,13 @@ fn of(named: impl Iterator<Item = f64>, unknown: Option<f64>, unseen: f64) -> Pr
     let prior = (1.0 - NOTHING_PRIOR) / KINDS.len() as f64;
     let named: Vec<f64> = named.collect();
     let best = named.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let temperature = TEMPERATURE + INEXACT_SHARE * best.max(0.0);
     let named: Vec<f64> =
-        named.into_iter().map(|evidence| prior.ln() + evidence / TEMPERATURE).collect();
+        named.into_iter().map(|evidence| prior.ln() + evidence / temperature).collect();
     let unknown = unknown.map_or(f64::NEG_INFINITY, |evidence| {
         let is_explained = best >= EXPLAINED_SHARE * evidence;
         let evidence = if is_explained { evidence.min(best) } else { evidence };
-        (UNKNOWN_PRIOR * prior).ln() + evidence / TEMPERATURE
+        (UNKNOWN_PRIOR * prior).ln() + evidence / temperature
     });
     let nothing = NOTHING_PRIOR.ln();
     let highest = named.iter().copied().fold(unknown.max(nothing), f64::max);
@@ -92,6 +97,14 @@ mod tests {
             of([12_797.0, 1201.0].into_iter(), Some(600.0), 0.3);
         assert!((named[0] - 1.0).abs() < 1e-12);
         assert!(named[1] < 1e-12 && unknown < 1e-12);
+    }
+
+    #[test]
+    fn look_alikes_a_thousandth_apart_are_both_possible() {
+        let strong = of([10_657.5, 10_647.6].into_iter(), None, 0.0).named;
+        assert!(strong[1] > 0.25 && strong[1] < 0.5, "{strong:?}");
+        let weak = of([100.0, 90.1].into_iter(), None, 0.0).named;
+        assert!(weak[1] < 0.05, "{weak:?}");
     }
 
     #[test]
