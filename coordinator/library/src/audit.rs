@@ -131,6 +131,10 @@ struct Sample {
 impl Write for Sample {
     type Answer = Vec<Audit>;
 
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
     async fn apply(&self, connection: &mut Connection) -> Result<Vec<Audit>, LibraryError> {
         let take = format!(
             "with next as (
@@ -177,6 +181,10 @@ struct Found {
 
 impl Write for Found {
     type Answer = Option<String>;
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.auditor)
+    }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Option<String>, LibraryError> {
         let keep = "update audit set state = $4, difference_dB = $5, ended_unix_ms = $6,

@@ -120,6 +120,10 @@ impl Library {
 impl Write for LeaseRequest {
     type Answer = Option<Lease>;
 
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
     async fn apply(&self, connection: &mut Connection) -> Result<Option<Lease>, LibraryError> {
         end_expired(connection, self.now_unix_ms, self.after_loss).await?;
         for campaign in self.candidates(connection).await? {
@@ -251,6 +255,10 @@ struct Renew {
 impl Write for Renew {
     type Answer = Vec<Held>;
 
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
     async fn apply(&self, connection: &mut Connection) -> Result<Vec<Held>, LibraryError> {
         let renew = format!(
             "update campaign_case set lease_expires_unix_ms = $3 from {}
@@ -284,6 +292,10 @@ struct Release {
 
 impl Write for Release {
     type Answer = ();
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let held = connection.dialect().held("$3", "$4");

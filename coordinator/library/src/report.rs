@@ -78,6 +78,10 @@ impl Library {
 impl Write for Report {
     type Answer = Vec<Verdict>;
 
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
     async fn apply(&self, connection: &mut Connection) -> Result<Vec<Verdict>, LibraryError> {
         let mut standings = self.standings(connection).await?;
         let earlier = self.earlier_leases(connection, &standings).await?;

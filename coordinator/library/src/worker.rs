@@ -157,6 +157,10 @@ fn state(row: &Row) -> Result<WorkerState, LibraryError> {
 impl Write for Registration {
     type Answer = WorkerState;
 
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
     async fn apply(&self, connection: &mut Connection) -> Result<WorkerState, LibraryError> {
         let insert = "insert into worker (id, code_version, model_hash, cores, registered_unix_ms,
                 last_seen_unix_ms)
@@ -184,6 +188,10 @@ struct Heartbeat {
 impl Write for Heartbeat {
     type Answer = Option<WorkerRecord>;
 
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
     async fn apply(&self, connection: &mut Connection) -> Result<Self::Answer, LibraryError> {
         let seen = sql("update worker set last_seen_unix_ms = $2 where id = $1 returning *")
             .bind(&self.worker)
@@ -199,6 +207,10 @@ struct Quarantine {
 
 impl Write for Quarantine {
     type Answer = ();
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let state = if self.reason.is_some() { "quarantined" } else { "active" };
@@ -218,6 +230,10 @@ struct Flag {
 
 impl Write for Flag {
     type Answer = u64;
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
 
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
         let (worker, reason) = (self.worker.clone(), Some(self.reason.clone()));

@@ -1,4 +1,4 @@
-//! Two databases behind one face: statements, rows, connections, and the task that writes.
+//! Two databases behind one face: statements, rows, connections, and the tasks that write.
 //!
 //! Owns what differs between `SQLite` and PostgreSQL, so that the tables' modules write each
 //! statement once, with `$1` for its first value; both databases understand that. Knows no table.
@@ -6,6 +6,7 @@
 mod connection;
 mod dialect;
 mod iso;
+mod lanes;
 mod open;
 mod patience;
 mod postgres;

@@ -44,6 +44,6 @@ async fn connect(target: Target, create: bool) -> Result<Opened, LibraryError> {
             (readers, None, clock_ahead_ms)
         }
     };
-    let writer = Writer::start(target.clone(), writing);
+    let writer = Writer::start(&target, writing);
     Ok(Opened { target, readers, writer, clock_ahead_ms })
 }

@@ -1,9 +1,11 @@
-//! The one task that writes: what arrives together is committed together.
+//! The tasks that write: what arrives together is committed together.
 //!
 //! A durable commit waits for the disk, and `SQLite` has one writer at a time. So all writes of a
-//! process go through one connection, and nobody is answered before the commit. A PostgreSQL server
-//! that goes away is waited for, within a bound.
+//! process go through one connection, or a few with PostgreSQL, where one waits for the disk while
+//! another fills its transaction; and nobody is answered before the commit. A server that goes away
+//! is waited for, within a bound.
 
+use super::lanes::Lanes;
 use super::patience::Patience;
 use super::{Connection, Target, postgres};
 use crate::LibraryError;
@@ -25,10 +27,19 @@ const QUEUE_MAX: usize = 1024;
 /// A transaction on a server that takes longer has lost its server, whatever the network says.
 const SERVER_TIMEOUT: Duration = Duration::from_mins(1);
 
+/// Connections that write to a server.
+const SERVER_LANES: usize = 2;
+
 /// A change to the library, made inside a transaction that others share.
 pub(crate) trait Write: Send + Sync + 'static {
     /// What it answers once it is committed.
     type Answer: Send + 'static;
+
+    /// Whose it is: what one worker has changed is changed by one transaction at a time, so that
+    /// none waits for another. Whatever is nobody's is so as well.
+    fn worker(&self) -> Option<&str> {
+        None
+    }
 
     /// Makes the change. It may be called again after a transaction that failed, or whose success
     /// was not heard of.
@@ -38,39 +49,62 @@ pub(crate) trait Write: Send + Sync + 'static {
     ) -> impl Future<Output = Result<Self::Answer, LibraryError>> + Send;
 }
 
-/// A handle on the writing task.
+/// A handle on the writing tasks.
 pub(crate) struct Writer {
+    tasks: Vec<Task>,
+    lanes: Lanes,
+}
+
+struct Task {
     orders: mpsc::Sender<Box<dyn Order>>,
     closing: Arc<Notify>,
-    task: Mutex<Option<JoinHandle<()>>>,
+    handle: Mutex<Option<JoinHandle<()>>>,
 }
 
 impl Writer {
-    /// Starts the task; without a connection it makes its own when there is something to write.
-    pub(super) fn start(target: Target, connection: Option<Connection>) -> Self {
-        let (orders, receiver) = mpsc::channel(QUEUE_MAX);
-        let closing = Arc::new(Notify::new());
-        let session = Session { target, connection, patient: true };
-        let task = tokio::spawn(write_all(session, receiver, closing.clone()));
-        Self { orders, closing, task: Mutex::new(Some(task)) }
+    /// Starts the tasks; without a connection they make their own when there is something to write.
+    pub(super) fn start(target: &Target, connection: Option<Connection>) -> Self {
+        let count = match target {
+            Target::Sqlite(_) => 1,
+            Target::Postgres { .. } => SERVER_LANES,
+        };
+        let connections = std::iter::once(connection).chain(std::iter::repeat_with(|| None));
+        let tasks = connections.take(count).map(|it| Task::start(target.clone(), it)).collect();
+        Self { tasks, lanes: Lanes::new(count) }
     }
 
     /// Makes a change and waits until it is on the disk.
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
         let (reply, answer) = oneshot::channel();
+        let lane = self.lanes.enter(write.worker().unwrap_or_default());
         let order = Pending { write, answer: None, reply };
-        self.orders.send(Box::new(order)).await.map_err(|_| LibraryError::Closed)?;
+        let orders = &self.tasks[lane.number()].orders;
+        orders.send(Box::new(order)).await.map_err(|_| LibraryError::Closed)?;
         answer.await.map_err(|_| LibraryError::Closed)?
     }
 
-    /// Finishes what was ordered and closes the connection.
+    /// Finishes what was ordered and closes the connections.
     pub(crate) async fn close(&self) {
-        self.closing.notify_one();
-        let task = self.task.lock().expect("nobody panics while holding it").take();
-        if let Some(task) = task {
-            // A writer that panicked has already failed those who waited for it.
-            let _ = task.await;
+        for task in &self.tasks {
+            task.closing.notify_one();
         }
+        for task in &self.tasks {
+            let handle = task.handle.lock().expect("nobody panics while holding it").take();
+            if let Some(handle) = handle {
+                // A writer that panicked has already failed those who waited for it.
+                let _ = handle.await;
+            }
+        }
+    }
+}
+
+impl Task {
+    fn start(target: Target, connection: Option<Connection>) -> Self {
+        let (orders, receiver) = mpsc::channel(QUEUE_MAX);
+        let closing = Arc::new(Notify::new());
+        let session = Session { target, connection, patient: true };
+        let handle = tokio::spawn(write_all(session, receiver, closing.clone()));
+        Self { orders, closing, handle: Mutex::new(Some(handle)) }
     }
 }
 
