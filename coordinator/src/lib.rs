@@ -8,6 +8,7 @@
 //! - [`trial`]: blind trials of the diagnosis, in a folder.
 //! - [`training`]: from a library to a training set.
 //! - [`diagnosing`]: from a recording to its diagnosis, stage by stage.
+//! - [`evaluating`]: from models and their library to what evaluates recordings.
 //! - [`null_campaign`]: simulations of a track with nothing left out, kept in the library.
 //! - [`provenance`]: what a library keeps of trainings, evaluations and diagnoses.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
@@ -19,6 +20,7 @@ pub mod commands;
 pub mod dashboard;
 pub mod diagnosing;
 pub mod dispatch;
+pub mod evaluating;
 pub mod farm;
 pub mod null_campaign;
 pub mod provenance;

@@ -4,22 +4,19 @@
 //! crate's. Every step leaves a file, so that an interrupted trial goes on.
 
 use crate::diagnosing::{self, Compared, Diagnosed, DiagnosingError, Setting};
-use crate::training;
+use crate::evaluating::Evaluator;
 use anyhow::Context;
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{CalibrationError, Diagnosis, Verdict};
-use tracktwin_evaluation::Twin;
 use tracktwin_library::Library;
 use tracktwin_parameters::{Preset, TrackDesign};
-use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::{Recording, RecordingError};
-use tracktwin_surrogate::{Trained, TrainingSet};
 use tracktwin_trial::{
     KnockedOut, Paper, Plan, Score, SealError, Seals, Summary, detectability, score,
 };
-use tracktwin_truth::{Scene, TruthError};
+use tracktwin_truth::TruthError;
 use tracktwin_worker::CODE_VERSION;
 
 /// File of the seals.
@@ -39,50 +36,9 @@ pub struct Trial {
     /// Whether local effects that were found are diagnosed again with shuffled sleepers.
     pub shuffle: bool,
     /// The models of the paper's pipeline, if it is to be asked too.
-    pub paper: Option<PaperModels>,
+    pub paper: Option<Evaluator>,
     /// Whether recordings are removed once they are scored.
     pub discard_recordings: bool,
-}
-
-/// Surrogates and model selector of one library.
-pub struct PaperModels {
-    extractor: Extractor,
-    models: Trained,
-    set: TrainingSet,
-}
-
-impl std::fmt::Debug for PaperModels {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("PaperModels")
-            .field("campaign", &self.models.campaign())
-            .finish_non_exhaustive()
-    }
-}
-
-impl PaperModels {
-    /// Models of a folder with the library that they were trained on.
-    ///
-    /// # Errors
-    /// When the folder has no models, or none of this library.
-    pub async fn load(folder: &Path, library: &Library) -> Result<Self, anyhow::Error> {
-        let models = Trained::load(folder)?;
-        let campaign = library
-            .campaign(models.campaign())
-            .await
-            .context("the models belong to another library")?;
-        let set = training::set(library, &campaign).await?;
-        let extractor = Extractor::new(&training::feature_definition(&campaign)?)?;
-        Ok(Self { extractor, models, set })
-    }
-
-    fn look_at(
-        &self,
-        recording: &Recording,
-        scene: &Scene,
-    ) -> Result<Option<Paper>, anyhow::Error> {
-        let twin = Twin { extractor: &self.extractor, models: &self.models, library: &self.set };
-        Ok(Paper::of(scene, &tracktwin_evaluation::evaluate(recording, &twin)?))
-    }
 }
 
 /// What a folder's trial is.
@@ -130,7 +86,7 @@ pub enum TrialError {
         /// Number of the case.
         number: u32,
         /// Why.
-        source: anyhow::Error,
+        source: tracktwin_evaluation::Error,
     },
     /// The truth makes no track.
     #[error(transparent)]
@@ -271,10 +227,11 @@ impl Trial {
         let plan = self.opened(score.number)?;
         let recording = self.again(&plan)?;
         let setting = Setting { design, library: Some(library), without: &[], shuffle: None };
-        if let Some(models) = paper {
-            let looked = models.look_at(&recording, &plan.scene);
-            score.paper =
-                looked.map_err(|source| TrialError::Paper { number: score.number, source })?;
+        if let Some(evaluator) = paper {
+            let evaluation = evaluator
+                .evaluate(&recording)
+                .map_err(|source| TrialError::Paper { number: score.number, source })?;
+            score.paper = Paper::of(&plan.scene, &evaluation);
         }
         if knock_out {
             score.knocked_out = Some(self.knocked_out(&plan, &recording, setting).await?);

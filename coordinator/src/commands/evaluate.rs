@@ -1,13 +1,13 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
 use super::{OrInput, Stop, say};
-use crate::{provenance, training};
+use crate::evaluating::{Evaluator, EvaluatorError};
+use crate::provenance;
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tracktwin_evaluation::{Evaluation, Twin};
+use tracktwin_evaluation::Evaluation;
 use tracktwin_library::Library;
-use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
 
@@ -50,24 +50,25 @@ pub(super) async fn evaluate(
     models: Trained,
     folder: &Path,
 ) -> Result<Evaluation, Stop> {
-    let campaign = library
-        .campaign(models.campaign())
-        .await
-        .context("the models belong to another library; train on this one")
-        .or_input()?;
-    let set = training::set(library, &campaign).await?;
-    let extractor = Extractor::new(&training::feature_definition(&campaign)?).or_input()?;
-    let twin = Twin { extractor: &extractor, models: &models, library: &set };
-    let evaluation = tracktwin_evaluation::evaluate(recording, &twin).or_input()?;
+    let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
+    let evaluation = evaluator.evaluate(recording).or_input()?;
     std::fs::create_dir_all(folder)
         .with_context(|| format!("{}: the folder cannot be made", folder.display()))
         .or_input()?;
     evaluation.write(folder)?;
-    let page = tracktwin_report::evaluation_page(&evaluation, recording, &extractor);
+    let page = tracktwin_report::evaluation_page(&evaluation, recording, &evaluator.extractor);
     std::fs::write(folder.join("report.html"), page)?;
     if let Err(error) = library.record_evaluation(provenance::evaluation(&evaluation)).await {
         // The answer stands in the folder; somebody who may only read the library has it all the same.
         tracing::warn!("the library does not keep this evaluation: {error:?}");
     }
     Ok(evaluation)
+}
+
+/// A library that can't be read is a failure; models that don't fit are mended by who gave them.
+fn stop(error: EvaluatorError) -> Stop {
+    match error {
+        EvaluatorError::Library(_) => Stop::Failure(error.into()),
+        EvaluatorError::Foreign(_) | EvaluatorError::Features(_) => Stop::Input(error.into()),
+    }
 }

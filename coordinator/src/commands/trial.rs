@@ -2,11 +2,13 @@
 
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
-use crate::trial::{PaperModels, Trial, TrialError};
+use crate::evaluating::Evaluator;
+use crate::trial::{Trial, TrialError};
 use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_library::Library;
+use tracktwin_surrogate::Trained;
 
 /// What `trial` is told.
 #[derive(Args)]
@@ -55,7 +57,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         .or_input()?;
     let library = Library::open_or_create(&url).await.or_input()?;
     let paper = match models {
-        Some(folder) => Some(PaperModels::load(&folder, &library).await.or_input()?),
+        Some(folder) => {
+            let models = Trained::load(&folder).or_input()?;
+            Some(Evaluator::new(models, &library).await.or_input()?)
+        }
         None => None,
     };
     let trial = Trial { seed, cases, folder: out, knock_out, shuffle, paper, discard_recordings };

@@ -1,0 +1,61 @@
+//! From models and their library to what evaluates recordings.
+
+use crate::training::{self, TrainingError};
+use tracktwin_evaluation::{Error, Evaluation, Twin};
+use tracktwin_library::{Library, LibraryError};
+use tracktwin_signal::recording::Recording;
+use tracktwin_signal::{Extractor, FeatureError};
+use tracktwin_surrogate::{Trained, TrainingSet};
+
+/// Surrogates and model selector of one library, ready for any number of recordings.
+pub struct Evaluator {
+    /// Works out the features that the models were trained on.
+    pub extractor: Extractor,
+    models: Trained,
+    set: TrainingSet,
+}
+
+/// Why models can't evaluate.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluatorError {
+    /// The library does not hold what they were trained on.
+    #[error("the models belong to another library; train on this one")]
+    Foreign(#[source] LibraryError),
+    /// Features of another version.
+    #[error(transparent)]
+    Features(#[from] FeatureError),
+    /// The library can't be read.
+    #[error(transparent)]
+    Library(#[from] TrainingError),
+}
+
+impl Evaluator {
+    /// Reads the library that the models were trained on.
+    ///
+    /// # Errors
+    /// [`EvaluatorError`].
+    pub async fn new(models: Trained, library: &Library) -> Result<Self, EvaluatorError> {
+        let campaign =
+            library.campaign(models.campaign()).await.map_err(EvaluatorError::Foreign)?;
+        let set = training::set(library, &campaign).await?;
+        let extractor = Extractor::new(&training::feature_definition(&campaign)?)?;
+        Ok(Self { extractor, models, set })
+    }
+
+    /// What models and selector say of a recording.
+    ///
+    /// # Errors
+    /// Those of [`tracktwin_evaluation::evaluate`].
+    pub fn evaluate(&self, recording: &Recording) -> Result<Evaluation, Error> {
+        let twin = Twin { extractor: &self.extractor, models: &self.models, library: &self.set };
+        tracktwin_evaluation::evaluate(recording, &twin)
+    }
+}
+
+impl std::fmt::Debug for Evaluator {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Evaluator")
+            .field("campaign", &self.models.campaign())
+            .finish_non_exhaustive()
+    }
+}
