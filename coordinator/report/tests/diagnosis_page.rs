@@ -317,7 +317,10 @@ fn a_consistent_recording_reads_well_and_has_no_empty_tables() {
     );
     assert_reads(
         &page,
-        &["Nowhere is the difference larger than chance explains", "doesn't exclude"],
+        &[
+            "No difference here is one that something left out would explain better",
+            "doesn't exclude",
+        ],
     );
     assert_reads(
         &page,

@@ -240,7 +240,7 @@ fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
 
 fn mismatches(diagnosis: &Diagnosis) -> Markup {
     if diagnosis.mismatches.is_empty() {
-        return html! { p { "Nowhere is the difference larger than chance explains." } };
+        return html! { p { "No difference here is one that something left out would explain better." } };
     }
     let words = |mismatch: &Mismatch| {
         let [low, high] = mismatch.frequency_hz;
