@@ -58,10 +58,14 @@ impl SimulatedTrack {
         self.extensions.iter().filter_map(|instance| Kind::from_name(&instance.physics))
     }
 
-    /// Where recording begins and ends, in m.
+    /// Where recording begins and ends, in m: so that every wheel stays away from the track's ends.
     pub(super) fn recorded_m(&self) -> [f64; 2] {
-        [END_SPANS, self.spans - END_SPANS]
-            .map(|spans| spans as f64 * self.design.sleeper.spacing_m)
+        let further_m = &self.model.vehicle().further_wheels_m;
+        let behind_m = further_m.iter().copied().fold(0.0, f64::min);
+        let ahead_m = further_m.iter().copied().fold(0.0, f64::max);
+        let [from_m, to_m] = [END_SPANS, self.spans - END_SPANS]
+            .map(|spans| spans as f64 * self.design.sleeper.spacing_m);
+        [from_m - behind_m, to_m - ahead_m]
     }
 
     /// The sleepers that stand where it is recorded.

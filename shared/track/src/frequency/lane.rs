@@ -179,6 +179,34 @@ impl Banded {
         }
     }
 
+    /// An entry of the inverse above its diagonal, from the factor and the entries in its band;
+    /// `work` holds a column.
+    ///
+    /// Each row follows from those next to it by the factor's column, as in
+    /// [`Banded::selected_inverse`].
+    #[inline(always)]
+    pub(super) fn inverse_entry(
+        &self,
+        inverse: &Self,
+        (row, column): (usize, usize),
+        work: &mut [Lane],
+    ) -> Lane {
+        let stride = self.width + 1;
+        let in_band = column.saturating_sub(self.width);
+        let first = in_band.max(row);
+        for (known, k) in work[first..=column].iter_mut().zip(first..) {
+            *known = inverse.entries[column * stride + column - k];
+        }
+        for i in (row..in_band).rev() {
+            let mut value = Lane::default();
+            for (known, k) in work[i + 1..=i + self.width].iter().zip(i + 1..) {
+                value = value - *known * self.entries[k * stride + k - i];
+            }
+            work[i] = value;
+        }
+        work[row]
+    }
+
     /// An entry on the diagonal.
     #[inline(always)]
     pub(super) fn diagonal(&self, row: usize) -> Lane {

@@ -13,5 +13,5 @@ mod rail;
 mod receptance;
 
 pub use peaks::{Peak, peaks};
-pub use rail::{RailReceptances, seat_stiffness};
+pub use rail::{RailReceptances, receptances_ahead, seat_stiffness, shares};
 pub use receptance::{FrequencyError, Place, receptance};

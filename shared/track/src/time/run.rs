@@ -41,7 +41,12 @@ pub struct PassRecord {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PassError {
     /// A wheel leaves the track, stands still, runs backwards or has no time step.
-    #[error("the pass {pass:?} makes no way along a track of {length_m} m")]
+    #[error(
+        "a pass from {} to {} m at {} m/s does not lie, with all its wheels, on a track of {length_m} m",
+        pass.start_m,
+        pass.end_m,
+        pass.speed_m_s
+    )]
     Pass {
         /// The pass.
         pass: Pass,
