@@ -6,13 +6,6 @@ use tracktwin_track::extension::{ExtensionInstance, KINDS, Kind, KindParameter};
 /// Of a parameter that may be zero, the least part of its greatest value that counts.
 const LEAST: f64 = 1e-2;
 
-/// Logarithm of a parameter over the end of its range up to which a kind may have it: what is
-/// further off acts alike and is something else.
-const BEYOND_MAX: f64 = 1.0;
-
-/// The same for a range that nothing of the kind lies beyond: what resonates is known to a hundredth.
-const BEYOND_CONFINED: f64 = 0.03;
-
 /// A piece of physics at a place, in terms of the recording, with the parameters to be found.
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -53,7 +46,7 @@ impl Candidate {
         let plausible = |(parameter, &value): (&&KindParameter, &f64)| {
             let [low, high] = parameter.v_track.map(f64::ln);
             let beyond = (low - value).max(value - high);
-            beyond <= if parameter.confined { BEYOND_CONFINED } else { BEYOND_MAX }
+            beyond <= parameter.slack
         };
         self.free.iter().zip(logarithms).all(plausible)
     }

@@ -69,6 +69,9 @@ pub struct Subject {
     pub first_sleeper: usize,
     /// Numbers in the recording of the passes at each speed.
     pub pass_numbers: Vec<Vec<usize>>,
+    /// Where the passes alone show the rail's own shape, from and to in m; nowhere until
+    /// [`Subject::suggested`].
+    pub heard_m: Vec<[f64; 2]>,
 }
 
 impl Subject {
@@ -100,7 +103,8 @@ impl Subject {
         let pass_variance = pass_variance(&forward, &spectra);
         let pass_numbers = spectra.speeds.iter().map(|speed| speed.passes.clone()).collect();
         let first_sleeper = sleepers.start;
-        Ok(Self { forward, log_power, pass_variance, first_sleeper, pass_numbers })
+        let heard_m = Vec::new();
+        Ok(Self { forward, log_power, pass_variance, first_sleeper, pass_numbers, heard_m })
     }
 
     /// The same powers at other sleepers: those of each speed in an order of its own, `[speed][sleeper]`,

@@ -7,8 +7,8 @@ use crate::subject::Subject;
 use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter};
 
 impl Subject {
-    /// Tells the model where the wheel begins its turns, if its blows say so, and makes candidates
-    /// of what a first look found.
+    /// Tells the model where the wheel begins its turns, if its blows say so, and where the rail's shape
+    /// was heard; makes candidates of what a first look found.
     pub fn suggested(&mut self, look: &FirstLook) -> Vec<Candidate> {
         let section = &self.forward.section;
         let turn_start_m = |pass: &usize| {
@@ -17,7 +17,16 @@ impl Subject {
         };
         let starts = |passes: &Vec<usize>| passes.iter().map(turn_start_m).collect();
         self.forward.wheel_starts_m = self.pass_numbers.iter().map(starts).collect();
+        self.heard_m = look.findings.iter().chain(&look.nameless).filter_map(heard_m).collect();
         look.findings.iter().filter_map(candidate).collect()
+    }
+}
+
+/// Where a finding heard the rail's shape.
+fn heard_m(finding: &Finding) -> Option<[f64; 2]> {
+    match finding.place {
+        Place::Stretch { from_m, to_m } => Some([from_m, to_m]),
+        Place::Everywhere => None,
     }
 }
 

@@ -73,7 +73,9 @@ fn searched_for(
     let log_power = expected + random.scatter(&forward);
     let pass_variance = DVector::from_element(forward.per_sleeper(), 1e-3);
     let pass_numbers = vec![vec![0], vec![1]];
-    let subject = Subject { forward, log_power, pass_variance, first_sleeper: 0, pass_numbers };
+    let heard_m = Vec::new();
+    let subject =
+        Subject { forward, log_power, pass_variance, first_sleeper: 0, pass_numbers, heard_m };
     let mut all = candidates(&subject.forward.section);
     all.retain(|candidate| is_known(candidate.kind.physics));
     search(&subject, &null, values, &all, &|_, _| ()).unwrap()

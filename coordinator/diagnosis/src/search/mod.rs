@@ -185,7 +185,7 @@ impl Search {
             }
             round = setting.round(&problem, &self.last, all, least, progress)?;
         }
-        if let Some(best) = sure(&round, &forward.section, least) {
+        if let Some(best) = sure(&round, setting.subject, least) {
             progress(Stage::HeldOut, 0.0);
             let with = [&accepted[..], std::slice::from_ref(&best.candidate)].concat();
             let scores = setting.held_out(&with, &best.calibration.values)?;

@@ -11,7 +11,6 @@ use crate::null_model::NullModel;
 use crate::observation::Observation;
 use crate::port_scan::{PortPlace, PortScan};
 use crate::screen::{Template, templates};
-use crate::section::Section;
 use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -155,18 +154,20 @@ pub(super) fn is_predicted(gains: &[f64]) -> bool {
 /// earlier effects.
 pub(super) fn sure<'r>(
     round: &'r Round,
-    section: &Section,
+    subject: &Subject,
     least: Least<'_>,
 ) -> Option<&'r Fitted> {
     let Probabilities { named, unknown, .. } = round.probabilities();
     let best = round.fitted.first()?;
-    let leads = named[0] > unknown || is_shape_at_port(&best.candidate, round, section);
+    let leads = named[0] > unknown || is_shape_at_port(&best.candidate, round, subject);
     (leads && best.log_evidence >= least.of(&best.candidate)).then_some(best)
 }
 
-/// Whether a candidate is a shape of the rail where the unknown is: the force of a shape adds to the
-/// surface's with a phase that mean powers leave out, so that an unknown fits better beside it.
-fn is_shape_at_port(candidate: &Candidate, round: &Round, section: &Section) -> bool {
+/// Whether a candidate is a shape of the rail that the passes alone show as well, where the unknown
+/// is: the force of a shape adds to the surface's with a phase that mean powers leave out, so that an
+/// unknown fits better beside it.
+fn is_shape_at_port(candidate: &Candidate, round: &Round, subject: &Subject) -> bool {
+    let section = &subject.forward.section;
     let is_shape = is_local_shape(candidate);
     let seats = match round.port.as_ref().map(|port| &port.place) {
         Some(PortPlace::Seats(seats)) => &seats[..],
@@ -177,7 +178,14 @@ fn is_shape_at_port(candidate: &Candidate, round: &Round, section: &Section) -> 
     let spacing_m = section.design.sleeper.spacing_m;
     let [first, last] = [seats[0], seats[seats.len() - 1]];
     let seats_m = [section.x_m(first) - spacing_m, section.x_m(last) + spacing_m];
-    is_shape && seats.len() <= 2 && seats_m[0] <= from_m && to_m <= seats_m[1]
+    let near = |[heard_from_m, heard_to_m]: &[f64; 2]| {
+        heard_from_m - spacing_m <= to_m && from_m <= heard_to_m + spacing_m
+    };
+    is_shape
+        && seats.len() <= 2
+        && seats_m[0] <= from_m
+        && to_m <= seats_m[1]
+        && subject.heard_m.iter().any(near)
 }
 
 /// The best trials: of each candidate one, of each kind a few; then of each kind without any the

@@ -144,8 +144,9 @@ pub struct KindParameter {
     pub default: Option<f64>,
     /// Which values make sense at all.
     pub bound: Bound,
-    /// Whether values beyond the range are another kind's.
-    pub confined: bool,
+    /// Logarithm of a value over the end of its range up to which it may still be this kind's: what
+    /// is further off acts alike and is something else.
+    pub slack: f64,
 }
 
 impl KindParameter {
@@ -160,7 +161,7 @@ impl KindParameter {
             typical: 0.0,
             default: None,
             bound: Bound::Positive,
-            confined: false,
+            slack: 1.0,
         }
     }
 
@@ -177,9 +178,9 @@ impl KindParameter {
         self
     }
 
-    /// With a range that nothing of this kind lies beyond: what resonates there is something else.
-    pub(super) const fn confined(mut self) -> Self {
-        self.confined = true;
+    /// With another slack than a factor of e.
+    pub(super) const fn slack(mut self, slack: f64) -> Self {
+        self.slack = slack;
         self
     }
 

@@ -4,22 +4,23 @@ use super::{Class, Extension, Kind, KindParameter, PlaceKind};
 use crate::model::{Assembly, Support};
 use std::sync::Arc;
 
-pub(super) const KIND: Kind =
-    Kind {
-        physics: "missing_railpad",
-        summary: "a railpad is missing or has lost most of its stiffness",
-        classes: &[Class::Frequency, Class::Local],
-        place: PlaceKind::Sleepers,
-        measuring_chain: false,
-        parameters: &[KindParameter::new("stiffness_N_per_m", "N/m", "what stiffness remains")
-            .ranges([5e6, 2e7], [2e7, 6e7], 1e7)],
-        look_alikes: &["support_variation", "load_dependent_railpad"],
-        would_separate: "a second speed, or a hammer test of the sleeper",
-        build: |inputs| {
-            let stiffness_n_m = inputs.value("stiffness_N_per_m");
-            Ok(Arc::new(MissingRailpad { sleepers: inputs.sleepers(), stiffness_n_m }))
-        },
-    };
+pub(super) const KIND: Kind = Kind {
+    physics: "missing_railpad",
+    summary: "a railpad is missing or has lost most of its stiffness",
+    classes: &[Class::Frequency, Class::Local],
+    place: PlaceKind::Sleepers,
+    measuring_chain: false,
+    parameters: &[KindParameter::new("stiffness_N_per_m", "N/m", "what stiffness remains")
+        .ranges([5e6, 2e7], [2e7, 6e7], 1e7)
+        // What carries more is a soft railpad, not a missing one.
+        .slack(0.4)],
+    look_alikes: &["support_variation", "load_dependent_railpad"],
+    would_separate: "a second speed, or a hammer test of the sleeper",
+    build: |inputs| {
+        let stiffness_n_m = inputs.value("stiffness_N_per_m");
+        Ok(Arc::new(MissingRailpad { sleepers: inputs.sleepers(), stiffness_n_m }))
+    },
+};
 
 /// Another stiffness of some railpads; their damping changes in proportion (mismatch catalogue 5).
 #[derive(Debug)]
