@@ -22,6 +22,7 @@ mod trial;
 use stop::{OrInput, Stop};
 
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 /// Digital twin of railway track: how stiff are railpad, sleeper and ballast, sleeper by sleeper,
@@ -109,7 +110,7 @@ pub fn main() -> ExitCode {
 /// One line that says what is wrong.
 fn report(error: &anyhow::Error, code: u8) -> ExitCode {
     let line = chain(error).replace('\n', " ");
-    eprintln!("tracktwin: {line}");
+    note(&format!("tracktwin: {line}"));
     ExitCode::from(code)
 }
 
@@ -171,11 +172,29 @@ fn asynchronously(work: impl Future<Output = Result<(), Stop>>) -> Result<(), St
 }
 
 fn completions(shell: clap_complete::Shell) {
-    clap_complete::generate(shell, &mut Program::command(), "tracktwin", &mut std::io::stdout());
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Program::command(), "tracktwin", &mut script);
+    answer(&script);
 }
 
 /// Says a line of the command's answer on standard output.
-#[expect(clippy::print_stdout, reason = "answers go to standard output")]
 fn say(line: &str) {
-    println!("{line}");
+    answer(format!("{line}\n").as_bytes());
+}
+
+/// Who reads may have gone, as `head` does once it has its lines: then nothing is amiss.
+fn answer(text: &[u8]) {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            note(&format!("tracktwin: standard output: {error}"));
+            std::process::exit(3);
+        }
+        _ => {}
+    }
+}
+
+/// Says a line beside the answer on standard error, if anybody reads that.
+fn note(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }

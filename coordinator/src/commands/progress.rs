@@ -1,5 +1,6 @@
 //! How far long work has come: a bar in a terminal, a line now and then elsewhere.
 
+use super::note;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -49,7 +50,7 @@ impl Progress {
         self.bar.finish_and_clear();
         if self.last_line.is_some() {
             let seconds = self.begun.elapsed().as_secs_f64();
-            eprintln!("{}: done in {seconds:.1} s", self.stage);
+            note(&format!("{}: done in {seconds:.1} s", self.stage));
         }
     }
 
@@ -63,6 +64,6 @@ impl Progress {
                 format!("{:.0} s", a_step * total.saturating_sub(done) as f64)
             }
         };
-        eprintln!("{}: {done} of {total}, {left} left {remark}", self.stage);
+        note(&format!("{}: {done} of {total}, {left} left {remark}", self.stage));
     }
 }

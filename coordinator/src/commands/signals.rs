@@ -1,5 +1,6 @@
 //! What ends long work from outside.
 
+use super::note;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 
@@ -14,7 +15,7 @@ pub(super) fn stop_on_signal(notice: &'static str) -> std::io::Result<Cancellati
             _ = interrupt.recv() => {}
             _ = terminate.recv() => {}
         }
-        eprintln!("{notice}");
+        note(notice);
         stop.cancel();
     });
     Ok(shutdown)

@@ -46,6 +46,17 @@ fn an_uneven_wheel_has_its_order_and_its_amplitude() {
 }
 
 #[test]
+fn a_high_order_is_found_though_the_sleepers_pass_in_its_waves() {
+    // 11.02 waves to a span.
+    let height = |pass, x: f64| 1e-6 * (TAU * 36.0 * x / TURN_M + pass as f64).cos();
+    let recording = Rolled { height_m: &height, ..Rolled::faultless(4) }.recording();
+    let waves = 36.0 * recording.spacing_m / TURN_M;
+    assert!((waves - waves.round()).abs() < 0.05, "{waves}");
+    let found = out_of_round(&recording, TURN_M, ALPHA);
+    assert_eq!(found.iter().map(|order| order.number).collect::<Vec<_>>(), [36]);
+}
+
+#[test]
 fn a_round_wheel_has_neither_flat_nor_orders() {
     for seed in 10..20 {
         let recording = Rolled::faultless(seed).recording();

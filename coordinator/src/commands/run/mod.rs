@@ -4,7 +4,7 @@ mod sample;
 
 use super::progress::Progress;
 use super::signals::stop_on_signal;
-use super::{OrInput, Stop, evaluate, say, train};
+use super::{OrInput, Stop, evaluate, note, say, train};
 use crate::campaign::{Campaign, DEFAULT};
 use crate::farm::{self, Task};
 use anyhow::{Context, anyhow};
@@ -112,10 +112,10 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
         return Err(anyhow!("interrupted with {left} cases left; the same command goes on").into());
     }
     if status.failed > 0 {
-        eprintln!(
+        note(&format!(
             "{} cases were given up; `tracktwin library status` says why; going on without them",
             status.failed
-        );
+        ));
     }
     Ok(())
 }
