@@ -209,6 +209,14 @@ fn is_it(hidden: &Hidden, physics: &str) -> bool {
     physics == right
 }
 
+/// Whether a hypothesis has an effect's place, within a sleeper; where either is everywhere, it has.
+fn is_placed(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
+    let (Some([from_m, to_m]), Some(location)) = (hidden.place(), &hypothesis.location) else {
+        return true;
+    };
+    from_m - 1.01 * SPACING_M <= location.x_m[1] && location.x_m[0] <= to_m + 1.01 * SPACING_M
+}
+
 /// The place of an effect that has one.
 fn local(hidden: &Hidden) -> Option<[f64; 2]> {
     hidden.place().filter(|[from_m, to_m]| to_m - from_m <= LOCAL_SPACINGS * SPACING_M)
@@ -227,8 +235,11 @@ fn set(hypotheses: &[Hypothesis]) -> &[Hypothesis] {
 
 /// Every probability given, with whether it was so; that of nothing where nothing is said.
 fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Vec<(f64, bool)> {
-    let is_there =
-        |hypothesis: &Hypothesis| left_out.iter().any(|hidden| is_it(hidden, &hypothesis.physics));
+    let is_there = |hypothesis: &Hypothesis| {
+        let is_so =
+            |hidden: &Hidden| is_it(hidden, &hypothesis.physics) && is_placed(hidden, hypothesis);
+        left_out.iter().any(is_so)
+    };
     let given = diagnosis.hypotheses.iter();
     let mut all: Vec<_> =
         given.map(|hypothesis| (hypothesis.probability, is_there(hypothesis))).collect();
@@ -293,4 +304,31 @@ fn cells_inside(diagnosis: &Diagnosis) -> bool {
             cells.into_iter().all(|((m, b), sd)| (m - b).abs() <= CELL_DEVIATIONS * sd)
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+    use tracktwin_diagnosis::Location;
+
+    #[test]
+    fn a_right_name_at_a_wrong_place_is_wrong() {
+        let hidden = Hidden::Squat { x_m: [2.5, 2.5], depth_m: 2e-5, length_m: 6e-3 };
+        let squat_at = |x_m: Option<f64>| Hypothesis {
+            physics: "squat".to_owned(),
+            probability: 0.5,
+            accepted: false,
+            location: x_m.map(|x_m| Location { x_m: [x_m, x_m], sleepers: Vec::new() }),
+            port: None,
+            parameters: BTreeMap::new(),
+            look_alikes: Vec::new(),
+            would_separate: String::new(),
+            detectability: 0.0,
+            log_evidence: 0.0,
+        };
+        let places = [Some(2.5), Some(2.6), Some(2.7), Some(1.0), None];
+        let placed = places.map(|x_m| is_placed(&hidden, &squat_at(x_m)));
+        assert_eq!(placed, [true, true, false, false, true]);
+    }
 }
