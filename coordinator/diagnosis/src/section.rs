@@ -99,6 +99,12 @@ impl Section {
         self.first_x_m + sleeper as f64 * self.design.sleeper.spacing_m
     }
 
+    /// Whether two stretches, each from and to in m, are at most a spacing apart.
+    pub fn are_beside(&self, one: [f64; 2], other: [f64; 2]) -> bool {
+        let spacing_m = self.design.sleeper.spacing_m;
+        one[0] - spacing_m <= other[1] && other[0] - spacing_m <= one[1]
+    }
+
     /// An extension given in terms of the recording (compared sleepers, places on its scale) in
     /// terms of the model's track.
     pub fn in_model(&self, extension: &ExtensionInstance) -> ExtensionInstance {
@@ -140,5 +146,20 @@ impl Section {
             bands.map(|&hz| self.window(sleeper, speed_m_s, hz)).collect()
         };
         (0..self.sleepers).map(of).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Section;
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn stretches_are_beside_each_other_up_to_a_spacing_apart() {
+        let section = Section::new(TrackDesign::v_track(), 25, 1.0);
+        let are = |one, other| [section.are_beside(one, other), section.are_beside(other, one)];
+        assert_eq!(are([2.0, 2.0], [2.12, 2.12]), [true; 2]);
+        assert_eq!(are([2.0, 2.0], [2.13, 2.13]), [false; 2]);
+        assert_eq!(are([1.0, 4.0], [2.5, 2.6]), [true; 2]);
     }
 }

@@ -7,7 +7,6 @@ mod place;
 
 pub use self::alone::passes_alone;
 use self::nameless::UNKNOWN;
-use self::place::are_neighbours;
 use crate::calibration::CalibrationError;
 use crate::chain::Trouble;
 use crate::finding::Finding;
@@ -241,10 +240,14 @@ impl Evidence<'_> {
     /// Whether two hypotheses are one: the same name at the same place, or beside an accepted one.
     fn is_same(&self, known: &Hypothesis, other: &Hypothesis) -> bool {
         let is_fit = known.accepted && !other.accepted;
-        let places = [known, other].map(|hypothesis| hypothesis.location.as_ref());
-        let spacing_m = self.subject.forward.section.design.sleeper.spacing_m;
-        let together = || are_neighbours(places[0], places[1], spacing_m);
-        known.physics == other.physics && (known.location == other.location || is_fit && together())
+        let are_beside = match (&known.location, &other.location) {
+            (Some(one), Some(another)) => {
+                self.subject.forward.section.are_beside(one.x_m, another.x_m)
+            }
+            // Everywhere is beside all.
+            _ => true,
+        };
+        known.physics == other.physics && (known.location == other.location || is_fit && are_beside)
     }
 
     fn hypothesis(&self, fitted: &Fitted, probability: f64, accepted: bool) -> Hypothesis {

@@ -126,31 +126,3 @@ fn loud(squares: &[f64]) -> Range<usize> {
     let last = squares.iter().rposition(part).unwrap_or(squares.len() - 1);
     first..last + 1
 }
-
-/// Whether two places are at most a spacing apart; none is everywhere.
-pub(super) fn are_neighbours(
-    one: Option<&Location>,
-    other: Option<&Location>,
-    spacing_m: f64,
-) -> bool {
-    let (Some(one), Some(other)) = (one, other) else { return true };
-    one.x_m[0] - spacing_m <= other.x_m[1] && other.x_m[0] - spacing_m <= one.x_m[1]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn neighbours_are_a_spacing_apart_and_everywhere_is_beside_all() {
-        let at = |from_m: f64, to_m: f64| Some(Location { x_m: [from_m, to_m], sleepers: vec![] });
-        let are = |one: &Option<Location>, other: &Option<Location>| {
-            let both = [(one, other), (other, one)];
-            both.map(|(one, other)| are_neighbours(one.as_ref(), other.as_ref(), 0.125))
-        };
-        assert_eq!(are(&at(2.0, 2.0), &at(2.12, 2.12)), [true; 2]);
-        assert_eq!(are(&at(2.0, 2.0), &at(2.13, 2.13)), [false; 2]);
-        assert_eq!(are(&at(1.0, 4.0), &at(2.5, 2.6)), [true; 2]);
-        assert_eq!(are(&None, &at(2.5, 2.5)), [true; 2]);
-    }
-}

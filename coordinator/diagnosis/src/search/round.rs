@@ -178,14 +178,12 @@ fn is_shape_at_port(candidate: &Candidate, round: &Round, subject: &Subject) -> 
     let spacing_m = section.design.sleeper.spacing_m;
     let [first, last] = [seats[0], seats[seats.len() - 1]];
     let seats_m = [section.x_m(first) - spacing_m, section.x_m(last) + spacing_m];
-    let near = |[heard_from_m, heard_to_m]: &[f64; 2]| {
-        heard_from_m - spacing_m <= to_m && from_m <= heard_to_m + spacing_m
-    };
+    let is_heard = |heard_m: &[f64; 2]| section.are_beside([from_m, to_m], *heard_m);
     is_shape
         && seats.len() <= 2
         && seats_m[0] <= from_m
         && to_m <= seats_m[1]
-        && subject.heard_m.iter().any(near)
+        && subject.heard_m.iter().any(is_heard)
 }
 
 /// The best trials: of each candidate one, of each kind a few; then of each kind without any the

@@ -7,11 +7,13 @@
     reason = "what solves must be compiled into each instruction set's own copy"
 )]
 
+mod ahead;
 mod lane;
 mod peaks;
 mod rail;
 mod receptance;
 
+pub use ahead::{receptances_ahead, shares};
 pub use peaks::{Peak, peaks};
-pub use rail::{RailReceptances, receptances_ahead, seat_stiffness, shares};
+pub use rail::{RailReceptances, seat_stiffness};
 pub use receptance::{FrequencyError, Place, receptance};
