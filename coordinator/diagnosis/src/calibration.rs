@@ -6,7 +6,7 @@ use crate::observation::Observation;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use std::sync::Arc;
-use tracktwin_track::extension::{Extension, InstanceError};
+use tracktwin_track::extension::{Class, Extension, InstanceError};
 use tracktwin_track::model::ModelError;
 
 /// Gauss-Newton steps; five suffice where the track is not far from the catalogue's.
@@ -26,6 +26,9 @@ const AT_END: f64 = 1e-9;
 
 /// Step of a logarithm by which extensions' parameters are varied for derivatives.
 const VARIATION: f64 = 1e-3;
+
+/// Sleepers on either side of a force law on which a wheel that decides about it stands.
+const LOADED: usize = 2;
 
 /// Why no calibration is found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -260,7 +263,9 @@ impl Problem<'_> {
         let extensions = self.extensions(values)?;
         let Linearised { log_power, jacobian } = self.forward.linearised(values, &extensions)?;
         let mut jacobian = jacobian.resize_horizontally(values.len(), 0.0);
-        let columns: Vec<_> = (self.forward.unknowns.count()..values.len())
+        let mut varied = self.under_load();
+        varied.extend(self.forward.unknowns.count()..values.len());
+        let columns: Vec<_> = varied
             .into_par_iter()
             .map(|index| {
                 let mut varied = values.clone();
@@ -273,6 +278,28 @@ impl Problem<'_> {
         }
         let residual = self.observation.residual(&log_power);
         Ok((residual, self.observation.whiten_matrix(&jacobian)))
+    }
+
+    /// Ballast and railpads that decide under which places of the wheel a candidate's force laws take
+    /// hold: no receptance tells what they change by that.
+    fn under_load(&self) -> Vec<usize> {
+        let unknowns = &self.forward.unknowns;
+        // A gap that no load closes has nothing free.
+        let by_load = |candidate: &&Candidate| {
+            candidate.kind.classes.contains(&Class::Load) && !candidate.free.is_empty()
+        };
+        let candidates = self.candidates.iter().filter(by_load);
+        let sleepers = candidates.filter_map(|candidate| candidate.extension.sleepers.as_ref());
+        let mut near: Vec<usize> = sleepers
+            .flatten()
+            .flat_map(|sleeper| sleeper.saturating_sub(LOADED)..=sleeper + LOADED)
+            .filter(|sleeper| *sleeper < self.forward.section.sleepers)
+            .collect();
+        near.sort_unstable();
+        near.dedup();
+        let both =
+            |sleeper| [unknowns.ballast().start + sleeper, unknowns.railpad().start + sleeper];
+        near.into_iter().flat_map(both).collect()
     }
 
     fn linearise(

@@ -173,13 +173,21 @@ fn everywhere(kind: &'static Kind) -> Option<Family> {
     Some((ExtensionInstance::new(kind.physics), free, trials))
 }
 
-/// Over every sleeper and every pair of neighbours, with a gap that does not close.
+/// Over every sleeper and every pair of neighbours, with gaps that close while the wheel is near and
+/// one that does not.
 fn hanging(section: &Section, new: impl Fn() -> ExtensionInstance) -> Vec<Family> {
     let single = (0..section.sleepers).map(|sleeper| vec![sleeper]);
     let pairs = (1..section.sleepers).map(|sleeper| vec![sleeper - 1, sleeper]);
-    let family = |sleepers| (new().on(sleepers).with("gap_m", OPEN_GAP_M), &[][..], grid(&[]));
-    single.chain(pairs).map(family).collect()
+    let families = |sleepers: Vec<usize>| {
+        let closing = (new().on(sleepers.clone()), &["gap_m"][..], grid(&[CLOSING_GAPS_M]));
+        let open = (new().on(sleepers).with("gap_m", OPEN_GAP_M), &[][..], grid(&[]));
+        [closing, open]
+    };
+    single.chain(pairs).flat_map(families).collect()
 }
+
+/// Gaps in m that close while the wheel is above the sleeper, or near it.
+const CLOSING_GAPS_M: &[f64] = &[1e-4, 1.6e-4];
 
 /// A gap in m that no load closes.
 const OPEN_GAP_M: f64 = 4e-4;

@@ -120,10 +120,21 @@ impl PortScan {
     /// The best port for a whitened residual; `felt` is its product with the baseline's
     /// derivatives.
     pub fn best(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> Option<Port> {
-        let evidences = self.filters.par_iter().map(|filter| filter.evidence(residual, felt));
-        let evidences: Vec<(f64, DVector<f64>)> = evidences.collect();
-        let found = self.filters.iter().zip(evidences);
-        let (filter, (log_evidence, heights)) = found.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+        self.best_where(residual, felt, |_| true)
+    }
+
+    /// The best of some places.
+    pub fn best_where(
+        &self,
+        residual: &DVector<f64>,
+        felt: &DVector<f64>,
+        is_one: impl Fn(&PortPlace) -> bool + Sync,
+    ) -> Option<Port> {
+        let filters = self.filters.par_iter().filter(|filter| is_one(&filter.place));
+        let found: Vec<_> =
+            filters.map(|filter| (filter, filter.evidence(residual, felt))).collect();
+        let best = found.into_iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let (filter, (log_evidence, heights)) = best?;
         let ratio = |(pair, &hz): (&[f64], &f64)| (hz, Complex64::new(pair[0], pair[1]));
         let stiffness_ratio =
             heights.as_slice().chunks_exact(2).zip(&self.centres_hz).map(ratio).collect();

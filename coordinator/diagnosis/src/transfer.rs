@@ -54,10 +54,11 @@ impl Transfer {
         Self { by_seats: from_seats, ..self }
     }
 
-    /// The same for another model at the same lines. Where it differs in no matrix, as by the shape
-    /// of the rail or by the sensor, the rail's receptances stay.
+    /// The same for another model at the same lines. Where it differs in no matrix and no force law, as
+    /// by the shape of the rail or by the sensor, the rail's receptances stay.
     pub(crate) fn with_model(&self, model: TrackModel, lines_hz: &[f64]) -> Self {
-        if model.matrices() == self.model.matrices() {
+        let are_linear = [&model, &self.model].iter().all(|model| model.force_laws().is_empty());
+        if are_linear && model.matrices() == self.model.matrices() {
             Self::on_rail(model, lines_hz, Arc::clone(&self.direct))
         } else {
             Self::new(model, lines_hz, false)
@@ -207,6 +208,7 @@ fn hertz(model: &TrackModel) -> f64 {
 mod tests {
     use super::*;
     use rustfft::FftPlanner;
+    use std::ops::Range;
     use tracktwin_parameters::{ParameterSet, TrackDesign};
     use tracktwin_track::extension::ExtensionInstance;
     use tracktwin_track::model::{Mesh, Roughness, Support};
@@ -214,28 +216,29 @@ mod tests {
 
     const SPANS: usize = 24;
 
-    fn track(second_wheel_m: Option<f64>) -> TrackModel {
+    fn track(extension: Option<ExtensionInstance>) -> TrackModel {
         let design = TrackDesign::v_track();
         let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
-        let extensions = second_wheel_m.map(|distance_m| {
-            let wheel = ExtensionInstance::new("second_wheel").with("distance_m", distance_m);
-            wheel.build(&design, SPANS).unwrap()
-        });
+        let extensions = extension.map(|extension| extension.build(&design, SPANS).unwrap());
         let mesh = Mesh::uniform(SPANS, 8, 8);
         TrackModel::build(&design, &mesh, &supports, &Vec::from_iter(extensions)).unwrap()
     }
 
-    /// Powers in bands of a third of an octave from 250 Hz, all passes together.
-    fn powers(model: &TrackModel, centres_hz: &[f64]) -> Vec<f64> {
-        let pass = Pass {
-            speed_m_s: 2.8,
-            start_m: 0.5,
-            end_m: 2.0,
-            time_step_s: 2e-5,
-            local_flexibility: true,
-        };
+    fn second_wheel(distance_m: f64) -> ExtensionInstance {
+        ExtensionInstance::new("second_wheel").with("distance_m", distance_m)
+    }
+
+    /// Powers in bands of a third of an octave over a stretch, of so many passes together.
+    fn powers(
+        model: &TrackModel,
+        centres_hz: &[f64],
+        [start_m, end_m]: [f64; 2],
+        surfaces: u64,
+    ) -> Vec<f64> {
+        let pass =
+            Pass { speed_m_s: 2.8, start_m, end_m, time_step_s: 2e-5, local_flexibility: true };
         let surfaces: Vec<_> =
-            (1..=8).map(|seed| model.surface(&Roughness::new(1.0), seed)).collect();
+            (1..=surfaces).map(|seed| model.surface(&Roughness::new(1.0), seed)).collect();
         let records = passes(&vec![model.clone(); surfaces.len()], &pass, &surfaces).unwrap();
         let mut powers = vec![0.0; centres_hz.len()];
         for record in records {
@@ -260,41 +263,71 @@ mod tests {
         powers
     }
 
-    #[test]
-    fn a_second_wheel_changes_the_power_as_in_time() {
-        let centres_hz: Vec<f64> =
-            (0..10).map(|k| 250.0 * 2_f64.powf(f64::from(k) / 3.0)).collect();
-        let distance_m = 0.3;
-        let [alone, with] = [None, Some(distance_m)].map(track);
-        let in_time = powers(&with, &centres_hz).into_iter().zip(powers(&alone, &centres_hz));
-        let in_time: Vec<f64> =
-            in_time.map(|(with, alone)| 10.0 * (with / alone).log10()).collect();
-        // Eight lines a band, over the nodes of the same stretch.
+    /// Centres of bands of a third of an octave.
+    fn thirds_hz(first_hz: f64, count: i32) -> Vec<f64> {
+        (0..count).map(|k| first_hz * 2_f64.powf(f64::from(k) / 3.0)).collect()
+    }
+
+    /// By how much powers in bands over some nodes are expected to differ, in dB, with the window
+    /// that a spectrum of the stretch has.
+    fn expected_db(models: [TrackModel; 2], centres_hz: &[f64], seen: Range<usize>) -> Vec<f64> {
         let lines_hz: Vec<f64> = centres_hz
             .iter()
             .flat_map(|hz| (0..8).map(move |k| hz * 2_f64.powf((f64::from(k) - 3.5) / 24.0)))
             .collect();
-        let [alone, with] = [alone, with].map(|model| Transfer::new(model, &lines_hz, false).power);
-        let seen = 6 * 8..16 * 8;
-        let sum =
-            |power: &[Vec<f64>]| -> f64 { power.iter().flat_map(|line| &line[seen.clone()]).sum() };
-        let expected: Vec<f64> = with
-            .chunks(8)
-            .zip(alone.chunks(8))
-            .map(|(with, alone)| 10.0 * (sum(with) / sum(alone)).log10())
-            .collect();
+        let [alone, with] = models.map(|model| Transfer::new(model, &lines_hz, false).power);
+        let turn = |index: usize| TAU * (index as f64 + 0.5) / seen.len() as f64;
+        let share = |index: usize| (1.0 - turn(index).cos()).powi(2);
+        let of_line = |line: &Vec<f64>| -> f64 {
+            line[seen.clone()].iter().enumerate().map(|(index, power)| share(index) * power).sum()
+        };
+        let sum = |power: &[Vec<f64>]| -> f64 { power.iter().map(of_line).sum() };
+        let bands = with.chunks(8).zip(alone.chunks(8));
+        bands.map(|(with, alone)| 10.0 * (sum(with) / sum(alone)).log10()).collect()
+    }
+
+    fn ratios_db(with: Vec<f64>, alone: Vec<f64>) -> Vec<f64> {
+        with.into_iter().zip(alone).map(|(with, alone)| 10.0 * (with / alone).log10()).collect()
+    }
+
+    fn rms_difference(one: &[f64], other: &[f64]) -> f64 {
+        let square = |(one, other): (&f64, &f64)| (one - other).powi(2);
+        (one.iter().zip(other).map(square).sum::<f64>() / one.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn a_second_wheel_changes_the_power_as_in_time() {
+        let centres_hz = thirds_hz(250.0, 10);
+        let [alone, with] = [None, Some(second_wheel(0.3))].map(track);
+        let in_time = |model| powers(model, &centres_hz, [0.5, 2.0], 8);
+        let in_time = ratios_db(in_time(&with), in_time(&alone));
+        let expected = expected_db([alone, with], &centres_hz, 6 * 8..16 * 8);
         assert!(expected.iter().any(|change| change.abs() > 6.0), "{expected:?}");
         // Eight surfaces leave some tenths of a decibel to chance in each band.
-        let square = |(one, other): (&f64, &f64)| (one - other).powi(2);
-        let error = in_time.iter().zip(&expected).map(square).sum::<f64>() / expected.len() as f64;
-        assert!(error.sqrt() < 0.5, "{in_time:?} {expected:?}");
+        assert!(rms_difference(&in_time, &expected) < 0.5, "{in_time:?} {expected:?}");
+    }
+
+    #[test]
+    fn a_gap_that_closes_under_a_near_wheel_changes_the_power_as_in_time() {
+        let centres_hz = thirds_hz(315.0, 6);
+        let gap = |gap_m: f64| {
+            Some(ExtensionInstance::new("hanging_sleeper").on([11]).with("gap_m", gap_m))
+        };
+        let [alone, closing, open] = [None, gap(1.6e-4), gap(4e-3)].map(track);
+        let in_time = |model| powers(model, &centres_hz, [0.92, 1.8], 3);
+        let in_time = ratios_db(in_time(&closing), in_time(&alone));
+        let [closing, open] =
+            [closing, open].map(|with| expected_db([alone.clone(), with], &centres_hz, 77..116));
+        // Three passes over six spans, in which the ballast is struck twice.
+        assert!(rms_difference(&in_time, &open) > 5.0, "{in_time:?} {open:?}");
+        assert!(rms_difference(&in_time, &closing) < 1.5, "{in_time:?} {closing:?}");
     }
 
     #[test]
     fn a_wheel_beyond_the_rail_changes_nothing() {
         let lines_hz = [500.0, 2000.0];
-        let [alone, with] =
-            [None, Some(10.0)].map(|m| Transfer::new(track(m), &lines_hz, false).power);
+        let [alone, with] = [None, Some(second_wheel(10.0))]
+            .map(|e| Transfer::new(track(e), &lines_hz, false).power);
         assert_eq!(alone, with);
     }
 }

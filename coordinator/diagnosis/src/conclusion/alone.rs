@@ -1,6 +1,7 @@
 //! What the passes tell by themselves where no model of the track can be compared with them.
 
-use super::{ONE_PASS_MAX, ONE_SPEED_MAX, one_speed, probability, seen, shown, verdict};
+use super::notes::{one_speed, shown};
+use super::{ONE_PASS_MAX, ONE_SPEED_MAX, probability, seen, verdict};
 use crate::finding::{Finding, Place};
 use crate::first_look::FirstLook;
 use crate::outcome::{Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Score, Scores};

@@ -3,6 +3,7 @@
 mod alone;
 mod fit;
 mod nameless;
+mod notes;
 mod place;
 
 pub use self::alone::passes_alone;
@@ -34,9 +35,6 @@ const REMAINDER_PRIOR: f64 = 0.2;
 /// Greatest probability where nothing could be tested on a speed that was not fitted: structure and
 /// geometry look alike at one speed.
 const ONE_SPEED_MAX: f64 = 0.5;
-
-/// Ratio of two speeds that tells structure from geometry well.
-const SPEED_RATIO: f64 = 1.35;
 
 /// Greatest probability where no pass repeats another: how far passes differ had to be assumed.
 const ONE_PASS_MAX: f64 = 0.9;
@@ -277,8 +275,8 @@ impl Evidence<'_> {
     fn add_finding(&self, finding: &Finding, all: &mut Vec<Hypothesis>) {
         let Some(kind) = Kind::from_name(finding.physics) else { return };
         let probability = probability(finding);
-        let known = all.iter_mut().find(|known| known.physics == finding.physics);
-        if let Some(known) = known {
+        let same = all.iter_mut().filter(|known| known.physics == finding.physics);
+        if let Some(known) = same.max_by_key(|known| known.accepted) {
             known.probability = known.probability.max(probability);
             if known.accepted {
                 return;
@@ -308,43 +306,6 @@ impl Evidence<'_> {
             ..seen(finding, kind, self.location_of_finding(finding))
         });
     }
-
-    fn notes(&self) -> Vec<String> {
-        let mut notes: Vec<String> = self.look.troubles.iter().map(ToString::to_string).collect();
-        if self.speeds() == 1 {
-            notes.push(one_speed(3.6 * self.subject.forward.speeds_m_s[0]));
-        }
-        if !self.repeats() {
-            notes.push(format!(
-                "One pass a speed: how far passes repeat each other had to be assumed, so that no \
-                 name is more certain than {:.0} %. Add a second pass at each speed.",
-                100.0 * ONE_PASS_MAX
-            ));
-        }
-        if let Some(round) = self.search.rounds.last().filter(|round| round.p_value <= 0.05) {
-            let rest = if self.search.accepted.is_empty() { "Something" } else { "A remainder" };
-            let place = round.port.as_ref().map_or(String::new(), |port| match &port.place {
-                PortPlace::Wheel => " at the wheel".to_owned(),
-                PortPlace::Seats(seats) if seats.len() <= 2 => {
-                    format!(" near {}", self.id(seats[0]))
-                }
-                PortPlace::Between([first, second]) => {
-                    format!(" between {} and {}", self.id(*first), self.id(*second))
-                }
-                PortPlace::Seats(_) => String::new(),
-            });
-            if !round.accepted {
-                notes.push(format!(
-                    "{rest} is left{place} that chance does not explain (p = {:.1e}); it may be the \
-                     model's own error, for nothing in the catalogue predicts the held-out speeds \
-                     better.",
-                    round.p_value
-                ));
-            }
-        }
-        notes.extend(self.look.findings.iter().map(shown));
-        notes
-    }
 }
 
 /// What a finding says as a hypothesis: accepted, as probable as it says.
@@ -367,21 +328,6 @@ fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -> Hypothesi
 
 fn probability(finding: &Finding) -> f64 {
     1.0 - finding.p_value.clamp(1e-6, 1.0)
-}
-
-/// A finding as a sentence.
-fn shown(finding: &Finding) -> String {
-    format!("The passes alone show {}: {}.", finding.physics, finding.evidence)
-}
-
-fn one_speed(speed_km_h: f64) -> String {
-    format!(
-        "One speed only: nothing could be tested on a speed that was not fitted, so that no name \
-         that needs such a test is more certain than {:.0} %. Add a pass at {:.0} km/h or at {:.0} km/h.",
-        100.0 * ONE_SPEED_MAX,
-        speed_km_h / SPEED_RATIO,
-        speed_km_h * SPEED_RATIO,
-    )
 }
 
 fn verdict(hypotheses: &[Hypothesis]) -> Verdict {

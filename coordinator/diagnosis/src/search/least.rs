@@ -1,5 +1,6 @@
 //! How much evidence a name needs, alone and beside what is accepted already.
 
+use super::extent::Extent;
 use super::probability::TEMPERATURE;
 use crate::candidate::Candidate;
 use crate::section::Section;
@@ -10,9 +11,6 @@ use tracktwin_track::extension::Class;
 /// not like one that is everywhere beside a shape at a place.
 const FURTHER_SHARE_MIN: f64 = 0.25;
 
-/// Spans on either side in which an effect at a place is felt.
-const FELT_SPANS: f64 = 2.0;
-
 /// By how much a candidate may gain more when it is fitted, with all of the baseline, than its best
 /// trial of free size: beside an effect that is accepted what can't get far enough is not fitted.
 const FITTED_GAIN: f64 = 3.0;
@@ -22,13 +20,30 @@ const FITTED_GAIN: f64 = 3.0;
 pub(super) struct Least<'a> {
     pub(super) accepted: &'a [(Candidate, f64)],
     pub(super) section: &'a Section,
+    /// Where the passes alone show the rail's own shape, from and to in m.
+    pub(super) heard_m: &'a [[f64; 2]],
 }
 
 impl Least<'_> {
+    ///
+    /// A shape that the passes alone show beside no accepted one is no small rest of another effect.
     pub(super) fn of(self, candidate: &Candidate) -> f64 {
+        let alone = TEMPERATURE * 20_f64.ln();
+        if is_local_shape(candidate) && self.is_heard(candidate) {
+            return alone;
+        }
         let known = self.accepted.iter();
         let beside = known.map(|(known, evidence)| self.share(known, candidate) * evidence);
-        beside.fold(TEMPERATURE * 20_f64.ln(), f64::max)
+        beside.fold(alone, f64::max)
+    }
+
+    fn is_heard(self, candidate: &Candidate) -> bool {
+        let Some(x_m) = candidate.extension.x_m else { return false };
+        let places = self.accepted.iter().filter_map(|(known, _)| known.extension.x_m);
+        let are_beside = |one, other| self.section.are_beside(one, other);
+        self.heard_m.iter().any(|&heard_m| {
+            are_beside(heard_m, x_m) && !places.clone().any(|known_m| are_beside(heard_m, known_m))
+        })
     }
 
     /// Share of an effect's log evidence that a candidate needs beside it.
@@ -36,28 +51,13 @@ impl Least<'_> {
         if candidate.is_everywhere() && is_local_shape(known) {
             return 0.0;
         }
-        let [one, other] = [known, candidate].map(|candidate| self.felt(candidate));
-        if other[1] < one[0] || one[1] < other[0] {
-            return 0.0;
+        let [one, other] =
+            [known, candidate].map(|candidate| Extent::of(candidate, self.section).felt());
+        if one.meets(other) {
+            FURTHER_SHARE_MIN * (other.length() / one.length()).min(1.0)
+        } else {
+            0.0
         }
-        FURTHER_SHARE_MIN * ((other[1] - other[0]) / (one[1] - one[0])).min(1.0)
-    }
-
-    /// From which sleeper to which a candidate is felt, in spacings.
-    fn felt(self, candidate: &Candidate) -> [f64; 2] {
-        let last = (self.section.sleepers - 1) as f64;
-        let place = match (&candidate.extension.sleepers, candidate.extension.x_m) {
-            (Some(sleepers), _) => sleepers
-                .iter()
-                .map(|&sleeper| sleeper as f64)
-                .fold([last, 0.0], |[from, to], s| [from.min(s), to.max(s)]),
-            (None, Some(x_m)) => {
-                let spacing_m = self.section.design.sleeper.spacing_m;
-                x_m.map(|x_m| (x_m - self.section.first_x_m) / spacing_m)
-            }
-            (None, None) => [0.0, last],
-        };
-        [place[0] - FELT_SPANS, place[1] + FELT_SPANS]
     }
 
     /// Whether fitting a candidate may give it that much, from the gain in nats of a trial of free
@@ -100,7 +100,7 @@ mod tests {
             };
             all.iter().find(is_it).unwrap()
         };
-        let least = Least { accepted: &[], section: &section };
+        let least = Least { accepted: &[], section: &section, heard_m: &[] };
         let (bolts, axle_box) = (of("sleeper_bolt", None), of("flexible_axle_box", None));
         let (gap, far) = (of("hanging_sleeper", Some(&[3])), of("sleeper_bolt", Some(&[20])));
         let near = of("missing_railpad", Some(&[4]));

@@ -1,13 +1,16 @@
 //! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
 
 mod chance;
+mod extent;
 mod fit;
 mod least;
 mod probability;
+mod remainder;
 mod round;
 
 pub(crate) use probability::Probabilities;
 
+use self::extent::Extent;
 use self::fit::retuned;
 use self::least::Least;
 use self::round::{Setting, is_predicted, sure};
@@ -15,7 +18,7 @@ use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
-use crate::port_scan::Port;
+use crate::port_scan::{Port, PortPlace};
 use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
 
@@ -67,6 +70,9 @@ pub struct Round {
     pub held_out_gain: Vec<f64>,
     /// Whether the best was accepted.
     pub accepted: bool,
+    /// Evidence in nats for something unknown that is left at the best's place, if it speaks against
+    /// the best.
+    pub remainder: Option<f64>,
 }
 
 /// What was found.
@@ -140,30 +146,24 @@ pub fn search(
         held_out: [0.0; 2],
     };
     let before = setting.held_out(&[], &search.baseline.values)?;
-    let mut densities = Densities { reached: before.clone(), before };
+    let mut densities = vec![before];
     while search.accepted.len() < EFFECTS_MAX
         && search.goes_on(&setting, all, &mut densities, progress)?
     {}
+    search.take_back(&subject.forward.section);
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
-    search.held_out = [mean(&densities.before), mean(&densities.reached)];
+    search.held_out = [mean(&densities[0]), mean(&densities[search.accepted.len()])];
     Ok(search)
 }
 
-/// Log density of each speed when it is held out.
-struct Densities {
-    /// By the baseline.
-    before: Vec<f64>,
-    /// With all that is accepted so far.
-    reached: Vec<f64>,
-}
-
 impl Search {
-    /// Looks for one effect more; whether one was accepted.
+    /// Looks for one effect more; whether one was accepted. `densities` are those of each speed when
+    /// it is held out, by the baseline and with one more effect each.
     fn goes_on(
         &mut self,
         setting: &Setting<'_>,
         all: &[Candidate],
-        densities: &mut Densities,
+        densities: &mut Vec<Vec<f64>>,
         progress: &(impl Fn(Stage, f64) + Sync),
     ) -> Result<bool, CalibrationError> {
         let (accepted, observation) = (self.accepted.clone(), self.observation.clone());
@@ -173,29 +173,40 @@ impl Search {
         let best = self.rounds.iter().filter_map(|round| round.fitted.first());
         let known: Vec<(Candidate, f64)> =
             best.map(|fitted| (fitted.candidate.clone(), fitted.log_evidence)).collect();
-        let least = Least { accepted: &known, section: &forward.section };
-        let mut round = setting.round(&problem, &self.last, all, least, progress)?;
+        let heard_m = &setting.subject.heard_m;
+        let least = Least { accepted: &known, section: &forward.section, heard_m };
+        let (mut round, mut ports) = setting.round(&problem, &self.last, all, least, progress)?;
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
             // The candidates found a better baseline on their way: the opponent gets it too.
             self.last = better;
-            densities.reached = setting.held_out(&accepted, &self.last.values)?;
+            densities[accepted.len()] = setting.held_out(&accepted, &self.last.values)?;
             if accepted.is_empty() {
                 self.baseline = self.last.clone();
-                densities.before.clone_from(&densities.reached);
             }
-            round = setting.round(&problem, &self.last, all, least, progress)?;
+            (round, ports) = setting.round(&problem, &self.last, all, least, progress)?;
         }
-        if let Some(best) = sure(&round, setting.subject, least) {
+        // Beside what is accepted, something unknown elsewhere is another effect, not another name.
+        let rival = match round.fitted.first().filter(|_| !accepted.is_empty()) {
+            Some(best) => {
+                let extent = Extent::of(&best.candidate, &forward.section).felt();
+                let together =
+                    |place: &PortPlace| extent.meets(Extent::of_port(place, &forward.section));
+                ports.best_where(&self.last.residual, &self.last.gradient, together)
+            }
+            None => round.port.clone(),
+        };
+        if let Some(best) = sure(&round, rival.as_ref(), setting.subject, least) {
             progress(Stage::HeldOut, 0.0);
             let with = [&accepted[..], std::slice::from_ref(&best.candidate)].concat();
             let scores = setting.held_out(&with, &best.calibration.values)?;
-            let pairs = scores.iter().zip(&densities.reached);
+            let pairs = scores.iter().zip(&densities[accepted.len()]);
             let gains: Vec<f64> = pairs.map(|(with, without)| with - without).collect();
             if is_predicted(&gains) {
                 self.last = best.calibration.clone();
                 self.accepted = with;
-                densities.reached = scores;
+                densities.push(scores);
                 round.accepted = true;
+                round.port = rival;
             }
             round.held_out_gain = gains;
         }

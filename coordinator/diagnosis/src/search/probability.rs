@@ -1,6 +1,7 @@
 //! How probable each explanation of a search is: evidence, tempered, times prior.
 
 use super::Round;
+use crate::port_scan::Port;
 use crate::screen::STRENGTHS;
 use std::collections::BTreeMap;
 use tracktwin_track::extension::KINDS;
@@ -38,8 +39,13 @@ impl Round {
     /// Probabilities of what was fitted, of something unknown and of nothing at all; the rest is
     /// that of something too weak to show.
     pub(crate) fn probabilities(&self) -> Probabilities {
+        self.against(self.port.as_ref())
+    }
+
+    /// The same with this as the unknown.
+    pub(super) fn against(&self, unknown: Option<&Port>) -> Probabilities {
         let named = self.fitted.iter().map(|fitted| fitted.log_evidence);
-        of(named, self.port.as_ref().map(|port| port.log_evidence), self.unseen)
+        of(named, unknown.map(|port| port.log_evidence), self.unseen)
     }
 }
 

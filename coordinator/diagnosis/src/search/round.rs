@@ -9,7 +9,7 @@ use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
-use crate::port_scan::{PortPlace, PortScan};
+use crate::port_scan::{Port, PortPlace, PortScan};
 use crate::screen::{Template, templates};
 use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Probability of a false alarm on a recording without anything left out.
-const FALSE_ALARM: f64 = 0.05;
+pub(super) const FALSE_ALARM: f64 = 0.05;
 
 /// Candidates of one kind, and in all, that are fitted together with the baseline.
 const REFINED_PER_KIND: usize = 2;
@@ -93,7 +93,7 @@ impl<'a> Setting<'a> {
         all: &[Candidate],
         least: Least<'_>,
         progress: &(impl Fn(Stage, f64) + Sync),
-    ) -> Result<Round, CalibrationError> {
+    ) -> Result<(Round, PortScan), CalibrationError> {
         let trials: usize = all.iter().map(|candidate| candidate.trials.len()).sum();
         let done = AtomicUsize::new(0);
         let templates = templates(problem, current, all, || {
@@ -104,7 +104,8 @@ impl<'a> Setting<'a> {
             .iter()
             .map(|template| (template.log_evidence(&current.residual, &current.gradient), template))
             .collect();
-        let mut round = self.alarm(problem, current, &screened)?;
+        let ports = PortScan::new(problem, current)?;
+        let mut round = self.alarm(problem, current, &screened, &ports);
         round.unseen = unseen(templates.iter().map(|template| {
             let kind = all[template.candidate].kind.physics;
             (kind, template.at_strengths(&current.residual, &current.gradient))
@@ -113,7 +114,7 @@ impl<'a> Setting<'a> {
             let starts = starts(problem, current, all, &templates, screened, least);
             round.fitted = fit(problem, current, all, starts, progress);
         }
-        Ok(round)
+        Ok((round, ports))
     }
 
     /// How probable the greatest evidence among candidates and ports is if nothing is left out.
@@ -122,7 +123,8 @@ impl<'a> Setting<'a> {
         problem: &Problem<'_>,
         current: &Calibration,
         screened: &[(f64, &Template)],
-    ) -> Result<Round, CalibrationError> {
+        ports: &PortScan,
+    ) -> Round {
         let highest = screened.iter().map(|(evidence, _)| *evidence).fold(f64::MIN, f64::max);
         let nulls = whitened(&self.nulls, problem.observation, current);
         let excess = excess(current, &nulls, self.subject.forward.section.sleepers);
@@ -130,7 +132,6 @@ impl<'a> Setting<'a> {
             let evidence = screened.iter().map(|(_, t)| t.log_evidence(residual, felt));
             Some(evidence.fold(f64::MIN, f64::max))
         });
-        let ports = PortScan::new(problem, current)?;
         let port = ports.best(&current.residual, &current.gradient);
         let port_p_value = port.as_ref().map_or(1.0, |port| {
             tail_probability(&nulls, port.log_evidence / excess, |residual, felt| {
@@ -139,7 +140,7 @@ impl<'a> Setting<'a> {
         });
         // The better of two tests.
         let p_value = (2.0 * p_value.min(port_p_value)).min(1.0);
-        Ok(Round { p_value, port, port_p_value, ..Round::default() })
+        Round { p_value, port, port_p_value, ..Round::default() }
     }
 }
 
@@ -150,29 +151,32 @@ pub(super) fn is_predicted(gains: &[f64]) -> bool {
     gains.is_empty() || (gains.iter().sum::<f64>() >= HELD_OUT_MIN && lost <= 1)
 }
 
-/// The best candidate, if something unknown does not speak against it and it is sure enough beside
+/// The best candidate, if its unknown rival does not speak against it and it is sure enough beside
 /// earlier effects.
 pub(super) fn sure<'r>(
     round: &'r Round,
+    rival: Option<&Port>,
     subject: &Subject,
     least: Least<'_>,
 ) -> Option<&'r Fitted> {
-    let Probabilities { named, unknown, .. } = round.probabilities();
+    let Probabilities { named, unknown, .. } = round.against(rival);
     let best = round.fitted.first()?;
-    let leads = named[0] > unknown || is_shape_at_port(&best.candidate, round, subject);
+    let is_shape =
+        || rival.is_some_and(|rival| is_shape_at(&rival.place, &best.candidate, subject));
+    let leads = named[0] > unknown || is_shape();
     (leads && best.log_evidence >= least.of(&best.candidate)).then_some(best)
 }
 
 /// Whether a candidate is a shape of the rail that the passes alone show as well, where the unknown
 /// is: the force of a shape adds to the surface's with a phase that mean powers leave out, so that an
 /// unknown fits better beside it.
-fn is_shape_at_port(candidate: &Candidate, round: &Round, subject: &Subject) -> bool {
+fn is_shape_at(port: &PortPlace, candidate: &Candidate, subject: &Subject) -> bool {
     let section = &subject.forward.section;
     let is_shape = is_local_shape(candidate);
-    let seats = match round.port.as_ref().map(|port| &port.place) {
-        Some(PortPlace::Seats(seats)) => &seats[..],
-        Some(PortPlace::Between(pair)) => pair,
-        Some(PortPlace::Wheel) | None => return false,
+    let seats = match port {
+        PortPlace::Seats(seats) => &seats[..],
+        PortPlace::Between(pair) => pair,
+        PortPlace::Wheel => return false,
     };
     let Some([from_m, to_m]) = candidate.extension.x_m else { return false };
     let spacing_m = section.design.sleeper.spacing_m;

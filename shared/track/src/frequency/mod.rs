@@ -12,6 +12,7 @@ mod lane;
 mod peaks;
 mod rail;
 mod receptance;
+mod states;
 
 pub use ahead::{receptances_ahead, shares};
 pub use peaks::{Peak, peaks};

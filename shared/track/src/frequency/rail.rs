@@ -5,6 +5,7 @@
 //! place after the other, on the same matrices.
 
 use super::lane::{Banded, LANES, Lane};
+use super::states::States;
 use crate::model::{Matrices, TrackModel};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
@@ -41,10 +42,19 @@ pub(super) struct Partition<'a> {
 }
 
 impl RailReceptances {
-    /// Works them out, with those from every rail seat if `from_seats`.
+    /// Works them out, with those from every rail seat if `from_seats`: at each node those of the
+    /// track as it is while the wheel stands there.
     ///
     /// Solves `K + i w C - w^2 M` on the model's own matrices, in the convention `exp(+i w t)`.
     pub fn new(model: &TrackModel, frequencies_hz: &[f64], from_seats: bool) -> Self {
+        let of = |track: &TrackModel| Self::of_matrices(track, frequencies_hz, from_seats);
+        match States::new(model) {
+            Some(states) => states.mix(of),
+            None => of(model),
+        }
+    }
+
+    fn of_matrices(model: &TrackModel, frequencies_hz: &[f64], from_seats: bool) -> Self {
         let partition = Partition::new(model);
         let layout = model.layout();
         let nodes: Vec<_> =

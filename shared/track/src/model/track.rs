@@ -91,20 +91,28 @@ impl TrackModel {
     /// With every force law linearised where the wheel stands above it.
     ///
     /// A track that carries no wheel keeps what it has: a pass over it says so.
-    fn linearised(mut self) -> Self {
+    fn linearised(self) -> Self {
         if self.force_laws.is_empty() {
             return self;
         }
-        let Some(tangents) = time::tangents(&self) else { return self };
+        let tangents = time::Standing::new(&self).and_then(|standing| standing.tangents_above());
+        match tangents {
+            Some(tangents) => self.with_tangents(&tangents),
+            None => self,
+        }
+    }
+
+    /// The same with each force law linearised to this spring and damper.
+    pub(crate) fn with_tangents(mut self, tangents: &[SpringDamper]) -> Self {
         let change = |(law, tangent): (&ForceLaw, &SpringDamper)| SpringDamper {
             stiffness: tangent.stiffness - law.linear.stiffness,
             damping: tangent.damping - law.linear.damping,
         };
-        let pairs = self.force_laws.iter().zip(&tangents);
+        let pairs = self.force_laws.iter().zip(tangents);
         let changes: Vec<_> = pairs.map(|pair| (&pair.0.port, change(pair))).collect();
         self.matrices = self.matrices.with(&changes);
         for (law, tangent) in self.force_laws.iter_mut().zip(tangents) {
-            law.linear = tangent;
+            law.linear = *tangent;
         }
         self
     }

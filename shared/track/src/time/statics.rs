@@ -5,7 +5,7 @@ use super::cholesky::Cholesky;
 use super::coupled::{self, Resistance};
 use super::kinematics::Kinematics;
 use crate::element::SpringDamper;
-use crate::model::{Port, Reaction, TrackModel};
+use crate::model::{ForceLaw, Port, Reaction, TrackModel};
 use nalgebra::{DMatrix, DVector};
 
 /// A track whose stiffness has been factorised.
@@ -61,20 +61,40 @@ impl<'a> Statics<'a> {
     }
 }
 
-/// Spring and damper that each force law of a track is to a small motion while the wheel stands
-/// above it; `None` where the track cannot carry the wheel.
-pub(crate) fn tangents(model: &TrackModel) -> Option<Vec<SpringDamper>> {
-    let statics = Statics::new(model).ok()?;
-    let mut standing: Option<(f64, Vec<f64>)> = None;
-    let mut tangents = Vec::with_capacity(model.force_laws().len());
-    for law in model.force_laws() {
-        let track = match standing.take() {
-            Some((place_m, track)) if place_m == law.place_m => track,
-            _ => statics.under(model.vehicle().wheel.load_n, &[law.place_m]).ok()?,
-        };
-        let Reaction { stiffness, damping, .. } = law.law.reaction(law.port.motion(&track), 0.0);
-        tangents.push(SpringDamper { stiffness, damping });
-        standing = Some((law.place_m, track));
+/// A track under a standing wheel.
+pub(crate) struct Standing<'a>(Statics<'a>);
+
+impl<'a> Standing<'a> {
+    /// `None` where the track cannot carry a wheel.
+    pub(crate) fn new(model: &'a TrackModel) -> Option<Self> {
+        Statics::new(model).ok().map(Self)
     }
-    Some(tangents)
+
+    /// Spring and damper that each force law is to a small motion while the wheel stands there.
+    pub(crate) fn tangents(&self, x_m: f64) -> Option<Vec<SpringDamper>> {
+        let Self(statics) = self;
+        let track = statics.under(statics.model.vehicle().wheel.load_n, &[x_m]).ok()?;
+        let tangent = |law: &ForceLaw| {
+            let Reaction { stiffness, damping, .. } =
+                law.law.reaction(law.port.motion(&track), 0.0);
+            SpringDamper { stiffness, damping }
+        };
+        Some(statics.model.force_laws().iter().map(tangent).collect())
+    }
+
+    /// The same for each law while the wheel stands above it.
+    pub(crate) fn tangents_above(&self) -> Option<Vec<SpringDamper>> {
+        let Self(statics) = self;
+        let mut standing: Option<(f64, Vec<SpringDamper>)> = None;
+        let mut tangents = Vec::with_capacity(statics.model.force_laws().len());
+        for (index, law) in statics.model.force_laws().iter().enumerate() {
+            let all = match standing.take() {
+                Some((place_m, all)) if place_m == law.place_m => all,
+                _ => self.tangents(law.place_m)?,
+            };
+            tangents.push(all[index]);
+            standing = Some((law.place_m, all));
+        }
+        Some(tangents)
+    }
 }

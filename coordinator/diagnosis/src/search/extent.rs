@@ -1,0 +1,95 @@
+//! Where along the sleepers something is, and where it is felt.
+
+use crate::candidate::Candidate;
+use crate::port_scan::PortPlace;
+use crate::section::Section;
+
+/// Spans on either side in which an effect at a place is felt.
+const FELT_SPANS: f64 = 2.0;
+
+/// From where to where, in spacings from the first sleeper compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Extent {
+    from: f64,
+    to: f64,
+}
+
+impl Extent {
+    /// Where a candidate is.
+    pub(super) fn of(candidate: &Candidate, section: &Section) -> Self {
+        match (&candidate.extension.sleepers, candidate.extension.x_m) {
+            (Some(sleepers), _) => Self::of_sleepers(sleepers, section),
+            (None, Some(x_m)) => {
+                let spacing_m = section.design.sleeper.spacing_m;
+                let [from, to] = x_m.map(|x_m| (x_m - section.first_x_m) / spacing_m);
+                Self { from, to }
+            }
+            (None, None) => Self::everywhere(section),
+        }
+    }
+
+    /// Where something unknown is.
+    pub(super) fn of_port(place: &PortPlace, section: &Section) -> Self {
+        match place {
+            PortPlace::Seats(seats) => Self::of_sleepers(seats, section),
+            PortPlace::Between(pair) => Self::of_sleepers(pair, section),
+            PortPlace::Wheel => Self::everywhere(section),
+        }
+    }
+
+    fn of_sleepers(sleepers: &[usize], section: &Section) -> Self {
+        let Self { from: first, to: last } = Self::everywhere(section);
+        let sleepers = sleepers.iter().map(|&sleeper| sleeper as f64);
+        let wider = |Self { from, to }, at: f64| Self { from: at.min(from), to: at.max(to) };
+        sleepers.fold(Self { from: last, to: first }, wider)
+    }
+
+    fn everywhere(section: &Section) -> Self {
+        Self { from: 0.0, to: (section.sleepers - 1) as f64 }
+    }
+
+    /// Where it is felt.
+    pub(super) fn felt(self) -> Self {
+        Self { from: self.from - FELT_SPANS, to: self.to + FELT_SPANS }
+    }
+
+    pub(super) fn length(self) -> f64 {
+        self.to - self.from
+    }
+
+    /// Whether the two have something in common.
+    pub(super) fn meets(self, other: Self) -> bool {
+        self.from <= other.to && other.from <= self.to
+    }
+
+    /// Whether the two are the same up to a spacing at either end.
+    pub(super) fn is_about(self, other: Self) -> bool {
+        (self.from - other.from).abs() <= 1.0 && (self.to - other.to).abs() <= 1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidate::candidates;
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn a_port_is_about_where_a_sleeper_beside_it_is() {
+        let section = Section::new(TrackDesign::v_track(), 24, 1.0);
+        let all = candidates(&section);
+        let on = |sleeper: usize| {
+            let is_it = |candidate: &&crate::Candidate| {
+                candidate.extension.sleepers.as_deref() == Some(&[sleeper][..])
+            };
+            Extent::of(all.iter().find(is_it).unwrap(), &section)
+        };
+        let between = Extent::of_port(&PortPlace::Between([3, 4]), &section);
+        assert!([2, 3, 4, 5].iter().all(|&sleeper| on(sleeper).felt().meets(between)));
+        assert!(on(3).is_about(between) && on(4).is_about(between) && !on(5).is_about(between));
+        assert!(!on(7).felt().meets(between) && on(6).felt().meets(between));
+        let wheel = Extent::of_port(&PortPlace::Wheel, &section);
+        let all_seats = Extent::of_port(&PortPlace::Seats((0..24).collect()), &section);
+        assert!(wheel == all_seats && wheel.meets(between) && !wheel.is_about(between));
+    }
+}

@@ -1,0 +1,86 @@
+//! Names that leave too much unexplained at their own place are taken back.
+
+use super::extent::Extent;
+use super::least::is_local_shape;
+use super::round::FALSE_ALARM;
+use super::{Round, Search};
+use crate::candidate::Candidate;
+use crate::section::Section;
+
+/// Share of the evidence for a name from which something unknown that is left at its place speaks
+/// against it: what hangs on some sleepers is modelled with errors, which grow with the effect.
+const LEFT_AT_PLACE: f64 = 1.0 / 3.0;
+
+/// The same for what is everywhere, at the wheel or in the measuring chain: it has hardly any.
+const LEFT_EVERYWHERE: f64 = 0.1;
+
+impl Search {
+    /// Takes the last names back as long as what is left at their place speaks against them.
+    pub(super) fn take_back(&mut self, section: &Section) {
+        let Some(last) = self.rounds.last().filter(|last| !last.accepted) else { return };
+        let Some(port) = last.port.as_ref().filter(|_| last.port_p_value <= FALSE_ALARM) else {
+            return;
+        };
+        let place = Extent::of_port(&port.place, section);
+        let mut left = port.log_evidence;
+        while let Some(number) = self.accepted.len().checked_sub(1) {
+            let least = least_left(&self.explained(section, place));
+            if least.is_none_or(|least| left < least) {
+                return;
+            }
+            let round = &mut self.rounds[number];
+            round.accepted = false;
+            round.remainder = Some(left);
+            left += round.fitted[0].log_evidence;
+            self.accepted.pop();
+            self.rounds.truncate(number + 1);
+            self.last = match number.checked_sub(1) {
+                Some(before) => self.rounds[before].fitted[0].calibration.clone(),
+                None => self.baseline.clone(),
+            };
+        }
+    }
+
+    /// What is accepted, last first, with its evidence, as long as it is at a place.
+    fn explained(&self, section: &Section, place: Extent) -> Vec<(&Candidate, f64)> {
+        let evidence = |(known, round): (_, &Round)| (known, round.fitted[0].log_evidence);
+        let rounds = &self.rounds[..self.accepted.len()];
+        let accepted = self.accepted.iter().zip(rounds).map(evidence).rev();
+        let is_there = |known: &Candidate| Extent::of(known, section).is_about(place);
+        accepted.take_while(|(known, _)| is_there(known)).collect()
+    }
+}
+
+/// Least evidence in nats for something unknown that speaks against the first of these names, which
+/// are at its place: what others of its kind explain beside it counts as well. None speaks against a
+/// shape, whose phase to the surface the model does not know.
+fn least_left(explained: &[(&Candidate, f64)]) -> Option<f64> {
+    let &(last, _) = explained.first()?;
+    let is_kind = |(known, _): &&(&Candidate, f64)| known.kind.physics == last.kind.physics;
+    let evidence: f64 = explained.iter().take_while(is_kind).map(|(_, evidence)| evidence).sum();
+    let share = if last.is_everywhere() { LEFT_EVERYWHERE } else { LEFT_AT_PLACE };
+    (!is_local_shape(last)).then_some(share * evidence)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidate::candidates;
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn what_is_left_speaks_against_a_name_but_not_against_a_shape_or_two_of_a_kind() {
+        let section = Section::new(TrackDesign::v_track(), 24, 1.0);
+        let all = candidates(&section);
+        let of = |physics: &str| {
+            let is_it = |candidate: &&Candidate| candidate.kind.physics == physics;
+            all.iter().find(is_it).unwrap()
+        };
+        let (gap, pad, dip) = (of("hanging_sleeper"), of("missing_railpad"), of("rail_joint"));
+        assert_eq!(least_left(&[(gap, 300.0)]), Some(100.0));
+        assert_eq!(least_left(&[(gap, 60.0), (gap, 300.0), (pad, 900.0)]), Some(120.0));
+        assert_eq!(least_left(&[(of("sensor_mount_resonance"), 900.0)]), Some(90.0));
+        assert_eq!(least_left(&[(dip, 300.0)]), None);
+        assert_eq!(least_left(&[]), None);
+    }
+}

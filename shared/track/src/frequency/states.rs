@@ -1,0 +1,227 @@
+//! Force laws take hold or not, by where the wheel stands.
+
+use super::rail::RailReceptances;
+use crate::model::{ForceLaw, TrackModel};
+use crate::time::Standing;
+use rustfft::num_complex::Complex64;
+
+/// Halvings of the way between two nodes by which it is found where a law takes hold: a place is
+/// then known to a millionth of the way.
+const HALVINGS: usize = 20;
+
+/// Spans on either side of a force law in which a standing wheel is felt.
+const REACH_SPANS: f64 = 4.0;
+
+/// Which force laws take hold.
+type Hold = Vec<bool>;
+
+/// A track as it is to small motions while the wheel stands at each node of its rail.
+///
+/// Ballast under a gap carries the sleeper while the wheel is near enough to press it down, and does
+/// not while it is further away. A law that takes hold is what it is under a wheel above it.
+pub(super) struct States {
+    /// The track in each of its states.
+    tracks: Vec<TrackModel>,
+    /// Shares of the states in the half bays about each node: `[node][state]`.
+    shares: Vec<Vec<f64>>,
+}
+
+impl States {
+    /// `None` for a track that is the same wherever the wheel stands.
+    pub(super) fn new(model: &TrackModel) -> Option<Self> {
+        if model.force_laws().is_empty() {
+            return None;
+        }
+        let standing = Standing::new(model)?;
+        let hold_at = |x_m: f64| -> Option<Hold> {
+            Some(standing.tangents(x_m)?.iter().map(|tangent| tangent.stiffness > 0.0).collect())
+        };
+        let nodes_m = model.layout().rail_nodes_m();
+        let at_nodes = at_nodes(model, &hold_at)?;
+        let above: Hold = model.force_laws().iter().map(holds_above).collect();
+        if at_nodes.iter().all(|hold| *hold == above) {
+            return None;
+        }
+        let mut holds: Vec<&Hold> = Vec::new();
+        // Each state with the place where it ends.
+        let mut stretches: Vec<(usize, f64)> = Vec::new();
+        for (node, hold) in at_nodes.iter().enumerate() {
+            let state = holds.iter().position(|known| *known == hold).unwrap_or_else(|| {
+                holds.push(hold);
+                holds.len() - 1
+            });
+            let x_m = nodes_m[node];
+            match stretches.last_mut() {
+                Some((last, to_m)) if *last == state => *to_m = x_m,
+                Some((last, to_m)) => {
+                    *to_m =
+                        change_m([*to_m, x_m], |x_m| hold_at(x_m).as_ref() == Some(holds[*last]));
+                    stretches.push((state, x_m));
+                }
+                None => stretches.push((state, x_m)),
+            }
+        }
+        let tracks = holds.iter().map(|hold| in_state(model, hold, &standing, nodes_m, &at_nodes));
+        let tracks = tracks.collect::<Option<Vec<_>>>()?;
+        let shares = shares(nodes_m, &stretches, tracks.len());
+        Some(Self { tracks, shares })
+    }
+
+    /// Receptances at each node of the track in the state that it has while the wheel is there.
+    pub(super) fn mix(&self, of: impl Fn(&TrackModel) -> RailReceptances) -> RailReceptances {
+        let states: Vec<RailReceptances> = self.tracks.iter().map(of).collect();
+        let mut mixed = RailReceptances {
+            direct: states[0].direct.clone(),
+            from_seats: states[0].from_seats.clone(),
+        };
+        let mix = |node: usize, value: &dyn Fn(&RailReceptances) -> Complex64| -> Complex64 {
+            self.shares[node].iter().zip(&states).map(|(share, state)| share * value(state)).sum()
+        };
+        for (line, nodes) in mixed.direct.iter_mut().enumerate() {
+            for (node, receptance) in nodes.iter_mut().enumerate() {
+                *receptance = mix(node, &|state| state.direct[line][node]);
+            }
+        }
+        for (line, seats) in mixed.from_seats.iter_mut().enumerate() {
+            for (seat, nodes) in seats.iter_mut().enumerate() {
+                for (node, receptance) in nodes.iter_mut().enumerate() {
+                    *receptance = mix(node, &|state| state.from_seats[line][seat][node]);
+                }
+            }
+        }
+        mixed
+    }
+}
+
+/// Which laws hold while the wheel stands at each node; beyond the reach of all laws as at its end.
+fn at_nodes(model: &TrackModel, hold_at: &impl Fn(f64) -> Option<Hold>) -> Option<Vec<Hold>> {
+    let reach_m = REACH_SPANS * model.design().sleeper.spacing_m;
+    let laws_m = || model.force_laws().iter().map(|law| law.place_m);
+    let from_m = laws_m().fold(f64::INFINITY, f64::min) - reach_m;
+    let to_m = laws_m().fold(f64::NEG_INFINITY, f64::max) + reach_m;
+    let nodes_m = model.layout().rail_nodes_m();
+    let first = nodes_m.partition_point(|x_m| *x_m < from_m);
+    let last = nodes_m.partition_point(|x_m| *x_m <= to_m).max(first + 1) - 1;
+    let within: Vec<Hold> =
+        nodes_m[first..=last].iter().map(|&x_m| hold_at(x_m)).collect::<Option<_>>()?;
+    let node = |node: usize| within[node.clamp(first, last) - first].clone();
+    Some((0..nodes_m.len()).map(node).collect())
+}
+
+fn holds_above(law: &ForceLaw) -> bool {
+    law.linear.stiffness > 0.0
+}
+
+/// The track with just these laws holding, from a node where they do.
+fn in_state(
+    model: &TrackModel,
+    hold: &Hold,
+    standing: &Standing<'_>,
+    nodes_m: &[f64],
+    at_nodes: &[Hold],
+) -> Option<TrackModel> {
+    let node = at_nodes.iter().position(|at_node| at_node == hold)?;
+    let mut tangents = standing.tangents(nodes_m[node])?;
+    for ((tangent, law), &holds) in tangents.iter_mut().zip(model.force_laws()).zip(hold) {
+        if holds == holds_above(law) {
+            *tangent = law.linear;
+        }
+    }
+    Some(model.clone().with_tangents(&tangents))
+}
+
+/// Where between two places something ends that is so at the first.
+fn change_m([mut from_m, mut to_m]: [f64; 2], is_so: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle_m = 0.5 * (from_m + to_m);
+        if is_so(middle_m) {
+            from_m = middle_m;
+        } else {
+            to_m = middle_m;
+        }
+    }
+    0.5 * (from_m + to_m)
+}
+
+/// Shares of each state in the half bays about each node, from stretches that follow one another.
+fn shares(nodes_m: &[f64], stretches: &[(usize, f64)], states: usize) -> Vec<Vec<f64>> {
+    let last = nodes_m.len() - 1;
+    let middle_m = |node: usize| 0.5 * (nodes_m[node] + nodes_m[node + 1]);
+    let of_node = |node: usize| {
+        let from_m = if node == 0 { nodes_m[0] } else { middle_m(node - 1) };
+        let to_m = if node == last { nodes_m[last] } else { middle_m(node) };
+        let mut shares = vec![0.0; states];
+        let mut begin_m = from_m;
+        for &(state, end_m) in stretches {
+            let end_m = end_m.clamp(begin_m, to_m);
+            shares[state] += (end_m - begin_m) / (to_m - from_m);
+            begin_m = end_m;
+        }
+        shares
+    };
+    (0..=last).map(of_node).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extension::ExtensionInstance;
+    use crate::model::{Mesh, Support};
+    use std::sync::Arc;
+    use tracktwin_parameters::{ParameterSet, TrackDesign};
+
+    const SPANS: usize = 20;
+    const ELEMENTS: usize = 8;
+
+    fn track(gap_m: Option<f64>) -> TrackModel {
+        let design = TrackDesign::v_track();
+        let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
+        let extension = gap_m.map(|gap_m| {
+            let hanging = ExtensionInstance::new("hanging_sleeper").on([9]).with("gap_m", gap_m);
+            hanging.build(&design, SPANS).unwrap()
+        });
+        let extensions: Vec<Arc<_>> = Vec::from_iter(extension);
+        let mesh = Mesh::uniform(SPANS, ELEMENTS, ELEMENTS);
+        TrackModel::build(&design, &mesh, &supports, &extensions).unwrap()
+    }
+
+    fn direct(model: &TrackModel) -> Vec<Complex64> {
+        RailReceptances::new(model, &[400.0], true).direct.remove(0)
+    }
+
+    #[test]
+    fn a_gap_is_closed_under_the_wheel_and_open_while_it_is_far_away() {
+        let [closing, plain, open] = [Some(1.6e-4), None, Some(4e-3)].map(track);
+        let [closing, plain, open] = [&closing, &plain, &open].map(direct);
+        let seat = 10 * ELEMENTS;
+        // In parts of what the gap changes: ends of the sleeper may stay open.
+        let distance = |node: usize, other: &[Complex64]| {
+            (closing[node] - other[node]).norm() / (plain[node] - open[node]).norm()
+        };
+        assert!((plain[seat] - open[seat]).norm() > 0.1 * plain[seat].norm());
+        assert!(distance(seat, &plain) < 0.05, "{}", distance(seat, &plain));
+        for node in [seat - 2 * ELEMENTS, seat + 2 * ELEMENTS] {
+            assert!(distance(node, &open) < 1e-6, "{}", distance(node, &open));
+        }
+    }
+
+    #[test]
+    fn the_place_where_a_gap_closes_moves_with_the_gap_from_node_to_node() {
+        let open_shares = |gap_m: f64| {
+            let states = States::new(&track(Some(gap_m))).unwrap();
+            let sums: Vec<f64> = states.shares.iter().map(|shares| shares.iter().sum()).collect();
+            assert!(sums.iter().all(|sum| (sum - 1.0).abs() < 1e-9));
+            // The first state is that of a wheel at the rail's end.
+            states.shares.iter().map(|shares| shares[0]).sum::<f64>()
+        };
+        let shares: Vec<f64> = (0..20).map(|k| open_shares(1.2e-4 + 2e-6 * f64::from(k))).collect();
+        let steps: Vec<f64> = shares.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(steps.iter().all(|step| *step > 0.0 && *step < 1.0), "{steps:?}");
+    }
+
+    #[test]
+    fn a_track_without_force_laws_has_no_states() {
+        assert!(States::new(&track(None)).is_none());
+        assert!(States::new(&track(Some(4e-3))).is_none());
+    }
+}
