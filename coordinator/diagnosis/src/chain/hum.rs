@@ -24,7 +24,7 @@ const WAVES_MIN: f64 = 10.0;
 /// Resolution cells on either side of a line up to which it must stand out as well: what a lightly
 /// damped resonance has around its peak is no background.
 const NEAR: f64 = 6.0;
-/// Resolution cells within which a line may be the sleepers'.
+/// Resolution cells within which a line may be the sleepers' or the blows'.
 const CELLS_APART: f64 = 1.5;
 
 /// A line of the mains.
@@ -41,7 +41,11 @@ pub struct Hum {
 }
 
 /// The lines of the mains that are less likely than `alpha` without them, most certain first.
-pub fn hum(recording: &Recording, alpha: f64) -> Vec<Hum> {
+///
+/// `turn_m` is the circumference in m of a wheel that strikes the rail once a turn, if it does: the
+/// blows have lines of their own.
+pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
+    let lengths_m: Vec<f64> = turn_m.into_iter().chain([recording.spacing_m]).collect();
     let heard = |group: Vec<usize>| {
         group.into_iter().map(|index| Heard::of(&recording.passes[index])).collect()
     };
@@ -50,7 +54,7 @@ pub fn hum(recording: &Recording, alpha: f64) -> Vec<Hum> {
     let mut tries = 0;
     for (mains, harmonics) in MAINS_HZ {
         for harmonic in 1..=harmonics {
-            let (line, bins) = line(&speeds, recording.spacing_m, mains * harmonic as f64);
+            let (line, bins) = line(&speeds, &lengths_m, mains * harmonic as f64);
             tries += bins;
             found.extend(line);
         }
@@ -64,7 +68,7 @@ pub fn hum(recording: &Recording, alpha: f64) -> Vec<Hum> {
 }
 
 /// The line nearest to a mains frequency, and how many bins were looked at.
-fn line(speeds: &[Vec<Heard>], spacing_m: f64, frequency: f64) -> (Option<Hum>, usize) {
+fn line(speeds: &[Vec<Heard>], lengths_m: &[f64], frequency: f64) -> (Option<Hum>, usize) {
     let mut tries = 0;
     let (mut each, mut ratios) = (Vec::new(), Vec::new());
     let (mut amplitudes, mut by_speed) = (Vec::new(), Vec::new());
@@ -75,8 +79,10 @@ fn line(speeds: &[Vec<Heard>], spacing_m: f64, frequency: f64) -> (Option<Hum>, 
         let mean = |of: fn(&Tone) -> f64| lines.iter().map(of).sum::<f64>() / lines.len() as f64;
         ratios.push(mean(|line| line.ratio));
         amplitudes.extend(lines.iter().map(|line| line.amplitude));
-        // Where it may be the sleepers' a line says nothing either way.
-        if !passes.iter().any(|pass| pass.may_be_sleepers(frequency, spacing_m)) {
+        // Where it may be the sleepers' or the blows' a line says nothing either way.
+        let may_be_of =
+            |&length_m: &f64| passes.iter().any(|pass| pass.may_be_of(frequency, length_m));
+        if !lengths_m.iter().any(may_be_of) {
             each.push(mean(|line| line.ln_p));
             by_speed.push(mean(|line| line.amplitude));
         }
@@ -145,9 +151,10 @@ impl Heard {
         }
     }
 
-    fn may_be_sleepers(&self, frequency: f64, spacing_m: f64) -> bool {
-        let order = frequency * spacing_m / self.speed_m_s;
-        let cell = spacing_m / self.speed_m_s / self.duration_s;
+    /// Whether it may be a line of what comes back after every such length.
+    fn may_be_of(&self, frequency: f64, length_m: f64) -> bool {
+        let order = frequency * length_m / self.speed_m_s;
+        let cell = length_m / self.speed_m_s / self.duration_s;
         order > 0.5 && (order - order.round()).abs() < CELLS_APART * cell
     }
 

@@ -36,7 +36,7 @@ fn the_mains_are_found_at_every_speed_but_not_at_one_only() {
                 }
             }
         });
-        hum(&recording, ALPHA)
+        hum(&recording, None, ALPHA)
     };
     let found = hums(4);
     assert_eq!(found[0].frequency_hz, 50.0);
@@ -62,7 +62,7 @@ fn a_speed_at_which_hum_is_drowned_does_not_speak_against_it() {
         let samples = noise.map(|(index, n)| amplitude * line(index) + 60.0 * n).collect();
         third.signal = tracktwin_signal::Signal::new(Rolled::RATE_HZ, samples).unwrap();
         recording.passes.push(third);
-        hum(&recording, ALPHA)
+        hum(&recording, None, ALPHA)
     };
     assert_eq!(hums(2.0)[0].frequency_hz, 50.0);
     // Four times as much there is not the mains'.
@@ -84,9 +84,24 @@ fn a_lightly_damped_resonance_at_a_frequency_of_the_mains_is_no_hum() {
                 *sample += 3.0 * omega * omega * place;
             }
         });
-        let found = hum(&recording, ALPHA);
+        let found = hum(&recording, None, ALPHA);
         assert!(found.is_empty(), "seed {seed}: {found:?}");
     }
+}
+
+#[test]
+fn blows_of_a_flat_with_a_line_at_a_frequency_of_the_mains_are_no_hum() {
+    // At 300 Hz the 32nd line of the turns at 13 km/h and the 52nd at 8 km/h.
+    let turn_m = 32.0 * 13.0 / 3.6 / 300.0;
+    let recording = measured(4, &|pass, samples, position_m| {
+        let speed_m_s = if pass < 2 { 13.0 / 3.6 } else { 8.0 / 3.6 };
+        for (sample, x_m) in samples.iter_mut().zip(position_m) {
+            let since_s = (*x_m + 0.1 * pass as f64).rem_euclid(turn_m) / speed_m_s;
+            *sample += 100.0 * (-since_s / 5e-3).exp() * (TAU * 300.0 * since_s).sin();
+        }
+    });
+    assert_eq!(hum(&recording, None, ALPHA)[0].frequency_hz, 300.0);
+    assert!(hum(&recording, Some(turn_m), ALPHA).is_empty());
 }
 
 #[test]
@@ -197,7 +212,7 @@ fn a_faultless_chain_shows_nothing() {
     for seed in 10..20 {
         let recording = measured(seed, &|_, _, _| ());
         assert!(clipping(&recording, ALPHA).is_empty(), "seed {seed}");
-        assert!(hum(&recording, ALPHA).is_empty(), "seed {seed}");
+        assert!(hum(&recording, None, ALPHA).is_empty(), "seed {seed}");
         assert!(gains(&recording).iter().all(|gain| !gain.is_error(ALPHA)), "seed {seed}");
         assert!(offsets(&recording).iter().all(|pair| pair.ln_p() == 0.0), "seed {seed}");
         assert_eq!(scale(&recording).unwrap().ln_p, 0.0, "seed {seed}");

@@ -2,12 +2,16 @@
 //!
 //! Owns the order of the tests, how the false-alarm rate is shared among them, and the sentences.
 
-use crate::chain::{Gain, Hum, Offsets, Scale, Trouble};
-use crate::finding::{Finding, Place};
-use crate::impact::{Corrugation, Form, Impact};
+mod findings;
+
+use self::findings::{
+    clipping_finding, comb_finding, corrugation_finding, flat_finding, gain_finding, hum_finding,
+    impact_finding, offset_finding, order_finding, scale_finding,
+};
+use crate::chain::{Gain, Offsets, Trouble};
+use crate::finding::Finding;
 use crate::wheel::{Comb, Flat, Order};
 use crate::{chain, impact, wheel};
-use std::collections::BTreeMap;
 use tracktwin_signal::recording::Recording;
 
 /// Probability of a false alarm on a recording without defects, all tests together.
@@ -15,9 +19,6 @@ pub const FALSE_ALARMS: f64 = 0.02;
 
 /// Share of it that each of the nine kinds of test has.
 const EACH_TEST: f64 = FALSE_ALARMS / 9.0;
-
-/// Lead of one form over the other, in nats, below which an impact may be either.
-const FORM_LEAD: f64 = 3.0;
 
 /// Sleeper spacings around a place where the wheel's flat meets the rail in every pass: what is
 /// heard there is the flat and its ringing.
@@ -75,14 +76,17 @@ impl FirstLook {
 pub fn first_look(recording: &Recording) -> FirstLook {
     let gains = chain::gains(recording);
     let offsets = chain::offsets(recording);
-    let mut findings: Vec<Finding> = clipped(recording).into_iter().collect();
-    findings.extend(hum_finding(&chain::hum(recording, EACH_TEST)));
+    let (flat, on_surface) = surface(recording);
+    let turn_m = flat.as_ref().map(|flat| flat.circumference_m.0);
+    let clipping = chain::clipping(recording, EACH_TEST);
+    let mut findings: Vec<Finding> =
+        clipping_finding(&clipping, recording.passes.len()).into_iter().collect();
+    findings.extend(hum_finding(&chain::hum(recording, turn_m, EACH_TEST)));
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let scale = chain::scale(recording).filter(|scale| scale.ln_p <= EACH_TEST.ln());
     findings.extend(scale.as_ref().map(scale_finding));
     let comb = unknown_wheel(recording);
     findings.extend(comb.as_ref().map(comb_finding));
-    let (flat, on_surface) = surface(recording);
     // Blows of a flat lie elsewhere in every pass: passes with them are not to be laid on each other.
     if flat.is_none() {
         let alarm = EACH_TEST.ln() - (offsets.len().max(1) as f64).ln();
@@ -150,216 +154,6 @@ fn common_places(blows_m: &[Vec<f64>], reach_m: f64) -> Vec<[f64; 2]> {
     let met =
         |x: f64| others.iter().all(|pass| pass.iter().any(|other| (other - x).abs() < reach_m));
     first.iter().filter(|x| met(**x)).map(|&x| [x - reach_m, x + reach_m]).collect()
-}
-
-fn clipped(recording: &Recording) -> Option<Finding> {
-    let passes = chain::clipping(recording, EACH_TEST);
-    let worst = passes.iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
-    let limit = passes.iter().map(|pass| pass.level_m_s2.abs()).fold(f64::MAX, f64::min);
-    Some(Finding {
-        physics: "clipping",
-        p_value: worst.ln_p.exp(),
-        place: Place::Everywhere,
-        parameters: BTreeMap::from([("limit_m_s2", (limit, 0.01 * limit))]),
-        evidence: format!(
-            "{} of {} passes are cut off: in pass {}, {} crests end within 1 % of {:.3} m/s2 ({:.2} % of the samples)",
-            passes.len(),
-            recording.passes.len(),
-            worst.pass + 1,
-            worst.crests,
-            worst.level_m_s2,
-            1e2 * worst.share
-        ),
-    })
-}
-
-fn hum_finding(lines: &[Hum]) -> Option<Finding> {
-    let first = lines.first()?;
-    let names: Vec<String> = lines
-        .iter()
-        .map(|l| format!("{:.1} Hz ({:.3} m/s2)", l.frequency_hz, l.amplitude_m_s2.0))
-        .collect();
-    Some(Finding {
-        physics: "electrical_hum",
-        p_value: first.ln_p.exp(),
-        place: Place::Everywhere,
-        parameters: BTreeMap::from([
-            ("frequency_Hz", (first.frequency_hz, 0.1)),
-            ("amplitude_m_s2", first.amplitude_m_s2),
-        ]),
-        evidence: format!(
-            "lines at frequencies of the mains at every speed, {:.0} times above their neighbours: {}",
-            first.ratio,
-            names.join(", ")
-        ),
-    })
-}
-
-fn gain_finding(gain: &Gain) -> Finding {
-    let (level, deviation) = gain.gain_db;
-    let factor = 10f64.powf(level / 20.0);
-    let which = if gain.passes > 2 { "" } else { " (or the other one is off; a third would tell)" };
-    Finding {
-        physics: "gain_error",
-        p_value: gain.ln_p.exp(),
-        place: Place::Everywhere,
-        // A decibel is a factor of e^0.115 in amplitude.
-        parameters: BTreeMap::from([("factor", (factor, 0.115 * deviation * factor))]),
-        evidence: format!(
-            "pass {} is {level:+.2} dB (sd {deviation:.2}) from the others at its speed{which}, alike within {:.2} dB in three bands",
-            gain.pass + 1,
-            gain.spread_db
-        ),
-    }
-}
-
-fn offset_finding(pair: &Offsets) -> Finding {
-    let (offset, scale) = pair.line();
-    let (offset_mm, greatest_mm) = (1e3 * offset, 1e3 * pair.greatest_m());
-    Finding {
-        physics: "position_error",
-        p_value: pair.ln_p().exp(),
-        place: Place::Everywhere,
-        parameters: BTreeMap::from([("offset_m", (offset, 1e-3)), ("scale", (scale, 1e-3))]),
-        evidence: format!(
-            "the odometers of passes {} and {} differ by up to {greatest_mm:.1} mm over the same surface ({offset_mm:+.1} mm in the middle, {:+.2} %); 6 mm are usual",
-            pair.passes[0] + 1,
-            pair.passes[1] + 1,
-            1e2 * scale
-        ),
-    }
-}
-
-fn scale_finding(scale: &Scale) -> Finding {
-    let (factor, deviation) = scale.scale;
-    Finding {
-        physics: "position_error",
-        p_value: scale.ln_p.exp(),
-        place: Place::Everywhere,
-        parameters: BTreeMap::from([("scale", scale.scale)]),
-        evidence: format!(
-            "at {} speeds alike, positions advance {:+.2} % (sd {:.2}) from the stated speeds; 0.3 % are usual",
-            scale.speeds,
-            1e2 * factor,
-            1e2 * deviation
-        ),
-    }
-}
-
-fn flat_finding(flat: &Flat) -> Finding {
-    let (turn, deviation) = flat.circumference_m;
-    let mut parameters = BTreeMap::new();
-    if let Some(shape) = &flat.shape {
-        parameters.insert("length_m", shape.length_m);
-        parameters.insert("depth_m", shape.depth_m);
-    }
-    Finding {
-        physics: "wheel_flat",
-        p_value: flat.ln_p.exp(),
-        place: Place::Everywhere,
-        parameters,
-        evidence: format!(
-            "one blow a turn in every pass, {turn:.4} m (sd {deviation:.4}) apart and {:.0} times louder than what is around them",
-            flat.power_ratio
-        ),
-    }
-}
-
-fn order_finding(orders: &[Order]) -> Option<Finding> {
-    let first = orders.iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
-    let names: Vec<String> = orders.iter().map(|order| order.number.to_string()).collect();
-    Some(Finding {
-        physics: "wheel_out_of_round",
-        p_value: first.ln_p.exp(),
-        place: Place::Everywhere,
-        parameters: BTreeMap::from([
-            ("order", (first.number as f64, 0.0)),
-            ("amplitude_m", first.amplitude_m),
-        ]),
-        evidence: format!(
-            "lines at whole waves to a turn of the wheel at every speed: order {}; order {} is {:.0} times above what lies between orders",
-            names.join(", "),
-            first.number,
-            first.ratio
-        ),
-    })
-}
-
-fn comb_finding(comb: &Comb) -> Finding {
-    let (turn, deviation) = comb.circumference_m;
-    let held_out = &comb.held_out;
-    Finding {
-        physics: "wheel_out_of_round",
-        p_value: comb.ln_p.exp(),
-        place: Place::Everywhere,
-        parameters: BTreeMap::from([("circumference_m", comb.circumference_m)]),
-        evidence: format!(
-            "a comb of wheel orders at multiples of {:.3} Hz, a circumference of {turn:.3} m (sd {deviation:.3}); of {} blocks that nothing was fitted on it explains {:.0} % of the variance in {:.0} to {:.0} Hz ({:.0} % by chance) and predicts {} better than a smooth spectrum does, by {:.1} nats a block",
-            comb.fundamental_hz,
-            held_out.blocks,
-            1e2 * held_out.explained,
-            comb.band_hz[0],
-            comb.band_hz[1],
-            1e2 * held_out.by_chance,
-            held_out.better,
-            held_out.gain_nats
-        ),
-    }
-}
-
-fn impact_finding(impact: &Impact, passes: usize) -> Finding {
-    let (x, deviation) = impact.x_m;
-    let physics = match &impact.shape {
-        Some(shape) if shape.form == Form::Hollow => "squat",
-        _ => "rail_joint",
-    };
-    let mut parameters = BTreeMap::new();
-    let mut form = String::new();
-    if let Some(shape) = &impact.shape {
-        let depth = if shape.form == Form::Hollow { "depth_m" } else { "dip_m" };
-        parameters.insert("length_m", shape.length_m);
-        parameters.insert(depth, shape.depth_m);
-        let (mine, other) = match shape.form {
-            Form::Hollow => ("a hollow", "a kink"),
-            Form::Dip => ("a kink", "a hollow"),
-        };
-        let sure = if shape.lead < FORM_LEAD { "hardly " } else { "" };
-        form = format!(
-            "; its spectrum is {sure}more like {mine} than {other} (by {:.1} nats)",
-            shape.lead
-        );
-    }
-    let who = if passes > 1 { "every pass at every speed" } else { "the only pass" };
-    // Three standard deviations, and 10 mm for the length of the defect itself.
-    let reach = 3.0 * deviation.max(3e-3);
-    Finding {
-        physics,
-        p_value: impact.ln_p.exp(),
-        place: Place::Stretch { from_m: x - reach, to_m: x + reach },
-        parameters,
-        evidence: format!(
-            "at {x:.4} m (sd {deviation:.4}) {who} is {:.0} times louder than around it{form}",
-            impact.power_ratio
-        ),
-    }
-}
-
-fn corrugation_finding(waves: &Corrugation) -> Finding {
-    let [from_m, to_m] = waves.stretch_m;
-    Finding {
-        physics: "corrugation",
-        p_value: waves.ln_p.exp(),
-        place: Place::Stretch { from_m, to_m },
-        parameters: BTreeMap::from([
-            ("wavelength_m", waves.wavelength_m),
-            ("amplitude_m", waves.amplitude_m),
-        ]),
-        evidence: format!(
-            "waves of {:.2} mm from {from_m:.2} to {to_m:.2} m, {:.0} times above the surface's own at every speed",
-            1e3 * waves.wavelength_m.0,
-            waves.ratio
-        ),
-    }
 }
 
 #[cfg(test)]
