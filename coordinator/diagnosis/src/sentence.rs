@@ -20,8 +20,8 @@ pub(crate) fn sentence(
     fit: &Fit,
     bias: &BTreeMap<String, BeforeAfter<f64>>,
 ) -> String {
-    let accepted = hypotheses.iter().find(|hypothesis| hypothesis.accepted);
-    let Some(first) = accepted.filter(|_| verdict != Verdict::Consistent) else {
+    let mut accepted = hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
+    let Some(first) = accepted.next().filter(|_| verdict != Verdict::Consistent) else {
         let tested = match fit.before.held_out {
             Some(_) => "improves the prediction of speeds that were held out",
             None => "explains it better; a second speed would make that sure",
@@ -32,28 +32,41 @@ pub(crate) fn sentence(
             100.0 * nothing_left_out
         );
     };
-    let summary = Kind::from_name(&first.physics)
+    let others = accepted.map(|other| format!(" Also: {}", named(other, sleepers)));
+    let found = capital(&named(first, sleepers)) + &others.collect::<String>();
+    [found, gained(fit), biased(bias)].concat()
+}
+
+/// Place, summary, name and probability.
+fn named(hypothesis: &Hypothesis, sleepers: usize) -> String {
+    let Hypothesis { physics, probability, .. } = hypothesis;
+    let summary = Kind::from_name(physics)
         .map_or("something that no kind in the catalogue explains", |kind| kind.summary);
-    let (place, probability) = (place(first, sleepers), 100.0 * first.probability);
-    let name = format!("{place}{summary} ({}, {probability:.0} %).", first.physics);
-    [name, gained(fit), biased(bias)].concat()
+    let place = place(hypothesis, sleepers);
+    format!("{place}{summary} ({physics}, {:.0} %).", 100.0 * probability)
+}
+
+/// With a capital first letter.
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect()
 }
 
 fn place(hypothesis: &Hypothesis, sleepers: usize) -> String {
     match &hypothesis.location {
         Some(location) if location.sleepers.len() <= NAMED_MAX => {
             let middle_m = 0.5 * (location.x_m[0] + location.x_m[1]);
-            format!("At {}, {middle_m:.2} m: ", location.sleepers.join(" and "))
+            format!("at {}, {middle_m:.2} m: ", location.sleepers.join(" and "))
         }
         Some(location) if hypothesis.physics == "corrugation" => {
-            format!("From {:.2} to {:.2} m: ", location.x_m[0], location.x_m[1])
+            format!("from {:.2} to {:.2} m: ", location.x_m[0], location.x_m[1])
         }
         Some(location) if location.sleepers.len() < sleepers => {
-            format!("At {}: ", location.sleepers.join(", "))
+            format!("at {}: ", location.sleepers.join(", "))
         }
         _ => match hypothesis.port.as_deref() {
-            Some("wheel") => "At the wheel: ".to_owned(),
-            Some("wheel_surface") => "On the wheel's tread: ".to_owned(),
+            Some("wheel") => "at the wheel: ".to_owned(),
+            Some("wheel_surface") => "on the wheel's tread: ".to_owned(),
             _ => String::new(),
         },
     }
@@ -87,5 +100,46 @@ fn words(parameter: &str) -> &str {
         "railpad_stiffness_N_m" => "railpad stiffness",
         "irregularity_level" => "the irregularity level",
         other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::{Location, Score, Scores};
+
+    fn hypothesis(physics: &str, location: Option<Location>) -> Hypothesis {
+        Hypothesis {
+            physics: physics.to_owned(),
+            probability: 0.987,
+            accepted: true,
+            location,
+            port: None,
+            parameters: BTreeMap::new(),
+            look_alikes: Vec::new(),
+            would_separate: String::new(),
+            detectability: 9.0,
+            log_evidence: 40.0,
+        }
+    }
+
+    #[test]
+    fn all_that_was_accepted_is_said_with_its_place() {
+        let at = Location { x_m: [1.125, 1.125], sleepers: vec!["SN9".to_owned()] };
+        let two = [hypothesis("wheel_flat", None), hypothesis("missing_railpad", Some(at))];
+        let scores = Scores { in_sample: Score { score: -1.0 }, held_out: None };
+        let fit = Fit {
+            score: String::new(),
+            before: scores,
+            after: scores,
+            held_out_gain_nats: BTreeMap::from([("10".to_owned(), 12.0)]),
+        };
+        let said = sentence(Verdict::LeftOutPhysics, &two, 0.0, 25, &fit, &BTreeMap::new());
+        assert_eq!(
+            said,
+            "A flat of the wheel's tread, met once a turn (wheel_flat, 99 %). Also: at SN9, 1.12 m: a \
+             railpad is missing or has lost most of its stiffness (missing_railpad, 99 %). With it, \
+             speeds that nothing was fitted to are predicted better by 12 nats."
+        );
     }
 }

@@ -3,7 +3,7 @@
 use super::levels::{Side, all_cells, difference, rms, share_within_two_sd, usual_scatter};
 use super::place::Site;
 use super::quantity::{digits, per_cent, signed};
-use super::words::{accepted, addition, chance, is_chain, physics, speeds};
+use super::words::{accepted, addition, chance, is_chain, physics, place, speeds};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Mismatch, Verdict};
 
@@ -45,11 +45,16 @@ pub(super) const fn verdict(verdict: Verdict) -> (&'static str, &'static str, &'
 
 /// Key figures, each with what it is.
 fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
+    let among_others = accepted(diagnosis).count() > 1;
     let mut facts: Vec<(String, String)> = accepted(diagnosis)
         .map(|hypothesis| {
             let of = if is_chain(&hypothesis.physics) { "fault" } else { "physics" };
             let name = physics(&hypothesis.physics);
-            (per_cent(hypothesis.probability), format!("probability of this {of}: {name}"))
+            let at = match hypothesis.location.as_ref().filter(|_| among_others) {
+                Some(location) => format!(", {}", place(diagnosis, location)),
+                None => String::new(),
+            };
+            (per_cent(hypothesis.probability), format!("probability of this {of}: {name}{at}"))
         })
         .collect();
     facts.extend(nothing(diagnosis));

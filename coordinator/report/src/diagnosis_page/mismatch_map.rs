@@ -228,7 +228,7 @@ fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
     });
     let sides = with.map_or_else(
         || " The prediction is that of the track model with its own stiffness at every sleeper.".to_owned(),
-        |with| format!(" Left: the track model re-tuned, with its own stiffness at every sleeper. Right: the same with {with}."),
+        |with| format!(" Before is the track model re-tuned, with its own stiffness at every sleeper, after the same with {with}."),
     );
     let boxes = if diagnosis.mismatches.is_empty() {
         ""

@@ -39,10 +39,15 @@ pub(super) fn is_fitted(hypothesis: &Hypothesis) -> bool {
     hypothesis.physics != UNKNOWN && hypothesis.detectability > 0.0
 }
 
-/// What the second prediction has and the first has not.
+/// What the second prediction has and the first has not, each kind once.
 pub(super) fn addition(diagnosis: &Diagnosis) -> Option<String> {
     let fitted = accepted(diagnosis).filter(|hypothesis| is_fitted(hypothesis));
-    let names: Vec<String> = fitted.map(|hypothesis| physics(&hypothesis.physics)).collect();
+    let mut names: Vec<String> = Vec::new();
+    for name in fitted.map(|hypothesis| physics(&hypothesis.physics)) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
     (!names.is_empty()).then(|| list(&names))
 }
 
