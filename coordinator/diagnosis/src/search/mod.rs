@@ -18,7 +18,8 @@ use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
-use crate::port_scan::{Port, PortPlace};
+use crate::port_scan::{Port, PortPlace, PortScan};
+use crate::section::Section;
 use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
 
@@ -185,16 +186,7 @@ impl Search {
             }
             (round, ports) = setting.round(&problem, &self.last, all, least, progress)?;
         }
-        // Beside what is accepted, something unknown elsewhere is another effect, not another name.
-        let rival = match round.fitted.first().filter(|_| !accepted.is_empty()) {
-            Some(best) => {
-                let extent = Extent::of(&best.candidate, &forward.section).felt();
-                let together =
-                    |place: &PortPlace| extent.meets(Extent::of_port(place, &forward.section));
-                ports.best_where(&self.last.residual, &self.last.gradient, together)
-            }
-            None => round.port.clone(),
-        };
+        let rival = self.rival(&round, &ports, &forward.section);
         if let Some(best) = sure(&round, rival.as_ref(), setting.subject, least) {
             progress(Stage::HeldOut, 0.0);
             let with = [&accepted[..], std::slice::from_ref(&best.candidate)].concat();
@@ -213,5 +205,16 @@ impl Search {
         let goes_on = round.accepted;
         self.rounds.push(round);
         Ok(goes_on)
+    }
+
+    /// The unknown that the best candidate of a search is compared with. Beside what is accepted it is
+    /// the best where the candidate is felt: elsewhere it is another effect, not another name.
+    fn rival(&self, round: &Round, ports: &PortScan, section: &Section) -> Option<Port> {
+        let Some(best) = round.fitted.first().filter(|_| !self.accepted.is_empty()) else {
+            return round.port.clone();
+        };
+        let felt = Extent::of(&best.candidate, section).felt();
+        let is_felt = |place: &PortPlace| felt.meets(Extent::of_port(place, section));
+        ports.best_where(&self.last.residual, &self.last.gradient, is_felt)
     }
 }

@@ -42,25 +42,7 @@ impl States {
         if at_nodes.iter().all(|hold| *hold == above) {
             return None;
         }
-        let mut holds: Vec<&Hold> = Vec::new();
-        // Each state with the place where it ends.
-        let mut stretches: Vec<(usize, f64)> = Vec::new();
-        for (node, hold) in at_nodes.iter().enumerate() {
-            let state = holds.iter().position(|known| *known == hold).unwrap_or_else(|| {
-                holds.push(hold);
-                holds.len() - 1
-            });
-            let x_m = nodes_m[node];
-            match stretches.last_mut() {
-                Some((last, to_m)) if *last == state => *to_m = x_m,
-                Some((last, to_m)) => {
-                    *to_m =
-                        change_m([*to_m, x_m], |x_m| hold_at(x_m).as_ref() == Some(holds[*last]));
-                    stretches.push((state, x_m));
-                }
-                None => stretches.push((state, x_m)),
-            }
-        }
+        let (holds, stretches) = stretches(nodes_m, &at_nodes, &hold_at);
         let tracks = holds.iter().map(|hold| in_state(model, hold, &standing, nodes_m, &at_nodes));
         let tracks = tracks.collect::<Option<Vec<_>>>()?;
         let shares = shares(nodes_m, &stretches, tracks.len());
@@ -106,6 +88,33 @@ fn at_nodes(model: &TrackModel, hold_at: &impl Fn(f64) -> Option<Hold>) -> Optio
         nodes_m[first..=last].iter().map(|&x_m| hold_at(x_m)).collect::<Option<_>>()?;
     let node = |node: usize| within[node.clamp(first, last) - first].clone();
     Some((0..nodes_m.len()).map(node).collect())
+}
+
+/// The states that occur, and the stretches of the rail that have them: the number of the state and
+/// the place in m where it ends.
+fn stretches<'h>(
+    nodes_m: &[f64],
+    at_nodes: &'h [Hold],
+    hold_at: &impl Fn(f64) -> Option<Hold>,
+) -> (Vec<&'h Hold>, Vec<(usize, f64)>) {
+    let mut holds: Vec<&Hold> = Vec::new();
+    let mut stretches: Vec<(usize, f64)> = Vec::new();
+    for (&x_m, hold) in nodes_m.iter().zip(at_nodes) {
+        let state = holds.iter().position(|known| *known == hold).unwrap_or_else(|| {
+            holds.push(hold);
+            holds.len() - 1
+        });
+        match stretches.last_mut() {
+            Some((last, to_m)) if *last == state => *to_m = x_m,
+            Some((last, to_m)) => {
+                let is_so = |x_m| hold_at(x_m).as_ref() == Some(holds[*last]);
+                *to_m = change_m([*to_m, x_m], is_so);
+                stretches.push((state, x_m));
+            }
+            None => stretches.push((state, x_m)),
+        }
+    }
+    (holds, stretches)
 }
 
 fn holds_above(law: &ForceLaw) -> bool {
