@@ -71,13 +71,11 @@ impl Extent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::candidate::candidates;
-    use tracktwin_parameters::TrackDesign;
+    use crate::search::testing::section_with_candidates;
 
     #[test]
     fn a_port_is_about_where_a_sleeper_beside_it_is() {
-        let section = Section::new(TrackDesign::v_track(), 24, 1.0);
-        let all = candidates(&section);
+        let (section, all) = section_with_candidates();
         let on = |sleeper: usize| {
             let is_it = |candidate: &&crate::Candidate| {
                 candidate.extension.sleepers.as_deref() == Some(&[sleeper][..])

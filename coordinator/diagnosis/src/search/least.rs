@@ -76,13 +76,11 @@ pub(super) fn is_local_shape(candidate: &Candidate) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::candidate::candidates;
-    use tracktwin_parameters::TrackDesign;
+    use crate::search::testing::section_with_candidates;
 
     #[test]
     fn beside_an_effect_a_candidate_needs_a_quarter_of_what_falls_to_its_place() {
-        let section = Section::new(TrackDesign::v_track(), 24, 1.0);
-        let all = candidates(&section);
+        let (section, all) = section_with_candidates();
         let of = |physics: &str, sleepers: Option<&[usize]>| {
             let found = all.iter().find(|candidate| {
                 candidate.kind.physics == physics

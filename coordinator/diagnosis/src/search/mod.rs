@@ -7,6 +7,8 @@ mod least;
 mod probability;
 mod remainder;
 mod round;
+#[cfg(test)]
+mod testing;
 
 pub(crate) use probability::Probabilities;
 

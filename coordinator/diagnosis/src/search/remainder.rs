@@ -65,13 +65,11 @@ fn least_left(explained: &[(&Candidate, f64)]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::candidate::candidates;
-    use tracktwin_parameters::TrackDesign;
+    use crate::search::testing::section_with_candidates;
 
     #[test]
     fn what_is_left_speaks_against_a_name_but_not_against_a_shape_or_two_of_a_kind() {
-        let section = Section::new(TrackDesign::v_track(), 24, 1.0);
-        let all = candidates(&section);
+        let (_, all) = section_with_candidates();
         let of = |physics: &str| {
             let is_it = |candidate: &&Candidate| candidate.kind.physics == physics;
             all.iter().find(is_it).unwrap()
