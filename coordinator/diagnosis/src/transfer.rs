@@ -54,11 +54,11 @@ impl Transfer {
         Self { by_seats: from_seats, ..self }
     }
 
-    /// The same for another model at the same lines. Where it differs in no matrix and no force law, as
-    /// by the shape of the rail or by the sensor, the rail's receptances stay.
+    /// The same for the model with further extensions at the same lines. Where they change no matrix
+    /// and add no force law, as the shape of the rail or the sensor, the rail's receptances stay.
     pub(crate) fn with_model(&self, model: TrackModel, lines_hz: &[f64]) -> Self {
-        let are_linear = [&model, &self.model].iter().all(|model| model.force_laws().is_empty());
-        if are_linear && model.matrices() == self.model.matrices() {
+        let adds_law = model.force_laws().len() != self.model.force_laws().len();
+        if !adds_law && model.matrices() == self.model.matrices() {
             Self::on_rail(model, lines_hz, Arc::clone(&self.direct))
         } else {
             Self::new(model, lines_hz, false)

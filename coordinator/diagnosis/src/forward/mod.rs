@@ -145,8 +145,8 @@ impl Forward {
         all + &self.ends * values.rows(ends.start, ends.len())
     }
 
-    /// The transfer of a baseline with extensions, which may differ from a known one of the same
-    /// baseline in little.
+    /// The transfer of a baseline with extensions: those of a known one of the same baseline and
+    /// further ones, which may change little.
     ///
     /// # Errors
     /// As [`Forward::log_power`].
