@@ -6,7 +6,7 @@ use crate::observation::Observation;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use std::sync::Arc;
-use tracktwin_track::extension::{Class, Extension, InstanceError};
+use tracktwin_track::extension::{Extension, InstanceError};
 use tracktwin_track::model::ModelError;
 
 /// Gauss-Newton steps; five suffice where the track is not far from the catalogue's.
@@ -261,16 +261,26 @@ impl Problem<'_> {
         values: &DVector<f64>,
     ) -> Result<(DVector<f64>, DMatrix<f64>), CalibrationError> {
         let extensions = self.extensions(values)?;
-        let Linearised { log_power, jacobian } = self.forward.linearised(values, &extensions)?;
+        let Linearised { log_power, jacobian, transfer } =
+            self.forward.linearised(values, &extensions)?;
         let mut jacobian = jacobian.resize_horizontally(values.len(), 0.0);
+        let baseline = self.forward.unknowns.count();
         let mut varied = self.under_load();
-        varied.extend(self.forward.unknowns.count()..values.len());
+        varied.extend(baseline..values.len());
+        let has_laws = self.candidates.iter().any(Candidate::is_under_load);
         let columns: Vec<_> = varied
             .into_par_iter()
             .map(|index| {
                 let mut varied = values.clone();
                 varied[index] += VARIATION;
-                Ok((index, (self.predict(&varied)? - &log_power) / VARIATION))
+                let changed = if index < baseline || has_laws {
+                    self.predict(&varied)?
+                } else {
+                    let extensions = self.extensions(&varied)?;
+                    let beside = self.forward.transfer_beside(&transfer, &varied, &extensions)?;
+                    self.forward.levels(&beside, &varied)
+                };
+                Ok((index, (changed - &log_power) / VARIATION))
             })
             .collect::<Result<_, CalibrationError>>()?;
         for (index, column) in columns {
@@ -285,9 +295,8 @@ impl Problem<'_> {
     fn under_load(&self) -> Vec<usize> {
         let unknowns = &self.forward.unknowns;
         // A gap that no load closes has nothing free.
-        let by_load = |candidate: &&Candidate| {
-            candidate.kind.classes.contains(&Class::Load) && !candidate.free.is_empty()
-        };
+        let by_load =
+            |candidate: &&Candidate| candidate.is_under_load() && !candidate.free.is_empty();
         let candidates = self.candidates.iter().filter(by_load);
         let sleepers = candidates.filter_map(|candidate| candidate.extension.sleepers.as_ref());
         let mut near: Vec<usize> = sleepers

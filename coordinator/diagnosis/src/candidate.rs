@@ -1,7 +1,7 @@
 //! What may be left out, where and how strong: the list that a recording is screened with.
 
 use crate::section::Section;
-use tracktwin_track::extension::{ExtensionInstance, KINDS, Kind, KindParameter};
+use tracktwin_track::extension::{Class, ExtensionInstance, KINDS, Kind, KindParameter};
 
 /// Of a parameter that may be zero, the least part of its greatest value that counts.
 const LEAST: f64 = 1e-2;
@@ -23,6 +23,11 @@ impl Candidate {
     /// Whether it is nowhere in particular: all along the track, at the wheel or in the sensor.
     pub fn is_everywhere(&self) -> bool {
         self.extension.sleepers.is_none() && self.extension.x_m.is_none()
+    }
+
+    /// Whether it acts by laws that the wheel's load decides about.
+    pub(crate) fn is_under_load(&self) -> bool {
+        self.kind.classes.contains(&Class::Load)
     }
 
     /// The extension with values for the free parameters.

@@ -59,6 +59,12 @@ fn searched_for(
     extension: Option<ExtensionInstance>,
     is_known: impl Fn(&str) -> bool,
 ) -> Search {
+    let (subject, null) = recorded(seed, extension);
+    search_for(&subject, &null, is_known)
+}
+
+/// What was recorded of this track, with its null model.
+fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (Subject, NullModel) {
     let forward = forward();
     let mut random = Normal(ChaCha8Rng::seed_from_u64(seed));
     let numbers: Vec<f64> =
@@ -76,9 +82,25 @@ fn searched_for(
     let heard_m = Vec::new();
     let subject =
         Subject { forward, log_power, pass_variance, first_sleeper: 0, pass_numbers, heard_m };
+    (subject, null)
+}
+
+fn search_for(subject: &Subject, null: &NullModel, is_known: impl Fn(&str) -> bool) -> Search {
     let mut all = candidates(&subject.forward.section);
     all.retain(|candidate| is_known(candidate.kind.physics));
-    search(&subject, &null, values, &all, &|_, _| ()).unwrap()
+    search(subject, null, subject.forward.unknowns.typical(), &all, &|_, _| ()).unwrap()
+}
+
+fn layer() -> ExtensionInstance {
+    ExtensionInstance::new("subgrade_layer")
+        .on([3])
+        .with("mass_kg", 2.0)
+        .with("stiffness_N_per_m", 1e7)
+        .with("damping_N_s_per_m", 5e2)
+}
+
+fn is_everywhere(physics: &str) -> bool {
+    ["rail_cross_section", "frequency_dependent_railpad"].contains(&physics)
 }
 
 #[test]
@@ -104,16 +126,25 @@ fn where_nothing_is_left_out_nothing_is_named() {
 
 #[test]
 fn a_layer_that_the_catalogue_lacks_is_something_unknown_under_its_sleeper() {
-    let layer = ExtensionInstance::new("subgrade_layer")
-        .on([3])
-        .with("mass_kg", 2.0)
-        .with("stiffness_N_per_m", 1e7)
-        .with("damping_N_s_per_m", 5e2);
-    let everywhere = ["rail_cross_section", "frequency_dependent_railpad"];
-    let found = searched_for(1, Some(layer), |physics| everywhere.contains(&physics));
+    let found = searched_for(1, Some(layer()), is_everywhere);
     assert!(found.accepted.is_empty(), "{:?}", found.accepted);
     let port = found.rounds[0].port.as_ref().unwrap();
     assert_eq!(port.place, PortPlace::Seats(vec![3]), "{}", port.log_evidence);
+    assert_eq!(found.rounds[0].port_speeds, 2);
+}
+
+#[test]
+fn what_only_one_speed_hears_at_a_place_is_heard_by_no_more() {
+    let ((mut subject, null), (plain, _)) = (recorded(1, Some(layer())), recorded(1, None));
+    let bands = subject.forward.bands.count();
+    for row in (0..subject.forward.count()).filter(|row| row / bands % 2 == 1) {
+        subject.log_power[row] = plain.log_power[row];
+    }
+    let found = search_for(&subject, &null, is_everywhere);
+    assert!(found.accepted.is_empty(), "{:?}", found.accepted);
+    let first = &found.rounds[0];
+    assert!(first.p_value < 1e-3, "{}", first.p_value);
+    assert!(first.port_speeds < 2, "{:?}", first.port.as_ref().map(|port| &port.place));
 }
 
 #[test]

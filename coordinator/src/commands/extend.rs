@@ -105,14 +105,19 @@ fn table(
     let place = place(diagnosis, hypothesis, kind, middle, spacing_m);
     table += &place;
     for (name, estimate) in &hypothesis.parameters {
-        if let Some(parameter) = kind.parameters.iter().find(|known| known.name == name) {
+        let Some(parameter) = kind.parameters.iter().find(|known| known.name == name) else {
+            continue;
+        };
+        // Writing to a string cannot fail.
+        let _ = if estimate.sd > 0.0 {
             let [low, high] = range(parameter, estimate);
-            // Writing to a string cannot fail.
-            let _ = writeln!(
+            writeln!(
                 table,
                 "{name} = {{ low = {low:e}, high = {high:e}, scale = \"logarithmic\" }}"
-            );
-        }
+            )
+        } else {
+            writeln!(table, "{name} = {:?}", estimate.mean)
+        };
     }
     for parameter in kind.parameters {
         let given = hypothesis.parameters.contains_key(parameter.name);

@@ -29,6 +29,8 @@ pub(crate) struct Line {
     pub ratio: f64,
     /// How many independent values the neighbours are worth.
     pub neighbours: f64,
+    /// Mean power of the neighbours.
+    pub beside: f64,
 }
 
 impl Line {
@@ -41,8 +43,13 @@ impl Line {
     /// their surface. None of none.
     pub(crate) fn mean(lines: &[Self]) -> Option<Self> {
         let least = lines.iter().map(|line| line.neighbours).min_by(f64::total_cmp)?;
-        let sum: f64 = lines.iter().map(|line| line.ratio).sum();
-        Some(Self { ratio: sum / lines.len() as f64, neighbours: least })
+        let mean =
+            |value: fn(&Self) -> f64| lines.iter().map(value).sum::<f64>() / lines.len() as f64;
+        Some(Self {
+            ratio: mean(|line| line.ratio),
+            neighbours: least,
+            beside: mean(|line| line.beside),
+        })
     }
 }
 
@@ -158,7 +165,8 @@ impl Spectrum {
         let mean = sides.iter().map(|(_, middle)| *middle).fold(0.0, f64::max) / 2f64.ln();
         let bins: usize = sides.iter().map(|(bins, _)| bins).sum();
         let neighbours = bins as f64 / BINS_PER_NEIGHBOUR;
-        (mean > 0.0).then(|| Line { ratio: self.power[bin] / mean, neighbours })
+        let ratio = self.power[bin] / mean;
+        (mean > 0.0).then_some(Line { ratio, neighbours, beside: mean })
     }
 }
 

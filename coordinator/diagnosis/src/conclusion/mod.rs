@@ -25,6 +25,10 @@ use tracktwin_track::extension::{Class, Kind};
 /// is said to be there.
 const PORT_ALARM: f64 = 0.01;
 
+/// Speeds that must hear something unknown, each alone: what only one of them hears at a place is not
+/// the track's.
+const SPEEDS_MIN: usize = 2;
+
 /// Probability of nothing at all below which something is left out even if no name predicts a
 /// withheld speed better.
 const NOTHING_LEFT: f64 = 0.02;
@@ -45,6 +49,9 @@ const FAILED_SHARE: f64 = 0.1;
 
 /// Names that are given beside something unknown.
 const NEAREST_MAX: usize = 3;
+
+/// The parameter that counts waves around the wheel.
+const ORDER: &str = "order";
 
 /// Hypotheses of less probability are not worth a line.
 const PROBABILITY_MIN: f64 = 0.001;
@@ -179,10 +186,11 @@ impl Evidence<'_> {
         let alone = first && !round.accepted;
         let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
         let others = named.iter().copied().fold(nothing, f64::max);
-        let is_port = alone && round.port_p_value <= PORT_ALARM && unknown > others;
+        let is_there = alone && round.port_speeds >= self.speeds().min(SPEEDS_MIN);
+        let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
         // Something is there, but the names that come near failed on withheld speeds.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
-        let unnamed = alone && !is_port && nothing < NOTHING_LEFT;
+        let unnamed = is_there && !is_port && nothing < NOTHING_LEFT;
         let (kept, unknown) =
             if unnamed { (FAILED_SHARE, unknown + failed) } else { (is_new, unknown) };
         let mut hypotheses: Vec<Hypothesis> = round
@@ -257,13 +265,16 @@ impl Evidence<'_> {
             let deviation = covariance[(first + index, first + index)].sqrt();
             (parameter.name.to_owned(), Estimate { mean, sd: mean * deviation })
         });
+        // Of whole numbers each is a candidate of its own.
+        let order = candidate.extension.parameters.get(ORDER);
+        let order = order.map(|&mean| (ORDER.to_owned(), Estimate { mean, sd: 0.0 }));
         Hypothesis {
             physics: candidate.kind.physics.to_owned(),
             probability,
             accepted,
             location: self.location_of(candidate),
             port: None,
-            parameters: parameters.collect(),
+            parameters: parameters.chain(order).collect(),
             look_alikes: names(candidate.kind),
             would_separate: candidate.kind.would_separate.to_owned(),
             detectability: *detectability,

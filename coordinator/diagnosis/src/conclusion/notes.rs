@@ -1,6 +1,6 @@
 //! What a reader should know beside the hypotheses.
 
-use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
+use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX, SPEEDS_MIN};
 use crate::finding::Finding;
 use crate::port_scan::PortPlace;
 
@@ -41,6 +41,15 @@ impl Evidence<'_> {
                 "{} explains most of what is left out{place}, but leaves {nats:.0} nats there: it \
                  looks like it and is something else.",
                 best.candidate.kind.physics
+            ));
+        }
+        let (speeds, hear) = (self.speeds(), round.port_speeds);
+        let alone = self.search.accepted.is_empty() && !round.accepted;
+        if alone && hear < speeds.min(SPEEDS_MIN) {
+            return Some(format!(
+                "Something is left{place} that chance does not explain (p = {:.1e}), but {hear} of \
+                 {speeds} speeds hear it there: what stays where it is, more than one would hear.",
+                round.p_value
             ));
         }
         let rest = if self.search.accepted.is_empty() { "Something" } else { "A remainder" };

@@ -133,7 +133,7 @@ pub(super) fn order_finding(orders: &[Order]) -> Option<Finding> {
             ("amplitude_m", first.amplitude_m),
         ]),
         evidence: format!(
-            "lines at whole waves to a turn of the wheel at every speed: order {}; order {} is {:.0} times above what lies between orders",
+            "lines at whole waves to a turn of the wheel: order {}; order {} is {:.0} times above what lies between orders",
             names.join(", "),
             first.number,
             first.ratio

@@ -29,6 +29,8 @@ pub struct Linearised {
     pub log_power: DVector<f64>,
     /// A row for each of them, a column for each unknown.
     pub jacobian: DMatrix<f64>,
+    /// What they are predicted by.
+    pub(crate) transfer: Transfer,
 }
 
 /// Changes of the log powers by unknown dynamic stiffnesses, in parts of the stiffness that is
@@ -76,7 +78,7 @@ impl Forward {
                 jacobian[(row, column)] += derivative;
             }
         }
-        Ok(Linearised { log_power, jacobian })
+        Ok(Linearised { log_power, jacobian, transfer: state.transfer })
     }
 
     /// Changes of the log powers by dynamic stiffnesses added under each compared sleeper's rail
@@ -334,7 +336,7 @@ mod tests {
         let mut forward = forward(TrackDesign::v_track());
         let values = forward.unknowns.typical();
         forward.allow_ends(&values).unwrap();
-        let Linearised { log_power, jacobian } = forward.linearised(&values, &[]).unwrap();
+        let Linearised { log_power, jacobian, .. } = forward.linearised(&values, &[]).unwrap();
         assert!((forward.log_power(&values, &[]).unwrap() - log_power).amax() < 1e-9);
         let step = 1e-4;
         // The outer sleepers stand for all beyond, of which only near ones are taken; so do those

@@ -107,7 +107,10 @@ fn refine(
     let start = DVector::from_vec(start);
     let mut calibration = with.calibrate(start.clone())?;
     let count = calibration.values.len();
-    if !candidate.is_plausible(&calibration.values.as_slice()[count - candidate.free.len()..]) {
+    // What explains nothing even beyond its ranges explains no more inside.
+    if calibration.log_evidence > current.log_evidence
+        && !candidate.is_plausible(&calibration.values.as_slice()[count - candidate.free.len()..])
+    {
         calibration = with.calibrate_in_range(start)?;
     }
     let log_evidence = calibration.log_evidence - current.log_evidence;

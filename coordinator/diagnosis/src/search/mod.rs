@@ -15,7 +15,7 @@ pub(crate) use probability::Probabilities;
 use self::extent::Extent;
 use self::fit::retuned;
 use self::least::Least;
-use self::round::{Setting, is_predicted, sure};
+use self::round::{FALSE_ALARM, Setting, is_predicted, sure};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
@@ -27,6 +27,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// Effects that are looked for one after the other.
 const EFFECTS_MAX: usize = 3;
+
+/// Log evidence in nats below which a kind that is everywhere is not tried again in the next search.
+const HOPELESS: f64 = -100.0;
 
 /// What is going on, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +72,8 @@ pub struct Round {
     pub port: Option<Port>,
     /// Probability to see as much evidence for one if nothing is left out.
     pub port_p_value: f64,
+    /// Speeds that have evidence for it, each alone; asked where nothing is named.
+    pub port_speeds: usize,
     /// Gain of the best on each speed held out, in nats.
     pub held_out_gain: Vec<f64>,
     /// Whether the best was accepted.
@@ -154,9 +159,19 @@ pub fn search(
         && search.goes_on(&setting, all, &mut densities, progress)?
     {}
     search.take_back(&subject.forward.section);
+    search.hear(&setting)?;
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
     search.held_out = [mean(&densities[0]), mean(&densities[search.accepted.len()])];
     Ok(search)
+}
+
+impl Round {
+    /// Kinds that are far worse than nothing where they are everywhere.
+    fn hopeless(&self) -> Vec<&'static str> {
+        let is_far =
+            |fitted: &&Fitted| fitted.candidate.is_everywhere() && fitted.log_evidence < HOPELESS;
+        self.fitted.iter().filter(is_far).map(|fitted| fitted.candidate.kind.physics).collect()
+    }
 }
 
 impl Search {
@@ -178,7 +193,9 @@ impl Search {
             best.map(|fitted| (fitted.candidate.clone(), fitted.log_evidence)).collect();
         let heard_m = &setting.subject.heard_m;
         let least = Least { accepted: &known, section: &forward.section, heard_m };
-        let (mut round, mut ports) = setting.round(&problem, &self.last, all, least, progress)?;
+        let hopeless = self.rounds.last().map_or(Vec::new(), Round::hopeless);
+        let (mut round, mut ports) =
+            setting.round(&problem, &self.last, all, least, &hopeless, progress)?;
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
             // The candidates found a better baseline on their way: the opponent gets it too.
             self.last = better;
@@ -186,7 +203,9 @@ impl Search {
             if accepted.is_empty() {
                 self.baseline = self.last.clone();
             }
-            (round, ports) = setting.round(&problem, &self.last, all, least, progress)?;
+            let hopeless = round.hopeless();
+            (round, ports) =
+                setting.round(&problem, &self.last, all, least, &hopeless, progress)?;
         }
         let rival = self.rival(&round, &ports, &forward.section);
         if let Some(best) = sure(&round, rival.as_ref(), setting.subject, least) {
@@ -207,6 +226,17 @@ impl Search {
         let goes_on = round.accepted;
         self.rounds.push(round);
         Ok(goes_on)
+    }
+
+    /// Asks every speed alone for what has no name: what stays where it is, all of them pass.
+    fn hear(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
+        let Some(first) = self.rounds.first_mut().filter(|first| !first.accepted) else {
+            return Ok(());
+        };
+        if let Some(port) = first.port.as_ref().filter(|_| first.p_value <= FALSE_ALARM) {
+            first.port_speeds = setting.speeds_that_hear(&port.place, &self.baseline.values)?;
+        }
+        Ok(())
     }
 
     /// The unknown that the best candidate of a search is compared with. Beside what is accepted it is

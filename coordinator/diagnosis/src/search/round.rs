@@ -85,13 +85,36 @@ impl<'a> Setting<'a> {
             .collect()
     }
 
-    /// One search: all candidates screened and, if there is anything, the best fitted.
+    /// How many speeds have evidence, each alone, for something unknown at a place of a track with
+    /// these values.
+    pub(super) fn speeds_that_hear(
+        &self,
+        place: &PortPlace,
+        values: &DVector<f64>,
+    ) -> Result<usize, CalibrationError> {
+        let forward = &self.subject.forward;
+        let hears = |speed: usize| {
+            let observation = self.observe(|row| row / forward.bands.count() != speed)?;
+            let problem = Problem { forward, observation: &observation, candidates: &[] };
+            let alone = problem.at(values)?;
+            let ports = PortScan::new(&problem, &alone)?;
+            let port = ports.best_where(&alone.residual, &alone.gradient, |port| port == place);
+            Ok(port.is_some_and(|port| port.log_evidence > 0.0))
+        };
+        let heard = (0..forward.speeds_m_s.len()).into_par_iter().map(hears);
+        let heard: Vec<bool> = heard.collect::<Result<_, CalibrationError>>()?;
+        Ok(heard.into_iter().filter(|is_heard| *is_heard).count())
+    }
+
+    /// One search: all candidates screened and, if there is anything, the best fitted; kinds that are
+    /// `hopeless` are not tried everywhere.
     pub(super) fn round(
         &self,
         problem: &Problem<'_>,
         current: &Calibration,
         all: &[Candidate],
         least: Least<'_>,
+        hopeless: &[&str],
         progress: &(impl Fn(Stage, f64) + Sync),
     ) -> Result<(Round, PortScan), CalibrationError> {
         let trials: usize = all.iter().map(|candidate| candidate.trials.len()).sum();
@@ -111,7 +134,7 @@ impl<'a> Setting<'a> {
             (kind, template.at_strengths(&current.residual, &current.gradient))
         }));
         if round.p_value <= FALSE_ALARM {
-            let starts = starts(problem, current, all, &templates, screened, least);
+            let starts = starts(problem, current, all, &templates, screened, least, hopeless);
             round.fitted = fit(problem, current, all, starts, progress);
         }
         Ok((round, ports))
@@ -227,6 +250,7 @@ fn starts<'t>(
     templates: &'t [Template],
     screened: Vec<(f64, &'t Template)>,
     least: Least<'_>,
+    hopeless: &[&str],
 ) -> Vec<(&'t Template, DVector<f64>)> {
     let mut chosen = choose(screened, all, &current.residual);
     chosen.retain(|template| {
@@ -241,7 +265,8 @@ fn starts<'t>(
     let unknowns = &problem.forward.unknowns;
     let mut typical = current.values.clone();
     typical.rows_mut(0, unknowns.count()).copy_from(&unknowns.typical());
-    let everywhere = everywhere(templates, all, &current.residual);
+    let mut everywhere = everywhere(templates, all, &current.residual);
+    everywhere.retain(|template| !hopeless.contains(&all[template.candidate].kind.physics));
     starts.extend(everywhere.into_iter().map(|template| (template, typical.clone())));
     starts
 }

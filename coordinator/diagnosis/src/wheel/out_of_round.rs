@@ -1,10 +1,13 @@
-//! Orders of an out-of-round wheel: lines at whole numbers of waves to a turn, at every speed.
+//! Orders of an out-of-round wheel: lines at whole numbers of waves to a turn.
+//!
+//! The rail's surface is the same in all passes and drops out of what two of them at one speed differ
+//! by; the wheel begins each pass with another side down and does not.
 
 use crate::along::{
     Line, Ruler, Spectrum, amplitude, by_speed, combined, of_best, on_even_places, speed_m_s,
 };
 use rustfft::num_complex::Complex64;
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::model::Roughness;
 
@@ -20,8 +23,10 @@ const TURNS_MIN: f64 = 5.0;
 const LOW_HZ: f64 = 15.0;
 /// Highest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
-/// Probability of one speed's line without it above which it doesn't repeat at that speed.
+/// Probability of one speed's line without it above which it doesn't repeat at that speed, and the speeds
+/// at which it must: two passes may happen to begin with the same side down.
 const EACH_SPEED: f64 = 0.05;
+const SPEEDS_MIN: usize = 2;
 /// Resolution cells around an order, or a harmonic of the sleepers' passing, that belong to it.
 const CELLS: f64 = 1.5;
 /// Harmonics of the sleepers' passing below which an order is not told from it. On a smooth rail even
@@ -47,8 +52,17 @@ pub struct Order {
     pub amplitude_m: (f64, f64),
     /// Probability of such a line at any order of a round wheel, in logarithm.
     pub ln_p: f64,
-    /// Power over what lies between the orders, mean of all speeds.
+    /// Power over what lies between the orders in what passes of a speed do not share, mean of all
+    /// speeds.
     pub ratio: f64,
+}
+
+/// Spectra along a stretch of the track at one speed.
+struct AtSpeed {
+    /// Of each pass.
+    passes: Vec<Spectrum>,
+    /// Of what neighbouring passes differ by, as loud as in one of them; of a single pass itself.
+    apart: Vec<Spectrum>,
 }
 
 /// The orders that are less likely than `alpha` on a round wheel, lowest first.
@@ -88,9 +102,9 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
 
 impl Order {
     /// Whether a part of the way has its share of the line's power, mean of all passes.
-    fn is_heard(&self, part: &[Vec<Spectrum>], circumference_m: f64) -> bool {
+    fn is_heard(&self, part: &[AtSpeed], circumference_m: f64) -> bool {
         let wave_number = self.number as f64 / circumference_m;
-        let passes: Vec<&Spectrum> = part.iter().flatten().collect();
+        let passes: Vec<&Spectrum> = part.iter().flat_map(|speed| &speed.apart).collect();
         let ratio = |spectrum: &&Spectrum| {
             let line = spectrum.line(spectrum.bin(wave_number), |_| false);
             line.map_or(0.0, |line| line.ratio)
@@ -119,17 +133,25 @@ impl Search<'_> {
     }
 
     /// Spectra along a stretch of the track of all passes, by speed.
-    fn spectra(&self, stretch_m: [f64; 2], ruler: Ruler) -> Vec<Vec<Spectrum>> {
+    fn spectra(&self, stretch_m: [f64; 2], ruler: Ruler) -> Vec<AtSpeed> {
         let passes = &self.recording.passes;
         let length = stretch_m[1] - stretch_m[0];
         // Eight points on the shortest wave.
         let points = (8.0 * length / self.circumference_m * ORDER_MAX as f64).ceil() as usize;
-        let spectrum = |index: usize| {
-            let smooth = smoothed(&passes[index], length / points as f64);
-            let values = on_even_places(&passes[index], &smooth, stretch_m, points, ruler);
-            Spectrum::new(&values, length / points as f64).reaching(REACH)
+        let step_m = length / points as f64;
+        let values = |index: usize| {
+            let smooth = smoothed(&passes[index], step_m);
+            on_even_places(&passes[index], &smooth, stretch_m, points, ruler)
         };
-        let speed = |group: Vec<usize>| group.into_iter().map(spectrum).collect();
+        let spectrum = |values: &Vec<Complex64>| Spectrum::new(values, step_m).reaching(REACH);
+        let speed = |group: Vec<usize>| {
+            let values: Vec<Vec<Complex64>> = group.into_iter().map(values).collect();
+            let passes: Vec<Spectrum> = values.iter().map(spectrum).collect();
+            let apart: Vec<Spectrum> =
+                values.windows(2).map(|pair| spectrum(&difference(&pair[0], &pair[1]))).collect();
+            let apart = if apart.is_empty() { passes.clone() } else { apart };
+            AtSpeed { passes, apart }
+        };
         by_speed(passes).into_iter().map(speed).collect()
     }
 
@@ -140,7 +162,7 @@ impl Search<'_> {
     }
 
     /// The order's least likely line, and how many bins were looked at.
-    fn order(&self, speeds: &[Vec<Spectrum>], number: usize) -> (Order, usize) {
+    fn order(&self, speeds: &[AtSpeed], number: usize) -> (Order, usize) {
         let middle = number as f64 / self.circumference_m;
         let mut best = Order { number, amplitude_m: (0.0, 0.0), ln_p: 0.0, ratio: 1.0 };
         let spacing = self.recording.spacing_m;
@@ -148,7 +170,7 @@ impl Search<'_> {
         if passing || !self.audible(middle) {
             return (best, 0);
         }
-        let first = &speeds[0][0];
+        let first = &speeds[0].passes[0];
         let bins = first.bin(middle * (1.0 - TOLERANCE))..=first.bin(middle * (1.0 + TOLERANCE));
         let tries = bins.clone().count();
         for bin in bins {
@@ -156,21 +178,30 @@ impl Search<'_> {
             let skip = |wave_number: f64| {
                 self.is_multiple(wave_number, turn) || self.is_multiple(wave_number, spacing)
             };
-            let lines: Option<Vec<Line>> = speeds
+            let mean = |spectra: &[Spectrum]| {
+                let each: Option<Vec<Line>> = spectra.iter().map(|s| s.line(bin, skip)).collect();
+                Line::mean(&each?)
+            };
+            let lines: Option<Vec<(Line, Line)>> = speeds
                 .iter()
-                .map(|passes| {
-                    let each: Option<Vec<Line>> =
-                        passes.iter().map(|s| s.line(bin, skip)).collect();
-                    Line::mean(&each?)
-                })
+                .map(|speed| Some((mean(&speed.apart)?, mean(&speed.passes)?)))
                 .collect();
             let Some(lines) = lines else { continue };
-            let each: Vec<f64> = lines.iter().map(|line| line.ln_tail()).collect();
+            let each: Vec<f64> = lines.iter().map(|(apart, _)| apart.ln_tail()).collect();
+            let heard = each.iter().filter(|&&ln_p| ln_p <= EACH_SPEED.ln()).count();
             let ln_p = combined(&each);
-            if each.iter().all(|&ln_p| ln_p <= EACH_SPEED.ln()) && ln_p < best.ln_p {
-                let ratio = lines.iter().map(|line| line.ratio).sum::<f64>() / lines.len() as f64;
+            if heard >= each.len().min(SPEEDS_MIN) && ln_p < best.ln_p {
+                let mean = |ratio: fn(&(Line, Line)) -> f64| {
+                    lines.iter().map(ratio).sum::<f64>() / lines.len() as f64
+                };
+                let ratio = mean(|(apart, _)| apart.ratio);
+                // Two sides down by chance alike, and the difference hides what the passes show.
+                let over_surface = mean(|(apart, passes)| {
+                    let differs = 1.0 + (apart.ratio - 1.0) * apart.beside / passes.beside;
+                    passes.ratio.max(differs)
+                });
                 let density = TAU * Roughness::new(LEVEL).density(TAU * middle);
-                let amplitude = amplitude(ratio, density, self.length());
+                let amplitude = amplitude(over_surface, density, self.length());
                 let deviation = ROOT_LEVEL_DEVIATION.hypot(0.25) * amplitude;
                 best = Order { number, amplitude_m: (amplitude, deviation), ln_p, ratio };
             }
@@ -198,6 +229,11 @@ fn smoothed(pass: &Pass, step_m: f64) -> Vec<Complex64> {
         values = average(&values, width);
     }
     values.into_iter().map(Complex64::from).collect()
+}
+
+/// What two passes differ by, as loud as in one of them where they share nothing.
+fn difference(one: &[Complex64], other: &[Complex64]) -> Vec<Complex64> {
+    one.iter().zip(other).map(|(one, other)| (one - other) * FRAC_1_SQRT_2).collect()
 }
 
 /// Running mean of `width` values around each.

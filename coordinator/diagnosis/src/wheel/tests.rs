@@ -57,6 +57,24 @@ fn a_high_order_is_found_though_the_sleepers_pass_in_its_waves() {
 }
 
 #[test]
+fn waves_that_every_pass_meets_at_the_same_places_are_the_rails() {
+    let height = |_, x: f64| 3e-6 * (TAU * 30.0 * x / TURN_M).cos();
+    let recording = Rolled { height_m: &height, ..Rolled::faultless(5) }.recording();
+    assert!(out_of_round(&recording, TURN_M, ALPHA).is_empty());
+}
+
+#[test]
+fn waves_far_below_the_surface_are_found_in_what_two_passes_differ_by() {
+    let height = |pass, x: f64| 5e-8 * (TAU * 30.0 * x / TURN_M + 2.0 * pass as f64).cos();
+    let recording = Rolled { height_m: &height, ..Rolled::faultless(5) }.recording();
+    let found = out_of_round(&recording, TURN_M, ALPHA);
+    assert_eq!(found.iter().map(|order| order.number).collect::<Vec<_>>(), [30]);
+    let mut single = recording;
+    single.passes = single.passes.into_iter().step_by(2).collect();
+    assert!(out_of_round(&single, TURN_M, ALPHA).is_empty());
+}
+
+#[test]
 fn a_round_wheel_has_neither_flat_nor_orders() {
     for seed in 10..20 {
         let recording = Rolled::faultless(seed).recording();
