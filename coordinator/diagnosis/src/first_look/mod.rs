@@ -20,10 +20,6 @@ pub const FALSE_ALARMS: f64 = 0.02;
 /// Share of it that each of the nine kinds of test has.
 const EACH_TEST: f64 = FALSE_ALARMS / 9.0;
 
-/// What of it the test for orders of the wheel takes: what passes of one speed do not share is less even
-/// than noise.
-const ORDER_TEST: f64 = 0.1 * EACH_TEST;
-
 /// Sleeper spacings around a place where the wheel's flat meets the rail in every pass: what is
 /// heard there is the flat and its ringing.
 const AROUND_BLOW: f64 = 0.4;
@@ -127,7 +123,7 @@ fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     let blows = flat.as_ref().map(|flat| common_places(&flat.blows_m, reach)).unwrap_or_default();
     let turn = flat.as_ref().map(|flat| flat.circumference_m.0);
     let mut orders = circumference
-        .map(|length| wheel::out_of_round(recording, turn.unwrap_or(length), ORDER_TEST))
+        .map(|length| wheel::out_of_round(recording, turn.unwrap_or(length), EACH_TEST))
         .unwrap_or_default();
     if let Some(flat) = &flat {
         orders.retain(|order| is_longer_than(order, flat));
