@@ -85,6 +85,30 @@ fn a_flat_is_named_and_unknown_on_the_tread_where_it_has_no_name() {
 }
 
 #[test]
+fn an_uneven_wheel_that_was_found_joins_a_campaign_with_its_order() {
+    let waves = "[[extension]]\nphysics = \"wheel_out_of_round\"\norder = 36\namplitude_m = 1e-6\n";
+    let folder = recorded(&["13", "10"], waves);
+    let (_, diagnosis) = diagnosed(folder.path(), &[]);
+    let diagnosis = diagnosis.unwrap();
+    assert_eq!(accepted(&diagnosis), [("wheel_out_of_round", Vec::new())]);
+    assert_eq!(diagnosis["hypotheses"][0]["parameters"]["order"]["mean"], 36.0);
+
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let [campaign, found] = ["track.toml", "out/diagnosis.json"].map(path);
+    let [extended, library] = ["track-extended.toml", "library.sqlite"].map(path);
+    let library = format!("sqlite:{library}");
+    std::fs::write(&campaign, run(PROGRAM, &["run", "--print-campaign"]).out).unwrap();
+    let answer = run(PROGRAM, &["extend", &campaign, "--from", &found]);
+    assert_eq!(answer.code, Some(0), "{}", answer.err);
+    let text = std::fs::read_to_string(&extended).unwrap();
+    assert!(text.contains("\norder = 36.0\n"), "{text}");
+    // Of four cases two have the wheel.
+    let arguments = ["run", &extended, "--cases", "4", "--no-train", "--library", &library];
+    let answer = run(PROGRAM, &[&arguments[..], &["--out", &path("campaign")]].concat());
+    assert_eq!(answer.code, Some(0), "{}", answer.err);
+}
+
+#[test]
 fn with_one_speed_nothing_is_more_certain_than_a_half() {
     let folder = recorded(&["13"], JOINT);
     let (_, diagnosis) = diagnosed(folder.path(), &[]);
