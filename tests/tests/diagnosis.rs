@@ -15,12 +15,17 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 /// A folder with a recording of thirteen sleepers at these speeds in km/h, two passes each, over a
 /// track with an extension in it.
 fn recorded(speeds: &[&str], extension: &str) -> TempDir {
+    recorded_over("25", speeds, extension)
+}
+
+/// The same on a track of so many spans.
+fn recorded_over(spans: &str, speeds: &[&str], extension: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("extension.toml");
     std::fs::write(&file, extension).unwrap();
     let [file, out] = [file, folder.path().join("recording")].map(|p| p.display().to_string());
     let speeds = speeds.iter().flat_map(|speed| ["--speed", speed]);
-    let mut arguments = vec!["simulate", "--passes", "2", "--spans", "25", "--seed", "3"];
+    let mut arguments = vec!["simulate", "--passes", "2", "--spans", spans, "--seed", "3"];
     arguments.extend(speeds);
     arguments.extend(["--extension", &file, "--out", &out]);
     assert_eq!(run(PROGRAM, &arguments).code, Some(0));
@@ -87,7 +92,8 @@ fn a_flat_is_named_and_unknown_on_the_tread_where_it_has_no_name() {
 #[test]
 fn an_uneven_wheel_that_was_found_joins_a_campaign_with_its_order() {
     let waves = "[[extension]]\nphysics = \"wheel_out_of_round\"\norder = 36\namplitude_m = 1e-6\n";
-    let folder = recorded(&["13", "10"], waves);
+    // Six turns.
+    let folder = recorded_over("32", &["13", "10"], waves);
     let (_, diagnosis) = diagnosed(folder.path(), &[]);
     let diagnosis = diagnosis.unwrap();
     assert_eq!(accepted(&diagnosis), [("wheel_out_of_round", Vec::new())]);
