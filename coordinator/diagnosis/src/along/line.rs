@@ -39,6 +39,11 @@ impl Line {
         ln_line_tail(self.neighbours, self.ratio)
     }
 
+    /// Its power.
+    pub(crate) fn power(self) -> f64 {
+        self.ratio * self.beside
+    }
+
     /// The mean of the same line in several passes; no surer than in one of them, for they share
     /// their surface. None of none.
     pub(crate) fn mean(lines: &[Self]) -> Option<Self> {

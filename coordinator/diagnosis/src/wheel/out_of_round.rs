@@ -39,10 +39,14 @@ const PASSING_MAX: f64 = 4.5;
 /// Resolution cells on either side in which an order's neighbours lie, four orders of a way of nine
 /// turns: only what is between the orders counts.
 const REACH: f64 = 36.0;
-/// Parts of the way that an order must be heard in, and how much of its share of power in each: the
+/// Parts of the way that an order must be heard in, and how much of a steady line's power in each: the
 /// wheel is as uneven at the end as at the beginning.
 const PARTS: usize = 3;
 const PART_SHARE: f64 = 0.2;
+/// Orders that a line may leak into, and by how much louder it then is: Hann's side lobes five cells away
+/// are 50 dB down.
+const LEAKS: usize = 4;
+const LEAKAGE: f64 = 1e3;
 /// Level of eq. B.6 that amplitudes are stated for, and the relative deviation of its root.
 const LEVEL: f64 = 3.0;
 const ROOT_LEVEL_DEVIATION: f64 = 0.23;
@@ -59,6 +63,8 @@ pub struct Order {
     /// Power over what lies between the orders, in the passes or in what they differ by, mean of all
     /// speeds.
     pub ratio: f64,
+    /// Power of the line at each speed.
+    powers: Vec<f64>,
 }
 
 /// Where an order is listened for.
@@ -120,20 +126,32 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
         order.ln_p = of_best(order.ln_p, tries);
     }
     found.retain(|order| order.ln_p <= alpha.ln());
+    let all = found.clone();
+    found.retain(|order| !all.iter().any(|louder| louder.leaks_into(order)));
     found
 }
 
 impl Order {
-    /// Whether a part of the way has its share of the line's power, mean of all passes.
+    /// Whether a part of the way has its share of the line's power, mean of all speeds: a steady line's
+    /// power grows with the square of the way.
     fn is_heard(&self, part: &[AtSpeed], heard: Heard, circumference_m: f64) -> bool {
         let wave_number = self.number as f64 / circumference_m;
-        let passes: Vec<&Spectrum> = part.iter().flat_map(|speed| speed.heard(heard)).collect();
-        let ratio = |spectrum: &&Spectrum| {
-            let line = spectrum.line(spectrum.bin(wave_number), |_| false);
-            line.map_or(0.0, |line| line.ratio)
+        let share = |(speed, power): (&AtSpeed, &f64)| {
+            let each = speed.heard(heard).iter();
+            let lines = each.filter_map(|s| s.line(s.bin(wave_number), |_| false));
+            let lines: Vec<Line> = lines.collect();
+            Line::mean(&lines).map_or(0.0, |line| line.power() / power)
         };
-        let mean = passes.iter().map(ratio).sum::<f64>() / passes.len() as f64;
-        mean >= PART_SHARE * self.ratio / PARTS as f64
+        let shares: f64 = part.iter().zip(&self.powers).map(share).sum();
+        !self.powers.is_empty()
+            && shares / self.powers.len() as f64 >= PART_SHARE / (PARTS * PARTS) as f64
+    }
+
+    /// Whether another order may be nothing but this one's side lobe.
+    fn leaks_into(&self, other: &Self) -> bool {
+        let power = |order: &Self| order.powers.iter().sum::<f64>();
+        let distance = self.number.abs_diff(other.number);
+        distance > 0 && distance <= LEAKS && power(self) > LEAKAGE * power(other)
     }
 }
 
@@ -186,7 +204,8 @@ impl Search<'_> {
     /// The order's least likely line, and how many bins were looked at.
     fn order(&self, speeds: &[AtSpeed], heard: Heard, number: usize) -> (Order, usize) {
         let middle = number as f64 / self.circumference_m;
-        let mut best = Order { number, amplitude_m: (0.0, 0.0), ln_p: 0.0, ratio: 1.0 };
+        let (amplitude_m, powers) = ((0.0, 0.0), Vec::new());
+        let mut best = Order { number, amplitude_m, ln_p: 0.0, ratio: 1.0, powers };
         let spacing = self.recording.spacing_m;
         let passing = self.is_multiple(middle, spacing) && middle * spacing < PASSING_MAX;
         if passing || !self.audible(middle) {
@@ -228,7 +247,8 @@ impl Search<'_> {
                 let density = TAU * Roughness::new(LEVEL).density(TAU * middle);
                 let amplitude = amplitude(over_surface, density, self.length());
                 let deviation = ROOT_LEVEL_DEVIATION.hypot(0.25) * amplitude;
-                best = Order { number, amplitude_m: (amplitude, deviation), ln_p, ratio };
+                let (amplitude_m, powers) = ((amplitude, deviation), powers_of(&lines));
+                best = Order { number, amplitude_m, ln_p, ratio, powers };
             }
         }
         (best, tries)
@@ -254,6 +274,11 @@ fn smoothed(pass: &Pass, step_m: f64) -> Vec<Complex64> {
         values = average(&values, width);
     }
     values.into_iter().map(Complex64::from).collect()
+}
+
+/// Of each speed's line, the first of a pair.
+fn powers_of(lines: &[(Line, Line)]) -> Vec<f64> {
+    lines.iter().map(|(line, _)| line.power()).collect()
 }
 
 /// What two passes differ by, as loud as in one of them where they share nothing.
