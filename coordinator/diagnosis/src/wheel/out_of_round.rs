@@ -28,9 +28,9 @@ const HIGH_SHARE: f64 = 0.4;
 const EACH_SPEED: f64 = 0.05;
 /// Speeds at which it must in what passes differ by: two may happen to begin with the same side down.
 const SPEEDS_APART_MIN: usize = 2;
-/// By how much likelier a line is there than in noise: of 86 recordings of another simulator two had lines by
-/// chance, of probabilities of 2e-3 and 3e-6.
-const UNEVEN: f64 = 3000.0;
+/// By how much likelier a line is there than in noise: of forty recordings of another simulator one had a
+/// probability of 0.002 by chance.
+const UNEVEN: f64 = 10.0;
 /// Resolution cells around an order, or a harmonic of the sleepers' passing, that belong to it.
 const CELLS: f64 = 1.5;
 /// Harmonics of the sleepers' passing below which an order is not told from it. On a smooth rail even
