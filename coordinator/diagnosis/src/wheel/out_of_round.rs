@@ -215,43 +215,59 @@ impl Search<'_> {
         let bins = first.bin(middle * (1.0 - TOLERANCE))..=first.bin(middle * (1.0 + TOLERANCE));
         let tries = bins.clone().count();
         for bin in bins {
-            let turn = number as f64 / (bin as f64 * first.bin_width());
-            let skip = |wave_number: f64| {
-                self.is_multiple(wave_number, turn) || self.is_multiple(wave_number, spacing)
-            };
-            let mean = |spectra: &[Spectrum]| {
-                let each: Option<Vec<Line>> = spectra.iter().map(|s| s.line(bin, skip)).collect();
-                Line::mean(&each?)
-            };
-            let lines: Option<Vec<(Line, Line)>> = speeds
-                .iter()
-                .map(|speed| Some((mean(speed.heard(heard))?, mean(&speed.passes)?)))
-                .collect();
-            let Some(lines) = lines else { continue };
-            let each: Vec<f64> = lines.iter().map(|(line, _)| line.ln_tail()).collect();
+            let Some(lines) = self.lines(speeds, heard, number, bin) else { continue };
+            let each: Vec<f64> = lines.iter().map(|line| line.ln_tail()).collect();
             let repeats = each.iter().filter(|&&ln_p| ln_p <= EACH_SPEED.ln()).count();
             let (least, uneven) = match heard {
                 Heard::InPasses => (each.len(), 0.0),
                 Heard::Apart => (each.len().min(SPEEDS_APART_MIN), UNEVEN.ln()),
             };
             let ln_p = combined(&each) + uneven;
-            if repeats >= least && ln_p < best.ln_p {
-                let mean = |ratio: fn(&(Line, Line)) -> f64| {
-                    lines.iter().map(ratio).sum::<f64>() / lines.len() as f64
-                };
-                let ratio = mean(|(line, _)| line.ratio);
-                // The surface is as loud as beside the line in the passes.
-                let over_surface = mean(|(line, passes)| {
-                    passes.ratio.max(1.0 + (line.ratio - 1.0) * line.beside / passes.beside)
-                });
-                let density = TAU * Roughness::new(LEVEL).density(TAU * middle);
-                let amplitude = amplitude(over_surface, density, self.length());
-                let deviation = ROOT_LEVEL_DEVIATION.hypot(0.25) * amplitude;
-                let (amplitude_m, powers) = ((amplitude, deviation), powers_of(&lines));
-                best = Order { number, amplitude_m, ln_p, ratio, powers };
+            if repeats < least || ln_p >= best.ln_p {
+                continue;
             }
+            let Some(passes) = self.lines(speeds, Heard::InPasses, number, bin) else { continue };
+            best = Order {
+                number,
+                amplitude_m: self.amplitude_m(middle, &lines, &passes),
+                ln_p,
+                ratio: mean(lines.iter().map(|line| line.ratio)),
+                powers: lines.iter().map(|line| line.power()).collect(),
+            };
         }
         (best, tries)
+    }
+
+    /// The line in a bin at each speed, if it is an order of that number; none where too little lies
+    /// between the orders.
+    fn lines(
+        &self,
+        speeds: &[AtSpeed],
+        heard: Heard,
+        number: usize,
+        bin: usize,
+    ) -> Option<Vec<Line>> {
+        let turn = number as f64 / (bin as f64 * speeds[0].passes[0].bin_width());
+        let skip = |wave_number: f64| {
+            self.is_multiple(wave_number, turn)
+                || self.is_multiple(wave_number, self.recording.spacing_m)
+        };
+        let of_speed = |speed: &AtSpeed| {
+            let each = speed.heard(heard).iter().map(|spectrum| spectrum.line(bin, skip));
+            Line::mean(&each.collect::<Option<Vec<Line>>>()?)
+        };
+        speeds.iter().map(of_speed).collect()
+    }
+
+    /// Amplitude of lines at a wave number in waves a metre and its deviation in m, from how loud the
+    /// surface is beside them in the passes.
+    fn amplitude_m(&self, wave_number: f64, lines: &[Line], passes: &[Line]) -> (f64, f64) {
+        let over_surface = lines.iter().zip(passes).map(|(line, passes)| {
+            passes.ratio.max(1.0 + (line.ratio - 1.0) * line.beside / passes.beside)
+        });
+        let density = TAU * Roughness::new(LEVEL).density(TAU * wave_number);
+        let amplitude = amplitude(mean(over_surface), density, self.length());
+        (amplitude, ROOT_LEVEL_DEVIATION.hypot(0.25) * amplitude)
     }
 
     fn audible(&self, wave_number: f64) -> bool {
@@ -276,9 +292,9 @@ fn smoothed(pass: &Pass, step_m: f64) -> Vec<Complex64> {
     values.into_iter().map(Complex64::from).collect()
 }
 
-/// Of each speed's line, the first of a pair.
-fn powers_of(lines: &[(Line, Line)]) -> Vec<f64> {
-    lines.iter().map(|(line, _)| line.power()).collect()
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
 }
 
 /// What two passes differ by, as loud as in one of them where they share nothing.

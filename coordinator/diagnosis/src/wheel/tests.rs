@@ -1,6 +1,6 @@
 //! Wheels whose truth is known.
 
-use super::{comb, flat, nominal_circumference_m, out_of_round};
+use super::{Order, comb, flat, nominal_circumference_m, out_of_round};
 use crate::along::testing::{Rolled, hollow_m, noise, shared};
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -10,6 +10,10 @@ use tracktwin_signal::recording::import::{AccelerationUnit, Layout, import};
 
 const ALPHA: f64 = 0.0025;
 const TURN_M: f64 = Rolled::CIRCUMFERENCE_M;
+
+fn numbers(orders: &[Order]) -> Vec<usize> {
+    orders.iter().map(|order| order.number).collect()
+}
 
 /// Distance along the tread from a flat that each pass meets at another phase.
 fn from_flat(pass: usize, x: f64) -> f64 {
@@ -40,7 +44,7 @@ fn an_uneven_wheel_has_its_order_and_its_amplitude() {
     let height = |pass, x: f64| 5e-6 * (TAU * 12.0 * x / TURN_M + pass as f64).cos();
     let recording = Rolled { height_m: &height, ..Rolled::faultless(3) }.recording();
     let found = out_of_round(&recording, TURN_M, ALPHA);
-    assert_eq!(found.iter().map(|order| order.number).collect::<Vec<_>>(), [12]);
+    assert_eq!(numbers(&found), [12]);
     // Neighbours of a single line are known to a quarter in power.
     assert!((found[0].amplitude_m.0 / 5e-6 - 1.0).abs() < 0.4, "{found:?}");
 }
@@ -53,7 +57,7 @@ fn a_high_order_is_found_though_the_sleepers_pass_in_its_waves() {
     let waves = 36.0 * recording.spacing_m / TURN_M;
     assert!((waves - waves.round()).abs() < 0.05, "{waves}");
     let found = out_of_round(&recording, TURN_M, ALPHA);
-    assert_eq!(found.iter().map(|order| order.number).collect::<Vec<_>>(), [36]);
+    assert_eq!(numbers(&found), [36]);
 }
 
 #[test]
@@ -61,7 +65,7 @@ fn a_wheel_that_begins_every_pass_with_the_same_side_down_is_heard_as_well() {
     let height = |_, x: f64| 3e-6 * (TAU * 30.0 * x / TURN_M).cos();
     let recording = Rolled { height_m: &height, ..Rolled::faultless(5) }.recording();
     let found = out_of_round(&recording, TURN_M, ALPHA);
-    assert_eq!(found.iter().map(|order| order.number).collect::<Vec<_>>(), [30]);
+    assert_eq!(numbers(&found), [30]);
 }
 
 #[test]
@@ -69,12 +73,12 @@ fn waves_far_below_the_surface_are_found_in_what_two_passes_differ_by() {
     let height = |pass, x: f64| 5e-8 * (TAU * 30.0 * x / TURN_M + 2.0 * pass as f64).cos();
     let recording = Rolled { height_m: &height, ..Rolled::faultless(5) }.recording();
     let found = out_of_round(&recording, TURN_M, ALPHA);
-    assert_eq!(found.iter().map(|order| order.number).collect::<Vec<_>>(), [30]);
+    assert_eq!(numbers(&found), [30]);
     // A hundredfold, all that is beside the line in the difference is its own side lobes.
     let height = |pass, x: f64| 5e-6 * (TAU * 30.0 * x / TURN_M + 2.0 * pass as f64).cos();
     let loud = Rolled { height_m: &height, ..Rolled::faultless(5) }.recording();
     let found = out_of_round(&loud, TURN_M, ALPHA);
-    assert_eq!(found.iter().map(|order| order.number).collect::<Vec<_>>(), [30]);
+    assert_eq!(numbers(&found), [30]);
     let mut single = recording;
     single.passes = single.passes.into_iter().step_by(2).collect();
     assert!(out_of_round(&single, TURN_M, ALPHA).is_empty());
