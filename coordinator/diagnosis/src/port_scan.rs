@@ -80,6 +80,26 @@ impl PortScan {
     /// # Errors
     /// [`CalibrationError`] when the calibrated track makes no model.
     pub fn new(problem: &Problem<'_>, current: &Calibration) -> Result<Self, CalibrationError> {
+        Self::of(problem, current, |_| true)
+    }
+
+    /// The same for one place.
+    ///
+    /// # Errors
+    /// As [`PortScan::new`].
+    pub fn at(
+        place: &PortPlace,
+        problem: &Problem<'_>,
+        current: &Calibration,
+    ) -> Result<Self, CalibrationError> {
+        Self::of(problem, current, |known| known == place)
+    }
+
+    fn of(
+        problem: &Problem<'_>,
+        current: &Calibration,
+        is_one: impl Fn(&PortPlace) -> bool,
+    ) -> Result<Self, CalibrationError> {
         let (forward, observation) = (problem.forward, problem.observation);
         let extensions = problem.extensions(&current.values)?;
         let lines = forward.bands.lines_hz();
@@ -112,6 +132,7 @@ impl PortScan {
                 .map(|(first, columns)| (PortPlace::Between([first, first + 1]), whiten(columns))),
         );
         places.push((PortPlace::Wheel, whiten(wheel)));
+        places.retain(|(place, _)| is_one(place));
         let filter = |(place, columns)| Filter::new(place, columns, current);
         let filters = places.into_par_iter().filter_map(filter).collect();
         Ok(Self { filters, centres_hz: centres.into_iter().map(f64::exp).collect() })

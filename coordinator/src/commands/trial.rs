@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     knock_out: bool,
     /// Diagnose every local effect that was found once more with the sleepers of each speed shuffled:
-    /// the alarm should then cease.
+    /// no physics should then be named.
     #[arg(long)]
     shuffle: bool,
     /// Folder of models trained on the library: asks the paper's own pipeline too whether it looks

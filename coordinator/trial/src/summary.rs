@@ -94,19 +94,19 @@ fn visible(scores: &[Score], least: f64) -> impl Iterator<Item = (&Score, &Named
 }
 
 fn alarms(scores: &[Score]) -> Vec<Row> {
-    let called_physics =
-        |score: &Score| matches!(score.verdict, Verdict::LeftOutPhysics | Verdict::UnknownPhysics);
+    let is_physics = |verdict| matches!(verdict, Verdict::LeftOutPhysics | Verdict::UnknownPhysics);
     let detected = |least| Rate::of(visible(scores, least).map(|(score, _)| alarmed(score)));
     let controls = Rate::of(of_class(scores, Class::Control).map(alarmed));
-    let artefacts = Rate::of(of_class(scores, Class::Artefact).map(called_physics));
+    let artefacts =
+        Rate::of(of_class(scores, Class::Artefact).map(|score| is_physics(score.verdict)));
     let shuffled = scores.iter().filter_map(|score| score.shuffled);
-    let shuffled = Rate::of(shuffled.map(|verdict| verdict != Verdict::Consistent));
+    let shuffled = Rate::of(shuffled.map(is_physics));
     vec![
         at_most("false alarms on controls", controls, 0.05),
         at_most("artefacts called physics", artefacts, 0.02),
         at_least("detected, d' 6.5 and more", detected(SURE), 0.95),
         at_least("detected, d' 5 and more", detected(LIKELY), 0.75),
-        at_most("of local effects found, alarms with sleepers shuffled", shuffled, 0.05),
+        at_most("of local effects found, called physics with sleepers shuffled", shuffled, 0.05),
     ]
 }
 

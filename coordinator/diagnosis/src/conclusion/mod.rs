@@ -1,6 +1,7 @@
 //! From a search to the diagnosis that is written down.
 
 mod alone;
+mod apart;
 mod fit;
 mod nameless;
 mod notes;
@@ -24,10 +25,6 @@ use tracktwin_track::extension::{Class, Kind};
 /// Probability to see such evidence for an unknown stiffness if nothing is left out, up to which it
 /// is said to be there.
 const PORT_ALARM: f64 = 0.01;
-
-/// Speeds that must hear something unknown, each alone: what only one of them hears at a place is not
-/// the track's.
-const SPEEDS_MIN: usize = 2;
 
 /// Probability of nothing at all below which something is left out even if no name predicts a
 /// withheld speed better.
@@ -152,6 +149,7 @@ impl Evidence<'_> {
                 }
             }
         }
+        self.add_apart(&mut all);
         for finding in &self.look.findings {
             self.add_finding(finding, &mut all);
         }
@@ -186,7 +184,7 @@ impl Evidence<'_> {
         let alone = first && !round.accepted;
         let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
         let others = named.iter().copied().fold(nothing, f64::max);
-        let is_there = alone && round.port_speeds >= self.speeds().min(SPEEDS_MIN);
+        let is_there = alone && !round.port_strays;
         let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
         // Something is there, but the names that come near failed on withheld speeds.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();

@@ -1,6 +1,6 @@
 //! What a reader should know beside the hypotheses.
 
-use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX, SPEEDS_MIN};
+use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
 use crate::finding::Finding;
 use crate::port_scan::PortPlace;
 
@@ -20,7 +20,7 @@ impl Evidence<'_> {
                 100.0 * ONE_PASS_MAX
             ));
         }
-        notes.extend(self.remainder());
+        notes.extend(self.apart().or_else(|| self.remainder()));
         notes.extend(self.look.findings.iter().map(shown));
         notes
     }
@@ -43,12 +43,10 @@ impl Evidence<'_> {
                 best.candidate.kind.physics
             ));
         }
-        let (speeds, hear) = (self.speeds(), round.port_speeds);
-        let alone = self.search.accepted.is_empty() && !round.accepted;
-        if alone && hear < speeds.min(SPEEDS_MIN) {
+        if round.port_strays {
             return Some(format!(
-                "Something is left{place} that chance does not explain (p = {:.1e}), but {hear} of \
-                 {speeds} speeds hear it there: what stays where it is, more than one would hear.",
+                "Something is left{place} that chance does not explain (p = {:.1e}), but at one speed \
+                 only: what stays where it is, all of them pass.",
                 round.p_value
             ));
         }

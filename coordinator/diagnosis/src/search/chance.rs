@@ -65,7 +65,7 @@ fn gumbel_tail(maxima: &[f64], value: f64) -> f64 {
     -(-(-(value - location) / scale).exp()).exp_m1()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -1,5 +1,6 @@
 //! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
 
+mod apart;
 mod chance;
 mod extent;
 mod fit;
@@ -15,7 +16,7 @@ pub(crate) use probability::Probabilities;
 use self::extent::Extent;
 use self::fit::retuned;
 use self::least::Least;
-use self::round::{FALSE_ALARM, Setting, is_predicted, sure};
+use self::round::{FALSE_ALARM, Setting, is_predicted, stays, sure};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
@@ -72,8 +73,9 @@ pub struct Round {
     pub port: Option<Port>,
     /// Probability to see as much evidence for one if nothing is left out.
     pub port_p_value: f64,
-    /// Speeds that have evidence for it, each alone; asked where nothing is named.
-    pub port_speeds: usize,
+    /// Whether one speed alone has more evidence for it than all together, and no other speed any; asked
+    /// where nothing is named.
+    pub port_strays: bool,
     /// Gain of the best on each speed held out, in nats.
     pub held_out_gain: Vec<f64>,
     /// Whether the best was accepted.
@@ -98,6 +100,9 @@ pub struct Search {
     pub observation: Observation,
     /// Scatter to expect of each log power of a sleeper.
     pub deviation: DVector<f64>,
+    /// By how many nats the recording is explained better if each speed has a track and a surface of its
+    /// own than by one track with all that was found; negative where all speeds passed the same track.
+    pub apart: f64,
     /// Log density of each speed when it is held out, in nats a log power: baseline, extended.
     pub held_out: [f64; 2],
 }
@@ -151,6 +156,7 @@ pub fn search(
         rounds: Vec::new(),
         observation,
         deviation: setting.covariance.diagonal().map(f64::sqrt),
+        apart: f64::NEG_INFINITY,
         held_out: [0.0; 2],
     };
     let before = setting.held_out(&[], &search.baseline.values)?;
@@ -160,6 +166,7 @@ pub fn search(
     {}
     search.take_back(&subject.forward.section);
     search.hear(&setting)?;
+    search.compare_apart(&setting)?;
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
     search.held_out = [mean(&densities[0]), mean(&densities[search.accepted.len()])];
     Ok(search)
@@ -228,13 +235,14 @@ impl Search {
         Ok(goes_on)
     }
 
-    /// Asks every speed alone for what has no name: what stays where it is, all of them pass.
+    /// Asks every speed alone for what has no name.
     fn hear(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
         let Some(first) = self.rounds.first_mut().filter(|first| !first.accepted) else {
             return Ok(());
         };
         if let Some(port) = first.port.as_ref().filter(|_| first.p_value <= FALSE_ALARM) {
-            first.port_speeds = setting.speeds_that_hear(&port.place, &self.baseline.values)?;
+            let alone = setting.unknown_alone(&port.place, &self.baseline.values)?;
+            first.port_strays = !stays(port.log_evidence, &alone);
         }
         Ok(())
     }

@@ -85,25 +85,33 @@ impl<'a> Setting<'a> {
             .collect()
     }
 
-    /// How many speeds have evidence, each alone, for something unknown at a place of a track with
+    /// Log evidence for something unknown at a place at each speed alone, in nats, on a track with
     /// these values.
-    pub(super) fn speeds_that_hear(
+    pub(super) fn unknown_alone(
         &self,
         place: &PortPlace,
         values: &DVector<f64>,
-    ) -> Result<usize, CalibrationError> {
+    ) -> Result<Vec<f64>, CalibrationError> {
+        self.at_each_speed(|observation| {
+            let forward = &self.subject.forward;
+            let problem = Problem { forward, observation, candidates: &[] };
+            let current = problem.at(values)?;
+            let port =
+                PortScan::at(place, &problem, &current)?.best(&current.residual, &current.gradient);
+            Ok(port.map_or(f64::NEG_INFINITY, |port| port.log_evidence))
+        })
+    }
+
+    /// What follows from each speed, all others held out.
+    pub(super) fn at_each_speed<T: Send>(
+        &self,
+        of: impl Fn(&Observation) -> Result<T, CalibrationError> + Sync,
+    ) -> Result<Vec<T>, CalibrationError> {
         let forward = &self.subject.forward;
-        let hears = |speed: usize| {
-            let observation = self.observe(|row| row / forward.bands.count() != speed)?;
-            let problem = Problem { forward, observation: &observation, candidates: &[] };
-            let alone = problem.at(values)?;
-            let ports = PortScan::new(&problem, &alone)?;
-            let port = ports.best_where(&alone.residual, &alone.gradient, |port| port == place);
-            Ok(port.is_some_and(|port| port.log_evidence > 0.0))
-        };
-        let heard = (0..forward.speeds_m_s.len()).into_par_iter().map(hears);
-        let heard: Vec<bool> = heard.collect::<Result<_, CalibrationError>>()?;
-        Ok(heard.into_iter().filter(|is_heard| *is_heard).count())
+        (0..forward.speeds_m_s.len())
+            .into_par_iter()
+            .map(|speed| of(&self.observe(|row| row / forward.bands.count() != speed)?))
+            .collect()
     }
 
     /// One search: all candidates screened and, if there is anything, the best fitted; kinds that are
@@ -172,6 +180,14 @@ impl<'a> Setting<'a> {
 pub(super) fn is_predicted(gains: &[f64]) -> bool {
     let lost = gains.iter().filter(|gain| **gain <= 0.0).count();
     gains.is_empty() || (gains.iter().sum::<f64>() >= HELD_OUT_MIN && lost <= 1)
+}
+
+/// Whether something unknown with so much evidence at all speeds together is where it is at all of
+/// them: two speeds hear it, each `alone`, or all together hear it better than any of them. Nothing
+/// speaks against one speed.
+pub(super) fn stays(together: f64, alone: &[f64]) -> bool {
+    let hear = alone.iter().filter(|evidence| **evidence > 0.0).count();
+    alone.len() < 2 || hear >= 2 || alone.iter().all(|evidence| *evidence < together)
 }
 
 /// The best candidate, if its unknown rival does not speak against it and it is sure enough beside

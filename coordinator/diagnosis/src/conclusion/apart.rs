@@ -1,0 +1,37 @@
+//! Speeds that do not agree about the track.
+
+use super::{Evidence, FAILED_SHARE};
+use crate::finding::{Finding, Place};
+use crate::outcome::Hypothesis;
+use std::collections::BTreeMap;
+
+impl Evidence<'_> {
+    /// Nothing is named on a track that the speeds do not agree about: their positions are wrong.
+    pub(super) fn add_apart(&self, all: &mut Vec<Hypothesis>) {
+        let Some(evidence) = self.apart() else { return };
+        for known in all.iter_mut() {
+            known.accepted = false;
+            known.probability *= FAILED_SHARE;
+        }
+        let finding = Finding {
+            physics: "position_error",
+            p_value: self.search.apart_p_value(),
+            place: Place::Everywhere,
+            parameters: BTreeMap::new(),
+            evidence,
+        };
+        self.add_finding(&finding, all);
+    }
+
+    /// What a reader should know of it, if it is so.
+    pub(super) fn apart(&self) -> Option<String> {
+        self.search.is_apart().then(|| {
+            format!(
+                "The speeds do not agree about the track: one for each explains the recording better \
+                 than one for all, by {:.0} nats. Positions of some pass belong to another place, or to \
+                 the other rail.",
+                self.search.apart
+            )
+        })
+    }
+}
