@@ -45,8 +45,8 @@ impl Evidence<'_> {
         }
         if round.port_strays {
             return Some(format!(
-                "Something is left{place} that chance does not explain (p = {:.1e}), but at one speed \
-                 only: what stays where it is, all of them pass.",
+                "Something is left{place} that chance does not explain (p = {:.1e}), but no two speeds \
+                 hear it there: what stays where it is, all of them pass.",
                 round.p_value
             ));
         }

@@ -1,10 +1,11 @@
 //! Whether all speeds passed the same track.
 
-use super::chance::median;
+use super::chance::squares;
 use super::probability::TEMPERATURE;
 use super::round::{FALSE_ALARM, Setting};
 use super::{Round, Search};
-use crate::calibration::{Calibration, CalibrationError, Problem};
+use crate::along::median;
+use crate::calibration::{CalibrationError, Problem};
 
 impl Search {
     /// Compares what was found with a track of its own for each speed, and takes it back if that is
@@ -26,12 +27,14 @@ impl Search {
         let left = self.rounds.last().filter(|last| !last.accepted).map_or(0.0, Round::most);
         let together = self.last.log_evidence - self.observation.log_deviation() + left;
         let sleepers = forward.section.sleepers;
-        let mut gains = misfit(&self.last, sleepers);
+        let mut gains = squares(&self.last.residual, sleepers);
         for (alone, _) in &each {
-            gains.iter_mut().zip(misfit(alone, sleepers)).for_each(|(gain, left)| *gain -= left);
+            let left = squares(&alone.residual, sleepers);
+            gains.iter_mut().zip(left).for_each(|(gain, left)| *gain -= left);
         }
         // What is wrong at one place is wrong with the track there, not with where the passes were.
-        self.apart = alone - together - gains.iter().sum::<f64>() + sleepers as f64 * median(gains);
+        let all: f64 = gains.iter().sum();
+        self.apart = alone - together + 0.5 * (sleepers as f64 * median(gains) - all);
         if self.is_apart() {
             self.accepted.clear();
             self.last = self.baseline.clone();
@@ -59,12 +62,4 @@ impl Round {
         let unknown = self.port.as_ref().map(|port| port.log_evidence);
         named.into_iter().chain(unknown).fold(0.0, f64::max)
     }
-}
-
-/// What a fit leaves at each sleeper, in nats.
-fn misfit(fit: &Calibration, sleepers: usize) -> Vec<f64> {
-    let rows = fit.residual.len() / sleepers;
-    (0..sleepers)
-        .map(|sleeper| 0.5 * fit.residual.rows(sleeper * rows, rows).norm_squared())
-        .collect()
 }

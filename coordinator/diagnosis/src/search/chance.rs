@@ -1,5 +1,6 @@
 //! How probable such evidence is if nothing is left out: from simulations of nothing left out.
 
+use crate::along::median;
 use crate::calibration::Calibration;
 use crate::observation::Observation;
 use nalgebra::DVector;
@@ -30,11 +31,7 @@ pub(super) fn whitened(
 /// By how much the recording scatters about the model more than null simulations about theirs,
 /// at least one: the median over the sleepers, which one place does not change.
 pub(super) fn excess(current: &Calibration, nulls: &[Null], sleepers: usize) -> f64 {
-    let square = |residual: &DVector<f64>| {
-        let size = residual.len() / sleepers;
-        let of = |sleeper: usize| residual.rows(sleeper * size, size).norm_squared();
-        median((0..sleepers).map(of).collect())
-    };
+    let square = |residual: &DVector<f64>| median(squares(residual, sleepers));
     let fitted = |null: &Null| {
         square(&(&null.residual - &current.jacobian * current.precision.solve(&null.felt)))
     };
@@ -65,7 +62,8 @@ fn gumbel_tail(maxima: &[f64], value: f64) -> f64 {
     -(-(-(value - location) / scale).exp()).exp_m1()
 }
 
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+/// Sum of a whitened residual's squares at each sleeper.
+pub(super) fn squares(residual: &DVector<f64>, sleepers: usize) -> Vec<f64> {
+    let size = residual.len() / sleepers;
+    (0..sleepers).map(|sleeper| residual.rows(sleeper * size, size).norm_squared()).collect()
 }

@@ -73,8 +73,8 @@ pub struct Round {
     pub port: Option<Port>,
     /// Probability to see as much evidence for one if nothing is left out.
     pub port_p_value: f64,
-    /// Whether one speed alone has more evidence for it than all together, and no other speed any; asked
-    /// where nothing is named.
+    /// Whether no two speeds have evidence for it, each alone, nor all together more than one of them;
+    /// asked where nothing is named.
     pub port_strays: bool,
     /// Gain of the best on each speed held out, in nats.
     pub held_out_gain: Vec<f64>,
