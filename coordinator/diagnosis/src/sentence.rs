@@ -26,11 +26,18 @@ pub(crate) fn sentence(
             Some(_) => "improves the prediction of speeds that were held out",
             None => "explains it better; a second speed would make that sure",
         };
-        return format!(
-            "Simulation and recording agree ({:.0} %): with every sleeper's stiffness, level and \
-             spectrum re-tuned, nothing that the catalogue knows {tested}.",
-            100.0 * nothing_left_out
+        let tested = format!(
+            "with every sleeper's stiffness, level and spectrum re-tuned, nothing that the catalogue \
+             knows {tested}"
         );
+        let percent = 100.0 * nothing_left_out.max(1.0 - nothing_left_out);
+        return if nothing_left_out >= 0.5 {
+            format!("Simulation and recording agree ({percent:.0} %): {tested}.")
+        } else {
+            format!(
+                "Nothing can be named: {tested}. Yet something seems left out ({percent:.0} %)."
+            )
+        };
     };
     let others = accepted.map(|other| format!(" Also: {}", named(other, sleepers)));
     let found = capital(&named(first, sleepers)) + &others.collect::<String>();
@@ -121,6 +128,23 @@ mod tests {
             detectability: 9.0,
             log_evidence: 40.0,
         }
+    }
+
+    #[test]
+    fn where_nothing_is_named_agreement_is_not_said_of_what_seems_left_out() {
+        let held_out = Some(Score { score: -1.0 });
+        let scores = Scores { in_sample: Score { score: -1.0 }, held_out };
+        let (score, held_out_gain_nats) = (String::new(), BTreeMap::new());
+        let fit = Fit { score, before: scores, after: scores, held_out_gain_nats };
+        let said = |nothing_left_out: f64| {
+            sentence(Verdict::Consistent, &[], nothing_left_out, 25, &fit, &BTreeMap::new())
+        };
+        assert!(
+            said(0.92).starts_with("Simulation and recording agree (92 %): with every sleeper")
+        );
+        let doubt = said(0.03);
+        assert!(doubt.starts_with("Nothing can be named: with every sleeper"), "{doubt}");
+        assert!(doubt.ends_with("Yet something seems left out (97 %)."), "{doubt}");
     }
 
     #[test]

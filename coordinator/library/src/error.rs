@@ -105,6 +105,17 @@ pub enum LibraryError {
         /// The campaign.
         id: String,
     },
+    /// A trial's case that was sealed with another truth.
+    #[error(
+        "the library's trial {trial} hides something else in case {number}; take another seed, or the \
+         program that began it"
+    )]
+    OtherTruth {
+        /// The trial.
+        trial: String,
+        /// Number of the case.
+        number: u32,
+    },
     /// A seed that SQL's signed integers cannot hold.
     #[error("the seed {seed} is too large; it must stay below 2^63")]
     SeedTooLarge {
@@ -179,6 +190,7 @@ impl LibraryError {
                 | Self::UnknownCampaign { .. }
                 | Self::UnknownWorker { .. }
                 | Self::OtherDefinition { .. }
+                | Self::OtherTruth { .. }
                 | Self::SeedTooLarge { .. }
                 | Self::OnlyReads
                 | Self::BadQuery { .. }

@@ -24,6 +24,7 @@ mod report;
 mod result;
 mod state;
 mod tally;
+mod trial;
 mod worker;
 
 pub use array::StoredArray;
@@ -43,4 +44,5 @@ pub use provenance::{
 pub use report::{CaseReport, Report, Verdict};
 pub use result::LibraryEntry;
 pub use state::{CampaignState, Ending, Policy, State};
+pub use trial::{Question, TrialAnswer, TrialRecord};
 pub use worker::{Registration, WorkerRecord, WorkerState};

@@ -14,8 +14,9 @@ use tracktwin_surrogate::Trained;
 #[derive(Args)]
 #[command(
     after_help = "In DIR: recordings/, sealed/ (the truth), seals.sha256 (check it with `sha256sum -c`), \
-diagnoses/, scores/, and trial.md with the tables. The same command on the same folder goes on where it was \
-interrupted.\n\nExit codes: 0 all goals reached, 1 some are not, 2 wrong input, 3 failure."
+diagnoses/, scores.jsonl, and trial.md with the tables. The same command goes on where it was interrupted. \
+Started on several nodes with the same --library, it shares the cases among them; a node that dies loses \
+its case to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 2 wrong input, 3 failure."
 )]
 pub(super) struct Arguments {
     /// How many recordings are made and diagnosed.
@@ -24,10 +25,11 @@ pub(super) struct Arguments {
     /// Decides what is hidden in which case.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
-    /// Folder of the trial.
+    /// Folder of this node's files.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The library that keeps null simulations; by default one in DIR.
+    /// The library that keeps answers and null simulations; by default one in DIR. Nodes that share
+    /// it share the trial.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
     library: Option<String>,
     /// Diagnose every single effect once more with its kind left out of the catalogue: the answer
@@ -63,16 +65,25 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         }
         None => None,
     };
-    let trial = Trial { seed, cases, folder: out, knock_out, shuffle, paper, discard_recordings };
-    trial.begin().map_err(stop)?;
-
-    let mut progress = Progress::begin("hiding", 0, u64::from(cases));
-    let digest = trial.hide(|done, remark| progress.at(done, remark)).map_err(stop)?;
-    progress.end();
+    let node = tracktwin_worker::agent::unique_name();
+    let trial = Trial {
+        seed,
+        cases,
+        folder: out,
+        library,
+        node,
+        knock_out,
+        shuffle,
+        paper,
+        discard_recordings,
+    };
+    let digest = trial.begin().await.map_err(stop)?;
     say(&format!("sealed: {cases} truths, SHA-256 of seals.sha256 {digest}"));
+    let done = trial.answered().await.map_err(stop)?;
+    say(&format!("trial {} in {}: {done} of {cases} answered", trial.id(), trial.library.name()));
 
-    let mut progress = Progress::begin("diagnosing", trial.scored(), u64::from(cases));
-    let answered = trial.answer(&library, |done, remark| progress.at(done, remark)).await;
+    let mut progress = Progress::begin("diagnosing", done, u64::from(cases));
+    let answered = trial.answer(|done, remark| progress.at(done, remark)).await;
     progress.end();
     let summary = answered.map_err(stop)?;
     summary
@@ -87,6 +98,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 fn stop(error: TrialError) -> Stop {
     match error {
         TrialError::Other { .. } | TrialError::Seal(_) => Stop::Input(error.into()),
+        TrialError::Library(ref reason) if reason.is_wrong_input() => Stop::Input(error.into()),
         _ => Stop::Failure(error.into()),
     }
 }

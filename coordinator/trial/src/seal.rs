@@ -40,6 +40,25 @@ impl Seals {
         }
     }
 
+    /// Makes sure that what both have sealed is the same.
+    ///
+    /// # Errors
+    /// [`SealError::Broken`] names the first file that isn't.
+    pub fn agree(&self, other: &Self) -> Result<(), SealError> {
+        let differs = |(name, digest): &(&String, &String)| {
+            other.0.get(*name).is_some_and(|other| other != *digest)
+        };
+        match self.0.iter().find(differs) {
+            Some((name, _)) => Err(SealError::Broken(name.clone())),
+            None => Ok(()),
+        }
+    }
+
+    /// The SHA-256 of each file, by name.
+    pub fn digests(&self) -> impl Iterator<Item = &str> {
+        self.0.values().map(String::as_str)
+    }
+
     /// How many files are sealed.
     ///
     /// # Panics

@@ -53,6 +53,13 @@ pub(crate) struct Bed {
     pub(crate) gap_m: Option<f64>,
 }
 
+impl Bed {
+    /// Stiffness and damping of ballast that the sleeper never leaves: none behind a gap.
+    fn held(&self) -> [f64; 2] {
+        if self.gap_m.is_some() { [0.0; 2] } else { [self.stiffness, self.damping] }
+    }
+}
+
 /// A sleeper on its bed as a system with the railpad's force as first input; where it may lift
 /// off, generalised forces on every mode follow.
 #[derive(Clone, Debug)]
@@ -175,7 +182,7 @@ impl SleeperModes {
                 depth_m,
                 stiffness: bed.stiffness,
                 damping: bed.damping,
-                along: self.along.clone(),
+                along: self.along.iter().map(|shape| on_layer(shape, layers)).collect(),
                 weights: self.weights.clone(),
             }),
         }
@@ -187,15 +194,15 @@ impl SleeperModes {
         let mut stiffness = DMatrix::zeros(dofs, dofs);
         // A bolt is a point load: what the cut modes give way there is in series with it.
         let bolt = bed.bolt / (1.0 + bed.bolt * self.tip_residual / scale);
-        let linear = if bed.gap_m.is_some() { [0.0; 2] } else { [bed.stiffness, bed.damping] };
+        let [ballast, ballast_damping] = bed.held();
         for a in 0..MODES {
             let omega = (self.squares[a] * scale).sqrt();
             stiffness[(a, a)] += omega * omega;
             damping[(a, a)] += 2.0 * DAMPING_RATIO * omega;
             for b in 0..MODES {
                 let shared = self.mean(|shape| shape[a] * shape[b]);
-                stiffness[(a, b)] += linear[0] * shared + bolt * self.tip[a] * self.tip[b];
-                damping[(a, b)] += linear[1] * shared;
+                stiffness[(a, b)] += ballast * shared + bolt * self.tip[a] * self.tip[b];
+                damping[(a, b)] += ballast_damping * shared;
             }
         }
         [DMatrix::identity(dofs, dofs), damping, stiffness]
@@ -205,9 +212,10 @@ impl SleeperModes {
     fn add_layer(&self, bed: &Bed, layer: [f64; 3], matrices: &mut [DMatrix<f64>; 3]) {
         let [mass_kg, stiffness_n_m, damping_n_s_m] = layer;
         let [mass, damping, stiffness] = matrices;
+        let [ballast, ballast_damping] = bed.held();
         mass[(MODES, MODES)] = mass_kg;
         for (matrix, ballast, ground) in
-            [(damping, bed.damping, damping_n_s_m), (stiffness, bed.stiffness, stiffness_n_m)]
+            [(damping, ballast_damping, damping_n_s_m), (stiffness, ballast, stiffness_n_m)]
         {
             matrix[(MODES, MODES)] = ballast + ground;
             for mode in 0..MODES {
@@ -235,6 +243,12 @@ impl SleeperModes {
 /// `E I` of the nominal section in N m2.
 const fn nominal_bending() -> f64 {
     YOUNG_PA * SLEEPER_SECOND_MOMENT_M4
+}
+
+/// What presses the ballast at a place by degree of freedom: the sleeper from above, and from below
+/// the layer that it lies on, if there is one.
+fn on_layer(shape: &[f64], layers: usize) -> Vec<f64> {
+    shape.iter().copied().chain(std::iter::repeat_n(-1.0, layers)).collect()
 }
 
 /// Mass and stiffness of the nominal section in the polynomials' coefficients.
@@ -416,5 +430,22 @@ mod tests {
         assert_eq!(forces_at(0.9e-4, 1.0), 0.0);
         assert!((forces_at(1.5e-4, 0.1) - (1.2e7 * 5e-5 + 90.0)).abs() < 1e-6);
         assert_eq!(forces_at(1.5e-4, -10.0), 0.0);
+    }
+
+    #[test]
+    fn ballast_between_a_gap_and_a_layer_pushes_both() {
+        let modes = SleeperModes::new(1.0);
+        let bed = Bed { gap_m: Some(1e-4), layer: Some([3.0, 6e7, 2e3]), ..bed() };
+        let sleeper = modes.on(&bed, STEP_S);
+        // Where it hangs, nothing but the railpad carries it.
+        assert!(sleeper.flexibility > 1e-5, "{}", sleeper.flexibility);
+        let mut state = vec![0.0; 2 * (MODES + 1)];
+        state[0] = 1.5e-4 / modes.seat[0];
+        state[MODES] = 2e-5;
+        let mut forces = vec![0.0; MODES + 1];
+        sleeper.gap.unwrap().push(&state, &mut forces);
+        // Less by what the layer has given way.
+        assert!((-forces[0] / modes.seat[0] - 1.2e7 * 3e-5).abs() < 1e-6);
+        assert!((forces[MODES] - 1.2e7 * 3e-5).abs() < 1e-6);
     }
 }

@@ -51,8 +51,9 @@ macro_rules! tables {
 
 impl Table {
     /// All tables, those first that others refer to. What follows from others is not among them:
-    /// counts of cases.
-    pub const ALL: [&'static Self; 16] = [
+    /// counts of cases; nor are the
+    /// leases of trials, which don't travel.
+    pub const ALL: [&'static Self; 19] = [
         &CAMPAIGN,
         &CAMPAIGN_CASE,
         &FREQUENCY_BIN,
@@ -68,6 +69,9 @@ impl Table {
         &DIAGNOSIS,
         &MISMATCH,
         &HYPOTHESIS,
+        &TRIAL,
+        &TRIAL_CASE,
+        &TRIAL_ANSWER,
         &STORED_ARRAY,
     ];
 
@@ -192,6 +196,16 @@ tables! {
     HYPOTHESIS = "hypothesis" by ["diagnosis_id", "place"] {
         "diagnosis_id" Text, "place" Integer, "physics" Text, "probability" Real,
         "from_x_m" Real, "to_x_m" Real, "parameters" Text,
+    }
+    TRIAL = "trial" by ["id"] {
+        "id" Text, "seed" Integer, "code_version" Text, "model_hash" Text, "created_at" Text,
+    }
+    TRIAL_CASE = "trial_case" by ["trial_id", "case_number"] {
+        "trial_id" Text, "case_number" Integer, "truth_sha256" Text,
+    }
+    TRIAL_ANSWER = "trial_answer" by ["trial_id", "case_number", "question"] {
+        "trial_id" Text, "case_number" Integer, "question" Text, "diagnosis_id" Text,
+        "score" Text, "worker" Text, "answered_at" Text,
     }
     STORED_ARRAY = "stored_array" by ["key"] {
         "key" Text, "kind" Text, "meta" Text, "numbers" Doubles, "created_at" Text,

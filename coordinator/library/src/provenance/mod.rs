@@ -12,7 +12,7 @@ pub use evaluation::{EvaluationRecord, SleeperRecord};
 pub use training::{SurrogateRecord, TrainingRecord};
 
 /// Hash of texts in order, 128 bits in hexadecimal.
-fn id(kind: &str, texts: &[&str]) -> String {
+pub(crate) fn id(kind: &str, texts: &[&str]) -> String {
     let mut hasher = blake3::Hasher::new_derive_key(kind);
     for text in texts {
         // The length keeps neighbouring texts apart.

@@ -12,5 +12,6 @@ mod provenance;
 mod queue;
 mod results;
 mod support;
+mod trials;
 mod upgrade;
 mod workers;

@@ -1,0 +1,314 @@
+//! Blind trials: the tables `trial`, `trial_case`, `trial_answer` and `trial_lease`.
+//!
+//! Any number of nodes share a trial. Which cases have something left to be asked is theirs to say,
+//! for it follows from the answers; who works on one stands here, and an answer is kept once.
+
+use crate::campaign::sql_seed;
+use crate::engine::{Connection, Row, Write, sql};
+use crate::{DiagnosisRecord, Library, LibraryError};
+
+/// Hexadecimal digits of the hash in a trial's id.
+const HASH_DIGITS: usize = 12;
+
+/// A trial as the library keeps it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TrialRecord {
+    /// Decides what is hidden in which case; below 2^63.
+    pub seed: u64,
+    /// Version of the program.
+    pub code_version: String,
+    /// Hash of the physics that it simulates.
+    pub model_hash: String,
+    /// SHA-256 of each case's truth, from case 0.
+    pub seals: Vec<String>,
+}
+
+/// What is asked of a case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Question {
+    /// A diagnosis that knows the whole catalogue.
+    Catalogue,
+    /// A diagnosis that does not know what is hidden.
+    KnockedOut,
+    /// A diagnosis of shuffled sleepers.
+    Shuffled,
+    /// The paper's own pipeline.
+    Paper,
+}
+
+/// A question answered and scored.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TrialAnswer {
+    /// Number of the case.
+    pub number: u32,
+    /// What was asked.
+    pub question: Question,
+    /// The score, as JSON.
+    pub score_json: String,
+}
+
+impl TrialRecord {
+    /// Seed and hash of the program: nodes whose programs differ don't share a trial.
+    pub fn id(&self) -> String {
+        let hash = crate::provenance::id(
+            "tracktwin trial 1",
+            &[&self.seed.to_string(), &self.code_version, &self.model_hash],
+        );
+        format!("{}-{}", self.seed, &hash[..HASH_DIGITS])
+    }
+}
+
+impl Library {
+    /// Stores a trial's seals, or makes sure that they are those that are stored; a longer trial of
+    /// the same seed adds to a shorter one.
+    ///
+    /// # Errors
+    /// [`LibraryError::OtherTruth`] when a case is sealed with another truth.
+    pub async fn seal_trial(&self, trial: TrialRecord) -> Result<(), LibraryError> {
+        self.write(trial).await
+    }
+
+    /// All answers of a trial, by case.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn trial_answers(&self, trial: &str) -> Result<Vec<TrialAnswer>, LibraryError> {
+        let ask = "select case_number, question, score from trial_answer where trial_id = $1
+            order by case_number, question";
+        let rows = self.readers().rows(sql(ask).bind(trial)).await?;
+        rows.iter().map(answer).collect()
+    }
+
+    /// Leases the first of these cases that nobody works on.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn lease_trial_case(
+        &self,
+        trial: &str,
+        worker: &str,
+        of: Vec<u32>,
+        lease_ms: i64,
+    ) -> Result<Option<u32>, LibraryError> {
+        let of = of.into_iter().map(i64::from).collect();
+        let now_unix_ms = self.now_unix_ms();
+        let until_unix_ms = now_unix_ms.saturating_add(lease_ms);
+        let (trial, worker) = (trial.to_owned(), worker.to_owned());
+        self.write(Take { trial, worker, of, now_unix_ms, until_unix_ms }).await
+    }
+
+    /// Lets a lease last for so long from now, if it is the worker's still.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn renew_trial_case(
+        &self,
+        trial: &str,
+        worker: &str,
+        number: u32,
+        lease_ms: i64,
+    ) -> Result<(), LibraryError> {
+        let until_unix_ms = Some(self.now_unix_ms().saturating_add(lease_ms));
+        let (trial, worker) = (trial.to_owned(), worker.to_owned());
+        self.write(Keep { trial, worker, number, until_unix_ms }).await
+    }
+
+    /// Gives a case back.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn release_trial_case(
+        &self,
+        trial: &str,
+        worker: &str,
+        number: u32,
+    ) -> Result<(), LibraryError> {
+        let (trial, worker) = (trial.to_owned(), worker.to_owned());
+        self.write(Keep { trial, worker, number, until_unix_ms: None }).await
+    }
+
+    /// Keeps an answer, and the diagnosis that it is the score of; a question that is answered
+    /// already stays as it is.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn record_trial_answer(
+        &self,
+        trial: &str,
+        worker: &str,
+        answer: TrialAnswer,
+        diagnosis: Option<DiagnosisRecord>,
+    ) -> Result<(), LibraryError> {
+        let (trial, worker) = (trial.to_owned(), worker.to_owned());
+        self.write(Told { trial, worker, answer, diagnosis }).await
+    }
+}
+
+impl Question {
+    const ALL: [Self; 4] = [Self::Catalogue, Self::KnockedOut, Self::Shuffled, Self::Paper];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Catalogue => "catalogue",
+            Self::KnockedOut => "knocked_out",
+            Self::Shuffled => "shuffled",
+            Self::Paper => "paper",
+        }
+    }
+}
+
+fn answer(row: &Row) -> Result<TrialAnswer, LibraryError> {
+    let name: String = row.get("question")?;
+    let question = Question::ALL.into_iter().find(|question| question.name() == name);
+    let damaged = || LibraryError::Damaged { what: format!("a question `{name}` in a trial") };
+    Ok(TrialAnswer {
+        number: row.get_u32("case_number")?,
+        question: question.ok_or_else(damaged)?,
+        score_json: row.get("score")?,
+    })
+}
+
+impl Write for TrialRecord {
+    type Answer = ();
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let id = self.id();
+        let insert = format!(
+            "insert into trial (id, seed, code_version, model_hash, created_at)
+            values ($1, $2, $3, $4, {}) on conflict (id) do nothing",
+            connection.dialect().now()
+        );
+        let insert = sql(insert)
+            .bind(&id)
+            .bind(sql_seed(self.seed)?)
+            .bind(&self.code_version)
+            .bind(&self.model_hash);
+        connection.execute(insert).await?;
+        for (number, seal) in (0_u32..).zip(&self.seals) {
+            let insert = "insert into trial_case (trial_id, case_number, truth_sha256)
+                values ($1, $2, $3) on conflict (trial_id, case_number) do nothing";
+            connection.execute(sql(insert).bind(&id).bind(number).bind(seal)).await?;
+        }
+        let ask = "select case_number, truth_sha256 from trial_case where trial_id = $1";
+        for row in connection.rows(sql(ask).bind(&id)).await? {
+            let number = row.get_u32("case_number")?;
+            let stored: String = row.get("truth_sha256")?;
+            if self.seals.get(number as usize).is_some_and(|seal| *seal != stored) {
+                return Err(LibraryError::OtherTruth { trial: id, number });
+            }
+        }
+        Ok(())
+    }
+}
+
+struct Take {
+    trial: String,
+    worker: String,
+    of: Vec<i64>,
+    now_unix_ms: i64,
+    until_unix_ms: i64,
+}
+
+impl Write for Take {
+    type Answer = Option<u32>;
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
+    async fn apply(&self, connection: &mut Connection) -> Result<Option<u32>, LibraryError> {
+        let dialect = connection.dialect();
+        let take = format!(
+            "with next as (
+                select trial_id as next_trial, case_number as next_number from trial_case
+                where trial_id = $1 and case_number {} and not exists (
+                    select 1 from trial_lease where trial_lease.trial_id = trial_case.trial_id
+                        and trial_lease.case_number = trial_case.case_number
+                        and lease_expires_unix_ms > $4)
+                order by case_number limit 1 {})
+            insert into trial_lease (trial_id, case_number, worker, lease_expires_unix_ms)
+            select next_trial, next_number, $3, $5 from next where true
+            on conflict (trial_id, case_number) do update
+                set worker = excluded.worker,
+                    lease_expires_unix_ms = excluded.lease_expires_unix_ms
+                where trial_lease.lease_expires_unix_ms <= $4
+            returning case_number",
+            dialect.listed("$2"),
+            dialect.skipping_locked()
+        );
+        let take = sql(take)
+            .bind(&self.trial)
+            .bind(self.of.clone())
+            .bind(&self.worker)
+            .bind(self.now_unix_ms)
+            .bind(self.until_unix_ms);
+        connection.row(take).await?.map(|row| row.get_u32("case_number")).transpose()
+    }
+}
+
+/// Keeps a lease until then, or gives it back.
+struct Keep {
+    trial: String,
+    worker: String,
+    number: u32,
+    until_unix_ms: Option<i64>,
+}
+
+impl Write for Keep {
+    type Answer = ();
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let theirs = "where trial_id = $1 and case_number = $2 and worker = $3";
+        let keep = match self.until_unix_ms {
+            Some(_) => format!("update trial_lease set lease_expires_unix_ms = $4 {theirs}"),
+            None => format!("delete from trial_lease {theirs}"),
+        };
+        let keep = sql(keep).bind(&self.trial).bind(self.number).bind(&self.worker);
+        let keep = match self.until_unix_ms {
+            Some(until_unix_ms) => keep.bind(until_unix_ms),
+            None => keep,
+        };
+        connection.execute(keep).await.map(drop)
+    }
+}
+
+struct Told {
+    trial: String,
+    worker: String,
+    answer: TrialAnswer,
+    diagnosis: Option<DiagnosisRecord>,
+}
+
+impl Write for Told {
+    type Answer = ();
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let diagnosis = match &self.diagnosis {
+            Some(diagnosis) => Some(diagnosis.apply(connection).await?),
+            None => None,
+        };
+        let insert = format!(
+            "insert into trial_answer (trial_id, case_number, question, diagnosis_id, score, worker,
+                answered_at)
+            values ($1, $2, $3, $4, $5, $6, {})
+            on conflict (trial_id, case_number, question) do nothing",
+            connection.dialect().now()
+        );
+        let insert = sql(insert)
+            .bind(&self.trial)
+            .bind(self.answer.number)
+            .bind(self.answer.question.name())
+            .bind(diagnosis)
+            .bind(&self.answer.score_json)
+            .bind(&self.worker);
+        connection.execute(insert).await.map(drop)
+    }
+}

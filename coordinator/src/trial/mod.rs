@@ -1,0 +1,271 @@
+//! A blind trial: truths sealed, recordings made, diagnosed, opened and scored, by as many nodes as
+//! share a library.
+//!
+//! Owns the order of things and the folder's files; what is hidden and how answers are scored is the
+//! trial crate's, who works on which case stands in the library, and so do the answers: a trial that
+//! was interrupted goes on.
+
+mod case;
+mod lease;
+mod scores;
+
+use crate::diagnosing::DiagnosingError;
+use crate::evaluating::Evaluator;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tracktwin_diagnosis::CalibrationError;
+use tracktwin_library::{Library, LibraryError, TrialRecord};
+use tracktwin_signal::recording::RecordingError;
+use tracktwin_trial::{Score, SealError, Seals, Summary};
+use tracktwin_truth::TruthError;
+use tracktwin_worker::{CODE_VERSION, MODEL_HASH};
+
+/// File of the seals.
+const SEALS: &str = "seals.sha256";
+
+/// How long a node waits for the cases that others work on before it looks again.
+const WAIT: Duration = Duration::from_secs(2);
+
+/// A trial, as one node takes part in it.
+pub struct Trial {
+    /// Decides what is hidden.
+    pub seed: u64,
+    /// How many cases.
+    pub cases: u32,
+    /// Where this node keeps its files.
+    pub folder: PathBuf,
+    /// Where all nodes keep their answers.
+    pub library: Library,
+    /// What this node is called.
+    pub node: String,
+    /// Whether single effects are diagnosed again without their kind.
+    pub knock_out: bool,
+    /// Whether local effects that were found are diagnosed again with shuffled sleepers.
+    pub shuffle: bool,
+    /// The models of the paper's pipeline, if it is to be asked too.
+    pub paper: Option<Evaluator>,
+    /// Whether recordings are removed once they are scored.
+    pub discard_recordings: bool,
+}
+
+/// What a folder's trial is.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Terms {
+    seed: u64,
+    code_version: String,
+}
+
+/// Why a trial ends before its time.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// The folder holds another trial.
+    #[error(
+        "{folder}: holds a trial of seed {seed} by version {version}; take another folder with --out, or the same seed"
+    )]
+    Other {
+        /// The folder.
+        folder: String,
+        /// Seed of the trial there.
+        seed: u64,
+        /// Version of the program that began it.
+        version: String,
+    },
+    /// The library fails, or refuses.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
+    /// A truth was changed.
+    #[error(transparent)]
+    Seal(#[from] SealError),
+    /// A recording cannot be made.
+    #[error(transparent)]
+    Truth(#[from] TruthError),
+    /// A recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A diagnosis broke down.
+    #[error("case {number}: {source}")]
+    Diagnosis {
+        /// Number of the case.
+        number: u32,
+        /// Why.
+        source: DiagnosingError,
+    },
+    /// The paper's pipeline can't be asked.
+    #[error("case {number}: {source}")]
+    Paper {
+        /// Number of the case.
+        number: u32,
+        /// Why.
+        source: tracktwin_evaluation::Error,
+    },
+    /// The truth makes no track.
+    #[error(transparent)]
+    Model(#[from] CalibrationError),
+    /// A file is not what it was.
+    #[error("{path}: {source}")]
+    Json {
+        /// The file.
+        path: String,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// A file cannot be read or written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+impl Trial {
+    /// What the trial is called in the library.
+    pub fn id(&self) -> String {
+        self.record(Vec::new()).id()
+    }
+
+    /// Makes the folder, or makes sure that it holds this trial; seals all truths, here and in the
+    /// library, before anything is diagnosed. Gives the digest of all seals.
+    ///
+    /// # Errors
+    /// [`TrialError::Other`] when the folder holds another trial, [`TrialError::Seal`] when seals
+    /// were changed.
+    pub async fn begin(&self) -> Result<String, TrialError> {
+        for part in ["recordings", "sealed", "diagnoses"] {
+            let path = self.folder.join(part);
+            std::fs::create_dir_all(&path).map_err(|source| file(&path, source))?;
+        }
+        self.begin_folder()?;
+        let mut seals = Seals::default();
+        for number in 0..self.cases {
+            let content = text(&tracktwin_trial::plan(self.seed, number).scene);
+            seals.seal(&sealed(number), content.as_bytes());
+            let truth = self.folder.join(sealed(number));
+            if !truth.exists() {
+                std::fs::write(&truth, content).map_err(|source| file(&truth, source))?;
+            }
+        }
+        let digests = seals.digests().map(str::to_owned).collect();
+        self.library.seal_trial(self.record(digests)).await?;
+        self.seal_folder(&seals)
+    }
+
+    /// How many cases have all their answers.
+    ///
+    /// # Errors
+    /// [`TrialError`] when the library cannot be read.
+    pub async fn answered(&self) -> Result<u64, TrialError> {
+        let scores = self.scores().await?;
+        Ok(u64::from(self.cases) - self.open(&scores).len() as u64)
+    }
+
+    /// Works on the cases that lack an answer and that no other node works on, until none lacks one;
+    /// then sums up.
+    ///
+    /// # Errors
+    /// [`TrialError`] when a seal is broken or a diagnosis breaks down.
+    pub async fn answer(&self, mut progress: impl FnMut(u64, &str)) -> Result<Summary, TrialError> {
+        loop {
+            let scores = self.scores().await?;
+            let open = self.open(&scores);
+            if open.is_empty() {
+                let scores: Vec<Score> = scores.into_values().map(|case| case.score).collect();
+                return self.sum_up(&scores);
+            }
+            let done = u64::from(self.cases) - open.len() as u64;
+            let others = open.len();
+            if let Some(number) = self.lease(open).await? {
+                progress(done, &format!("case {number}"));
+                self.work_on(number).await?;
+            } else {
+                progress(done, &format!("waiting for other nodes: {others}"));
+                tokio::time::sleep(WAIT).await;
+            }
+        }
+    }
+
+    /// The cases that lack an answer.
+    fn open(&self, scores: &scores::Scores) -> Vec<u32> {
+        let lacks = |number: &u32| !self.unanswered(scores.get(number)).is_empty();
+        (0..self.cases).filter(lacks).collect()
+    }
+
+    fn sum_up(&self, scores: &[Score]) -> Result<Summary, TrialError> {
+        let summary = Summary::new(scores);
+        write(&self.folder.join("summary.json"), &summary)?;
+        let line = |score| serde_json::to_string(score).expect("plain data is plain JSON") + "\n";
+        let path = self.folder.join("scores.jsonl");
+        let lines: String = scores.iter().map(line).collect();
+        std::fs::write(&path, lines).map_err(|source| file(&path, source))?;
+        let path = self.folder.join("trial.md");
+        let tables = format!(
+            "Trial of seed {}, {} cases, version {CODE_VERSION}.\n\n{}",
+            self.seed,
+            self.cases,
+            summary.to_markdown(scores)
+        );
+        std::fs::write(&path, tables).map_err(|source| file(&path, source))?;
+        Ok(summary)
+    }
+
+    /// Makes sure that the folder's trial is this one.
+    fn begin_folder(&self) -> Result<(), TrialError> {
+        let path = self.folder.join("trial.json");
+        let terms = Terms { seed: self.seed, code_version: CODE_VERSION.to_owned() };
+        let Ok(content) = std::fs::read(&path) else { return write(&path, &terms) };
+        let known: Terms = serde_json::from_slice(&content)
+            .map_err(|source| TrialError::Json { path: path.display().to_string(), source })?;
+        if known == terms {
+            return Ok(());
+        }
+        Err(TrialError::Other {
+            folder: self.folder.display().to_string(),
+            seed: known.seed,
+            version: known.code_version,
+        })
+    }
+
+    /// Writes the seals down, or makes sure that they are those that were; gives their digest.
+    fn seal_folder(&self, seals: &Seals) -> Result<String, TrialError> {
+        let path = self.folder.join(SEALS);
+        if let Ok(known) = std::fs::read_to_string(&path) {
+            let known = Seals::from_text(&known)?;
+            // A longer trial of the same seed has more seals, but none other.
+            seals.agree(&known)?;
+            if known.count() > self.cases {
+                return Ok(known.digest());
+            }
+        }
+        std::fs::write(&path, seals.to_text()).map_err(|source| file(&path, source))?;
+        Ok(seals.digest())
+    }
+
+    fn record(&self, seals: Vec<String>) -> TrialRecord {
+        TrialRecord {
+            seed: self.seed,
+            code_version: CODE_VERSION.to_owned(),
+            model_hash: MODEL_HASH.to_owned(),
+            seals,
+        }
+    }
+}
+
+fn sealed(number: u32) -> String {
+    format!("sealed/{number:04}.json")
+}
+
+fn text(value: &impl Serialize) -> String {
+    let mut text = serde_json::to_string_pretty(value).expect("plain data is plain JSON");
+    text.push('\n');
+    text
+}
+
+fn write(path: &Path, value: &impl Serialize) -> Result<(), TrialError> {
+    std::fs::write(path, text(value)).map_err(|source| file(path, source))
+}
+
+fn file(path: &Path, source: std::io::Error) -> TrialError {
+    TrialError::File { path: path.display().to_string(), source }
+}

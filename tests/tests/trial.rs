@@ -1,0 +1,56 @@
+//! A blind trial is shared by nodes, and loses nothing when one of them dies.
+
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use system_tests::run;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+
+#[test]
+fn a_node_that_is_killed_loses_its_case_to_another_and_each_case_has_one_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let library = format!("sqlite:{}", path("library.sqlite"));
+    let arguments = |out: &str| {
+        let options = ["trial", "--cases", "2", "--seed", "6174", "--discard-recordings"];
+        let places = ["--library".to_owned(), library.clone(), "--out".to_owned(), path(out)];
+        options.map(str::to_owned).into_iter().chain(places).collect::<Vec<_>>()
+    };
+    let begun = |out: &str| -> Child {
+        let mut node = Command::new(PROGRAM);
+        node.args(arguments(out)).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    let ask = |question: &str| {
+        let asked = ["library", "sql", "--library", &library, "--format", "csv", question];
+        run(PROGRAM, &asked).out
+    };
+    let leased = || ask("select count(*) from trial_lease").lines().nth(1) == Some("1");
+
+    let mut first = begun("first");
+    while !leased() {
+        assert!(first.try_wait().unwrap().is_none(), "it ended without a case");
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    let mut second = begun("second");
+    std::thread::sleep(Duration::from_secs(2));
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let ended = second.wait().unwrap();
+    // Two cases reach some goals and not others.
+    assert!(matches!(ended.code(), Some(0 | 1)), "{ended}");
+
+    let answers = ask("select case_number, question, count(*) from trial_answer group by 1, 2");
+    assert_eq!(answers.lines().skip(1).collect::<Vec<_>>(), ["0,catalogue,1", "1,catalogue,1"]);
+    let nodes = ask("select count(distinct worker) from trial_answer");
+    assert_eq!(nodes.lines().nth(1), Some("1"), "the survivor did both");
+    assert_eq!(ask("select count(*) from trial_lease").lines().nth(1), Some("0"));
+    let scores = std::fs::read_to_string(path("second/scores.jsonl")).unwrap();
+    assert_eq!(scores.lines().count(), 2);
+
+    // The node that died comes back, and finds all done.
+    let arguments = arguments("first");
+    let again = run(PROGRAM, &arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    assert!(matches!(again.code, Some(0 | 1)), "{}", again.err);
+    assert!(again.out.contains("2 of 2 answered"), "{}", again.out);
+    assert_eq!(std::fs::read_to_string(path("first/scores.jsonl")).unwrap(), scores);
+}
