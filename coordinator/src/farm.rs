@@ -8,7 +8,7 @@ use std::num::NonZeroUsize;
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
-use tracktwin_library::{CampaignRecord, Library, LibraryError, Status};
+use tracktwin_library::{CampaignRecord, Claim, Library, LibraryError, Status};
 use tracktwin_parameters::SobolError;
 use tracktwin_worker::agent::{self, AgentError};
 use tracktwin_worker::{Prepare, prepare_simulation};
@@ -107,6 +107,49 @@ pub async fn embedded(
     shutdown: CancellationToken,
     mut progress: impl FnMut(Status),
 ) -> Result<Status, FarmError> {
+    let (_claim, dispatch) = claimed(library, &task).await?;
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
+    let coordinator = format!("http://{}", listener.local_addr()?);
+
+    let stop_working = shutdown.child_token();
+    let stop_serving = CancellationToken::new();
+    // However this ends, nothing goes on behind its back.
+    let _guards = [stop_working.clone().drop_guard(), stop_serving.clone().drop_guard()];
+    let stop = stop_serving.clone();
+    let server =
+        tokio::spawn(async { serve(listener, dispatch, &Security::default(), stop).await });
+    let config =
+        agent::Config { prepare: task.prepare, ..agent::Config::new(coordinator, task.cores) };
+    let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
+
+    let ended = loop {
+        let status = library.status_of(task.campaign, task.cases).await?;
+        progress(status);
+        if status.done() == status.total() || shutdown.is_cancelled() {
+            break None;
+        }
+        tokio::select! {
+            () = tokio::time::sleep(LOOK_EVERY) => {}
+            () = shutdown.cancelled() => {}
+            ended = &mut worker => break Some(ended),
+        }
+    };
+    // The worker hands in what it has begun, so it must end before the service.
+    stop_working.cancel();
+    let ended = match ended {
+        Some(ended) => ended,
+        None => worker.await,
+    };
+    stop_serving.cancel();
+    server.await.expect("the service does not panic")?;
+    ended.expect("a worker does not panic: what it computes is caught")?;
+    let status = library.status_of(task.campaign, task.cases).await?;
+    progress(status);
+    Ok(status)
+}
+
+/// The right to hand out a campaign's cases, and what hands them out.
+async fn claimed(library: &Library, task: &Task<'_>) -> Result<(Claim, Dispatch), FarmError> {
     let claim = library.claim()?;
     if claim.is_exclusive() {
         // Whoever held these died with the process that served it.
@@ -123,46 +166,5 @@ pub async fn embedded(
     };
     let dispatch = Dispatch::new(library.clone(), settings, Counts::default());
     dispatch.check(task.campaign).await?;
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
-    let coordinator = format!("http://{}", listener.local_addr()?);
-
-    let stop_working = shutdown.child_token();
-    let stop_serving = CancellationToken::new();
-    // However this ends, nothing goes on behind its back.
-    let _guards = [stop_working.clone().drop_guard(), stop_serving.clone().drop_guard()];
-    let stop = stop_serving.clone();
-    let server =
-        tokio::spawn(async { serve(listener, dispatch, &Security::default(), stop).await });
-    let config =
-        agent::Config { prepare: task.prepare, ..agent::Config::new(coordinator, task.cores) };
-    let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
-
-    let mut ended = None;
-    loop {
-        let status = library.status_of(task.campaign, task.cases).await?;
-        progress(status);
-        if status.done() == status.total() || shutdown.is_cancelled() {
-            break;
-        }
-        tokio::select! {
-            () = tokio::time::sleep(LOOK_EVERY) => {}
-            () = shutdown.cancelled() => {}
-            end = &mut worker => {
-                ended = Some(end);
-                break;
-            }
-        }
-    }
-    // The worker hands in what it has begun, so it must end before the service.
-    stop_working.cancel();
-    let ended = match ended {
-        Some(ended) => ended,
-        None => worker.await,
-    };
-    stop_serving.cancel();
-    server.await.expect("the service does not panic")?;
-    ended.expect("a worker does not panic: what it computes is caught")?;
-    let status = library.status_of(task.campaign, task.cases).await?;
-    progress(status);
-    Ok(status)
+    Ok((claim, dispatch))
 }

@@ -5,6 +5,7 @@ use crate::along::{
     whitened,
 };
 use rustfft::num_complex::Complex64;
+use std::f64::consts::LN_2;
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Band in Hz and shortest wave in m of what is compared: the surface's own sound.
@@ -102,7 +103,11 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     let mut correlations = Vec::new();
     let mut start = reach;
     while start + length + reach <= points.min(a.len()).min(b.len()) {
-        let (lag, correlation) = best_lag(&a[start..start + length], &b, start, reach);
+        let Lag { lag, correlation, elsewhere } =
+            best_lag(&a[start..start + length], &b, start, reach);
+        // Squares of correlations by chance are exponential, with the mean of one over the freedom:
+        // a stretch whose sound is of few frequencies has less than its bandwidth promises.
+        let freedom = freedom.min(LN_2 / elsewhere.powi(2));
         let ln_p = of_best(-freedom * correlation.powi(2), 2 * reach);
         all.stretches += 1;
         correlations.push(correlation);
@@ -116,8 +121,17 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     Some(all)
 }
 
-/// The lag in points, with a parabola through the peak, and the correlation there.
-fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize) -> (f64, f64) {
+/// Where a stretch correlates best with the other pass.
+struct Lag {
+    /// In points, with a parabola through the peak.
+    lag: f64,
+    /// Correlation there.
+    correlation: f64,
+    /// Median correlation over all lags.
+    elsewhere: f64,
+}
+
+fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize) -> Lag {
     let norm = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
     let own = norm(part);
     let correlation = |lag: usize| {
@@ -135,5 +149,5 @@ fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize)
             lag += 0.5 * (left - right) / curvature;
         }
     }
-    (lag - reach as f64, values[best])
+    Lag { lag: lag - reach as f64, correlation: values[best], elsewhere: median(values) }
 }

@@ -173,6 +173,25 @@ fn odometers_that_wander_as_usual_are_no_error() {
 }
 
 #[test]
+fn passes_that_share_a_few_tones_are_not_matched_by_chance() {
+    // With phases of its own in each pass a tone says nothing of places.
+    const TONES_HZ: [f64; 5] = [700.0, 930.0, 1210.0, 1490.0, 1820.0];
+    let recording = measured(8, &|pass, samples, _| {
+        let phases = noise(20 + pass as u64, TONES_HZ.len());
+        let background = noise(40 + pass as u64, samples.len());
+        for (index, sample) in samples.iter_mut().enumerate() {
+            let turns = |tone: f64| TAU * tone * index as f64 / Rolled::RATE_HZ;
+            let tones = TONES_HZ.iter().zip(&phases);
+            *sample = tones.map(|(tone, phase)| (turns(*tone) + 9.0 * phase).sin()).sum::<f64>()
+                + 0.3 * background[index];
+        }
+    });
+    for pair in offsets(&recording) {
+        assert_eq!(pair.ln_p(), 0.0, "{:?}", pair.matched);
+    }
+}
+
+#[test]
 fn passes_that_cannot_be_used_are_named_with_the_reason() {
     let broken = |chain: &Chain<'_>| {
         let recording = measured(6, chain);
