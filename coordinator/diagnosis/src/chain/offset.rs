@@ -103,7 +103,7 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     let mut correlations = Vec::new();
     let mut start = reach;
     while start + length + reach <= points.min(a.len()).min(b.len()) {
-        let Lag { lag, correlation, elsewhere } =
+        let Match { lag, correlation, elsewhere } =
             best_lag(&a[start..start + length], &b, start, reach);
         // Squares of correlations by chance are exponential, with the mean of one over the freedom:
         // a stretch whose sound is of few frequencies has less than its bandwidth promises.
@@ -122,8 +122,8 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
 }
 
 /// Where a stretch correlates best with the other pass.
-struct Lag {
-    /// In points, with a parabola through the peak.
+struct Match {
+    /// Lag in points, with a parabola through the peak.
     lag: f64,
     /// Correlation there.
     correlation: f64,
@@ -131,7 +131,7 @@ struct Lag {
     elsewhere: f64,
 }
 
-fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize) -> Lag {
+fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize) -> Match {
     let norm = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
     let own = norm(part);
     let correlation = |lag: usize| {
@@ -149,5 +149,5 @@ fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize)
             lag += 0.5 * (left - right) / curvature;
         }
     }
-    Lag { lag: lag - reach as f64, correlation: values[best], elsewhere: median(values) }
+    Match { lag: lag - reach as f64, correlation: values[best], elsewhere: median(values) }
 }
