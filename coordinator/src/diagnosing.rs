@@ -89,7 +89,7 @@ pub async fn diagnose(
     let suggested = subject.suggested(&look);
     watch("baseline", 0.0);
     let start = first_calibration(&subject).context("no baseline fits")?;
-    subject.forward.allow_ends(&start).context("no baseline fits")?;
+    subject.forward.allow_beyond(&start).context("no baseline fits")?;
     watch("null model", 0.0);
     let surfaces = f64::from(null_campaign::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);

@@ -2,7 +2,7 @@
 //!
 //! Every sleeper has its own ballast, railpad and irregularity level, the surface its own spectrum,
 //! every speed its own gain; the sensor is flat to two per cent, and nobody knows where the track
-//! ends. This is the honest opponent of every extension.
+//! ends and how the sleepers beyond are held. This is the honest opponent of every extension.
 
 use crate::section::Section;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -48,6 +48,21 @@ mod prior {
 /// Distances in spans at which the track may end: what that changes is free to be any of them.
 pub(crate) const ENDS_SPANS: [usize; 7] = [7, 8, 9, 10, 11, 13, 24];
 
+/// Sleepers beyond either end of the section whose support is free; the last of them stands for all
+/// further ones.
+const OUTER: usize = 3;
+
+/// Stiffness of railpad or ballast of a sleeper beyond the section.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Outer {
+    /// Its number, counted from the first sleeper compared.
+    pub(crate) sleeper: isize,
+    /// Whether those further out have the same.
+    pub(crate) is_last: bool,
+    /// Whether it is the railpad's; else the ballast's.
+    pub(crate) is_railpad: bool,
+}
+
 /// Typical values about which the logarithms lie: `k_b`, `k_p`, `A_irr`, `EI_s`, `c_p`, `c_b`
 /// (paper, Table D1).
 const TYPICAL: [f64; 6] = [1.0e7, 9.0e7, 2.5, 5.0e3, 6.0e3, 8.0e2];
@@ -67,7 +82,7 @@ impl Unknowns {
 
     /// How many unknowns there are.
     pub fn count(&self) -> usize {
-        self.ends().end
+        self.outer().end
     }
 
     /// Ballast stiffness of each sleeper.
@@ -110,6 +125,29 @@ impl Unknowns {
         self.response().end..self.response().end + ENDS_SPANS.len()
     }
 
+    /// How much stiffer sleepers beyond the section are held than its first or last one.
+    pub fn outer(&self) -> Range<usize> {
+        self.ends().end..self.ends().end + self.outer_supports().len()
+    }
+
+    /// All that lies beyond the section.
+    pub fn beyond(&self) -> Range<usize> {
+        self.ends().start..self.outer().end
+    }
+
+    /// What each unknown of [`Unknowns::outer`] is.
+    pub(crate) fn outer_supports(&self) -> Vec<Outer> {
+        let (sleepers, outer) = (self.sleepers.cast_signed(), OUTER.cast_signed());
+        let beyond = || (-outer..0).chain(sleepers..sleepers + outer);
+        let held = |is_railpad| {
+            beyond().map(move |sleeper| {
+                let is_last = sleeper == -outer || sleeper == sleepers + outer - 1;
+                Outer { sleeper, is_last, is_railpad }
+            })
+        };
+        held(false).chain(held(true)).collect()
+    }
+
     /// The prior mean of all unknowns.
     pub fn typical(&self) -> DVector<f64> {
         let mut values = DVector::zeros(self.count());
@@ -128,15 +166,13 @@ impl Unknowns {
         let mut covariance = DMatrix::zeros(self.count(), self.count());
         for (field, range) in [self.ballast(), self.railpad(), self.level()].into_iter().enumerate()
         {
-            for i in range.clone() {
-                for j in range.clone() {
-                    let distance = (i as f64 - j as f64) / prior::LENGTH;
-                    let smooth = prior::SMOOTH[field].powi(2) * (-0.5 * distance.powi(2)).exp();
-                    covariance[(i, j)] = prior::MEAN[field].powi(2) + smooth;
+            for (i, row) in (0..).zip(range.clone()) {
+                for (j, column) in (0..).zip(range.clone()) {
+                    covariance[(row, column)] = along(field, i, j);
                 }
-                covariance[(i, i)] += prior::ALONE[field].powi(2);
             }
         }
+        self.add_outer(&mut covariance);
         for (index, deviation) in self.global().zip(prior::GLOBAL) {
             covariance[(index, index)] = deviation.powi(2);
         }
@@ -159,6 +195,27 @@ impl Unknowns {
             covariance[(index, index)] = 1.0 / ENDS_SPANS.len() as f64;
         }
         Cholesky::new(covariance).expect("a prior with a white part is positive definite").inverse()
+    }
+
+    /// The sleepers beyond vary as those compared do: a difference from the first or last one is what
+    /// the same field has between the two.
+    fn add_outer(&self, covariance: &mut DMatrix<f64>) {
+        let last = self.sleepers.cast_signed() - 1;
+        let outer: Vec<(usize, Outer)> = self.outer().zip(self.outer_supports()).collect();
+        for &(row, Outer { sleeper, is_railpad, .. }) in &outer {
+            let field = usize::from(is_railpad);
+            let end = sleeper.clamp(0, last);
+            let with = |other: isize| along(field, sleeper, other) - along(field, end, other);
+            let compared = if is_railpad { self.railpad() } else { self.ballast() };
+            for (other, column) in (0..).zip(compared) {
+                covariance[(row, column)] = with(other);
+                covariance[(column, row)] = with(other);
+            }
+            for &(column, other) in outer.iter().filter(|(_, it)| it.is_railpad == is_railpad) {
+                let other_end = other.sleeper.clamp(0, last);
+                covariance[(row, column)] = with(other.sleeper) - with(other_end);
+            }
+        }
     }
 
     /// Supports of all sleepers of the section's track.
@@ -187,6 +244,14 @@ impl Unknowns {
     pub fn response_shares(&self, frequency_hz: f64) -> [(usize, f64); 2] {
         shares(&self.response_knots, frequency_hz, self.response().start)
     }
+}
+
+/// Prior covariance of one of ballast, railpad and level between two sleepers.
+fn along(field: usize, i: isize, j: isize) -> f64 {
+    let distance = (i - j) as f64 / prior::LENGTH;
+    let smooth = prior::SMOOTH[field].powi(2) * (-0.5 * distance.powi(2)).exp();
+    let alone = if i == j { prior::ALONE[field].powi(2) } else { 0.0 };
+    prior::MEAN[field].powi(2) + smooth + alone
 }
 
 /// Knots that cover a range, in logarithms.

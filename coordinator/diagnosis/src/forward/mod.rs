@@ -4,6 +4,7 @@
 //! `|H| = 1 / (m |1/k_H + alpha_r(x, x) + alpha_w|)`; the mean power in a band over a sleeper is
 //! the surface's spectrum times `|H|^2`, averaged over band and window (mismatch design, eq. 2, 3).
 
+mod beyond;
 mod derivatives;
 mod supports;
 
@@ -11,7 +12,7 @@ pub use derivatives::Linearised;
 pub(crate) use derivatives::PortColumns;
 
 use crate::bands::Bands;
-use crate::baseline::{ENDS_SPANS, Unknowns};
+use crate::baseline::Unknowns;
 use crate::profile::Shape;
 use crate::section::{Section, Window};
 use crate::transfer::Transfer;
@@ -38,9 +39,9 @@ pub struct Forward {
     /// Where on the model's track the wheel begins a turn, in m: `[speed][pass]`; empty if nobody
     /// knows.
     pub wheel_starts_m: Vec<Vec<f64>>,
-    /// Changes of the log powers where the track ends at each of the distances that it may end at: a
-    /// column each, zero until [`Forward::allow_ends`].
-    ends: DMatrix<f64>,
+    /// Changes of the log powers by what lies beyond the sleepers compared, a column for each unknown
+    /// of [`Unknowns::beyond`]; zero until [`Forward::allow_beyond`].
+    beyond: DMatrix<f64>,
     /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
     windows: Vec<Vec<Vec<Window>>>,
     /// Spectrum of the surface at level one in m2/Hz at each speed and line.
@@ -70,7 +71,7 @@ impl Forward {
             speeds_m_s.iter().map(|&v| lines.iter().map(|&hz| density(v, hz)).collect()).collect();
         let wheel_starts_m = Vec::new();
         let rows = section.sleepers * speeds_m_s.len() * bands.count();
-        let ends = DMatrix::zeros(rows, ENDS_SPANS.len());
+        let beyond = DMatrix::zeros(rows, unknowns.beyond().len());
         Self {
             section,
             bands,
@@ -78,29 +79,13 @@ impl Forward {
             unknowns,
             noise_density,
             wheel_starts_m,
-            ends,
+            beyond,
             windows,
             surface,
         }
     }
 
-    /// Lets the track end at any of the distances that it may end at: what that changes is taken from
-    /// a track of these values.
-    ///
-    /// # Errors
-    /// As [`Forward::log_power`].
-    pub fn allow_ends(&mut self, values: &DVector<f64>) -> Result<(), ModelError> {
-        let plain = self.log_power(values, &[])?;
-        let changes = ENDS_SPANS.into_par_iter().map(|spans| {
-            let ended = self.with_ends(spans).log_power(values, &[])?;
-            Ok(ended - &plain)
-        });
-        let changes: Vec<DVector<f64>> = changes.collect::<Result<_, ModelError>>()?;
-        self.ends = DMatrix::from_columns(&changes);
-        Ok(())
-    }
-
-    /// The same for a track that ends so many spans beyond the sleepers compared.
+    /// A predictor of the same for a track that ends so many spans beyond the sleepers compared.
     #[must_use]
     pub fn with_ends(&self, spans_beyond: usize) -> Self {
         let section = Section { spans_beyond, ..self.section.clone() };
@@ -141,8 +126,8 @@ impl Forward {
             let shapes = self.shape_powers(transfer, sleeper, speed, band);
             self.response(values, band) + mean(shapes, |shape| (floor + shape).ln())
         });
-        let ends = self.unknowns.ends();
-        all + &self.ends * values.rows(ends.start, ends.len())
+        let beyond = self.unknowns.beyond();
+        all + &self.beyond * values.rows(beyond.start, beyond.len())
     }
 
     /// The transfer of a baseline with extensions: those of a known one of the same baseline and
