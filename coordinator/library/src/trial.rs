@@ -79,7 +79,8 @@ impl Library {
         rows.iter().map(answer).collect()
     }
 
-    /// Leases the first of these cases that nobody works on.
+    /// Leases the first of these cases that nobody else works on: one of the worker's own that it could
+    /// not give back is its again.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -224,14 +225,14 @@ impl Write for Take {
                 where trial_id = $1 and case_number {} and not exists (
                     select 1 from trial_lease where trial_lease.trial_id = trial_case.trial_id
                         and trial_lease.case_number = trial_case.case_number
-                        and lease_expires_unix_ms > $4)
+                        and lease_expires_unix_ms > $4 and worker <> $3)
                 order by case_number limit 1 {})
             insert into trial_lease (trial_id, case_number, worker, lease_expires_unix_ms)
             select next_trial, next_number, $3, $5 from next where true
             on conflict (trial_id, case_number) do update
                 set worker = excluded.worker,
                     lease_expires_unix_ms = excluded.lease_expires_unix_ms
-                where trial_lease.lease_expires_unix_ms <= $4
+                where trial_lease.lease_expires_unix_ms <= $4 or trial_lease.worker = $3
             returning case_number",
             dialect.listed("$2"),
             dialect.skipping_locked()

@@ -13,7 +13,7 @@ use crate::diagnosing::DiagnosingError;
 use crate::evaluating::Evaluator;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tracktwin_diagnosis::CalibrationError;
 use tracktwin_library::{Library, LibraryError, TrialRecord};
 use tracktwin_signal::recording::RecordingError;
@@ -26,6 +26,9 @@ const SEALS: &str = "seals.sha256";
 
 /// How long a node waits for the cases that others work on before it looks again.
 const WAIT: Duration = Duration::from_secs(2);
+
+/// How long a node waits for a library that does not answer before it gives up.
+const PATIENCE: Duration = Duration::from_mins(10);
 
 /// A trial, as one node takes part in it.
 pub struct Trial {
@@ -120,6 +123,20 @@ pub enum TrialError {
     },
 }
 
+impl TrialError {
+    /// Whether the same may succeed later, when the library answers again.
+    fn is_temporary(&self) -> bool {
+        match self {
+            Self::Library(error) => error.is_temporary(),
+            Self::Diagnosis { source: DiagnosingError::Failure(failure), .. } => failure
+                .chain()
+                .filter_map(|cause| cause.downcast_ref::<LibraryError>())
+                .any(LibraryError::is_temporary),
+            _ => false,
+        }
+    }
+}
+
 impl Trial {
     /// What the trial is called in the library.
     pub fn id(&self) -> String {
@@ -162,28 +179,48 @@ impl Trial {
     }
 
     /// Works on the cases that lack an answer and that no other node works on, until none lacks one;
-    /// then sums up.
+    /// then sums up. A library that does not answer is waited for.
     ///
     /// # Errors
     /// [`TrialError`] when a seal is broken or a diagnosis breaks down.
     pub async fn answer(&self, mut progress: impl FnMut(u64, &str)) -> Result<Summary, TrialError> {
+        let mut failing_since: Option<Instant> = None;
         loop {
-            let scores = self.scores().await?;
-            let open = self.open(&scores);
-            if open.is_empty() {
-                let scores: Vec<Score> = scores.into_values().map(|case| case.score).collect();
-                return self.sum_up(&scores);
-            }
-            let done = u64::from(self.cases) - open.len() as u64;
-            let others = open.len();
-            if let Some(number) = self.lease(open).await? {
-                progress(done, &format!("case {number}"));
-                self.work_on(number).await?;
-            } else {
-                progress(done, &format!("waiting for other nodes: {others}"));
-                tokio::time::sleep(WAIT).await;
+            match self.step(&mut progress).await {
+                Ok(Some(summary)) => return Ok(summary),
+                Ok(None) => failing_since = None,
+                Err(error) => {
+                    let since = failing_since.get_or_insert_with(Instant::now);
+                    if !error.is_temporary() || since.elapsed() > PATIENCE {
+                        return Err(error);
+                    }
+                    tracing::warn!("{error}; tried again");
+                    tokio::time::sleep(WAIT).await;
+                }
             }
         }
+    }
+
+    /// One case, or a look at what the others do; the summary once all is answered.
+    async fn step(
+        &self,
+        progress: &mut impl FnMut(u64, &str),
+    ) -> Result<Option<Summary>, TrialError> {
+        let scores = self.scores().await?;
+        let open = self.open(&scores);
+        if open.is_empty() {
+            let scores: Vec<Score> = scores.into_values().map(|case| case.score).collect();
+            return self.sum_up(&scores).map(Some);
+        }
+        let (done, others) = (u64::from(self.cases) - open.len() as u64, open.len());
+        if let Some(number) = self.lease(open).await? {
+            progress(done, &format!("case {number}"));
+            self.work_on(number).await?;
+        } else {
+            progress(done, &format!("waiting for other nodes: {others}"));
+            tokio::time::sleep(WAIT).await;
+        }
+        Ok(None)
     }
 
     /// The cases that lack an answer.
