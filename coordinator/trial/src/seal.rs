@@ -109,6 +109,22 @@ mod tests {
     }
 
     #[test]
+    fn a_longer_trial_agrees_with_a_shorter_one_of_the_same_truths() {
+        let sealed = |contents: &[&[u8]]| {
+            let mut seals = Seals::default();
+            for (number, content) in contents.iter().enumerate() {
+                seals.seal(&number.to_string(), content);
+            }
+            seals
+        };
+        let shorter = sealed(&[b"squat"]);
+        assert_eq!(sealed(&[b"squat", b"joint"]).agree(&shorter), Ok(()));
+        assert_eq!(shorter.agree(&sealed(&[b"squat", b"joint"])), Ok(()));
+        let broken = SealError::Broken("0".to_owned());
+        assert_eq!(sealed(&[b"joint"]).agree(&shorter), Err(broken));
+    }
+
+    #[test]
     fn a_changed_truth_breaks_its_seal() {
         let mut seals = Seals::default();
         seals.seal("sealed/0001.json", b"squat");

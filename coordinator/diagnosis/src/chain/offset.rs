@@ -131,6 +131,8 @@ struct Match {
     elsewhere: f64,
 }
 
+/// The lag at which a stretch of one pass, from point `start`, is most like the other, up to `reach`
+/// points either way.
 fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize) -> Match {
     let norm = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
     let own = norm(part);
