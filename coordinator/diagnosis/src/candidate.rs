@@ -100,10 +100,10 @@ fn families(kind: &'static Kind, section: &Section) -> Vec<Family> {
 /// Those with a place on the track.
 fn local(kind: &'static Kind, section: &Section) -> Vec<Family> {
     let new = || ExtensionInstance::new(kind.physics);
-    let on_each = |free: &'static [&'static str], trials: &[&[f64]]| -> Vec<Family> {
+    let on = |sleepers: Vec<Vec<usize>>, free: &'static [&'static str], trials: &[&[f64]]| {
         let trials = grid(trials);
-        let sleepers = 0..section.sleepers;
-        sleepers.map(|sleeper| (new().on([sleeper]), free, trials.clone())).collect()
+        let at = |sleepers| (new().on(sleepers), free, trials.clone());
+        sleepers.into_iter().map(at).collect()
     };
     match kind.physics {
         "rail_joint" => at_points(
@@ -123,13 +123,24 @@ fn local(kind: &'static Kind, section: &Section) -> Vec<Family> {
             &["depth_m", "length_m"],
             &[vec![2e-5, 3e-3], vec![2e-5, 6e-3], vec![2e-5, 1e-2]],
         ),
-        "missing_railpad" => on_each(&["stiffness_N_per_m"], &[&[5e6, 1.5e7]]),
-        "sleeper_bolt" => on_each(&["stiffness_N_per_m"], &[&[1e7, 3e7]]),
+        "missing_railpad" => on(single(section), &["stiffness_N_per_m"], &[&[5e6, 1.5e7]]),
+        "sleeper_bolt" => on(with_neighbours(section), &["stiffness_N_per_m"], &[&[1e7, 3e7]]),
         "hanging_sleeper" => hanging(section, new),
-        "subgrade_layer" => on_each(LAYER, &[&[0.5, 2.0], &[1.5e7, 5e7], &[1e3]]),
+        "subgrade_layer" => on(single(section), LAYER, &[&[0.5, 2.0], &[1.5e7, 5e7], &[1e3]]),
         "fastening_clamp" => clamps(section, new),
         _ => Vec::new(),
     }
+}
+
+/// Every sleeper.
+fn single(section: &Section) -> Vec<Vec<usize>> {
+    (0..section.sleepers).map(|sleeper| vec![sleeper]).collect()
+}
+
+/// Every sleeper and every pair of neighbours.
+fn with_neighbours(section: &Section) -> Vec<Vec<usize>> {
+    let pairs = (1..section.sleepers).map(|sleeper| vec![sleeper - 1, sleeper]);
+    single(section).into_iter().chain(pairs).collect()
 }
 
 /// A layer's parameters.
@@ -181,14 +192,12 @@ fn everywhere(kind: &'static Kind) -> Option<Family> {
 /// Over every sleeper and every pair of neighbours, with gaps that close while the wheel is near and
 /// one that does not.
 fn hanging(section: &Section, new: impl Fn() -> ExtensionInstance) -> Vec<Family> {
-    let single = (0..section.sleepers).map(|sleeper| vec![sleeper]);
-    let pairs = (1..section.sleepers).map(|sleeper| vec![sleeper - 1, sleeper]);
     let families = |sleepers: Vec<usize>| {
         let closing = (new().on(sleepers.clone()), &["gap_m"][..], grid(&[CLOSING_GAPS_M]));
         let open = (new().on(sleepers).with("gap_m", OPEN_GAP_M), &[][..], grid(&[]));
         [closing, open]
     };
-    single.chain(pairs).flat_map(families).collect()
+    with_neighbours(section).into_iter().flat_map(families).collect()
 }
 
 /// Gaps in m that close while the wheel is above the sleeper, or near it.

@@ -6,13 +6,17 @@ use crate::outcome::Hypothesis;
 use std::collections::BTreeMap;
 
 impl Evidence<'_> {
-    /// Nothing is named on a track that the speeds do not agree about: their positions are wrong.
+    /// Nothing is named on a track that the speeds do not agree about: their positions are wrong, if
+    /// no other fault of the measuring chain makes them differ.
     pub(super) fn add_apart(&self, all: &mut Vec<Hypothesis>) {
-        let Some(evidence) = self.apart() else { return };
+        if !self.search.is_apart() {
+            return;
+        }
         for known in all.iter_mut() {
             known.accepted = false;
             known.probability *= FAILED_SHARE;
         }
+        let Some(evidence) = self.apart() else { return };
         let finding = Finding {
             physics: "position_error",
             p_value: self.search.apart_p_value(),
@@ -23,9 +27,11 @@ impl Evidence<'_> {
         self.add_finding(&finding, all);
     }
 
-    /// What a reader should know of it, if it is so.
+    /// What a reader should know of it, if it is so. Passes that are cut off differ wherever they were:
+    /// the faster they are, the more is missing.
     pub(super) fn apart(&self) -> Option<String> {
-        self.search.is_apart().then(|| {
+        let are_cut = self.look.findings.iter().any(|finding| finding.physics == "clipping");
+        (self.search.is_apart() && !are_cut).then(|| {
             format!(
                 "The speeds do not agree about the track: one for each explains the recording better \
                  than one for all, by {:.0} nats. Positions of some pass belong to another place, or to \

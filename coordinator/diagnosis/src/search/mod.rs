@@ -4,6 +4,7 @@ mod apart;
 mod chance;
 mod extent;
 mod fit;
+mod imitated;
 mod least;
 mod probability;
 mod remainder;

@@ -2,6 +2,7 @@
 
 use super::chance::{excess, tail_probability, whitened};
 use super::fit::fit;
+use super::imitated::Imitated;
 use super::least::{Least, is_local_shape};
 use super::probability::{Probabilities, unseen};
 use super::{Fitted, Round, Stage};
@@ -20,7 +21,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub(super) const FALSE_ALARM: f64 = 0.05;
 
 /// Candidates of one kind, and in all, that are fitted together with the baseline.
-const REFINED_PER_KIND: usize = 2;
+pub(super) const REFINED_PER_KIND: usize = 2;
 const REFINED_MAX: usize = 8;
 
 /// Least log evidence in screening for a candidate to be fitted.
@@ -142,7 +143,9 @@ impl<'a> Setting<'a> {
             (kind, template.at_strengths(&current.residual, &current.gradient))
         }));
         if round.p_value <= FALSE_ALARM {
-            let starts = starts(problem, current, all, &templates, screened, least, hopeless);
+            let imitated = Imitated::new(problem, current, all)?;
+            let mut starts = starts(problem, current, all, &templates, screened, least, hopeless);
+            starts.extend(imitated.starts());
             round.fitted = fit(problem, current, all, starts, progress);
         }
         Ok((round, ports))

@@ -23,7 +23,7 @@ pub(super) fn headline(diagnosis: &Diagnosis) -> Markup {
 pub(super) const fn verdict(verdict: Verdict) -> (&'static str, &'static str, &'static str) {
     match verdict {
         Verdict::Consistent => {
-            ("consistent", "consistent", "the track model, re-tuned, explains the recording")
+            ("consistent", "consistent", "nothing was found that the re-tuned track model has not")
         }
         Verdict::LeftOutPhysics => (
             "left-out",
