@@ -2,23 +2,18 @@
 //!
 //! Owns one sleeper as a linear system that the railpad pushes; the railpad is `port`'s.
 
+mod gap;
+mod ritz;
+
+use self::gap::Gap;
+use self::ritz::{TERMS, energies, gauss_points, legendre, nominal_bending};
 use crate::system::LinearSystem;
-use crate::vtrack::{
-    DENSITY_KG_M3, SLEEPER_AREA_M2, SLEEPER_HALF_LENGTH_M, SLEEPER_SECOND_MOMENT_M4,
-    SLEEPER_SHEAR_COEFFICIENT, YOUNG_PA, shear_modulus_pa,
-};
 use nalgebra::{DMatrix, DVector};
 
-/// Polynomials of deflection, and of rotation.
-const TERMS: usize = 12;
 /// Modes kept: rigid motion and bending up to 12 kHz. The others give way statically.
 pub(crate) const MODES: usize = 5;
-/// Points of Gauss's rule along the half sleeper; exact for products of the polynomials.
-const POINTS: usize = 14;
 /// Modal damping over critical damping: half of a structural loss factor of 0.2 %, that of steel.
 const DAMPING_RATIO: f64 = 1e-3;
-/// Length in m that a crack softens.
-const CRACK_LENGTH_M: f64 = 0.02;
 
 /// Mass-normalised modes of a free half sleeper, symmetric about the track's symmetry plane.
 #[derive(Clone, Debug)]
@@ -76,39 +71,6 @@ pub(crate) struct Sleeper {
     pub(crate) gap: Option<Gap>,
 }
 
-/// Ballast that a sleeper touches where it is pressed further down than the gap.
-#[derive(Clone, Debug)]
-pub(crate) struct Gap {
-    depth_m: f64,
-    stiffness: f64,
-    damping: f64,
-    along: Vec<Vec<f64>>,
-    weights: Vec<f64>,
-}
-
-/// Depth in m over which the damping of closing ballast sets in, so that it begins without a jump.
-const ONSET_M: f64 = 1e-6;
-
-impl Gap {
-    /// Generalised forces on the modes in a state of the sleeper, added to `forces`.
-    pub(crate) fn push(&self, state: &[f64], forces: &mut [f64]) {
-        let modes = state.len() / 2;
-        for (shape, weight) in self.along.iter().zip(&self.weights) {
-            let value = |part: &[f64]| shape.iter().zip(part).map(|(a, b)| a * b).sum::<f64>();
-            let pressed_m = value(&state[..modes]) - self.depth_m;
-            if pressed_m <= 0.0 {
-                continue;
-            }
-            let onset = (pressed_m / ONSET_M).min(1.0);
-            let damper = onset * self.damping * value(&state[modes..]);
-            let pressure = (self.stiffness * pressed_m + damper).max(0.0);
-            for (force, shape) in forces.iter_mut().zip(shape) {
-                *force -= weight * pressure * shape;
-            }
-        }
-    }
-}
-
 impl SleeperModes {
     /// The modes of a sleeper whose softened middle keeps `bending_factor` of its bending
     /// stiffness, 1 for a sound one.
@@ -117,7 +79,7 @@ impl SleeperModes {
     /// for the rotation, which symmetry holds at the rail seat. A crack lets it turn there, by an
     /// angular spring `E I beta / ((1 - beta) l)`.
     pub(crate) fn new(bending_factor: f64) -> Self {
-        let (mass, stiffness) = ritz_matrices(bending_factor);
+        let (mass, stiffness) = energies(bending_factor);
         let factor = mass.cholesky().expect("kinetic energy is positive").l();
         let inverse = factor.clone().try_inverse().expect("a Cholesky factor is regular");
         let eigen = (&inverse * stiffness * inverse.transpose()).symmetric_eigen();
@@ -240,118 +202,24 @@ impl SleeperModes {
     }
 }
 
-/// `E I` of the nominal section in N m2.
-const fn nominal_bending() -> f64 {
-    YOUNG_PA * SLEEPER_SECOND_MOMENT_M4
-}
-
 /// What presses the ballast at a place by degree of freedom: the sleeper from above, and from below
 /// the layer that it lies on, if there is one.
 fn on_layer(shape: &[f64], layers: usize) -> Vec<f64> {
     shape.iter().copied().chain(std::iter::repeat_n(-1.0, layers)).collect()
 }
 
-/// Mass and stiffness of the nominal section in the polynomials' coefficients.
-fn ritz_matrices(bending_factor: f64) -> (DMatrix<f64>, DMatrix<f64>) {
-    let length = SLEEPER_HALF_LENGTH_M;
-    let shear = SLEEPER_SHEAR_COEFFICIENT * shear_modulus_pa() * SLEEPER_AREA_M2;
-    let cracked = bending_factor < 1.0;
-    let size = 2 * TERMS + usize::from(cracked);
-    let mut mass = DMatrix::zeros(size, size);
-    let mut stiffness = DMatrix::zeros(size, size);
-    let (points, weights) = gauss_points();
-    for (&xi, weight) in points.iter().zip(&weights) {
-        let [values, slopes] = [legendre(xi), legendre_slopes(xi)];
-        let mut deflection = DVector::zeros(size);
-        let mut rotation = DVector::zeros(size);
-        let mut strain = DVector::zeros(size);
-        let mut curvature = DVector::zeros(size);
-        for term in 0..TERMS {
-            deflection[term] = values[term];
-            strain[term] = slopes[term] / length;
-            rotation[TERMS + term] = xi * values[term];
-            curvature[TERMS + term] = (values[term] + xi * slopes[term]) / length;
-        }
-        if cracked {
-            rotation[2 * TERMS] = 1.0;
-        }
-        strain -= &rotation;
-        let share = weight * length;
-        mass += share * DENSITY_KG_M3 * SLEEPER_AREA_M2 * &deflection * deflection.transpose();
-        mass += share * DENSITY_KG_M3 * SLEEPER_SECOND_MOMENT_M4 * &rotation * rotation.transpose();
-        stiffness += share * nominal_bending() * &curvature * curvature.transpose();
-        stiffness += share * shear * &strain * strain.transpose();
-    }
-    if cracked {
-        // Half of the crack's length lies on this side of the symmetry plane.
-        let softened = (1.0 / bending_factor - 1.0) * 0.5 * CRACK_LENGTH_M;
-        stiffness[(2 * TERMS, 2 * TERMS)] += nominal_bending() / softened;
-    }
-    (mass, stiffness)
-}
-
-/// Legendre polynomials of `2 xi - 1` for `xi` in 0..1.
-fn legendre(xi: f64) -> [f64; TERMS] {
-    let x = 2.0 * xi - 1.0;
-    let mut values = [1.0; TERMS];
-    values[1] = x;
-    for n in 1..TERMS - 1 {
-        let order = n as f64;
-        values[n + 1] =
-            ((2.0 * order + 1.0) * x * values[n] - order * values[n - 1]) / (order + 1.0);
-    }
-    values
-}
-
-/// Their derivatives by `xi`: `P'_{n+1} = P'_{n-1} + (2 n + 1) P_n`, twice for the scale of `x`.
-fn legendre_slopes(xi: f64) -> [f64; TERMS] {
-    let values = legendre(xi);
-    let mut slopes = [0.0; TERMS];
-    slopes[1] = 2.0;
-    for n in 1..TERMS - 1 {
-        slopes[n + 1] = slopes[n - 1] + 2.0 * (2.0 * n as f64 + 1.0) * values[n];
-    }
-    slopes
-}
-
-/// Points of Gauss's rule in 0..1 and their weights, whose sum is one.
-fn gauss_points() -> (Vec<f64>, Vec<f64>) {
-    let count = POINTS as f64;
-    (0..POINTS)
-        .map(|index| {
-            let mut x = (std::f64::consts::PI * (index as f64 + 0.75) / (count + 0.5)).cos();
-            let mut slope = 1.0;
-            // Newton's method doubles the digits at each step; five are enough for all of them.
-            for _ in 0..6 {
-                let (mut before, mut value) = (1.0, x);
-                for n in 1..POINTS {
-                    let order = n as f64;
-                    let next = ((2.0 * order + 1.0) * x * value - order * before) / (order + 1.0);
-                    (before, value) = (value, next);
-                }
-                slope = count * (x * value - before) / (x * x - 1.0);
-                x -= value / slope;
-            }
-            (0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope))
-        })
-        .unzip()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vtrack::{
+        DENSITY_KG_M3, SLEEPER_AREA_M2, SLEEPER_HALF_LENGTH_M, SLEEPER_SECOND_MOMENT_M4,
+        SLEEPER_SHEAR_COEFFICIENT, shear_modulus_pa,
+    };
 
     const STEP_S: f64 = 5e-6;
 
     fn bed() -> Bed {
         Bed { bending: 5000.0, stiffness: 1.2e7, damping: 900.0, ..Bed::default() }
-    }
-
-    #[test]
-    fn gauss_integrates_polynomials_to_degree_27() {
-        let (points, weights) = gauss_points();
-        let integral: f64 = points.iter().zip(&weights).map(|(x, w)| w * x.powi(27)).sum();
-        assert!((28.0 * integral - 1.0).abs() < 1e-13, "{integral}");
     }
 
     #[test]
