@@ -42,6 +42,16 @@ impl Evaluator {
         Ok(Self { extractor, models, set })
     }
 
+    /// The models.
+    pub const fn models(&self) -> &Trained {
+        &self.models
+    }
+
+    /// The results they were trained and tested on.
+    pub const fn set(&self) -> &TrainingSet {
+        &self.set
+    }
+
     /// What models and selector say of a recording.
     ///
     /// # Errors

@@ -10,6 +10,7 @@
 //! - [`diagnosing`]: from a recording to its diagnosis, stage by stage.
 //! - [`evaluating`]: from models and their library to what evaluates recordings.
 //! - [`null_campaign`]: simulations of a track with nothing left out, kept in the library.
+//! - [`reproducing`]: from a library and models to the paper's figures.
 //! - [`provenance`]: what a library keeps of trainings, evaluations and diagnoses.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
 //!
@@ -24,6 +25,7 @@ pub mod evaluating;
 pub mod farm;
 pub mod null_campaign;
 pub mod provenance;
+pub mod reproducing;
 pub mod service;
 pub mod training;
 pub mod trial;

@@ -4,7 +4,7 @@ use tracktwin_library::{CampaignRecord, Library, LibraryError};
 use tracktwin_parameters::Parameter;
 use tracktwin_report::Tested;
 use tracktwin_signal::{FeatureDefinition, FeatureSet};
-use tracktwin_surrogate::{FeatureColumns, Split, TrainOptions, Trained, TrainingSet};
+use tracktwin_surrogate::{FeatureColumns, ModelGroup, Split, TrainOptions, Trained, TrainingSet};
 use tracktwin_worker::Experiment;
 
 /// The feature vectors of the paper, each trained at every speed (paper, eq. 9).
@@ -88,6 +88,18 @@ pub fn tested(
     trained: &Trained,
 ) -> Result<Vec<Tested>, tracktwin_surrogate::Error> {
     let Some(group) = trained.groups().last() else { return Ok(Vec::new()) };
+    tested_by(set, trained, group)
+}
+
+/// True and predicted values of cases that no model was trained on, by the models of one group.
+///
+/// # Errors
+/// [`tracktwin_surrogate::Error`] when set and models don't belong together.
+pub fn tested_by(
+    set: &TrainingSet,
+    trained: &Trained,
+    group: &ModelGroup,
+) -> Result<Vec<Tested>, tracktwin_surrogate::Error> {
     let mut cases = Split::halves(set.entries(), trained.split_seed()).test;
     cases.truncate(TESTED_SHOWN);
     let bins = set.frequencies_hz.len();

@@ -14,6 +14,7 @@ mod models_page;
 mod number;
 mod page;
 mod receptance;
+mod reproduction_page;
 mod spectrum_picture;
 mod track_picture;
 
@@ -23,3 +24,4 @@ pub use farm_page::{Farm, FarmCampaign, FarmWorker, duration, farm_page, farm_vi
 pub use inspection_page::{Inspected, InspectedCurve, Inspection, inspection_page};
 pub use models_page::{Tested, models_page};
 pub use receptance::{ReceptanceCurve, receptance_chart};
+pub use reproduction_page::reproduction_page;

@@ -66,7 +66,7 @@ pub(super) async fn evaluate(
 }
 
 /// A library that can't be read is a failure; models that don't fit are mended by who gave them.
-fn stop(error: EvaluatorError) -> Stop {
+pub(super) fn stop(error: EvaluatorError) -> Stop {
     match error {
         EvaluatorError::Library(_) => Stop::Failure(error.into()),
         EvaluatorError::Foreign(_) | EvaluatorError::Features(_) => Stop::Input(error.into()),

@@ -11,6 +11,7 @@ mod inspect;
 mod library;
 mod progress;
 mod receptance;
+mod reproduce;
 mod run;
 mod signals;
 mod simulate;
@@ -72,6 +73,8 @@ enum Command {
     Extend(extend::Arguments),
     /// Hide physics in recordings, diagnose them blindly and score the answers.
     Trial(trial::Arguments),
+    /// Set the paper's results beside this program's, figure by figure.
+    Reproduce(reproduce::Arguments),
     /// Make a recording of CSV, Parquet, NumPy or MATLAB files.
     Import(import::Arguments),
     /// Say what is in a recording and what it can be used for.
@@ -137,6 +140,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Extend(arguments) => extend::run(arguments),
         Command::Trial(arguments) => asynchronously(trial::run(arguments)),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
+        Command::Reproduce(arguments) => asynchronously(reproduce::run(arguments)),
         Command::Import(arguments) => import::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Library(question) => asynchronously(library::run(question)),

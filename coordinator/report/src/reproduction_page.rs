@@ -1,0 +1,171 @@
+//! The paper's results beside this program's.
+
+use crate::axis::Axis;
+use crate::chart::Chart;
+use crate::page::{figure, page};
+use maud::{Markup, html};
+use tracktwin_reproduction::{Compared, Curve, Picture, Reproduction, Scale, Style, Verdict};
+
+const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
+
+/// Width and height in px of a picture that takes the page's width, and of one of several.
+const WIDE: [f64; 2] = [860.0, 320.0];
+const NARROW: [f64; 2] = [370.0, 270.0];
+
+/// Legends longer than this do not fit above a narrow picture beside its title.
+const LEGEND_MAX: usize = 16;
+
+/// The page of a reproduction: one sentence, a table of all rows, a picture a figure.
+pub fn reproduction_page(reproduction: &Reproduction) -> String {
+    let of = &reproduction.provenance;
+    let body = html! {
+        p.note { "Shen et al. 2023, Mechanical Systems and Signal Processing 204, 110730. A verdict follows from the tolerance that stands beside it." }
+        @for compared in &reproduction.figures { (section(compared)) }
+        h2 { "Provenance" }
+        dl {
+            dt { "campaign" } dd { (of.campaign) }
+            dt { "library" } dd { code { (of.library_digest) } ", " (of.library_entries) " entries" }
+            dt { "program" } dd { "tracktwin " (of.code_version) }
+        }
+        p { "To reproduce, with the library of that digest:" }
+        pre { "tracktwin reproduce " (names(reproduction)) " --library URL --out DIR" }
+    };
+    page("The paper's results and ours", &summary(reproduction), &body)
+}
+
+/// What a reader in a hurry needs.
+fn summary(reproduction: &Reproduction) -> String {
+    let count = |verdict| reproduction.count(verdict);
+    format!(
+        "Of {} statements of the paper {} are reproduced, {} come out different, and of {} it \
+         cannot be told.",
+        reproduction.rows.len(),
+        count(Verdict::Reproduced),
+        count(Verdict::Differs),
+        count(Verdict::CannotTell)
+    )
+}
+
+fn names(reproduction: &Reproduction) -> String {
+    let names: Vec<_> = reproduction.figures.iter().map(|of| of.figure.name()).collect();
+    names.join(" ")
+}
+
+fn section(compared: &Compared) -> Markup {
+    let charts: Vec<String> = compared.pictures.iter().map(chart).collect();
+    html! {
+        h2 id=(compared.figure) { (compared.figure.name().replace("fig", "Fig. ")) ": " (compared.figure.title()) }
+        div.scroll { (table(compared)) }
+        (figure(&charts, &compared.caption))
+    }
+}
+
+fn table(compared: &Compared) -> Markup {
+    let wrapped = "white-space:normal;vertical-align:top;min-width:9rem";
+    html! {
+        table {
+            thead { tr {
+                th.words { "statement" } th.words { "paper" } th.words { "ours" }
+                th.words { "verdict" } th.words { "tolerance and reason" }
+            } }
+            tbody {
+                @for row in &compared.rows {
+                    tr {
+                        td.words style=(wrapped) { (row.claim) }
+                        td.words style=(wrapped) { (row.paper) }
+                        td.words style=(wrapped) { (row.ours) }
+                        td.words style="vertical-align:top" { (verdict(row.verdict)) }
+                        td.words style=(wrapped) { (row.why) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The verdict with a mark, so that it does not hang on colour alone.
+fn verdict(verdict: Verdict) -> Markup {
+    let (mark, colour) = match verdict {
+        Verdict::Reproduced => ("✓", "var(--c)"),
+        Verdict::Differs => ("✗", "var(--b)"),
+        Verdict::CannotTell => ("?", "var(--dim)"),
+    };
+    html! { strong style=(format!("color:{colour}")) { (mark) " " (verdict.label()) } }
+}
+
+fn chart(picture: &Picture) -> String {
+    let points = || picture.curves.iter().flat_map(reach);
+    let x = if picture.names.is_empty() {
+        axis(&picture.x, points().map(|point| point.0))
+    } else {
+        Axis::linear(&picture.x.label, -0.5, picture.names.len() as f64 - 0.5)
+    };
+    let y = axis(&picture.y, points().map(|point| point.1));
+    let size = if picture.wide { WIDE } else { NARROW };
+    let mut chart = Chart::new(&picture.title, size, x, y);
+    let bars = picture.curves.iter().filter(|curve| curve.style == Style::Bars).count();
+    for (index, curve) in picture.curves.iter().enumerate() {
+        draw(&mut chart, CLASSES[index % CLASSES.len()], curve, [index, bars]);
+    }
+    legend(&mut chart, picture);
+    if !picture.names.is_empty() {
+        chart.name_x(picture.names.clone());
+    }
+    chart.into_svg()
+}
+
+/// Everything that a curve covers, for the axes.
+fn reach(curve: &Curve) -> Vec<(f64, f64)> {
+    let ends = |(place, &(x, y)): (usize, &(f64, f64))| match &curve.style {
+        Style::Band(half) => [(x, y - half[place]), (x, y + half[place])],
+        Style::Bars => [(x, 0.0), (x, y)],
+        _ => [(x, y), (x, y)],
+    };
+    curve.points.iter().enumerate().flat_map(ends).collect()
+}
+
+fn axis(scale: &Scale, values: impl Iterator<Item = f64>) -> Axis {
+    if !scale.logarithmic {
+        return Axis::around(&scale.label, values);
+    }
+    let positive = values.filter(|value| *value > 0.0);
+    let [low, high] = positive.fold([f64::INFINITY, 0.0_f64], |[a, b], v| [a.min(v), b.max(v)]);
+    let [low, high] = if low.is_finite() { [low, high.max(low * 1.001)] } else { [1.0, 10.0] };
+    Axis::logarithmic(&scale.label, low, high)
+}
+
+fn draw(chart: &mut Chart, class: &'static str, curve: &Curve, [index, bars]: [usize; 2]) {
+    let points = curve.points.iter().copied();
+    match &curve.style {
+        Style::Line => chart.line(class, points),
+        Style::Truth => chart.line("ink", points),
+        Style::Dots => chart.dots("a pale", 1.6, &curve.points),
+        Style::Band(half) => {
+            let sides = points.clone().zip(half).map(|((x, y), half)| (x, y - half, y + half));
+            chart.band(class, &sides.collect::<Vec<_>>());
+            chart.line(class, points);
+        }
+        Style::Bars => {
+            let width = 0.84 / bars.max(1) as f64;
+            for (x, y) in points.filter(|point| point.1.is_finite()) {
+                let left = x - 0.42 + width * index as f64;
+                let name = format!("{}: {y:.1}", curve.name);
+                chart.bar(class, [left, left + 0.92 * width], y, &name);
+            }
+        }
+    }
+}
+
+fn legend(chart: &mut Chart, picture: &Picture) {
+    let names: usize = picture.curves.iter().map(|curve| curve.name.len()).sum();
+    if !picture.wide && names > LEGEND_MAX {
+        return;
+    }
+    for (index, curve) in picture.curves.iter().enumerate().filter(|(_, of)| !of.name.is_empty()) {
+        let class = match curve.style {
+            Style::Truth => "ink",
+            _ => CLASSES[index % CLASSES.len()],
+        };
+        chart.explain(class, &curve.name);
+    }
+}

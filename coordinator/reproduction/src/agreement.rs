@@ -1,0 +1,108 @@
+//! Whether estimates agree with the truth, as far as they claim to.
+
+use crate::average::DEVIATIONS;
+use crate::picture::{Picture, Scale, Style};
+use crate::{Compared, Told, Verdict};
+use tracktwin_parameters::Parameter;
+
+/// Share of a normal distribution beyond [`DEVIATIONS`] standard deviations.
+const BEYOND: f64 = 0.045_500_26;
+
+/// More than the allowed number lie beyond by chance in no more than this share of trials.
+const CHANCE: f64 = 0.05;
+
+/// Estimates beside the truth.
+pub(crate) struct Agreement {
+    /// Estimates beyond two of their own standard deviations.
+    outside: usize,
+    /// All of them.
+    total: usize,
+    /// Mean absolute error, as a share of the range.
+    error: f64,
+    /// Mean standard deviation, as a share of the range.
+    sd: f64,
+}
+
+impl Agreement {
+    /// Of a parameter at these sleepers, counted from 1, of all examples.
+    pub(crate) fn new(told: &[Told], sleepers: &[usize], parameter: Parameter) -> Self {
+        let [low, high] = parameter.range();
+        let pairs = told.iter().flat_map(|of| sleepers.iter().map(move |&at| (of, at)));
+        let pairs: Vec<_> =
+            pairs.map(|(of, at)| (of.truth(at, parameter), of.estimate(at, parameter))).collect();
+        let n = pairs.len() as f64 * (high - low);
+        let beyond =
+            pairs.iter().filter(|(truth, of)| (of.mean - truth).abs() > DEVIATIONS * of.sd);
+        Self {
+            outside: beyond.count(),
+            total: pairs.len(),
+            error: pairs.iter().map(|(truth, of)| (of.mean - truth).abs()).sum::<f64>() / n,
+            sd: pairs.iter().map(|(_, of)| of.sd).sum::<f64>() / n,
+        }
+    }
+
+    /// Adds the row of this claim.
+    pub(crate) fn row(&self, compared: &mut Compared, claim: String, paper: &str) {
+        let inside = self.total - self.outside;
+        let allowed = allowed(self.total);
+        let ours = format!(
+            "{inside} of {} within two standard deviations; mean error {:.1} %, mean standard \
+             deviation {:.1} % of the range",
+            self.total,
+            100.0 * self.error,
+            100.0 * self.sd
+        );
+        let why = format!(
+            "chance alone leaves more than {allowed} of {} outside once in twenty times at most",
+            self.total
+        );
+        let verdict = Verdict::of(self.outside <= allowed);
+        compared.row(claim, [paper.to_owned(), ours], verdict, why);
+    }
+}
+
+/// How many of `total` normal estimates may lie beyond, before chance is no longer the reason.
+fn allowed(total: usize) -> usize {
+    // Binomial distribution, term by term.
+    let n = total as f64;
+    let mut term = (1.0 - BEYOND).powi(total as i32);
+    let mut sum = term;
+    let mut count = 0;
+    while 1.0 - sum > CHANCE && count < total {
+        let k = count as f64;
+        term *= (n - k) / (k + 1.0) * BEYOND / (1.0 - BEYOND);
+        sum += term;
+        count += 1;
+    }
+    count
+}
+
+/// Truth and estimates of a parameter along an example.
+pub(crate) fn picture(told: &Told, parameter: Parameter) -> Picture {
+    let divisor = if parameter.range()[1] >= 1e6 { 1e6 } else { 1.0 };
+    let unit = if divisor > 1.0 { "MN/m".to_owned() } else { parameter.unit().to_owned() };
+    let unit = unit.replace("1e-4", "10⁻⁴").replace("m2", "m²");
+    let numbers = 1..=told.sleepers.len();
+    let estimates = || numbers.clone().map(|at| (at as f64, told.estimate(at, parameter)));
+    let truth =
+        numbers.clone().map(|at| (at as f64, told.truth(at, parameter) / divisor)).collect();
+    let band = estimates().map(|(_, of)| DEVIATIONS * of.sd / divisor).collect();
+    let means = estimates().map(|(at, of)| (at, of.mean / divisor)).collect();
+    let y = Scale::linear(format!("{} in {unit}", parameter.symbol()));
+    Picture::new(told.example.name.clone(), Scale::linear("sleeper"), y)
+        .with("told", Style::Band(band), means)
+        .with("true", Style::Truth, truth)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chance_leaves_a_few_outside() {
+        // P(X = 0) of 20 is 0.39, up to 1 0.77, up to 2 0.94, up to 3 0.988.
+        assert_eq!(allowed(20), 3);
+        assert_eq!(allowed(1), 0);
+        assert_eq!(allowed(0), 0);
+    }
+}

@@ -1,0 +1,95 @@
+//! Means with how surely they are known, and what may be said of their sign.
+
+use crate::Verdict;
+use tracktwin_evaluation::Estimate;
+
+/// Standard deviations beyond which chance is no longer taken for the reason: it reaches further
+/// once in twenty times.
+pub(crate) const DEVIATIONS: f64 = 2.0;
+
+/// A mean and its standard error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Average {
+    /// The mean.
+    pub(crate) mean: f64,
+    /// Its standard error.
+    pub(crate) error: f64,
+}
+
+impl Average {
+    /// Of values that vary by chance.
+    pub(crate) fn of(values: &[f64]) -> Self {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        Self { mean, error: (squares / (n - 1.0) / n).sqrt() }
+    }
+
+    /// Of estimates, each as sure as it says, whose errors are each its own.
+    pub(crate) fn of_estimates(estimates: &[Estimate]) -> Self {
+        let n = estimates.len() as f64;
+        let mean = estimates.iter().map(|estimate| estimate.mean).sum::<f64>() / n;
+        let squares: f64 = estimates.iter().map(|estimate| estimate.sd.powi(2)).sum();
+        Self { mean, error: squares.sqrt() / n }
+    }
+
+    /// This less another that is independent of it.
+    pub(crate) fn less(self, other: Self) -> Self {
+        Self { mean: self.mean - other.mean, error: self.error.hypot(other.error) }
+    }
+
+    /// The same in another unit.
+    pub(crate) fn times(self, factor: f64) -> Self {
+        Self { mean: self.mean * factor, error: self.error * factor.abs() }
+    }
+
+    /// The same from another zero.
+    pub(crate) fn plus(self, offset: f64) -> Self {
+        Self { mean: self.mean + offset, ..self }
+    }
+
+    /// Whether it is told from zero.
+    pub(crate) fn is_told(self) -> bool {
+        self.mean.abs() > DEVIATIONS * self.error
+    }
+
+    /// What becomes of the claim that it is above zero.
+    pub(crate) fn is_positive(self) -> Verdict {
+        if self.is_told() { Verdict::of(self.mean > 0.0) } else { Verdict::CannotTell }
+    }
+}
+
+/// The verdict on several claims of which all must hold.
+pub(crate) fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
+    verdicts.into_iter().fold(Verdict::Reproduced, |all, verdict| match (all, verdict) {
+        (Verdict::Differs, _) | (_, Verdict::Differs) => Verdict::Differs,
+        (Verdict::CannotTell, _) | (_, Verdict::CannotTell) => Verdict::CannotTell,
+        _ => Verdict::Reproduced,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_has_its_error_and_a_difference_both() {
+        let average = Average::of(&[1.0, 3.0]);
+        // Standard deviation sqrt(2) over sqrt(2) values.
+        assert!((average.mean - 2.0).abs() < 1e-12 && (average.error - 1.0).abs() < 1e-12);
+        let other = Average { mean: -3.0, error: 1.0 };
+        let difference = average.less(other);
+        assert!((difference.error - 2.0_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(difference.is_positive(), Verdict::Reproduced);
+        assert_eq!(other.is_positive(), Verdict::Differs);
+        assert_eq!(Average { mean: 1.0, error: 1.0 }.is_positive(), Verdict::CannotTell);
+    }
+
+    #[test]
+    fn one_that_differs_spoils_all() {
+        use Verdict::{CannotTell, Differs, Reproduced};
+        assert_eq!(all([Reproduced, CannotTell, Differs]), Differs);
+        assert_eq!(all([Reproduced, CannotTell]), CannotTell);
+        assert_eq!(all([Reproduced, Reproduced]), Reproduced);
+    }
+}

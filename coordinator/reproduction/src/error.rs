@@ -1,0 +1,75 @@
+//! Why a figure cannot be compared.
+
+use crate::Figure;
+
+/// What a library or a track lacks.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The library has not the speed of the paper's figure.
+    #[error("{figure} is at {wanted} km/h; the library has {} km/h", join(known))]
+    NoSpeed {
+        /// The figure.
+        figure: Figure,
+        /// The speed in km/h.
+        wanted: f64,
+        /// Those of the library in km/h.
+        known: Vec<f64>,
+    },
+    /// One speed cannot be compared with another.
+    #[error("{figure} compares speeds; the library has one, a campaign with more is needed")]
+    OneSpeed {
+        /// The figure.
+        figure: Figure,
+    },
+    /// A parameter is the same in all cases.
+    #[error("{figure}: the library does not vary {symbol}; take one over all of Table D1")]
+    NotVaried {
+        /// The figure.
+        figure: Figure,
+        /// The parameter's symbol.
+        symbol: &'static str,
+    },
+    /// There are too few cases to compare.
+    #[error("{figure}: {found} finished cases are too few; give at least {least}")]
+    TooFewCases {
+        /// The figure.
+        figure: Figure,
+        /// Finished cases.
+        found: usize,
+        /// How many it takes.
+        least: usize,
+    },
+    /// There is no such model.
+    #[error("{figure}: there is no {feature} model at {speed_km_h} km/h; train again")]
+    NoModel {
+        /// The figure.
+        figure: Figure,
+        /// The feature set.
+        feature: &'static str,
+        /// The speed in km/h.
+        speed_km_h: f64,
+    },
+    /// An example's recording was not told at all of its sleepers.
+    #[error("{figure}: sleeper {sleeper} of an example has no estimate of {symbol}")]
+    NotTold {
+        /// The figure.
+        figure: Figure,
+        /// Number of the sleeper, from 1.
+        sleeper: usize,
+        /// The parameter's symbol.
+        symbol: &'static str,
+    },
+    /// The track cannot be built.
+    #[error(transparent)]
+    Model(#[from] tracktwin_track::model::ModelError),
+    /// It has no receptance.
+    #[error(transparent)]
+    Frequency(#[from] tracktwin_track::frequency::FrequencyError),
+    /// The model selector or a model refuses.
+    #[error(transparent)]
+    Surrogate(#[from] tracktwin_surrogate::Error),
+}
+
+fn join(speeds: &[f64]) -> String {
+    speeds.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,170 @@
+//! The tracks of the paper's numerical examples (section 4), and what was told of them.
+
+use crate::{Error, Figure};
+use Parameter::{BallastStiffness, IrregularityLevel, RailpadStiffness, SleeperBendingStiffness};
+use tracktwin_evaluation::{Estimate, Evaluation};
+use tracktwin_parameters::{Parameter, ParameterSet};
+
+/// Sleepers of a track section (paper, Fig. 15).
+pub(crate) const SLEEPERS: usize = 9;
+
+/// Parameter sets A0 to A3: railpad and ballast stiffness in N/m (paper, Table 4.1).
+const TABLE_4_1: [[f64; 2]; 4] = [[2e8, 2e7], [1.5e8, 1.6e7], [1e8, 1.2e7], [5e7, 8e6]];
+
+/// Levels of irregularity of Fig. 17 in 1e-4 m2 rad/m.
+const LEVELS: [f64; 3] = [2.0, 3.0, 4.0];
+
+/// Bending stiffness of Fig. 18 in N m2: low, middle and high in Table D1's range, as the text does
+/// not give the paper's.
+const BENDING_N_M2: [f64; 3] = [4000.0, 5000.0, 6000.0];
+
+/// Lengths of the rail's elements in m between sleepers 1 and 5 and between 5 and 9 (paper,
+/// section 4).
+const ELEMENTS_M: [f64; 2] = [0.3e-3, 6.3e-3];
+
+/// Sleepers, from 1, at which stiffness is reduced in Fig. 19.
+pub(crate) const REDUCED: [std::ops::RangeInclusive<usize>; 3] = [4..=4, 4..=6, 5..=9];
+
+/// A track section of nine sleepers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Example {
+    /// The figure it belongs to.
+    pub figure: Figure,
+    /// What the paper's column shows.
+    pub name: String,
+    /// The parameters at each sleeper.
+    pub sleepers: Vec<ParameterSet>,
+}
+
+/// The examples of a figure, a column each; none for figures that have none.
+pub fn examples(figure: Figure) -> Vec<Example> {
+    let example = |name: String, of: &dyn Fn(usize) -> ParameterSet| Example {
+        figure,
+        name,
+        sleepers: (1..=SLEEPERS).map(of).collect(),
+    };
+    match figure {
+        Figure::Fig16 => (1..=3)
+            .map(|to| example(format!("A0 to A{to}"), &|at| set(if at <= 4 { 0 } else { to })))
+            .collect(),
+        Figure::Fig17 => LEVELS
+            .iter()
+            .map(|&level| {
+                example(format!("A_irr {level}"), &|_| set(2).with(IrregularityLevel, level))
+            })
+            .collect(),
+        Figure::Fig18 => BENDING_N_M2
+            .iter()
+            .map(|&stiffness| {
+                let of = |_| set(2).with(SleeperBendingStiffness, stiffness);
+                example(format!("EI_s {stiffness} N m²"), &of)
+            })
+            .collect(),
+        Figure::Fig19 => REDUCED
+            .iter()
+            .map(|reduced| {
+                let of = |at| set(if reduced.contains(&at) { 3 } else { 2 });
+                let count = reduced.clone().count();
+                example(format!("{count} of nine reduced"), &of)
+            })
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The nominal track with railpads and ballast of a row of Table 4.1.
+fn set(row: usize) -> ParameterSet {
+    let [railpad, ballast] = TABLE_4_1[row];
+    ParameterSet::nominal().with(RailpadStiffness, railpad).with(BallastStiffness, ballast)
+}
+
+impl Example {
+    /// Rail elements between a sleeper, counted from 1, and the next, `spacing_m` on.
+    pub fn elements(sleeper: usize, spacing_m: f64) -> usize {
+        let length_m = if sleeper < 5 { ELEMENTS_M[0] } else { ELEMENTS_M[1] };
+        (spacing_m / length_m).round() as usize
+    }
+
+    /// The name of a sleeper, counted from 1.
+    pub fn sleeper(number: usize) -> String {
+        format!("S{number}")
+    }
+}
+
+/// What was told of an example.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Told {
+    /// The truth.
+    pub example: Example,
+    /// Estimates, a sleeper each.
+    pub sleepers: Vec<tracktwin_evaluation::Estimates>,
+}
+
+impl Told {
+    /// What an evaluation of the example's recording says.
+    ///
+    /// # Errors
+    /// [`Error::NotTold`] names a sleeper or a parameter that it lacks.
+    pub fn new(example: Example, evaluation: &Evaluation) -> Result<Self, Error> {
+        let figure = example.figure;
+        let of = |number: usize| {
+            let id = Example::sleeper(number);
+            let sleeper = evaluation.sleepers.iter().find(|sleeper| sleeper.id == id);
+            let estimates = sleeper.map(|sleeper| sleeper.estimates.clone()).unwrap_or_default();
+            let varied =
+                [RailpadStiffness, BallastStiffness, SleeperBendingStiffness, IrregularityLevel];
+            match varied.iter().find(|parameter| !estimates.contains_key(parameter)) {
+                Some(missing) => {
+                    Err(Error::NotTold { figure, sleeper: number, symbol: missing.symbol() })
+                }
+                None => Ok(estimates),
+            }
+        };
+        let sleepers = (1..=SLEEPERS).map(of).collect::<Result<_, _>>()?;
+        Ok(Self { example, sleepers })
+    }
+
+    /// What is true of a sleeper, counted from 1.
+    pub(crate) fn truth(&self, sleeper: usize, parameter: Parameter) -> f64 {
+        self.example.sleepers[sleeper - 1][parameter]
+    }
+
+    /// What was told of it.
+    pub(crate) fn estimate(&self, sleeper: usize, parameter: Parameter) -> Estimate {
+        self.sleepers[sleeper - 1][&parameter]
+    }
+
+    /// Estimates at these sleepers.
+    pub(crate) fn estimates(
+        &self,
+        sleepers: impl IntoIterator<Item = usize>,
+        parameter: Parameter,
+    ) -> Vec<Estimate> {
+        sleepers.into_iter().map(|sleeper| self.estimate(sleeper, parameter)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_examples_are_the_paper_s() {
+        let step = &examples(Figure::Fig16)[2];
+        assert_eq!(step.sleepers[3][RailpadStiffness], 2e8);
+        assert_eq!(step.sleepers[4][RailpadStiffness], 5e7);
+        assert_eq!(step.sleepers[4][BallastStiffness], 8e6);
+        let local = &examples(Figure::Fig19)[1];
+        let soft = local.sleepers.iter().filter(|set| set[BallastStiffness] == 8e6).count();
+        assert_eq!((soft, local.name.as_str()), (3, "3 of nine reduced"));
+        assert_eq!(examples(Figure::Fig17)[0].sleepers[8][IrregularityLevel], 2.0);
+        assert!(examples(Figure::Fig12).is_empty());
+    }
+
+    #[test]
+    fn the_mesh_is_fine_up_to_the_fifth_sleeper() {
+        assert_eq!(Example::elements(1, 0.125), 417);
+        assert_eq!(Example::elements(4, 0.125), 417);
+        assert_eq!(Example::elements(5, 0.125), 20);
+    }
+}

@@ -1,0 +1,119 @@
+//! The figures of the paper that are reproduced.
+
+use serde::{Serialize, Serializer};
+use std::str::FromStr;
+
+/// A figure of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Figure {
+    /// Receptance of the nominal track.
+    Fig9,
+    /// LWPS at several speeds.
+    Fig10,
+    /// Sensitivity of the LWPS to each parameter.
+    Fig12,
+    /// The model selector's error by size of the library.
+    Fig13,
+    /// The models' errors on the test half.
+    Fig14,
+    /// Numerical example: a step in railpad and ballast.
+    Fig16,
+    /// Numerical example: levels of irregularity.
+    Fig17,
+    /// Numerical example: bending stiffness of the sleepers.
+    Fig18,
+    /// Numerical example: stiffness reduced at one, three and five sleepers.
+    Fig19,
+}
+
+impl Figure {
+    /// All of them, in the paper's order.
+    pub const ALL: [Self; 9] = [
+        Self::Fig9,
+        Self::Fig10,
+        Self::Fig12,
+        Self::Fig13,
+        Self::Fig14,
+        Self::Fig16,
+        Self::Fig17,
+        Self::Fig18,
+        Self::Fig19,
+    ];
+
+    /// The name used at every border.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fig9 => "fig9",
+            Self::Fig10 => "fig10",
+            Self::Fig12 => "fig12",
+            Self::Fig13 => "fig13",
+            Self::Fig14 => "fig14",
+            Self::Fig16 => "fig16",
+            Self::Fig17 => "fig17",
+            Self::Fig18 => "fig18",
+            Self::Fig19 => "fig19",
+        }
+    }
+
+    /// What it shows.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Fig9 => "Receptance of the nominal track",
+            Self::Fig10 => "Spectra at several speeds",
+            Self::Fig12 => "Sensitivity of the spectra to each parameter",
+            Self::Fig13 => "Model selector and the size of the library",
+            Self::Fig14 => "Errors of the models on the test half",
+            Self::Fig16 => "Example: a step in railpad and ballast",
+            Self::Fig17 => "Example: levels of irregularity",
+            Self::Fig18 => "Example: bending stiffness of the sleepers",
+            Self::Fig19 => "Example: stiffness reduced at a few sleepers",
+        }
+    }
+
+    /// Whether it asks trained models.
+    pub const fn needs_models(self) -> bool {
+        matches!(self, Self::Fig14) || self.is_example()
+    }
+
+    /// Whether it is one of the numerical examples, whose passes are simulated.
+    pub const fn is_example(self) -> bool {
+        matches!(self, Self::Fig16 | Self::Fig17 | Self::Fig18 | Self::Fig19)
+    }
+}
+
+impl std::fmt::Display for Figure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Figure {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|figure| figure.name() == text).ok_or_else(|| {
+            let known: Vec<_> = Self::ALL.iter().map(|figure| figure.name()).collect();
+            format!("no figure `{text}` is reproduced; known are {}", known.join(", "))
+        })
+    }
+}
+
+impl Serialize for Figure {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_leads_back_to_its_figure_and_others_to_the_known_ones() {
+        for figure in Figure::ALL {
+            assert_eq!(figure.name().parse(), Ok(figure));
+        }
+        let message = "fig11".parse::<Figure>().unwrap_err();
+        assert!(message.contains("`fig11`") && message.contains("fig9, fig10"), "{message}");
+    }
+}

@@ -1,0 +1,38 @@
+//! The results of the source paper (Shen et al. 2023) beside what this program gets, row by row.
+//!
+//! Owns the paper's claims, the tolerances behind a verdict and the tracks of its numerical
+//! examples; goes from data to rows and plain pictures. Leaves to others where the data come from
+//! (library, surrogate, evaluation), who simulates the examples, and how a page looks (report).
+
+mod agreement;
+mod average;
+mod error;
+mod errors;
+mod example;
+mod figure;
+mod local_change;
+mod one_parameter;
+mod picture;
+mod receptance;
+mod row;
+mod selector;
+mod sensitivity;
+mod spectrum;
+mod speed;
+mod step;
+#[cfg(test)]
+mod testing;
+
+pub use error::Error;
+pub use errors::{Tested, errors};
+pub use example::{Example, Told, examples};
+pub use figure::Figure;
+pub use local_change::local_change;
+pub use one_parameter::{bending_stiffness, irregularity};
+pub use picture::{Curve, Picture, Scale, Style};
+pub use receptance::{HammerTest, hammer_tests, receptance};
+pub use row::{Compared, FORMAT, Provenance, Reproduction, Row, Verdict};
+pub use selector::selector;
+pub use sensitivity::sensitivity;
+pub use speed::speed;
+pub use step::step;

@@ -1,0 +1,82 @@
+//! Pictures as plain data; how they look is the page's.
+
+/// A chart: curves over two axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// What it shows.
+    pub title: String,
+    /// The horizontal axis.
+    pub x: Scale,
+    /// The vertical axis.
+    pub y: Scale,
+    /// What is drawn, in this order.
+    pub curves: Vec<Curve>,
+    /// Names at places of the horizontal axis, in place of numbers.
+    pub names: Vec<(f64, String)>,
+    /// Whether it takes the page's width.
+    pub wide: bool,
+}
+
+/// An axis.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Scale {
+    /// What it shows, with the unit.
+    pub label: String,
+    /// Logarithmic, or linear.
+    pub logarithmic: bool,
+}
+
+/// Points of one kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// What the legend calls it; empty for no entry.
+    pub name: String,
+    /// How it is drawn.
+    pub style: Style,
+    /// Its points.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// How points are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Style {
+    /// As a line in a colour of its own.
+    Line,
+    /// As a line in the colour of the text: what is true.
+    Truth,
+    /// As a line with a band of this half-width about it.
+    Band(Vec<f64>),
+    /// As dots.
+    Dots,
+    /// As bars from zero.
+    Bars,
+}
+
+impl Scale {
+    pub(crate) fn linear(label: impl Into<String>) -> Self {
+        Self { label: label.into(), logarithmic: false }
+    }
+
+    pub(crate) fn logarithmic(label: impl Into<String>) -> Self {
+        Self { label: label.into(), logarithmic: true }
+    }
+}
+
+impl Picture {
+    pub(crate) fn new(title: impl Into<String>, x: Scale, y: Scale) -> Self {
+        let (curves, names) = (Vec::new(), Vec::new());
+        Self { title: title.into(), x, y, curves, names, wide: false }
+    }
+
+    /// The same with a curve more.
+    #[must_use]
+    pub(crate) fn with(
+        mut self,
+        name: impl Into<String>,
+        style: Style,
+        points: Vec<(f64, f64)>,
+    ) -> Self {
+        self.curves.push(Curve { name: name.into(), style, points });
+        self
+    }
+}

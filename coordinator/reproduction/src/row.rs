@@ -1,0 +1,130 @@
+//! What a comparison says: a row a claim.
+
+use crate::{Figure, Picture};
+use serde::Serialize;
+
+/// The format of `reproduce.json`.
+pub const FORMAT: &str = "reproduction/1";
+
+/// What became of a claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Within the stated tolerance.
+    Reproduced,
+    /// Beyond it.
+    Differs,
+    /// Chance, or something the paper does not say, stands in the way.
+    CannotTell,
+}
+
+impl Verdict {
+    /// `yes` is reproduced, else it differs.
+    pub(crate) const fn of(yes: bool) -> Self {
+        if yes { Self::Reproduced } else { Self::Differs }
+    }
+
+    /// A few words for a person.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Reproduced => "reproduced",
+            Self::Differs => "differs",
+            Self::CannotTell => "cannot tell",
+        }
+    }
+}
+
+/// A claim of the paper beside what this program gets.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Row {
+    /// The figure it belongs to.
+    pub figure: Figure,
+    /// What the paper says, in words.
+    pub claim: String,
+    /// Its number or finding.
+    pub paper: String,
+    /// Ours.
+    pub ours: String,
+    /// How the two compare.
+    pub verdict: Verdict,
+    /// The tolerance, and the reason for a difference where it is known.
+    pub why: String,
+}
+
+/// A figure's rows and pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compared {
+    /// The figure.
+    pub figure: Figure,
+    /// A row a claim.
+    pub rows: Vec<Row>,
+    /// Ours, drawn as the paper does.
+    pub pictures: Vec<Picture>,
+    /// What is to be seen in them.
+    pub caption: String,
+}
+
+impl Compared {
+    pub(crate) fn new(figure: Figure, caption: &str) -> Self {
+        Self { figure, rows: Vec::new(), pictures: Vec::new(), caption: caption.to_owned() }
+    }
+
+    /// Adds the row of a claim.
+    pub(crate) fn row(
+        &mut self,
+        claim: impl Into<String>,
+        [paper, ours]: [String; 2],
+        verdict: Verdict,
+        why: impl Into<String>,
+    ) {
+        let (figure, claim, why) = (self.figure, claim.into(), why.into());
+        self.rows.push(Row { figure, claim, paper, ours, verdict, why });
+    }
+}
+
+/// What the comparison rests on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Provenance {
+    /// Version of this program.
+    pub code_version: &'static str,
+    /// The campaign.
+    pub campaign: String,
+    /// Digest of its results.
+    pub library_digest: String,
+    /// Its finished cases.
+    pub library_entries: usize,
+}
+
+/// The paper's results beside ours.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reproduction {
+    /// [`FORMAT`].
+    pub format: &'static str,
+    /// Where ours come from.
+    #[serde(flatten)]
+    pub provenance: Provenance,
+    /// A row a claim, in the paper's order.
+    pub rows: Vec<Row>,
+    /// The figures with their pictures, for a page.
+    #[serde(skip)]
+    pub figures: Vec<Compared>,
+}
+
+impl Reproduction {
+    /// All rows of these figures.
+    pub fn new(provenance: Provenance, figures: Vec<Compared>) -> Self {
+        let rows = figures.iter().flat_map(|figure| figure.rows.iter().cloned()).collect();
+        Self { format: FORMAT, provenance, rows, figures }
+    }
+
+    /// How many rows came out so.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        self.rows.iter().filter(|row| row.verdict == verdict).count()
+    }
+
+    /// The record as the text of `reproduce.json`.
+    pub fn json(&self) -> String {
+        let text = serde_json::to_string_pretty(self).expect("rows of text become JSON");
+        format!("{text}\n")
+    }
+}

@@ -1,0 +1,206 @@
+//! `tracktwin reproduce`: the paper's results beside this program's.
+
+use super::library::choose;
+use super::progress::Progress;
+use super::{OrInput, Stop, evaluate, say, train};
+use crate::evaluating::Evaluator;
+use crate::reproducing::{self, ReproducingError};
+use crate::training;
+use anyhow::{Context, anyhow};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use tracktwin_library::{CampaignRecord, Library};
+use tracktwin_reproduction::{Compared, Figure, Provenance, Reproduction, Verdict};
+use tracktwin_surrogate::{Trained, TrainingSet};
+use tracktwin_worker::Experiment;
+
+/// What `reproduce` is told.
+#[derive(Args)]
+#[command(after_long_help = "\
+The paper: Shen et al. 2023, Mechanical Systems and Signal Processing 204, 110730.
+
+  fig9    receptance peaks of the nominal track
+  fig10   spectra at several speeds
+  fig12   sensitivity of the spectra to each parameter
+  fig13   model selector and the size of the library
+  fig14   errors of the models on the test half (needs models)
+  fig16   example: a step in railpad and ballast (needs models; passes are simulated)
+  fig17   example: levels of irregularity (likewise)
+  fig18   example: bending stiffness of the sleepers (likewise)
+  fig19   example: stiffness reduced at a few sleepers (likewise)
+
+A library for all of them, and what the command says of it:
+
+  tracktwin run --cases 10000 --no-train --library sqlite:library.sqlite --out out
+  tracktwin reproduce --library sqlite:library.sqlite --out reproduction
+
+Exit codes: 0 nothing differs, 1 a row differs, 2 wrong input, 3 failure.")]
+pub(super) struct Arguments {
+    /// Figures of the paper, `fig9` to `fig19` [default: all that are known].
+    #[arg(value_name = "FIGURE")]
+    figures: Vec<String>,
+    /// The library to compare with: sqlite:PATH.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    library: String,
+    /// Folder for reproduce.json and reproduce.html.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Folder of models trained on this library [default: train them into OUT/models].
+    #[arg(long, value_name = "DIR")]
+    models: Option<PathBuf>,
+    /// The campaign, where the library holds several.
+    #[arg(long, value_name = "ID")]
+    campaign: Option<String>,
+}
+
+/// Which half of the cases trains and is searched where no models were given, as with `train`.
+const SEED: u64 = 0;
+
+pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    let figures = figures(&arguments.figures).or_input()?;
+    let library = Library::open(&arguments.library).await.or_input()?;
+    let given = arguments.models.as_deref().map(Trained::load).transpose().or_input()?;
+    let campaign = campaign(&library, arguments.campaign.as_deref(), given.as_ref()).await?;
+    let experiment = Experiment::from_json(&campaign.experiment_json).or_input()?;
+    reproducing::check(&experiment, &figures).or_input()?;
+    let out = &arguments.out;
+    std::fs::create_dir_all(out)
+        .with_context(|| format!("{}: the folder cannot be made", out.display()))
+        .or_input()?;
+    let needed = figures.iter().any(|figure| figure.needs_models());
+    let models = match given {
+        Some(models) => Some(models),
+        None if needed => Some(train::train(&library, &campaign, SEED, &out.join("models")).await?),
+        None => None,
+    };
+    let material = Material::read(&library, &campaign, models).await?;
+    let compare = move || compare(&figures, &experiment, &material);
+    let reproduction = tokio::task::spawn_blocking(compare).await?.or_input()?;
+    answer(&reproduction, out)
+}
+
+/// The figures of these names, each once and in the paper's order; all if there are no names.
+fn figures(names: &[String]) -> Result<Vec<Figure>, anyhow::Error> {
+    if names.is_empty() {
+        return Ok(Figure::ALL.to_vec());
+    }
+    let parsed = names.iter().map(|name| name.parse().map_err(|error: String| anyhow!(error)));
+    let mut figures = parsed.collect::<Result<Vec<Figure>, _>>()?;
+    figures.sort_unstable();
+    figures.dedup();
+    Ok(figures)
+}
+
+/// The named campaign, that of the models, or the only one.
+async fn campaign(
+    library: &Library,
+    id: Option<&str>,
+    models: Option<&Trained>,
+) -> Result<CampaignRecord, Stop> {
+    let campaign = choose(library, id.or(models.map(Trained::campaign))).await?;
+    match models {
+        Some(models) if models.campaign() != campaign.id => {
+            let (of, id) = (models.campaign(), &campaign.id);
+            Err(anyhow!("--models: they are of campaign {of}, not {id}; train on that one"))
+                .or_input()
+        }
+        _ => Ok(campaign),
+    }
+}
+
+/// A library's results, and the models that were trained on them.
+enum Material {
+    Results(TrainingSet),
+    Models(Evaluator),
+}
+
+impl Material {
+    async fn read(
+        library: &Library,
+        campaign: &CampaignRecord,
+        models: Option<Trained>,
+    ) -> Result<Self, Stop> {
+        let Some(models) = models else {
+            return Ok(Self::Results(training::set(library, campaign).await?));
+        };
+        let evaluator = Evaluator::new(models, library).await.map_err(evaluate::stop)?;
+        evaluator.models().belongs_to(&evaluator.set().library_digest).or_input()?;
+        Ok(Self::Models(evaluator))
+    }
+
+    fn set(&self) -> &TrainingSet {
+        match self {
+            Self::Results(set) => set,
+            Self::Models(evaluator) => evaluator.set(),
+        }
+    }
+
+    fn evaluator(&self) -> Option<&Evaluator> {
+        match self {
+            Self::Results(_) => None,
+            Self::Models(evaluator) => Some(evaluator),
+        }
+    }
+}
+
+fn compare(
+    figures: &[Figure],
+    experiment: &Experiment,
+    material: &Material,
+) -> Result<Reproduction, ReproducingError> {
+    let set = material.set();
+    let mut examples = if figures.iter().any(|figure| figure.is_example()) {
+        let mut progress = Progress::begin("examples", 0, experiment.speeds_km_h.len() as u64);
+        let recordings =
+            reproducing::recordings(figures, experiment, &mut |done| progress.at(done as u64, ""))?;
+        progress.end();
+        recordings
+    } else {
+        std::collections::BTreeMap::new()
+    };
+    let mut progress = Progress::begin("comparing", 0, figures.len() as u64);
+    let mut all: Vec<Compared> = Vec::new();
+    for (done, &figure) in figures.iter().enumerate() {
+        progress.at(done as u64, figure.name());
+        let evaluator = material.evaluator();
+        let seed = evaluator.map_or(SEED, |evaluator| evaluator.models().split_seed());
+        let compared = match (examples.remove(&figure), evaluator) {
+            (Some(recordings), Some(evaluator)) => {
+                Some(reproducing::from_examples(figure, evaluator, recordings)?)
+            }
+            (None, Some(evaluator)) if figure.needs_models() => {
+                Some(reproducing::test_errors(set, evaluator.models())?)
+            }
+            _ => reproducing::from_library(figure, experiment, set, seed)?,
+        };
+        all.extend(compared);
+    }
+    progress.end();
+    let provenance = Provenance {
+        code_version: env!("CARGO_PKG_VERSION"),
+        campaign: set.campaign.clone(),
+        library_digest: set.library_digest.clone(),
+        library_entries: set.entries(),
+    };
+    Ok(Reproduction::new(provenance, all))
+}
+
+/// Writes the files, says every row, and is negative if one differs.
+fn answer(reproduction: &Reproduction, out: &Path) -> Result<(), Stop> {
+    std::fs::write(out.join("reproduce.json"), reproduction.json())?;
+    let page = out.join("reproduce.html");
+    std::fs::write(&page, tracktwin_report::reproduction_page(reproduction))?;
+    for row in &reproduction.rows {
+        let (figure, verdict) = (row.figure.name(), row.verdict.label());
+        say(&format!("{figure:6} {verdict:12} {}: {} (paper: {})", row.claim, row.ours, row.paper));
+    }
+    let count = |verdict| reproduction.count(verdict);
+    say(&format!(
+        "{} reproduced, {} differ, {} cannot be told; page: {}",
+        count(Verdict::Reproduced),
+        count(Verdict::Differs),
+        count(Verdict::CannotTell),
+        page.display()
+    ));
+    if count(Verdict::Differs) > 0 { Err(Stop::Negative) } else { Ok(()) }
+}
