@@ -12,8 +12,11 @@ const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 const WIDE: [f64; 2] = [860.0, 320.0];
 const NARROW: [f64; 2] = [370.0, 270.0];
 
-/// Legends longer than this do not fit above a narrow picture beside its title.
-const LEGEND_MAX: usize = 16;
+/// Room in px for title and legend above the frame of a narrow picture, and what they take: a letter
+/// of either, a key.
+const ROOM: f64 = 284.0;
+const LETTER: f64 = 7.4;
+const KEY: f64 = 36.0;
 
 /// The page of a reproduction: one sentence, a table of all rows, a picture a figure.
 pub fn reproduction_page(reproduction: &Reproduction) -> String {
@@ -157,8 +160,9 @@ fn draw(chart: &mut Chart, class: &'static str, curve: &Curve, [index, bars]: [u
 }
 
 fn legend(chart: &mut Chart, picture: &Picture) {
-    let names: usize = picture.curves.iter().map(|curve| curve.name.len()).sum();
-    if !picture.wide && names > LEGEND_MAX {
+    let names = picture.curves.iter().filter(|of| !of.name.is_empty());
+    let width: f64 = names.map(|of| KEY + LETTER * of.name.chars().count() as f64).sum();
+    if !picture.wide && LETTER * picture.title.chars().count() as f64 + width > ROOM {
         return;
     }
     for (index, curve) in picture.curves.iter().enumerate().filter(|(_, of)| !of.name.is_empty()) {

@@ -11,6 +11,13 @@ const BEYOND: f64 = 0.045_500_26;
 /// More than the allowed number lie beyond by chance in no more than this share of trials.
 const CHANCE: f64 = 0.05;
 
+/// Standard deviation of a parameter of which only the range is known, as a share of it.
+const UNKNOWN: f64 = 0.288_675;
+
+/// Estimates must be surer than this share of the range to be called correct: twice as sure as who
+/// only knows the range. Others agree with anything.
+const SURE: f64 = 0.5 * UNKNOWN;
+
 /// Estimates beside the truth.
 pub(crate) struct Agreement {
     /// Estimates beyond two of their own standard deviations.
@@ -53,10 +60,19 @@ impl Agreement {
             100.0 * self.sd
         );
         let why = format!(
-            "chance alone leaves more than {allowed} of {} outside once in twenty times at most",
-            self.total
+            "chance alone leaves more than {allowed} of {} outside once in twenty times at most; \
+             estimates less sure than {:.0} % of the range, half of what knowing the range alone \
+             gives, agree with anything",
+            self.total,
+            100.0 * SURE
         );
-        let verdict = Verdict::of(self.outside <= allowed);
+        let verdict = if self.outside > allowed {
+            Verdict::Differs
+        } else if self.sd > SURE {
+            Verdict::CannotTell
+        } else {
+            Verdict::Reproduced
+        };
         compared.row(claim, [paper.to_owned(), ours], verdict, why);
     }
 }
@@ -65,7 +81,7 @@ impl Agreement {
 fn allowed(total: usize) -> usize {
     // Binomial distribution, term by term.
     let n = total as f64;
-    let mut term = (1.0 - BEYOND).powi(total as i32);
+    let mut term = (1.0 - BEYOND).powf(n);
     let mut sum = term;
     let mut count = 0;
     while 1.0 - sum > CHANCE && count < total {

@@ -53,6 +53,18 @@ impl Average {
         self.mean.abs() > DEVIATIONS * self.error
     }
 
+    /// What becomes of the claim that it is no more than chance, where `matters` would matter: one
+    /// that is known less surely than that cannot tell.
+    pub(crate) fn is_nothing(self, matters: f64) -> Verdict {
+        if self.is_told() {
+            Verdict::Differs
+        } else if DEVIATIONS * self.error < matters {
+            Verdict::Reproduced
+        } else {
+            Verdict::CannotTell
+        }
+    }
+
     /// What becomes of the claim that it is above zero.
     pub(crate) fn is_positive(self) -> Verdict {
         if self.is_told() { Verdict::of(self.mean > 0.0) } else { Verdict::CannotTell }
@@ -82,7 +94,11 @@ mod tests {
         assert!((difference.error - 2.0_f64.sqrt()).abs() < 1e-12);
         assert_eq!(difference.is_positive(), Verdict::Reproduced);
         assert_eq!(other.is_positive(), Verdict::Differs);
-        assert_eq!(Average { mean: 1.0, error: 1.0 }.is_positive(), Verdict::CannotTell);
+        let unsure = Average { mean: 1.0, error: 1.0 };
+        assert_eq!(unsure.is_positive(), Verdict::CannotTell);
+        assert_eq!(unsure.is_nothing(3.0), Verdict::Reproduced);
+        assert_eq!(unsure.is_nothing(1.0), Verdict::CannotTell);
+        assert_eq!(other.is_nothing(9.0), Verdict::Differs);
     }
 
     #[test]

@@ -97,27 +97,26 @@ fn global_rows(compared: &mut Compared, models: &Trained, global: &Mases<'_>) {
             format!("Error of {} by the global feature at 13 km/h", parameter.symbol()),
             [paper.to_owned(), format!("{ours:.1} %")],
             Verdict::of(ours < limit),
-            because(ours < limit, limit, models),
+            because(ours < limit, limit, models, REASON),
         );
     }
 }
 
+/// What limits the models at one speed.
+const REASON: &str = "; where every case has its own surface, one stretch of 0.125 m at one speed \
+                      tells no more (docs/decisions/0003)";
+
 /// The tolerance; behind it, what makes errors larger than the paper's.
-fn because(reached: bool, limit: f64, models: &Trained) -> String {
+fn because(reached: bool, limit: f64, models: &Trained, reason: &str) -> String {
     let tolerance = format!("below {limit} %, the paper's number with its rounding");
-    if reached {
-        return tolerance;
-    }
     let trained = models.entries().div_ceil(2);
-    let size = if trained < PAPER_TRAINED {
-        format!("; {trained} cases trained, the paper's {PAPER_TRAINED}")
-    } else {
-        String::new()
-    };
-    format!(
-        "{tolerance}; where every case has its own surface, one stretch of 0.125 m at one speed \
-         tells no more (docs/decisions/0003){size}"
-    )
+    match (reached, trained < PAPER_TRAINED) {
+        (true, _) => tolerance,
+        (false, true) => {
+            format!("{tolerance}{reason}; {trained} cases trained, the paper's {PAPER_TRAINED}")
+        }
+        (false, false) => format!("{tolerance}{reason}"),
+    }
 }
 
 fn together(compared: &mut Compared, models: &Trained) {
@@ -141,7 +140,7 @@ fn together(compared: &mut Compared, models: &Trained) {
                 format!("{ours:.1} %, at {} km/h", speeds.join(" + ")),
             ],
             Verdict::of(ours < limit),
-            because(ours < limit, limit, models),
+            because(ours < limit, limit, models, ""),
         );
     }
 }

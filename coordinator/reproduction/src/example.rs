@@ -11,6 +11,13 @@ pub(crate) const SLEEPERS: usize = 9;
 /// Parameter sets A0 to A3: railpad and ballast stiffness in N/m (paper, Table 4.1).
 const TABLE_4_1: [[f64; 2]; 4] = [[2e8, 2e7], [1.5e8, 1.6e7], [1e8, 1.2e7], [5e7, 8e6]];
 
+/// The smallest change of a stiffness between two of these sets in N/m: what the examples tell.
+pub(crate) fn smallest_step(parameter: Parameter) -> f64 {
+    let column = usize::from(parameter == BallastStiffness);
+    let steps = TABLE_4_1.windows(2).map(|pair| (pair[0][column] - pair[1][column]).abs());
+    steps.fold(f64::INFINITY, f64::min)
+}
+
 /// Levels of irregularity of Fig. 17 in 1e-4 m2 rad/m.
 const LEVELS: [f64; 3] = [2.0, 3.0, 4.0];
 
@@ -159,6 +166,12 @@ mod tests {
         assert_eq!((soft, local.name.as_str()), (3, "3 of nine reduced"));
         assert_eq!(examples(Figure::Fig17)[0].sleepers[8][IrregularityLevel], 2.0);
         assert!(examples(Figure::Fig12).is_empty());
+    }
+
+    #[test]
+    fn the_smallest_steps_are_those_of_the_table() {
+        assert_eq!(smallest_step(RailpadStiffness), 5e7);
+        assert_eq!(smallest_step(BallastStiffness), 4e6);
     }
 
     #[test]

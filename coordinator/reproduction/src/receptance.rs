@@ -126,10 +126,12 @@ fn pinned(compared: &mut Compared, peaks: &[f64]) {
     );
 }
 
-/// Frequencies that the paper's "about" may stand for: it gives one digit.
+/// Frequencies that the paper's "about" may stand for: those that with one digit are its number.
 fn rounded(paper_hz: f64) -> [f64; 2] {
-    let half = 0.5 * 10.0_f64.powf(paper_hz.log10().floor());
-    [paper_hz - half, paper_hz + half]
+    let unit = 10.0_f64.powf(paper_hz.log10().floor());
+    // Below a power of ten digits are ten times as fine.
+    let below = if paper_hz > unit { unit } else { 0.1 * unit };
+    [paper_hz - 0.5 * below, paper_hz + 0.5 * unit]
 }
 
 fn limits(paper_hz: f64) -> String {
@@ -174,6 +176,12 @@ mod tests {
         let compared = receptance(&tests);
         assert_eq!(verdicts(&compared), [Reproduced, Reproduced, Reproduced, Differs, CannotTell]);
         assert_eq!(compared.rows[0].ours, "345 Hz");
+    }
+
+    #[test]
+    fn a_number_of_one_digit_stands_for_what_rounds_to_it() {
+        assert_eq!(rounded(300.0), [250.0, 350.0]);
+        assert_eq!(rounded(1000.0), [950.0, 1500.0]);
     }
 
     #[test]

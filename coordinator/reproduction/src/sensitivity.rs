@@ -93,7 +93,7 @@ impl Effect {
 
     fn picture(&self, frequencies_hz: &[f64]) -> Picture {
         let x = Scale::logarithmic("frequency in Hz");
-        let title = format!("{} ({})", self.parameter.label(), self.parameter.symbol());
+        let title = self.parameter.symbol();
         let mut picture = Picture::new(title, x, Scale::linear("dB re 1 (m/s²)²"));
         let names = ["lowest", "", "", "", "highest"];
         for (name, group) in names.into_iter().zip(&self.groups) {

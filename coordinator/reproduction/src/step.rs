@@ -1,7 +1,7 @@
 //! Fig. 16: railpads and ballast that soften from sleeper 5 on.
 
 use crate::agreement::{Agreement, picture};
-use crate::average::Average;
+use crate::average::{Average, all};
 use crate::{Compared, Figure, Told};
 use tracktwin_parameters::Parameter::{self, BallastStiffness, RailpadStiffness};
 
@@ -36,19 +36,20 @@ fn gradual(compared: &mut Compared, told: &[Told], parameter: Parameter) {
     let whole = |of: &Told| side(of, &BEFORE).less(side(of, &BEHIND));
     let between = |of: &Told| side(of, &[4]).less(side(of, &[5]));
     let sum = |of: &dyn Fn(&Told) -> f64| told.iter().map(of).sum::<f64>();
-    let rest = Average {
-        mean: sum(&|of| whole(of).less(between(of)).mean),
-        error: sum(&|of| whole(of).less(between(of)).error.powi(2)).sqrt(),
+    let total = |of: &dyn Fn(&Told) -> Average| Average {
+        mean: sum(&|told| of(told).mean),
+        error: sum(&|told| of(told).error.powi(2)).sqrt(),
     };
-    let share = 100.0 * sum(&|of| between(of).mean) / sum(&|of| whole(of).mean);
-    let size = 100.0 * rest.error / sum(&|of| whole(of).mean).abs();
+    let (change, rest) = (total(&whole), total(&|of| whole(of).less(between(of))));
+    let share = 100.0 * (1.0 - rest.mean / change.mean);
+    let size = 100.0 * rest.error / change.mean.abs();
     compared.row(
         format!("{} changes gradually between sleepers 4 and 5", parameter.symbol()),
         [
             "gradual, not abrupt".to_owned(),
             format!("{share:.0} ± {size:.0} % of the change lie between the two"),
         ],
-        rest.is_positive(),
+        all([change.is_positive(), rest.is_positive()]),
         "all of the change between the two would be abrupt; less by more than two standard \
          deviations of the estimates, over the three examples together",
     );

@@ -111,7 +111,7 @@ async fn campaign(
 /// A library's results, and the models that were trained on them.
 enum Material {
     Results(TrainingSet),
-    Models(Evaluator),
+    Models(Box<Evaluator>),
 }
 
 impl Material {
@@ -125,7 +125,7 @@ impl Material {
         };
         let evaluator = Evaluator::new(models, library).await.map_err(evaluate::stop)?;
         evaluator.models().belongs_to(&evaluator.set().library_digest).or_input()?;
-        Ok(Self::Models(evaluator))
+        Ok(Self::Models(Box::new(evaluator)))
     }
 
     fn set(&self) -> &TrainingSet {
