@@ -1,7 +1,5 @@
 //! The paper's results beside ours, as a user asks for them.
 
-#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
-
 use serde_json::Value;
 use std::fs;
 use system_tests::run;

@@ -98,15 +98,19 @@ fn verdict(verdict: Verdict) -> Markup {
 
 fn chart(picture: &Picture) -> String {
     let points = || picture.curves.iter().flat_map(reach);
-    let x = if picture.names.is_empty() {
-        axis(&picture.x, points().map(|point| point.0))
-    } else {
-        Axis::linear(&picture.x.label, -0.5, picture.names.len() as f64 - 0.5)
+    let x = match &picture.names[..] {
+        [(first, _), .., (last, _)] => Axis::linear(&picture.x.label, first - 0.5, last + 0.5),
+        _ => axis(&picture.x, points().map(|point| point.0)),
     };
-    let y = axis(&picture.y, points().map(|point| point.1));
+    let bars = picture.curves.iter().filter(|curve| curve.style == Style::Bars).count();
+    let heights = || points().map(|point| point.1);
+    let y = if bars > 0 {
+        Axis::linear(&picture.y.label, 0.0, 1.1 * heights().fold(0.0, f64::max))
+    } else {
+        axis(&picture.y, heights())
+    };
     let size = if picture.wide { WIDE } else { NARROW };
     let mut chart = Chart::new(&picture.title, size, x, y);
-    let bars = picture.curves.iter().filter(|curve| curve.style == Style::Bars).count();
     for (index, curve) in picture.curves.iter().enumerate() {
         draw(&mut chart, CLASSES[index % CLASSES.len()], curve, [index, bars]);
     }

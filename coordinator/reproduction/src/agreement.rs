@@ -105,9 +105,11 @@ pub(crate) fn picture(told: &Told, parameter: Parameter) -> Picture {
     let band = estimates().map(|(_, of)| DEVIATIONS * of.sd / divisor).collect();
     let means = estimates().map(|(at, of)| (at, of.mean / divisor)).collect();
     let y = Scale::linear(format!("{} in {unit}", parameter.symbol()));
-    Picture::new(told.example.name.clone(), Scale::linear("sleeper"), y)
+    let mut picture = Picture::new(told.example.name.clone(), Scale::linear("sleeper"), y)
         .with("told", Style::Band(band), means)
-        .with("true", Style::Truth, truth)
+        .with("true", Style::Truth, truth);
+    picture.names = numbers.map(|at| (at as f64, at.to_string())).collect();
+    picture
 }
 
 #[cfg(test)]

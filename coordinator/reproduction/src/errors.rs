@@ -201,23 +201,26 @@ fn ballast_by_first(compared: &mut Compared, global: &Mases<'_>, first: &Mases<'
 fn grows(compared: &mut Compared, tested: &[Tested]) {
     let Some((_, pairs)) = tested.iter().find(|of| of.0 == RailpadStiffness) else { return };
     let [low, high] = RailpadStiffness.range();
-    let part = |truth: f64| (((truth - low) / (high - low) * PARTS as f64) as usize).min(PARTS - 1);
-    let of = |wanted: usize| -> Vec<f64> {
-        let chosen = pairs.iter().filter(|(truth, _)| part(*truth) == wanted);
-        chosen.map(|(truth, told)| 100.0 * (told - truth).abs() / (high - low)).collect()
+    let part = |truth: f64| ((truth - low) / (high - low) * PARTS as f64) as usize;
+    let of = |wanted: &dyn Fn(usize) -> bool| {
+        let chosen = pairs.iter().filter(|(truth, _)| wanted(part(*truth)));
+        let errors: Vec<f64> =
+            chosen.map(|(truth, told)| 100.0 * (told - truth).abs() / (high - low)).collect();
+        Average::of(&errors)
     };
-    let (few, many) = (of(0), of(PARTS - 1));
-    let (soft, hard) = (Average::of(&few), Average::of(&many));
-    let ours = format!("{:.1} % in the lowest fifth, {:.1} % in the highest", soft.mean, hard.mean);
-    let verdict = match few.len().min(many.len()) {
-        0 | 1 => Verdict::CannotTell,
-        _ => hard.less(soft).is_positive(),
-    };
+    let (soft, above) = (of(&|part| part == 0), of(&|part| part > 0));
+    let (below, hard) = (of(&|part| part < PARTS - 1), of(&|part| part >= PARTS - 1));
+    let ours = format!(
+        "{:.1} % in the lowest fifth, {:.1} % above; {:.1} % in the highest, {:.1} % below",
+        soft.mean, above.mean, hard.mean, below.mean
+    );
     compared.row(
-        "Errors of railpad stiffness grow with it",
+        "Errors of railpad stiffness are small where it is low and grow with it",
         ["small where low, larger where high".to_owned(), ours],
-        verdict,
-        "mean absolute error of test cases at 13 km/h, beyond two standard errors",
+        all([above.less(soft).is_positive(), hard.less(below).is_positive()]),
+        "mean absolute error of test cases at 13 km/h, lowest and highest fifth each against all \
+         others, beyond two standard errors; models that hear little of a parameter answer near \
+         the middle of its range, and err most at both ends",
     );
 }
 
