@@ -3,9 +3,9 @@
 use crate::evaluating::Evaluator;
 use std::collections::BTreeMap;
 use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
-use tracktwin_reproduction::{Compared, Error, Example, Figure, HammerTest, Told};
-use tracktwin_signal::Signal;
+use tracktwin_reproduction::{Compared, Error, Example, Figure, HammerTest, SPEED_KM_H, Told};
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
+use tracktwin_signal::{FeatureSet, Signal};
 use tracktwin_surrogate::{Trained, TrainingSet};
 use tracktwin_track::model::{Mesh, Roughness, Support, Surface, TrackModel};
 use tracktwin_track::time;
@@ -100,7 +100,7 @@ pub fn from_library(
 /// # Errors
 /// [`ReproducingError::Figure`] or [`ReproducingError::Surrogate`].
 pub fn test_errors(set: &TrainingSet, models: &Trained) -> Result<Compared, ReproducingError> {
-    let single = models.group(&[13.0], "GF");
+    let single = models.group(&[SPEED_KM_H], FeatureSet::Gf.name());
     let tested = single.map(|group| crate::training::tested_by(set, models, group)).transpose()?;
     Ok(tracktwin_reproduction::errors(models, &tested.unwrap_or_default())?)
 }
@@ -190,23 +190,27 @@ impl<'a> Section<'a> {
     /// The track: what lies before the section is as its first sleeper, what lies behind as its
     /// last.
     fn track(&self, example: &Example) -> Result<TrackModel, tracktwin_track::model::ModelError> {
-        let Experiment { design, spans, rail_elements_per_span, sleeper_elements, .. } =
-            self.experiment;
+        let Experiment { design, spans, sleeper_elements, .. } = self.experiment;
         let count = example.sleepers.len();
         let set_of = |number: usize| -> &ParameterSet {
             &example.sleepers[number.saturating_sub(self.first).min(count - 1)]
         };
         // Supports begin behind the first span.
         let supports: Vec<_> = (1..*spans).map(|number| Support::from(set_of(number))).collect();
-        let elements = |span: usize| match (span + 1).checked_sub(self.first) {
-            Some(sleeper) if (1..count).contains(&sleeper) => {
-                Example::elements(sleeper, design.sleeper.spacing_m)
-            }
-            _ => *rail_elements_per_span,
-        };
-        let rail_elements = (0..*spans).map(elements).collect();
-        let mesh = Mesh { rail_elements, sleeper_elements: *sleeper_elements };
+        let mesh =
+            Mesh { rail_elements: self.rail_elements(), sleeper_elements: *sleeper_elements };
         TrackModel::build(design, &mesh, &supports, &[])
+    }
+
+    /// Rail elements span by span: the example's inside the section, the campaign's outside.
+    fn rail_elements(&self) -> Vec<usize> {
+        let elements = |span: usize| match (span + 1).checked_sub(self.first) {
+            Some(sleeper) if (1..=SECTION_SPANS).contains(&sleeper) => {
+                Example::elements(sleeper, self.spacing_m())
+            }
+            _ => self.experiment.rail_elements_per_span,
+        };
+        (0..self.experiment.spans).map(elements).collect()
     }
 
     fn surface(&self, track: &TrackModel, example: &Example, seed: u64) -> Surface {
@@ -250,4 +254,35 @@ fn recorded(record: time::PassRecord, speed_km_h: f64) -> Result<Pass, Reproduci
         .collect();
     let signal = Signal::new(1.0 / record.time_step_s, record.acceleration_m_s2)?;
     Ok(Pass { file: format!("{speed_km_h} km/h"), speed_km_h, signal, position_m })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_section_lies_in_the_middle_with_its_own_mesh_and_its_own_stiffness() {
+        let experiment = Experiment::new(TrackDesign::v_track());
+        let section = Section::new(&experiment);
+        assert!((section.x_m(5) - 2.5).abs() < 1e-12, "the fifth of nine is in the middle");
+        let elements = section.rail_elements();
+        assert_eq!(elements.len(), 40);
+        assert_eq!(elements[15..=24], [4, 417, 417, 417, 417, 20, 20, 20, 20, 4]);
+        for speed_km_h in [7.0, 13.0] {
+            let pass = section.pass(speed_km_h);
+            assert!(pass.start_m > 0.0 && pass.end_m < 5.0);
+            let margin_m = experiment.features.margin_s * speed_km_h / 3.6;
+            assert!(pass.end_m - section.x_m(9) > margin_m + 0.5 * section.spacing_m());
+        }
+    }
+
+    #[test]
+    fn another_track_and_one_that_is_too_short_are_refused() {
+        let other = Experiment::new(TrackDesign::v_track().enlarged(5.0));
+        assert!(matches!(check(&other, &[]), Err(ReproducingError::OtherTrack)));
+        let short = Experiment { spans: 22, ..Experiment::new(TrackDesign::v_track()) };
+        assert!(check(&short, &[Figure::Fig12]).is_ok());
+        let message = check(&short, &[Figure::Fig16]).unwrap_err().to_string();
+        assert!(message.contains("24 spans"), "{message}");
+    }
 }

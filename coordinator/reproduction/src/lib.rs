@@ -34,5 +34,6 @@ pub use receptance::{HammerTest, hammer_tests, receptance};
 pub use row::{Compared, FORMAT, Provenance, Reproduction, Row, Verdict};
 pub use selector::selector;
 pub use sensitivity::sensitivity;
+pub use spectrum::SPEED_KM_H;
 pub use speed::speed;
 pub use step::step;

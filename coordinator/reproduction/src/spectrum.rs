@@ -6,7 +6,7 @@ use std::f64::consts::LN_10;
 use tracktwin_surrogate::TrainingSet;
 
 /// The speed of the paper's figures where they show one, in km/h.
-pub(crate) const SPEED_KM_H: f64 = 13.0;
+pub const SPEED_KM_H: f64 = 13.0;
 
 /// Decibels a unit of the natural logarithm of a power.
 pub(crate) const DB: f64 = 10.0 / LN_10;
