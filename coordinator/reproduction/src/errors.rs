@@ -42,12 +42,15 @@ const PARTS: usize = 5;
 /// `tested` are true and predicted values by the global feature at 13 km/h.
 ///
 /// # Errors
-/// [`Error::NoModel`].
+/// [`Error::NoModel`] or [`Error::NotVaried`].
 pub fn errors(models: &Trained, tested: &[Tested]) -> Result<Compared, Error> {
     let caption = "Mean absolute scaled error (MASE) on the test half at 13 km/h by feature \
                    vector; true and predicted values by the global feature.";
     let mut compared = Compared::new(Figure::Fig14, caption);
     let global = Mases::new(models, FeatureSet::Gf)?;
+    if let Some((missing, ..)) = PAPER_GF.iter().find(|of| global.of(of.0).is_nan()) {
+        return Err(Error::NotVaried { figure: Figure::Fig14, symbol: missing.symbol() });
+    }
     let locals = LOCAL.map(|feature| Mases::new(models, feature));
     let [Ok(lf1), Ok(lf2), Ok(lf3), Ok(lf4)] = locals else {
         return Err(locals.into_iter().find_map(Result::err).expect("one is missing"));
@@ -307,6 +310,17 @@ mod tests {
         assert_eq!(verdict(&compared, "grow"), Verdict::Reproduced);
         let shrinking = errors(&models, &told(false)).unwrap();
         assert_eq!(verdict(&shrinking, "grow"), Verdict::Differs);
+    }
+
+    #[test]
+    fn models_without_one_of_the_four_parameters_are_refused() {
+        let mut set = library(&[13.0], 300, |_, set, _| set[IrregularityLevel]);
+        set.varied = vec![IrregularityLevel];
+        set.parameters = set.parameters.into_iter().skip(5).step_by(6).collect();
+        let features = vec![FeatureColumns::new("GF", 0..10)];
+        let models = train(&set, &TrainOptions::new(features), &|_| ()).unwrap();
+        let message = errors(&models, &[]).unwrap_err().to_string();
+        assert!(message.contains("fig14") && message.contains("k_b"), "{message}");
     }
 
     #[test]
