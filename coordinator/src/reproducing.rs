@@ -102,7 +102,7 @@ pub fn from_library(
 pub fn test_errors(set: &TrainingSet, models: &Trained) -> Result<Compared, ReproducingError> {
     let single = models.group(&[SPEED_KM_H], FeatureSet::Gf.name());
     let tested = single.map(|group| crate::training::tested_by(set, models, group)).transpose()?;
-    Ok(tracktwin_reproduction::errors(models, &tested.unwrap_or_default())?)
+    Ok(tracktwin_reproduction::test_errors(models, &tested.unwrap_or_default())?)
 }
 
 /// A numerical example's figure, of what the models say of its recordings.

@@ -7,7 +7,6 @@
 mod agreement;
 mod average;
 mod error;
-mod errors;
 mod example;
 mod figure;
 mod local_change;
@@ -20,11 +19,11 @@ mod sensitivity;
 mod spectrum;
 mod speed;
 mod step;
+mod test_errors;
 #[cfg(test)]
 mod testing;
 
 pub use error::Error;
-pub use errors::{Tested, errors};
 pub use example::{Example, Told, examples};
 pub use figure::Figure;
 pub use local_change::local_change;
@@ -37,3 +36,4 @@ pub use sensitivity::sensitivity;
 pub use spectrum::SPEED_KM_H;
 pub use speed::speed;
 pub use step::step;
+pub use test_errors::{Tested, test_errors};

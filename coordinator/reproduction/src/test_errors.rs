@@ -43,7 +43,7 @@ const PARTS: usize = 5;
 ///
 /// # Errors
 /// [`Error::NoModel`] or [`Error::NotVaried`].
-pub fn errors(models: &Trained, tested: &[Tested]) -> Result<Compared, Error> {
+pub fn test_errors(models: &Trained, tested: &[Tested]) -> Result<Compared, Error> {
     let caption = "Mean absolute scaled error (MASE) on the test half at 13 km/h by feature \
                    vector; true and predicted values by the global feature.";
     let mut compared = Compared::new(Figure::Fig14, caption);
@@ -301,14 +301,14 @@ mod tests {
             vec![(RailpadStiffness, (0..100).map(pair).collect())]
         };
         let models = models(0.5);
-        let compared = errors(&models, &told(true)).unwrap();
+        let compared = test_errors(&models, &told(true)).unwrap();
         for parameter in [BallastStiffness, RailpadStiffness, SleeperBendingStiffness] {
             let words = format!("Error of {} by", parameter.symbol());
             assert_eq!(verdict(&compared, &words), Verdict::Reproduced, "{parameter}");
         }
         assert_eq!(verdict(&compared, "Any local feature"), Verdict::Differs);
         assert_eq!(verdict(&compared, "grow"), Verdict::Reproduced);
-        let shrinking = errors(&models, &told(false)).unwrap();
+        let shrinking = test_errors(&models, &told(false)).unwrap();
         assert_eq!(verdict(&shrinking, "grow"), Verdict::Differs);
     }
 
@@ -319,13 +319,13 @@ mod tests {
         set.parameters = set.parameters.into_iter().skip(5).step_by(6).collect();
         let features = vec![FeatureColumns::new("GF", 0..10)];
         let models = train(&set, &TrainOptions::new(features), &|_| ()).unwrap();
-        let message = errors(&models, &[]).unwrap_err().to_string();
+        let message = test_errors(&models, &[]).unwrap_err().to_string();
         assert!(message.contains("fig14") && message.contains("k_b"), "{message}");
     }
 
     #[test]
     fn errors_above_the_paper_s_differ_and_say_why() {
-        let compared = errors(&models(400.0), &[]).unwrap();
+        let compared = test_errors(&models(400.0), &[]).unwrap();
         let row = &compared.rows[0];
         assert_eq!(row.verdict, Verdict::Differs, "{row:?}");
         assert!(row.why.contains("0003") && row.why.contains("150 cases"), "{}", row.why);
