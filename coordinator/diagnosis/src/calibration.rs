@@ -174,10 +174,10 @@ impl Problem<'_> {
             if longest > STEP_MAX {
                 step *= STEP_MAX / longest;
             }
-            let mut objective = self.objective(&prior, &(&values + &step))?;
+            let mut objective = self.objective_or_none(&prior, &(&values + &step));
             while objective > state.objective && step.amax() > STEP_MIN {
                 step *= 0.5;
-                objective = self.objective(&prior, &(&values + &step))?;
+                objective = self.objective_or_none(&prior, &(&values + &step));
             }
             let gain = state.objective - objective;
             if gain <= 0.0 {
@@ -253,6 +253,12 @@ impl Problem<'_> {
         let objective = self.observation.fitted(&residual).norm_squared();
         let from_prior = values - &prior.mean;
         Ok(0.5 * (objective + from_prior.dot(&(&prior.precision * &from_prior))))
+    }
+
+    /// The same; infinite for values that make no track, such as an axle box heavier than the wheel, so
+    /// that a step stops short of them.
+    fn objective_or_none(&self, prior: &Prior, values: &DVector<f64>) -> f64 {
+        self.objective(prior, values).unwrap_or(f64::INFINITY)
     }
 
     /// Whitened residual and derivatives at some values, held-out rows included.
