@@ -1,4 +1,5 @@
-//! A blind trial is shared by nodes, and loses nothing when one of them dies.
+//! A blind trial is shared by nodes, loses nothing when one of them dies, and goes on where a
+//! diagnosis breaks down.
 
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -53,4 +54,24 @@ fn a_node_that_is_killed_loses_its_case_to_another_and_each_case_has_one_answer(
     assert!(matches!(again.code, Some(0 | 1)), "{}", again.err);
     assert!(again.out.contains("2 of 2 answered"), "{}", again.out);
     assert_eq!(std::fs::read_to_string(path("first/scores.jsonl")).unwrap(), scores);
+}
+
+#[test]
+fn a_case_whose_diagnosis_breaks_down_is_named_at_the_end_and_stops_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("trial");
+    // What is there already is not recorded again: one pass over 17 spans, too short to diagnose.
+    for case in ["0000", "0001"] {
+        let recording = out.join("recordings").join(case).display().to_string();
+        let short =
+            ["simulate", "--spans", "17", "--speed", "13", "--passes", "1", "--out", &recording];
+        assert_eq!(run(PROGRAM, &short).code, Some(0));
+    }
+    let out_text = out.display().to_string();
+    let answer = run(PROGRAM, &["trial", "--cases", "2", "--out", &out_text]);
+    assert_eq!(answer.code, Some(3), "{}", answer.err);
+    assert!(answer.err.contains("2 of 2 diagnoses broke down"), "{}", answer.err);
+    assert!(answer.err.contains("case 0: ") && answer.err.contains("case 1: "), "{}", answer.err);
+    let table = std::fs::read_to_string(out.join("trial.md")).unwrap();
+    assert!(table.contains("| diagnoses that broke down | 2 of 2: 100 %"), "{table}");
 }

@@ -184,7 +184,9 @@ impl Problem<'_> {
                 break;
             }
             values += step;
-            state = self.linearise(&prior, &values)?;
+            // At the edge of what makes a track there are no derivatives.
+            let Ok(next) = self.linearise(&prior, &values) else { break };
+            state = next;
             if gain < TOLERANCE {
                 break;
             }

@@ -12,6 +12,7 @@ mod scores;
 use crate::diagnosing::DiagnosingError;
 use crate::evaluating::Evaluator;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tracktwin_diagnosis::CalibrationError;
@@ -86,6 +87,18 @@ pub enum TrialError {
     /// A recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// Diagnoses broke down, each with its reason by the number of its case; all others are answered.
+    #[error(
+        "{} of {of} diagnoses broke down; all others are answered\n{}",
+        .cases.len(),
+        .cases.iter().map(|(number, reason)| format!("case {number}: {reason}")).collect::<Vec<_>>().join("\n")
+    )]
+    BrokenDown {
+        /// The cases.
+        cases: BTreeMap<u32, String>,
+        /// Of how many.
+        of: u32,
+    },
     /// A diagnosis broke down.
     #[error("case {number}: {source}")]
     Diagnosis {
@@ -179,35 +192,48 @@ impl Trial {
     }
 
     /// Works on the cases that lack an answer and that no other node works on, until none lacks one;
-    /// then sums up. A library that does not answer is waited for.
+    /// then sums up. A library that does not answer is waited for; a case whose diagnosis breaks down
+    /// is left, and counts as such.
     ///
     /// # Errors
-    /// [`TrialError`] when a seal is broken or a diagnosis breaks down.
+    /// [`TrialError`] when a seal is broken; [`TrialError::BrokenDown`] at the end, all else summed up.
     pub async fn answer(&self, mut progress: impl FnMut(u64, &str)) -> Result<Summary, TrialError> {
         let mut failing_since: Option<Instant> = None;
+        let mut broken = BTreeMap::new();
         loop {
-            match self.step(&mut progress).await {
-                Ok(Some(summary)) => return Ok(summary),
+            match self.step(&broken, &mut progress).await {
+                Ok(Some(summary)) if broken.is_empty() => return Ok(summary),
+                Ok(Some(_)) => {
+                    return Err(TrialError::BrokenDown { cases: broken, of: self.cases });
+                }
                 Ok(None) => failing_since = None,
-                Err(error) => {
+                Err(error) if error.is_temporary() => {
                     let since = failing_since.get_or_insert_with(Instant::now);
-                    if !error.is_temporary() || since.elapsed() > PATIENCE {
+                    if since.elapsed() > PATIENCE {
                         return Err(error);
                     }
                     tracing::warn!("{error}; tried again");
                     tokio::time::sleep(WAIT).await;
                 }
+                Err(TrialError::Diagnosis { number, source }) => {
+                    tracing::warn!("case {number}: {source}; the others go on");
+                    broken.insert(number, source.to_string());
+                }
+                Err(error) => return Err(error),
             }
         }
     }
 
-    /// One case, or a look at what the others do; the summary once all is answered.
+    /// One case, or a look at what the others do; the summary once all is answered but for what has
+    /// broken down here.
     async fn step(
         &self,
+        broken: &BTreeMap<u32, String>,
         progress: &mut impl FnMut(u64, &str),
     ) -> Result<Option<Summary>, TrialError> {
         let scores = self.scores().await?;
-        let open = self.open(&scores);
+        let mut open = self.open(&scores);
+        open.retain(|number| !broken.contains_key(number));
         if open.is_empty() {
             let scores: Vec<Score> = scores.into_values().map(|case| case.score).collect();
             return self.sum_up(&scores).map(Some);
@@ -230,7 +256,7 @@ impl Trial {
     }
 
     fn sum_up(&self, scores: &[Score]) -> Result<Summary, TrialError> {
-        let summary = Summary::new(scores);
+        let summary = Summary::new(self.cases, scores);
         write(&self.folder.join("summary.json"), &summary)?;
         let line = |score| serde_json::to_string(score).expect("plain data is plain JSON") + "\n";
         let path = self.folder.join("scores.jsonl");

@@ -59,9 +59,9 @@ pub struct KindRow {
 }
 
 impl Summary {
-    /// Of these scores.
-    pub fn new(scores: &[Score]) -> Self {
-        Self { cases: scores.len(), rows: rows(scores), kinds: kinds(scores) }
+    /// Of the scores of so many cases; a case without one has a diagnosis that broke down.
+    pub fn new(cases: u32, scores: &[Score]) -> Self {
+        Self { cases: scores.len(), rows: rows(cases, scores), kinds: kinds(scores) }
     }
 }
 
@@ -78,12 +78,15 @@ fn singles(scores: &[Score]) -> impl Iterator<Item = (&Score, &Named)> {
     of_class(scores, Class::Single).filter_map(|score| Some((score, score.hidden.first()?)))
 }
 
-fn rows(scores: &[Score]) -> Vec<Row> {
+fn rows(cases: u32, scores: &[Score]) -> Vec<Row> {
+    let scored: std::collections::BTreeSet<u32> = scores.iter().map(|score| score.number).collect();
+    let broken_down = Rate::of((0..cases).map(|number| !scored.contains(&number)));
     [
         alarms(scores),
         names(scores),
         places(scores),
         vec![calibration(scores), bias(scores), cost(scores)],
+        vec![at_most("diagnoses that broke down", broken_down, 0.0)],
     ]
     .concat()
 }
@@ -291,10 +294,15 @@ mod tests {
         let scores: Vec<Score> = (0..10)
             .map(|n| control(n, if n == 4 { Verdict::LeftOutPhysics } else { Verdict::Consistent }))
             .collect();
-        let summary = Summary::new(&scores);
+        let summary = Summary::new(10, &scores);
         assert!(summary.rows[0].value.starts_with("1 of 10: 10 %"), "{:?}", summary.rows[0]);
         assert_eq!(summary.rows[0].reached, Some(false));
-        assert_eq!(Summary::new(&scores[..4]).rows[0].reached, Some(true));
+        assert_eq!(Summary::new(4, &scores[..4]).rows[0].reached, Some(true));
         assert_eq!(summary.rows[1].reached, None);
+        assert_eq!(summary.rows.last().unwrap().reached, Some(true));
+        let without_one = Summary::new(11, &scores);
+        let broken_down = without_one.rows.last().unwrap();
+        assert!(broken_down.value.starts_with("1 of 11:"), "{broken_down:?}");
+        assert_eq!(broken_down.reached, Some(false));
     }
 }
