@@ -54,7 +54,7 @@ impl Write for StoredArray {
             .bind(&self.key)
             .bind(&self.kind)
             .bind(&self.meta_json)
-            .bind(self.numbers.clone());
+            .bind(&self.numbers[..]);
         connection.execute(insert).await.map(drop)
     }
 }

@@ -156,7 +156,7 @@ async fn insert_in_groups(
                 .bind(*speed_km_h)
                 .bind(case.duration_s)
                 .bind(&case.parameter_hash)
-                .bind(features.log_power.clone());
+                .bind(&features.log_power[..]);
             let levels = &features.band_levels_db;
             insert = levels.iter().fold(insert, |insert, &level| insert.bind(level));
         }
@@ -166,8 +166,8 @@ async fn insert_in_groups(
     Ok(())
 }
 
-/// Over a network, one statement for all: features and levels of all rows travel as one array each,
-/// of which every row takes its stretch.
+/// Over a network, one statement for all: features of all rows travel as one series and their levels as
+/// one array, of which every row takes its stretch.
 async fn insert_at_once(
     connection: &mut Connection,
     report: &Report,
@@ -180,14 +180,14 @@ async fn insert_at_once(
     let mut insert = format!("{INSERT}, {}) ", LEVEL_COLUMNS.join(", "));
     insert.push_str(
         "select $1, $2, $3, $4, $5, $6, sobol_index, speed_km_h, duration_s, parameter_hash,
-            ($12)[first_bin:last_bin]",
+            substring($12 from cast(first_byte as integer) for cast(bytes as integer))",
     );
     for level in 1..=LEVEL_COLUMNS.len() {
         let _ = write!(insert, ", ($13)[{} * (place - 1) + {level}]", LEVEL_COLUMNS.len());
     }
     insert.push_str(
         " from unnest($7, $8, $9, $10, $11, $14) with ordinality
-            as of (sobol_index, speed_km_h, duration_s, parameter_hash, first_bin, last_bin, place)",
+            as of (sobol_index, speed_km_h, duration_s, parameter_hash, first_byte, bytes, place)",
     );
     let insert = sql(insert)
         .bind(&report.campaign)
@@ -197,13 +197,13 @@ async fn insert_at_once(
         .bind(&report.experiment_hash)
         .bind(iso_utc(report.now_unix_ms))
         .bind(rows.index)
-        .bind(rows.speed_km_h)
-        .bind(rows.duration_s)
+        .bind(Value::Reals(rows.speed_km_h))
+        .bind(Value::Reals(rows.duration_s))
         .bind(Value::Texts(rows.parameter_hash))
-        .bind(rows.first_bin)
-        .bind(rows.log_power)
-        .bind(rows.level_db)
-        .bind(rows.last_bin);
+        .bind(rows.first_byte)
+        .bind(&rows.log_power[..])
+        .bind(Value::Reals(rows.level_db))
+        .bind(rows.bytes);
     connection.execute(insert).await.map(drop)
 }
 
@@ -214,9 +214,9 @@ struct Columns {
     speed_km_h: Vec<f64>,
     duration_s: Vec<f64>,
     parameter_hash: Vec<String>,
-    /// Where in `log_power` a row's features begin and end, counted from 1.
-    first_bin: Vec<i64>,
-    last_bin: Vec<i64>,
+    /// Where in the bytes of `log_power` a row's features begin, counted from 1, and how many they are.
+    first_byte: Vec<i64>,
+    bytes: Vec<i64>,
     log_power: Vec<f64>,
     level_db: Vec<f64>,
 }
@@ -227,13 +227,13 @@ impl Columns {
         self.speed_km_h.push(speed_km_h);
         self.duration_s.push(case.duration_s);
         self.parameter_hash.push(case.parameter_hash.clone());
-        self.first_bin.push(self.bins() + 1);
+        self.first_byte.push(bytes_of(&self.log_power) + 1);
+        self.bytes.push(bytes_of(&features.log_power));
         self.log_power.extend_from_slice(&features.log_power);
-        self.last_bin.push(self.bins());
         self.level_db.extend_from_slice(&features.band_levels_db);
     }
+}
 
-    fn bins(&self) -> i64 {
-        i64::try_from(self.log_power.len()).expect("memory holds fewer")
-    }
+fn bytes_of(series: &[f64]) -> i64 {
+    i64::try_from(size_of_val(series)).expect("memory holds fewer")
 }

@@ -27,11 +27,11 @@ impl Cell {
             (ColumnKind::Text, Self::Null) => Value::Text(None),
             (ColumnKind::Integer, Self::Null) => Value::Integer(None),
             (ColumnKind::Real, Self::Null) => Value::Real(None),
-            (ColumnKind::Doubles, Self::Null) => Value::Doubles(None),
+            (ColumnKind::Doubles, Self::Null) => Value::Series(None),
             (ColumnKind::Text, Self::Text(text)) => Value::Text(Some(text)),
             (ColumnKind::Integer, Self::Integer(integer)) => Value::Integer(Some(integer)),
             (ColumnKind::Real, Self::Real(real)) => Value::Real(Some(real)),
-            (ColumnKind::Doubles, Self::Doubles(doubles)) => Value::Doubles(Some(doubles)),
+            (ColumnKind::Doubles, Self::Doubles(doubles)) => doubles[..].into(),
             _ => return None,
         })
     }

@@ -2,7 +2,7 @@
 
 use super::{Cell, Column, ColumnKind, Table};
 use crate::LibraryError;
-use crate::engine::Row;
+use crate::engine::{Row, series};
 use sqlx::postgres::{PgRow, PgValueFormat, PgValueRef};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row as _, TypeInfo, ValueRef};
@@ -49,17 +49,18 @@ fn sqlite_cell(row: &SqliteRow, place: usize, name: &str) -> Result<Cell, Librar
         "INTEGER" => Cell::Integer(row.try_get_unchecked(place)?),
         "REAL" => Cell::Real(row.try_get_unchecked(place)?),
         "BOOLEAN" => Cell::Boolean(row.try_get_unchecked(place)?),
-        "BLOB" => {
-            let bytes: &[u8] = row.try_get_unchecked(place)?;
-            match bytes.as_chunks::<8>() {
-                (chunks, []) if is_series(name) => {
-                    Cell::Doubles(chunks.iter().map(|it| f64::from_be_bytes(*it)).collect())
-                }
-                _ => Cell::Text(hexadecimal(bytes)),
-            }
-        }
+        "BLOB" => bytes_cell(row.try_get_unchecked(place)?, name),
         _ => Cell::Text(row.try_get_unchecked(place)?),
     })
+}
+
+/// Bytes are a series where the column is called as one of the schema's; else their digits.
+fn bytes_cell(bytes: &[u8], name: &str) -> Cell {
+    if bytes.len().is_multiple_of(size_of::<f64>()) && is_series(name) {
+        Cell::Doubles(series(bytes))
+    } else {
+        Cell::Text(hexadecimal(bytes))
+    }
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {
@@ -94,6 +95,7 @@ fn postgres_cell(row: &PgRow, place: usize, name: &str) -> Result<Cell, LibraryE
         "FLOAT4" => Cell::Real(row.try_get::<f32, _>(place)?.into()),
         "FLOAT8" => Cell::Real(row.try_get(place)?),
         "FLOAT8[]" => Cell::Doubles(row.try_get(place)?),
+        "BYTEA" => bytes_cell(row.try_get(place)?, name),
         "NUMERIC" => numeric(&value).ok_or_else(unknown)?,
         "TEXT" | "VARCHAR" | "CHAR" | "NAME" | "UNKNOWN" | "JSON" => {
             Cell::Text(row.try_get_unchecked(place)?)

@@ -22,6 +22,6 @@ pub(crate) use iso::iso_utc;
 pub(crate) use open::{Opened, open, open_or_create};
 pub(crate) use postgres::unix_ms;
 pub(crate) use row::Row;
-pub(crate) use statement::{Statement, Value, sql};
+pub(crate) use statement::{Statement, Value, series, sql};
 pub(crate) use target::Target;
 pub(crate) use writer::{Write, Writer};

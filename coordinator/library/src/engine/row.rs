@@ -1,5 +1,6 @@
 //! A row of either database.
 
+use super::statement::series;
 use crate::LibraryError;
 use sqlx::postgres::PgRow;
 use sqlx::sqlite::SqliteRow;
@@ -39,15 +40,13 @@ impl Row {
             .map_err(|_| LibraryError::Damaged { what: format!("{column} is {value}") })
     }
 
-    /// A series of doubles: an array with PostgreSQL, a blob with `SQLite`.
+    /// A series of numbers.
     pub(crate) fn doubles(&self, column: &str) -> Result<Vec<f64>, LibraryError> {
-        Ok(match self {
-            Self::Sqlite(row) => {
-                let (chunks, _) = sqlx::Row::try_get::<&[u8], _>(row, column)?.as_chunks::<8>();
-                chunks.iter().map(|chunk| f64::from_be_bytes(*chunk)).collect()
-            }
+        let bytes: &[u8] = match self {
+            Self::Sqlite(row) => sqlx::Row::try_get(row, column)?,
             Self::Postgres(row) => sqlx::Row::try_get(row, &*folded(column))?,
-        })
+        };
+        Ok(series(bytes))
     }
 }
 

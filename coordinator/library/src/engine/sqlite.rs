@@ -18,11 +18,15 @@ const APPLICATION_ID: i64 = 0x7477_696e;
 /// The longest write is a thousand cases; anything beyond half a minute is a stuck process.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
 
+/// Size of a new library's pages in bytes: three to five results fit, where with `SQLite`'s 4096 one does
+/// and leaves a quarter empty.
+const PAGE_BYTES: u32 = 16_384;
+
 /// Pages of the write-ahead log before it is carried over into the file: 32 MB.
 ///
-/// Carrying over waits twice for the disk. With `SQLite`'s 1000 pages, 300 cases, that would come with
+/// Carrying over waits twice for the disk. With `SQLite`'s 4 MB, 300 cases, that would come with
 /// every second group of reports.
-const LOG_PAGES: &str = "8192";
+const LOG_PAGES: &str = "2048";
 
 /// Connections that read beside the one that writes.
 const READERS: u32 = 4;
@@ -32,6 +36,7 @@ pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryEr
     let options = SqliteConnectOptions::new()
         .filename(path)
         .create_if_missing(true)
+        .page_size(PAGE_BYTES)
         .busy_timeout(BUSY_TIMEOUT)
         .foreign_keys(true);
     let mut connection = options.connect().await.map_err(|error| not_a_database(error, path))?;

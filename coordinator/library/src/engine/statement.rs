@@ -12,12 +12,14 @@ pub(crate) enum Value {
     Text(Option<String>),
     Integer(Option<i64>),
     Real(Option<f64>),
-    /// With `SQLite` a blob of big-endian doubles.
-    Doubles(Option<Vec<f64>>),
+    /// A series of numbers as it is stored: big-endian doubles, one after the other.
+    Series(Option<Vec<u8>>),
     /// A list for a statement's own use; with `SQLite` JSON. See [`super::Dialect::listed`].
     Integers(Vec<i64>),
     /// The same of texts.
     Texts(Vec<String>),
+    /// The same of numbers.
+    Reals(Vec<f64>),
 }
 
 /// A statement of this crate's own making.
@@ -45,9 +47,10 @@ impl Statement {
             Value::Text(text) => query.bind(text),
             Value::Integer(integer) => query.bind(integer),
             Value::Real(real) => query.bind(real),
-            Value::Doubles(doubles) => query.bind(doubles.as_deref().map(big_endian)),
+            Value::Series(bytes) => query.bind(bytes),
             Value::Integers(integers) => query.bind(format!("{integers:?}")),
             Value::Texts(texts) => query.bind(serde_json::Value::from(texts).to_string()),
+            Value::Reals(reals) => query.bind(serde_json::Value::from(reals).to_string()),
         })
     }
 
@@ -57,16 +60,17 @@ impl Statement {
             Value::Text(text) => query.bind(text),
             Value::Integer(integer) => query.bind(integer),
             Value::Real(real) => query.bind(real),
-            Value::Doubles(doubles) => query.bind(doubles),
+            Value::Series(bytes) => query.bind(bytes),
             Value::Integers(integers) => query.bind(integers),
             Value::Texts(texts) => query.bind(texts),
+            Value::Reals(reals) => query.bind(reals),
         })
     }
 }
 
-/// Doubles in big-endian order, as bytes.
-fn big_endian(doubles: &[f64]) -> Vec<u8> {
-    doubles.iter().map(|value| value.to_be_bytes()).collect::<Vec<_>>().into_flattened()
+/// The numbers of a stored series.
+pub(crate) fn series(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks().0.iter().map(|chunk| f64::from_be_bytes(*chunk)).collect()
 }
 
 impl From<&str> for Value {
@@ -105,9 +109,10 @@ impl From<f64> for Value {
     }
 }
 
-impl From<Vec<f64>> for Value {
-    fn from(doubles: Vec<f64>) -> Self {
-        Self::Doubles(Some(doubles))
+impl From<&[f64]> for Value {
+    fn from(series: &[f64]) -> Self {
+        let bytes = series.iter().map(|number| number.to_be_bytes()).collect::<Vec<_>>();
+        Self::Series(Some(bytes.into_flattened()))
     }
 }
 

@@ -110,6 +110,25 @@ on_both_databases! {
 }
 
 #[tokio::test]
+async fn postgres_reads_every_double_of_a_series() {
+    let Some(home) = Home::postgres() else { return };
+    home.library(1).await.close().await;
+    let mut connection = PgConnection::connect(&home.url).await.unwrap();
+    let numbers =
+        [0.0, -0.0, 1.0, -13.4, 5e-324, 1e-310, f64::MIN_POSITIVE, f64::MAX, f64::NEG_INFINITY];
+    let bytes: Vec<u8> = numbers.iter().flat_map(|number: &f64| number.to_be_bytes()).collect();
+    let (read, before, beyond): (Vec<f64>, Option<f64>, Option<f64>) =
+        sqlx::query_as("select doubles($1), double_at($1, 0), double_at($1, 10)")
+            .bind(bytes)
+            .fetch_one(&mut connection)
+            .await
+            .unwrap();
+    // Zeros with their signs.
+    assert_eq!(read.iter().map(|it| it.to_bits()).collect::<Vec<_>>(), numbers.map(f64::to_bits));
+    assert_eq!((before, beyond), (None, None));
+}
+
+#[tokio::test]
 async fn the_pages_role_for_analysts_reads_and_does_not_write() {
     let Some(home) = Home::postgres() else { return };
     let library = library(&home).await;

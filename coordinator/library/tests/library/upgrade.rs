@@ -1,7 +1,7 @@
 //! Libraries that earlier programs wrote are brought up to date, and hold what they held.
 
 use crate::support::{Home, policy};
-use sqlx::{Connection, SqliteConnection};
+use sqlx::{Connection, PgConnection, SqliteConnection};
 use tracktwin_library::{LeaseRequest, Library, State, Status};
 
 pub(crate) const CAMPAIGN: &str = "released-13c0db7b51c4";
@@ -68,4 +68,18 @@ async fn the_bins_of_an_old_campaign_are_known_after_opening_it() {
     .unwrap();
     assert_eq!(bins, values);
     connection.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn arrays_of_a_server_s_library_of_the_fourth_schema_become_series_of_the_same_numbers() {
+    let Some(home) = Home::postgres() else { return };
+    let mut connection = PgConnection::connect(&home.url).await.unwrap();
+    sqlx::migrate!("../../migrations/postgres").run_to(4, &mut connection).await.unwrap();
+    let store = "insert into stored_array (key, kind, meta, numbers, created_at)
+        values ('key', 'kind', '{}', array[-1.5, 0, 1e-300], '2026-11-01T00:00:00Z')";
+    sqlx::query(store).execute(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+    let library = Library::open(&home.url).await.unwrap();
+    let stored = library.array("key").await.unwrap().unwrap();
+    assert_eq!(stored.numbers, [-1.5, 0.0, 1e-300]);
 }
