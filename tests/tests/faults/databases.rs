@@ -49,7 +49,7 @@ impl Drop for Tmpfs<'_> {
 #[test]
 fn a_full_disk_stops_the_campaign_until_there_is_room_and_loses_nothing() {
     let volume = tempfile::tempdir().unwrap();
-    let Some(disk) = Tmpfs::mount(volume.path(), "700k") else {
+    let Some(disk) = Tmpfs::mount(volume.path(), "1500k") else {
         eprintln!("skipped: no file system may be mounted here");
         return;
     };
