@@ -203,7 +203,7 @@ fn bias(scores: &[Score]) -> Row {
     let after = biases.iter().map(|bias| bias.after).sum::<f64>() / count;
     let known = !biases.is_empty();
     Row {
-        measure: "mean |ln error| of railpad and ballast stiffness next to what was named"
+        measure: "mean absolute error of ln stiffness, railpad and ballast, next to what was named"
             .to_owned(),
         value: if known {
             format!("{after:.3}, re-tuned baseline {before:.3}")
