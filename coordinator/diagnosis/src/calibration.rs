@@ -143,7 +143,7 @@ impl Problem<'_> {
     /// Gauss-Newton on the whitened log powers; steps that lead uphill are halved.
     ///
     /// # Errors
-    /// [`CalibrationError`] when the model breaks down on the way.
+    /// [`CalibrationError`] when the start makes no track.
     pub fn calibrate(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
         self.calibrate_among(start, &Ranges::default())
     }
@@ -174,10 +174,10 @@ impl Problem<'_> {
             if longest > STEP_MAX {
                 step *= STEP_MAX / longest;
             }
-            let mut objective = self.objective_or_none(&prior, &(&values + &step));
+            let mut objective = self.objective_or_infinity(&prior, &(&values + &step));
             while objective > state.objective && step.amax() > STEP_MIN {
                 step *= 0.5;
-                objective = self.objective_or_none(&prior, &(&values + &step));
+                objective = self.objective_or_infinity(&prior, &(&values + &step));
             }
             let gain = state.objective - objective;
             if gain <= 0.0 {
@@ -259,7 +259,7 @@ impl Problem<'_> {
 
     /// The same; infinite for values that make no track, such as an axle box heavier than the wheel, so
     /// that a step stops short of them.
-    fn objective_or_none(&self, prior: &Prior, values: &DVector<f64>) -> f64 {
+    fn objective_or_infinity(&self, prior: &Prior, values: &DVector<f64>) -> f64 {
         self.objective(prior, values).unwrap_or(f64::INFINITY)
     }
 
