@@ -30,6 +30,13 @@ impl Candidate {
         self.kind.classes.contains(&Class::Load)
     }
 
+    /// Whether it does nothing but add to the dynamic stiffness of track, vehicle or sensor: its model
+    /// lacks neither what a load decides nor the phase of a shape.
+    pub(crate) fn is_linear(&self) -> bool {
+        let classes = self.kind.classes;
+        !classes.contains(&Class::Load) && !classes.contains(&Class::Wavelength)
+    }
+
     /// The extension with values for the free parameters.
     pub fn with(&self, values: &[f64]) -> ExtensionInstance {
         let pairs = self.free.iter().zip(values);

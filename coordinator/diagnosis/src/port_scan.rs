@@ -8,6 +8,7 @@
 
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::forward::PortColumns;
+use crate::section::Section;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
@@ -17,6 +18,9 @@ const BUMPS: usize = 14;
 
 /// Prior deviations of a bump's height over the track's own stiffness there.
 const SCALES: [f64; 3] = [0.1, 0.3, 1.0];
+
+/// Prior correlations of neighbouring bumps: of a resonance none, of a spring or a mass much.
+const CORRELATIONS: [f64; 2] = [0.0, 0.9];
 
 /// Longest period of a pattern of sleepers, in sleepers.
 const EVERY_MAX: usize = 5;
@@ -70,8 +74,39 @@ struct Filter {
     columns: DMatrix<f64>,
     /// The baseline's part in them: what it is multiplied with for a residual's projection.
     imitated: DMatrix<f64>,
-    /// For each of [`SCALES`] the posterior precision of the bumps' heights, factored.
-    precisions: Vec<Cholesky<f64, Dyn>>,
+    /// What the bumps' heights may be beforehand, each with their posterior precision, factored.
+    priors: Vec<(Prior, Cholesky<f64, Dyn>)>,
+}
+
+/// Normal prior of the bumps' heights.
+struct Prior {
+    precision: DMatrix<f64>,
+    /// Half the logarithm of the precision's determinant.
+    half_ln_determinant: f64,
+}
+
+impl Prior {
+    /// All pairs of [`SCALES`] and [`CORRELATIONS`].
+    fn all() -> Vec<Self> {
+        let of_scale = |scale| CORRELATIONS.map(|correlation| Self::new(scale, correlation));
+        SCALES.into_iter().flat_map(of_scale).collect()
+    }
+
+    /// Real and imaginary parts that are each an autoregressive process over the bumps.
+    fn new(scale: f64, correlation: f64) -> Self {
+        let innovation = 1.0 - correlation * correlation;
+        let weight = 1.0 / (scale * scale * innovation);
+        let ends = |bump: usize| bump == 0 || bump == BUMPS - 1;
+        let precision = DMatrix::from_fn(2 * BUMPS, 2 * BUMPS, |i, j| match i.abs_diff(j) {
+            0 if ends(i / 2) => weight,
+            0 => weight * (1.0 + correlation * correlation),
+            2 => -weight * correlation,
+            _ => 0.0,
+        });
+        let half_ln_determinant =
+            -((2 * BUMPS) as f64 * scale.ln() + (BUMPS - 1) as f64 * innovation.ln());
+        Self { precision, half_ln_determinant }
+    }
 }
 
 impl PortScan {
@@ -120,12 +155,12 @@ impl PortScan {
         let whiten =
             |columns: DMatrix<f64>| observation.fitted_rows(&observation.whiten_matrix(&columns));
         let seats: Vec<DMatrix<f64>> = seats.into_iter().map(whiten).collect();
-        let together = |together: Vec<usize>| {
-            let columns = together.iter().map(|&sleeper| &seats[sleeper]).sum();
-            (PortPlace::Seats(together), columns)
+        let together = |(compared, in_track): (Vec<usize>, Vec<usize>)| {
+            let columns = in_track.iter().map(|&sleeper| &seats[sleeper]).sum();
+            (PortPlace::Seats(compared), columns)
         };
         let mut places: Vec<(PortPlace, DMatrix<f64>)> =
-            seats_together(seats.len()).into_iter().map(together).collect();
+            seats_together(&forward.section).into_iter().map(together).collect();
         let between = between.into_iter().enumerate();
         places.extend(
             between
@@ -164,19 +199,25 @@ impl PortScan {
     }
 }
 
-/// Sleepers under which something unknown may be the same.
-fn seats_together(sleepers: usize) -> Vec<Vec<usize>> {
-    let single = (0..sleepers).map(|sleeper| vec![sleeper]);
-    let pairs = (1..sleepers).map(|sleeper| vec![sleeper - 1, sleeper]);
-    let mut all: Vec<Vec<usize>> = single.chain(pairs).collect();
-    if sleepers > 2 {
-        all.push((0..sleepers).collect());
-    }
+/// Sleepers under which something unknown may be the same: the compared ones, and the same and others
+/// by their numbers in the whole track. A pattern ends with the compared sleepers, or goes on.
+fn seats_together(section: &Section) -> Vec<(Vec<usize>, Vec<usize>)> {
+    let count = section.sleepers;
+    let single = (0..count).map(|sleeper| vec![sleeper]);
+    let pairs = (1..count).map(|sleeper| vec![sleeper - 1, sleeper]);
     // A pattern is one where it comes back twice.
-    for every in (2..=EVERY_MAX).filter(|every| 3 * every <= sleepers) {
-        all.extend((0..every).map(|first| (first..sleepers).step_by(every).collect::<Vec<_>>()));
-    }
-    all
+    let steps = (1..=EVERY_MAX).filter(|step| 3 * step <= count);
+    let patterns = steps.flat_map(|step| (0..step).map(move |first| (first, step)));
+    let of_step = |(first, step): (usize, usize)| (first..count).step_by(step).collect();
+    let here = single.chain(pairs).chain(patterns.clone().map(of_step)).map(|compared| {
+        let in_track = compared.iter().map(|&sleeper| section.in_track(sleeper)).collect();
+        (compared, in_track)
+    });
+    let beyond = patterns.map(|(first, step)| {
+        let begins = section.in_track(first) % step;
+        (of_step((first, step)), (begins..section.spans() - 1).step_by(step).collect())
+    });
+    here.chain(beyond).collect()
 }
 
 impl Filter {
@@ -186,27 +227,70 @@ impl Filter {
         let shared = current.jacobian.tr_mul(&columns);
         let imitated = current.precision.solve(&shared);
         let square = columns.tr_mul(&columns) - shared.tr_mul(&imitated);
-        let white = DMatrix::identity(square.nrows(), square.ncols());
-        let precision = |scale: f64| Cholesky::new(&square + &white / (scale * scale));
-        let precisions = SCALES.into_iter().map(precision).collect::<Option<_>>()?;
-        Some(Self { place, columns, imitated, precisions })
+        let posterior = |prior: Prior| {
+            let precision = Cholesky::new(&square + &prior.precision)?;
+            Some((prior, precision))
+        };
+        let priors = Prior::all().into_iter().map(posterior).collect::<Option<_>>()?;
+        Some(Self { place, columns, imitated, priors })
     }
 
-    /// Log evidence averaged over the prior's scales, and the bumps' most probable heights.
+    /// Log evidence averaged over the priors, and the bumps' most probable heights.
     fn evidence(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> (f64, DVector<f64>) {
         let along = self.columns.tr_mul(residual) - self.imitated.tr_mul(felt);
-        let of_scale = |(scale, precision): (f64, &Cholesky<f64, Dyn>)| {
+        let of_prior = |(prior, precision): &(Prior, Cholesky<f64, Dyn>)| {
             let heights = precision.solve(&along);
-            let log_evidence = 0.5 * along.dot(&heights)
-                - 0.5 * precision.ln_determinant()
-                - along.len() as f64 * f64::ln(scale);
+            let log_evidence = 0.5 * along.dot(&heights) - 0.5 * precision.ln_determinant()
+                + prior.half_ln_determinant;
             (log_evidence, heights)
         };
-        let mut all: Vec<_> = SCALES.into_iter().zip(&self.precisions).map(of_scale).collect();
+        let mut all: Vec<_> = self.priors.iter().map(of_prior).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let highest = all[all.len() - 1].0;
         let sum: f64 = all.iter().map(|(evidence, _)| (evidence - highest).exp()).sum();
-        let (_, heights) = all.swap_remove(SCALES.len() - 1);
-        (highest + (sum / SCALES.len() as f64).ln(), heights)
+        let (_, heights) = all.swap_remove(self.priors.len() - 1);
+        (highest + (sum / self.priors.len() as f64).ln(), heights)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn a_prior_is_that_of_heights_that_hang_together() {
+        let (scale, correlation) = (0.3, 0.9);
+        let Prior { precision, half_ln_determinant } = Prior::new(scale, correlation);
+        let covariance = DMatrix::from_fn(2 * BUMPS, 2 * BUMPS, |i, j| {
+            let apart = (i / 2).abs_diff(j / 2) as f64;
+            if i % 2 == j % 2 { scale * scale * correlation.powf(apart) } else { 0.0 }
+        });
+        let identity = DMatrix::<f64>::identity(2 * BUMPS, 2 * BUMPS);
+        assert!((&precision * &covariance - identity).amax() < 1e-10);
+        let half = 0.5 * Cholesky::new(precision).unwrap().ln_determinant();
+        assert!((half_ln_determinant - half).abs() < 1e-9, "{half_ln_determinant} {half}");
+    }
+
+    #[test]
+    fn a_pattern_ends_with_the_section_or_goes_on_through_the_track() {
+        let section = Section::new(TrackDesign::v_track(), 7, 1.0);
+        let all = seats_together(&section);
+        let last = section.spans() - 1;
+        let in_track = |first: usize| first + section.in_track(0);
+        let of = |compared: &[usize]| -> Vec<&[usize]> {
+            let those = all.iter().filter(|(known, _)| known == compared);
+            those.map(|(_, in_track)| &in_track[..]).collect()
+        };
+        assert_eq!(of(&[3]), [[in_track(3)]]);
+        assert_eq!(of(&[3, 4]), [[in_track(3), in_track(4)]]);
+        let every: Vec<usize> = (0..last).collect();
+        assert_eq!(of(&[0, 1, 2, 3, 4, 5, 6]), [&every[in_track(0)..=in_track(6)], &every[..]]);
+        let second = of(&[1, 3, 5]);
+        assert_eq!(second[0], [1, 3, 5].map(in_track));
+        assert_eq!(second[1].len(), every[in_track(1) % 2..].iter().step_by(2).count());
+        assert!(second[0].iter().all(|sleeper| second[1].contains(sleeper)));
+        // A third would come but once or twice.
+        assert!(of(&[0, 3, 6]).is_empty());
     }
 }

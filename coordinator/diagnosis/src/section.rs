@@ -86,7 +86,12 @@ impl Section {
 
     /// Rail node above a compared sleeper.
     pub const fn seat_node(&self, sleeper: usize) -> usize {
-        (self.spans_beyond + sleeper) * ELEMENTS
+        self.node_above(self.in_track(sleeper))
+    }
+
+    /// The same above a sleeper of the whole track.
+    pub const fn node_above(&self, in_track: usize) -> usize {
+        (in_track + 1) * ELEMENTS
     }
 
     /// Place on the model's track of a place on the recording's scale, both in m.

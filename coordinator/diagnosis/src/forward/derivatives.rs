@@ -36,7 +36,7 @@ pub struct Linearised {
 /// Changes of the log powers by unknown dynamic stiffnesses, in parts of the stiffness that is
 /// there: a row for each log power, a column for each shape over the lines.
 pub(crate) struct PortColumns {
-    /// Under each compared sleeper's rail seat.
+    /// Under the rail seat of each sleeper of the whole track.
     pub(crate) seats: Vec<DMatrix<f64>>,
     /// Between the rail seats of each compared sleeper but the first and the one before it.
     pub(crate) between: Vec<DMatrix<f64>>,
@@ -81,8 +81,8 @@ impl Forward {
         Ok(Linearised { log_power, jacobian, transfer: state.transfer })
     }
 
-    /// Changes of the log powers by dynamic stiffnesses added under each compared sleeper's rail
-    /// seat, between the seats of neighbours, and between wheel and ground.
+    /// Changes of the log powers by dynamic stiffnesses added under each sleeper's rail seat,
+    /// between the seats of compared neighbours, and between wheel and ground.
     ///
     /// # Errors
     /// As [`Forward::log_power`].
@@ -96,13 +96,13 @@ impl Forward {
         let excitation = self.excitation(&transfer, values);
         let shares: Vec<f64> =
             (0..self.count()).map(|row| self.share(&transfer, &excitation, values, row)).collect();
-        let seat = |sleeper: usize| {
-            let in_track = self.section.in_track(sleeper);
-            let seat_node = self.section.seat_node(sleeper);
+        let seat = |in_track: usize| {
+            let seat_node = self.section.node_above(in_track);
             self.columns(&shares, &excitation, shapes, |seen_from, window, line| {
-                let is_near = seen_from.abs_diff(sleeper) <= NEIGHBOURS;
+                let seen_from = self.section.in_track(seen_from);
                 let felt = || transfer.felt(window, line, in_track);
-                is_near.then(|| felt() / transfer.receptance(line, seat_node))
+                (seen_from.abs_diff(in_track) <= NEIGHBOURS)
+                    .then(|| felt() / transfer.receptance(line, seat_node))
             })
         };
         let between = |sleeper: usize| {
@@ -115,7 +115,7 @@ impl Forward {
                 is_near.then(|| felt() / transfer.receptance(line, seat_node))
             })
         };
-        let seats = (0..self.section.sleepers).into_par_iter().map(seat).collect();
+        let seats = (0..self.section.spans() - 1).into_par_iter().map(seat).collect();
         let between = (1..self.section.sleepers).into_par_iter().map(between).collect();
         let wheel = self.columns(&shares, &excitation, shapes, |_, window, line| {
             Some(transfer.felt_at_wheel(window, line))

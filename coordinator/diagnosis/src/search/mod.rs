@@ -74,6 +74,9 @@ pub struct Round {
     pub port: Option<Port>,
     /// Probability to see as much evidence for one if nothing is left out.
     pub port_p_value: f64,
+    /// What an unknown dynamic stiffness at the place of the last name before explains, where no more
+    /// is accepted.
+    pub left: Option<Port>,
     /// Whether no two speeds have evidence for it, each alone, nor all together more than one of them;
     /// asked where nothing is named.
     pub port_strays: bool,
@@ -232,6 +235,9 @@ impl Search {
             round.held_out_gain = gains;
         }
         let goes_on = round.accepted;
+        if !goes_on {
+            round.left = self.left(&ports, &forward.section);
+        }
         self.rounds.push(round);
         Ok(goes_on)
     }

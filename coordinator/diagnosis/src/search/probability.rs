@@ -17,8 +17,9 @@ const INEXACT_SHARE: f64 = 1e-3;
 /// on a track is in the catalogue.
 const UNKNOWN_PRIOR: f64 = 0.1;
 
-/// Share of the unknown's evidence from which a name explains what it does: the unknown is free at
-/// every frequency, and fits what is not exact in a name's model as well.
+/// Share of the unknown's evidence from which a name explains what it does, if the name's model is not
+/// exact: the unknown is free at every frequency, and fits what is missing there as well. A linear
+/// name that is right explains more than the unknown.
 const EXPLAINED_SHARE: f64 = 2.0 / 3.0;
 
 /// Least prior of nothing at all.
@@ -45,7 +46,9 @@ impl Round {
     /// The same with this as the unknown.
     pub(super) fn against(&self, unknown: Option<&Port>) -> Probabilities {
         let named = self.fitted.iter().map(|fitted| fitted.log_evidence);
-        of(named, unknown.map(|port| port.log_evidence), self.unseen)
+        let is_linear = self.fitted.first().is_some_and(|best| best.candidate.is_linear());
+        let explained_share = if is_linear { 1.0 } else { EXPLAINED_SHARE };
+        of(named, unknown.map(|port| port.log_evidence), explained_share, self.unseen)
     }
 }
 
@@ -64,9 +67,14 @@ pub(super) fn unseen(trials: impl Iterator<Item = (&'static str, [f64; STRENGTHS
     kinds.values().map(|(sum, count)| sum / count).sum::<f64>() / kinds.len().max(1) as f64
 }
 
-/// Log evidences of names and of the unknown against nothing, in nats, and the share of all names
-/// that would not be seen.
-fn of(named: impl Iterator<Item = f64>, unknown: Option<f64>, unseen: f64) -> Probabilities {
+/// Log evidences of names and of the unknown against nothing, in nats, the share of the unknown's from
+/// which the best name explains it, and the share of all names that would not be seen.
+fn of(
+    named: impl Iterator<Item = f64>,
+    unknown: Option<f64>,
+    explained_share: f64,
+    unseen: f64,
+) -> Probabilities {
     let prior = (1.0 - NOTHING_PRIOR) / KINDS.len() as f64;
     let named: Vec<f64> = named.collect();
     let best = named.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -74,7 +82,7 @@ fn of(named: impl Iterator<Item = f64>, unknown: Option<f64>, unseen: f64) -> Pr
     let named: Vec<f64> =
         named.into_iter().map(|evidence| prior.ln() + evidence / temperature).collect();
     let unknown = unknown.map_or(f64::NEG_INFINITY, |evidence| {
-        let is_explained = best >= EXPLAINED_SHARE * evidence;
+        let is_explained = best >= explained_share * evidence;
         let evidence = if is_explained { evidence.min(best) } else { evidence };
         (UNKNOWN_PRIOR * prior).ln() + evidence / temperature
     });
@@ -100,22 +108,22 @@ mod tests {
     #[test]
     fn of_two_names_far_above_nothing_the_better_one_is_sure() {
         let Probabilities { named, unknown, .. } =
-            of([12_797.0, 1201.0].into_iter(), Some(600.0), 0.3);
+            of([12_797.0, 1201.0].into_iter(), Some(600.0), 1.0, 0.3);
         assert!((named[0] - 1.0).abs() < 1e-12);
         assert!(named[1] < 1e-12 && unknown < 1e-12);
     }
 
     #[test]
     fn look_alikes_a_thousandth_apart_are_both_possible() {
-        let strong = of([10_657.5, 10_647.6].into_iter(), None, 0.0).named;
+        let strong = of([10_657.5, 10_647.6].into_iter(), None, 1.0, 0.0).named;
         assert!(strong[1] > 0.25 && strong[1] < 0.5, "{strong:?}");
-        let weak = of([100.0, 90.1].into_iter(), None, 0.0).named;
+        let weak = of([100.0, 90.1].into_iter(), None, 1.0, 0.0).named;
         assert!(weak[1] < 0.05, "{weak:?}");
     }
 
     #[test]
     fn without_evidence_a_name_has_its_prior() {
-        let Probabilities { named, unknown, .. } = of([0.0].into_iter(), None, 0.0);
+        let Probabilities { named, unknown, .. } = of([0.0].into_iter(), None, 1.0, 0.0);
         let prior = 0.5 / KINDS.len() as f64;
         assert!((named[0] - prior / (0.5 + prior)).abs() < 1e-12);
         assert_eq!(unknown, 0.0);
@@ -123,19 +131,21 @@ mod tests {
 
     #[test]
     fn the_unknown_needs_more_evidence_than_a_name() {
-        let equal = of([100.0].into_iter(), Some(100.0), 0.0);
+        let equal = of([100.0].into_iter(), Some(100.0), 1.0, 0.0);
         assert!((equal.unknown / equal.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
-        // What a name explains for the most part is not unknown.
-        let little_more = of([100.0].into_iter(), Some(140.0), 0.0);
-        assert!((little_more.unknown / little_more.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
-        let much_more = of([100.0].into_iter(), Some(160.0), 0.0);
-        assert!(much_more.unknown > much_more.named[0]);
+        // What a name explains for the most part is not unknown, if its model is not exact.
+        let more = |unknown| of([100.0].into_iter(), Some(unknown), EXPLAINED_SHARE, 0.0);
+        let [little, much] = [140.0, 160.0].map(more);
+        assert!((little.unknown / little.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
+        assert!(much.unknown > much.named[0]);
+        let exact = of([100.0].into_iter(), Some(140.0), 1.0, 0.0);
+        assert!(exact.unknown > exact.named[0]);
     }
 
     #[test]
     fn nothing_is_as_sure_as_what_is_hidden_would_show() {
-        let certain = of([].into_iter(), None, 0.0).nothing;
-        let blind = of([].into_iter(), None, 1.0).nothing;
+        let certain = of([].into_iter(), None, 1.0, 0.0).nothing;
+        let blind = of([].into_iter(), None, 1.0, 1.0).nothing;
         assert_eq!((certain, blind), (1.0, NOTHING_PRIOR));
     }
 

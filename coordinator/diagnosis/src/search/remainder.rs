@@ -5,20 +5,22 @@ use super::least::is_local_shape;
 use super::round::FALSE_ALARM;
 use super::{Round, Search};
 use crate::candidate::Candidate;
+use crate::port_scan::{Port, PortPlace, PortScan};
 use crate::section::Section;
 
 /// Share of the evidence for a name from which something unknown that is left at its place speaks
-/// against it: what hangs on some sleepers is modelled with errors, which grow with the effect.
-const LEFT_AT_PLACE: f64 = 1.0 / 3.0;
+/// against it: one that is right leaves hardly any.
+const LEFT: f64 = 0.1;
 
-/// The same for what is everywhere, at the wheel or in the measuring chain: it has hardly any.
-const LEFT_EVERYWHERE: f64 = 0.1;
+/// The same for what acts by laws that the wheel's load decides about: it is modelled with errors,
+/// which grow with the effect.
+const LEFT_UNDER_LOAD: f64 = 1.0 / 3.0;
 
 impl Search {
     /// Takes the last names back as long as what is left at their place speaks against them.
     pub(super) fn take_back(&mut self, section: &Section) {
         let Some(last) = self.rounds.last().filter(|last| !last.accepted) else { return };
-        let Some(port) = last.port.as_ref().filter(|_| last.port_p_value <= FALSE_ALARM) else {
+        let Some(port) = last.left.as_ref().filter(|_| last.port_p_value <= FALSE_ALARM) else {
             return;
         };
         let place = Extent::of_port(&port.place, section);
@@ -41,6 +43,13 @@ impl Search {
         }
     }
 
+    /// What something unknown at the last name's place explains beside all names.
+    pub(super) fn left(&self, ports: &PortScan, section: &Section) -> Option<Port> {
+        let there = Extent::of(self.accepted.last()?, section);
+        let is_there = |place: &PortPlace| Extent::of_port(place, section).is_about(there);
+        ports.best_where(&self.last.residual, &self.last.gradient, is_there)
+    }
+
     /// What is accepted, last first, with its evidence, as long as it is at a place.
     fn explained(&self, section: &Section, place: Extent) -> Vec<(&Candidate, f64)> {
         let evidence = |(known, round): (_, &Round)| (known, round.fitted[0].log_evidence);
@@ -58,7 +67,7 @@ fn least_left(explained: &[(&Candidate, f64)]) -> Option<f64> {
     let &(last, _) = explained.first()?;
     let is_kind = |(known, _): &&(&Candidate, f64)| known.kind.physics == last.kind.physics;
     let evidence: f64 = explained.iter().take_while(is_kind).map(|(_, evidence)| evidence).sum();
-    let share = if last.is_everywhere() { LEFT_EVERYWHERE } else { LEFT_AT_PLACE };
+    let share = if last.is_under_load() { LEFT_UNDER_LOAD } else { LEFT };
     (!is_local_shape(last)).then_some(share * evidence)
 }
 
@@ -77,6 +86,7 @@ mod tests {
         let (gap, pad, dip) = (of("hanging_sleeper"), of("missing_railpad"), of("rail_joint"));
         assert_eq!(least_left(&[(gap, 300.0)]), Some(100.0));
         assert_eq!(least_left(&[(gap, 60.0), (gap, 300.0), (pad, 900.0)]), Some(120.0));
+        assert_eq!(least_left(&[(pad, 300.0)]), Some(30.0));
         assert_eq!(least_left(&[(of("sensor_mount_resonance"), 900.0)]), Some(90.0));
         assert_eq!(least_left(&[(dip, 300.0)]), None);
         assert_eq!(least_left(&[]), None);
