@@ -7,6 +7,7 @@
 mod along;
 mod bands;
 mod baseline;
+mod behaviour;
 mod calibration;
 mod candidate;
 pub mod chain;
@@ -34,6 +35,7 @@ pub mod wheel;
 
 pub use bands::Bands;
 pub use baseline::Unknowns;
+pub use behaviour::{Behaviour, Element};
 pub use calibration::{Calibration, CalibrationError, Problem};
 pub use candidate::{Candidate, candidates};
 pub use conclusion::{Evidence, passes_alone};

@@ -1,5 +1,6 @@
 //! The diagnosis as files and pages have it (`tracktwin-diagnosis/1`).
 
+use crate::behaviour::Element;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -97,6 +98,9 @@ pub struct Hypothesis {
     /// `rail_surface` or `wheel_surface`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub port: Option<String>,
+    /// Of something unknown, the element that it behaves like, with its parameters below.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub behaviour: Option<Element>,
     /// Its parameters.
     pub parameters: BTreeMap<String, Estimate>,
     /// What looks alike.

@@ -6,8 +6,8 @@
 //! sleepers, between their seats; whatever the vehicle has, at the wheel. Its trace is linear in
 //! that stiffness, so that the evidence for it has a closed form (mismatch design, eq. 9).
 
+use crate::behaviour::{Behaviour, Seen};
 use crate::calibration::{Calibration, CalibrationError, Problem};
-use crate::forward::PortColumns;
 use crate::section::Section;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
@@ -55,8 +55,8 @@ pub struct Port {
     pub place: PortPlace,
     /// Logarithm of the evidence against the model without it, in nats.
     pub log_evidence: f64,
-    /// The dynamic stiffness over the track's or the wheel's own there, at the bumps' frequencies.
-    pub stiffness_ratio: Vec<(f64, Complex64)>,
+    /// What the dynamic stiffness behaves like; none if like no element.
+    pub behaviour: Option<Behaviour>,
     /// Its trace: whitened change of the log powers.
     pub change: DVector<f64>,
 }
@@ -74,6 +74,10 @@ struct Filter {
     columns: DMatrix<f64>,
     /// The baseline's part in them: what it is multiplied with for a residual's projection.
     imitated: DMatrix<f64>,
+    /// Square of the columns less the baseline's part.
+    square: DMatrix<f64>,
+    /// Receptance in m/N that the bumps' heights are in parts of, mean over each bump.
+    receptance: Vec<Complex64>,
     /// What the bumps' heights may be beforehand, each with their posterior precision, factored.
     priors: Vec<(Prior, Cholesky<f64, Dyn>)>,
 }
@@ -150,25 +154,37 @@ impl PortScan {
                     .map(|part| shape.iter().map(|height| part * height).collect())
             })
             .collect();
-        let PortColumns { seats, between, wheel } =
-            forward.port_columns(&current.values, &extensions, &shapes)?;
+        let columns = forward.port_columns(&current.values, &extensions, &shapes)?;
         let whiten =
             |columns: DMatrix<f64>| observation.fitted_rows(&observation.whiten_matrix(&columns));
-        let seats: Vec<DMatrix<f64>> = seats.into_iter().map(whiten).collect();
+        // The mean over each bump; every second shape is its real part.
+        let smooth = |receptance: &[Complex64]| -> Vec<Complex64> {
+            let mean = |shape: &Vec<Complex64>| {
+                let weighted = shape.iter().zip(receptance).map(|(weight, value)| weight * value);
+                weighted.sum::<Complex64>() / shape.iter().sum::<Complex64>()
+            };
+            shapes.iter().step_by(2).map(mean).collect()
+        };
+        let at_seat = |compared: usize| {
+            let magnitudes = &columns.seat_receptances[forward.section.in_track(compared)];
+            smooth(&magnitudes.iter().map(|&magnitude| magnitude.into()).collect::<Vec<_>>())
+        };
+        let seats: Vec<DMatrix<f64>> = columns.seats.into_iter().map(whiten).collect();
         let together = |(compared, in_track): (Vec<usize>, Vec<usize>)| {
             let columns = in_track.iter().map(|&sleeper| &seats[sleeper]).sum();
-            (PortPlace::Seats(compared), columns)
+            let receptance = at_seat(compared[0]);
+            (PortPlace::Seats(compared), columns, receptance)
         };
-        let mut places: Vec<(PortPlace, DMatrix<f64>)> =
+        let mut places: Vec<(PortPlace, DMatrix<f64>, Vec<Complex64>)> =
             seats_together(&forward.section).into_iter().map(together).collect();
-        let between = between.into_iter().enumerate();
-        places.extend(
-            between
-                .map(|(first, columns)| (PortPlace::Between([first, first + 1]), whiten(columns))),
-        );
-        places.push((PortPlace::Wheel, whiten(wheel)));
-        places.retain(|(place, _)| is_one(place));
-        let filter = |(place, columns)| Filter::new(place, columns, current);
+        let between = columns.between.into_iter().enumerate();
+        places.extend(between.map(|(first, columns)| {
+            (PortPlace::Between([first, first + 1]), whiten(columns), at_seat(first + 1))
+        }));
+        places.push((PortPlace::Wheel, whiten(columns.wheel), smooth(&columns.wheel_receptance)));
+        places.retain(|(place, ..)| is_one(place));
+        let filter =
+            |(place, columns, receptance)| Filter::new(place, columns, receptance, current);
         let filters = places.into_par_iter().filter_map(filter).collect();
         Ok(Self { filters, centres_hz: centres.into_iter().map(f64::exp).collect() })
     }
@@ -191,11 +207,12 @@ impl PortScan {
             filters.map(|filter| (filter, filter.evidence(residual, felt))).collect();
         let best = found.into_iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let (filter, (log_evidence, heights)) = best?;
-        let ratio = |(pair, &hz): (&[f64], &f64)| (hz, Complex64::new(pair[0], pair[1]));
-        let stiffness_ratio =
-            heights.as_slice().chunks_exact(2).zip(&self.centres_hz).map(ratio).collect();
-        let change = &filter.columns * heights;
-        Some(Port { place: filter.place.clone(), log_evidence, stiffness_ratio, change })
+        Some(Port {
+            place: filter.place.clone(),
+            log_evidence,
+            behaviour: filter.behaviour(residual, felt, &heights, &self.centres_hz),
+            change: &filter.columns * heights,
+        })
     }
 }
 
@@ -222,7 +239,12 @@ fn seats_together(section: &Section) -> Vec<(Vec<usize>, Vec<usize>)> {
 
 impl Filter {
     /// None where a precision is not positive definite.
-    fn new(place: PortPlace, columns: DMatrix<f64>, current: &Calibration) -> Option<Self> {
+    fn new(
+        place: PortPlace,
+        columns: DMatrix<f64>,
+        receptance: Vec<Complex64>,
+        current: &Calibration,
+    ) -> Option<Self> {
         // What the baseline imitates is taken out of columns and residual.
         let shared = current.jacobian.tr_mul(&columns);
         let imitated = current.precision.solve(&shared);
@@ -232,12 +254,30 @@ impl Filter {
             Some((prior, precision))
         };
         let priors = Prior::all().into_iter().map(posterior).collect::<Option<_>>()?;
-        Some(Self { place, columns, imitated, priors })
+        Some(Self { place, columns, imitated, square, receptance, priors })
+    }
+
+    /// What something with these heights behaves like.
+    fn behaviour(
+        &self,
+        residual: &DVector<f64>,
+        felt: &DVector<f64>,
+        heights: &DVector<f64>,
+        centres_hz: &[f64],
+    ) -> Option<Behaviour> {
+        let along = &self.along(residual, felt);
+        let Self { square, receptance, .. } = self;
+        Seen { along, square, receptance, centres_hz }.behaviour(0.5 * along.dot(heights))
+    }
+
+    /// Slope of the log likelihood with the bumps' heights.
+    fn along(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> DVector<f64> {
+        self.columns.tr_mul(residual) - self.imitated.tr_mul(felt)
     }
 
     /// Log evidence averaged over the priors, and the bumps' most probable heights.
     fn evidence(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> (f64, DVector<f64>) {
-        let along = self.columns.tr_mul(residual) - self.imitated.tr_mul(felt);
+        let along = self.along(residual, felt);
         let of_prior = |(prior, precision): &(Prior, Cholesky<f64, Dyn>)| {
             let heights = precision.solve(&along);
             let log_evidence = 0.5 * along.dot(&heights) - 0.5 * precision.ln_determinant()

@@ -48,9 +48,24 @@ pub(crate) fn sentence(
 fn named(hypothesis: &Hypothesis, sleepers: usize) -> String {
     let Hypothesis { physics, probability, .. } = hypothesis;
     let summary = Kind::from_name(physics)
-        .map_or("something that no kind in the catalogue explains", |kind| kind.summary);
+        .map_or_else(|| unknown(hypothesis), |kind| kind.summary.to_owned());
     let place = place(hypothesis, sleepers);
     format!("{place}{summary} ({physics}, {:.0} %).", 100.0 * probability)
+}
+
+/// Something that the catalogue lacks, with its port and what it does there.
+fn unknown(hypothesis: &Hypothesis) -> String {
+    let port = match hypothesis.port.as_deref() {
+        Some("rail_seat") => " under the rail seat",
+        Some("between_rail_seats") => " between the rail seats",
+        Some("wheel") => " at the wheel",
+        Some("rail_surface") => " on the rail's surface",
+        Some("wheel_surface") => " on the wheel's tread",
+        _ => "",
+    };
+    let does = hypothesis.behaviour.and_then(|element| element.words(&hypothesis.parameters));
+    let does = does.map_or(String::new(), |does| format!("; it {does}"));
+    format!("something{port} that no kind in the catalogue explains{does}")
 }
 
 /// With a capital first letter.
@@ -71,11 +86,8 @@ fn place(hypothesis: &Hypothesis, sleepers: usize) -> String {
         Some(location) if location.sleepers.len() < sleepers => {
             format!("at {}: ", location.sleepers.join(", "))
         }
-        _ => match hypothesis.port.as_deref() {
-            Some("wheel") => "at the wheel: ".to_owned(),
-            Some("wheel_surface") => "on the wheel's tread: ".to_owned(),
-            _ => String::new(),
-        },
+        _ if hypothesis.port.as_deref() == Some("rail_seat") => "at all sleepers: ".to_owned(),
+        _ => String::new(),
     }
 }
 
@@ -113,7 +125,8 @@ fn words(parameter: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::outcome::{Location, Score, Scores};
+    use crate::behaviour::Element;
+    use crate::outcome::{Estimate, Location, Score, Scores};
 
     fn hypothesis(physics: &str, location: Option<Location>) -> Hypothesis {
         Hypothesis {
@@ -122,6 +135,7 @@ mod tests {
             accepted: true,
             location,
             port: None,
+            behaviour: None,
             parameters: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: String::new(),
@@ -164,6 +178,32 @@ mod tests {
             "A flat of the wheel's tread, met once a turn (wheel_flat, 99 %). Also: at SN9, 1.12 m: a \
              railpad is missing or has lost most of its stiffness (missing_railpad, 99 %). With it, \
              speeds that nothing was fitted to are predicted better by 12 nats."
+        );
+    }
+
+    #[test]
+    fn something_unknown_is_said_with_its_place_its_port_and_what_it_does() {
+        let at = Location { x_m: [3.0, 3.0], sleepers: vec!["SN24".to_owned()] };
+        let estimate = |mean: f64| Estimate { mean, sd: 0.1 * mean };
+        let absorber = Hypothesis {
+            port: Some("rail_seat".to_owned()),
+            behaviour: Some(Element::MassOnSpring),
+            parameters: BTreeMap::from([
+                ("mass_kg".to_owned(), estimate(0.41)),
+                ("frequency_Hz".to_owned(), estimate(900.0)),
+            ]),
+            ..hypothesis("unknown_physics", Some(at))
+        };
+        assert_eq!(
+            capital(&named(&absorber, 25)),
+            "At SN24, 3.00 m: something under the rail seat that no kind in the catalogue explains; it \
+             acts like a mass of 0.41 kg on a spring, at 900 Hz (unknown_physics, 99 %)."
+        );
+        let everywhere = Hypothesis { location: None, behaviour: None, ..absorber };
+        assert_eq!(
+            named(&everywhere, 25),
+            "at all sleepers: something under the rail seat that no kind in the catalogue explains \
+             (unknown_physics, 99 %)."
         );
     }
 }

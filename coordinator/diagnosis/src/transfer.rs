@@ -139,6 +139,11 @@ impl Transfer {
         self.direct[line][node].norm()
     }
 
+    /// Receptance of the wheel in m/N.
+    pub(crate) fn wheel_receptance(&self, line: usize) -> Complex64 {
+        self.wheel_receptance[line]
+    }
+
     /// By what a change of the dynamic stiffness between wheel and ground, in parts of the wheel's
     /// own, changes a window's mean power: its product's real part.
     ///

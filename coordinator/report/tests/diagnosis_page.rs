@@ -98,6 +98,7 @@ fn hypothesis(physics: &str, probability: f64, would_separate: &str) -> Hypothes
         accepted: false,
         location: None,
         port: None,
+        behaviour: None,
         parameters: BTreeMap::new(),
         look_alikes: Vec::new(),
         would_separate: would_separate.to_owned(),

@@ -321,6 +321,7 @@ mod tests {
             accepted: false,
             location: x_m.map(|x_m| Location { x_m: [x_m, x_m], sleepers: Vec::new() }),
             port: None,
+            behaviour: None,
             parameters: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: String::new(),

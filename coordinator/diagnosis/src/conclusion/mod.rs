@@ -9,6 +9,7 @@ mod place;
 
 pub use self::alone::passes_alone;
 use self::nameless::UNKNOWN;
+use crate::behaviour::Behaviour;
 use crate::calibration::CalibrationError;
 use crate::chain::Trouble;
 use crate::finding::Finding;
@@ -207,7 +208,8 @@ impl Evidence<'_> {
                 accepted: is_port || unnamed,
                 location: self.location_of_port(&port.place),
                 port: Some(port.place.name().to_owned()),
-                parameters: BTreeMap::new(),
+                behaviour: port.behaviour.as_ref().map(|behaviour| behaviour.element),
+                parameters: port.behaviour.as_ref().map_or_else(BTreeMap::new, Behaviour::named),
                 look_alikes: if unnamed { nearest(round) } else { Vec::new() },
                 would_separate: match port.place {
                     PortPlace::Seats(_) => {
@@ -272,6 +274,7 @@ impl Evidence<'_> {
             accepted,
             location: self.location_of(candidate),
             port: None,
+            behaviour: None,
             parameters: parameters.chain(order).collect(),
             look_alikes: names(candidate.kind),
             would_separate: candidate.kind.would_separate.to_owned(),
@@ -327,6 +330,7 @@ fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -> Hypothesi
         accepted: true,
         location,
         port: None,
+        behaviour: None,
         parameters: finding.parameters.iter().map(estimate).collect(),
         look_alikes: names(kind),
         would_separate: kind.would_separate.to_owned(),

@@ -42,6 +42,11 @@ pub(crate) struct PortColumns {
     pub(crate) between: Vec<DMatrix<f64>>,
     /// Between wheel and ground.
     pub(crate) wheel: DMatrix<f64>,
+    /// Magnitudes of the receptances that stiffnesses at the seats are in parts of, in m/N:
+    /// `[sleeper of the whole track][line]`.
+    pub(crate) seat_receptances: Vec<Vec<f64>>,
+    /// The wheel's receptance in m/N at each line.
+    pub(crate) wheel_receptance: Vec<Complex64>,
 }
 
 /// A track with what its derivatives are made of.
@@ -120,7 +125,14 @@ impl Forward {
         let wheel = self.columns(&shares, &excitation, shapes, |_, window, line| {
             Some(transfer.felt_at_wheel(window, line))
         });
-        Ok(PortColumns { seats, between, wheel })
+        let lines = 0..self.bands.lines_hz().len();
+        let receptances = |in_track: usize| {
+            let seat_node = self.section.node_above(in_track);
+            lines.clone().map(|line| transfer.receptance(line, seat_node)).collect()
+        };
+        let seat_receptances = (0..self.section.spans() - 1).map(receptances).collect();
+        let wheel_receptance = lines.map(|line| transfer.wheel_receptance(line)).collect();
+        Ok(PortColumns { seats, between, wheel, seat_receptances, wheel_receptance })
     }
 
     /// Changes of the log powers by a stiffness of the given shapes; `felt` says by what one of its

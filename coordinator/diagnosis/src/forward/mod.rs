@@ -9,7 +9,6 @@ mod derivatives;
 mod supports;
 
 pub use derivatives::Linearised;
-pub(crate) use derivatives::PortColumns;
 
 use crate::bands::Bands;
 use crate::baseline::Unknowns;

@@ -1,0 +1,263 @@
+//! What an unknown dynamic stiffness behaves like: a spring, a damper, a mass, or a mass on a spring.
+//!
+//! Each has a dynamic stiffness of known form, so that how well it explains what is left follows from
+//! the port scan's own traces (mismatch design, 4.7).
+
+use crate::outcome::Estimate;
+use nalgebra::{DMatrix, DVector};
+use rustfft::num_complex::Complex64;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// Share of what a free dynamic stiffness explains from which something behaves like an element.
+const ALIKE: f64 = 0.5;
+
+/// Nats that each parameter beyond the first must gain.
+const PARAMETER_NATS: f64 = 3.0;
+
+/// Resonances tried between two centres of the frequencies asked for.
+const RESONANCES: usize = 6;
+
+/// Damping ratios tried.
+const DAMPING_RATIOS: [f64; 4] = [0.02, 0.05, 0.1, 0.3];
+
+/// Points of a bump that its mean is taken over.
+const POINTS: i32 = 8;
+
+/// An element with one end at the port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Element {
+    /// A spring to the ground, `stiffness_N_per_m`; below zero one that is missing.
+    Spring,
+    /// A damper to the ground, `damping_N_s_per_m`; below zero one that is missing.
+    Damper,
+    /// A mass, `mass_kg`; below zero one that is missing.
+    Mass,
+    /// A mass on a spring: `mass_kg`, `frequency_Hz` and `damping_ratio`.
+    MassOnSpring,
+}
+
+/// An element with its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Behaviour {
+    /// What it behaves like.
+    pub element: Element,
+    /// Its parameters by name; standard deviations are those of the linear model.
+    pub parameters: Vec<(&'static str, Estimate)>,
+}
+
+/// What is known of a port: the slope of the log likelihood with its traces' heights and the square
+/// of those, and the receptance in m/N that they are in parts of, at the centres in Hz.
+pub(crate) struct Seen<'a> {
+    pub(crate) along: &'a DVector<f64>,
+    pub(crate) square: &'a DMatrix<f64>,
+    pub(crate) receptance: &'a [Complex64],
+    pub(crate) centres_hz: &'a [f64],
+}
+
+/// One element's best fit.
+struct Fit {
+    behaviour: Behaviour,
+    nats: f64,
+}
+
+impl Seen<'_> {
+    /// What it behaves like, if that explains most of what anything would, `free` in nats.
+    pub(crate) fn behaviour(&self, free: f64) -> Option<Behaviour> {
+        let spring = self.linear(Element::Spring, "stiffness_N_per_m", |_| Complex64::ONE);
+        let damper =
+            self.linear(Element::Damper, "damping_N_s_per_m", |hz| Complex64::I * TAU * hz);
+        let mass = self.linear(Element::Mass, "mass_kg", |hz| (-(TAU * hz).powi(2)).into());
+        let all = [spring, damper, mass].into_iter().chain(self.mass_on_spring());
+        let best = all.max_by(|a, b| a.nats.total_cmp(&b.nats))?;
+        (best.nats >= ALIKE * free).then_some(best.behaviour)
+    }
+
+    /// An element that is its one parameter times a dynamic stiffness in N/m.
+    fn linear(
+        &self,
+        element: Element,
+        name: &'static str,
+        stiffness: impl Fn(f64) -> Complex64,
+    ) -> Fit {
+        let (parameter, nats) = self.amplitude(stiffness);
+        Fit { behaviour: Behaviour { element, parameters: vec![(name, parameter)] }, nats }
+    }
+
+    /// The resonance and damping with which a mass above zero explains most.
+    fn mass_on_spring(&self) -> Option<Fit> {
+        let (first, last) =
+            (self.centres_hz[0].ln(), self.centres_hz[self.centres_hz.len() - 1].ln());
+        let steps = RESONANCES * (self.centres_hz.len() - 1);
+        let step = (last - first) / steps as f64;
+        let resonances = (0..=steps).map(|number| (first + step * number as f64).exp());
+        let fits = resonances.flat_map(|hz| {
+            DAMPING_RATIOS.map(|ratio| {
+                (hz, ratio, self.amplitude(|at| resonator(at / hz, ratio) * (TAU * at).powi(2)))
+            })
+        });
+        let possible = fits.filter(|(_, _, (mass, _))| mass.mean > 0.0);
+        let (hz, ratio, (mass, nats)) = possible.max_by(|a, b| a.2.1.total_cmp(&b.2.1))?;
+        let parameters = vec![
+            ("mass_kg", mass),
+            ("frequency_Hz", Estimate { mean: hz, sd: step * hz }),
+            ("damping_ratio", Estimate { mean: ratio, sd: ratio }),
+        ];
+        let behaviour = Behaviour { element: Element::MassOnSpring, parameters };
+        Some(Fit { behaviour, nats: nats - 2.0 * PARAMETER_NATS })
+    }
+
+    /// Best factor of a dynamic stiffness in N/m, and what it explains in nats.
+    fn amplitude(&self, stiffness: impl Fn(f64) -> Complex64) -> (Estimate, f64) {
+        let width = (self.centres_hz[1] / self.centres_hz[0]).ln();
+        let mean = |centre_hz: f64| {
+            let points = (1 - POINTS..POINTS).map(|point| f64::from(point) / f64::from(POINTS));
+            let weighted =
+                points.map(|at| (1.0 - at.abs()) * stiffness(centre_hz * (at * width).exp()));
+            weighted.sum::<Complex64>() / f64::from(POINTS)
+        };
+        let heights = self.centres_hz.iter().zip(self.receptance).flat_map(|(&hz, receptance)| {
+            let height = mean(hz) * receptance;
+            [height.re, height.im]
+        });
+        let heights = DVector::from_iterator(self.along.len(), heights);
+        let (slope, precision) = (self.along.dot(&heights), heights.dot(&(self.square * &heights)));
+        (
+            Estimate { mean: slope / precision, sd: precision.sqrt().recip() },
+            0.5 * slope * slope / precision,
+        )
+    }
+}
+
+/// Dynamic stiffness of a mass on a spring over that of the mass alone, turned round, at a frequency
+/// in parts of its resonance: `-1/(1 - r^2/(1 + 2i zeta r))`.
+fn resonator(ratio: f64, damping_ratio: f64) -> Complex64 {
+    let spring = Complex64::new(1.0, 2.0 * damping_ratio * ratio);
+    -spring / (spring - ratio * ratio)
+}
+
+impl Behaviour {
+    /// The parameters as a hypothesis has them.
+    pub(crate) fn named(&self) -> BTreeMap<String, Estimate> {
+        self.parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect()
+    }
+}
+
+impl Element {
+    /// What something that behaves like it does, as part of a sentence; none where a parameter is not
+    /// known.
+    pub(crate) fn words(self, parameters: &BTreeMap<String, Estimate>) -> Option<String> {
+        let value = |name: &str| parameters.get(name).map(|parameter| parameter.mean);
+        let quantity = |name: &str, unit: &str, scale: f64, thing: &str| {
+            let value = value(name)? / scale;
+            let size = significant(value.abs());
+            Some(if value >= 0.0 {
+                format!("acts like {thing} of {size} {unit}")
+            } else {
+                format!("acts as if {thing} of {size} {unit} were missing")
+            })
+        };
+        match self {
+            Self::Spring => quantity("stiffness_N_per_m", "MN/m", 1e6, "a spring"),
+            Self::Damper => quantity("damping_N_s_per_m", "kN s/m", 1e3, "a damper"),
+            Self::Mass => quantity("mass_kg", "kg", 1.0, "a mass"),
+            Self::MassOnSpring => {
+                let mass = quantity("mass_kg", "kg", 1.0, "a mass")?;
+                Some(format!("{mass} on a spring, at {} Hz", significant(value("frequency_Hz")?)))
+            }
+        }
+    }
+}
+
+/// A value above zero with two digits that mean something.
+fn significant(value: f64) -> String {
+    let digits = 1.0 - value.log10().floor();
+    let step = 10_f64.powf(-digits);
+    let shown = digits.clamp(0.0, 9.0) as usize;
+    format!("{:.shown$}", (value / step).round() * step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a stiffness in N/m at a port looks like whose traces are as loud at all frequencies, `loud`
+    /// for each part of its own stiffness; the centres are those of a scan from 100 to 3,300 Hz.
+    fn seen(stiffness: impl Fn(f64) -> Complex64, loud: f64) -> Option<Behaviour> {
+        let centres_hz: Vec<f64> =
+            (0..14).map(|bump| 100.0 * 33_f64.powf(f64::from(bump) / 13.0)).collect();
+        // A beam's receptance falls with the frequency.
+        let receptance: Vec<Complex64> = centres_hz.iter().map(|hz| (1e-6 / hz).into()).collect();
+        let heights = centres_hz.iter().zip(&receptance).flat_map(|(&hz, receptance)| {
+            let height = stiffness(hz) * receptance;
+            [height.re, height.im]
+        });
+        let heights = DVector::from_iterator(28, heights);
+        let square = DMatrix::identity(28, 28) * (loud * loud);
+        let along = &square * &heights;
+        let seen = Seen {
+            along: &along,
+            square: &square,
+            receptance: &receptance,
+            centres_hz: &centres_hz,
+        };
+        seen.behaviour(0.5 * along.dot(&heights))
+    }
+
+    fn value(behaviour: &Behaviour, name: &str) -> f64 {
+        behaviour.named()[name].mean
+    }
+
+    #[test]
+    fn each_element_is_known_again_with_its_size() {
+        let spring = seen(|_| (-3e7).into(), 1e4).unwrap();
+        assert_eq!(spring.element, Element::Spring);
+        assert!((value(&spring, "stiffness_N_per_m") / -3e7 - 1.0).abs() < 1e-9);
+        let damper = seen(|hz| Complex64::I * TAU * hz * 5e3, 1e4).unwrap();
+        assert_eq!(damper.element, Element::Damper);
+        // The mean over a bump is not the value at its middle.
+        assert!((value(&damper, "damping_N_s_per_m") / 5e3 - 1.0).abs() < 0.05);
+        let mass = seen(|hz| (-(TAU * hz).powi(2) * 0.7).into(), 1e4).unwrap();
+        assert_eq!(mass.element, Element::Mass);
+        assert!((value(&mass, "mass_kg") / 0.7 - 1.0).abs() < 0.1);
+        let absorber =
+            seen(|hz| resonator(hz / 900.0, 0.1) * (TAU * hz).powi(2) * 0.4, 1e4).unwrap();
+        assert_eq!(absorber.element, Element::MassOnSpring, "{absorber:?}");
+        assert!((value(&absorber, "frequency_Hz") / 900.0 - 1.0).abs() < 0.1);
+        assert!((value(&absorber, "mass_kg") / 0.4 - 1.0).abs() < 0.3, "{absorber:?}");
+    }
+
+    #[test]
+    fn what_jumps_with_the_frequency_is_like_none() {
+        let jumps =
+            |hz: f64| Complex64::from(if (hz.ln() * 4.0) as i64 % 2 == 0 { 3e7 } else { -3e7 });
+        assert_eq!(seen(jumps, 1e4), None);
+    }
+
+    #[test]
+    fn a_mass_on_a_spring_is_a_mass_far_below_its_resonance_and_a_spring_far_above() {
+        let (mass, hz) = (0.4, 900.0);
+        let stiffness = |at: f64| resonator(at / hz, 0.01) * (TAU * at).powi(2) * mass;
+        let rigid = |at: f64| -(TAU * at).powi(2) * mass;
+        assert!((stiffness(9.0) / rigid(9.0) - 1.0).norm() < 1e-3);
+        let spring = (TAU * hz).powi(2) * mass;
+        assert!((stiffness(90_000.0) / spring - 1.0).norm() < 0.03 * 90_000.0 / hz);
+        assert!(stiffness(hz).im > 0.0);
+    }
+
+    #[test]
+    fn a_behaviour_is_said_with_two_digits_and_its_unit() {
+        let said = |element: Element, values: &[(&str, f64)]| {
+            let estimate =
+                |&(name, mean): &(&str, f64)| (name.to_owned(), Estimate { mean, sd: 0.0 });
+            element.words(&values.iter().map(estimate).collect()).unwrap()
+        };
+        let spring = said(Element::Spring, &[("stiffness_N_per_m", -1.234e7)]);
+        assert_eq!(spring, "acts as if a spring of 12 MN/m were missing");
+        let absorber =
+            said(Element::MassOnSpring, &[("mass_kg", 0.4123), ("frequency_Hz", 1234.0)]);
+        assert_eq!(absorber, "acts like a mass of 0.41 kg on a spring, at 1200 Hz");
+    }
+}
