@@ -103,7 +103,7 @@ impl Seen<'_> {
         let parameters = vec![
             ("mass_kg", mass),
             ("frequency_Hz", Estimate { mean: hz, sd: step * hz }),
-            ("damping_ratio", Estimate { mean: ratio, sd: ratio }),
+            ("damping_ratio", Estimate { mean: ratio, sd: 0.5 * ratio }),
         ];
         let behaviour = Behaviour { element: Element::MassOnSpring, parameters };
         Some(Fit { behaviour, nats: nats - 2.0 * PARAMETER_NATS })
