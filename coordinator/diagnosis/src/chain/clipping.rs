@@ -1,5 +1,6 @@
 //! Crests that all stop at one height.
 
+use super::still::Still;
 use crate::along::{ln_binomial_tail, of_best};
 use tracktwin_signal::recording::{Pass, Recording};
 
@@ -24,11 +25,13 @@ pub struct Clipping {
 /// The passes that are cut off, with a probability below `alpha` that none is.
 ///
 /// Heights of crests become rarer with height: of those in two layers of equal thickness below the
-/// greatest, no more than half are in the upper one, but for chance.
+/// greatest, no more than half are in the upper one, but for chance. And no crest is even for longer
+/// than the recorder's steps make it.
 pub fn clipping(recording: &Recording, alpha: f64) -> Vec<Clipping> {
     let passes = recording.passes.iter().enumerate();
     let sides = passes.flat_map(|(index, pass)| [1.0, -1.0].map(|sign| side(index, pass, sign)));
-    let tries = 2 * recording.passes.len();
+    // Two sides, two tests.
+    let tries = 4 * recording.passes.len();
     let cut = sides.map(|side| Clipping { ln_p: of_best(side.ln_p, tries), ..side });
     let mut all: Vec<Clipping> = cut.filter(|side| side.ln_p <= alpha.ln()).collect();
     // One entry a pass: the side that is cut more surely.
@@ -65,6 +68,12 @@ fn side(index: usize, pass: &Pass, sign: f64) -> Clipping {
         level_m_s2: sign * greatest + mean,
         crests: high,
         share: within as f64 / samples.len() as f64,
-        ln_p: ln_binomial_tail(high, high + next, 0.5),
+        ln_p: ln_binomial_tail(high, high + next, 0.5).min(ln_even(samples, sign)),
     }
+}
+
+/// `ln P` of an even crest as long as the longest at the greatest value; certain without one.
+fn ln_even(samples: &[f64], sign: f64) -> f64 {
+    let still = Still::longest(samples);
+    if still.is_at_limit(samples, sign) { still.ln_p.min(0.0) } else { 0.0 }
 }

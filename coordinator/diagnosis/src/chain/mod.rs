@@ -9,6 +9,7 @@ mod gain;
 mod hum;
 mod offset;
 mod scale;
+mod still;
 mod trouble;
 
 pub use clipping::{Clipping, clipping};

@@ -27,6 +27,23 @@ fn a_limit_is_found_with_its_value() {
 }
 
 #[test]
+fn a_limit_that_few_long_crests_reach_is_found_and_is_no_drop_out() {
+    let recording = measured(1, &|pass, samples, _| {
+        if pass == 1 {
+            for (index, sample) in samples.iter_mut().enumerate() {
+                let slow = 40.0 * (TAU * 2.0 * index as f64 / Rolled::RATE_HZ).sin();
+                *sample = (0.01 * *sample + slow).clamp(-39.0, 39.0);
+            }
+        }
+    });
+    let found = clipping(&recording, ALPHA);
+    assert_eq!(found.iter().map(|found| found.pass).collect::<Vec<_>>(), [1], "{found:?}");
+    let drop_out = |trouble: &Trouble| matches!(trouble, Trouble::DropOut { .. });
+    let troubles = troubles(&recording, &[]);
+    assert!(!troubles.iter().any(drop_out), "{troubles:?}");
+}
+
+#[test]
 fn the_mains_are_found_at_every_speed_but_not_at_one_only() {
     let hums = |passes: usize| {
         let recording = measured(2, &|pass, samples, _| {

@@ -1,6 +1,7 @@
 //! Passes that say nothing about the track, and why.
 
 use super::offset::Offsets;
+use super::still::Still;
 use crate::along::Background;
 use std::fmt;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -134,23 +135,15 @@ fn share_at_limits(samples: &[f64]) -> f64 {
 
 /// The longest stretch without a change, if chance doesn't make it.
 fn drop_out(index: usize, pass: &Pass) -> Option<Trouble> {
-    let (samples, rate) = (pass.signal.samples(), pass.signal.sample_rate_hz());
-    let equal = samples.windows(2).filter(|pair| pair[0] == pair[1]).count();
-    let (mut run, mut longest, mut end) = (0, 0, 0);
-    for (place, pair) in samples.windows(2).enumerate() {
-        run = if pair[0] == pair[1] { run + 1 } else { 0 };
-        if run > longest {
-            (longest, end) = (run, place + 1);
-        }
-    }
-    // Outside the run: how often two neighbours are alike by the recorder's steps.
-    let share = (equal - longest + 1) as f64 / (samples.len() - longest) as f64;
-    let ln_p = longest as f64 * share.ln() + (samples.len() as f64).ln();
-    let duration_s = longest as f64 / rate;
-    let still = duration_s >= STILL_S && ln_p < STILL_LN_P;
-    still.then(|| Trouble::DropOut {
+    let samples = pass.signal.samples();
+    let still = Still::longest(samples);
+    let duration_s = still.samples as f64 / pass.signal.sample_rate_hz();
+    // At the recorder's limit it is a crest that is cut off.
+    let is_cut = [1.0, -1.0].iter().any(|&sign| still.is_at_limit(samples, sign));
+    let is_drop_out = duration_s >= STILL_S && still.ln_p < STILL_LN_P && !is_cut;
+    is_drop_out.then(|| Trouble::DropOut {
         pass: index,
-        from_m: pass.position_m[end - longest],
+        from_m: pass.position_m[still.from],
         duration_s,
     })
 }
