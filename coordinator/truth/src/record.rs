@@ -44,7 +44,7 @@ fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
         (0..scene.passes.len()).into_par_iter().map(pass).collect();
     Ok(Recording {
         name: String::new(),
-        sample_rate_hz: 0.5 / track.step_s,
+        sample_rate_hz: (0.5 / track.step_s).round(),
         channel: "vertical axle-box acceleration, positive downwards".to_owned(),
         passes: passes?,
         sleepers: sleepers(scene),

@@ -10,6 +10,7 @@ mod hum;
 mod offset;
 mod scale;
 mod still;
+mod stranger;
 mod trouble;
 
 pub use clipping::{Clipping, clipping};

@@ -214,7 +214,7 @@ fn passes_that_cannot_be_used_are_named_with_the_reason() {
         let recording = measured(6, chain);
         troubles(&recording, &offsets(&recording))
     };
-    assert!(broken(&|_, _, _| ()).is_empty());
+    assert_eq!(broken(&|_, _, _| ()), []);
     let still = broken(&|pass, samples, _| {
         if pass == 0 {
             samples[10_000..10_200].fill(0.25);
@@ -233,6 +233,29 @@ fn passes_that_cannot_be_used_are_named_with_the_reason() {
         }
     });
     assert!(matches!(noisy[..], [Trouble::Unlike { passes: [2, 3], .. }]), "{noisy:?}");
+    let mut lone = measured(6, &|_, samples, _| samples.copy_from_slice(&noise(7, samples.len())));
+    lone.passes.truncate(1);
+    assert_eq!(troubles(&lone, &offsets(&lone)), [Trouble::Noise { pass: 0 }]);
+    let elsewhere = measured(7, &|_, _, _| ());
+    let other_rail = |pass: usize, samples: &mut [f64]| {
+        samples.copy_from_slice(elsewhere.passes[pass].signal.samples());
+    };
+    let unlike = broken(&|pass, samples, _| {
+        if pass == 2 {
+            other_rail(pass, samples);
+        }
+    });
+    assert!(matches!(unlike[..], [Trouble::Unlike { passes: [2, 3], .. }]), "{unlike:?}");
+    let strange = broken(&|pass, samples, _| {
+        if pass > 1 {
+            other_rail(pass, samples);
+        }
+    });
+    let speeds = strange.iter().map(|trouble| match trouble {
+        Trouble::Stranger { speed_km_h, .. } => Some(*speed_km_h),
+        _ => None,
+    });
+    assert_eq!(speeds.collect::<Vec<_>>(), [Some(13.0), Some(8.0)], "{strange:?}");
     let full = broken(&|pass, samples, _| {
         if pass == 3 {
             for sample in samples {

@@ -2,7 +2,8 @@
 
 use super::offset::Offsets;
 use super::still::Still;
-use crate::along::Background;
+use super::stranger::companies;
+use crate::along::{Background, by_speed};
 use std::fmt;
 use tracktwin_signal::recording::{Pass, Recording};
 
@@ -14,6 +15,12 @@ const STILL_LN_P: f64 = -20.0;
 const SATURATED: f64 = 0.02;
 /// Correlation of two passes at one speed below which they have no track in common.
 const UNLIKE: f64 = 0.3;
+/// Coherence of passes at two speeds below which they have no surface in common.
+const STRANGE: f64 = 0.1;
+/// Times the density of its noise floor above which a pass is heard, and up to what frequency in Hz
+/// it must be: lower there is no track to hear, only a vehicle.
+const HEARD: f64 = 4.0;
+const HEARD_HZ: f64 = 80.0;
 /// Sleeper spacings that a pass must cover to be compared with itself elsewhere.
 const SPANS_MIN: f64 = 4.0;
 
@@ -34,6 +41,11 @@ pub enum Trouble {
         /// Index of the pass.
         pass: usize,
     },
+    /// The only pass at its speed, and nothing but the noise of sensor and recorder.
+    Noise {
+        /// Index of the pass.
+        pass: usize,
+    },
     /// A large part of the samples is at the recorder's limit.
     Saturated {
         /// Index of the pass.
@@ -48,6 +60,14 @@ pub enum Trouble {
         passes: [usize; 2],
         /// Their median correlation.
         correlation: f64,
+    },
+    /// The passes at one speed share no surface with those at any other: noise, another track, or
+    /// positions that are off by more than a sleeper spacing.
+    Stranger {
+        /// Nominal speed in km/h.
+        speed_km_h: f64,
+        /// Their greatest coherence with a pass at another speed.
+        coherence: f64,
     },
     /// The pass covers too few sleepers.
     Short {
@@ -70,6 +90,11 @@ impl fmt::Display for Trouble {
             Self::Dead { pass } => {
                 write!(f, "pass {}: the signal doesn't change; check sensor and cable", pass + 1)
             }
+            Self::Noise { pass } => write!(
+                f,
+                "pass {}: nothing stands out of the noise floor; check sensor, cable and gain",
+                pass + 1
+            ),
             Self::Saturated { pass, share } => write!(
                 f,
                 "pass {}: {:.1} % of the samples are at the recorder's limit; record again with less gain",
@@ -81,6 +106,10 @@ impl fmt::Display for Trouble {
                 "passes {} and {}, at one speed: their correlation above 500 Hz is {correlation:.2}; noise, another track, or positions off by more than half a sleeper spacing",
                 first + 1,
                 second + 1
+            ),
+            Self::Stranger { speed_km_h, coherence } => write!(
+                f,
+                "the passes at {speed_km_h} km/h: their coherence with those at other speeds, in waves of a tenth of a sleeper spacing to one, is {coherence:.2}; noise, another track, or positions off by more than a sleeper spacing"
             ),
             Self::Short { pass, length_m } => write!(
                 f,
@@ -96,6 +125,10 @@ pub fn troubles(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
     let passes = recording.passes.iter().enumerate();
     let mut all: Vec<Trouble> =
         passes.flat_map(|(index, pass)| of_pass(index, pass, recording.spacing_m)).collect();
+    let speeds = by_speed(&recording.passes);
+    let alone = speeds.iter().filter(|passes| passes.len() == 1).map(|passes| passes[0]);
+    let noise = alone.filter(|&pass| is_noise(&recording.passes[pass]));
+    all.extend(noise.map(|pass| Trouble::Noise { pass }));
     let unlike = |offsets: &&Offsets| {
         // Where half of the stretches match, the rest is noise or a worn clock, not another track.
         2 * offsets.matched.len() < offsets.stretches && offsets.correlation < UNLIKE
@@ -103,6 +136,12 @@ pub fn troubles(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
     all.extend(offsets.iter().filter(unlike).map(|offsets| Trouble::Unlike {
         passes: offsets.passes,
         correlation: offsets.correlation,
+    }));
+    let companies = companies(recording);
+    let strangers = companies.iter().filter(|company| company.coherence < STRANGE);
+    all.extend(strangers.map(|company| Trouble::Stranger {
+        speed_km_h: company.speed_km_h,
+        coherence: company.coherence,
     }));
     all
 }
@@ -125,6 +164,13 @@ fn of_pass(index: usize, pass: &Pass, spacing_m: f64) -> Vec<Trouble> {
     }
     all.extend(drop_out(index, pass));
     all
+}
+
+/// Whether nothing stands out of the noise floor. Of a pass that another repeats, that other tells
+/// better.
+fn is_noise(pass: &Pass) -> bool {
+    let background = Background::of(&pass.signal);
+    background.is_some_and(|background| background.audible_hz(HEARD) < HEARD_HZ)
 }
 
 /// Share of samples that have exactly the greatest or the least value.

@@ -59,14 +59,18 @@ impl FirstLook {
     }
 
     /// What keeps everybody from saying anything of the track: a pass without a signal, or passes
-    /// that nowhere repeat each other, unless their odometers are to blame.
+    /// that nowhere repeat each other or those at other speeds, unless their odometers are to blame.
     pub fn refusal(&self) -> Option<&Trouble> {
-        let dead = |trouble: &&Trouble| matches!(trouble, Trouble::Dead { .. });
+        let silent =
+            |trouble: &&Trouble| matches!(trouble, Trouble::Dead { .. } | Trouble::Noise { .. });
         let unlike = |trouble: &&Trouble| matches!(trouble, Trouble::Unlike { .. });
+        let stranger = |trouble: &&Trouble| matches!(trouble, Trouble::Stranger { .. });
         let is_misplaced = self.findings.iter().any(|found| found.physics == "position_error");
         let is_noise = self.troubles.iter().filter(unlike).count() == self.offsets.len();
-        let noise = self.troubles.iter().find(unlike).filter(|_| is_noise && !is_misplaced);
-        self.troubles.iter().find(dead).or(noise)
+        let troubles = || self.troubles.iter();
+        let noise = troubles().find(unlike).filter(|_| is_noise);
+        let apart = noise.or_else(|| troubles().find(stranger)).filter(|_| !is_misplaced);
+        troubles().find(silent).or(apart)
     }
 }
 

@@ -1,0 +1,101 @@
+//! Passes that share no surface with those at other speeds.
+
+use crate::along::{Background, Ruler, by_speed, hann, on_even_places, speed_m_s, whitened};
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex64;
+use tracktwin_signal::recording::{Pass, Recording};
+
+/// Waves compared, in waves a sleeper spacing: longer than what a wander of the odometer blurs, and
+/// loud at every speed.
+const WAVES: [usize; 2] = [1, 10];
+/// Points on the shortest wave.
+const POINTS: usize = 4;
+/// Length of a segment in sleeper spacings; segments overlap by half.
+const SEGMENT_SPACINGS: usize = 3;
+/// Segments below which chance looks like coherence.
+const SEGMENTS_MIN: usize = 8;
+
+/// Lines of the waves compared in every segment of a pass.
+type Segments = Vec<Vec<Complex64>>;
+
+/// What the passes at one speed have in common with those at others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Company {
+    /// Nominal speed in km/h.
+    pub(super) speed_km_h: f64,
+    /// Greatest coherence of one of its passes with one at another speed: zero as by chance, one
+    /// where the same surface is all that both hear.
+    pub(super) coherence: f64,
+}
+
+/// The company of every speed; none where there is one speed only, or where all passes together
+/// cover too little.
+pub(super) fn companies(recording: &Recording) -> Vec<Company> {
+    let speeds = by_speed(&recording.passes);
+    let Some(segments) = segments(recording).filter(|_| speeds.len() > 1) else {
+        return Vec::new();
+    };
+    let company = |own: &Vec<usize>| {
+        let others = || (0..recording.passes.len()).filter(|other| !own.contains(other));
+        let pairs = own.iter().flat_map(|&pass| others().map(move |other| [pass, other]));
+        let coherences = pairs.map(|[pass, other]| coherence(&segments[pass], &segments[other]));
+        Company {
+            speed_km_h: recording.passes[own[0]].speed_km_h,
+            coherence: coherences.fold(f64::NEG_INFINITY, f64::max),
+        }
+    };
+    speeds.iter().map(company).collect()
+}
+
+/// Segments of all passes at the same places.
+fn segments(recording: &Recording) -> Option<Vec<Segments>> {
+    let ends = |pass: &Pass| [pass.position_m[0], pass.position_m[pass.position_m.len() - 1]];
+    let passes = || recording.passes.iter();
+    let from_m = passes().map(|pass| ends(pass)[0]).fold(f64::NEG_INFINITY, f64::max);
+    let to_m = passes().map(|pass| ends(pass)[1]).fold(f64::INFINITY, f64::min);
+    let step_m = recording.spacing_m / (WAVES[1] * POINTS) as f64;
+    let points = ((to_m - from_m) / step_m) as usize;
+    let length = SEGMENT_SPACINGS * WAVES[1] * POINTS;
+    if (2 * points / length).saturating_sub(1) < SEGMENTS_MIN {
+        return None;
+    }
+    let stretch_m = [from_m, from_m + points as f64 * step_m];
+    passes()
+        .map(|pass| {
+            let band = WAVES.map(|waves| waves as f64 * speed_m_s(pass) / recording.spacing_m);
+            let white = whitened(&pass.signal, &Background::of(&pass.signal)?, band);
+            let values = on_even_places(pass, &white, stretch_m, points, Ruler::Odometer);
+            Some(lines(&values, length))
+        })
+        .collect()
+}
+
+fn lines(values: &[Complex64], length: usize) -> Segments {
+    let transform = FftPlanner::new().plan_fft_forward(length);
+    let of_segment = |start: usize| {
+        let mut lines: Vec<Complex64> =
+            (0..length).map(|i| values[start + i] * hann(i, length)).collect();
+        transform.process(&mut lines);
+        lines[WAVES[0] * SEGMENT_SPACINGS..=WAVES[1] * SEGMENT_SPACINGS].to_vec()
+    };
+    (0..=values.len() - length).step_by(length / 2).map(of_segment).collect()
+}
+
+/// Mean over the waves of the magnitude-squared coherence over the segments, less what chance makes
+/// of so few.
+///
+/// What track and speed do to a wave is the same in all segments, as far as the track is even.
+fn coherence(first: &Segments, second: &Segments) -> f64 {
+    let waves = first[0].len();
+    let of_wave = |wave: usize| {
+        let pairs = || first.iter().zip(second).map(|(a, b)| (a[wave], b[wave]));
+        let cross: Complex64 = pairs().map(|(a, b)| a.conj() * b).sum();
+        let own = |part: fn((Complex64, Complex64)) -> Complex64| -> f64 {
+            pairs().map(|pair| part(pair).norm_sqr()).sum()
+        };
+        cross.norm_sqr() / (own(|pair| pair.0) * own(|pair| pair.1)).max(f64::MIN_POSITIVE)
+    };
+    let mean = (0..waves).map(of_wave).sum::<f64>() / waves as f64;
+    let by_chance = 1.0 / first.len() as f64;
+    (mean - by_chance) / (1.0 - by_chance)
+}
