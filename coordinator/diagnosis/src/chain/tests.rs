@@ -233,29 +233,6 @@ fn passes_that_cannot_be_used_are_named_with_the_reason() {
         }
     });
     assert!(matches!(noisy[..], [Trouble::Unlike { passes: [2, 3], .. }]), "{noisy:?}");
-    let mut lone = measured(6, &|_, samples, _| samples.copy_from_slice(&noise(7, samples.len())));
-    lone.passes.truncate(1);
-    assert_eq!(troubles(&lone, &offsets(&lone)), [Trouble::Noise { pass: 0 }]);
-    let elsewhere = measured(7, &|_, _, _| ());
-    let other_rail = |pass: usize, samples: &mut [f64]| {
-        samples.copy_from_slice(elsewhere.passes[pass].signal.samples());
-    };
-    let unlike = broken(&|pass, samples, _| {
-        if pass == 2 {
-            other_rail(pass, samples);
-        }
-    });
-    assert!(matches!(unlike[..], [Trouble::Unlike { passes: [2, 3], .. }]), "{unlike:?}");
-    let strange = broken(&|pass, samples, _| {
-        if pass > 1 {
-            other_rail(pass, samples);
-        }
-    });
-    let speeds = strange.iter().map(|trouble| match trouble {
-        Trouble::Stranger { speed_km_h, .. } => Some(*speed_km_h),
-        _ => None,
-    });
-    assert_eq!(speeds.collect::<Vec<_>>(), [Some(13.0), Some(8.0)], "{strange:?}");
     let full = broken(&|pass, samples, _| {
         if pass == 3 {
             for sample in samples {
@@ -264,6 +241,33 @@ fn passes_that_cannot_be_used_are_named_with_the_reason() {
         }
     });
     assert!(matches!(full[..], [Trouble::Saturated { pass: 3, .. }]), "{full:?}");
+}
+
+#[test]
+fn passes_without_the_others_surface_are_named() {
+    let mut lone = measured(6, &|_, samples, _| samples.copy_from_slice(&noise(7, samples.len())));
+    lone.passes.truncate(1);
+    assert_eq!(troubles(&lone, &offsets(&lone)), [Trouble::Noise { pass: 0 }]);
+    let elsewhere = measured(7, &|_, _, _| ());
+    let other_rail = |pass: usize, samples: &mut [f64]| {
+        samples.copy_from_slice(elsewhere.passes[pass].signal.samples());
+    };
+    let on_other_rail = |is_there: fn(usize) -> bool| {
+        let recording = measured(6, &|pass, samples, _| {
+            if is_there(pass) {
+                other_rail(pass, samples);
+            }
+        });
+        troubles(&recording, &offsets(&recording))
+    };
+    let unlike = on_other_rail(|pass| pass == 2);
+    assert!(matches!(unlike[..], [Trouble::Unlike { passes: [2, 3], .. }]), "{unlike:?}");
+    let strange = on_other_rail(|pass| pass > 1);
+    let speeds = strange.iter().map(|trouble| match trouble {
+        Trouble::Stranger { speed_km_h, .. } => Some(*speed_km_h),
+        _ => None,
+    });
+    assert_eq!(speeds.collect::<Vec<_>>(), [Some(13.0), Some(8.0)], "{strange:?}");
 }
 
 #[test]

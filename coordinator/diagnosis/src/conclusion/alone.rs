@@ -1,7 +1,8 @@
 //! What the passes tell by themselves where no model of the track can be compared with them.
 
+use super::finding::{probability, seen};
 use super::notes::{one_speed, shown};
-use super::{ONE_PASS_MAX, ONE_SPEED_MAX, probability, seen, verdict};
+use super::{ONE_PASS_MAX, ONE_SPEED_MAX, verdict};
 use crate::finding::{Finding, Place};
 use crate::first_look::FirstLook;
 use crate::outcome::{Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Score, Scores};

@@ -1,6 +1,7 @@
 //! What shows in the passes themselves, but has no name in the catalogue.
 
-use super::{Evidence, FAILED_SHARE, seen};
+use super::finding::seen;
+use super::{Evidence, FAILED_SHARE};
 use crate::finding::Finding;
 use crate::outcome::{Hypothesis, Location};
 use std::collections::BTreeMap;

@@ -221,18 +221,11 @@ impl Search {
         let rival = self.rival(&round, &ports, &forward.section);
         if let Some(best) = sure(&round, rival.as_ref(), setting.subject, least) {
             progress(Stage::HeldOut, 0.0);
-            let with = [&accepted[..], std::slice::from_ref(&best.candidate)].concat();
-            let scores = setting.held_out(&with, &best.calibration.values)?;
-            let pairs = scores.iter().zip(&densities[accepted.len()]);
-            let gains: Vec<f64> = pairs.map(|(with, without)| with - without).collect();
-            if is_predicted(&gains) {
-                self.last = best.calibration.clone();
-                self.accepted = with;
-                densities.push(scores);
-                round.accepted = true;
+            round.held_out_gain = self.try_out(best, setting, densities)?;
+            round.accepted = self.accepted.len() > accepted.len();
+            if round.accepted {
                 round.port = rival;
             }
-            round.held_out_gain = gains;
         }
         let goes_on = round.accepted;
         if !goes_on {
@@ -240,6 +233,26 @@ impl Search {
         }
         self.rounds.push(round);
         Ok(goes_on)
+    }
+
+    /// What a candidate more gains in log density at each speed when it is held out; it is accepted if
+    /// they are predicted better.
+    fn try_out(
+        &mut self,
+        best: &Fitted,
+        setting: &Setting<'_>,
+        densities: &mut Vec<Vec<f64>>,
+    ) -> Result<Vec<f64>, CalibrationError> {
+        let with = [&self.accepted[..], std::slice::from_ref(&best.candidate)].concat();
+        let scores = setting.held_out(&with, &best.calibration.values)?;
+        let pairs = scores.iter().zip(&densities[self.accepted.len()]);
+        let gains: Vec<f64> = pairs.map(|(with, without)| with - without).collect();
+        if is_predicted(&gains) {
+            self.last = best.calibration.clone();
+            self.accepted = with;
+            densities.push(scores);
+        }
+        Ok(gains)
     }
 
     /// Asks every speed alone for what has no name.

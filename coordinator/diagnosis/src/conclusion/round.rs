@@ -1,0 +1,148 @@
+//! What a search fitted, as hypotheses.
+
+use super::nameless::UNKNOWN;
+use super::{Evidence, FAILED_SHARE, names};
+use crate::behaviour::Behaviour;
+use crate::outcome::{Estimate, Hypothesis};
+use crate::port_scan::Port;
+use crate::search::{Fitted, Probabilities, Round};
+use std::collections::BTreeMap;
+
+/// Probability to see such evidence for an unknown stiffness if nothing is left out, up to which it
+/// is said to be there.
+const PORT_ALARM: f64 = 0.01;
+
+/// Probability of nothing at all below which something is left out even if no name predicts a
+/// withheld speed better.
+const NOTHING_LEFT: f64 = 0.02;
+
+/// Probability that what is left beside a named effect is something new.
+const REMAINDER_PRIOR: f64 = 0.2;
+
+/// Names that are given beside something unknown.
+const NEAREST_MAX: usize = 3;
+
+/// The parameter that counts waves around the wheel.
+const ORDER: &str = "order";
+
+impl Evidence<'_> {
+    /// What one search fitted, as hypotheses.
+    pub(super) fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
+        let Probabilities { named, unknown, nothing } = round.probabilities();
+        // What is left beside a named effect may be its model's error as well as something new.
+        let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
+        let alone = first && !round.accepted;
+        let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
+        let others = named.iter().copied().fold(nothing, f64::max);
+        let is_there = alone && !round.port_strays;
+        let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
+        // Something is there, but the names that come near failed on withheld speeds.
+        let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
+        let unnamed = is_there && !is_port && nothing < NOTHING_LEFT;
+        let (kept, unknown) =
+            if unnamed { (FAILED_SHARE, unknown + failed) } else { (is_new, unknown) };
+        let mut hypotheses: Vec<Hypothesis> = round
+            .fitted
+            .iter()
+            .zip(named)
+            .enumerate()
+            .map(|(rank, (fitted, probability))| {
+                self.hypothesis(fitted, kept * probability, round.accepted && rank == 0)
+            })
+            .collect();
+        if let Some(port) = &round.port {
+            let unknown = unknown * if alone { 1.0 } else { REMAINDER_PRIOR };
+            hypotheses.push(Hypothesis {
+                accepted: is_port || unnamed,
+                look_alikes: if unnamed { nearest(round) } else { Vec::new() },
+                ..self.without_name(port, unknown)
+            });
+        }
+        if round.accepted {
+            self.gather(&mut hypotheses);
+        }
+        hypotheses
+    }
+
+    /// Something unknown.
+    fn without_name(&self, port: &Port, probability: f64) -> Hypothesis {
+        let behaviour = port.behaviour.as_ref();
+        Hypothesis {
+            physics: UNKNOWN.to_owned(),
+            probability,
+            accepted: false,
+            location: self.location_of_port(&port.place),
+            port: Some(port.place.name().to_owned()),
+            behaviour: behaviour.map(|behaviour| behaviour.element),
+            parameters: behaviour.map_or_else(BTreeMap::new, Behaviour::named),
+            look_alikes: Vec::new(),
+            would_separate: port.place.would_separate().to_owned(),
+            detectability: 0.0,
+            log_evidence: port.log_evidence,
+        }
+    }
+
+    /// Gives the accepted one, which is the first, what the same name has at its place: another
+    /// fit of the same thing.
+    fn gather(&self, hypotheses: &mut Vec<Hypothesis>) {
+        let mut accepted = hypotheses.remove(0);
+        let others = std::mem::take(hypotheses).into_iter();
+        let (same, different): (Vec<_>, Vec<_>) =
+            others.partition(|other| self.is_same(&accepted, other));
+        accepted.probability += same.iter().map(|other| other.probability).sum::<f64>();
+        hypotheses.push(accepted);
+        hypotheses.extend(different);
+    }
+
+    /// Whether two hypotheses are one: the same name at the same place, or beside an accepted one.
+    pub(super) fn is_same(&self, known: &Hypothesis, other: &Hypothesis) -> bool {
+        let is_fit = known.accepted && !other.accepted;
+        let are_beside = match (&known.location, &other.location) {
+            (Some(one), Some(another)) => {
+                self.subject.forward.section.are_beside(one.x_m, another.x_m)
+            }
+            // Everywhere is beside all.
+            _ => true,
+        };
+        known.physics == other.physics && (known.location == other.location || is_fit && are_beside)
+    }
+
+    fn hypothesis(&self, fitted: &Fitted, probability: f64, accepted: bool) -> Hypothesis {
+        let Fitted { candidate, calibration, log_evidence, detectability, .. } = fitted;
+        let first = calibration.values.len() - candidate.free.len();
+        let covariance = calibration.precision.inverse();
+        let parameters = candidate.free.iter().enumerate().map(|(index, parameter)| {
+            let mean = calibration.values[first + index].exp();
+            let deviation = covariance[(first + index, first + index)].sqrt();
+            (parameter.name.to_owned(), Estimate { mean, sd: mean * deviation })
+        });
+        // Of whole numbers each is a candidate of its own.
+        let order = candidate.extension.parameters.get(ORDER);
+        let order = order.map(|&mean| (ORDER.to_owned(), Estimate { mean, sd: 0.0 }));
+        Hypothesis {
+            physics: candidate.kind.physics.to_owned(),
+            probability,
+            accepted,
+            location: self.location_of(candidate),
+            port: None,
+            behaviour: None,
+            parameters: parameters.chain(order).collect(),
+            look_alikes: names(candidate.kind),
+            would_separate: candidate.kind.would_separate.to_owned(),
+            detectability: *detectability,
+            log_evidence: *log_evidence,
+        }
+    }
+}
+
+/// Names that what a search found may have, though none predicts withheld speeds better.
+fn nearest(round: &Round) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for fitted in &round.fitted {
+        let name = fitted.candidate.kind.physics;
+        if names.len() < NEAREST_MAX && names.iter().all(|known| known != name) {
+            names.push(name.to_owned());
+        }
+    }
+    names
+}

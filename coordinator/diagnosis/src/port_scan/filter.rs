@@ -1,0 +1,85 @@
+//! Evidence in closed form for an unknown dynamic stiffness at one place.
+
+use super::place::PortPlace;
+use super::prior::Prior;
+use crate::behaviour::{Behaviour, Seen};
+use crate::calibration::Calibration;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rustfft::num_complex::Complex64;
+
+/// What an unknown dynamic stiffness changes at one place.
+pub(super) struct Trace {
+    /// Where it acts.
+    pub(super) place: PortPlace,
+    /// Change of the whitened log powers by each bump's two parts: `[row][2 × bump + part]`.
+    pub(super) columns: DMatrix<f64>,
+    /// Receptance in m/N that the bumps' heights are in parts of, mean over each bump.
+    pub(super) receptance: Vec<Complex64>,
+}
+
+/// All that the evidence at one place needs of the track.
+pub(super) struct Filter {
+    pub(super) trace: Trace,
+    /// The baseline's part in its columns: what it is multiplied with for a residual's projection.
+    imitated: DMatrix<f64>,
+    /// Square of the columns less the baseline's part.
+    square: DMatrix<f64>,
+    /// What the bumps' heights may be beforehand, each with their posterior precision, factored.
+    priors: Vec<(Prior, Cholesky<f64, Dyn>)>,
+}
+
+impl Filter {
+    /// None where a precision is not positive definite.
+    pub(super) fn new(trace: Trace, current: &Calibration) -> Option<Self> {
+        let columns = &trace.columns;
+        // What the baseline imitates is taken out of columns and residual.
+        let shared = current.jacobian.tr_mul(columns);
+        let imitated = current.precision.solve(&shared);
+        let square = columns.tr_mul(columns) - shared.tr_mul(&imitated);
+        let posterior = |prior: Prior| {
+            let precision = Cholesky::new(&square + &prior.precision)?;
+            Some((prior, precision))
+        };
+        let priors = Prior::all().into_iter().map(posterior).collect::<Option<_>>()?;
+        Some(Self { trace, imitated, square, priors })
+    }
+
+    /// What something with these heights behaves like.
+    pub(super) fn behaviour(
+        &self,
+        residual: &DVector<f64>,
+        felt: &DVector<f64>,
+        heights: &DVector<f64>,
+        centres_hz: &[f64],
+    ) -> Option<Behaviour> {
+        let along = &self.along(residual, felt);
+        let Self { trace: Trace { receptance, .. }, square, .. } = self;
+        Seen { along, square, receptance, centres_hz }.behaviour(0.5 * along.dot(heights))
+    }
+
+    /// Slope of the log likelihood with the bumps' heights.
+    fn along(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> DVector<f64> {
+        self.trace.columns.tr_mul(residual) - self.imitated.tr_mul(felt)
+    }
+
+    /// Log evidence averaged over the priors, and the bumps' most probable heights.
+    pub(super) fn evidence(
+        &self,
+        residual: &DVector<f64>,
+        felt: &DVector<f64>,
+    ) -> (f64, DVector<f64>) {
+        let along = self.along(residual, felt);
+        let of_prior = |(prior, precision): &(Prior, Cholesky<f64, Dyn>)| {
+            let heights = precision.solve(&along);
+            let log_evidence = 0.5 * along.dot(&heights) - 0.5 * precision.ln_determinant()
+                + prior.half_ln_determinant;
+            (log_evidence, heights)
+        };
+        let mut all: Vec<_> = self.priors.iter().map(of_prior).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let highest = all[all.len() - 1].0;
+        let sum: f64 = all.iter().map(|(evidence, _)| (evidence - highest).exp()).sum();
+        let (_, heights) = all.swap_remove(self.priors.len() - 1);
+        (highest + (sum / self.priors.len() as f64).ln(), heights)
+    }
+}

@@ -1,0 +1,138 @@
+//! What a recording says where no name fits: an unknown dynamic stiffness under rail seats, between
+//! two of them or at the wheel.
+//!
+//! Whatever a sleeper, its railpad or its ballast have that the model lacks acts on the rail as an
+//! additional dynamic stiffness at the rail seat, free in every frequency; whatever links two
+//! sleepers, between their seats; whatever the vehicle has, at the wheel. Its trace is linear in
+//! that stiffness, so that the evidence for it has a closed form (mismatch design, eq. 9).
+
+mod bumps;
+mod filter;
+mod place;
+mod prior;
+
+use self::bumps::Bumps;
+use self::filter::{Filter, Trace};
+pub use self::place::PortPlace;
+use self::place::seats_together;
+use crate::behaviour::Behaviour;
+use crate::calibration::{Calibration, CalibrationError, Problem};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use rustfft::num_complex::Complex64;
+
+/// Evidence for an unknown dynamic stiffness.
+#[derive(Clone, Debug)]
+pub struct Port {
+    /// Where it acts.
+    pub place: PortPlace,
+    /// Logarithm of the evidence against the model without it, in nats.
+    pub log_evidence: f64,
+    /// What the dynamic stiffness behaves like; none if like no element.
+    pub behaviour: Option<Behaviour>,
+    /// Its trace: whitened change of the log powers.
+    pub change: DVector<f64>,
+}
+
+/// What recordings of a calibrated track are searched with for an unknown dynamic stiffness.
+pub struct PortScan {
+    filters: Vec<Filter>,
+    centres_hz: Vec<f64>,
+}
+
+impl PortScan {
+    /// Works out the traces on a calibrated track.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when the calibrated track makes no model.
+    pub fn new(problem: &Problem<'_>, current: &Calibration) -> Result<Self, CalibrationError> {
+        Self::of(problem, current, |_| true)
+    }
+
+    /// The same for one place.
+    ///
+    /// # Errors
+    /// As [`PortScan::new`].
+    pub fn at(
+        place: &PortPlace,
+        problem: &Problem<'_>,
+        current: &Calibration,
+    ) -> Result<Self, CalibrationError> {
+        Self::of(problem, current, |known| known == place)
+    }
+
+    fn of(
+        problem: &Problem<'_>,
+        current: &Calibration,
+        is_one: impl Fn(&PortPlace) -> bool,
+    ) -> Result<Self, CalibrationError> {
+        let bumps = Bumps::over(problem.forward.bands.lines_hz());
+        let mut traces = traces(problem, current, &bumps)?;
+        traces.retain(|trace| is_one(&trace.place));
+        let filter = |trace| Filter::new(trace, current);
+        let filters = traces.into_par_iter().filter_map(filter).collect();
+        Ok(Self { filters, centres_hz: bumps.centres_hz })
+    }
+
+    /// The best port for a whitened residual; `felt` is its product with the baseline's
+    /// derivatives.
+    pub fn best(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> Option<Port> {
+        self.best_where(residual, felt, |_| true)
+    }
+
+    /// The best of some places.
+    pub fn best_where(
+        &self,
+        residual: &DVector<f64>,
+        felt: &DVector<f64>,
+        is_one: impl Fn(&PortPlace) -> bool + Sync,
+    ) -> Option<Port> {
+        let filters = self.filters.par_iter().filter(|filter| is_one(&filter.trace.place));
+        let found: Vec<_> =
+            filters.map(|filter| (filter, filter.evidence(residual, felt))).collect();
+        let best = found.into_iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let (filter, (log_evidence, heights)) = best?;
+        Some(Port {
+            place: filter.trace.place.clone(),
+            log_evidence,
+            behaviour: filter.behaviour(residual, felt, &heights, &self.centres_hz),
+            change: &filter.trace.columns * heights,
+        })
+    }
+}
+
+/// What each bump changes at every place.
+fn traces(
+    problem: &Problem<'_>,
+    current: &Calibration,
+    bumps: &Bumps,
+) -> Result<Vec<Trace>, CalibrationError> {
+    let (section, observation) = (&problem.forward.section, problem.observation);
+    let extensions = problem.extensions(&current.values)?;
+    let columns = problem.forward.port_columns(&current.values, &extensions, &bumps.shapes)?;
+    let whiten =
+        |columns: DMatrix<f64>| observation.fitted_rows(&observation.whiten_matrix(&columns));
+    let at_seat = |compared: usize| {
+        let magnitudes = &columns.seat_receptances[section.in_track(compared)];
+        let receptance: Vec<Complex64> = magnitudes.iter().map(|&value| value.into()).collect();
+        bumps.mean(&receptance)
+    };
+    let seats: Vec<DMatrix<f64>> = columns.seats.into_iter().map(whiten).collect();
+    let together = |(compared, in_track): (Vec<usize>, Vec<usize>)| Trace {
+        columns: in_track.iter().map(|&sleeper| &seats[sleeper]).sum(),
+        receptance: at_seat(compared[0]),
+        place: PortPlace::Seats(compared),
+    };
+    let mut all: Vec<Trace> = seats_together(section).into_iter().map(together).collect();
+    all.extend(columns.between.into_iter().enumerate().map(|(first, columns)| Trace {
+        place: PortPlace::Between([first, first + 1]),
+        columns: whiten(columns),
+        receptance: at_seat(first + 1),
+    }));
+    all.push(Trace {
+        place: PortPlace::Wheel,
+        columns: whiten(columns.wheel),
+        receptance: bumps.mean(&columns.wheel_receptance),
+    });
+    Ok(all)
+}
