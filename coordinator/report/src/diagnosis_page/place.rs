@@ -164,7 +164,8 @@ fn chart(diagnosis: &Diagnosis, site: &Site, speed: usize) -> String {
         (Some(&low), Some(&high)) if high > low => Axis::logarithmic("frequency in Hz", low, high),
         _ => Axis::around("frequency in Hz", levels.frequency_hz.iter().copied()),
     };
-    let title = format!("{}, {}", site.name, speeds(&levels.speeds_km_h[speed..=speed]));
+    // The speed first: many sleepers don't find room.
+    let title = format!("{}, {}", speeds(&levels.speeds_km_h[speed..=speed]), site.name);
     let mut chart = Chart::new(&title, SIZE, x, y.clone());
     rule(&mut chart, levels, &y);
     if !band.is_empty() {

@@ -62,7 +62,7 @@ fn left_out_physics_is_named_placed_measured_and_its_bias_shown() {
     // Before and after at each speed, a chart a speed at the place, three along the track.
     assert_eq!(charts(&page, "before, re-tuned track only"), 3);
     assert_eq!(charts(&page, "after, with rail joint"), 3);
-    assert_eq!(charts(&page, "SN18, 13 km/h") + charts(&page, "SN19, 13 km/h"), 1);
+    assert_eq!(charts(&page, "13 km/h, SN18") + charts(&page, "13 km/h, SN19"), 1);
     assert_eq!(page.matches("class=\"line box").count(), 6);
     assert!(!page.contains("sleeper bolt"), "what is improbable is counted, not listed");
     assert_reads(&page, &["1 further hypothesis is"]);
@@ -142,7 +142,7 @@ fn a_fault_of_the_measuring_chain_is_not_called_physics() {
         &["measuring chain", "not the track", "in the measuring chain", "over 99 %"],
     );
     assert_reads(&page, &["3213 Hz", "all along the track, 2540 to 4032 Hz"]);
-    assert_reads(&page, &["mean over all sleepers, 13 km/h", "probability of this fault"]);
+    assert_reads(&page, &["13 km/h, mean over all sleepers", "probability of this fault"]);
     assert!(!page.contains("probability of this physics"));
 }
 
