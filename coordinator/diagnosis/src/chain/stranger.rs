@@ -32,9 +32,10 @@ pub(super) struct Company {
 /// cover too little.
 pub(super) fn companies(recording: &Recording) -> Vec<Company> {
     let speeds = by_speed(&recording.passes);
-    let Some(segments) = segments(recording).filter(|_| speeds.len() > 1) else {
+    if speeds.len() < 2 {
         return Vec::new();
-    };
+    }
+    let Some(segments) = segments(recording) else { return Vec::new() };
     let company = |own: &Vec<usize>| {
         let others = || (0..recording.passes.len()).filter(|other| !own.contains(other));
         let pairs = own.iter().flat_map(|&pass| others().map(move |other| [pass, other]));

@@ -193,6 +193,16 @@ mod tests {
     }
 
     #[test]
+    fn speeds_that_share_no_surface_are_refused() {
+        let mut recording = Rolled::faultless(6).recording();
+        assert_eq!(first_look(&recording).refusal(), None);
+        let elsewhere = Rolled::faultless(7).recording().passes.split_off(2);
+        recording.passes.splice(2.., elsewhere);
+        let look = first_look(&recording);
+        assert!(matches!(look.refusal(), Some(Trouble::Stranger { .. })), "{:?}", look.troubles);
+    }
+
+    #[test]
     #[ignore = "takes two minutes"]
     fn of_a_hundred_faultless_recordings_few_raise_an_alarm() {
         let alarms = (0..100).filter(|&seed| {
