@@ -1,5 +1,7 @@
 //! Compiles the farm's messages, without `protoc`.
 
+use prost_types::FileDescriptorSet;
+use prost_types::field_descriptor_proto::{Label, Type};
 use std::error::Error;
 
 /// The messages, as seen from this crate.
@@ -7,7 +9,24 @@ const PROTO_ROOT: &str = "../../proto";
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed={PROTO_ROOT}");
-    let descriptors = protox::compile(["farm/v1/farm.proto"], [PROTO_ROOT])?;
-    tonic_prost_build::configure().compile_fds(descriptors)?;
+    let mut descriptors = protox::compile(["farm/v1/farm.proto"], [PROTO_ROOT])?;
+    take_as_it_lies(&mut descriptors, "PassFeatures", "log_power")?;
+    tonic_prost_build::configure().bytes(".farm.v1.PassFeatures").compile_fds(descriptors)?;
+    Ok(())
+}
+
+/// Makes bytes of a field of `repeated double`, which is the same in a message: the numbers after each
+/// other, little-endian. One by one they cost the farm a tenth of its time.
+fn take_as_it_lies(
+    descriptors: &mut FileDescriptorSet,
+    message: &str,
+    field: &str,
+) -> Result<(), Box<dyn Error>> {
+    let messages = descriptors.file.iter_mut().flat_map(|file| &mut file.message_type);
+    let mut fields = messages.filter(|it| it.name() == message).flat_map(|it| &mut it.field);
+    let found = fields.find(|it| it.name() == field && it.r#type() == Type::Double);
+    let found = found.ok_or_else(|| format!("{message} has no numbers {field}"))?;
+    found.set_type(Type::Bytes);
+    found.set_label(Label::Optional);
     Ok(())
 }

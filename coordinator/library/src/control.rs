@@ -3,7 +3,7 @@
 
 use crate::attempt;
 use crate::engine::{Connection, Write, sql};
-use crate::{CampaignState, Library, LibraryError};
+use crate::{CampaignState, Library, LibraryError, result};
 
 /// Which cases are tried again.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -145,12 +145,11 @@ impl RetryCases {
                 select sobol_index from result where campaign_id = $1 and flagged is not null)";
         let cases = connection.execute(sql(again).bind(&self.campaign)).await?;
         // Their audits looked at results that are no more.
-        for discard in [
-            "delete from audit where campaign_id = $1 and sobol_index in (
-                select sobol_index from result where campaign_id = $1 and flagged is not null)",
-            "delete from result where campaign_id = $1 and sobol_index in (
-                select sobol_index from result where campaign_id = $1 and flagged is not null)",
-        ] {
+        for table in ["audit", result::table(connection.dialect())] {
+            let discard = format!(
+                "delete from {table} where campaign_id = $1 and sobol_index in (
+                    select sobol_index from result where campaign_id = $1 and flagged is not null)"
+            );
             connection.execute(sql(discard).bind(&self.campaign)).await?;
         }
         Ok(cases)

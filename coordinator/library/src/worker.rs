@@ -1,7 +1,7 @@
 //! The table `worker`: who works for the farm, as all coordinators see it.
 
 use crate::engine::{Connection, Row, Write, sql};
-use crate::{Library, LibraryError};
+use crate::{Library, LibraryError, result};
 
 /// Whether a worker is given cases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -238,9 +238,13 @@ impl Write for Flag {
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
         let (worker, reason) = (self.worker.clone(), Some(self.reason.clone()));
         Quarantine { worker, reason }.apply(connection).await?;
-        let flag = sql("update result set flagged = $2 where worker = $1 and flagged is null")
-            .bind(&self.worker)
-            .bind(&self.reason);
-        connection.execute(flag).await
+        let theirs = "select count(*) as results from result where worker = $1 and flagged is null";
+        let theirs = connection.rows(sql(theirs).bind(&self.worker)).await?;
+        let flag = format!(
+            "update {} set flagged = $2 where worker = $1 and flagged is null",
+            result::table(connection.dialect())
+        );
+        connection.execute(sql(flag).bind(&self.worker).bind(&self.reason)).await?;
+        theirs.first().map_or(Ok(0), |row| row.get_u32("results").map(u64::from))
     }
 }

@@ -15,6 +15,9 @@ const KEEP_ALIVE: Duration = Duration::from_secs(5);
 /// Calls of one connection at a time: a worker has a few a core.
 const CALLS_A_CONNECTION: u32 = 512;
 
+/// Most bytes of a message in one piece: HTTP/2's own 16 kB make a hundred of a report.
+const FRAME_BYTES: u32 = 1 << 20;
+
 /// How long calls may go on after the service was told to stop.
 const FAREWELL: Duration = Duration::from_secs(5);
 
@@ -48,6 +51,7 @@ pub async fn serve(
         .http2_keepalive_timeout(Some(KEEP_ALIVE))
         .initial_stream_window_size(WINDOW_BYTES)
         .initial_connection_window_size(WINDOW_BYTES)
+        .max_frame_size(FRAME_BYTES)
         .max_concurrent_streams(CALLS_A_CONNECTION)
         .add_service(guarded)
         .serve_with_incoming_shutdown(incoming, stop.clone().cancelled_owned());

@@ -1,7 +1,7 @@
 //! What the service answers, and what it refuses.
 
 use crate::support::{
-    CORES, coordinator, lease, registered, registration, report, stand_in, verdicts,
+    CORES, coordinator, lease, pass, registered, registration, report, stand_in, verdicts,
 };
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
@@ -141,7 +141,10 @@ async fn malformed_reports_are_refused_and_the_service_goes_on() {
     };
     let mut nan = good.clone();
     let mut changed = passes(&mut nan);
-    changed.passes[1].log_power[7] = f64::NAN;
+    let bins = changed.passes[1].log_power.len() / size_of::<f64>();
+    let mut log_power = vec![0.5; bins];
+    log_power[7] = f64::NAN;
+    changed.passes[1] = pass(changed.passes[1].speed_km_h, log_power);
     nan.cases[0].outcome = Some(messages::case_report::Outcome::Passes(changed));
     let mut short = good.clone();
     let mut changed = passes(&mut short);

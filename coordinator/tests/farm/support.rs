@@ -132,13 +132,16 @@ pub(crate) async fn lease(
     client.lease(request).await.unwrap().into_inner()
 }
 
+/// The message of a pass.
+pub(crate) fn pass(speed_km_h: f64, log_power: Vec<f64>) -> messages::PassFeatures {
+    let features = Features { log_power, band_levels_db: vec![1.0; ThirdOctave::COUNT] };
+    PassFeatures { speed_km_h, features }.into()
+}
+
 pub(crate) fn report(lease: &messages::LeaseResponse, worker: &str) -> ReportRequest {
     let experiment = Experiment::from_json(&lease.experiment_json).unwrap();
-    let pass = |&speed_km_h: &f64| messages::PassFeatures {
-        speed_km_h,
-        log_power: vec![0.5; experiment.features.frequencies_hz().len()],
-        band_levels_db: vec![1.0; ThirdOctave::COUNT],
-    };
+    let bins = experiment.features.frequencies_hz().len();
+    let pass = |&speed_km_h: &f64| pass(speed_km_h, vec![0.5; bins]);
     let passes = messages::Passes { passes: experiment.speeds_km_h.iter().map(pass).collect() };
     let case = |case: &messages::LeasedCase| CaseReport {
         sobol_index: case.sobol_index,

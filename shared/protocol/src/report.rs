@@ -3,6 +3,7 @@
 use crate::check::{BadMessage, bounded, duration, finite, name};
 use crate::farm;
 use farm::case_report::Outcome as OutcomeMessage;
+use prost::bytes::Bytes;
 use tracktwin_signal::{Features, ThirdOctave};
 
 /// Longest reason of a failure that is kept, in bytes; the rest is cut off.
@@ -74,7 +75,7 @@ impl From<CaseReport> for farm::CaseReport {
 impl From<PassFeatures> for farm::PassFeatures {
     fn from(PassFeatures { speed_km_h, features }: PassFeatures) -> Self {
         let Features { log_power, band_levels_db } = features;
-        Self { speed_km_h, log_power, band_levels_db }
+        Self { speed_km_h, log_power: as_bytes(&log_power), band_levels_db }
     }
 }
 
@@ -130,12 +131,24 @@ fn checked_passes(
         found => Err(BadMessage::WrongLength { index, field, found, expected }),
     };
     let pass = |message: farm::PassFeatures| {
-        let log_power = of_length("log_power", message.log_power, shape.bins)?;
+        let log_power = of_length("log_power", from_bytes(&message.log_power), shape.bins)?;
         let levels = of_length("band_levels_db", message.band_levels_db, ThirdOctave::COUNT)?;
         let features = Features { log_power, band_levels_db: levels };
         Ok(PassFeatures { speed_km_h: message.speed_km_h, features })
     };
     messages.into_iter().map(pass).collect()
+}
+
+/// Numbers as they lie in a message.
+fn as_bytes(numbers: &[f64]) -> Bytes {
+    numbers.iter().map(|number| number.to_le_bytes()).collect::<Vec<_>>().into_flattened().into()
+}
+
+/// The numbers that lie in a message; a piece at the end is not a number.
+fn from_bytes(bytes: &[u8]) -> Vec<f64> {
+    let (whole, piece) = bytes.as_chunks();
+    let piece = (!piece.is_empty()).then_some(f64::NAN);
+    whole.iter().map(|number| f64::from_le_bytes(*number)).chain(piece).collect()
 }
 
 fn shortened(mut reason: String) -> String {
@@ -149,6 +162,7 @@ fn shortened(mut reason: String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use prost::Message;
 
     fn shape() -> Shape {
         Shape { speeds_km_h: vec![7.0, 13.0], bins: 3 }
@@ -191,15 +205,43 @@ mod tests {
     }
 
     #[test]
+    fn numbers_lie_in_a_message_as_the_contract_says() {
+        /// `PassFeatures` of farm.proto, to the letter.
+        #[derive(Clone, PartialEq, prost::Message)]
+        struct Contract {
+            #[prost(double, tag = "1")]
+            speed_km_h: f64,
+            #[prost(double, repeated, tag = "2")]
+            log_power: Vec<f64>,
+            #[prost(double, repeated, tag = "3")]
+            band_levels_db: Vec<f64>,
+        }
+        let message = passes(&mut report().into())[1].clone();
+        let contract = Contract {
+            speed_km_h: 13.0,
+            log_power: vec![-1.0, 0.1, 2.0],
+            band_levels_db: vec![13.0; ThirdOctave::COUNT],
+        };
+        assert_eq!(message.encode_to_vec(), contract.encode_to_vec());
+        assert_eq!(farm::PassFeatures::decode(&*contract.encode_to_vec()), Ok(message));
+    }
+
+    #[test]
     fn features_that_are_not_finite_are_refused() {
-        let error = refusal(|message| passes(message)[1].log_power[0] = f64::NAN);
+        let error =
+            refusal(|message| passes(message)[1].log_power = as_bytes(&[0.0, f64::NAN, 1.0]));
         assert!(matches!(error, BadMessage::NotANumber { field: "log_power", .. }), "{error}");
     }
 
     #[test]
     fn features_of_another_shape_are_refused() {
-        let bins = refusal(|message| passes(message)[0].log_power.push(1.0));
+        let bins = refusal(|message| passes(message)[0].log_power = as_bytes(&[1.0; 4]));
         assert!(matches!(bins, BadMessage::WrongLength { field: "log_power", .. }), "{bins}");
+        let piece = refusal(|message| {
+            let log_power = &mut passes(message)[0].log_power;
+            log_power.truncate(log_power.len() - 1);
+        });
+        assert!(matches!(piece, BadMessage::NotANumber { field: "log_power", .. }), "{piece}");
         let speeds = refusal(|message| passes(message).reverse());
         assert!(matches!(speeds, BadMessage::WrongSpeeds { index: 5, .. }), "{speeds}");
     }

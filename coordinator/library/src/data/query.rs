@@ -86,12 +86,13 @@ fn names<C: sqlx::Column>(columns: &[C]) -> Vec<String> {
     columns.iter().map(|column| schema::spelled(column.name()).to_owned()).collect()
 }
 
-/// `SQLITE_READONLY` and its kin end so; PostgreSQL's code for a transaction that only reads.
+/// `SQLITE_READONLY` and its kin end so; PostgreSQL's codes for a transaction that only reads, and for what
+/// can't be written because it is a view.
 fn refused(error: sqlx::Error) -> LibraryError {
     let sqlx::Error::Database(database) = &error else { return error.into() };
     let code = database.code().unwrap_or_default();
     let sqlite_result = code.parse::<u32>().map(|code| code % 256);
-    if sqlite_result == Ok(8) && code.len() < 5 || code == "25006" {
+    if sqlite_result == Ok(8) && code.len() < 5 || ["25006", "55000"].contains(&&*code) {
         return LibraryError::OnlyReads;
     }
     LibraryError::BadQuery { reason: database.message().to_owned() }

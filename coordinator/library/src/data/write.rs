@@ -1,8 +1,8 @@
 //! Writing rows in that came from another library.
 
 use super::{Cell, Column, Table, decode};
-use crate::engine::{Connection, Write, sql};
-use crate::{Library, LibraryError};
+use crate::engine::{Connection, Dialect, Statement, Write, sql};
+use crate::{Library, LibraryError, result};
 use std::collections::HashSet;
 
 /// Rows in one statement: of the widest table's 38 columns well below the 32,766 values that
@@ -136,27 +136,57 @@ impl Write for Rows {
     type Answer = u64;
 
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        let columns = self.table.columns.len();
-        let insert = format!(
-            "insert into {} ({}) values {} on conflict ({}) do nothing",
-            self.table.name,
-            self.table.column_list(),
-            connection.dialect().rows_of_values(self.rows.len(), columns),
-            self.table.key.join(", ")
-        );
-        let mut insert = sql(insert);
+        let list = self.table.column_list();
+        let dialect = connection.dialect();
+        let values = dialect.rows_of_values(self.rows.len(), self.table.columns.len());
+        if self.table.name == "result" && dialect == Dialect::Postgres {
+            let gather = self.bound(result::gathering(&list, &values))?;
+            result::lock(connection, self.texts("campaign_id"), self.integers("sobol_index"))
+                .await?;
+            let rows = connection.rows(gather).await?;
+            return rows.first().map_or(Ok(0), |row| row.get_u32("added").map(u64::from));
+        }
+        let (table, key) = (self.table.name, self.table.key.join(", "));
+        let insert =
+            format!("insert into {table} ({list}) values {values} on conflict ({key}) do nothing");
+        connection.execute(self.bound(insert)?).await
+    }
+}
+
+impl Rows {
+    /// A statement with the cells of all rows.
+    fn bound(&self, statement: String) -> Result<Statement, LibraryError> {
+        let columns = self.table.columns;
+        let misfit = |what: String| LibraryError::BadRow { table: self.table.name, what };
+        let mut statement = sql(statement);
         for row in &self.rows {
-            let misfit = |what: String| LibraryError::BadRow { table: self.table.name, what };
-            if row.len() != columns {
-                return Err(misfit(format!("{} columns instead of {columns}", row.len())));
+            if row.len() != columns.len() {
+                return Err(misfit(format!("{} columns instead of {}", row.len(), columns.len())));
             }
-            for (column, cell) in self.table.columns.iter().zip(row) {
+            for (column, cell) in columns.iter().zip(row) {
                 let value = cell.clone().bound_as(column.kind);
                 let value = value.ok_or_else(|| misfit(format!("{cell:?} in {}", column.name)))?;
-                insert = insert.bind(value);
+                statement = statement.bind(value);
             }
         }
-        connection.execute(insert).await
+        Ok(statement)
+    }
+
+    /// The cells of a column.
+    fn column(&self, name: &str) -> impl Iterator<Item = &Cell> {
+        let place = self.table.column(name);
+        self.rows.iter().filter_map(move |row| row.get(place?))
+    }
+
+    fn texts(&self, name: &str) -> Vec<String> {
+        let text =
+            |cell: &Cell| if let Cell::Text(text) = cell { Some(text.clone()) } else { None };
+        let texts: HashSet<String> = self.column(name).filter_map(text).collect();
+        texts.into_iter().collect()
+    }
+
+    fn integers(&self, name: &str) -> Vec<i64> {
+        self.column(name).filter_map(integer).collect()
     }
 }
 

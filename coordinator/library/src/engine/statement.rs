@@ -68,6 +68,18 @@ impl Statement {
     }
 }
 
+impl Value {
+    /// Series after each other, as one.
+    pub(crate) fn series<'a>(parts: impl IntoIterator<Item = &'a [f64], IntoIter: Clone>) -> Self {
+        let parts = parts.into_iter();
+        let mut bytes = Vec::with_capacity(parts.clone().map(size_of_val).sum());
+        for number in parts.flatten() {
+            bytes.extend_from_slice(&number.to_be_bytes());
+        }
+        Self::Series(Some(bytes))
+    }
+}
+
 /// The numbers of a stored series.
 pub(crate) fn series(bytes: &[u8]) -> Vec<f64> {
     bytes.as_chunks().0.iter().map(|chunk| f64::from_be_bytes(*chunk)).collect()
@@ -111,8 +123,7 @@ impl From<f64> for Value {
 
 impl From<&[f64]> for Value {
     fn from(series: &[f64]) -> Self {
-        let bytes = series.iter().map(|number| number.to_be_bytes()).collect::<Vec<_>>();
-        Self::Series(Some(bytes.into_flattened()))
+        Self::series([series])
     }
 }
 

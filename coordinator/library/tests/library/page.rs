@@ -145,7 +145,7 @@ async fn the_pages_role_for_analysts_reads_and_does_not_write() {
     assert!(analyst.pause(CAMPAIGN).await.is_err());
     let mut connection = PgConnection::connect(&url).await.unwrap();
     for attempt in [
-        "delete from result",
+        "delete from case_result",
         "set default_transaction_read_only = off; update campaign set name = 'mine'",
         "begin read write; insert into worker select * from worker; commit",
         "create table mine (x text)",

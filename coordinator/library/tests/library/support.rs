@@ -124,7 +124,9 @@ pub(crate) fn features(index: u32) -> Vec<Features> {
         log_power: (0..5)
             .map(|bin| (f64::from(index) + speed).sin() / f64::from(bin + 1))
             .collect(),
-        band_levels_db: vec![f64::from(index) / 3.0 - speed; ThirdOctave::COUNT],
+        band_levels_db: (0..ThirdOctave::COUNT)
+            .map(|band| f64::from(index) / 3.0 - speed + band as f64 / 7.0)
+            .collect(),
     };
     record().speeds_km_h.into_iter().map(pass).collect()
 }

@@ -1,7 +1,7 @@
 //! Libraries that earlier programs wrote are brought up to date, and hold what they held.
 
 use crate::support::{Home, policy};
-use sqlx::{Connection, PgConnection, SqliteConnection};
+use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
 use tracktwin_library::{LeaseRequest, Library, State, Status};
 
 pub(crate) const CAMPAIGN: &str = "released-13c0db7b51c4";
@@ -82,4 +82,37 @@ async fn arrays_of_a_server_s_library_of_the_fourth_schema_become_series_of_the_
     let library = Library::open(&home.url).await.unwrap();
     let stored = library.array("key").await.unwrap().unwrap();
     assert_eq!(stored.numbers, [-1.5, 0.0, 1e-300]);
+}
+
+#[tokio::test]
+async fn results_of_a_server_s_library_of_the_fifth_schema_stay_as_they_were() {
+    let Some(home) = Home::postgres() else { return };
+    let mut connection = PgConnection::connect(&home.url).await.unwrap();
+    sqlx::migrate!("../../migrations/postgres").run_to(5, &mut connection).await.unwrap();
+    let case = "insert into campaign (id, name, definition, definition_hash, experiment,
+            experiment_hash, speeds_km_h, seed, created_at)
+        values ('c', 'c', '{}', 'd', '{}', 'e', '[7, 10, 13]', 1, '2026-11-01T00:00:00Z');
+        insert into campaign_case (campaign_id, sobol_index, railpad_stiffness_N_m,
+            railpad_damping_N_s_m, ballast_stiffness_N_m, ballast_damping_N_s_m, sleeper_EI_N_m2,
+            irregularity_level, surface_seed, parameter_hash)
+        select 'c', index, 1, 1, 1, 1, 1, 1, 1, 'p' || index from generate_series(3, 4) as index";
+    sqlx::raw_sql(case).execute(&mut connection).await.unwrap();
+    // The faster pass first; no two numbers alike.
+    let numbers: Vec<_> = (1..=20).map(|place| format!("speed / {place} - index")).collect();
+    let results = format!(
+        "insert into result
+        select 'c', index, speed, float8send(speed / 3) || float8send(index / speed), {},
+            0.25, 'w' || index, 'v', 'm', 'e', 'p' || index, '2026-11-01T00:00:00Z', null
+        from unnest(array[13, 7, 10]::double precision[]) as speed, generate_series(3, 4) as index",
+        numbers.join(", ")
+    );
+    sqlx::raw_sql(AssertSqlSafe(results)).execute(&mut connection).await.unwrap();
+    let all = "select array_agg(cast(result as text) order by sobol_index, speed_km_h),
+            count(*) from result";
+    let before: (Vec<String>, i64) = sqlx::query_as(all).fetch_one(&mut connection).await.unwrap();
+    assert_eq!(before.1, 6);
+    Library::open(&home.url).await.unwrap().close().await;
+    let after: (Vec<String>, i64) = sqlx::query_as(all).fetch_one(&mut connection).await.unwrap();
+    assert_eq!(after, before);
+    connection.close().await.unwrap();
 }

@@ -1,0 +1,105 @@
+//! A row a case, as a server has it.
+
+use super::LEVEL_COLUMNS;
+use crate::LibraryError;
+use crate::engine::{Connection, Value, iso_utc, sql};
+use crate::report::{CaseReport, Report};
+use tracktwin_signal::Features;
+
+/// Cases in one statement: what is read and copied again and again on both sides stays in the cache.
+const CASES_A_STATEMENT: usize = 32;
+
+/// A row a case. Over a network many go in one statement: their levels and series travel one after the
+/// other, and every row takes its stretch.
+pub(super) async fn insert(
+    connection: &mut Connection,
+    report: &Report,
+    finished: &[(&CaseReport, &[Features])],
+) -> Result<(), LibraryError> {
+    let insert = "insert into case_result (campaign_id, worker, code_version, model_hash,
+            experiment_hash, finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash,
+            levels_dB, log_power)
+        select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash,
+            ($11)[levels * (place - 1) + 1:levels * place],
+            substring($12 from bytes * (place - 1) + 1 for bytes)
+        from (
+            select sobol_index, duration_s, parameter_hash, cast(place as integer) as place,
+                cardinality($11) / cardinality($8) as levels,
+                length($12) / cardinality($8) as bytes
+            from unnest($8, $9, $10) with ordinality
+                as of (sobol_index, duration_s, parameter_hash, place)) as cases";
+    let finished_at = iso_utc(report.now_unix_ms);
+    for cases in finished.chunks(CASES_A_STATEMENT) {
+        let passes = || cases.iter().flat_map(|(_, features)| features.iter());
+        let indices: Vec<i64> = cases.iter().map(|(case, _)| case.index.into()).collect();
+        let hashes = cases.iter().map(|(case, _)| case.parameter_hash.clone()).collect();
+        let insert = sql(insert)
+            .bind(&report.campaign)
+            .bind(&report.worker)
+            .bind(&report.code_version)
+            .bind(&report.model_hash)
+            .bind(&report.experiment_hash)
+            .bind(&finished_at)
+            .bind(Value::Reals(report.speeds_km_h.clone()))
+            .bind(indices)
+            .bind(Value::Reals(cases.iter().map(|(case, _)| case.duration_s).collect()))
+            .bind(Value::Texts(hashes))
+            .bind(Value::Reals(passes().flat_map(|it| it.band_levels_db.clone()).collect()))
+            .bind(Value::series(passes().map(|it| &it.log_power[..])));
+        connection.execute(insert).await?;
+    }
+    Ok(())
+}
+
+/// Keeps others from writing results of these cases before this transaction ends.
+pub(crate) async fn lock(
+    connection: &mut Connection,
+    campaigns: Vec<String>,
+    indices: Vec<i64>,
+) -> Result<(), LibraryError> {
+    let lock = "select sobol_index from campaign_case
+        where campaign_id = any($1) and sobol_index = any($2)
+        order by campaign_id, sobol_index for update";
+    connection.execute(sql(lock).bind(Value::Texts(campaigns)).bind(indices)).await.map(drop)
+}
+
+/// A statement that adds passes which stand in `values` in the columns `columns` of `result`, and answers
+/// how many were `added`: those that are not there yet, beside the passes of their cases that are.
+pub(crate) fn gathering(columns: &str, values: &str) -> String {
+    format!(
+        "with given ({columns}) as (values {values}),
+        here as (
+            select {columns} from result
+            where (campaign_id, sobol_index) in (select campaign_id, sobol_index from given)),
+        added as (
+            select distinct on (campaign_id, sobol_index, speed_km_h) * from given
+            where (campaign_id, sobol_index, speed_km_h)
+                not in (select campaign_id, sobol_index, speed_km_h from here)),
+        gathered as (
+            insert into case_result (campaign_id, sobol_index, speeds_km_h, levels_dB, log_power,
+                duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash,
+                finished_at, flagged)
+            select campaign_id, sobol_index, speeds_km_h,
+                array(select level from unnest(levels) with ordinality as of (level, place)
+                    order by place),
+                log_power, duration_s, worker, code_version, model_hash, experiment_hash,
+                parameter_hash, finished_at, flagged
+            from (
+                select campaign_id, sobol_index,
+                    array_agg(speed_km_h order by speed_km_h) as speeds_km_h,
+                    array_agg(array[{levels}] order by speed_km_h) as levels,
+                    string_agg(log_power, ''::bytea order by speed_km_h) as log_power,
+                    max(duration_s) as duration_s, max(worker) as worker,
+                    max(code_version) as code_version, max(model_hash) as model_hash,
+                    max(experiment_hash) as experiment_hash,
+                    max(parameter_hash) as parameter_hash, max(finished_at) as finished_at,
+                    max(flagged) as flagged
+                from (select * from here union all select * from added) as passes
+                group by campaign_id, sobol_index) as cases
+            on conflict (campaign_id, sobol_index) do update set
+                speeds_km_h = excluded.speeds_km_h, levels_dB = excluded.levels_dB,
+                log_power = excluded.log_power)
+        select count(*) as added from added",
+        levels = LEVEL_COLUMNS.join(", ")
+    )
+}

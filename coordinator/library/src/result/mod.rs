@@ -1,0 +1,132 @@
+//! `result`: what came out of each case at each speed.
+//!
+//! With `SQLite` a table of a row a pass, with PostgreSQL a view of `case_result`, which has a row a
+//! case: docs/decisions/0030.
+
+mod by_case;
+mod by_pass;
+
+pub(crate) use by_case::{gathering, lock};
+
+use crate::case::case_of;
+use crate::engine::{Connection, Dialect, Row, sql};
+use crate::report::{CaseReport, Report};
+use crate::{Library, LibraryError};
+use tokio_stream::StreamExt;
+use tracktwin_parameters::Case;
+use tracktwin_signal::Features;
+
+/// The columns of one-third-octave levels, ascending; 50 to 4000 Hz.
+pub(crate) const LEVEL_COLUMNS: [&str; 20] = [
+    "level_50_Hz_dB",
+    "level_63_Hz_dB",
+    "level_80_Hz_dB",
+    "level_100_Hz_dB",
+    "level_125_Hz_dB",
+    "level_160_Hz_dB",
+    "level_200_Hz_dB",
+    "level_250_Hz_dB",
+    "level_315_Hz_dB",
+    "level_400_Hz_dB",
+    "level_500_Hz_dB",
+    "level_630_Hz_dB",
+    "level_800_Hz_dB",
+    "level_1000_Hz_dB",
+    "level_1250_Hz_dB",
+    "level_1600_Hz_dB",
+    "level_2000_Hz_dB",
+    "level_2500_Hz_dB",
+    "level_3150_Hz_dB",
+    "level_4000_Hz_dB",
+];
+
+/// A finished case: what went in and what came out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LibraryEntry {
+    /// The case.
+    pub case: Case,
+    /// Features, one a speed of the campaign, by ascending speed.
+    pub features: Vec<Features>,
+}
+
+impl Library {
+    /// Hands every finished case of a campaign to `take`, by ascending index.
+    ///
+    /// One entry is held at a time, so a million cases need no more memory than one.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read or a case lacks a speed.
+    pub async fn training_set(
+        &self,
+        campaign: &str,
+        mut take: impl FnMut(LibraryEntry),
+    ) -> Result<(), LibraryError> {
+        let speeds = self.campaign(campaign).await?.speeds_km_h.len();
+        let ask = "select * from result_with_parameters where campaign_id = $1
+            order by sobol_index, speed_km_h";
+        let mut rows = self.readers().stream(sql(ask).bind(campaign));
+        let mut entry: Option<LibraryEntry> = None;
+        while let Some(row) = rows.next().await {
+            let row = row?;
+            let index = row.get_u32("sobol_index")?;
+            match &mut entry {
+                Some(entry) if entry.case.index == index => entry.features.push(features_of(&row)?),
+                _ => {
+                    let next =
+                        LibraryEntry { case: case_of(&row)?, features: vec![features_of(&row)?] };
+                    if let Some(done) = entry.replace(next) {
+                        take(complete(done, speeds)?);
+                    }
+                }
+            }
+        }
+        if let Some(done) = entry {
+            take(complete(done, speeds)?);
+        }
+        Ok(())
+    }
+}
+
+fn complete(entry: LibraryEntry, speeds: usize) -> Result<LibraryEntry, LibraryError> {
+    if entry.features.len() == speeds {
+        return Ok(entry);
+    }
+    let (index, found) = (entry.case.index, entry.features.len());
+    Err(LibraryError::Damaged { what: format!("case {index} has {found} of {speeds} results") })
+}
+
+pub(crate) fn features_of(row: &Row) -> Result<Features, LibraryError> {
+    let levels = LEVEL_COLUMNS.iter().map(|&column| row.get(column));
+    let band_levels_db = levels.collect::<Result<_, _>>()?;
+    Ok(Features { log_power: row.doubles("log_power")?, band_levels_db })
+}
+
+/// The table that results are written to.
+pub(crate) const fn table(dialect: Dialect) -> &'static str {
+    match dialect {
+        Dialect::Sqlite => "result",
+        Dialect::Postgres => "case_result",
+    }
+}
+
+/// Stores the results of cases that have none.
+///
+/// # Panics
+/// When features have another shape than the first: whoever took the message in looked at that.
+pub(crate) async fn insert_results(
+    connection: &mut Connection,
+    report: &Report,
+    finished: &[(&CaseReport, &[Features])],
+) -> Result<(), LibraryError> {
+    let shape = |features: &Features| (features.log_power.len(), features.band_levels_db.len());
+    let first = finished.iter().find_map(|(_, passes)| passes.first());
+    let expected = (first.map_or(0, |it| it.log_power.len()), LEVEL_COLUMNS.len());
+    for (_, passes) in finished {
+        assert_eq!(passes.len(), report.speeds_km_h.len(), "a pass at each speed");
+        assert!(passes.iter().all(|pass| shape(pass) == expected), "passes of one shape");
+    }
+    match connection.dialect() {
+        Dialect::Sqlite => by_pass::insert(connection, report, finished).await,
+        Dialect::Postgres => by_case::insert(connection, report, finished).await,
+    }
+}
