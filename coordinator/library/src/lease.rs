@@ -143,9 +143,10 @@ impl LeaseRequest {
         let ask = format!(
             "select id from campaign where {only} state = 'running'
                 and not exists (select 1 from worker where id = $1 and state = 'quarantined')
-                and exists (select 1 from campaign_case
+                and exists (select 1 from campaign_case {}
                     where campaign_id = campaign.id and state = 'waiting' and sobol_index < $2)
-            order by priority desc, created_at, id limit $3"
+            order by priority desc, created_at, id limit $3",
+            connection.dialect().by_state()
         );
         let ask = sql(ask).bind(&self.worker).bind(self.indices_below).bind(CAMPAIGNS_TRIED);
         let ask = match &self.campaign {
@@ -161,10 +162,13 @@ impl LeaseRequest {
         connection: &mut Connection,
         campaign: &str,
     ) -> Result<(u32, u32), LibraryError> {
-        let ask = "select attempts from campaign_case
+        let ask = format!(
+            "select attempts from campaign_case {}
             where campaign_id = $1 and state = 'waiting' and sobol_index < $2
-            order by sobol_index limit 1";
-        let ask = sql(ask.to_owned()).bind(campaign).bind(self.indices_below);
+            order by sobol_index limit 1",
+            connection.dialect().by_state()
+        );
+        let ask = sql(ask).bind(campaign).bind(self.indices_below);
         let first = connection.rows(ask).await?;
         let attempts = first.first().map_or(Ok(0), |row| row.get_u32("attempts"))?;
         Ok(if attempts > self.alone_after {
@@ -184,7 +188,7 @@ impl LeaseRequest {
         // The limit stands in a CTE of its own: it is evaluated once, whatever the planner does.
         let take = format!(
             "with next as (
-                select campaign_id as next_campaign, sobol_index as next_index from campaign_case
+                select campaign_id as next_campaign, sobol_index as next_index from campaign_case {}
                 where campaign_id = $1 and state = 'waiting' and sobol_index < $2
                     and attempts <= $7
                 order by sobol_index limit $3 {})
@@ -194,6 +198,7 @@ impl LeaseRequest {
             returning sobol_index, railpad_stiffness_N_m, railpad_damping_N_s_m,
                 ballast_stiffness_N_m, ballast_damping_N_s_m, sleeper_EI_N_m2, irregularity_level,
                 surface_seed, epoch",
+            connection.dialect().by_state(),
             connection.dialect().skipping_locked()
         );
         let take = sql(take)
@@ -260,20 +265,20 @@ impl Write for Renew {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Vec<Held>, LibraryError> {
+        // A lease that followed lasts longer as well, if it is the same worker's: which one was meant is
+        // told below. Joined with a list of epochs, SQLite would go through all cases of the campaign.
         let renew = format!(
-            "update campaign_case set lease_expires_unix_ms = $3 from {}
-            where campaign_id = $1 and sobol_index = held_index and epoch = held_epoch
-                and state = 'leased' and worker = $2
+            "update campaign_case set lease_expires_unix_ms = $3
+            where campaign_id = $1 and sobol_index {} and state = 'leased' and worker = $2
             returning sobol_index, epoch",
-            connection.dialect().held("$4", "$5")
+            connection.dialect().listed("$4")
         );
-        let (indices, epochs) = lists(&self.held);
+        let (indices, _) = lists(&self.held);
         let renew = sql(renew)
             .bind(&self.campaign)
             .bind(&self.worker)
             .bind(self.until_unix_ms)
-            .bind(indices)
-            .bind(epochs);
+            .bind(indices);
         let rows = connection.rows(renew).await?;
         let held = |row: &Row| {
             Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? })
@@ -299,8 +304,12 @@ impl Write for Release {
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let held = connection.dialect().held("$3", "$4");
-        let theirs = "campaign_id = $1 and sobol_index = held_index and epoch = held_epoch
-            and state = 'leased' and worker = $2";
+        // The list once more, so that SQLite looks at these cases only.
+        let theirs = format!(
+            "campaign_id = $1 and sobol_index {} and sobol_index = held_index
+                and epoch = held_epoch and state = 'leased' and worker = $2",
+            connection.dialect().listed("$3")
+        );
         let note = format!(
             "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
                 ended_unix_ms, ending)
