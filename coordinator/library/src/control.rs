@@ -140,16 +140,19 @@ impl Write for RetryCases {
 
 impl RetryCases {
     async fn discard_flagged(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        let again = "update campaign_case set state = 'waiting', attempts = 0, error = null
-            where campaign_id = $1 and state = 'finished' and sobol_index in (
-                select sobol_index from result where campaign_id = $1 and flagged is not null)";
+        let results = result::table(connection.dialect());
+        let flagged = format!(
+            "campaign_id = $1 and sobol_index in (
+                select sobol_index from {results} where campaign_id = $1 and flagged is not null)"
+        );
+        let again = format!(
+            "update campaign_case set state = 'waiting', attempts = 0, error = null
+            where state = 'finished' and {flagged}"
+        );
         let cases = connection.execute(sql(again).bind(&self.campaign)).await?;
         // Their audits looked at results that are no more.
-        for table in ["audit", result::table(connection.dialect())] {
-            let discard = format!(
-                "delete from {table} where campaign_id = $1 and sobol_index in (
-                    select sobol_index from result where campaign_id = $1 and flagged is not null)"
-            );
+        for table in ["audit", results] {
+            let discard = format!("delete from {table} where {flagged}");
             connection.execute(sql(discard).bind(&self.campaign)).await?;
         }
         Ok(cases)

@@ -2,7 +2,7 @@
 
 use crate::attempt::{self, Ended};
 use crate::case::case_of;
-use crate::engine::{Connection, Row, Write, sql};
+use crate::engine::{Connection, Dialect, Row, Write, sql};
 use crate::{Ending, Library, LibraryError, Policy};
 use tracktwin_parameters::Case;
 
@@ -245,9 +245,22 @@ async fn end_expired(
     Ok(())
 }
 
-/// Indices and epochs, each as a list to be bound.
-fn lists(held: &[Held]) -> (Vec<i64>, Vec<i64>) {
-    held.iter().map(|held| (i64::from(held.index), i64::from(held.epoch))).unzip()
+/// That a case is worker `$2`'s under one of the leases bound as `$3` and `$4`; see [`leases`].
+///
+/// The indices alone stand first: by them cases are found, in both databases.
+fn is_held(dialect: Dialect) -> String {
+    format!(
+        "campaign_id = $1 and worker = $2 and state = 'leased' and sobol_index {}
+            and ((sobol_index << 32) | epoch) {}",
+        dialect.listed("$3"),
+        dialect.listed("$4")
+    )
+}
+
+/// Indices of leases, and these with their epochs as one number each.
+fn leases(held: &[Held]) -> (Vec<i64>, Vec<i64>) {
+    let index = |held: &Held| i64::from(held.index);
+    held.iter().map(|held| (index(held), index(held) << 32 | i64::from(held.epoch))).unzip()
 }
 
 struct Renew {
@@ -265,20 +278,18 @@ impl Write for Renew {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Vec<Held>, LibraryError> {
-        // A lease that followed lasts longer as well, if it is the same worker's: which one was meant is
-        // told below. Joined with a list of epochs, SQLite would go through all cases of the campaign.
         let renew = format!(
-            "update campaign_case set lease_expires_unix_ms = $3
-            where campaign_id = $1 and sobol_index {} and state = 'leased' and worker = $2
+            "update campaign_case set lease_expires_unix_ms = $5 where {}
             returning sobol_index, epoch",
-            connection.dialect().listed("$4")
+            is_held(connection.dialect())
         );
-        let (indices, _) = lists(&self.held);
+        let (indices, leases) = leases(&self.held);
         let renew = sql(renew)
             .bind(&self.campaign)
             .bind(&self.worker)
-            .bind(self.until_unix_ms)
-            .bind(indices);
+            .bind(indices)
+            .bind(leases)
+            .bind(self.until_unix_ms);
         let rows = connection.rows(renew).await?;
         let held = |row: &Row| {
             Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? })
@@ -303,28 +314,22 @@ impl Write for Release {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let held = connection.dialect().held("$3", "$4");
-        // The list once more, so that SQLite looks at these cases only.
-        let theirs = format!(
-            "campaign_id = $1 and sobol_index {} and sobol_index = held_index
-                and epoch = held_epoch and state = 'leased' and worker = $2",
-            connection.dialect().listed("$3")
-        );
+        let theirs = is_held(connection.dialect());
         let note = format!(
             "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
                 ended_unix_ms, ending)
             select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $5, 'returned'
-            from campaign_case, {held} where {theirs}
+            from campaign_case where {theirs}
             on conflict (campaign_id, sobol_index, epoch) do nothing"
         );
         let end = format!(
             "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
-            from {held} where {theirs}"
+            where {theirs}"
         );
-        let (indices, epochs) = lists(&self.held);
+        let (indices, leases) = leases(&self.held);
         let bound = |text| {
-            let (indices, epochs) = (indices.clone(), epochs.clone());
-            sql(text).bind(&self.campaign).bind(&self.worker).bind(indices).bind(epochs)
+            let (indices, leases) = (indices.clone(), leases.clone());
+            sql(text).bind(&self.campaign).bind(&self.worker).bind(indices).bind(leases)
         };
         connection.execute(bound(note).bind(self.now_unix_ms)).await?;
         connection.execute(bound(end)).await.map(drop)

@@ -181,8 +181,7 @@ impl Rows {
     fn texts(&self, name: &str) -> Vec<String> {
         let text =
             |cell: &Cell| if let Cell::Text(text) = cell { Some(text.clone()) } else { None };
-        let texts: HashSet<String> = self.column(name).filter_map(text).collect();
-        texts.into_iter().collect()
+        self.column(name).filter_map(text).collect()
     }
 
     fn integers(&self, name: &str) -> Vec<i64> {

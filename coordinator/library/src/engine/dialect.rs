@@ -44,19 +44,6 @@ impl Dialect {
         }
     }
 
-    /// A table `held (held_index, held_epoch)` of two lists bound as `$N` and `$M`.
-    pub(crate) fn held(self, indices: &str, epochs: &str) -> String {
-        match self {
-            Self::Sqlite => format!(
-                "(select i.value as held_index, e.value as held_epoch
-                from json_each({indices}) as i join json_each({epochs}) as e using (key)) as held"
-            ),
-            Self::Postgres => {
-                format!("unnest({indices}, {epochs}) as held (held_index, held_epoch)")
-            }
-        }
-    }
-
     /// So many rows of so many values each, the only values of their statement: `(?, ?), (?, ?)`.
     ///
     /// `SQLite` looks a named place up among all that have names, so that a statement with a thousand

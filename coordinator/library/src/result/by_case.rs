@@ -44,7 +44,7 @@ pub(super) async fn insert(
             .bind(indices)
             .bind(Value::Reals(cases.iter().map(|(case, _)| case.duration_s).collect()))
             .bind(Value::Texts(hashes))
-            .bind(Value::Reals(passes().flat_map(|it| it.band_levels_db.clone()).collect()))
+            .bind(Value::Reals(passes().flat_map(|it| &it.band_levels_db).copied().collect()))
             .bind(Value::series(passes().map(|it| &it.log_power[..])));
         connection.execute(insert).await?;
     }

@@ -45,6 +45,19 @@ on_both_databases! {
         assert_eq!(lost, [held(&mine[1])]);
     }
 
+    async fn a_heartbeat_of_an_ended_lease_keeps_none_that_followed(home: &Home) {
+        let library = home.library(1).await;
+        let first = lease(&library, "a", 1, 0).await;
+        let second = lease(&library, "a", 1, 1000).await;
+        for kept in [held(&first[0]), Held { index: 0, epoch: 3 }] {
+            assert_eq!(library.renew(CAMPAIGN, "a", vec![kept], 9000).await.unwrap(), [kept]);
+            library.release(CAMPAIGN, "a", vec![kept]).await.unwrap();
+        }
+        assert_eq!(lease(&library, "b", 1, 1999).await, []);
+        assert_eq!(held(&second[0]), Held { index: 0, epoch: 2 });
+        assert_eq!(held(&lease(&library, "b", 1, 2000).await[0]), Held { index: 0, epoch: 3 });
+    }
+
     async fn a_case_that_loses_three_workers_is_given_up_with_the_reason(home: &Home) {
         let library = home.library(1).await;
         for attempt in 0..3 {
