@@ -60,6 +60,14 @@ impl Server {
     /// # Panics
     /// As [`Server::shared`].
     pub fn start(settings: Settings) -> Option<Self> {
+        Self::start_in(&std::env::temp_dir(), settings)
+    }
+
+    /// The same with its files in a folder of their own under `folder`, which everybody may enter.
+    ///
+    /// # Panics
+    /// As [`Server::shared`].
+    pub fn start_in(folder: &Path, settings: Settings) -> Option<Self> {
         let Some(programs) = programs() else {
             assert!(
                 std::env::var_os("TRACKTWIN_REQUIRE_POSTGRES").is_none(),
@@ -69,7 +77,7 @@ impl Server {
         };
         let number = SERVERS.fetch_add(1, Ordering::Relaxed);
         let name = format!("tracktwin-postgres-{}-{number}", std::process::id());
-        let data = std::env::temp_dir().join(name);
+        let data = folder.join(name);
         initialise(&programs, &data);
         let (keeper, databases) = (Mutex::default(), AtomicU32::new(0));
         let server = Self { programs, data, port: free_port(), settings, keeper, databases };

@@ -66,3 +66,27 @@ fn a_full_disk_stops_the_campaign_until_there_is_room_and_loses_nothing() {
     drop(worker);
     farm.assert_undisturbed();
 }
+
+#[test]
+fn a_full_disk_under_a_postgres_server_loses_nothing_either() {
+    let volume = tempfile::tempdir().unwrap();
+    let Some(_disk) = Tmpfs::mount(volume.path(), "200m") else {
+        eprintln!("skipped: no file system may be mounted here");
+        return;
+    };
+    let Some(server) = Server::start_in(volume.path(), Settings { durable: true }) else { return };
+    let farm = Farm::on(tempfile::tempdir().unwrap(), server.database(), 64);
+    let mut coordinator = farm.coordinator(0);
+    let worker = farm.worker();
+    farm.reach(8);
+    let ballast = volume.path().join("ballast");
+    let full = std::fs::write(&ballast, vec![0; 200 << 20]).unwrap_err();
+    assert_eq!(full.kind(), std::io::ErrorKind::StorageFull);
+    std::thread::sleep(Duration::from_secs(6));
+    assert!(farm.finished() < 64, "the full disk stopped nobody");
+    assert!(coordinator.0.try_wait().unwrap().is_none(), "the coordinator waits for room");
+    std::fs::remove_file(&ballast).unwrap();
+    Farm::finish(&mut coordinator);
+    drop(worker);
+    farm.assert_undisturbed();
+}
