@@ -1,11 +1,14 @@
 //! How all campaigns stand, at a glance.
 
 use crate::engine::{Row, sql};
-use crate::tally::{INTERVAL_S, interval};
+use crate::tally::interval;
 use crate::{CampaignState, Library, LibraryError, Status};
 
-/// What the rate is a mean over, in s.
+/// What the rate is a mean over, and the begun interval, in s.
 const RATE_OVER_S: i64 = 60;
+
+/// A first report in a new interval is no rate of thousands.
+const SHORTEST_S: f64 = 1.0;
 
 /// Causes of failure that are told apart for one campaign.
 const CAUSES_MAX: u32 = 20;
@@ -25,21 +28,12 @@ pub struct CampaignOverview {
     pub created_at: String,
     /// How many cases stand where.
     pub status: Status,
-    /// Cases finished in the last whole minute, to ten seconds.
-    pub finished_last_minute: u32,
-    /// Mean computing time of these, in s.
+    /// Cases finished a second: in the last minute or a little more, or since the campaign's first results.
+    pub per_second: f64,
+    /// Mean computing time of these cases, in s.
     pub mean_case_s: Option<f64>,
     /// Why cases were given up, the most frequent first.
     pub causes: Vec<Cause>,
-}
-
-impl CampaignOverview {
-    /// How long the rest takes at the present rate, in s.
-    pub fn remaining_s(&self) -> Option<f64> {
-        let left = self.status.total() - self.status.done();
-        let rate = f64::from(self.finished_last_minute) / RATE_OVER_S as f64;
-        (rate > 0.0).then(|| f64::from(left) / rate)
-    }
 }
 
 /// Why cases were given up.
@@ -57,20 +51,24 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
     pub async fn overview(&self) -> Result<Vec<CampaignOverview>, LibraryError> {
-        let now = interval(self.now_unix_ms());
+        let now_unix_ms = self.now_unix_ms();
+        let since_unix_s = interval(now_unix_ms) - RATE_OVER_S;
         let ask = "select campaign_status.*,
                 (select cast(coalesce(sum(finished), 0) as bigint) from progress
                 where progress.campaign_id = campaign_status.campaign_id
-                    and from_unix_s >= $1 and from_unix_s < $2) as finished_last_minute,
+                    and from_unix_s >= $1) as finished_lately,
                 (select sum(busy_s) from progress
                 where progress.campaign_id = campaign_status.campaign_id
-                    and from_unix_s >= $1 and from_unix_s < $2) as busy_s
+                    and from_unix_s >= $1) as busy_s,
+                (select min(from_unix_s) from progress
+                where progress.campaign_id = campaign_status.campaign_id) as first_unix_s
             from campaign_status order by created_at, campaign_id";
-        // The present interval is not over; the rate is that of the six before.
-        let ask = sql(ask).bind(now - RATE_OVER_S / INTERVAL_S * INTERVAL_S).bind(now);
         let mut overviews = Vec::new();
-        for row in self.readers().rows(ask).await? {
-            let mut overview = overview(&row)?;
+        for row in self.readers().rows(sql(ask).bind(since_unix_s)).await? {
+            let first_unix_s: Option<i64> = row.get("first_unix_s")?;
+            let counted_from_unix_s = first_unix_s.map_or(since_unix_s, |it| it.max(since_unix_s));
+            let over_s = now_unix_ms as f64 / 1000.0 - counted_from_unix_s as f64;
+            let mut overview = overview(&row, over_s.max(SHORTEST_S))?;
             if overview.status.failed > 0 {
                 overview.causes = self.causes(&overview.id).await?;
             }
@@ -90,8 +88,9 @@ impl Library {
     }
 }
 
-fn overview(row: &Row) -> Result<CampaignOverview, LibraryError> {
-    let finished_last_minute = row.get_u32("finished_last_minute")?;
+/// What a row says; its cases were finished within `over_s`.
+fn overview(row: &Row, over_s: f64) -> Result<CampaignOverview, LibraryError> {
+    let finished = f64::from(row.get_u32("finished_lately")?);
     let busy_s: Option<f64> = row.get("busy_s")?;
     let priority: i64 = row.get("priority")?;
     Ok(CampaignOverview {
@@ -107,10 +106,8 @@ fn overview(row: &Row) -> Result<CampaignOverview, LibraryError> {
             finished: row.get_u32("finished")?,
             failed: row.get_u32("failed")?,
         },
-        finished_last_minute,
-        mean_case_s: busy_s
-            .filter(|_| finished_last_minute > 0)
-            .map(|busy_s| busy_s / f64::from(finished_last_minute)),
+        per_second: finished / over_s,
+        mean_case_s: busy_s.filter(|_| finished > 0.0).map(|busy_s| busy_s / finished),
         causes: Vec::new(),
     })
 }

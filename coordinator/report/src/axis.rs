@@ -51,7 +51,9 @@ impl Axis {
 
     /// Values that get a tick, and their texts.
     pub(crate) fn ticks(&self, at_most: usize) -> Vec<(f64, String)> {
-        if self.logarithmic { self.decades(at_most) } else { self.round_values(at_most) }
+        let decades = if self.logarithmic { self.decades(at_most) } else { Vec::new() };
+        // A stretch of less than a decade reads like a linear one.
+        if decades.len() < 3 { self.round_values(at_most) } else { decades }
     }
 
     fn round_values(&self, at_most: usize) -> Vec<(f64, String)> {
@@ -134,6 +136,8 @@ mod tests {
         let decades = Axis::logarithmic("", 50.0, 4000.0);
         assert_eq!(texts(&decades, 8), ["50", "100", "200", "500", "1000", "2000"]);
         assert_eq!(texts(&Axis::logarithmic("", 1e-9, 1e-7), 3), ["10⁻⁹", "10⁻⁸", "10⁻⁷"]);
+        let less_than_a_decade = Axis::logarithmic("", 110.0, 450.0);
+        assert_eq!(texts(&less_than_a_decade, 4), ["200", "300", "400"]);
     }
 
     #[test]

@@ -141,9 +141,9 @@ fn summary(farm: &Farm) -> String {
     let rate: f64 = farm.campaigns.iter().map(|campaign| campaign.per_second).sum();
     let alive = farm.workers.iter().filter(|worker| worker.silent_s < 60.0).count();
     format!(
-        "{} campaigns, {} of them with work to do; {alive} workers; {} cases a second.",
-        farm.campaigns.len(),
+        "Campaigns with work to do: {} of {}; workers: {alive}; {} cases a second.",
         running.count(),
+        farm.campaigns.len(),
         significant(rate)
     )
 }

@@ -103,7 +103,7 @@ fn campaign_text(text: &mut String, campaign: &FarmCampaign) {
 
 fn workers_text(text: &mut String, workers: &[FarmWorker]) {
     let alive = workers.iter().filter(|worker| worker.silent_s < ALIVE_S).count();
-    let _ = writeln!(text, "\n{alive} workers alive, {} in the last hour", workers.len());
+    let _ = writeln!(text, "\nworkers: {alive} alive, {} in the last hour", workers.len());
     let width = workers.iter().map(|it| it.id.len()).max().unwrap_or(0).max("worker".len());
     let _ = writeln!(text, "{:width$}  cores  finished  failed  s a case  heard of", "worker");
     for worker in workers.iter().take(WORKERS) {
@@ -172,7 +172,7 @@ mod tests {
             "10.0 cases/s",
             "5 s left",
             "1 given up: the sleeper floats",
-            "25 workers alive",
+            "workers: 25 alive",
             "and 5 more",
         ] {
             assert!(text.contains(part), "{part} is not in\n{text}");

@@ -17,9 +17,6 @@ const GIVEN_UP: u32 = 200;
 /// Workers silent for longer are history, in ms.
 const HISTORY_MS: i64 = 3_600_000;
 
-/// What the rate of the overview is a mean over, in s.
-const RATE_OVER_S: f64 = 60.0;
-
 /// How much is asked of the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
@@ -63,7 +60,7 @@ fn counted(overview: &CampaignOverview) -> FarmCampaign {
         leased: status.leased,
         finished: status.finished,
         failed: status.failed,
-        per_second: f64::from(overview.finished_last_minute) / RATE_OVER_S,
+        per_second: overview.per_second,
         causes: causes.iter().map(|it| (it.error.clone(), it.cases)).collect(),
         ..FarmCampaign::default()
     }

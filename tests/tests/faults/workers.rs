@@ -38,7 +38,7 @@ fn workers_killed_again_and_again_lose_nothing_postgres() {
 #[ignore = "takes minutes; see docs/farm-faults.md"]
 fn a_worker_killed_every_second_for_long() {
     for engine in [Engine::Sqlite, Engine::Postgres] {
-        let Some(farm) = Farm::many(engine, 300) else { continue };
+        let Some(farm) = Farm::many(engine, 3000) else { continue };
         workers_are_killed(&farm, Duration::from_secs(1));
     }
 }

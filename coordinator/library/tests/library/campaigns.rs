@@ -5,7 +5,7 @@ use crate::support::{
     report, request,
 };
 use tracktwin_library::{
-    CampaignState, Cause, LeaseRequest, LibraryError, Report, Retry, State, Status, Verdict,
+    CampaignState, Cause, LeaseRequest, Leased, LibraryError, Report, Retry, State, Status, Verdict,
 };
 
 const OTHER: &str = "other-000000000000";
@@ -84,20 +84,26 @@ on_both_databases! {
         assert!(matches!(error, LibraryError::UnknownCampaign { .. }), "{error}");
     }
 
-    async fn the_rate_is_that_of_the_last_whole_minute(home: &Home) {
+    async fn the_rate_is_that_of_the_last_minute_or_since_the_first_results(home: &Home) {
         let library = home.library(5).await;
         let leased = lease(&library, "w", 5, 0).await;
         let now = library.now_unix_ms();
-        for (case, seconds_ago) in leased.iter().zip([10, 30, 55, 75, 3600]) {
+        let finish = async |case: &Leased, seconds_ago: i64| {
             let message = message("w", vec![finished(case)]);
             let now_unix_ms = now - 1000 * seconds_ago;
             library.report(Report { now_unix_ms, ..message }).await.unwrap();
-        }
-        let overview = library.overview().await.unwrap().remove(0);
-        // The ten seconds that are not over don't count, nor does what is older than a minute.
-        assert!((2..=3).contains(&overview.finished_last_minute), "{overview:?}");
-        assert_eq!(overview.mean_case_s, Some(0.25));
-        assert_eq!(overview.remaining_s(), Some(0.0));
+            library.overview().await.unwrap().remove(0)
+        };
+        assert_eq!(library.overview().await.unwrap()[0].per_second, 0.0);
+        // Counted in tens of seconds: what was 20 s ago may count from 30 s ago. And tests may be slow.
+        let young = finish(&leased[0], 20).await;
+        assert!((1.0 / 45.0..=1.0 / 20.0).contains(&young.per_second), "{young:?}");
+        assert_eq!(young.mean_case_s, Some(0.25));
+        finish(&leased[1], 75).await;
+        finish(&leased[2], 3600).await;
+        let old = finish(&leased[3], 0).await;
+        assert!((2.0 / 85.0..=2.0 / 60.0).contains(&old.per_second), "{old:?}");
+        assert_eq!(old.mean_case_s, Some(0.25));
     }
 
     async fn counts_follow_whatever_happens(home: &Home) {
