@@ -12,6 +12,7 @@ use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
+use tracktwin_traces::{Export, ExportError};
 
 /// Exit code for wrong arguments, and for a worker that is of no use to its coordinator.
 const REFUSED: u8 = 2;
@@ -38,6 +39,8 @@ const END: Duration = Duration::from_millis(100);
 On a cluster:
   tracktwin-worker --coordinator https://head:7700 --tls-ca certs/ca.pem \\
       --token-file certs/token --idle-exit 300 --give-up-after 3600
+
+OpenTelemetry traces go where OTEL_EXPORTER_OTLP_ENDPOINT says.
 
 Exit codes, for batch systems:
   0  stopped as asked, or no work for --idle-exit seconds: don't start it again
@@ -107,7 +110,8 @@ pub fn main() -> ExitCode {
     match serve(config, arguments.health) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let refused = error.downcast_ref::<AgentError>().is_some_and(|error| !error.may_pass());
+            let refused = error.downcast_ref::<AgentError>().is_some_and(|error| !error.may_pass())
+                || error.is::<ExportError>();
             report(&error, if refused { REFUSED } else { FAILED })
         }
     }
@@ -162,6 +166,7 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
 fn serve(config: Config, health: Option<SocketAddr>) -> anyhow::Result<()> {
     let runtime = tokio::runtime::Runtime::new()?;
     let served = runtime.block_on(async {
+        let _traces = Export::from_environment("tracktwin-worker")?;
         let shutdown = CancellationToken::new();
         stop_on_signals(shutdown.clone())?;
         let port = match health {

@@ -10,6 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase};
+use tracktwin_traces::{Step, Value};
 
 /// One core's share of a worker.
 pub(crate) struct Core {
@@ -79,6 +80,9 @@ impl Core {
             if group.is_empty() {
                 continue;
             }
+            let step = Step::after("simulate", [&lease.traceparent]);
+            step.tell("campaign_id", lease.campaign.clone());
+            step.tell("sobol_index", indices(&group));
             let begun = Instant::now();
             let cases: Vec<Case> = group.iter().map(|leased| leased.case.clone()).collect();
             let outcomes = tokio::select! {
@@ -91,7 +95,7 @@ impl Core {
             let computing_s = begun.elapsed().as_secs_f64();
             self.counters.computing_s.inc_by(computing_s);
             let reports = reports(&group, outcomes, computing_s / group.len() as f64);
-            self.put(lease, reports).await;
+            self.put(Finished::new(lease, reports, step.traceparent())).await;
         }
         Ok(())
     }
@@ -105,15 +109,20 @@ impl Core {
     }
 
     /// Puts results into the outbox; waits while it is full.
-    async fn put(&self, lease: &CaseLease, reports: Vec<CaseReport>) {
+    async fn put(&self, finished: Finished) {
         self.session.worked();
-        let count = i64::try_from(reports.len()).unwrap_or(i64::MAX);
+        let count = i64::try_from(finished.reports.len()).unwrap_or(i64::MAX);
         self.counters.unsent.inc_by(count);
-        if self.outbox.send(Finished::new(lease, reports)).await.is_err() {
+        if self.outbox.send(finished).await.is_err() {
             // It ended with an error, which ends the worker; the leases expire.
             self.counters.unsent.dec_by(count);
         }
     }
+}
+
+fn indices(cases: &[LeasedCase]) -> Value {
+    let indices: Vec<i64> = cases.iter().map(|it| it.case.index.into()).collect();
+    Value::Array(indices.into())
 }
 
 fn held(cases: &[LeasedCase]) -> Vec<(u32, u32)> {

@@ -90,6 +90,7 @@ mod tests {
             experiment_hash: String::new(),
             lease_s: 1.0,
             cases: indices.map(|index| LeasedCase { case: case(index), epoch: 1 }).collect(),
+            traceparent: String::new(),
         }
     }
 

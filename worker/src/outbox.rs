@@ -21,13 +21,15 @@ pub(crate) struct Finished {
     pub(crate) campaign: String,
     pub(crate) experiment_hash: String,
     pub(crate) reports: Vec<CaseReport>,
+    /// How they were simulated, as W3C Trace Contexts.
+    pub(crate) traceparents: Vec<String>,
 }
 
 impl Finished {
-    pub(crate) fn new(lease: &CaseLease, reports: Vec<CaseReport>) -> Self {
+    pub(crate) fn new(lease: &CaseLease, reports: Vec<CaseReport>, traceparent: String) -> Self {
         let CaseLease { campaign, experiment_hash, .. } = lease;
         let (campaign, experiment_hash) = (campaign.clone(), experiment_hash.clone());
-        Self { campaign, experiment_hash, reports }
+        Self { campaign, experiment_hash, reports, traceparents: vec![traceparent] }
     }
 
     /// Takes another group into the same report, if it belongs there and fits.
@@ -36,6 +38,7 @@ impl Finished {
         if fits && self.campaign == other.campaign && self.experiment_hash == other.experiment_hash
         {
             self.reports.extend(other.reports);
+            self.traceparents.extend(other.traceparents);
             return None;
         }
         Some(other)
@@ -91,6 +94,7 @@ mod tests {
             campaign: campaign.to_owned(),
             experiment_hash: String::new(),
             reports: vec![report; cases],
+            traceparents: Vec::new(),
         }
     }
 

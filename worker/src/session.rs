@@ -15,6 +15,7 @@ use tonic::Code;
 use tracktwin_protocol::{
     CaseLease, Lease, Outcome, PROTOCOL_VERSION, Registration, farm, held_to_messages,
 };
+use tracktwin_traces::Step;
 
 /// Cases asked for at a time; the coordinator, who knows how long they take, gives fewer.
 const CASES_ASKED: u32 = 1024;
@@ -131,7 +132,8 @@ impl Session {
 
     /// Hands in results; after shutdown only until the worker gives up.
     pub(crate) async fn report(&self, finished: Finished) -> Result<(), AgentError> {
-        let Finished { campaign, experiment_hash, reports } = finished;
+        let Finished { campaign, experiment_hash, reports, traceparents } = finished;
+        let step = Step::after("hand in", &traceparents);
         let held: Vec<_> = reports.iter().map(|report| (report.index, report.epoch)).collect();
         let failed = reports.iter().filter(|it| matches!(it.outcome, Outcome::Failed { .. }));
         let failed = failed.count() as u64;
@@ -140,6 +142,7 @@ impl Session {
             campaign_id: campaign.clone(),
             experiment_hash,
             cases: reports.into_iter().map(Into::into).collect(),
+            traceparent: step.traceparent(),
         };
         loop {
             let seen = *self.registrations.read().await;
@@ -152,8 +155,12 @@ impl Session {
                 .await;
             match answer {
                 Err(AgentError::Unknown) => self.register(seen, &self.give_up).await?,
-                Err(error) => return Err(error),
+                Err(error) => {
+                    step.fail(&error.to_string());
+                    return Err(error);
+                }
                 Ok(None) => {
+                    step.fail("nobody answered");
                     tracing::warn!("{} results could not be handed in", held.len());
                     break;
                 }

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tracktwin_library::Library;
+use tracktwin_traces::Export;
 
 /// What `coordinator` is told.
 #[derive(Args)]
@@ -26,6 +27,7 @@ On a cluster:
 
 Any number of coordinators may serve one PostgreSQL library; one at a time a SQLite library.
 It may be killed and started again at any time: workers wait and go on.
+OpenTelemetry traces go where OTEL_EXPORTER_OTLP_ENDPOINT says.
 
 Exit codes: 0 stopped as asked, or done with --exit-when-done; 2 wrong input; 3 failure.")]
 pub(super) struct Arguments {
@@ -78,6 +80,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         // Pages are plain HTTP: beyond this machine a proxy has to carry them.
         pages.check(address).context("--dashboard").or_input()?;
     }
+    let _traces = Export::from_environment("tracktwin-coordinator").or_input()?;
     let campaigns = arguments.campaigns.iter().map(|path| Campaign::read(path, None));
     let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
     let library = Library::open_or_create(&arguments.library).await.or_input()?;

@@ -7,7 +7,7 @@ use super::roster::{Roster, Standing};
 use super::settings::Settings;
 use super::{Counts, SUSPECT_AFTER, after_attempt};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 use tokio::time::Instant;
 use tonic::{Request, Response, Status};
 use tracktwin_library::{self as library, LeaseRequest, Library, Report, Verdict, WorkerState};
@@ -15,6 +15,7 @@ use tracktwin_protocol::farm::farm_server::Farm;
 use tracktwin_protocol::{
     CaseLease, CaseReport, Lease, LeasedCase, Outcome, Registration, farm, held_to_messages,
 };
+use tracktwin_traces::Step;
 
 /// After the library had no case to give, it is not asked again for so long.
 const NOTHING: Duration = Duration::from_millis(100);
@@ -150,6 +151,7 @@ impl Dispatch {
         standing: Standing,
         served: &Arc<Served>,
         reports: Vec<CaseReport>,
+        step: &Step,
     ) -> Result<Vec<Verdict>, Status> {
         let mut verdicts = vec![Verdict::Refused; reports.len()];
         let mut places = Vec::new();
@@ -168,6 +170,7 @@ impl Dispatch {
         let failed: Vec<bool> =
             ordinary.iter().map(|it| matches!(it.outcome, Outcome::Failed { .. })).collect();
         let durations_s: Vec<f64> = ordinary.iter().map(|it| it.duration_s).collect();
+        let step = Step::after("store", [&step.traceparent()]);
         let report = Report {
             campaign: served.record.id.clone(),
             worker: worker.to_owned(),
@@ -180,7 +183,13 @@ impl Dispatch {
             after_failure: after_attempt,
             audit_share: self.settings.audit_share,
         };
-        let stored = self.library.report(report).await.map_err(|error| unavailable(&error))?;
+        let stored = self.library.report(report).await.map_err(|error| {
+            step.fail(&error.to_string());
+            unavailable(&error)
+        })?;
+        let rows = stored.iter().filter(|it| matches!(it, Verdict::Stored)).count();
+        step.count("cases_stored", rows);
+        drop(step);
         served.measured(durations_s);
         if self.settings.put_aside && self.roster.reported(worker, &failed) {
             tracing::warn!(worker, "put aside: it fails where other workers don't");
@@ -235,6 +244,7 @@ impl Served {
             experiment_hash: self.record.experiment_hash.clone(),
             lease_s: lease.as_secs_f64(),
             cases,
+            traceparent: String::new(),
         }
     }
 }
@@ -279,16 +289,24 @@ impl Farm for Dispatch {
         &self,
         request: Request<farm::LeaseRequest>,
     ) -> Result<Response<farm::LeaseResponse>, Status> {
-        let begun = Instant::now();
+        let (begun, begun_at) = (Instant::now(), SystemTime::now());
         let farm::LeaseRequest { worker, cases_max } = request.into_inner();
         let standing = self.standing(&worker).await?;
-        let lease = match standing.aside {
+        let mut lease = match standing.aside {
             Some((wait, reason)) => {
                 Lease::NoneNow { retry_after_s: wait.as_secs_f64(), reason: Some(reason) }
             }
             None if standing.on_trial => self.hand_out(&worker, cases_max.min(1)).await?,
             None => self.hand_out(&worker, cases_max).await?,
         };
+        if let Lease::Cases(lease) = &mut lease {
+            // Whoever gets nothing is no trace.
+            let step = Step::first("lease", begun_at);
+            step.tell("campaign_id", lease.campaign.clone());
+            step.tell("worker", worker);
+            step.count("cases", lease.cases.len());
+            lease.traceparent = step.traceparent();
+        }
         self.counts.lease_s.observe(begun.elapsed().as_secs_f64());
         Ok(Response::new(lease.into()))
     }
@@ -317,8 +335,9 @@ impl Farm for Dispatch {
         request: Request<farm::ReportRequest>,
     ) -> Result<Response<farm::ReportResponse>, Status> {
         let begun = Instant::now();
-        let farm::ReportRequest { worker, campaign_id, experiment_hash, cases } =
+        let farm::ReportRequest { worker, campaign_id, experiment_hash, cases, traceparent } =
             request.into_inner();
+        let step = Step::after("report", [&traceparent]);
         let standing = self.standing(&worker).await?;
         let indices: Vec<u32> = cases.iter().map(|case| case.sobol_index).collect();
         let served = match self.campaigns.of(&campaign_id).await {
@@ -333,7 +352,7 @@ impl Farm for Dispatch {
                     self.counts.malformed.inc();
                     malformed(&error)
                 })?;
-                self.store(&worker, standing, &served, reports).await?
+                self.store(&worker, standing, &served, reports, &step).await?
             }
             None => vec![Verdict::Refused; indices.len()],
         };

@@ -104,6 +104,7 @@ async fn a_worker_that_fails_where_another_does_not_is_put_aside() {
             campaign_id: leased.campaign_id.clone(),
             experiment_hash: leased.experiment_hash.clone(),
             cases: leased.cases.iter().map(failed).collect(),
+            traceparent: String::new(),
         };
         client.report(request).await.unwrap();
     }

@@ -155,6 +155,7 @@ pub(crate) fn report(lease: &messages::LeaseResponse, worker: &str) -> ReportReq
         campaign_id: lease.campaign_id.clone(),
         experiment_hash: lease.experiment_hash.clone(),
         cases: lease.cases.iter().map(case).collect(),
+        traceparent: lease.traceparent.clone(),
     }
 }
 

@@ -31,6 +31,8 @@ pub struct CaseLease {
     pub lease_s: f64,
     /// The cases.
     pub cases: Vec<LeasedCase>,
+    /// The lease as W3C Trace Context; empty where nothing is traced.
+    pub traceparent: String,
 }
 
 /// A case, and which lease of it this is.
@@ -72,6 +74,7 @@ impl From<Lease> for farm::LeaseResponse {
                 experiment_hash: lease.experiment_hash,
                 cases: lease.cases.into_iter().map(Into::into).collect(),
                 lease_s: lease.lease_s,
+                traceparent: lease.traceparent,
                 ..Self::default()
             },
         }
@@ -121,6 +124,7 @@ impl TryFrom<farm::LeaseResponse> for CaseLease {
             experiment_hash: name("experiment_hash", message.experiment_hash)?,
             lease_s: duration("lease_s", message.lease_s)?,
             cases: message.cases.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            traceparent: message.traceparent,
         })
     }
 }

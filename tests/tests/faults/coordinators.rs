@@ -21,13 +21,13 @@ fn coordinator_is_killed(farm: &Farm, times: u32) {
 
 #[test]
 fn a_coordinator_killed_again_and_again_loses_nothing_sqlite() {
-    let Some(farm) = Farm::new(Engine::Sqlite) else { return };
+    let Some(farm) = Farm::many(Engine::Sqlite, 300) else { return };
     coordinator_is_killed(&farm, 4);
 }
 
 #[test]
 fn a_coordinator_killed_again_and_again_loses_nothing_postgres() {
-    let Some(farm) = Farm::new(Engine::Postgres) else { return };
+    let Some(farm) = Farm::many(Engine::Postgres, 300) else { return };
     coordinator_is_killed(&farm, 4);
 }
 

@@ -1,0 +1,56 @@
+//! Where steps are sent: to a collector, by OTLP over gRPC.
+
+use opentelemetry::global;
+use opentelemetry_otlp::{ExporterBuildError, SpanExporter};
+use opentelemetry_sdk::Resource;
+use opentelemetry_sdk::trace::SdkTracerProvider;
+
+/// Each names a collector; without one of them nothing is traced.
+const ENDPOINTS: [&str; 2] = ["OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT"];
+
+/// Sends the steps of this process for as long as it lives; what is left is sent when it is dropped.
+pub struct Export(Option<SdkTracerProvider>);
+
+/// The collector that the environment names can't be sent anything.
+#[derive(Debug)]
+pub struct ExportError(ExporterBuildError);
+
+impl std::fmt::Display for ExportError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: write http://HOST:PORT: {}", ENDPOINTS[0], self.0)
+    }
+}
+
+impl std::error::Error for ExportError {}
+
+impl Export {
+    /// Sends steps to the collector that `OTEL_EXPORTER_OTLP_ENDPOINT` names, if it does. The other
+    /// variables of `OpenTelemetry` hold too, such as `OTEL_TRACES_SAMPLER` and `OTEL_SERVICE_NAME`,
+    /// which is `service` otherwise. To be called within a Tokio runtime.
+    ///
+    /// # Errors
+    /// [`ExportError`] when the address is none.
+    pub fn from_environment(service: &str) -> Result<Self, ExportError> {
+        let said = |name: &str| std::env::var(name).ok().filter(|it| !it.is_empty());
+        if !ENDPOINTS.iter().any(|name| said(name).is_some()) {
+            return Ok(Self(None));
+        }
+        let exporter = SpanExporter::builder().with_tonic().build().map_err(ExportError)?;
+        let service = said("OTEL_SERVICE_NAME").unwrap_or_else(|| service.to_owned());
+        let provider = SdkTracerProvider::builder()
+            .with_batch_exporter(exporter)
+            .with_resource(Resource::builder().with_service_name(service).build())
+            .build();
+        global::set_tracer_provider(provider.clone());
+        Ok(Self(Some(provider)))
+    }
+}
+
+impl Drop for Export {
+    fn drop(&mut self) {
+        if let Some(provider) = &self.0 {
+            // A collector that is away gets nothing, which the log says; the farm goes on.
+            let _ = provider.shutdown();
+        }
+    }
+}
