@@ -51,20 +51,21 @@ impl Axis {
 
     /// Values that get a tick, and their texts.
     pub(crate) fn ticks(&self, at_most: usize) -> Vec<(f64, String)> {
-        let decades = if self.logarithmic { self.decades(at_most) } else { Vec::new() };
-        // A stretch of less than a decade reads like a linear one.
-        if decades.len() < 3 { self.round_values(at_most) } else { decades }
+        if self.logarithmic { self.decades(at_most) } else { self.round_values(at_most) }
     }
 
     fn round_values(&self, at_most: usize) -> Vec<(f64, String)> {
         let raw = (self.high - self.low) / at_most as f64;
         let decade = 10f64.powf(raw.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|round| round * decade);
-        let chosen = step.into_iter().find(|step| *step >= raw).unwrap_or(10.0 * decade);
-        let step = self.step.unwrap_or(chosen);
+        let ends = |step: f64| ((self.low / step).ceil() as i64, (self.high / step).floor() as i64);
+        let steps = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2].map(|round| round * decade);
+        // The finest that leaves room; a finer one where that gives less than two ticks.
+        let roomy = steps.iter().rposition(|step| *step >= raw).unwrap_or(0);
+        let is_scale = |step: &&f64| ends(**step).1 > ends(**step).0;
+        let chosen = steps[roomy..].iter().find(is_scale).unwrap_or(&steps[roomy]);
+        let step = self.step.unwrap_or(*chosen);
         let decimals = (-step.log10().floor()).max(0.0) as usize;
-        let first = (self.low / step).ceil() as i64;
-        let last = (self.high / step).floor() as i64;
+        let (first, last) = ends(step);
         (first..=last)
             .map(|tick| tick as f64 * step)
             .map(|value| (value, format!("{value:.decimals$}")))
@@ -136,8 +137,8 @@ mod tests {
         let decades = Axis::logarithmic("", 50.0, 4000.0);
         assert_eq!(texts(&decades, 8), ["50", "100", "200", "500", "1000", "2000"]);
         assert_eq!(texts(&Axis::logarithmic("", 1e-9, 1e-7), 3), ["10⁻⁹", "10⁻⁸", "10⁻⁷"]);
-        let less_than_a_decade = Axis::logarithmic("", 110.0, 450.0);
-        assert_eq!(texts(&less_than_a_decade, 4), ["200", "300", "400"]);
+        // One tick alone is no scale.
+        assert_eq!(texts(&Axis::linear("", 110.0, 290.0), 2), ["150", "200", "250"]);
     }
 
     #[test]

@@ -1,0 +1,244 @@
+//! The coordinator's pages: what they say, who may press their buttons, and how a browser shows them.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+use headless_chrome::{Browser, LaunchOptions, Tab};
+use std::net::{Ipv4Addr, TcpListener};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use system_tests::run;
+use tempfile::TempDir;
+use ureq::http::Response;
+use ureq::{Agent, Body};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
+
+/// A coarse, short model: what is tested are pages.
+const CAMPAIGN: &str = "name = \"pages\"\nseed = 5\ncases = 24\nspeeds_km_h = [13]\n\
+    [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n";
+
+/// When something that does not happen has failed.
+const PATIENCE: Duration = Duration::from_mins(1);
+
+/// A coordinator with pages and 24 cases to do, and a worker if one is asked for.
+struct Farm {
+    folder: TempDir,
+    library: String,
+    workers: String,
+    pages: String,
+    processes: Vec<Child>,
+}
+
+impl Farm {
+    fn start(token: Option<&str>) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        std::fs::write(path("campaign.toml"), CAMPAIGN).unwrap();
+        let library = format!("sqlite:{}", path("l.sqlite"));
+        let [listen, dashboard] = [(); 2].map(|()| format!("127.0.0.1:{}", free_port()));
+        let mut coordinator = Command::new(PROGRAM);
+        coordinator.args(["coordinator", "--campaign", &path("campaign.toml")]);
+        coordinator.args(["--library", &library, "--listen", &listen, "--dashboard", &dashboard]);
+        if let Some(token) = token {
+            std::fs::write(path("token"), token).unwrap();
+            coordinator.args(["--token-file", &path("token")]);
+        }
+        let coordinator = coordinator.stderr(Stdio::null()).spawn().unwrap();
+        let farm = Self {
+            library,
+            workers: format!("http://{listen}"),
+            pages: format!("http://{dashboard}"),
+            processes: vec![coordinator],
+            folder,
+        };
+        until("the pages are there", || farm.agent().get(farm.at("/healthz")).call().is_ok());
+        farm
+    }
+
+    fn at(&self, path: &str) -> String {
+        format!("{}{path}", self.pages)
+    }
+
+    /// One that says what it gets, errors and redirections too.
+    #[expect(clippy::unused_self, reason = "it speaks to this farm")]
+    fn agent(&self) -> Agent {
+        Agent::config_builder().http_status_as_error(false).max_redirects(0).build().into()
+    }
+
+    fn get(&self, path: &str) -> String {
+        let mut answer = self.agent().get(self.at(path)).call().unwrap();
+        assert_eq!(answer.status(), 200, "{path}");
+        answer.body_mut().read_to_string().unwrap()
+    }
+
+    fn post(&self, path: &str, form: [(&str, &str); 1], header: [&str; 2]) -> Response<Body> {
+        let [name, value] = header;
+        self.agent().post(self.at(path)).header(name, value).send_form(form).unwrap()
+    }
+
+    fn work(&mut self) {
+        let mut worker = Command::new(WORKER);
+        worker.args(["--coordinator", &self.workers, "--cores", "1"]).stderr(Stdio::null());
+        let token = self.folder.path().join("token");
+        if token.exists() {
+            worker.arg("--token-file").arg(token);
+        }
+        self.processes.push(worker.spawn().unwrap());
+    }
+
+    fn campaign(&self) -> serde_json::Value {
+        let answer = run(PROGRAM, &["status", "--json", "--library", &self.library]);
+        assert_eq!(answer.code, Some(0), "{}", answer.err);
+        let status: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
+        status["campaigns"][0].clone()
+    }
+
+    fn name(&self) -> String {
+        self.campaign()["campaign"].as_str().unwrap().to_owned()
+    }
+
+    fn state(&self) -> String {
+        self.campaign()["state"].as_str().unwrap().to_owned()
+    }
+}
+
+impl Drop for Farm {
+    fn drop(&mut self) {
+        for process in &mut self.processes {
+            let _ = process.kill();
+            let _ = process.wait();
+        }
+    }
+}
+
+/// A port that nobody listens on now.
+fn free_port() -> u16 {
+    TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port()
+}
+
+fn until(what: &str, happened: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !happened() {
+        assert!(begun.elapsed() < PATIENCE, "not within {PATIENCE:?}: {what}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// No header that matters.
+const PLAIN: [&str; 2] = ["Accept", "text/html"];
+
+#[test]
+fn pages_and_numbers_tell_how_a_campaign_stands() {
+    let mut farm = Farm::start(None);
+    let name = farm.name();
+    assert!(farm.get("/").contains("0 of 24 cases finished"));
+    assert_eq!(farm.get("/healthz"), "serving\n");
+    let cases =
+        |state| format!("tracktwin_campaign_cases{{campaign=\"{name}\",state=\"{state}\"}}");
+    let numbers = farm.get("/metrics");
+    assert!(numbers.contains(&format!("{} 24\n", cases("waiting"))), "{numbers}");
+    assert!(numbers.contains("tracktwin_queue_depth 24\n"), "{numbers}");
+    farm.work();
+    until("all is done", || farm.get("/view").contains("24 of 24 cases finished"));
+    let (page, numbers) = (farm.get("/"), farm.get("/metrics"));
+    assert!(page.contains("local wavelet power spectra of the newest cases"), "{page}");
+    assert!(numbers.contains(&format!("{} 24\n", cases("finished"))), "{numbers}");
+    assert!(numbers.contains("tracktwin_queue_depth 0\n"), "{numbers}");
+}
+
+#[test]
+fn buttons_are_pressed_by_those_who_have_shown_the_token_and_by_nobody_else() {
+    let farm = Farm::start(Some("a-token-of-some-length\n"));
+    let name = farm.name();
+    let (chosen, nobody) = ([("campaign", name.as_str())], [("campaign", "nobody")]);
+    assert_eq!(farm.post("/campaign/pause", chosen, PLAIN).status(), 403);
+    assert_eq!(farm.post("/campaign/pause", chosen, ["Cookie", "tracktwin=1"]).status(), 403);
+    assert_eq!(farm.post("/login", [("token", "another")], PLAIN).status(), 403);
+    assert!(!farm.get("/").contains("campaign/pause"));
+    assert_eq!(farm.state(), "running");
+
+    let answer = farm.post("/login", [("token", "a-token-of-some-length")], PLAIN);
+    assert_eq!(answer.status(), 303);
+    let cookie = answer.headers()["set-cookie"].to_str().unwrap();
+    let (shown, how) = cookie.split_once(';').unwrap();
+    assert!(how.contains("HttpOnly") && how.contains("SameSite=Strict"), "{cookie}");
+    assert!(!shown.contains("a-token"), "{cookie}");
+    let cookie = ["Cookie", shown];
+    assert_eq!(farm.post("/campaign/pause", chosen, cookie).status(), 303);
+    assert_eq!(farm.state(), "paused");
+    assert_eq!(farm.post("/campaign/resume", chosen, cookie).status(), 303);
+    assert_eq!(farm.state(), "running");
+    assert_eq!(farm.post("/campaign/retry", chosen, cookie).status(), 303);
+    assert_eq!(farm.post("/campaign/explode", chosen, cookie).status(), 404);
+    assert_eq!(farm.post("/campaign/pause", nobody, cookie).status(), 400);
+    // Machines show the token itself.
+    let token = ["Authorization", "Bearer a-token-of-some-length"];
+    assert_eq!(farm.post("/campaign/pause", chosen, token).status(), 303);
+    assert_eq!(farm.state(), "paused");
+}
+
+#[test]
+fn other_sites_and_other_names_are_turned_away() {
+    let farm = Farm::start(None);
+    let name = farm.name();
+    let chosen = [("campaign", name.as_str())];
+    let elsewhere = ["Origin", "http://elsewhere.example"];
+    assert_eq!(farm.post("/campaign/pause", chosen, elsewhere).status(), 403);
+    // A name of somebody else's that leads to this machine.
+    let named = farm.agent().get(farm.at("/")).header("Host", "elsewhere.example").call();
+    assert_eq!(named.unwrap().status(), 403);
+    assert_eq!(farm.state(), "running");
+    let answer = farm.agent().get(farm.at("/")).call().unwrap();
+    let policy = answer.headers()["content-security-policy"].to_str().unwrap();
+    assert!(policy.contains("default-src 'none'") && policy.contains("frame-ancestors 'none'"));
+}
+
+/// Chromium, where it is installed.
+fn browser() -> Option<Browser> {
+    // As root in a container it can't have a sandbox, and it sees our own pages only.
+    let options = LaunchOptions { sandbox: false, ..LaunchOptions::default() };
+    match Browser::new(options) {
+        Ok(browser) => Some(browser),
+        Err(error) => {
+            let demanded = std::env::var_os("TRACKTWIN_REQUIRE_CHROMIUM").is_some();
+            assert!(!demanded, "Chromium is demanded: {error}");
+            eprintln!("skipped: no Chromium");
+            None
+        }
+    }
+}
+
+/// Everything that can be read in the window.
+fn read(tab: &Tab) -> String {
+    let text = tab.evaluate("document.body.innerText", false).unwrap();
+    text.value.unwrap().as_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_browser_shows_a_campaign_as_it_goes_and_presses_its_buttons() {
+    let Some(browser) = browser() else { return };
+    let mut farm = Farm::start(Some("a-token"));
+    let tab = browser.new_tab().unwrap();
+    tab.navigate_to(&farm.at("/")).unwrap().wait_until_navigated().unwrap();
+    assert!(read(&tab).contains("0 of 24 cases finished") && !read(&tab).contains("pause\n"));
+
+    tab.wait_for_element("input[name=token]").unwrap().type_into("a-token").unwrap();
+    tab.press_key("Enter").unwrap();
+    let press = |label: &str| {
+        let button = format!("//button[text()='{label}']");
+        tab.wait_for_xpath(&button).unwrap().click().unwrap();
+    };
+    press("pause");
+    until("it is paused", || farm.state() == "paused");
+    press("resume");
+    until("it runs", || farm.state() == "running");
+
+    // Nobody loads the page again.
+    farm.work();
+    until("the page says so", || read(&tab).contains("24 of 24 cases finished"));
+    assert!(tab.find_elements("svg").unwrap().len() >= 3, "spectra and parameter space");
+    let outside = "performance.getEntriesByType('resource').filter(\
+        it => !it.name.startsWith(location.origin)).length";
+    assert_eq!(tab.evaluate(outside, false).unwrap().value.unwrap(), 0);
+}
