@@ -1,7 +1,10 @@
 //! What the tests of the whole program share: starting it, stopping it, reading what it says.
 
+use std::collections::BTreeSet;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Mutex;
 
 /// The reference data that lies beside a checkout, if it is there.
 ///
@@ -19,8 +22,19 @@ pub fn shared_data() -> Option<PathBuf> {
         "{} is demanded and missing",
         folder.display()
     );
-    eprintln!("skipped: ../shared is not there");
+    skipped("tests on reference data; ../shared is not there");
     None
+}
+
+/// Says once what is skipped and why, past the harness, which keeps what passing tests print.
+///
+/// # Panics
+/// Where a test has panicked here.
+pub fn skipped(what: &'static str) {
+    static SAID: Mutex<BTreeSet<&str>> = Mutex::new(BTreeSet::new());
+    if SAID.lock().expect("nobody panics while holding it").insert(what) {
+        let _ = writeln!(std::io::stderr(), "skipped: {what}");
+    }
 }
 
 /// What a finished program said.

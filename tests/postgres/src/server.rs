@@ -6,7 +6,7 @@ use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Mutex, Once, OnceLock};
 use std::time::{Duration, Instant};
 
 /// When a server that does not answer has failed.
@@ -48,11 +48,7 @@ impl Server {
     /// When it cannot be started, or is missing although `TRACKTWIN_REQUIRE_POSTGRES` is set.
     pub fn shared() -> Option<&'static Self> {
         static SHARED: OnceLock<Option<Server>> = OnceLock::new();
-        let shared = SHARED.get_or_init(|| Self::start(Settings::default()));
-        if shared.is_none() {
-            eprintln!("skipped: no PostgreSQL server");
-        }
-        shared.as_ref()
+        SHARED.get_or_init(|| Self::start(Settings::default())).as_ref()
     }
 
     /// A server of one's own, to be stopped and started.
@@ -73,6 +69,7 @@ impl Server {
                 std::env::var_os("TRACKTWIN_REQUIRE_POSTGRES").is_none(),
                 "a PostgreSQL server is demanded and not installed; set PG_BIN to its folder"
             );
+            skipped();
             return None;
         };
         let number = SERVERS.fetch_add(1, Ordering::Relaxed);
@@ -155,6 +152,15 @@ impl Drop for Server {
             let _ = std::fs::remove_dir_all(&self.data);
         }
     }
+}
+
+/// Says so once, past the harness, which keeps what passing tests print.
+fn skipped() {
+    static SAID: Once = Once::new();
+    SAID.call_once(|| {
+        let line = "skipped: tests on PostgreSQL; install postgresql, or set PG_BIN to its folder";
+        let _ = writeln!(std::io::stderr(), "{line}");
+    });
 }
 
 fn initialise(programs: &Path, data: &Path) {

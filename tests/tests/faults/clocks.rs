@@ -3,6 +3,7 @@
 use crate::farm::{Engine, Farm};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use system_tests::skipped;
 
 /// Where Debian puts the library that tells a program another time of day.
 const FAKETIME: &str = "faketime/libfaketime.so.1";
@@ -19,7 +20,7 @@ impl Clock {
         let folders = std::fs::read_dir("/usr/lib").ok()?.flatten();
         let library = folders.map(|it| it.path().join(FAKETIME)).find(|it| it.is_file());
         let Some(library) = library else {
-            eprintln!("skipped: libfaketime is not installed");
+            skipped("clocks that jump; install libfaketime");
             return None;
         };
         let clock = Self { library, setting: tempfile::NamedTempFile::new().unwrap() };

@@ -4,6 +4,7 @@ use crate::farm::Farm;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
+use system_tests::skipped;
 use test_postgres::{Server, Settings};
 
 #[test]
@@ -50,7 +51,7 @@ impl Drop for Tmpfs<'_> {
 fn a_full_disk_stops_the_campaign_until_there_is_room_and_loses_nothing() {
     let volume = tempfile::tempdir().unwrap();
     let Some(disk) = Tmpfs::mount(volume.path(), "1500k") else {
-        eprintln!("skipped: no file system may be mounted here");
+        skipped("full disks; no file system may be mounted here");
         return;
     };
     let library = format!("sqlite:{}", volume.path().join("l.sqlite").display());
@@ -71,7 +72,7 @@ fn a_full_disk_stops_the_campaign_until_there_is_room_and_loses_nothing() {
 fn a_full_disk_under_a_postgres_server_loses_nothing_either() {
     let volume = tempfile::tempdir().unwrap();
     let Some(_disk) = Tmpfs::mount(volume.path(), "200m") else {
-        eprintln!("skipped: no file system may be mounted here");
+        skipped("full disks; no file system may be mounted here");
         return;
     };
     let Some(server) = Server::start_in(volume.path(), Settings { durable: true }) else { return };
