@@ -1,5 +1,6 @@
 //! A library in a file.
 
+use super::patience::Patience;
 use super::{Connection, Readers};
 use crate::LibraryError;
 use sqlx::migrate::{MigrateError, Migrator};
@@ -48,7 +49,14 @@ pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryEr
         .journal_mode(SqliteJournalMode::Wal)
         .synchronous(SqliteSynchronous::Full)
         .pragma("wal_autocheckpoint", LOG_PAGES);
-    let mut connection = options.connect().await?;
+    let mut patience = Patience::new(true);
+    let mut connection = loop {
+        match options.connect().await.map_err(LibraryError::from) {
+            // A log begins only where nobody else looks, and doesn't wait for that itself.
+            Err(error) if error.is_temporary() && patience.wait().await.is_ok() => {}
+            opened => break opened?,
+        }
+    };
     migrate(&mut connection, path).await?;
     let readers = SqlitePoolOptions::new()
         .max_connections(READERS)
@@ -87,10 +95,20 @@ async fn refuse_strangers(
 
 async fn migrate(connection: &mut SqliteConnection, path: &Path) -> Result<(), LibraryError> {
     let known = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0);
-    MIGRATIONS.run(connection).await.map_err(|error| match error {
+    let newer = |error| match error {
         MigrateError::VersionMissing(found) if found > known => {
             LibraryError::NewerSchema { library: path.display().to_string(), found, known }
         }
         other => other.into(),
-    })
+    };
+    // Fails where there is no such table yet.
+    let ask = sqlx::query_scalar("select max(version) from _sqlx_migrations");
+    let found: i64 = ask.fetch_one(&mut *connection).await.unwrap_or(0);
+    if found >= known {
+        return MIGRATIONS.run(connection).await.map_err(newer);
+    }
+    // One of those who open it at once does it; the others wait, and find it done.
+    let mut alone = connection.begin_with("begin immediate").await?;
+    MIGRATIONS.run(&mut *alone).await.map_err(newer)?;
+    Ok(alone.commit().await?)
 }

@@ -144,3 +144,21 @@ async fn with_a_server_any_number_of_processes_hands_out_cases() {
     let claims = [one.claim().unwrap(), other.claim().unwrap()];
     assert!(claims.iter().all(|claim| !claim.is_exclusive()));
 }
+
+#[test]
+fn of_many_that_open_a_new_library_at_once_one_makes_it_and_none_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    for round in 0..10 {
+        let url = format!("sqlite:{}", folder.path().join(format!("{round}.sqlite")).display());
+        let opening = (0..8).map(|_| {
+            let url = url.clone();
+            std::thread::spawn(move || {
+                let runtime = tokio::runtime::Runtime::new().unwrap();
+                runtime.block_on(async { Library::open_or_create(&url).await.map(drop) })
+            })
+        });
+        for opened in opening.collect::<Vec<_>>() {
+            opened.join().unwrap().unwrap();
+        }
+    }
+}
