@@ -95,7 +95,10 @@ impl Core {
             let computing_s = begun.elapsed().as_secs_f64();
             self.counters.computing_s.inc_by(computing_s);
             let reports = reports(&group, outcomes, computing_s / group.len() as f64);
-            self.put(Finished::new(lease, reports, step.traceparent())).await;
+            let finished = Finished::new(lease, reports, step.traceparent());
+            // Waiting for room in the outbox is no part of it.
+            drop(step);
+            self.put(finished).await;
         }
         Ok(())
     }
