@@ -1,5 +1,9 @@
 //! What the tests of the whole program share: starting it, stopping it, reading what it says.
 
+mod process;
+
+pub use process::{Process, free_port, until};
+
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -37,6 +41,10 @@ pub fn skipped(what: &'static str) {
     }
 }
 
+/// Of a campaign where what is tested is the farm: a coarse, short model.
+pub const COARSE_MODEL: &str = "seed = 5\nspeeds_km_h = [13]\n\
+     [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n";
+
 /// What a finished program said.
 pub struct Answer {
     /// Its exit code; none if a signal ended it.
@@ -45,6 +53,17 @@ pub struct Answer {
     pub out: String,
     /// Its standard error.
     pub err: String,
+}
+
+impl Answer {
+    /// What it wrote to standard output.
+    ///
+    /// # Panics
+    /// When it failed.
+    pub fn succeeded(self) -> String {
+        assert_eq!(self.code, Some(0), "{}", self.err);
+        self.out
+    }
 }
 
 /// Runs the program at `program` with these arguments, to its end.

@@ -4,20 +4,15 @@
 
 use headless_chrome::browser::default_executable;
 use headless_chrome::{Browser, LaunchOptions, Tab};
-use std::net::{Ipv4Addr, TcpListener};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
-use system_tests::{run, skipped};
+use std::process::Command;
+use std::time::Duration;
+use system_tests::{COARSE_MODEL, Process, free_port, run, skipped};
 use tempfile::TempDir;
 use ureq::http::Response;
 use ureq::{Agent, Body};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
-
-/// A coarse, short model: what is tested are pages.
-const CAMPAIGN: &str = "name = \"pages\"\nseed = 5\ncases = 24\nspeeds_km_h = [13]\n\
-    [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n";
 
 /// When something that does not happen has failed.
 const PATIENCE: Duration = Duration::from_mins(1);
@@ -28,14 +23,15 @@ struct Farm {
     library: String,
     workers: String,
     pages: String,
-    processes: Vec<Child>,
+    processes: Vec<Process>,
 }
 
 impl Farm {
     fn start(token: Option<&str>) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).display().to_string();
-        std::fs::write(path("campaign.toml"), CAMPAIGN).unwrap();
+        let campaign = format!("name = \"pages\"\ncases = 24\n{COARSE_MODEL}");
+        std::fs::write(path("campaign.toml"), campaign).unwrap();
         let library = format!("sqlite:{}", path("l.sqlite"));
         let [listen, dashboard] = [(); 2].map(|()| format!("127.0.0.1:{}", free_port()));
         let mut coordinator = Command::new(PROGRAM);
@@ -45,12 +41,11 @@ impl Farm {
             std::fs::write(path("token"), token).unwrap();
             coordinator.args(["--token-file", &path("token")]);
         }
-        let coordinator = coordinator.stderr(Stdio::null()).spawn().unwrap();
         let farm = Self {
             library,
             workers: format!("http://{listen}"),
             pages: format!("http://{dashboard}"),
-            processes: vec![coordinator],
+            processes: vec![Process::start(&mut coordinator, "coordinator")],
             folder,
         };
         until("the pages are there", || farm.agent().get(farm.at("/healthz")).call().is_ok());
@@ -80,18 +75,17 @@ impl Farm {
 
     fn work(&mut self) {
         let mut worker = Command::new(WORKER);
-        worker.args(["--coordinator", &self.workers, "--cores", "1"]).stderr(Stdio::null());
+        worker.args(["--coordinator", &self.workers, "--cores", "1"]);
         let token = self.folder.path().join("token");
         if token.exists() {
             worker.arg("--token-file").arg(token);
         }
-        self.processes.push(worker.spawn().unwrap());
+        self.processes.push(Process::start(&mut worker, "worker"));
     }
 
     fn campaign(&self) -> serde_json::Value {
-        let answer = run(PROGRAM, &["status", "--json", "--library", &self.library]);
-        assert_eq!(answer.code, Some(0), "{}", answer.err);
-        let status: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
+        let answer = run(PROGRAM, &["status", "--json", "--library", &self.library]).succeeded();
+        let status: serde_json::Value = serde_json::from_str(&answer).unwrap();
         status["campaigns"][0].clone()
     }
 
@@ -104,26 +98,9 @@ impl Farm {
     }
 }
 
-impl Drop for Farm {
-    fn drop(&mut self) {
-        for process in &mut self.processes {
-            let _ = process.kill();
-            let _ = process.wait();
-        }
-    }
-}
-
-/// A port that nobody listens on now.
-fn free_port() -> u16 {
-    TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port()
-}
-
-fn until(what: &str, happened: impl Fn() -> bool) {
-    let begun = Instant::now();
-    while !happened() {
-        assert!(begun.elapsed() < PATIENCE, "not within {PATIENCE:?}: {what}");
-        std::thread::sleep(Duration::from_millis(50));
-    }
+/// Waits until something happens.
+fn until(what: &str, happened: impl FnMut() -> bool) {
+    system_tests::until(what, PATIENCE, happened);
 }
 
 /// No header that matters.

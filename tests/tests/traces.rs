@@ -11,10 +11,11 @@ use opentelemetry_proto::tonic::collector::trace::v1::{
 use opentelemetry_proto::tonic::common::v1::{KeyValue, any_value::Value};
 use opentelemetry_proto::tonic::trace::v1::{ResourceSpans, Span};
 use std::collections::BTreeSet;
-use std::net::{Ipv4Addr, TcpListener};
-use std::process::{Command, Stdio};
+use std::net::Ipv4Addr;
+use std::process::Command;
 use std::sync::{Arc, Mutex};
-use system_tests::run;
+use std::time::Duration;
+use system_tests::{COARSE_MODEL, Process, free_port, run};
 use tokio_stream::wrappers::TcpListenerStream;
 use tonic::{Request, Response, Status};
 
@@ -23,6 +24,9 @@ const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
 /// Where a program sends its traces.
 const ENDPOINT: &str = "OTEL_EXPORTER_OTLP_ENDPOINT";
+
+/// When a program that has not ended has failed.
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// Cases of the campaign.
 const CASES: i64 = 24;
@@ -101,31 +105,20 @@ fn indices(span: &Span) -> Vec<i64> {
 fn run_campaign(endpoint: &str) {
     let folder = tempfile::tempdir().unwrap();
     let campaign = folder.path().join("campaign.toml").display().to_string();
-    let text = format!(
-        "name = \"traces\"\nseed = 5\ncases = {CASES}\nspeeds_km_h = [13]\n\
-         [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n"
-    );
+    let text = format!("name = \"traces\"\ncases = {CASES}\n{COARSE_MODEL}");
     std::fs::write(&campaign, text).unwrap();
     let library = format!("sqlite:{}", folder.path().join("l.sqlite").display());
-    let port = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port();
-    let listen = format!("127.0.0.1:{port}");
-    let mut coordinator = Command::new(PROGRAM)
-        .args(["coordinator", "--exit-when-done", "--listen", &listen])
-        .args(["--campaign", &campaign, "--library", &library])
-        .env(ENDPOINT, endpoint)
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let mut worker = Command::new(WORKER)
-        .args(["--coordinator", &format!("http://{listen}"), "--cores", "1"])
-        .env(ENDPOINT, endpoint)
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    assert_eq!(coordinator.wait().unwrap().code(), Some(0));
-    let told = Command::new("kill").args(["-TERM", &worker.id().to_string()]).status().unwrap();
-    assert!(told.success());
-    assert_eq!(worker.wait().unwrap().code(), Some(0));
+    let listen = format!("127.0.0.1:{}", free_port());
+    let mut coordinator = Command::new(PROGRAM);
+    coordinator.args(["coordinator", "--exit-when-done", "--listen", &listen]);
+    coordinator.args(["--campaign", &campaign, "--library", &library]);
+    let mut coordinator = Process::start(coordinator.env(ENDPOINT, endpoint), "coordinator");
+    let mut worker = Command::new(WORKER);
+    worker.args(["--coordinator", &format!("http://{listen}"), "--cores", "1"]);
+    let mut worker = Process::start(worker.env(ENDPOINT, endpoint), "worker");
+    assert_eq!(coordinator.ended(PATIENCE).code(), Some(0));
+    worker.signal("TERM");
+    assert_eq!(worker.ended(PATIENCE).code(), Some(0));
 }
 
 #[tokio::test(flavor = "multi_thread")]

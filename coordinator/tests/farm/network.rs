@@ -3,13 +3,14 @@
 //!
 //! `TRACKTWIN_SEEDS=1000` runs as many seeds instead of a few, `TRACKTWIN_SEED=7` that one.
 
-use crate::support::{CORES, library, stand_in, undisturbed};
+use crate::support::{CORES, library_at, stand_in, undisturbed};
 use std::future::{Future, ready};
 use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::task::{Context, Poll, Wake, Waker};
 use std::thread::Thread;
 use std::time::Duration;
+use test_postgres::Server as Postgres;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::runtime::Runtime;
 use tokio::sync::mpsc;
@@ -266,12 +267,12 @@ fn mend(sim: &turmoil::Sim<'_>) {
     }
 }
 
-/// A farm whose network and hosts misbehave as the seed says; its digest, and the time it took.
-fn misbehaving(real: &Runtime, seed: u64) -> (String, Duration) {
+/// A farm whose network and hosts misbehave as the seed says, with a new library at this address; its
+/// digest, and the time it took.
+fn misbehaving(real: &Runtime, library: &str, seed: u64) -> (String, Duration) {
     let campaign = Campaign::built_in(Some(CASES)).unwrap();
     let id = campaign.id();
-    let folder = tempfile::tempdir().unwrap();
-    let library = real.block_on(library(&folder, &campaign));
+    let library = real.block_on(library_at(library, &campaign));
     let chance = Chance::new(seed);
     let mut sim = turmoil::Builder::new()
         .rng_seed(seed)
@@ -295,6 +296,8 @@ fn misbehaving(real: &Runtime, seed: u64) -> (String, Duration) {
         if status.done() == status.total() {
             assert_eq!(status.failed, 0, "seed {seed}: a case was given up");
             let digest = real.block_on(library.digest(&id)).unwrap();
+            drop(sim);
+            real.block_on(library.close());
             return (digest, elapsed);
         }
         assert!(elapsed < PATIENCE, "seed {seed}: {status:?} after {elapsed:?}");
@@ -318,8 +321,8 @@ fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|text| text.parse().expect("a number"))
 }
 
-#[test]
-fn whatever_network_and_hosts_do_the_digest_is_that_of_an_undisturbed_run() {
+/// Does so with many seeds, each in a library of its own, which is removed.
+fn all_misbehave(new: impl Fn() -> String, remove: impl Fn(&str)) {
     let real = runtime();
     let campaign = Campaign::built_in(Some(CASES)).unwrap();
     let expected = real.block_on(undisturbed(&campaign));
@@ -329,15 +332,38 @@ fn whatever_network_and_hosts_do_the_digest_is_that_of_an_undisturbed_run() {
     };
     let mut longest = Duration::ZERO;
     for seed in seeds.clone() {
-        let (digest, took) = misbehaving(real, seed);
+        let library = new();
+        let (digest, took) = misbehaving(real, &library, seed);
         assert_eq!(digest, expected, "seed {seed}");
         longest = longest.max(took);
+        remove(&library);
     }
     eprintln!("{seeds:?}: every digest is right; the longest took {longest:?} of simulated time");
 }
 
 #[test]
+fn whatever_network_and_hosts_do_the_digest_is_that_of_an_undisturbed_run_sqlite() {
+    let folder = tempfile::tempdir().unwrap();
+    let home = folder.path().join("of a seed");
+    let new = || {
+        std::fs::create_dir(&home).unwrap();
+        format!("sqlite:{}", home.join("l.sqlite").display())
+    };
+    all_misbehave(new, |_| std::fs::remove_dir_all(&home).unwrap());
+}
+
+#[test]
+fn whatever_network_and_hosts_do_the_digest_is_that_of_an_undisturbed_run_postgres() {
+    let Some(server) = Postgres::shared() else { return };
+    all_misbehave(|| server.database(), |library| server.remove(library));
+}
+
+#[test]
 fn the_same_seed_does_the_same() {
-    let real = runtime();
-    assert_eq!(misbehaving(real, 3).1, misbehaving(real, 3).1);
+    let folder = tempfile::tempdir().unwrap();
+    let took = |name| {
+        let library = format!("sqlite:{}", folder.path().join(name).display());
+        misbehaving(runtime(), &library, 3).1
+    };
+    assert_eq!(took("one"), took("the other"));
 }

@@ -54,7 +54,11 @@ pub(crate) const CORES: NonZeroUsize = NonZeroUsize::new(2).expect("two are more
 
 pub(crate) async fn library(folder: &TempDir, campaign: &Campaign) -> Library {
     let url = format!("sqlite:{}", folder.path().join("library.sqlite").display());
-    let library = Library::open_or_create(&url).await.unwrap();
+    library_at(&url, campaign).await
+}
+
+pub(crate) async fn library_at(url: &str, campaign: &Campaign) -> Library {
+    let library = Library::open_or_create(url).await.unwrap();
     farm::prepare(&library, campaign).await.unwrap();
     library
 }

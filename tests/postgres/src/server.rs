@@ -95,6 +95,17 @@ impl Server {
         format!("postgres://postgres@127.0.0.1:{port}/{name}")
     }
 
+    /// Removes a database, whoever is still connected to it.
+    ///
+    /// # Panics
+    /// When it cannot be removed.
+    pub fn remove(&self, database: &str) {
+        let name = database.rsplit('/').next().expect("a URL ends with its database");
+        let mut command = Command::new(self.programs.join("dropdb"));
+        let port = self.port.to_string();
+        succeed(command.args(["-h", "127.0.0.1", "-U", "postgres", "-p", &port, "--force", name]));
+    }
+
     /// Stops the server, as an administrator would: connections end, data stay.
     ///
     /// # Panics

@@ -1,22 +1,30 @@
 //! Coordinators that are killed.
 
 use crate::farm::{Engine, Farm};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// Kills the coordinator so many times and lets the last one finish.
 fn coordinator_is_killed(farm: &Farm, times: u32) {
     let workers = [farm.worker(), farm.worker()];
+    let mut acknowledged = BTreeMap::new();
     for kill in 0..times {
         let coordinator = farm.coordinator(0);
         // Moments spread over start, work and commit by the golden ratio.
         std::thread::sleep(Duration::from_millis(150 + u64::from(kill) * 618 % 700));
         coordinator.kill();
+        acknowledged.extend(farm.results());
     }
     assert!(!farm.is_done(), "the campaign was over before the last was killed");
     let mut coordinator = farm.coordinator(0);
     Farm::finish(&mut coordinator);
     drop(workers);
     farm.assert_undisturbed();
+    assert!(!acknowledged.is_empty(), "nothing was finished before a kill");
+    let results = farm.results();
+    for (case, came) in acknowledged {
+        assert_eq!(results[&case], came, "case {case} was leased or stored again");
+    }
 }
 
 #[test]

@@ -1,20 +1,15 @@
 //! A farm of processes: its library, its coordinators, its workers.
 
-use std::io::{BufRead, BufReader};
-use std::net::{Ipv4Addr, TcpListener};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::OnceLock;
-use std::time::{Duration, Instant};
-use system_tests::run;
+use std::collections::{BTreeMap, HashMap};
+use std::process::Command;
+use std::sync::{Mutex, OnceLock};
+use std::time::Duration;
+use system_tests::{COARSE_MODEL, Process, free_port, run, until};
 use tempfile::TempDir;
 use test_postgres::Server;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
-const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
-
-/// A coarse, short model: what is tested is the farm.
-const CAMPAIGN: &str = "name = \"faults\"\nseed = 5\ncases = 64\nspeeds_km_h = [13]\n\
-    [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n";
+pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+pub(crate) const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
 /// When a farm that is not done has failed.
 const PATIENCE: Duration = Duration::from_mins(2);
@@ -37,43 +32,6 @@ pub(crate) struct Farm {
     pub(crate) lease: &'static str,
 }
 
-/// A process that ends with its handle.
-pub(crate) struct Process(pub(crate) Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-impl Process {
-    /// Sends a signal by its name.
-    pub(crate) fn signal(&self, name: &str) {
-        let pid = self.0.id().to_string();
-        let sent = Command::new("kill").args([&format!("-{name}"), &pid]).status().unwrap();
-        assert!(sent.success());
-    }
-
-    /// Ends it at once.
-    pub(crate) fn kill(mut self) {
-        self.0.kill().unwrap();
-        self.0.wait().unwrap();
-    }
-
-    /// Waits for its end.
-    pub(crate) fn ended(&mut self, within: Duration) -> ExitStatus {
-        let begun = Instant::now();
-        loop {
-            if let Some(status) = self.0.try_wait().unwrap() {
-                return status;
-            }
-            assert!(begun.elapsed() < within, "it did not end within {within:?}");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    }
-}
-
 impl Farm {
     /// A library with the campaign in it; nothing where there is no such database.
     pub(crate) fn new(engine: Engine) -> Option<Self> {
@@ -93,33 +51,24 @@ impl Farm {
     /// A library at this address with so many cases.
     pub(crate) fn on(folder: TempDir, library: String, cases: u32) -> Self {
         let campaign = folder.path().join("campaign.toml").display().to_string();
-        std::fs::write(&campaign, CAMPAIGN).unwrap();
-        let farm = Self {
-            _folder: folder,
-            library,
-            cases,
-            ports: [free_port(), free_port()],
-            lease: "1.5",
-        };
-        let cases = cases.to_string();
-        let add = ["campaign", "add", &campaign, "--cases", &cases, "--library", &farm.library];
-        let answer = run(PROGRAM, &add);
-        assert_eq!(answer.code, Some(0), "{}", answer.err);
-        farm
+        std::fs::write(&campaign, campaign_of(cases)).unwrap();
+        run(PROGRAM, &["campaign", "add", &campaign, "--library", &library]).succeeded();
+        let ports = [free_port(), free_port()];
+        Self { _folder: folder, library, cases, ports, lease: "1.5" }
     }
 
-    /// Starts the first or the second coordinator; it ends when everything is done.
+    /// How a coordinator is started that listens there; it ends when everything is done.
+    pub(crate) fn coordinating(&self, listen: &str) -> Command {
+        let mut coordinator = Command::new(PROGRAM);
+        coordinator.args(["coordinator", "--exit-when-done", "--library", &self.library]);
+        coordinator.args(["--listen", listen, "--lease", self.lease]);
+        coordinator
+    }
+
+    /// Starts the first or the second coordinator.
     pub(crate) fn coordinator(&self, number: usize) -> Process {
         let listen = format!("127.0.0.1:{}", self.ports[number]);
-        let arguments = ["coordinator", "--exit-when-done", "--library", &self.library];
-        let child = Command::new(PROGRAM)
-            .args(arguments)
-            .args(["--listen", &listen, "--lease", self.lease])
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        forwarding(child, "coordinator")
+        Process::start(&mut self.coordinating(&listen), "coordinator")
     }
 
     /// Port of a coordinator.
@@ -144,14 +93,9 @@ impl Farm {
 
     /// Starts a worker of one core for these coordinators, with these environment variables.
     pub(crate) fn worker_in(urls: &str, environment: &[(&str, String)]) -> Process {
-        let child = Command::new(WORKER)
-            .args(["--coordinator", urls, "--cores", "1"])
-            .envs(environment.iter().cloned())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        forwarding(child, "worker")
+        let mut worker = Command::new(WORKER);
+        worker.args(["--coordinator", urls, "--cores", "1"]).envs(environment.iter().cloned());
+        Process::start(&mut worker, "worker")
     }
 
     /// Waits until a coordinator says that everything is done.
@@ -161,9 +105,8 @@ impl Farm {
 
     /// Results so far.
     pub(crate) fn finished(&self) -> u64 {
-        let answer = run(PROGRAM, &["status", "--json", "--library", &self.library]);
-        assert_eq!(answer.code, Some(0), "{}", answer.err);
-        let status: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
+        let answer = run(PROGRAM, &["status", "--json", "--library", &self.library]).succeeded();
+        let status: serde_json::Value = serde_json::from_str(&answer).unwrap();
         status["campaigns"][0]["finished"].as_u64().unwrap()
     }
 
@@ -172,23 +115,41 @@ impl Farm {
         self.finished() == u64::from(self.cases)
     }
 
+    /// What the library answers.
+    fn ask(&self, sql: &str) -> Vec<serde_json::Value> {
+        let ask = ["library", "sql", sql, "--format", "json"];
+        let answer = run(PROGRAM, &[&ask[..], &["--library", &self.library]].concat());
+        serde_json::from_str(&answer.succeeded()).unwrap()
+    }
+
     /// Leases that ended without a result so far.
     pub(crate) fn attempts(&self) -> u64 {
-        let ask = "select count(*) as attempts from attempt";
-        let answer =
-            run(PROGRAM, &["library", "sql", ask, "--format", "json", "--library", &self.library]);
-        assert_eq!(answer.code, Some(0), "{}", answer.err);
-        let rows: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
+        let rows = self.ask("select count(*) as attempts from attempt");
         rows[0]["attempts"].as_u64().unwrap()
+    }
+
+    /// Cases leased more than once.
+    pub(crate) fn leased_again(&self) -> u64 {
+        let rows = self.ask("select count(*) as cases from campaign_case where epoch > 1");
+        rows[0]["cases"].as_u64().unwrap()
+    }
+
+    /// For each case with a result how often it was leased, and when the result came.
+    pub(crate) fn results(&self) -> BTreeMap<u64, (u64, String)> {
+        let rows = self.ask(
+            "select sobol_index, epoch, finished_at
+            from campaign_case join result using (campaign_id, sobol_index)",
+        );
+        let came = |row: &serde_json::Value| {
+            let leases = row["epoch"].as_u64().unwrap();
+            (row["sobol_index"].as_u64().unwrap(), (leases, row["finished_at"].to_string()))
+        };
+        rows.iter().map(came).collect()
     }
 
     /// Waits until there are so many results.
     pub(crate) fn reach(&self, finished: u64) {
-        let begun = Instant::now();
-        while self.finished() < finished {
-            assert!(begun.elapsed() < PATIENCE, "{} of {finished}", self.finished());
-            std::thread::sleep(Duration::from_millis(50));
-        }
+        until(&format!("{finished} results"), PATIENCE, || self.finished() >= finished);
     }
 
     /// Every case has a result, and the results are those of an undisturbed run.
@@ -203,44 +164,27 @@ impl Farm {
     }
 }
 
-/// Passes on what a process says, so that a failed test tells it.
-fn forwarding(mut child: Child, name: &'static str) -> Process {
-    let pid = child.id();
-    let said = BufReader::new(child.stderr.take().unwrap());
-    std::thread::spawn(move || {
-        for line in said.lines().map_while(Result::ok) {
-            eprintln!("{name} {pid}: {line}");
-        }
-    });
-    Process(child)
+/// What is to be done.
+fn campaign_of(cases: u32) -> String {
+    format!("name = \"faults\"\ncases = {cases}\n{COARSE_MODEL}")
 }
 
 fn digest(library: &str) -> String {
-    let answer = run(PROGRAM, &["library", "digest", "--library", library]);
-    assert_eq!(answer.code, Some(0), "{}", answer.err);
-    answer.out
+    run(PROGRAM, &["library", "digest", "--library", library]).succeeded()
 }
 
 /// The digest of a campaign of so many cases that nothing disturbed.
 fn undisturbed(cases: u32) -> String {
-    static KNOWN: OnceLock<std::sync::Mutex<std::collections::HashMap<u32, String>>> =
-        OnceLock::new();
-    let mut known = KNOWN.get_or_init(Default::default).lock().unwrap();
+    static KNOWN: OnceLock<Mutex<HashMap<u32, String>>> = OnceLock::new();
+    let mut known = KNOWN.get_or_init(Mutex::default).lock().unwrap();
     let fresh = || {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).display().to_string();
         let (campaign, library) = (path("campaign.toml"), format!("sqlite:{}", path("l.sqlite")));
-        std::fs::write(&campaign, CAMPAIGN).unwrap();
-        let (cases, out) = (cases.to_string(), path("out"));
-        let arguments = ["run", &campaign, "--cases", &cases, "--no-train", "--out", &out];
-        let answer = run(PROGRAM, &[&arguments[..], &["--library", &library]].concat());
-        assert_eq!(answer.code, Some(0), "{}", answer.err);
+        std::fs::write(&campaign, campaign_of(cases)).unwrap();
+        let arguments = ["run", &campaign, "--no-train", "--out", &path("out")];
+        run(PROGRAM, &[&arguments[..], &["--library", &library]].concat()).succeeded();
         digest(&library)
     };
     known.entry(cases).or_insert_with(fresh).clone()
-}
-
-/// A port that nobody listens on now.
-pub(crate) fn free_port() -> u16 {
-    TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port()
 }

@@ -10,6 +10,7 @@ mod clocks;
 mod coordinators;
 mod databases;
 mod farm;
+mod hosts;
 mod networks;
 mod proxy;
 mod workers;

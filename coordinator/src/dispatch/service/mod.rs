@@ -1,27 +1,22 @@
 //! The gRPC service: messages in, library calls, messages out.
 
-use super::audits::{self, Audits, Found};
-use super::campaigns::{Campaigns, DispatchError, Served};
-use super::messages::{held, library_report, malformed, unavailable, unfit, verdict_message};
+mod hand_out;
+mod take_in;
+
+use super::Counts;
+use super::audits::{self, Audits};
+use super::campaigns::{Campaigns, DispatchError};
+use super::messages::{held, malformed, unavailable, unfit, verdict_message};
 use super::roster::{Roster, Standing};
 use super::settings::Settings;
-use super::{Counts, SUSPECT_AFTER, after_attempt};
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 use std::time::{Duration, SystemTime};
 use tokio::time::Instant;
 use tonic::{Request, Response, Status};
-use tracktwin_library::{self as library, LeaseRequest, Library, Report, Verdict, WorkerState};
+use tracktwin_library::{self as library, Library, Verdict, WorkerState};
 use tracktwin_protocol::farm::farm_server::Farm;
-use tracktwin_protocol::{
-    CaseLease, CaseReport, Lease, LeasedCase, Outcome, Registration, farm, held_to_messages,
-};
+use tracktwin_protocol::{CaseReport, Lease, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
-
-/// After the library had no case to give, it is not asked again for so long.
-const NOTHING: Duration = Duration::from_millis(100);
-
-/// Workers without work that may ask once a second all together.
-const IDLE_CALLS_S: f64 = 400.0;
 
 /// The farm's service, for the campaigns of a library.
 pub struct Dispatch {
@@ -75,177 +70,6 @@ impl Dispatch {
             self.roster.quarantine(worker, record.state, record.reason);
         }
         self.roster.standing(worker).ok_or_else(stranger)
-    }
-
-    /// Cases for a worker that is to have some.
-    async fn hand_out(&self, worker: &str, cases_max: u32) -> Result<Lease, Status> {
-        let failed = |error: &DispatchError| {
-            tracing::error!("no cases can be handed out: {error:?}");
-            Status::unavailable(error.to_string())
-        };
-        let audit = self.audits.lease(worker, &self.campaigns).await;
-        if let Some(lease) = audit.map_err(|error| failed(&error))? {
-            return Ok(Lease::Cases(lease));
-        }
-        if self.had_nothing() {
-            return Ok(self.none_now());
-        }
-        let scope = self.settings.scope.as_ref();
-        let request = LeaseRequest {
-            campaign: scope.map(|scope| scope.campaign.clone()),
-            indices_below: scope.map_or(u32::MAX, |scope| scope.cases),
-            worker: worker.to_owned(),
-            cases_max: cases_max.min(self.campaigns.cases_per_lease(self.roster.present().1)),
-            now_unix_ms: self.now_unix_ms(),
-            lease_ms: unix_ms(self.settings.timing.lease),
-            after_loss: after_attempt,
-            alone_after: SUSPECT_AFTER,
-        };
-        let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
-        let Some(leased) = leased else {
-            let mut until = self.nothing_until.lock().expect("nobody panics while holding it");
-            *until = Some(Instant::now() + NOTHING.min(self.settings.timing.retry));
-            return Ok(self.none_now());
-        };
-        match self.campaigns.of(&leased.campaign).await {
-            Ok(served) => {
-                self.campaigns.leased(&served);
-                self.counts.leased.inc_by(leased.cases.len() as u64);
-                let cases = leased.cases.into_iter();
-                let cases = cases.map(|it| LeasedCase { case: it.case, epoch: it.epoch });
-                Ok(Lease::Cases(served.lease(cases.collect(), self.settings.timing.lease)))
-            }
-            Err(error) => {
-                self.give_up_campaign(worker, &leased).await;
-                Err(failed(&error))
-            }
-        }
-    }
-
-    /// A campaign that this version can't do must not hold up the others.
-    async fn give_up_campaign(&self, worker: &str, leased: &library::Lease) {
-        let held = leased.cases.iter();
-        let held = held.map(|it| library::Held { index: it.case.index, epoch: it.epoch });
-        let released = self.library.release(&leased.campaign, worker, held.collect()).await;
-        let paused = self.library.pause(&leased.campaign).await;
-        tracing::error!("campaign {} is paused: {released:?}, {paused:?}", leased.campaign);
-    }
-
-    fn had_nothing(&self) -> bool {
-        let until = self.nothing_until.lock().expect("nobody panics while holding it");
-        until.is_some_and(|until| until > Instant::now())
-    }
-
-    /// The more workers have nothing to do, the less often each asks.
-    fn none_now(&self) -> Lease {
-        let (workers, cores) = self.roster.present();
-        let crowd = f64::from(cores).max(workers as f64) / IDLE_CALLS_S;
-        let retry_after_s = self.settings.timing.retry.as_secs_f64().max(crowd);
-        Lease::NoneNow { retry_after_s, reason: None }
-    }
-
-    /// Stores checked reports; those of audits are compared instead.
-    async fn store(
-        &self,
-        worker: &str,
-        standing: Standing,
-        served: &Arc<Served>,
-        reports: Vec<CaseReport>,
-        step: &Step,
-    ) -> Result<Vec<Verdict>, Status> {
-        let mut verdicts = vec![Verdict::Refused; reports.len()];
-        let mut places = Vec::new();
-        let mut ordinary = Vec::new();
-        for (place, report) in reports.into_iter().enumerate() {
-            if report.epoch == audits::EPOCH {
-                verdicts[place] = self.audited(worker, served, &report).await?;
-            } else {
-                places.push(place);
-                ordinary.push(report);
-            }
-        }
-        if ordinary.is_empty() {
-            return Ok(verdicts);
-        }
-        let failed: Vec<bool> =
-            ordinary.iter().map(|it| matches!(it.outcome, Outcome::Failed { .. })).collect();
-        let durations_s: Vec<f64> = ordinary.iter().map(|it| it.duration_s).collect();
-        let step = Step::after("store", [&step.traceparent()]);
-        let report = Report {
-            campaign: served.record.id.clone(),
-            worker: worker.to_owned(),
-            code_version: standing.code_version,
-            model_hash: standing.model_hash,
-            experiment_hash: served.record.experiment_hash.clone(),
-            speeds_km_h: served.shape.speeds_km_h.clone(),
-            cases: ordinary.into_iter().map(library_report).collect(),
-            now_unix_ms: self.now_unix_ms(),
-            after_failure: after_attempt,
-            audit_share: self.settings.audit_share,
-        };
-        let stored = self.library.report(report).await.map_err(|error| {
-            step.fail(&error.to_string());
-            unavailable(&error)
-        })?;
-        let rows = stored.iter().filter(|it| matches!(it, Verdict::Stored)).count();
-        step.count("cases_stored", rows);
-        drop(step);
-        served.measured(durations_s);
-        if self.settings.put_aside && self.roster.reported(worker, &failed) {
-            tracing::warn!(worker, "put aside: it fails where other workers don't");
-            self.counts.put_aside.inc();
-        }
-        for (place, verdict) in places.into_iter().zip(stored) {
-            verdicts[place] = verdict;
-        }
-        Ok(verdicts)
-    }
-
-    async fn audited(
-        &self,
-        worker: &str,
-        served: &Arc<Served>,
-        report: &CaseReport,
-    ) -> Result<Verdict, Status> {
-        let found = self.audits.report(worker, served, report).await;
-        Ok(match found.map_err(|error| unavailable(&error))? {
-            None => Verdict::Refused,
-            Some(Found::Agreement) => {
-                self.counts.audited.inc();
-                Verdict::Duplicate
-            }
-            Some(Found::Wrong { worker, reason }) => {
-                self.counts.audited.inc();
-                self.counts.differed.inc();
-                self.roster.quarantine(&worker, WorkerState::Quarantined, Some(reason));
-                Verdict::Duplicate
-            }
-        })
-    }
-
-    fn count(&self, verdicts: &[Verdict]) {
-        for verdict in verdicts {
-            match verdict {
-                Verdict::Stored => self.counts.stored.inc(),
-                Verdict::Duplicate => self.counts.duplicates.inc(),
-                Verdict::Late => self.counts.late.inc(),
-                Verdict::Refused => self.counts.refused.inc(),
-            };
-        }
-    }
-}
-
-impl Served {
-    /// These cases, for a while.
-    pub(crate) fn lease(&self, cases: Vec<LeasedCase>, lease: Duration) -> CaseLease {
-        CaseLease {
-            campaign: self.record.id.clone(),
-            experiment_json: self.record.experiment_json.clone(),
-            experiment_hash: self.record.experiment_hash.clone(),
-            lease_s: lease.as_secs_f64(),
-            cases,
-            traceparent: String::new(),
-        }
     }
 }
 
@@ -352,7 +176,7 @@ impl Farm for Dispatch {
                     self.counts.malformed.inc();
                     malformed(&error)
                 })?;
-                self.store(&worker, standing, &served, reports, &step).await?
+                self.take_in(&worker, standing, &served, reports, &step).await?
             }
             None => vec![Verdict::Refused; indices.len()],
         };

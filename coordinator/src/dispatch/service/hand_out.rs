@@ -1,0 +1,100 @@
+//! Cases for workers.
+
+use super::{Dispatch, unix_ms};
+use crate::dispatch::campaigns::{DispatchError, Served};
+use crate::dispatch::messages::unavailable;
+use crate::dispatch::{SUSPECT_AFTER, after_attempt};
+use std::time::Duration;
+use tokio::time::Instant;
+use tonic::Status;
+use tracktwin_library::{self as library, LeaseRequest};
+use tracktwin_protocol::{CaseLease, Lease, LeasedCase};
+
+/// After the library had no case to give, it is not asked again for so long.
+const NOTHING: Duration = Duration::from_millis(100);
+
+/// Workers without work that may ask once a second all together.
+const IDLE_CALLS_S: f64 = 400.0;
+
+impl Dispatch {
+    /// Cases for a worker that is to have some.
+    pub(super) async fn hand_out(&self, worker: &str, cases_max: u32) -> Result<Lease, Status> {
+        let failed = |error: &DispatchError| {
+            tracing::error!("no cases can be handed out: {error:?}");
+            Status::unavailable(error.to_string())
+        };
+        let audit = self.audits.lease(worker, &self.campaigns).await;
+        if let Some(lease) = audit.map_err(|error| failed(&error))? {
+            return Ok(Lease::Cases(lease));
+        }
+        if self.had_nothing() {
+            return Ok(self.none_now());
+        }
+        let scope = self.settings.scope.as_ref();
+        let request = LeaseRequest {
+            campaign: scope.map(|scope| scope.campaign.clone()),
+            indices_below: scope.map_or(u32::MAX, |scope| scope.cases),
+            worker: worker.to_owned(),
+            cases_max: cases_max.min(self.campaigns.cases_per_lease(self.roster.present().1)),
+            now_unix_ms: self.now_unix_ms(),
+            lease_ms: unix_ms(self.settings.timing.lease),
+            after_loss: after_attempt,
+            alone_after: SUSPECT_AFTER,
+        };
+        let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
+        let Some(leased) = leased else {
+            let mut until = self.nothing_until.lock().expect("nobody panics while holding it");
+            *until = Some(Instant::now() + NOTHING.min(self.settings.timing.retry));
+            return Ok(self.none_now());
+        };
+        match self.campaigns.of(&leased.campaign).await {
+            Ok(served) => {
+                self.campaigns.leased(&served);
+                self.counts.leased.inc_by(leased.cases.len() as u64);
+                let cases = leased.cases.into_iter();
+                let cases = cases.map(|it| LeasedCase { case: it.case, epoch: it.epoch });
+                Ok(Lease::Cases(served.lease(cases.collect(), self.settings.timing.lease)))
+            }
+            Err(error) => {
+                self.give_up_campaign(worker, &leased).await;
+                Err(failed(&error))
+            }
+        }
+    }
+
+    /// A campaign that this version can't do must not hold up the others.
+    async fn give_up_campaign(&self, worker: &str, leased: &library::Lease) {
+        let held = leased.cases.iter();
+        let held = held.map(|it| library::Held { index: it.case.index, epoch: it.epoch });
+        let released = self.library.release(&leased.campaign, worker, held.collect()).await;
+        let paused = self.library.pause(&leased.campaign).await;
+        tracing::error!("campaign {} is paused: {released:?}, {paused:?}", leased.campaign);
+    }
+
+    fn had_nothing(&self) -> bool {
+        let until = self.nothing_until.lock().expect("nobody panics while holding it");
+        until.is_some_and(|until| until > Instant::now())
+    }
+
+    /// The more workers have nothing to do, the less often each asks.
+    fn none_now(&self) -> Lease {
+        let (workers, cores) = self.roster.present();
+        let crowd = f64::from(cores).max(workers as f64) / IDLE_CALLS_S;
+        let retry_after_s = self.settings.timing.retry.as_secs_f64().max(crowd);
+        Lease::NoneNow { retry_after_s, reason: None }
+    }
+}
+
+impl Served {
+    /// These cases, for a while.
+    pub(crate) fn lease(&self, cases: Vec<LeasedCase>, lease: Duration) -> CaseLease {
+        CaseLease {
+            campaign: self.record.id.clone(),
+            experiment_json: self.record.experiment_json.clone(),
+            experiment_hash: self.record.experiment_hash.clone(),
+            lease_s: lease.as_secs_f64(),
+            cases,
+            traceparent: String::new(),
+        }
+    }
+}

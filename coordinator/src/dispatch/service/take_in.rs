@@ -1,0 +1,115 @@
+//! Workers' results, into the library.
+
+use super::Dispatch;
+use crate::dispatch::after_attempt;
+use crate::dispatch::audits::{self, Found};
+use crate::dispatch::campaigns::Served;
+use crate::dispatch::messages::{library_report, unavailable};
+use crate::dispatch::roster::Standing;
+use std::sync::Arc;
+use tonic::Status;
+use tracktwin_library::{Report, Verdict, WorkerState};
+use tracktwin_protocol::{CaseReport, Outcome};
+use tracktwin_traces::Step;
+
+impl Dispatch {
+    /// Stores checked reports; those of audits are compared instead.
+    pub(super) async fn take_in(
+        &self,
+        worker: &str,
+        standing: Standing,
+        served: &Arc<Served>,
+        reports: Vec<CaseReport>,
+        step: &Step,
+    ) -> Result<Vec<Verdict>, Status> {
+        let mut verdicts = vec![Verdict::Refused; reports.len()];
+        let (mut places, mut ordinary) = (Vec::new(), Vec::new());
+        for (place, report) in reports.into_iter().enumerate() {
+            if report.epoch == audits::EPOCH {
+                verdicts[place] = self.audited(worker, served, &report).await?;
+            } else {
+                places.push(place);
+                ordinary.push(report);
+            }
+        }
+        if !ordinary.is_empty() {
+            let stored = self.store(worker, standing, served, ordinary, step).await?;
+            for (place, verdict) in places.into_iter().zip(stored) {
+                verdicts[place] = verdict;
+            }
+        }
+        Ok(verdicts)
+    }
+
+    async fn store(
+        &self,
+        worker: &str,
+        standing: Standing,
+        served: &Served,
+        reports: Vec<CaseReport>,
+        step: &Step,
+    ) -> Result<Vec<Verdict>, Status> {
+        let failed: Vec<bool> =
+            reports.iter().map(|it| matches!(it.outcome, Outcome::Failed { .. })).collect();
+        let durations_s: Vec<f64> = reports.iter().map(|it| it.duration_s).collect();
+        let step = Step::after("store", [&step.traceparent()]);
+        let report = Report {
+            campaign: served.record.id.clone(),
+            worker: worker.to_owned(),
+            code_version: standing.code_version,
+            model_hash: standing.model_hash,
+            experiment_hash: served.record.experiment_hash.clone(),
+            speeds_km_h: served.shape.speeds_km_h.clone(),
+            cases: reports.into_iter().map(library_report).collect(),
+            now_unix_ms: self.now_unix_ms(),
+            after_failure: after_attempt,
+            audit_share: self.settings.audit_share,
+        };
+        let verdicts = self.library.report(report).await.map_err(|error| {
+            step.fail(&error.to_string());
+            unavailable(&error)
+        })?;
+        let rows = verdicts.iter().filter(|it| matches!(it, Verdict::Stored)).count();
+        step.count("cases_stored", rows);
+        drop(step);
+        served.measured(durations_s);
+        if self.settings.put_aside && self.roster.reported(worker, &failed) {
+            tracing::warn!(worker, "put aside: it fails where other workers don't");
+            self.counts.put_aside.inc();
+        }
+        Ok(verdicts)
+    }
+
+    async fn audited(
+        &self,
+        worker: &str,
+        served: &Arc<Served>,
+        report: &CaseReport,
+    ) -> Result<Verdict, Status> {
+        let found = self.audits.report(worker, served, report).await;
+        Ok(match found.map_err(|error| unavailable(&error))? {
+            None => Verdict::Refused,
+            Some(Found::Agreement) => {
+                self.counts.audited.inc();
+                Verdict::Duplicate
+            }
+            Some(Found::Wrong { worker, reason }) => {
+                self.counts.audited.inc();
+                self.counts.differed.inc();
+                self.roster.quarantine(&worker, WorkerState::Quarantined, Some(reason));
+                Verdict::Duplicate
+            }
+        })
+    }
+
+    pub(super) fn count(&self, verdicts: &[Verdict]) {
+        for verdict in verdicts {
+            match verdict {
+                Verdict::Stored => self.counts.stored.inc(),
+                Verdict::Duplicate => self.counts.duplicates.inc(),
+                Verdict::Late => self.counts.late.inc(),
+                Verdict::Refused => self.counts.refused.inc(),
+            };
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Every command that the documents tell readers to type is one that the programs understand.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag};
+use std::fs;
+use std::path::{Path, PathBuf};
+use system_tests::run;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
+
+/// Every file with this ending in a folder and below.
+fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path, ending));
+        } else if path.extension().is_some_and(|it| it == ending) {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// What a page gives to a shell: its blocks of shell, and code within its text.
+fn shell(page: &str) -> String {
+    let mut shell = String::new();
+    let mut in_shell = true;
+    for event in Parser::new_ext(page, Options::ENABLE_TABLES) {
+        match event {
+            Event::Start(Tag::CodeBlock(kind)) => {
+                in_shell = matches!(kind, CodeBlockKind::Fenced(of) if &*of == "sh");
+            }
+            Event::End(_) => in_shell = false,
+            Event::Text(text) if in_shell => shell += &text,
+            Event::Code(code) => shell.extend([&*code, "\n"]),
+            _ => {}
+        }
+    }
+    shell
+}
+
+/// Commands of ours, each a program and what it is told.
+fn commands(shell: &str) -> Vec<(&'static str, Vec<String>)> {
+    let lines = shell.replace("\\\n", " ");
+    let words = lines.lines().filter_map(shlex::split);
+    let parts = words.flat_map(|words| {
+        words
+            .split(|it| matches!(it.as_str(), "&&" | "||" | "|" | "&" | ";"))
+            .map(<[_]>::to_vec)
+            .collect::<Vec<_>>()
+    });
+    parts.filter_map(command).collect()
+}
+
+/// Of the words of a command the program and what it is told; `tracktwin help` tells nothing to test.
+fn command(words: Vec<String>) -> Option<(&'static str, Vec<String>)> {
+    let mut words = words.into_iter().take_while(|it| !it.starts_with('>'));
+    let mut program = words.next()?;
+    if program == "cargo" {
+        // As in `cargo run --release -- ...`; examples are programs of their own.
+        let options: Vec<_> = words.by_ref().take_while(|it| it != "--").collect();
+        let ours = options.first().is_some_and(|it| it == "run")
+            && !options.contains(&"--example".to_owned());
+        program = if ours { "tracktwin".to_owned() } else { return None };
+    }
+    let program = match program.as_str() {
+        "tracktwin" => PROGRAM,
+        "tracktwin-worker" => WORKER,
+        _ => return None,
+    };
+    let told: Vec<String> =
+        words.map(|it| example(it.trim_matches(['[', ']'])).to_owned()).collect();
+    (told.first().is_none_or(|it| it != "help")).then_some((program, told))
+}
+
+/// For a placeholder that stands for one of few words or a number, one that it may stand for.
+fn example(word: &str) -> &str {
+    match word {
+        "INDEX" | "N" | "P" => "1",
+        "PHYSICS" => "rail_joint",
+        "SHELL" => "bash",
+        word => word,
+    }
+}
+
+#[test]
+fn documented_commands_are_understood() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut pages = files(&root.join("docs"), "md");
+    pages.push(root.join("README.md"));
+    let of_pages = pages.into_iter().map(|file| (shell(&fs::read_to_string(&file).unwrap()), file));
+    let scripts = files(&root.join("docs"), "sh").into_iter();
+    let of_scripts = scripts.map(|file| (fs::read_to_string(&file).unwrap(), file));
+    let mut count = 0;
+    for (shell, file) in of_pages.chain(of_scripts) {
+        for (program, mut told) in commands(&shell) {
+            // What follows is understood before help is given.
+            told.push("--help".to_owned());
+            let told: Vec<&str> = told.iter().map(String::as_str).collect();
+            let answer = run(program, &told);
+            assert_eq!(answer.code, Some(0), "{}: {told:?}: {}", file.display(), answer.err);
+            count += 1;
+        }
+    }
+    assert!(count > 50, "only {count} commands were found");
+}
