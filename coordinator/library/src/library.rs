@@ -2,13 +2,17 @@
 
 use crate::LibraryError;
 use crate::engine::{self, Opened, Readers, Target, Write, unix_ms};
+use crate::lease::Horizon;
 use std::fs::File;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A model library. Clones share its connections.
 #[derive(Clone)]
-pub struct Library(Arc<Opened>);
+pub struct Library {
+    opened: Arc<Opened>,
+    horizon: Arc<Horizon>,
+}
 
 /// The right to hand out a library's cases, until it is dropped.
 #[derive(Debug)]
@@ -30,7 +34,7 @@ impl Library {
     /// [`LibraryError`] when the URL is none, nothing is there, it is no library, or a later
     /// version of the program has written it.
     pub async fn open(url: &str) -> Result<Self, LibraryError> {
-        let library = Self(Arc::new(engine::open(url).await?));
+        let library = Self::of(engine::open(url).await?);
         library.add_missing_bins().await?;
         Ok(library)
     }
@@ -40,19 +44,23 @@ impl Library {
     /// # Errors
     /// As [`Library::open`]; and when the folder that should hold it is not there.
     pub async fn open_or_create(url: &str) -> Result<Self, LibraryError> {
-        Ok(Self(Arc::new(engine::open_or_create(url).await?)))
+        Ok(Self::of(engine::open_or_create(url).await?))
+    }
+
+    fn of(opened: Opened) -> Self {
+        Self { opened: Arc::new(opened), horizon: Arc::default() }
     }
 
     /// Finishes what was ordered and closes the connections. Whoever still holds a clone is told
     /// that the library is closed.
     pub async fn close(self) {
-        self.0.writer.close().await;
-        self.0.readers.close().await;
+        self.opened.writer.close().await;
+        self.opened.readers.close().await;
     }
 
     /// What it is called: its file, or its URL without user and password.
     pub fn name(&self) -> String {
-        self.0.target.name()
+        self.opened.target.name()
     }
 
     /// The library's clock, in ms since 1970: what leases are given and ended by.
@@ -60,7 +68,7 @@ impl Library {
     /// With `SQLite` it is this machine's. With PostgreSQL it is the server's, as compared when the
     /// library was opened, so that coordinators whose clocks differ agree on when a lease has ended.
     pub fn now_unix_ms(&self) -> i64 {
-        unix_ms().saturating_add(self.0.clock_ahead_ms)
+        unix_ms().saturating_add(self.opened.clock_ahead_ms)
     }
 
     /// Claims the right to hand out cases. With `SQLite` one process at a time has it; with
@@ -71,7 +79,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError::InUse`] when another process has it.
     pub fn claim(&self) -> Result<Claim, LibraryError> {
-        let Some(path) = self.0.target.path() else { return Ok(Claim { lock: None }) };
+        let Some(path) = self.opened.target.path() else { return Ok(Claim { lock: None }) };
         let mut name = path.as_os_str().to_owned();
         name.push("-lock");
         let failed = |source| LibraryError::Lock { library: self.name(), source };
@@ -86,14 +94,18 @@ impl Library {
     }
 
     pub(crate) fn target(&self) -> &Target {
-        &self.0.target
+        &self.opened.target
     }
 
     pub(crate) fn readers(&self) -> &Readers {
-        &self.0.readers
+        &self.opened.readers
+    }
+
+    pub(crate) fn horizon(&self) -> Arc<Horizon> {
+        self.horizon.clone()
     }
 
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
-        self.0.writer.write(write).await
+        self.opened.writer.write(write).await
     }
 }

@@ -40,8 +40,8 @@ async fn some_of_all(home: &Home) -> Library {
     let library = home.library(4).await;
     let leased = lease(&library, "w", 2, 0).await;
     report(&library, "w", vec![finished(&leased[0]), failed(&leased[1])]).await;
-    for _ in 0..2 {
-        let again = lease(&library, "w", 1, 0).await;
+    for later_ms in [100, 200] {
+        let again = lease(&library, "w", 1, later_ms).await;
         report(&library, "w", vec![failed(&again[0])]).await;
     }
     lease(&library, "w", 1, i64::MAX / 2).await;

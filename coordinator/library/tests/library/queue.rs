@@ -115,6 +115,20 @@ on_both_databases! {
         assert_eq!(lease(&library, "b", 2, 0).await[0].epoch, 2);
     }
 
+    async fn what_waits_again_is_seen_within_a_part_of_a_lease_and_before_there_is_nothing(
+        home: &Home
+    ) {
+        let library = home.library(6).await;
+        let mut index = async |now| lease(&library, "w", 1, now).await[0].case.index;
+        let first = lease(&library, "w", 2, 0).await;
+        library.release(CAMPAIGN, "w", vec![held(&first[0])]).await.unwrap();
+        // It looks on from where it was, and at everything every 41 ms.
+        assert_eq!((index(40).await, index(41).await, index(42).await), (2, 0, 3));
+        library.release(CAMPAIGN, "w", vec![held(&first[1])]).await.unwrap();
+        assert_eq!((index(43).await, index(44).await, index(45).await), (4, 5, 1));
+        assert_eq!(lease(&library, "w", 1, 46).await, []);
+    }
+
     async fn a_new_coordinator_takes_back_what_died_with_the_old_one(home: &Home) {
         let library = home.library(4).await;
         lease(&library, "w", 3, 0).await;

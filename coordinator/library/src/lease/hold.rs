@@ -1,0 +1,109 @@
+//! What a worker holds: kept, or taken back.
+
+use super::Held;
+use crate::engine::{Connection, Dialect, Row, Write, sql};
+use crate::{LibraryError, attempt};
+
+/// That a case is worker `$2`'s under one of the leases bound as `$3` and `$4`; see [`leases`].
+///
+/// The indices alone stand first: by them cases are found, in both databases.
+fn is_held(dialect: Dialect) -> String {
+    format!(
+        "campaign_id = $1 and worker = $2 and state = 'leased' and sobol_index {}
+            and ((sobol_index << 32) | epoch) {}",
+        dialect.listed("$3"),
+        dialect.listed("$4")
+    )
+}
+
+/// Indices of leases, and these with their epochs as one number each.
+fn leases(held: &[Held]) -> (Vec<i64>, Vec<i64>) {
+    let index = |held: &Held| i64::from(held.index);
+    held.iter().map(|held| (index(held), index(held) << 32 | i64::from(held.epoch))).unzip()
+}
+
+pub(super) struct Renew {
+    pub(super) campaign: String,
+    pub(super) worker: String,
+    pub(super) held: Vec<Held>,
+    pub(super) until_unix_ms: i64,
+}
+
+impl Write for Renew {
+    type Answer = Vec<Held>;
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
+    async fn apply(&self, connection: &mut Connection) -> Result<Vec<Held>, LibraryError> {
+        let renew = format!(
+            "update campaign_case set lease_expires_unix_ms = $5 where {}
+            returning sobol_index, epoch",
+            is_held(connection.dialect())
+        );
+        let (indices, leases) = leases(&self.held);
+        let renew = sql(renew)
+            .bind(&self.campaign)
+            .bind(&self.worker)
+            .bind(indices)
+            .bind(leases)
+            .bind(self.until_unix_ms);
+        let rows = connection.rows(renew).await?;
+        let held = |row: &Row| {
+            Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? })
+        };
+        let renewed = rows.iter().map(held).collect::<Result<Vec<_>, LibraryError>>()?;
+        Ok(self.held.iter().copied().filter(|held| !renewed.contains(held)).collect())
+    }
+}
+
+pub(super) struct Release {
+    pub(super) campaign: String,
+    pub(super) worker: String,
+    pub(super) held: Vec<Held>,
+    pub(super) now_unix_ms: i64,
+}
+
+impl Write for Release {
+    type Answer = ();
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let theirs = is_held(connection.dialect());
+        let note = format!(
+            "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
+                ended_unix_ms, ending)
+            select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $5, 'returned'
+            from campaign_case where {theirs}
+            on conflict (campaign_id, sobol_index, epoch) do nothing"
+        );
+        let end = format!(
+            "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
+            where {theirs}"
+        );
+        let (indices, leases) = leases(&self.held);
+        let bound = |text| {
+            let (indices, leases) = (indices.clone(), leases.clone());
+            sql(text).bind(&self.campaign).bind(&self.worker).bind(indices).bind(leases)
+        };
+        connection.execute(bound(note).bind(self.now_unix_ms)).await?;
+        connection.execute(bound(end)).await.map(drop)
+    }
+}
+
+pub(super) struct ReleaseAll {
+    pub(super) campaign: String,
+    pub(super) now_unix_ms: i64,
+}
+
+impl Write for ReleaseAll {
+    type Answer = ();
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        attempt::end_all(connection, &self.campaign, "abandoned", self.now_unix_ms).await
+    }
+}

@@ -1,0 +1,118 @@
+//! Leases: handing cases out, keeping them, taking them back.
+
+mod hold;
+mod horizon;
+mod take;
+
+pub(crate) use horizon::Horizon;
+
+use crate::{Library, LibraryError, Policy};
+use hold::{Release, ReleaseAll, Renew};
+use take::Take;
+use tracktwin_parameters::Case;
+
+/// A worker's wish for cases.
+#[derive(Clone, Debug)]
+pub struct LeaseRequest {
+    /// Only cases of this campaign; else of the running one with the largest priority, the oldest
+    /// among equals.
+    pub campaign: Option<String>,
+    /// Only cases with a smaller index.
+    pub indices_below: u32,
+    /// Who asks.
+    pub worker: String,
+    /// Most cases wanted.
+    pub cases_max: u32,
+    /// The library's clock.
+    pub now_unix_ms: i64,
+    /// How long the lease lasts without renewal.
+    pub lease_ms: i64,
+    /// What becomes of cases whose lease has expired.
+    pub after_loss: Policy,
+    /// Attempts without result after which a case is handed out alone: if it is what ends its
+    /// workers, it takes no other case with it.
+    pub alone_after: u32,
+}
+
+/// Cases handed to a worker, all of one campaign.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lease {
+    /// The campaign.
+    pub campaign: String,
+    /// The cases, by ascending index; at least one.
+    pub cases: Vec<Leased>,
+}
+
+/// A case handed to a worker.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leased {
+    /// The case.
+    pub case: Case,
+    /// Which lease of this case it is, from 1.
+    pub epoch: u32,
+}
+
+/// A case under a certain lease.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Held {
+    /// Place in the campaign.
+    pub index: u32,
+    /// Which lease of the case.
+    pub epoch: u32,
+}
+
+impl Library {
+    /// Hands out waiting cases of a campaign that is running, the first first. There are none for a
+    /// worker in quarantine.
+    ///
+    /// Expired leases are ended, and cases that wait again are seen, several times in the length of a
+    /// lease, and before it is said that there are none.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn lease(&self, request: LeaseRequest) -> Result<Option<Lease>, LibraryError> {
+        self.write(Take { request, horizon: self.horizon() }).await
+    }
+
+    /// Lets leases last until `until_unix_ms`; answers those that are no longer the worker's.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn renew(
+        &self,
+        campaign: &str,
+        worker: &str,
+        held: Vec<Held>,
+        until_unix_ms: i64,
+    ) -> Result<Vec<Held>, LibraryError> {
+        let (campaign, worker) = (campaign.to_owned(), worker.to_owned());
+        self.write(Renew { campaign, worker, held, until_unix_ms }).await
+    }
+
+    /// Takes back cases that their worker did not begin; no attempt is counted.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn release(
+        &self,
+        campaign: &str,
+        worker: &str,
+        held: Vec<Held>,
+    ) -> Result<(), LibraryError> {
+        let (campaign, worker) = (campaign.to_owned(), worker.to_owned());
+        let now_unix_ms = self.now_unix_ms();
+        self.write(Release { campaign, worker, held, now_unix_ms }).await
+    }
+
+    /// Takes back every lease of a campaign; no attempt is counted.
+    ///
+    /// For a coordinator whose workers die with it, so that none can be alive when it starts, and
+    /// that is alone: see [`crate::Claim::is_exclusive`].
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn release_all(&self, campaign: &str) -> Result<(), LibraryError> {
+        let now_unix_ms = self.now_unix_ms();
+        self.write(ReleaseAll { campaign: campaign.to_owned(), now_unix_ms }).await
+    }
+}
