@@ -119,7 +119,7 @@ on_both_databases! {
         home: &Home
     ) {
         let library = home.library(6).await;
-        let mut index = async |now| lease(&library, "w", 1, now).await[0].case.index;
+        let index = async |now| lease(&library, "w", 1, now).await[0].case.index;
         let first = lease(&library, "w", 2, 0).await;
         library.release(CAMPAIGN, "w", vec![held(&first[0])]).await.unwrap();
         // It looks on from where it was, and at everything every 41 ms.
