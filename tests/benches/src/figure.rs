@@ -39,12 +39,15 @@ pub fn figure(title: &str, x_name: &str, y_name: &str, curves: &[Curve]) -> Stri
         for value in ticks(low, high) {
             let [x, y] = at(if axis == 0 { (value, axes[1][0]) } else { (axes[0][0], value) });
             let (line, text) = if axis == 0 {
-                (format!("M{x:.1} {y:.1}V{MARGIN}"), format!(r#"x="{x:.1}" y="{:.1}""#, y + 16.0))
+                (
+                    format!("M{x:.1} {y:.1}V{MARGIN}"),
+                    format!(r#"x="{x:.1}" y="{:.1}" text-anchor="middle""#, y + 16.0),
+                )
             } else {
                 let end = SIZE[0] - MARGIN;
                 (
                     format!("M{x:.1} {y:.1}H{end}"),
-                    format!(r#"x="{:.1}" y="{:.1}""#, x - 38.0, y + 4.0),
+                    format!(r#"x="{:.1}" y="{:.1}" text-anchor="end""#, x - 6.0, y + 4.0),
                 )
             };
             let _ = write!(svg, r##"<path d="{line}" stroke="#ddd"/><text {text}>{value}</text>"##);
@@ -68,18 +71,20 @@ pub fn figure(title: &str, x_name: &str, y_name: &str, curves: &[Curve]) -> Stri
     svg + "</svg>\n"
 }
 
-/// A range that holds all values with some room.
+/// A range that holds all values with some room: a decade at least, so that what is level looks so.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = values
         .fold([f64::INFINITY, 0.0_f64], |[low, high], value| [low.min(value), high.max(value)]);
-    [low / 1.3, high * 1.3]
+    let room = (10.0 / (high / low)).sqrt().max(1.3);
+    [low / room, high * room]
 }
 
-/// 1, 2 and 5 times powers of ten within a range.
+/// Powers of ten within a range; of less than two decades 2 and 5 times them too.
 fn ticks(low: f64, high: f64) -> Vec<f64> {
     let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
+    let digits: &[u8] = if high / low < 100.0 { &[1, 2, 5] } else { &[1] };
     let digits = decades.flat_map(|decade| {
-        [1, 2, 5].map(|digit| format!("{digit}e{decade}").parse().unwrap_or(f64::NAN))
+        digits.iter().map(move |digit| format!("{digit}e{decade}").parse().unwrap_or(f64::NAN))
     });
     digits.filter(|value: &f64| (low..=high).contains(value)).collect()
 }
