@@ -98,6 +98,23 @@ impl Farm {
         Process::start(&mut worker, "worker")
     }
 
+    /// A far worker that is at work is cut off for longer than its lease, while what it holds goes to a
+    /// near one; the rest is left to it alone.
+    pub(crate) fn outlives_a_cut(
+        &self,
+        cut: impl FnOnce(),
+        near: impl FnOnce() -> Process,
+        mend: impl FnOnce(),
+    ) {
+        self.reach(4);
+        cut();
+        let near = near();
+        std::thread::sleep(Duration::from_secs(3));
+        near.kill();
+        assert!(!self.is_done() && self.leased_again() > 0, "nothing is left for the far worker");
+        mend();
+    }
+
     /// Waits until a coordinator says that everything is done.
     pub(crate) fn finish(coordinator: &mut Process) {
         assert_eq!(coordinator.ended(PATIENCE).code(), Some(0));

@@ -3,7 +3,6 @@
 
 use crate::farm::{Engine, Farm, PROGRAM, WORKER};
 use std::process::{Command, id};
-use std::time::Duration;
 use system_tests::{Process, free_port, run, skipped};
 
 /// A host that is a network namespace, with a cable to this one.
@@ -81,14 +80,7 @@ fn cable_is_pulled(engine: Engine, number: u32) {
         Process::start(&mut command, "worker")
     };
     let far = worker(host.command(WORKER));
-    farm.reach(4);
-    host.unplug();
-    // Longer than the lease: what the far worker holds goes to the near one.
-    let near = worker(Command::new(WORKER));
-    std::thread::sleep(Duration::from_secs(3));
-    near.kill();
-    assert!(!farm.is_done() && farm.leased_again() > 0, "nothing is left for the far worker");
-    host.plug();
+    farm.outlives_a_cut(|| host.unplug(), || worker(Command::new(WORKER)), || host.plug());
     Farm::finish(&mut coordinator);
     drop(far);
     farm.assert_undisturbed();
