@@ -18,6 +18,7 @@ mod error;
 mod lease;
 mod library;
 mod overview;
+mod pace;
 mod provenance;
 mod recent;
 mod report;

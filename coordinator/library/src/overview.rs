@@ -1,14 +1,8 @@
 //! How all campaigns stand, at a glance.
 
 use crate::engine::{Row, sql};
-use crate::tally::interval;
+use crate::pace::Pace;
 use crate::{CampaignState, Library, LibraryError, Status};
-
-/// What the rate is a mean over, and the begun interval, in s.
-const RATE_OVER_S: i64 = 60;
-
-/// A first report in a new interval is no rate of thousands.
-const SHORTEST_S: f64 = 1.0;
 
 /// Causes of failure that are told apart for one campaign.
 const CAUSES_MAX: u32 = 20;
@@ -28,7 +22,8 @@ pub struct CampaignOverview {
     pub created_at: String,
     /// How many cases stand where.
     pub status: Status,
-    /// Cases finished a second: in the last minute or a little more, or since the campaign's first results.
+    /// Cases finished a second: in the last minute or a little more, or since the campaign's first
+    /// results, or the first after a pause.
     pub per_second: f64,
     /// Mean computing time of these cases, in s.
     pub mean_case_s: Option<f64>,
@@ -51,26 +46,14 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
     pub async fn overview(&self) -> Result<Vec<CampaignOverview>, LibraryError> {
-        let now_unix_ms = self.now_unix_ms();
-        let since_unix_s = interval(now_unix_ms) - RATE_OVER_S;
-        let ask = "select campaign_status.*,
-                (select cast(coalesce(sum(finished), 0) as bigint) from progress
-                where progress.campaign_id = campaign_status.campaign_id
-                    and from_unix_s >= $1) as finished_lately,
-                (select sum(busy_s) from progress
-                where progress.campaign_id = campaign_status.campaign_id
-                    and from_unix_s >= $1) as busy_s,
-                (select min(from_unix_s) from progress
-                where progress.campaign_id = campaign_status.campaign_id) as first_unix_s
-            from campaign_status order by created_at, campaign_id";
+        let paces = self.paces().await?;
+        let ask = "select * from campaign_status order by created_at, campaign_id";
         let mut overviews = Vec::new();
-        for row in self.readers().rows(sql(ask).bind(since_unix_s)).await? {
-            let first_unix_s: Option<i64> = row.get("first_unix_s")?;
-            let counted_from_unix_s = first_unix_s.map_or(since_unix_s, |it| it.max(since_unix_s));
-            let over_s = now_unix_ms as f64 / 1000.0 - counted_from_unix_s as f64;
-            let mut overview = overview(&row, over_s.max(SHORTEST_S))?;
+        for row in self.readers().rows(sql(ask)).await? {
+            let id: String = row.get("campaign_id")?;
+            let mut overview = overview(&row, paces.get(&id).copied().unwrap_or_default())?;
             if overview.status.failed > 0 {
-                overview.causes = self.causes(&overview.id).await?;
+                overview.causes = self.causes(&id).await?;
             }
             overviews.push(overview);
         }
@@ -88,10 +71,8 @@ impl Library {
     }
 }
 
-/// What a row says; its cases were finished within `over_s`.
-fn overview(row: &Row, over_s: f64) -> Result<CampaignOverview, LibraryError> {
-    let finished = f64::from(row.get_u32("finished_lately")?);
-    let busy_s: Option<f64> = row.get("busy_s")?;
+/// What a row says of a campaign that goes at this pace.
+fn overview(row: &Row, pace: Pace) -> Result<CampaignOverview, LibraryError> {
     let priority: i64 = row.get("priority")?;
     Ok(CampaignOverview {
         id: row.get("campaign_id")?,
@@ -106,8 +87,8 @@ fn overview(row: &Row, over_s: f64) -> Result<CampaignOverview, LibraryError> {
             finished: row.get_u32("finished")?,
             failed: row.get_u32("failed")?,
         },
-        per_second: finished / over_s,
-        mean_case_s: busy_s.filter(|_| finished > 0.0).map(|busy_s| busy_s / finished),
+        per_second: pace.per_second,
+        mean_case_s: pace.mean_case_s,
         causes: Vec::new(),
     })
 }

@@ -14,6 +14,7 @@ use std::time::Duration;
 use tokio::net::TcpListener;
 use tracktwin_library::Library;
 use tracktwin_traces::Export;
+use tracktwin_worker::Token;
 
 /// What `coordinator` is told.
 #[derive(Args)]
@@ -35,6 +36,9 @@ pub(super) struct Arguments {
     /// more while it runs; with none it serves what the library holds.
     #[arg(long = "campaign", value_name = "FILE")]
     campaigns: Vec<PathBuf>,
+    /// How many cases, instead of the campaigns' own number.
+    #[arg(long, value_name = "N", requires = "campaigns")]
+    cases: Option<u32>,
     /// Library to fill: sqlite:PATH or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
     library: String,
@@ -81,7 +85,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         pages.check(address).context("--dashboard").or_input()?;
     }
     let _traces = Export::from_environment("tracktwin-coordinator").or_input()?;
-    let campaigns = arguments.campaigns.iter().map(|path| Campaign::read(path, None));
+    let campaigns = arguments.campaigns.iter().map(|path| Campaign::read(path, arguments.cases));
     let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
     let library = Library::open_or_create(&arguments.library).await.or_input()?;
     for campaign in &campaigns {
@@ -135,6 +139,8 @@ fn token(path: &Path) -> anyhow::Result<String> {
         "{}: the file is empty; `tracktwin certs` makes a token",
         path.display()
     );
+    // One that no worker could show would lock all of them out.
+    Token::new(&text).with_context(|| path.display().to_string())?;
     Ok(text)
 }
 

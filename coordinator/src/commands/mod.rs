@@ -23,7 +23,7 @@ mod trial;
 use stop::{OrInput, Stop};
 
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;
 
 /// Digital twin of railway track: how stiff are railpad, sleeper and ballast, sleeper by sleeper,
@@ -164,7 +164,12 @@ fn log_to_stderr(program: &Program) {
     };
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(usual));
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    // Colours are for eyes: in a file they are noise.
+    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(colours)
+        .with_writer(std::io::stderr);
     match program.log_format {
         LogFormat::Text => log.init(),
         LogFormat::Json => log.json().init(),

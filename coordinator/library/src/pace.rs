@@ -1,0 +1,124 @@
+//! How fast campaigns go, from what was finished in each ten seconds of the last minute.
+
+use crate::engine::sql;
+use crate::tally::{INTERVAL_S, interval};
+use crate::{Library, LibraryError};
+use std::collections::HashMap;
+
+/// What the rate is a mean over, and the begun interval, in s.
+const OVER_S: i64 = 60;
+
+/// A first report in a new interval is no rate of thousands.
+const SHORTEST_S: f64 = 1.0;
+
+/// A time without results is a pause if so many should have come in it at the rate that followed.
+const MISSING_IN_A_PAUSE: f64 = 10.0;
+
+/// And if it is longer than a worker takes for so many cases, some of which it hands in together.
+const CASES_IN_A_PAUSE: f64 = 16.0;
+
+/// How fast a campaign goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Pace {
+    /// Cases finished a second.
+    pub(crate) per_second: f64,
+    /// Mean computing time of a case, in s.
+    pub(crate) mean_case_s: Option<f64>,
+}
+
+/// What was finished in an interval.
+#[derive(Clone, Copy, Debug)]
+struct Interval {
+    from_unix_s: i64,
+    finished: f64,
+    busy_s: f64,
+}
+
+impl Library {
+    /// The paces of campaigns that have finished something lately.
+    pub(crate) async fn paces(&self) -> Result<HashMap<String, Pace>, LibraryError> {
+        let now_unix_ms = self.now_unix_ms();
+        let since_unix_s = interval(now_unix_ms) - OVER_S;
+        let ask = "select campaign.id, from_unix_s, cast(sum(finished) as bigint) as finished,
+                sum(busy_s) as busy_s,
+                (select min(from_unix_s) from progress where campaign_id = campaign.id) as first_unix_s
+            from campaign join progress on campaign_id = campaign.id and from_unix_s >= $1
+            group by campaign.id, from_unix_s order by campaign.id, from_unix_s";
+        let rows = self.readers().rows(sql(ask).bind(since_unix_s)).await?;
+        let mut campaigns: HashMap<String, (i64, Vec<Interval>)> = HashMap::new();
+        for row in &rows {
+            let begun_unix_s = since_unix_s.max(row.get("first_unix_s")?);
+            let (_, intervals) =
+                campaigns.entry(row.get("id")?).or_insert((begun_unix_s, Vec::new()));
+            intervals.push(Interval {
+                from_unix_s: row.get("from_unix_s")?,
+                finished: f64::from(row.get_u32("finished")?),
+                busy_s: row.get("busy_s")?,
+            });
+        }
+        let now_unix_s = now_unix_ms as f64 / 1000.0;
+        let pace = |(begun, intervals): (i64, Vec<Interval>)| pace(&intervals, begun, now_unix_s);
+        Ok(campaigns.into_iter().map(|(id, campaign)| (id, pace(campaign))).collect())
+    }
+}
+
+/// The pace of these intervals, ascending: since `begun_unix_s`, or since the last pause.
+fn pace(intervals: &[Interval], begun_unix_s: i64, now_unix_s: f64) -> Pace {
+    let all: f64 = intervals.iter().map(|it| it.finished).sum();
+    let busy_s: f64 = intervals.iter().map(|it| it.busy_s).sum();
+    let mean_case_s = (all > 0.0).then(|| busy_s / all);
+    let rate = |finished: f64, since_unix_s: i64| {
+        finished / (now_unix_s - since_unix_s as f64).max(SHORTEST_S)
+    };
+    let mut finished = 0.0;
+    for (place, latest) in intervals.iter().enumerate().rev() {
+        finished += latest.finished;
+        let earlier = place.checked_sub(1).map(|place| intervals[place].from_unix_s + INTERVAL_S);
+        let still_s = (latest.from_unix_s - earlier.unwrap_or(begun_unix_s)) as f64;
+        let per_second = rate(finished, latest.from_unix_s);
+        if still_s * per_second > MISSING_IN_A_PAUSE
+            && still_s > CASES_IN_A_PAUSE * mean_case_s.unwrap_or(0.0)
+        {
+            return Pace { per_second, mean_case_s };
+        }
+    }
+    Pace { per_second: rate(all, begun_unix_s), mean_case_s }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Intervals that begin so many seconds after 1970, with cases of so many seconds.
+    fn intervals(finished: &[(i64, f64)], case_s: f64) -> Vec<Interval> {
+        let interval = |&(from_unix_s, finished): &(i64, f64)| Interval {
+            from_unix_s,
+            finished,
+            busy_s: case_s * finished,
+        };
+        finished.iter().map(interval).collect()
+    }
+
+    #[test]
+    fn after_a_pause_the_rate_is_that_since_then() {
+        let paused = intervals(&[(0, 250.0), (50, 240.0), (60, 60.0)], 0.1);
+        assert_eq!(pace(&paused, 0, 62.0).per_second, 25.0);
+        // A campaign that stood still for longer than is looked at.
+        let resumed = intervals(&[(50, 250.0), (60, 50.0)], 0.1);
+        assert_eq!(pace(&resumed, 0, 62.0).per_second, 25.0);
+    }
+
+    #[test]
+    fn results_that_come_seldom_or_many_at_a_time_are_no_pauses() {
+        let seldom = intervals(&[(0, 1.0), (30, 1.0), (60, 1.0)], 20.0);
+        assert_eq!(pace(&seldom, 0, 66.0).per_second, 3.0 / 66.0);
+        let many_at_a_time = intervals(&[(0, 128.0), (30, 128.0), (60, 128.0)], 2.0);
+        assert_eq!(pace(&many_at_a_time, 0, 64.0).per_second, 6.0);
+    }
+
+    #[test]
+    fn the_mean_of_a_case_is_that_of_the_last_minute() {
+        assert_eq!(pace(&intervals(&[(0, 3.0), (50, 1.0)], 0.5), 0, 60.0).mean_case_s, Some(0.5));
+        assert_eq!(pace(&intervals(&[(0, 0.0)], 0.5), 0, 60.0), Pace::default());
+    }
+}

@@ -1,0 +1,92 @@
+//! A worker as a batch system has it: its exit code says whether to start it again, and its log is a file.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+use system_tests::{Answer, COARSE_MODEL, Process, free_port, run, until};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
+
+/// Longer than anything here takes, on a busy machine too.
+const LONG: Duration = Duration::from_mins(1);
+
+/// A coordinator without work that wants a token, and its address.
+fn coordinator(folder: &Path) -> (Process, String) {
+    fs::write(folder.join("token"), "a-token-of-thirty-two-characters").unwrap();
+    let address = format!("127.0.0.1:{}", free_port());
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(folder).args(["coordinator", "--library", "sqlite:library.sqlite"]);
+    command.args(["--token-file", "token", "--listen", &address]);
+    let process = Process::start(&mut command, "coordinator");
+    until("the coordinator listens", LONG, || std::net::TcpStream::connect(&address).is_ok());
+    (process, format!("http://{address}"))
+}
+
+fn worker(arguments: &[&str]) -> Answer {
+    run(WORKER, &[&["--cores", "1"], arguments].concat())
+}
+
+#[test]
+fn a_worker_without_coordinator_may_be_started_again() {
+    let nobody = format!("http://127.0.0.1:{}", free_port());
+    let answer = worker(&["--coordinator", &nobody, "--give-up-after", "1"]);
+    assert_eq!(answer.code, Some(3), "{}", answer.err);
+    assert!(answer.err.contains("does not answer"), "it logs: {}", answer.err);
+    assert!(!answer.err.contains('\u{1b}'), "colours are for terminals: {}", answer.err);
+}
+
+#[test]
+fn a_refused_worker_is_not_to_be_started_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_coordinator, address) = coordinator(folder.path());
+    let answer = worker(&["--coordinator", &address]);
+    assert_eq!(answer.code, Some(2), "{}", answer.err);
+    assert!(answer.err.contains("--token-file"), "{}", answer.err);
+}
+
+#[test]
+fn a_token_that_no_worker_can_show_is_refused_by_the_coordinator() {
+    let folder = tempfile::tempdir().unwrap();
+    let token = folder.path().join("token");
+    let library = folder.path().join("library.sqlite");
+    let (file, url) = (token.display().to_string(), format!("sqlite:{}", library.display()));
+    for wrong in ["", "two words", "schlüssel"] {
+        fs::write(&token, wrong).unwrap();
+        let answer = run(PROGRAM, &["coordinator", "--library", &url, "--token-file", &file]);
+        assert_eq!(answer.code, Some(2), "{wrong}: {}", answer.err);
+        assert!(answer.err.contains(&file) && answer.err.contains("certs"), "{}", answer.err);
+        assert!(!library.exists());
+    }
+}
+
+#[test]
+fn a_worker_without_work_or_told_to_stop_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_coordinator, address) = coordinator(folder.path());
+    let token = folder.path().join("token").display().to_string();
+    let arguments = ["--coordinator", &address, "--token-file", &token];
+    let answer = worker(&[&arguments[..], &["--idle-exit", "1"]].concat());
+    assert_eq!(answer.code, Some(0), "{}", answer.err);
+
+    // What it holds is given back before it ends.
+    let campaign = folder.path().join("campaign.toml");
+    fs::write(&campaign, format!("name = \"much\"\ncases = 100000\n{COARSE_MODEL}")).unwrap();
+    let library = format!("sqlite:{}", folder.path().join("library.sqlite").display());
+    let campaign = campaign.display().to_string();
+    run(PROGRAM, &["campaign", "add", &campaign, "--library", &library]).succeeded();
+    let leased = || {
+        let ask = "select count(*) from campaign_case where state = 'leased'";
+        let ask = ["library", "sql", ask, "--library", &library, "--format", "csv"];
+        run(PROGRAM, &ask).succeeded().lines().nth(1) != Some("0")
+    };
+    let mut command = Command::new(WORKER);
+    let mut told = Process::start(command.args(arguments).args(["--cores", "1"]), "worker");
+    until("it has cases", LONG, leased);
+    told.signal("TERM");
+    assert_eq!(told.ended(Duration::from_secs(10)).code(), Some(0));
+    assert!(!leased(), "everything was handed in or given back");
+}
