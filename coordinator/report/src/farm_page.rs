@@ -103,6 +103,16 @@ impl FarmCampaign {
         self.waiting + self.leased + self.finished + self.failed
     }
 
+    /// Whether every case has its results or was given up.
+    pub const fn is_done(&self) -> bool {
+        self.waiting + self.leased == 0
+    }
+
+    /// How it stands, for people: its state, or that it is done.
+    pub fn standing(&self) -> &str {
+        if self.is_done() { "done" } else { &self.state }
+    }
+
     /// How long the rest takes at the present rate, in s.
     pub fn eta_s(&self) -> Option<f64> {
         let left = f64::from(self.waiting + self.leased);
@@ -136,8 +146,7 @@ pub fn farm_view(farm: &Farm) -> Markup {
 
 /// What a reader in a hurry needs, in one sentence.
 fn summary(farm: &Farm) -> String {
-    let running =
-        farm.campaigns.iter().filter(|it| it.state == "running" && it.waiting + it.leased > 0);
+    let running = farm.campaigns.iter().filter(|it| it.state == "running" && !it.is_done());
     let rate: f64 = farm.campaigns.iter().map(|campaign| campaign.per_second).sum();
     let alive = farm.workers.iter().filter(|worker| worker.silent_s < 60.0).count();
     format!(
@@ -148,35 +157,36 @@ fn summary(farm: &Farm) -> String {
     )
 }
 
+/// Below the pictures of a campaign.
+const CAPTION: &str = "Left: local wavelet power spectra of the newest cases at the fastest speed. \
+    Right: finished cases in the parameter space; given-up ones in the second colour.";
+
 fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
     let FarmCampaign { waiting, leased, finished, failed, .. } = campaign;
     let pictures = pictures(campaign);
     html! {
-            section {
-                h2 { (campaign.id) " " span.state { (campaign.state) } }
-                (progress(campaign))
-                p {
-                    (finished) " of " (campaign.cases()) " cases finished, " (leased) " in work, "
-                    (waiting) " waiting, "
-                    span.bad[*failed > 0] { (failed) " given up" } "; "
-                    (significant(campaign.per_second)) " a second, "
-    (left(campaign))
-                    @if campaign.priority != 0 { ", priority " (campaign.priority) }
-                }
-                @if may_control { (buttons(campaign)) }
-                @if !campaign.causes.is_empty() { (causes(&campaign.causes)) }
-                @if !pictures.is_empty() {
-                    (figure(&pictures, "Left: local wavelet power spectra of the newest cases at the fastest speed. Right: finished cases in the parameter space; given-up ones in the second colour."))
-                }
+        section {
+            h2 { (campaign.id) " " span.state { (campaign.standing()) } }
+            (progress(campaign))
+            p {
+                (finished) " of " (campaign.cases()) " cases finished, " (leased) " in work, "
+                (waiting) " waiting, "
+                span.bad[*failed > 0] { (failed) " given up" } "; "
+                (significant(campaign.per_second)) " a second, " (left(campaign))
+                @if campaign.priority != 0 { ", priority " (campaign.priority) }
             }
+            @if may_control { (buttons(campaign)) }
+            @if !campaign.causes.is_empty() { (causes(&campaign.causes)) }
+            @if !pictures.is_empty() { (figure(&pictures, CAPTION)) }
         }
+    }
 }
 
 fn left(campaign: &FarmCampaign) -> String {
     match campaign.eta_s() {
         Some(eta) => format!("{} left", duration(eta)),
-        None if campaign.waiting + campaign.leased > 0 => "rate not known yet".to_owned(),
-        None => "nothing left to do".to_owned(),
+        None if campaign.is_done() => "nothing left to do".to_owned(),
+        None => "rate not known yet".to_owned(),
     }
 }
 
@@ -203,7 +213,11 @@ fn buttons(campaign: &FarmCampaign) -> Markup {
     };
     html! {
         p {
-            @if campaign.state == "running" { (button("pause")) } @else { (button("resume")) }
+            @match (campaign.is_done(), campaign.state.as_str()) {
+                (true, _) => {}
+                (_, "running") => { (button("pause")) }
+                _ => { (button("resume")) }
+            }
             @if campaign.failed > 0 { (button("retry")) }
         }
     }
@@ -357,6 +371,17 @@ mod tests {
         let locked = Farm { may_control: false, ..farm() };
         let page = farm_page(&locked);
         assert!(!page.contains("campaign/pause") && page.contains("action=\"login\""));
+    }
+
+    #[test]
+    fn a_campaign_without_cases_left_is_done() {
+        let mut done = farm();
+        let campaign = &mut done.campaigns[0];
+        (campaign.waiting, campaign.leased, campaign.finished) = (0, 0, 99);
+        let page = farm_page(&done);
+        assert!(page.contains(">done<") && !page.contains("campaign/pause"));
+        // What was given up can be tried again.
+        assert!(page.contains("campaign/retry"));
     }
 
     #[test]

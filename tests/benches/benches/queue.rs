@@ -7,31 +7,14 @@
 //! `docs/figures/leases.svg`. Libraries are made in `$TRACKTWIN_BENCH_DIR`, or here; N cases take 15 kB
 //! each.
 
-use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 use test_postgres::{Server, Settings};
-use tokio::task::JoinSet;
-use tracktwin_benches::{Curve, figure};
-use tracktwin_library::{
-    CampaignRecord, CaseReport, Held, LeaseRequest, Leased, Library, Report, State, Verdict,
-};
-use tracktwin_parameters::{Case, Parameter, ParameterSet};
-use tracktwin_signal::{Features, ThirdOctave};
-
-type Failure = Box<dyn Error + Send + Sync>;
-
-const CAMPAIGN: &str = "queue";
-
-/// Workers that ask at the same time.
-const WORKERS: u32 = 8;
+use tracktwin_benches::{CAMPAIGN, Curve, Failure, figure, fill, finish, lease};
+use tracktwin_library::{Held, Library};
 
 /// Leases of one case after another whose mean is told.
 const LEASES: u32 = 200;
-
-/// Three passes of 500 bins: 12 kB a case.
-const SPEEDS_KM_H: [f64; 3] = [7.0, 10.0, 13.0];
-const BINS: usize = 500;
 
 #[tokio::main]
 async fn main() -> Result<(), Failure> {
@@ -102,31 +85,6 @@ fn ms(begin: Instant) -> f64 {
     1e3 * begin.elapsed().as_secs_f64()
 }
 
-async fn fill(library: &Library, cases: u32) -> Result<(), Failure> {
-    let record = CampaignRecord {
-        id: CAMPAIGN.to_owned(),
-        name: CAMPAIGN.to_owned(),
-        definition_json: "{}".to_owned(),
-        definition_hash: "definition".to_owned(),
-        experiment_json: "{}".to_owned(),
-        experiment_hash: "experiment".to_owned(),
-        speeds_km_h: SPEEDS_KM_H.to_vec(),
-        seed: 1,
-    };
-    library.insert_campaign(&record).await?;
-    for start in (0..cases).step_by(4096) {
-        let chunk: Vec<Case> = (start..cases.min(start + 4096)).map(case).collect();
-        library.insert_cases(CAMPAIGN, &chunk).await?;
-    }
-    Ok(())
-}
-
-fn case(index: u32) -> Case {
-    let stiffness = 1e7 * (1.0 + f64::from(index) / 1e6);
-    let parameters = ParameterSet::nominal().with(Parameter::BallastStiffness, stiffness);
-    Case { index, parameters, surface_seed: index.into() }
-}
-
 /// What a lease of one case costs in the mean, one after another, in ms; they are given back.
 async fn leases(library: &Library) -> Result<f64, Failure> {
     let mut held = Vec::new();
@@ -138,71 +96,4 @@ async fn leases(library: &Library) -> Result<f64, Failure> {
     let held = held.iter().map(|it| Held { index: it.case.index, epoch: it.epoch }).collect();
     library.release(CAMPAIGN, "one by one", held).await?;
     Ok(each_ms)
-}
-
-/// Has so many cases done by the workers together.
-async fn finish(library: &Library, cases: u32, batch: u32) -> Result<(), Failure> {
-    let mut workers = JoinSet::new();
-    for worker in 0..WORKERS {
-        let share = cases / WORKERS + u32::from(worker < cases % WORKERS);
-        let library = library.clone();
-        workers.spawn(async move { work(&library, &format!("w{worker}"), share, batch).await });
-    }
-    while let Some(worked) = workers.join_next().await {
-        worked??;
-    }
-    Ok(())
-}
-
-async fn work(library: &Library, worker: &str, cases: u32, batch: u32) -> Result<(), Failure> {
-    let mut left = cases;
-    while left > 0 {
-        let leased = lease(library, worker, batch.min(left)).await?;
-        left -= u32::try_from(leased.len())?;
-        let report = Report {
-            campaign: CAMPAIGN.to_owned(),
-            worker: worker.to_owned(),
-            code_version: "0.1.0".to_owned(),
-            model_hash: "model".to_owned(),
-            experiment_hash: "experiment".to_owned(),
-            speeds_km_h: SPEEDS_KM_H.to_vec(),
-            cases: leased.iter().map(finished).collect(),
-            now_unix_ms: library.now_unix_ms(),
-            after_failure: |_, _| State::Waiting,
-            audit_share: 0.0,
-        };
-        let verdicts = library.report(report).await?;
-        assert!(verdicts.iter().all(|verdict| *verdict == Verdict::Stored));
-    }
-    Ok(())
-}
-
-async fn lease(library: &Library, worker: &str, cases_max: u32) -> Result<Vec<Leased>, Failure> {
-    let request = LeaseRequest {
-        campaign: Some(CAMPAIGN.to_owned()),
-        indices_below: u32::MAX,
-        worker: worker.to_owned(),
-        cases_max,
-        now_unix_ms: library.now_unix_ms(),
-        lease_ms: 12_000,
-        after_loss: |_, _| State::Waiting,
-        alone_after: u32::MAX,
-    };
-    let lease = library.lease(request).await?;
-    Ok(lease.ok_or("nothing waits: give more cases")?.cases)
-}
-
-fn finished(leased: &Leased) -> CaseReport {
-    let phase = f64::from(leased.case.index);
-    let features = |speed: f64| Features {
-        log_power: (0..BINS).map(|bin| (phase + speed * bin as f64).sin()).collect(),
-        band_levels_db: vec![phase.cos(); ThirdOctave::COUNT],
-    };
-    CaseReport {
-        index: leased.case.index,
-        epoch: leased.epoch,
-        parameter_hash: leased.case.parameter_hash(),
-        duration_s: 0.02,
-        outcome: Ok(SPEEDS_KM_H.map(features).to_vec()),
-    }
 }

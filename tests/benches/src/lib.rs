@@ -7,8 +7,10 @@ mod cases;
 mod clock;
 mod features;
 mod figure;
+mod stand_in;
 
 pub use cases::{Track, cases};
-pub use clock::{Cost, by_the_clock, cost, once};
+pub use clock::{Cost, by_the_clock, cost, cpu_of_threads, once};
 pub use features::{axle_box, feature_vectors, library};
 pub use figure::{Curve, figure};
+pub use stand_in::{CAMPAIGN, Failure, fill, finish, lease};
