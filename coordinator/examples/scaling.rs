@@ -1,5 +1,5 @@
 //! Where a farm saturates: a discrete-event simulation of workers that lease, compute and report at
-//! one library, with service times as the benchmark `farm` measures them.
+//! one library, with service times as the benchmark `service_times` measures them.
 //!
 //! `cargo run --release -p tracktwin --example scaling -- [--lease-ms X] [--case-ms Y]`
 //!
@@ -120,8 +120,8 @@ fn argument(name: &str, usual: f64) -> f64 {
 
 fn main() {
     let service = Service {
-        lease_s: argument("--lease-ms", 1.0) / 1000.0,
-        case_s: argument("--case-ms", 0.12) / 1000.0,
+        lease_s: argument("--lease-ms", 0.4) / 1000.0,
+        case_s: argument("--case-ms", 0.07) / 1000.0,
     };
     println!("| s a case | nodes of {CORES} cores | cases a second | cores busy | library busy |");
     println!("|---|---|---|---|---|");
