@@ -1,8 +1,10 @@
-//! Every command that the documents tell readers to type is one that the programs understand.
+//! Every command that the documents tell readers to type, and every setting of the files for deployment, is
+//! one that the programs understand.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use system_tests::run;
@@ -106,4 +108,27 @@ fn documented_commands_are_understood() {
         }
     }
     assert!(count > 50, "only {count} commands were found");
+}
+
+/// Names of our settings in a text: `TRACKTWIN_...`.
+fn settings(text: &str) -> BTreeSet<&str> {
+    let words = text.split(|it: char| !(it.is_ascii_uppercase() || it == '_'));
+    words.filter(|it| it.starts_with("TRACKTWIN_") && !it.ends_with('_')).collect()
+}
+
+#[test]
+fn settings_of_deployed_programs_are_understood() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let helps = [run(PROGRAM, &["coordinator", "--help"]), run(WORKER, &["--help"])];
+    let help: String = helps.into_iter().map(|it| it.succeeded()).collect();
+    let known = settings(&help);
+    let deployed = fs::read_dir(root.join("docs/deploy")).unwrap().map(|it| it.unwrap().path());
+    let mut count = 0;
+    for file in deployed.chain([root.join("docker-compose.yml")]) {
+        for setting in settings(&fs::read_to_string(&file).unwrap()) {
+            assert!(known.contains(setting), "{}: {setting}", file.display());
+            count += 1;
+        }
+    }
+    assert!(count > 10, "only {count} settings were found");
 }
