@@ -2,6 +2,8 @@
 FROM rust:1.95-slim-bookworm AS build
 RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
+# Line tables would be four fifths of the program.
+ENV CARGO_PROFILE_RELEASE_STRIP=debuginfo
 COPY . .
 # Registry and target are kept between builds; the program is copied out of the cache.
 RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \

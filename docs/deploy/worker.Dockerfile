@@ -4,6 +4,8 @@
 FROM rust:1.95-slim-bookworm AS build
 RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
+# Line tables would be four fifths of the program.
+ENV CARGO_PROFILE_RELEASE_STRIP=debuginfo
 COPY . .
 RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \
     cargo build --release --locked -p tracktwin-worker && cp target/release/tracktwin-worker /tracktwin-worker

@@ -7,7 +7,7 @@ use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use system_tests::run;
+use system_tests::{Answer, run};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
@@ -120,7 +120,7 @@ fn settings(text: &str) -> BTreeSet<&str> {
 fn settings_of_deployed_programs_are_understood() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let helps = [run(PROGRAM, &["coordinator", "--help"]), run(WORKER, &["--help"])];
-    let help: String = helps.into_iter().map(|it| it.succeeded()).collect();
+    let help: String = helps.into_iter().map(Answer::succeeded).collect();
     let known = settings(&help);
     let deployed = fs::read_dir(root.join("docs/deploy")).unwrap().map(|it| it.unwrap().path());
     let mut count = 0;

@@ -7,6 +7,7 @@ mod axis;
 mod chart;
 mod diagnosis_page;
 mod evaluation_page;
+mod farm;
 mod farm_page;
 mod inspection_page;
 mod map_picture;
@@ -20,7 +21,8 @@ mod track_picture;
 
 pub use diagnosis_page::{Origin, diagnosis_page};
 pub use evaluation_page::evaluation_page;
-pub use farm_page::{Farm, FarmCampaign, FarmWorker, duration, farm_page, farm_view};
+pub use farm::{Farm, FarmCampaign, FarmWorker, duration};
+pub use farm_page::{farm_page, farm_view};
 pub use inspection_page::{Inspected, InspectedCurve, Inspection, inspection_page};
 pub use models_page::{Tested, models_page};
 pub use receptance::{ReceptanceCurve, receptance_chart};

@@ -84,18 +84,14 @@ fn campaign_text(text: &mut String, campaign: &FarmCampaign) {
     let share = f64::from(*finished) / f64::from(cases.max(1));
     let full = (share * BAR as f64) as usize;
     let bar = format!("{}{}", "█".repeat(full), "░".repeat(BAR - full));
-    let left = match campaign.eta_s() {
-        Some(eta) => format!("{} left", duration(eta)),
-        None if campaign.is_done() => "nothing left to do".to_owned(),
-        None => "rate not known yet".to_owned(),
-    };
     let _ = write!(
         text,
-        "\n{id}  ({})\n{bar} {:5.1} %  {:.1} cases/s  {left}\n\
+        "\n{id}  ({})\n{bar} {:5.1} %  {:.1} cases/s  {}\n\
          {cases} cases: {finished} finished, {leased} in work, {waiting} waiting, {failed} given up\n",
         campaign.standing(),
         100.0 * share,
         campaign.per_second,
+        campaign.left(),
     );
     for (cause, count) in campaign.causes.iter().take(CAUSES) {
         let _ = writeln!(text, "  {count} given up: {cause}");

@@ -1,0 +1,141 @@
+//! A farm at one moment: campaigns, workers, newest results, and the space covered so far.
+
+use tracktwin_parameters::ParameterSet;
+
+/// Everything that is shown of a farm, at one moment.
+#[derive(Clone, Debug, Default)]
+pub struct Farm {
+    /// What the library is called.
+    pub library: String,
+    /// When, for people.
+    pub at: String,
+    /// The campaigns, in the order they are worked on.
+    pub campaigns: Vec<FarmCampaign>,
+    /// The workers, those heard of last first.
+    pub workers: Vec<FarmWorker>,
+    /// Whether the reader may press buttons.
+    pub may_control: bool,
+}
+
+/// A campaign as it stands.
+#[derive(Clone, Debug, Default)]
+pub struct FarmCampaign {
+    /// Its id.
+    pub id: String,
+    /// `running`, `paused` or `cancelled`.
+    pub state: String,
+    /// Cases of the largest are handed out first.
+    pub priority: i64,
+    /// Cases nobody works on.
+    pub waiting: u32,
+    /// Cases that workers hold.
+    pub leased: u32,
+    /// Cases with results.
+    pub finished: u32,
+    /// Cases that were given up.
+    pub failed: u32,
+    /// Cases finished a second, lately.
+    pub per_second: f64,
+    /// Why cases were given up, and how many so.
+    pub causes: Vec<(String, u32)>,
+    /// Frequencies of the spectra in Hz.
+    pub frequencies_hz: Vec<f64>,
+    /// ln LWPS of the newest cases at the fastest speed, with what each is called.
+    pub newest: Vec<(String, Vec<f64>)>,
+    /// Finished cases, or an even share of them where there are many.
+    pub covered: Vec<ParameterSet>,
+    /// Cases that were given up.
+    pub given_up: Vec<ParameterSet>,
+}
+
+/// A worker as it was last heard of.
+#[derive(Clone, Debug, Default)]
+pub struct FarmWorker {
+    /// Its name.
+    pub id: String,
+    /// Version of its program.
+    pub code_version: String,
+    /// Groups of cases it simulates at a time.
+    pub cores: u32,
+    /// Results it has brought.
+    pub finished: u64,
+    /// Failures it has reported.
+    pub failed: u64,
+    /// Mean computing time of a case in s.
+    pub case_s: Option<f64>,
+    /// For how long it was not heard of, in s.
+    pub silent_s: f64,
+    /// Why it gets no cases, if so.
+    pub aside: Option<String>,
+}
+
+impl FarmCampaign {
+    /// All cases.
+    pub const fn cases(&self) -> u32 {
+        self.waiting + self.leased + self.finished + self.failed
+    }
+
+    /// Whether every case has its results or was given up.
+    pub const fn is_done(&self) -> bool {
+        self.waiting + self.leased == 0
+    }
+
+    /// How it stands, for people: its state, or that it is done.
+    pub fn standing(&self) -> &str {
+        if self.is_done() { "done" } else { &self.state }
+    }
+
+    /// How long the rest takes at the present rate, in s; none where nothing is handed out.
+    pub fn eta_s(&self) -> Option<f64> {
+        let left = f64::from(self.waiting + self.leased);
+        let goes_on = self.state == "running" && self.per_second > 0.0 && left > 0.0;
+        goes_on.then(|| left / self.per_second)
+    }
+
+    /// What there is to say of the rest, for people.
+    pub fn left(&self) -> String {
+        match self.eta_s() {
+            Some(eta_s) => format!("{} left", duration(eta_s)),
+            None if self.is_done() => "nothing left to do".to_owned(),
+            None if self.state != "running" => "nothing is handed out".to_owned(),
+            None => "rate not known yet".to_owned(),
+        }
+    }
+}
+
+/// A time as people say it: the two largest units that matter.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.max(0.0).round() as u64;
+    let (days, hours, minutes) = (whole / 86_400, whole / 3600 % 24, whole / 60 % 60);
+    match (days, hours, minutes) {
+        (0, 0, 0) => format!("{whole} s"),
+        (0, 0, _) => format!("{minutes} min {} s", whole % 60),
+        (0, ..) => format!("{hours} h {minutes} min"),
+        _ => format!("{days} d {hours} h"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_paused_campaign_has_no_time_left() {
+        let running = FarmCampaign {
+            state: "running".to_owned(),
+            waiting: 60,
+            leased: 10,
+            per_second: 2.0,
+            ..FarmCampaign::default()
+        };
+        assert_eq!(running.left(), "35 s left");
+        let paused = FarmCampaign { state: "paused".to_owned(), ..running };
+        assert_eq!((paused.eta_s(), paused.left().as_str()), (None, "nothing is handed out"));
+    }
+
+    #[test]
+    fn durations_have_two_units() {
+        let said = [12.0, 75.0, 3_700.0, 200_000.0].map(duration);
+        assert_eq!(said, ["12 s", "1 min 15 s", "1 h 1 min", "2 d 7 h"]);
+    }
+}
