@@ -1,10 +1,11 @@
 //! What a worker holds: kept, or taken back.
 
 use super::Held;
-use crate::engine::{Connection, Dialect, Row, Write, sql};
+use crate::engine::{Connection, Dialect, Row, Statement, Write, sql};
 use crate::{LibraryError, attempt};
 
-/// That a case is worker `$2`'s under one of the leases bound as `$3` and `$4`; see [`leases`].
+/// That a case is worker `$2`'s under one of its leases: their indices are `$3`, and these with their
+/// epochs as one number each `$4`.
 ///
 /// The indices alone stand first: by them cases are found, in both databases.
 fn is_held(dialect: Dialect) -> String {
@@ -16,10 +17,13 @@ fn is_held(dialect: Dialect) -> String {
     )
 }
 
-/// Indices of leases, and these with their epochs as one number each.
-fn leases(held: &[Held]) -> (Vec<i64>, Vec<i64>) {
+/// A statement about leases of a worker, bound as [`is_held`] wants them.
+fn about(text: String, campaign: &str, worker: &str, held: &[Held]) -> Statement {
     let index = |held: &Held| i64::from(held.index);
-    held.iter().map(|held| (index(held), index(held) << 32 | i64::from(held.epoch))).unzip()
+    let indices: Vec<_> = held.iter().map(index).collect();
+    let leases: Vec<_> =
+        held.iter().map(|held| index(held) << 32 | i64::from(held.epoch)).collect();
+    sql(text).bind(campaign).bind(worker).bind(indices).bind(leases)
 }
 
 pub(super) struct Renew {
@@ -42,13 +46,7 @@ impl Write for Renew {
             returning sobol_index, epoch",
             is_held(connection.dialect())
         );
-        let (indices, leases) = leases(&self.held);
-        let renew = sql(renew)
-            .bind(&self.campaign)
-            .bind(&self.worker)
-            .bind(indices)
-            .bind(leases)
-            .bind(self.until_unix_ms);
+        let renew = about(renew, &self.campaign, &self.worker, &self.held).bind(self.until_unix_ms);
         let rows = connection.rows(renew).await?;
         let held = |row: &Row| {
             Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? })
@@ -85,11 +83,7 @@ impl Write for Release {
             "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
             where {theirs}"
         );
-        let (indices, leases) = leases(&self.held);
-        let bound = |text| {
-            let (indices, leases) = (indices.clone(), leases.clone());
-            sql(text).bind(&self.campaign).bind(&self.worker).bind(indices).bind(leases)
-        };
+        let bound = |text| about(text, &self.campaign, &self.worker, &self.held);
         connection.execute(bound(note).bind(self.now_unix_ms)).await?;
         connection.execute(bound(end)).await.map(drop)
     }
