@@ -1,10 +1,9 @@
 //! The command line of `tracktwin-worker`: arguments, signals, log and exit codes.
 
 use crate::agent::{self, AgentError, Config};
-use crate::{Credentials, Token};
+use crate::{Credentials, LogFormat, Token, log_to_stderr};
 use anyhow::Context;
-use clap::{Parser, ValueEnum};
-use std::io::IsTerminal;
+use clap::Parser;
 use std::net::SocketAddr;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -13,6 +12,8 @@ use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
 use tracktwin_traces::{Export, ExportError};
 
 /// Exit code for wrong arguments, and for a worker that is of no use to its coordinator.
@@ -91,19 +92,10 @@ struct Arguments {
     log_format: LogFormat,
 }
 
-/// How log lines look.
-#[derive(Clone, Copy, ValueEnum)]
-enum LogFormat {
-    /// For people.
-    Text,
-    /// For machines: one JSON object a line.
-    Json,
-}
-
 /// Reads the command line, works, and turns the end into an exit code.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    log_to_stderr(arguments.log_format);
+    log_to_stderr(arguments.log_format, filter());
     let config = match config(&arguments) {
         Ok(config) => config,
         Err(error) => return report(&error, REFUSED),
@@ -200,21 +192,9 @@ fn stop_on_signals(shutdown: CancellationToken) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Sends warnings, or what `RUST_LOG` asks for, to standard error.
-fn log_to_stderr(format: LogFormat) {
-    let filter = tracing_subscriber::EnvFilter::builder()
-        .with_default_directive(tracing_subscriber::filter::LevelFilter::WARN.into())
-        .from_env_lossy();
-    // Colours are for eyes: in a file they are noise.
-    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_ansi(colours)
-        .with_writer(std::io::stderr);
-    match format {
-        LogFormat::Text => log.init(),
-        LogFormat::Json => log.json().init(),
-    }
+/// Warnings, or what `RUST_LOG` asks for.
+fn filter() -> EnvFilter {
+    EnvFilter::builder().with_default_directive(LevelFilter::WARN.into()).from_env_lossy()
 }
 
 #[cfg(test)]

@@ -22,9 +22,11 @@ mod trial;
 
 use stop::{OrInput, Stop};
 
-use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
-use std::io::{ErrorKind, IsTerminal, Write};
+use clap::{CommandFactory, Parser, Subcommand};
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
+use tracing_subscriber::EnvFilter;
+use tracktwin_worker::{LogFormat, log_to_stderr};
 
 /// Digital twin of railway track: how stiff are railpad, sleeper and ballast, sleeper by sleeper,
 /// from the vibration of a passing axle box.
@@ -43,15 +45,6 @@ struct Program {
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text,
           env = "TRACKTWIN_LOG_FORMAT")]
     log_format: LogFormat,
-}
-
-/// How log lines look.
-#[derive(Clone, Copy, ValueEnum)]
-enum LogFormat {
-    /// For people.
-    Text,
-    /// For machines: one JSON object a line.
-    Json,
 }
 
 /// The subcommands.
@@ -101,7 +94,7 @@ enum Command {
 /// Reads the command line, runs one command and turns its end into an exit code.
 pub fn main() -> ExitCode {
     let program = Program::parse();
-    log_to_stderr(&program);
+    log_to_stderr(program.log_format, filter(&program));
     match run(program.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Stop::Negative) => ExitCode::from(1),
@@ -155,25 +148,14 @@ fn run(command: Command) -> Result<(), Stop> {
     }
 }
 
-/// Sends warnings, a service's course, or what `RUST_LOG` asks for, to standard error.
-fn log_to_stderr(program: &Program) {
+/// Warnings, a service's course, or what `RUST_LOG` asks for.
+fn filter(program: &Program) -> EnvFilter {
     // A statement over a whole library takes a second or more: that is no fault.
     let usual = match program.command {
         Command::Coordinator(_) => "warn,tracktwin=info,sqlx::query=error",
         _ => "warn,sqlx::query=error",
     };
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(usual));
-    // Colours are for eyes: in a file they are noise.
-    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_ansi(colours)
-        .with_writer(std::io::stderr);
-    match program.log_format {
-        LogFormat::Text => log.init(),
-        LogFormat::Json => log.json().init(),
-    }
+    EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual))
 }
 
 fn asynchronously(work: impl Future<Output = Result<(), Stop>>) -> Result<(), Stop> {

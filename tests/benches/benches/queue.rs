@@ -10,7 +10,7 @@
 use std::path::Path;
 use std::time::Instant;
 use test_postgres::{Server, Settings};
-use tracktwin_benches::{CAMPAIGN, Curve, Failure, figure, fill, finish, lease};
+use tracktwin_benches::{CAMPAIGN, Curve, Failure, figure, fill, finish, lease, sqlite_library};
 use tracktwin_library::{Held, Library};
 
 /// Leases of one case after another whose mean is told.
@@ -30,9 +30,7 @@ async fn main() -> Result<(), Failure> {
     };
     let mut curves = Vec::new();
     if wanted("sqlite") {
-        let home = std::env::var("TRACKTWIN_BENCH_DIR").unwrap_or_else(|_| ".".into());
-        let folder = tempfile::tempdir_in(home)?;
-        let url = format!("sqlite:{}", folder.path().join("l.sqlite").display());
+        let (_folder, url) = sqlite_library()?;
         curves.push(measure("SQLite, synchronous=FULL", &url, cases, batch).await?);
     }
     if wanted("postgres")

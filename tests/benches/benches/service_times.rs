@@ -6,7 +6,7 @@
 //! the database. A lease and its report cost `a`, a case in them `b`: the time of n leases of m cases is
 //! n a + n m b, fitted to the batches by least squares of the time a case.
 
-use tracktwin_benches::{Failure, cpu_of_threads, fill, finish};
+use tracktwin_benches::{Failure, cpu_of_threads, fill, finish, sqlite_library};
 use tracktwin_library::Library;
 
 /// Cases of a lease, and how many are done with leases of that size.
@@ -32,9 +32,7 @@ async fn main() -> Result<(), Failure> {
 
 /// What the writer takes for so many cases, a batch at a time, in s.
 async fn writer_s(batch: u32, cases: u32) -> Result<f64, Failure> {
-    let home = std::env::var("TRACKTWIN_BENCH_DIR").unwrap_or_else(|_| ".".into());
-    let folder = tempfile::tempdir_in(home)?;
-    let url = format!("sqlite:{}", folder.path().join("l.sqlite").display());
+    let (_folder, url) = sqlite_library()?;
     let library = Library::open_or_create(&url).await?;
     fill(&library, cases).await?;
     let before = cpu_of_threads(THREADS);

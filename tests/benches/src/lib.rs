@@ -13,4 +13,4 @@ pub use cases::{Track, cases};
 pub use clock::{Cost, by_the_clock, cost, cpu_of_threads, once};
 pub use features::{axle_box, feature_vectors, library};
 pub use figure::{Curve, figure};
-pub use stand_in::{CAMPAIGN, Failure, fill, finish, lease};
+pub use stand_in::{CAMPAIGN, Failure, fill, finish, lease, sqlite_library};

@@ -1,5 +1,6 @@
 //! Workers that compute nothing: they lease from a library, and report features of 12 kB a case.
 
+use tempfile::TempDir;
 use tokio::task::JoinSet;
 use tracktwin_library::{
     CampaignRecord, CaseReport, LeaseRequest, Leased, Library, Report, State, Verdict,
@@ -19,6 +20,17 @@ const WORKERS: u32 = 8;
 /// Three passes of 500 bins: 12 kB a case.
 const SPEEDS_KM_H: [f64; 3] = [7.0, 10.0, 13.0];
 const BINS: usize = 500;
+
+/// A folder in `$TRACKTWIN_BENCH_DIR`, or here, and the URL of an `SQLite` library in it.
+///
+/// # Errors
+/// When it can't be made.
+pub fn sqlite_library() -> Result<(TempDir, String), Failure> {
+    let home = std::env::var("TRACKTWIN_BENCH_DIR").unwrap_or_else(|_| ".".into());
+    let folder = tempfile::tempdir_in(home)?;
+    let url = format!("sqlite:{}", folder.path().join("l.sqlite").display());
+    Ok((folder, url))
+}
 
 /// Stores a campaign of so many cases.
 ///

@@ -150,8 +150,17 @@ impl Farm {
 
     /// Cases leased more than once.
     pub(crate) fn leased_again(&self) -> u64 {
-        let rows = self.ask("select count(*) as cases from campaign_case where epoch > 1");
-        rows[0]["cases"].as_u64().unwrap()
+        self.count("epoch > 1")
+    }
+
+    /// Cases that somebody holds.
+    pub(crate) fn leased(&self) -> u64 {
+        self.count("state = 'leased'")
+    }
+
+    fn count(&self, which: &str) -> u64 {
+        let ask = format!("select count(*) as cases from campaign_case where {which}");
+        self.ask(&ask)[0]["cases"].as_u64().unwrap()
     }
 
     /// For each case with a result how often it was leased, and when the result came.

@@ -95,6 +95,7 @@ fn a_worker_that_is_told_to_stop_hands_back_what_it_has_and_says_so_by_its_exit_
     let begun = Instant::now();
     assert_eq!(first.ended(Duration::from_secs(10)).code(), Some(0));
     eprintln!("it ended within {:.2} s", begun.elapsed().as_secs_f64());
+    assert_eq!(farm.leased(), 0, "it has handed everything in or back");
     let second = farm.worker();
     Farm::finish(&mut coordinator);
     drop(second);
