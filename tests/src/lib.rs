@@ -4,42 +4,7 @@ mod process;
 
 pub use process::{Process, free_port, until};
 
-use std::collections::BTreeSet;
-use std::io::Write;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::Mutex;
-
-/// The reference data that lies beside a checkout, if it is there.
-///
-/// Prints one line where it isn't, so that a skipped test says so.
-///
-/// # Panics
-/// When the data is missing although `TRACKTWIN_REQUIRE_SHARED` is set.
-pub fn shared_data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    assert!(
-        std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(),
-        "{} is demanded and missing",
-        folder.display()
-    );
-    skipped("tests on reference data; ../shared is not there");
-    None
-}
-
-/// Says once what is skipped and why, past the harness, which keeps what passing tests print.
-///
-/// # Panics
-/// Where a test has panicked here.
-pub fn skipped(what: &'static str) {
-    static SAID: Mutex<BTreeSet<&str>> = Mutex::new(BTreeSet::new());
-    if SAID.lock().expect("nobody panics while holding it").insert(what) {
-        let _ = writeln!(std::io::stderr(), "skipped: {what}");
-    }
-}
 
 /// Of a campaign where what is tested is the farm: a coarse, short model.
 pub const COARSE_MODEL: &str = "seed = 5\nspeeds_km_h = [13]\n\

@@ -5,7 +5,7 @@
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
-use system_tests::shared_data;
+use test_needs::shared_data;
 use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
 use tracktwin_signal::{PowerSpectrum, Signal};
 use tracktwin_track::model::{Mesh, Support, Surface, TrackModel};

@@ -6,8 +6,9 @@ use headless_chrome::browser::default_executable;
 use headless_chrome::{Browser, LaunchOptions, Tab};
 use std::process::Command;
 use std::time::Duration;
-use system_tests::{COARSE_MODEL, Process, free_port, run, skipped};
+use system_tests::{COARSE_MODEL, Process, free_port, run};
 use tempfile::TempDir;
+use test_needs::skipped;
 use ureq::http::Response;
 use ureq::{Agent, Body};
 

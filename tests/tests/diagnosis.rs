@@ -5,8 +5,9 @@
 
 use serde_json::Value;
 use std::path::Path;
-use system_tests::{Answer, run, shared_data};
+use system_tests::{Answer, run};
 use tempfile::TempDir;
+use test_needs::shared_data;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Recording;
 

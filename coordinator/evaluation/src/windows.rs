@@ -160,14 +160,8 @@ mod tests {
 
     #[test]
     fn the_sleepers_of_an_independent_recording_are_clean_but_for_the_outer_ones() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../../../shared/recordings/dev-01");
-        if !path.is_dir() {
-            assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "no {path:?}");
-            println!("skipped: ../shared is not there");
-            return;
-        }
-        let recording = Recording::open(path).unwrap();
+        let Some(shared) = test_needs::shared_data() else { return };
+        let recording = Recording::open(shared.join("recordings/dev-01")).unwrap();
         let extractor = Extractor::new(&tracktwin_signal::FeatureDefinition::default()).unwrap();
         let all = features(&recording, &extractor, &[7.0, 10.0, 13.0]).unwrap();
         let of = |id: &str| {

@@ -69,6 +69,14 @@ pub struct FarmWorker {
     pub aside: Option<String>,
 }
 
+impl FarmWorker {
+    /// Whether it was heard of within a minute. Idle ones of a large farm, and those put aside for a
+    /// while, ask less often than leases are renewed.
+    pub fn is_present(&self) -> bool {
+        self.silent_s < 60.0
+    }
+}
+
 impl FarmCampaign {
     /// All cases.
     pub const fn cases(&self) -> u32 {

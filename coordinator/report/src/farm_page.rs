@@ -59,9 +59,9 @@ pub fn farm_view(farm: &Farm) -> Markup {
 fn summary(farm: &Farm) -> String {
     let running = farm.campaigns.iter().filter(|it| it.state == "running" && !it.is_done());
     let rate: f64 = farm.campaigns.iter().map(|campaign| campaign.per_second).sum();
-    let alive = farm.workers.iter().filter(|worker| worker.silent_s < 60.0).count();
+    let present = farm.workers.iter().filter(|worker| worker.is_present()).count();
     format!(
-        "Campaigns with work to do: {} of {}; workers: {alive}; {} cases a second.",
+        "Campaigns with work to do: {} of {}; workers: {present}; {} cases a second.",
         running.count(),
         farm.campaigns.len(),
         significant(rate)

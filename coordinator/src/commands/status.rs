@@ -19,9 +19,6 @@ const CAUSES: usize = 3;
 /// Workers shown; the others are counted.
 const WORKERS: usize = 20;
 
-/// A worker heard of within this is alive, in s.
-const ALIVE_S: f64 = 60.0;
-
 /// Clears the screen and puts the cursor into its corner (ECMA-48).
 const CLEAR: &str = "\x1b[2J\x1b[H";
 
@@ -99,8 +96,9 @@ fn campaign_text(text: &mut String, campaign: &FarmCampaign) {
 }
 
 fn workers_text(text: &mut String, workers: &[FarmWorker]) {
-    let alive = workers.iter().filter(|worker| worker.silent_s < ALIVE_S).count();
-    let _ = writeln!(text, "\nworkers: {alive} alive, {} in the last hour", workers.len());
+    let present = workers.iter().filter(|worker| worker.is_present()).count();
+    let heard_of = workers.len();
+    let _ = writeln!(text, "\nworkers: {present} in the last minute, {heard_of} in the last hour");
     let width = workers.iter().map(|it| it.id.len()).max().unwrap_or(0).max("worker".len());
     let _ = writeln!(text, "{:width$}  cores  finished  failed  s a case  heard of", "worker");
     for worker in workers.iter().take(WORKERS) {
@@ -169,7 +167,7 @@ mod tests {
             "10.0 cases/s",
             "5 s left",
             "1 given up: the sleeper floats",
-            "workers: 25 alive",
+            "workers: 25 in the last minute, 25 in the last hour",
             "and 5 more",
         ] {
             assert!(text.contains(part), "{part} is not in\n{text}");

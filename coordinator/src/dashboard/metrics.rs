@@ -7,9 +7,6 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::Registry;
 use tracktwin_report::Farm;
 
-/// A worker heard of within this is alive, in s.
-const ALIVE_S: f64 = 60.0;
-
 type Labels = Vec<(&'static str, String)>;
 
 /// The farm's gauges and this coordinator's counts, in Prometheus' text format.
@@ -39,9 +36,9 @@ pub(crate) fn text(farm: &Farm, counts: &Counts) -> String {
     queue.set(i64::try_from(depth).unwrap_or(i64::MAX));
     registry.register("queue_depth", "Cases left in running campaigns: what to scale by", queue);
 
-    let alive = farm.workers.iter().filter(|worker| worker.silent_s < ALIVE_S);
+    let present = farm.workers.iter().filter(|worker| worker.is_present());
     let (workers, cores) =
-        alive.fold((0, 0), |(count, cores), worker| (count + 1, cores + i64::from(worker.cores)));
+        present.fold((0, 0), |(count, cores), worker| (count + 1, cores + i64::from(worker.cores)));
     let gauge = |value: i64| {
         let gauge = Gauge::<i64>::default();
         gauge.set(value);

@@ -6,7 +6,8 @@
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use serde_json::Value;
-use std::{f64::consts::TAU, ops::Range, path::Path};
+use std::{f64::consts::TAU, ops::Range};
+use test_needs::shared_data;
 use tracktwin_signal::{Conventions, Cwt, Morlet, Normalisation, Padding, squeeze};
 
 const RATE_HZ: f64 = 100_000.0;
@@ -19,17 +20,8 @@ const TOLERANCE: f64 = 1e-8;
 
 /// The reference's numbers, or nothing where it is not there and need not be.
 fn reference() -> Option<Value> {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../../shared/reference/sswt/reference_50_4000.json"
-    );
-    if Path::new(path).exists() {
-        let text = std::fs::read_to_string(path).unwrap();
-        return Some(serde_json::from_str(&text).unwrap());
-    }
-    assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "{path} is not there");
-    println!("skipped: ../shared is not there");
-    None
+    let file = shared_data()?.join("reference/sswt/reference_50_4000.json");
+    Some(serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap())
 }
 
 /// Two tones and a chirp from 400 to 3000 Hz (S1 of the reference).

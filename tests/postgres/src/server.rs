@@ -6,8 +6,12 @@ use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, Once, OnceLock};
+use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
+use test_needs::missing;
+
+/// What is said where no server is installed.
+const WITHOUT: &str = "tests on PostgreSQL; install postgresql, or set PG_BIN to its folder";
 
 /// When a server that does not answer has failed.
 const START_TIMEOUT: Duration = Duration::from_secs(30);
@@ -65,11 +69,7 @@ impl Server {
     /// As [`Server::shared`].
     pub fn start_in(folder: &Path, settings: Settings) -> Option<Self> {
         let Some(programs) = programs() else {
-            assert!(
-                std::env::var_os("TRACKTWIN_REQUIRE_POSTGRES").is_none(),
-                "a PostgreSQL server is demanded and not installed; set PG_BIN to its folder"
-            );
-            skipped();
+            missing("TRACKTWIN_REQUIRE_POSTGRES", WITHOUT);
             return None;
         };
         let number = SERVERS.fetch_add(1, Ordering::Relaxed);
@@ -163,15 +163,6 @@ impl Drop for Server {
             let _ = std::fs::remove_dir_all(&self.data);
         }
     }
-}
-
-/// Says so once, past the harness, which keeps what passing tests print.
-fn skipped() {
-    static SAID: Once = Once::new();
-    SAID.call_once(|| {
-        let line = "skipped: tests on PostgreSQL; install postgresql, or set PG_BIN to its folder";
-        let _ = writeln!(std::io::stderr(), "{line}");
-    });
 }
 
 fn initialise(programs: &Path, data: &Path) {

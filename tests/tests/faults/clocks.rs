@@ -3,7 +3,7 @@
 use crate::farm::{Engine, Farm};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use system_tests::skipped;
+use test_needs::skipped;
 
 /// Where Debian puts the library that tells a program another time of day.
 const FAKETIME: &str = "faketime/libfaketime.so.1";

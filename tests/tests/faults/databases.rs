@@ -4,7 +4,7 @@ use crate::farm::Farm;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use system_tests::skipped;
+use test_needs::skipped;
 use test_postgres::{Server, Settings};
 
 #[test]

@@ -3,7 +3,8 @@
 
 use crate::farm::{Engine, Farm, PROGRAM, WORKER};
 use std::process::{Command, id};
-use system_tests::{Process, free_port, run, skipped};
+use system_tests::{Process, free_port, run};
+use test_needs::skipped;
 
 /// A host that is a network namespace, with a cable to this one.
 struct Host {

@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
-use std::path::{Path, PathBuf};
+use test_needs::shared_data;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_track::model::Surface;
@@ -18,13 +18,8 @@ pub(crate) fn noise(seed: u64, count: usize) -> Vec<f64> {
 
 /// One of the shared recordings, unless they are absent.
 pub(crate) fn shared(name: &str) -> Option<Recording> {
-    let root: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    if root.is_dir() {
-        return Some(Recording::open(root.join("recordings").join(name)).unwrap());
-    }
-    assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "../shared is not there");
-    println!("skipped: ../shared is not there");
-    None
+    let folder = shared_data()?.join("recordings").join(name);
+    Some(Recording::open(folder).unwrap())
 }
 
 /// What a chain does to a pass: its index, its samples, its positions.

@@ -3,7 +3,7 @@
 use super::{Order, comb, flat, nominal_circumference_m, out_of_round};
 use crate::along::testing::{Rolled, hollow_m, noise, shared};
 use std::f64::consts::TAU;
-use std::path::Path;
+use test_needs::shared_data;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Pass;
 use tracktwin_signal::recording::import::{AccelerationUnit, Layout, import};
@@ -140,12 +140,8 @@ fn noise_has_no_comb() {
 
 #[test]
 fn the_wheel_of_a_real_recording_is_found_on_both_sides() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/real/aba-k1/aba-k1.csv");
-    if !file.is_file() {
-        assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "../shared is not there");
-        println!("skipped: ../shared is not there");
-        return;
-    }
+    let Some(shared) = shared_data() else { return };
+    let file = shared.join("real/aba-k1/aba-k1.csv");
     let layout = Layout {
         acceleration: vec!["acc_left".to_owned(), "acc_right".to_owned()],
         time: Some("t_s".to_owned()),

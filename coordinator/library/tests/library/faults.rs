@@ -4,6 +4,7 @@ use crate::support::{CAMPAIGN, Home, fill, finished, lease, report};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+use test_needs::skipped;
 use test_postgres::{Server, Settings};
 use tracktwin_library::{Leased, Library, LibraryError, Verdict};
 
@@ -110,7 +111,7 @@ impl SmallDisk {
         mount.args(["-t", "tmpfs", "-o", "size=8m", "tmpfs"]).arg(folder.path());
         let mounted = mount.stderr(Stdio::null()).status().is_ok_and(|status| status.success());
         if !mounted {
-            eprintln!("skipped: file systems cannot be mounted here");
+            skipped("a full disk; no file system may be mounted here");
         }
         mounted.then_some(Self(folder))
     }

@@ -4,7 +4,8 @@ use super::{Pass, Recording, Sleeper};
 use crate::Signal;
 use serde_json::{Value, json};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use test_needs::shared_data;
 
 const RATE_HZ: f64 = 1e4;
 
@@ -258,21 +259,10 @@ fn a_wrong_speed_a_short_pass_and_a_foreign_place_are_refused() {
     assert!(text.starts_with("recording.json: sleepers: none lies inside a pass"), "{text}");
 }
 
-/// The shared recordings, unless they are absent.
-fn shared_recordings() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/recordings");
-    if path.is_dir() {
-        return Some(path);
-    }
-    assert!(std::env::var_os("TRACKTWIN_REQUIRE_SHARED").is_none(), "../shared is not there");
-    println!("skipped: ../shared is not there");
-    None
-}
-
 #[test]
 fn an_independent_recording_opens_with_a_window_for_every_sleeper() {
-    let Some(shared) = shared_recordings() else { return };
-    let recording = Recording::open(shared.join("dev-01")).unwrap();
+    let Some(shared) = shared_data() else { return };
+    let recording = Recording::open(shared.join("recordings/dev-01")).unwrap();
     assert_eq!(recording.name, "dev-01");
     assert_eq!((recording.passes.len(), recording.sleepers.len()), (6, 29));
     assert_eq!(recording.speeds_km_h(), [7.0, 10.0, 13.0]);

@@ -1,0 +1,41 @@
+//! What tests need beyond the checkout, such as reference data or a server.
+//!
+//! Where it is missing, a test skips and the run says so in one line, unless it is demanded.
+
+use std::collections::BTreeSet;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// The reference data that lies beside a checkout, if it is there.
+///
+/// # Panics
+/// When it is missing although `TRACKTWIN_REQUIRE_SHARED` is set.
+pub fn shared_data() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    missing("TRACKTWIN_REQUIRE_SHARED", "tests on reference data; ../shared is not there");
+    None
+}
+
+/// Says that tests skip what they need, for it is missing.
+///
+/// # Panics
+/// When the environment has this variable: then it is demanded.
+pub fn missing(demanded_by: &str, what: &'static str) {
+    assert!(std::env::var_os(demanded_by).is_none(), "{demanded_by} is set, but skipped: {what}");
+    skipped(what);
+}
+
+/// Says once what is skipped and why, past the harness, which keeps what passing tests print.
+///
+/// # Panics
+/// Where a test has panicked here.
+pub fn skipped(what: &'static str) {
+    static SAID: Mutex<BTreeSet<&str>> = Mutex::new(BTreeSet::new());
+    if SAID.lock().expect("nobody panics while holding it").insert(what) {
+        let _ = writeln!(std::io::stderr(), "skipped: {what}");
+    }
+}
