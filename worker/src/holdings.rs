@@ -88,7 +88,6 @@ mod tests {
             campaign: campaign.to_owned(),
             experiment_json: String::new(),
             experiment_hash: String::new(),
-            lease_s: 1.0,
             cases: indices.map(|index| LeasedCase { case: case(index), epoch: 1 }).collect(),
             traceparent: String::new(),
         }

@@ -8,13 +8,15 @@ use crate::agent::AgentError;
 use crate::session::Session;
 use std::sync::Arc;
 use tokio::sync::mpsc;
-use tracktwin_protocol::{CaseLease, CaseReport};
+use tracktwin_protocol::{CaseLease, CaseReport, MESSAGE_BYTES_MAX, Outcome};
 
 /// Groups that may wait: some 500 cases, or a few megabytes.
 const GROUPS_WAITING: usize = 64;
 
-/// Cases in one report at most, so that a message stays well below the largest allowed.
+/// Cases and numbers in one report at most: a large message of an ordinary experiment, and a quarter of
+/// what is allowed of any.
 const CASES_A_REPORT: usize = 128;
+const NUMBERS_A_REPORT: usize = MESSAGE_BYTES_MAX / size_of::<f64>() / 4;
 
 /// Results of one group of cases.
 pub(crate) struct Finished {
@@ -34,7 +36,8 @@ impl Finished {
 
     /// Takes another group into the same report, if it belongs there and fits.
     fn join(&mut self, other: Self) -> Option<Self> {
-        let fits = self.reports.len() + other.reports.len() <= CASES_A_REPORT;
+        let fits = self.reports.len() + other.reports.len() <= CASES_A_REPORT
+            && self.numbers() + other.numbers() <= NUMBERS_A_REPORT;
         if fits && self.campaign == other.campaign && self.experiment_hash == other.experiment_hash
         {
             self.reports.extend(other.reports);
@@ -42,6 +45,17 @@ impl Finished {
             return None;
         }
         Some(other)
+    }
+
+    /// How many numbers are in its spectra.
+    fn numbers(&self) -> usize {
+        let of_outcome = |outcome: &Outcome| match outcome {
+            Outcome::Finished(passes) => {
+                passes.iter().map(|pass| pass.features.log_power.len()).sum()
+            }
+            Outcome::Failed { .. } => 0,
+        };
+        self.reports.iter().map(|report| of_outcome(&report.outcome)).sum()
     }
 }
 
@@ -80,7 +94,8 @@ pub(crate) async fn send(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tracktwin_protocol::Outcome;
+    use tracktwin_protocol::PassFeatures;
+    use tracktwin_signal::Features;
 
     fn finished(campaign: &str, cases: usize) -> Finished {
         let report = CaseReport {
@@ -105,5 +120,20 @@ mod tests {
         assert!(together.join(finished("b", 8)).is_some());
         assert!(together.join(finished("a", CASES_A_REPORT)).is_some());
         assert_eq!(together.reports.len(), 16);
+    }
+
+    #[test]
+    fn groups_of_long_spectra_share_none() {
+        let long = || {
+            let log_power = vec![0.0; NUMBERS_A_REPORT / 8];
+            let features = Features { log_power, band_levels_db: Vec::new() };
+            let mut finished = finished("a", 7);
+            for report in &mut finished.reports {
+                let pass = PassFeatures { speed_km_h: 7.0, features: features.clone() };
+                report.outcome = Outcome::Finished(vec![pass]);
+            }
+            finished
+        };
+        assert!(long().join(long()).is_some());
     }
 }

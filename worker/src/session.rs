@@ -26,6 +26,9 @@ const FIRST_HEARTBEAT: Duration = Duration::from_secs(1);
 /// Heartbeats lie between a twentieth of a second and a minute, whatever a coordinator says.
 const HEARTBEATS_S: [f64; 2] = [0.05, 60.0];
 
+/// Whoever is told to stop does not wait for longer: a scheduler gives ten seconds in all.
+const RELEASE_TIMEOUT: Duration = Duration::from_millis(1500);
+
 /// What the tasks of a worker share.
 pub(crate) struct Session {
     worker: String,
@@ -177,7 +180,7 @@ impl Session {
         Ok(())
     }
 
-    /// Gives back cases that were not simulated. What cannot be given back expires.
+    /// Gives back cases that were not simulated. What cannot be given back soon expires.
     pub(crate) async fn release(&self, lease: &CaseLease, held: Vec<(u32, u32)>) {
         self.holdings.let_go(&lease.campaign, held.iter().copied());
         let request = farm::ReleaseRequest {
@@ -189,9 +192,13 @@ impl Session {
             let request = request.clone();
             async move { client.release(request).await }
         };
-        if let Err(status) = self.coordinators.once(release).await {
-            tracing::warn!("cases not given back, their lease expires: {}", status.message());
-        }
+        let released = tokio::time::timeout(RELEASE_TIMEOUT, self.coordinators.once(release)).await;
+        let failed = match &released {
+            Ok(Ok(_)) => return,
+            Ok(Err(status)) => status.message(),
+            Err(_) => "no answer",
+        };
+        tracing::warn!("cases not given back, their lease expires: {failed}");
     }
 
     /// Renews what is held, for as long as the worker lives: a task of its own, so that no

@@ -41,6 +41,22 @@ pub(crate) async fn end(connection: &mut Connection, it: Ended<'_>) -> Result<()
     connection.execute(end).await.map(drop)
 }
 
+/// How many of a case's last so many attempts that count have failed.
+pub(crate) async fn failures(
+    connection: &mut Connection,
+    report: &Report,
+    index: u32,
+    attempts: u32,
+) -> Result<u32, LibraryError> {
+    let ask = "select count(*) as failures from (
+            select ending from attempt
+            where campaign_id = $1 and sobol_index = $2 and ending in ('failed', 'lost')
+            order by epoch desc limit $3) as counted
+        where ending = 'failed'";
+    let ask = sql(ask).bind(&report.campaign).bind(index).bind(attempts);
+    connection.row(ask).await?.map_or(Ok(0), |row| row.get_u32("failures"))
+}
+
 /// Ends every lease of a campaign; no attempt is counted.
 pub(crate) async fn end_all(
     connection: &mut Connection,
@@ -48,15 +64,32 @@ pub(crate) async fn end_all(
     ending: &'static str,
     now_unix_ms: i64,
 ) -> Result<(), LibraryError> {
-    let note = "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
+    let dialect = connection.dialect();
+    // What is leased after this stays leased.
+    let leased = format!(
+        "select sobol_index from campaign_case where campaign_id = $1 and state = 'leased'
+        order by sobol_index {}",
+        dialect.locking()
+    );
+    let leased = connection.rows(sql(leased).bind(campaign)).await?;
+    let leased = leased.iter().map(|row| row.get("sobol_index"));
+    let leased = leased.collect::<Result<Vec<i64>, _>>()?;
+    let note = format!(
+        "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
             ended_unix_ms, ending)
-        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $2, $3
-        from campaign_case where campaign_id = $1 and state = 'leased'
-        on conflict (campaign_id, sobol_index, epoch) do nothing";
-    connection.execute(sql(note).bind(campaign).bind(now_unix_ms).bind(ending)).await?;
-    let end = "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
-        where campaign_id = $1 and state = 'leased'";
-    connection.execute(sql(end).bind(campaign)).await.map(drop)
+        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $3, $4
+        from campaign_case where campaign_id = $1 and sobol_index {}
+        on conflict (campaign_id, sobol_index, epoch) do nothing",
+        dialect.listed("$2")
+    );
+    let note = sql(note).bind(campaign).bind(leased.clone()).bind(now_unix_ms).bind(ending);
+    connection.execute(note).await?;
+    let end = format!(
+        "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index {}",
+        dialect.listed("$2")
+    );
+    connection.execute(sql(end).bind(campaign).bind(leased)).await.map(drop)
 }
 
 /// Notes that a case's present lease is overtaken by the result of an earlier one.

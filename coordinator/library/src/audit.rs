@@ -6,11 +6,9 @@
 use crate::case::case_of;
 use crate::engine::{Connection, Row, Write, sql};
 use crate::report::CaseReport;
+use crate::worker::Flag;
 use crate::{Library, LibraryError, Report};
 use tracktwin_parameters::Case;
-
-/// Expired audits taken back with one request for audits.
-const AUDITS_MAX: u32 = 100;
 
 /// A finished case to be simulated again.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,8 +42,8 @@ pub struct AuditCounts {
 }
 
 impl Library {
-    /// Cases of a campaign for `worker` to audit, none of them its own; for `lease_ms`, after which
-    /// others may be asked.
+    /// Cases of a campaign for `worker` to audit, none of them its own and none while the campaign is
+    /// paused or cancelled; for `lease_ms`, after which others may be asked.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -57,13 +55,13 @@ impl Library {
         lease_ms: i64,
     ) -> Result<Vec<Audit>, LibraryError> {
         let (campaign, worker) = (campaign.to_owned(), worker.to_owned());
-        let cases_max = cases_max.min(AUDITS_MAX);
         let now_unix_ms = self.now_unix_ms();
         self.write(Sample { campaign, worker, cases_max, now_unix_ms, lease_ms }).await
     }
 
     /// Keeps what an auditor found; answers whose result it was about, or nothing where the audit
-    /// was not this worker's any more.
+    /// was not this worker's any more. Whoever is `wrong` is put into quarantine with it, for this reason:
+    /// see [`Library::flag_worker`].
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -73,10 +71,45 @@ impl Library {
         index: u32,
         auditor: &str,
         finding: AuditFinding,
+        wrong: Option<(&str, &str)>,
     ) -> Result<Option<String>, LibraryError> {
         let (campaign, auditor) = (campaign.to_owned(), auditor.to_owned());
         let now_unix_ms = self.now_unix_ms();
-        self.write(Found { campaign, index, auditor, finding, now_unix_ms }).await
+        let wrong = wrong
+            .map(|(worker, reason)| Flag { worker: worker.to_owned(), reason: reason.to_owned() });
+        self.write(Found { campaign, index, auditor, finding, wrong, now_unix_ms }).await
+    }
+
+    /// Takes back audits of these cases that their auditor will not do.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn release_audits(
+        &self,
+        campaign: &str,
+        auditor: &str,
+        indices: Vec<u32>,
+    ) -> Result<(), LibraryError> {
+        let (campaign, auditor) = (campaign.to_owned(), auditor.to_owned());
+        self.write(ReleaseAudits { campaign, auditor, indices }).await
+    }
+
+    /// Open audits of a campaign that somebody could do: a worker heard of since, that is not in
+    /// quarantine and did not simulate the case itself.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn audits_to_do(
+        &self,
+        campaign: &str,
+        since_unix_ms: i64,
+    ) -> Result<u32, LibraryError> {
+        let ask = "select count(*) as cases from audit
+            where campaign_id = $1 and state in ('waiting', 'leased') and exists (
+                select 1 from worker where id <> audit.worker and state = 'active'
+                    and last_seen_unix_ms >= $2)";
+        let rows = self.readers().rows(sql(ask).bind(campaign).bind(since_unix_ms)).await?;
+        rows.first().map_or(Ok(0), |row| row.get_u32("cases"))
     }
 
     /// How a campaign's audits stand.
@@ -141,6 +174,7 @@ impl Write for Sample {
                 select campaign_id as next_campaign, sobol_index as next_index from audit
                 where campaign_id = $1 and worker <> $2 and (state = 'waiting'
                     or (state = 'leased' and lease_expires_unix_ms <= $3))
+                    and exists (select 1 from campaign where id = $1 and state = 'running')
                 order by sobol_index limit $4 {})
             update audit set state = 'leased', auditor = $2, lease_expires_unix_ms = $5
             from next where campaign_id = next_campaign and sobol_index = next_index
@@ -176,6 +210,7 @@ struct Found {
     index: u32,
     auditor: String,
     finding: AuditFinding,
+    wrong: Option<Flag>,
     now_unix_ms: i64,
 }
 
@@ -198,7 +233,36 @@ impl Write for Found {
             .bind(if self.finding.agrees { "agrees" } else { "differs" })
             .bind(self.finding.difference_db)
             .bind(self.now_unix_ms);
-        connection.row(keep).await?.map(|row| row.get("worker")).transpose()
+        let Some(kept) = connection.row(keep).await? else { return Ok(None) };
+        if let Some(wrong) = &self.wrong {
+            wrong.apply(connection).await?;
+        }
+        kept.get("worker").map(Some)
+    }
+}
+
+struct ReleaseAudits {
+    campaign: String,
+    auditor: String,
+    indices: Vec<u32>,
+}
+
+impl Write for ReleaseAudits {
+    type Answer = ();
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.auditor)
+    }
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let release = format!(
+            "update audit set state = 'waiting', lease_expires_unix_ms = null
+            where campaign_id = $1 and auditor = $2 and state = 'leased' and sobol_index {}",
+            connection.dialect().listed("$3")
+        );
+        let indices: Vec<_> = self.indices.iter().copied().map(i64::from).collect();
+        let release = sql(release).bind(&self.campaign).bind(&self.auditor).bind(indices);
+        connection.execute(release).await.map(drop)
     }
 }
 

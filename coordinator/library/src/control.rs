@@ -140,21 +140,27 @@ impl Write for RetryCases {
 
 impl RetryCases {
     async fn discard_flagged(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        let results = result::table(connection.dialect());
+        let dialect = connection.dialect();
+        let results = result::table(dialect);
+        // What is flagged after this waits for the next retry.
         let flagged = format!(
-            "campaign_id = $1 and sobol_index in (
-                select sobol_index from {results} where campaign_id = $1 and flagged is not null)"
+            "select sobol_index from campaign_case
+            where campaign_id = $1 and state = 'finished' and sobol_index in (
+                select sobol_index from {results} where campaign_id = $1 and flagged is not null)
+            order by sobol_index {}",
+            dialect.locking()
         );
-        let again = format!(
-            "update campaign_case set state = 'waiting', attempts = 0, error = null
-            where state = 'finished' and {flagged}"
-        );
-        let cases = connection.execute(sql(again).bind(&self.campaign)).await?;
+        let flagged = connection.rows(sql(flagged).bind(&self.campaign)).await?;
+        let flagged = flagged.iter().map(|row| row.get("sobol_index"));
+        let flagged = flagged.collect::<Result<Vec<i64>, _>>()?;
+        let again = "update campaign_case set state = 'waiting', attempts = 0, error = null";
         // Their audits looked at results that are no more.
-        for table in ["audit", results] {
-            let discard = format!("delete from {table} where {flagged}");
-            connection.execute(sql(discard).bind(&self.campaign)).await?;
+        let discard = ["audit", results].map(|table| format!("delete from {table}"));
+        for change in [again].into_iter().chain(discard.iter().map(String::as_str)) {
+            let change =
+                format!("{change} where campaign_id = $1 and sobol_index {}", dialect.listed("$2"));
+            connection.execute(sql(change).bind(&self.campaign).bind(flagged.clone())).await?;
         }
-        Ok(cases)
+        Ok(flagged.len() as u64)
     }
 }

@@ -1,7 +1,7 @@
 //! Opening and closing a library; the connections to it.
 
 use crate::LibraryError;
-use crate::engine::{self, Opened, Readers, Target, Write, unix_ms};
+use crate::engine::{self, Opened, Readers, Target, Write};
 use crate::lease::Horizon;
 use std::fs::File;
 use std::path::PathBuf;
@@ -65,10 +65,10 @@ impl Library {
 
     /// The library's clock, in ms since 1970: what leases are given and ended by.
     ///
-    /// With `SQLite` it is this machine's. With PostgreSQL it is the server's, as compared when the
-    /// library was opened, so that coordinators whose clocks differ agree on when a lease has ended.
+    /// With `SQLite` it is this machine's. With PostgreSQL it is the server's, so that coordinators
+    /// whose clocks differ, or are set anew, agree on when a lease has ended.
     pub fn now_unix_ms(&self) -> i64 {
-        unix_ms().saturating_add(self.opened.clock_ahead_ms)
+        self.opened.clock.unix_ms()
     }
 
     /// Claims the right to hand out cases. With `SQLite` one process at a time has it; with

@@ -106,8 +106,9 @@ impl Write for Report {
                 }
             }
         }
-        self.finish(connection, &finished).await?;
-        Tally::of(self, &verdicts).store(connection).await?;
+        // Counted first, for that keeps others from putting the worker into quarantine meanwhile.
+        let flagged = Tally::of(self, &verdicts).store(connection).await?;
+        self.finish(connection, &finished, flagged).await?;
         Ok(verdicts)
     }
 }
@@ -208,12 +209,13 @@ impl Report {
         standing: &Standing,
         reason: &str,
     ) -> Result<State, LibraryError> {
-        let attempts = standing.attempts + 1;
-        let state = (self.after_failure)(Ending::Failed, attempts);
+        let failures =
+            attempt::failures(connection, self, case.index, standing.attempts).await? + 1;
+        let state = (self.after_failure)(Ending::Failed, failures);
         let ended = Ended {
             campaign: &self.campaign,
             index: case.index,
-            attempts,
+            attempts: standing.attempts + 1,
             state,
             ending: "failed",
             error: reason,
@@ -227,11 +229,12 @@ impl Report {
         &self,
         connection: &mut Connection,
         finished: &[(&CaseReport, &[Features])],
+        flagged: Option<String>,
     ) -> Result<(), LibraryError> {
         if finished.is_empty() {
             return Ok(());
         }
-        insert_results(connection, self, finished).await?;
+        insert_results(connection, self, finished, flagged).await?;
         let update = format!(
             "update campaign_case set state = 'finished', worker = $2, error = null,
                 lease_expires_unix_ms = null

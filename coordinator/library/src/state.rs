@@ -73,7 +73,8 @@ pub enum Ending {
     Lost,
 }
 
-/// What becomes of a case after so many attempts without result, the last of which ended so.
+/// What becomes of a case whose last attempt ended so, after so many attempts: those that failed where it
+/// [failed](Ending::Failed), all that were without result where it was [lost](Ending::Lost).
 ///
 /// It is to answer [`State::Waiting`] or [`State::Failed`].
 pub type Policy = fn(Ending, attempts: u32) -> State;

@@ -37,16 +37,21 @@ impl<'a> Tally<'a> {
         tally
     }
 
-    pub(crate) async fn store(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+    /// Adds it; answers why the worker's results are not to be trusted, if so.
+    pub(crate) async fn store(
+        &self,
+        connection: &mut Connection,
+    ) -> Result<Option<String>, LibraryError> {
         if self.finished + self.failed == 0 {
-            return Ok(());
+            return Ok(None);
         }
         let worker = "update worker set cases_finished = cases_finished + $2,
                 cases_failed = cases_failed + $3, busy_s = busy_s + $4,
                 failures_in_a_row = case when $2 > 0 then $5 else failures_in_a_row + $5 end,
                 last_seen_unix_ms = case when last_seen_unix_ms < $6 then $6
                     else last_seen_unix_ms end
-            where id = $1";
+            where id = $1
+            returning case when state = 'quarantined' then reason end as quarantine";
         let worker = sql(worker)
             .bind(&self.report.worker)
             .bind(self.finished)
@@ -54,7 +59,7 @@ impl<'a> Tally<'a> {
             .bind(self.busy_s)
             .bind(self.failed_since)
             .bind(self.report.now_unix_ms);
-        connection.execute(worker).await?;
+        let worker = connection.row(worker).await?;
         let progress = format!(
             "insert into progress (campaign_id, from_unix_s, writer, finished, failed, busy_s)
             values ($1, $2, {}, $3, $4, $5)
@@ -70,7 +75,8 @@ impl<'a> Tally<'a> {
             .bind(self.finished)
             .bind(self.failed)
             .bind(self.busy_s);
-        connection.execute(progress).await.map(drop)
+        connection.execute(progress).await?;
+        worker.map_or(Ok(None), |row| row.get("quarantine"))
     }
 }
 

@@ -114,15 +114,6 @@ impl Library {
         self.write(Flag { worker: worker.to_owned(), reason: reason.to_owned() }).await
     }
 
-    /// Puts a worker aside without a word about its results: it gets no more cases until it is
-    /// [pardoned](Self::pardon_worker).
-    ///
-    /// # Errors
-    /// [`LibraryError::UnknownWorker`], or when the library cannot be written.
-    pub async fn quarantine_worker(&self, worker: &str, reason: &str) -> Result<(), LibraryError> {
-        self.write(Quarantine { worker: worker.to_owned(), reason: Some(reason.to_owned()) }).await
-    }
-
     /// Gives cases to a worker again. Its flagged results stay flagged.
     ///
     /// # Errors
@@ -223,9 +214,9 @@ impl Write for Quarantine {
     }
 }
 
-struct Flag {
-    worker: String,
-    reason: String,
+pub(crate) struct Flag {
+    pub(crate) worker: String,
+    pub(crate) reason: String,
 }
 
 impl Write for Flag {

@@ -109,8 +109,8 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
             done(library, &format!("{id} has priority {to}")).await
         }
         Action::Pardon { worker, which } => {
-            let library = Library::open(&which.library).await.or_input()?;
-            library.pardon_worker(&worker).await.or_input()?;
+            let library = Library::open(&which.library).await.map_err(Stop::from_library)?;
+            library.pardon_worker(&worker).await.map_err(Stop::from_library)?;
             done(library, &format!("{worker} gets cases again")).await
         }
     }
@@ -123,7 +123,7 @@ async fn add(
     which: &Which,
 ) -> Result<(), Stop> {
     let campaign = Campaign::read(&file, cases).or_input()?;
-    let library = Library::open_or_create(&which.library).await.or_input()?;
+    let library = Library::open_or_create(&which.library).await.map_err(Stop::from_library)?;
     farm::prepare(&library, &campaign).await?;
     let id = campaign.id();
     if let Some(priority) = priority {
@@ -136,7 +136,7 @@ async fn add(
 
 impl Named {
     async fn open(self) -> Result<(Library, String), Stop> {
-        let library = Library::open(&self.which.library).await.or_input()?;
+        let library = Library::open(&self.which.library).await.map_err(Stop::from_library)?;
         let named = self.campaign.as_deref();
         let all = library.campaigns().await?;
         let mut same = all.iter().filter(|it| Some(it.name.as_str()) == named);

@@ -16,7 +16,7 @@ pub(super) struct Arguments {
     #[arg(long = "host", value_name = "NAME", required = true)]
     hosts: Vec<String>,
     /// How long the certificates are valid; the authority is for ten years.
-    #[arg(long, default_value_t = 365, value_name = "N")]
+    #[arg(long, default_value_t = 365, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=3650))]
     days: u32,
 }
 

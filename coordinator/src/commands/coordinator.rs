@@ -87,7 +87,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let _traces = Export::from_environment("tracktwin-coordinator").or_input()?;
     let campaigns = arguments.campaigns.iter().map(|path| Campaign::read(path, arguments.cases));
     let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
-    let library = Library::open_or_create(&arguments.library).await.or_input()?;
+    let library = Library::open_or_create(&arguments.library).await.map_err(Stop::from_library)?;
     for campaign in &campaigns {
         farm::prepare(&library, campaign).await?;
     }

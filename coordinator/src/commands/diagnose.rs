@@ -56,8 +56,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let recording = Recording::open(&recording).or_input()?;
     let library = match library {
         // Models belong to a library that is there already.
-        Some(url) if models.is_some() => Some(Library::open(&url).await.or_input()?),
-        Some(url) => Some(Library::open_or_create(&url).await.or_input()?),
+        Some(url) if models.is_some() => {
+            Some(Library::open(&url).await.map_err(Stop::from_library)?)
+        }
+        Some(url) => Some(Library::open_or_create(&url).await.map_err(Stop::from_library)?),
         None => None,
     };
     let design = design(models, library.as_ref()).await?;

@@ -35,7 +35,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         let text = "recording.json: sleepers: is []; give their places, or import with --sleeper";
         return Err(Stop::Input(anyhow::anyhow!(text)));
     }
-    let library = Library::open(&library).await.or_input()?;
+    let library = Library::open(&library).await.map_err(Stop::from_library)?;
     let models = Trained::load(&models).or_input()?;
     let evaluation = evaluate(&recording, &library, models, &out).await?;
     let sleepers = evaluation.sleepers.len();

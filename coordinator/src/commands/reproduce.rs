@@ -58,7 +58,7 @@ const SEED: u64 = 0;
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let figures = figures(&arguments.figures).or_input()?;
-    let library = Library::open(&arguments.library).await.or_input()?;
+    let library = Library::open(&arguments.library).await.map_err(Stop::from_library)?;
     let given = arguments.models.as_deref().map(Trained::load).transpose().or_input()?;
     let campaign = campaign(&library, arguments.campaign.as_deref(), given.as_ref()).await?;
     let experiment = Experiment::from_json(&campaign.experiment_json).or_input()?;

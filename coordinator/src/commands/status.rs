@@ -1,6 +1,6 @@
 //! `tracktwin status`: how far a farm is, once or all the time.
 
-use super::{OrInput, Stop, say};
+use super::{Stop, say};
 use crate::dashboard::{Detail, farm};
 use clap::Args;
 use serde_json::{Value, json};
@@ -41,7 +41,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let library = Library::open(&arguments.library).await.or_input()?;
+    let library = Library::open(&arguments.library).await.map_err(Stop::from_library)?;
     let terminal = std::io::stdout().is_terminal();
     loop {
         let farm = farm(&library, Detail::Counts).await?;

@@ -28,7 +28,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let library = Library::open(&arguments.library).await.or_input()?;
+    let library = Library::open(&arguments.library).await.map_err(Stop::from_library)?;
     let campaign = choose(&library, arguments.campaign.as_deref()).await?;
     let trained = train(&library, &campaign, arguments.seed, &arguments.out).await?;
     say(&table(&trained));

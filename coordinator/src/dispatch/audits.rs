@@ -3,9 +3,10 @@
 //! An auditor does not know that it is one. Where two workers differ, this machine simulates the
 //! case itself and finds out which of them is wrong.
 
-use super::campaigns::{Campaigns, DispatchError, Served};
+use super::campaigns::{Campaigns, Served};
 use super::settings::Settings;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::time::Instant;
@@ -53,33 +54,62 @@ impl Audits {
         }
     }
 
-    /// Cases for a worker to audit, if there are any.
+    /// So many cases for a worker to audit at most, if there are any.
     pub(crate) async fn lease(
         &self,
         worker: &str,
+        cases_max: u32,
         campaigns: &Campaigns,
-    ) -> Result<Option<CaseLease>, DispatchError> {
+    ) -> Result<Option<CaseLease>, LibraryError> {
         if self.share <= 0.0 || !self.is_time() {
             return Ok(None);
         }
+        let cases_max = cases_max.min(CASES);
         for campaign in self.library.campaigns().await? {
+            // One that this version can't do must not hold up the others.
+            let Ok(served) = campaigns.of(&campaign.id).await else { continue };
             let lease_ms = i64::try_from(LEASE.as_millis()).unwrap_or(i64::MAX);
-            let sample = self.library.audit_sample(&campaign.id, worker, CASES, lease_ms).await?;
+            let sample =
+                self.library.audit_sample(&campaign.id, worker, cases_max, lease_ms).await?;
             if sample.is_empty() {
                 continue;
             }
-            let served = campaigns.of(&campaign.id).await?;
             let cases = sample.iter().map(|it| LeasedCase { case: it.case.clone(), epoch: EPOCH });
-            let lease = served.lease(cases.collect(), LEASE);
-            let mut under_way = self.under_way.lock().expect("nobody panics while holding it");
+            let lease = served.lease(cases.collect());
             for audit in sample {
-                let key = (audit.campaign.clone(), audit.case.index);
-                under_way.insert(key, (worker.to_owned(), audit));
+                self.put(worker.to_owned(), audit);
             }
             *self.next.lock().expect("nobody panics while holding it") = None;
             return Ok(Some(lease));
         }
         Ok(None)
+    }
+
+    /// Takes back what an auditor will not do.
+    pub(crate) async fn release(
+        &self,
+        worker: &str,
+        campaign: &str,
+        indices: Vec<u32>,
+    ) -> Result<(), LibraryError> {
+        for &index in &indices {
+            self.take(worker, campaign, index);
+        }
+        self.library.release_audits(campaign, worker, indices).await
+    }
+
+    fn put(&self, worker: String, audit: Audit) {
+        let key = (audit.campaign.clone(), audit.case.index);
+        self.under_way.lock().expect("nobody panics while holding it").insert(key, (worker, audit));
+    }
+
+    /// What a worker was asked to audit; another's audit stays.
+    fn take(&self, worker: &str, campaign: &str, index: u32) -> Option<Audit> {
+        let mut under_way = self.under_way.lock().expect("nobody panics while holding it");
+        match under_way.entry((campaign.to_owned(), index)) {
+            Entry::Occupied(entry) if entry.get().0 == worker => Some(entry.remove().1),
+            _ => None,
+        }
     }
 
     /// Whether there may be something to audit; the next to ask waits for a while.
@@ -94,50 +124,73 @@ impl Audits {
     }
 
     /// Takes what an auditor found. Answers whether it was asked, and who was wrong, if somebody.
+    ///
+    /// It is gone through with even if nobody waits for the answer any more.
     pub(crate) async fn report(
-        &self,
+        self: &Arc<Self>,
         worker: &str,
         served: &Arc<Served>,
-        report: &CaseReport,
+        report: CaseReport,
     ) -> Result<Option<Found>, LibraryError> {
-        let key = (served.record.id.clone(), report.index);
-        let under_way = {
-            let mut all = self.under_way.lock().expect("nobody panics while holding it");
-            all.remove(&key)
-        };
-        let Some((_, audit)) = under_way.filter(|(auditor, _)| auditor == worker) else {
+        let Some(audit) = self.take(worker, &served.record.id, report.index) else {
             return Ok(None);
         };
-        let campaign = &served.record.id;
-        let Some(entry) = self.library.entry(campaign, report.index).await? else {
-            return Ok(None);
+        let (this, worker, served) = (self.clone(), worker.to_owned(), served.clone());
+        let compare = async move {
+            let found = this.compare(&worker, served, &audit, &report.outcome).await;
+            if found.is_err() {
+                // The auditor reports again.
+                this.put(worker, audit);
+            }
+            found
         };
-        let difference_db = difference(&entry.features, &report.outcome);
+        tokio::spawn(compare).await.expect("comparing does not panic")
+    }
+
+    async fn compare(
+        &self,
+        worker: &str,
+        served: Arc<Served>,
+        audit: &Audit,
+        outcome: &Outcome,
+    ) -> Result<Option<Found>, LibraryError> {
+        let (campaign, index) = (&audit.campaign, audit.case.index);
+        let Some(entry) = self.library.entry(campaign, index).await? else { return Ok(None) };
+        let difference_db = difference(&entry.features, outcome);
         let agrees = difference_db <= TOLERANCE_DB;
+        let wrong = if agrees {
+            None
+        } else {
+            let judged = self.judge(served, audit.case.clone()).await;
+            judged.map(|judged| {
+                let stored_is_right = difference(&entry.features, &judged) <= TOLERANCE_DB;
+                if stored_is_right { worker } else { audit.worker.as_str() }
+            })
+        };
+        let reason = format!(
+            "case {index} of {campaign} by {} and {worker} differs by {difference_db:.2} dB",
+            audit.worker
+        );
         let finding = AuditFinding { agrees, difference_db };
-        let kept = self.library.audited(campaign, report.index, worker, finding).await?;
+        let blame = wrong.map(|wrong| (wrong, reason.as_str()));
+        let kept = self.library.audited(campaign, index, worker, finding, blame).await?;
         if agrees || kept.is_none() {
             return Ok(Some(Found::Agreement));
         }
-        let judged = self.judge(served.clone(), audit.case.clone()).await;
-        let stored_is_right =
-            judged.is_some_and(|judged| difference(&entry.features, &judged) <= TOLERANCE_DB);
-        let wrong = if stored_is_right { worker } else { audit.worker.as_str() };
-        let reason = format!(
-            "case {} of {campaign} by {} and {worker} differs by {difference_db:.2} dB",
-            report.index, audit.worker
-        );
+        let Some(wrong) = wrong else {
+            tracing::error!("{reason}; this machine could not simulate it, so nobody is blamed");
+            return Ok(Some(Found::Unjudged));
+        };
         tracing::error!(worker = wrong, "quarantined: {reason}");
-        self.library.flag_worker(wrong, &reason).await?;
         Ok(Some(Found::Wrong { worker: wrong.to_owned(), reason }))
     }
 
-    /// What this machine makes of a case.
+    /// What this machine makes of a case, if it can simulate it.
     async fn judge(&self, served: Arc<Served>, case: Case) -> Option<Outcome> {
         let prepare = self.prepare;
         let simulate = move || {
             let simulation = prepare(&served.experiment).ok()?;
-            simulation.simulate(&[case]).pop()
+            simulation.simulate(&[case]).pop().filter(|it| matches!(it, Outcome::Finished(_)))
         };
         tokio::task::spawn_blocking(simulate).await.ok().flatten()
     }
@@ -145,8 +198,10 @@ impl Audits {
 
 /// What came of an audit.
 pub(crate) enum Found {
-    /// Both agree.
+    /// Both agree, or it is known already.
     Agreement,
+    /// They differ, and nobody knows who is wrong.
+    Unjudged,
     /// A worker is wrong, and was put into quarantine.
     Wrong {
         /// Which.

@@ -14,6 +14,9 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// Between two lines of the log about how far it is.
 const TELL_EVERY: Duration = Duration::from_mins(1);
 
+/// A worker heard of within this many ms is there.
+const PRESENT_MS: i64 = 60_000;
+
 /// What a coordinator is started with.
 pub struct Coordinator {
     /// The library it serves.
@@ -92,10 +95,16 @@ async fn watch(library: Library, exit_when_done: bool, stop: CancellationToken) 
             Ok(left) => {
                 if told.is_none_or(|told| told.elapsed() >= TELL_EVERY) {
                     told = Some(tokio::time::Instant::now());
-                    tracing::info!(left, "cases left");
+                    tracing::info!(left = left.cases, "cases left");
                 }
-                if left == 0 && exit_when_done {
-                    tracing::info!("everything is done");
+                if left.is_done() && exit_when_done {
+                    match left.audits {
+                        0 => tracing::info!("everything is done"),
+                        audits => tracing::warn!(
+                            audits,
+                            "done but for audits that no other worker is there for"
+                        ),
+                    }
                     stop.cancel();
                 }
             }
@@ -108,13 +117,31 @@ async fn watch(library: Library, exit_when_done: bool, stop: CancellationToken) 
     }
 }
 
-/// Cases and audits left to be simulated, in campaigns that run.
-async fn left(library: &Library) -> Result<u64, LibraryError> {
-    let mut left = 0;
+/// What is left to be simulated, in campaigns that run.
+#[derive(Default)]
+struct Left {
+    cases: u64,
+    /// Open audits.
+    audits: u64,
+    /// Those of them that a worker who is there could do.
+    audits_to_do: u64,
+}
+
+impl Left {
+    const fn is_done(&self) -> bool {
+        self.cases + self.audits_to_do == 0
+    }
+}
+
+async fn left(library: &Library) -> Result<Left, LibraryError> {
+    let mut left = Left::default();
+    let since_unix_ms = library.now_unix_ms() - PRESENT_MS;
     for campaign in library.overview().await? {
         if campaign.state == CampaignState::Running {
-            left += u64::from(campaign.status.total() - campaign.status.done());
-            left += u64::from(library.audits(&campaign.id).await?.open);
+            left.cases += u64::from(campaign.status.total() - campaign.status.done());
+            left.audits += u64::from(library.audits(&campaign.id).await?.open);
+            let to_do = library.audits_to_do(&campaign.id, since_unix_ms).await?;
+            left.audits_to_do += u64::from(to_do);
         }
     }
     Ok(left)

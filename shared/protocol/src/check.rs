@@ -21,6 +21,12 @@ pub enum BadMessage {
         /// The longest allowed.
         max: usize,
     },
+    /// A name with characters that nobody sees.
+    #[error("{field} has control characters")]
+    ControlCharacters {
+        /// The field.
+        field: &'static str,
+    },
     /// A number is NaN, infinite or negative where it can't be.
     #[error("{field} is {value}")]
     NotANumber {
@@ -98,13 +104,14 @@ pub enum BadMessage {
 /// Longest name of a worker, version or hash, in bytes.
 const NAME_BYTES_MAX: usize = 256;
 
-/// A name: not empty, not too long.
+/// A name: not empty, not too long, fit to be printed and stored.
 pub(crate) fn name(field: &'static str, text: String) -> Result<String, BadMessage> {
     match text.len() {
         0 => Err(BadMessage::Missing { field }),
         length if length > NAME_BYTES_MAX => {
             Err(BadMessage::TooLong { field, length, max: NAME_BYTES_MAX })
         }
+        _ if text.contains(char::is_control) => Err(BadMessage::ControlCharacters { field }),
         _ => Ok(text),
     }
 }

@@ -27,8 +27,6 @@ pub struct CaseLease {
     pub experiment_json: String,
     /// BLAKE3 of that, hexadecimal.
     pub experiment_hash: String,
-    /// How long the lease lasts without renewal, in s.
-    pub lease_s: f64,
     /// The cases.
     pub cases: Vec<LeasedCase>,
     /// The lease as W3C Trace Context; empty where nothing is traced.
@@ -73,7 +71,6 @@ impl From<Lease> for farm::LeaseResponse {
                 experiment_json: lease.experiment_json,
                 experiment_hash: lease.experiment_hash,
                 cases: lease.cases.into_iter().map(Into::into).collect(),
-                lease_s: lease.lease_s,
                 traceparent: lease.traceparent,
                 ..Self::default()
             },
@@ -122,7 +119,6 @@ impl TryFrom<farm::LeaseResponse> for CaseLease {
             campaign: name("campaign_id", message.campaign_id)?,
             experiment_json: message.experiment_json,
             experiment_hash: name("experiment_hash", message.experiment_hash)?,
-            lease_s: duration("lease_s", message.lease_s)?,
             cases: message.cases.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
             traceparent: message.traceparent,
         })

@@ -101,7 +101,7 @@ impl CaseReport {
         let outcome = match message.outcome {
             None => return Err(BadMessage::Missing { field: "outcome" }),
             Some(OutcomeMessage::Failure(failure)) => {
-                Outcome::Failed { reason: shortened(failure.reason) }
+                Outcome::Failed { reason: in_one_line(failure.reason) }
             }
             Some(OutcomeMessage::Passes(passes)) => {
                 Outcome::Finished(checked_passes(index, passes.passes, shape)?)
@@ -151,12 +151,13 @@ fn from_bytes(bytes: &[u8]) -> Vec<f64> {
     whole.iter().map(|number| f64::from_le_bytes(*number)).chain(piece).collect()
 }
 
-fn shortened(mut reason: String) -> String {
+/// In one line that is not endless, and that any database takes.
+fn in_one_line(mut reason: String) -> String {
     if reason.is_empty() {
         return "no reason given".to_owned();
     }
     reason.truncate(reason.floor_char_boundary(REASON_BYTES_MAX));
-    reason
+    reason.replace(char::is_control, " ")
 }
 
 #[cfg(test)]
@@ -253,10 +254,14 @@ mod tests {
     }
 
     #[test]
-    fn an_endless_reason_is_cut_short() {
+    fn a_reason_is_one_line_that_is_not_endless() {
         let long =
             CaseReport { outcome: Outcome::Failed { reason: "ä".repeat(5000) }, ..report() };
         let back = CaseReport::checked(long.into(), &shape()).unwrap();
         assert_eq!(back.outcome, Outcome::Failed { reason: "ä".repeat(1000) });
+        let report =
+            CaseReport { outcome: Outcome::Failed { reason: "a\nb\0".to_owned() }, ..report() };
+        let back = CaseReport::checked(report.into(), &shape()).unwrap();
+        assert_eq!(back.outcome, Outcome::Failed { reason: "a b ".to_owned() });
     }
 }

@@ -3,6 +3,7 @@
 //! Owns what differs between `SQLite` and PostgreSQL, so that the tables' modules write each
 //! statement once, with `$1` for its first value; both databases understand that. Knows no table.
 
+mod clock;
 mod connection;
 mod dialect;
 mod iso;
@@ -20,7 +21,6 @@ pub(crate) use connection::{Connection, Readers};
 pub(crate) use dialect::Dialect;
 pub(crate) use iso::iso_utc;
 pub(crate) use open::{Opened, open, open_or_create};
-pub(crate) use postgres::unix_ms;
 pub(crate) use row::Row;
 pub(crate) use statement::{Statement, Value, series, sql};
 pub(crate) use target::Target;

@@ -1,16 +1,17 @@
 //! Opening a library, whichever database it is in.
 
+use super::clock::Clock;
 use super::{Readers, Target, Writer, postgres, sqlite};
 use crate::LibraryError;
 use std::path::Path;
+use std::sync::Arc;
 
 /// An open library's connections.
 pub(crate) struct Opened {
     pub(crate) target: Target,
     pub(crate) readers: Readers,
     pub(crate) writer: Writer,
-    /// What the database's clock is ahead of this machine's.
-    pub(crate) clock_ahead_ms: i64,
+    pub(crate) clock: Arc<Clock>,
 }
 
 /// Opens a library that is there.
@@ -34,16 +35,17 @@ pub(crate) async fn open_or_create(url: &str) -> Result<Opened, LibraryError> {
 }
 
 async fn connect(target: Target, create: bool) -> Result<Opened, LibraryError> {
-    let (readers, writing, clock_ahead_ms) = match &target {
+    let (readers, writing, clock) = match &target {
         Target::Sqlite(path) => {
             let (readers, writing) = sqlite::open(path).await?;
-            (readers, Some(writing), 0)
+            (readers, Some(writing), Clock::Machine)
         }
         Target::Postgres { options, name } => {
-            let (readers, clock_ahead_ms) = postgres::open(options, name, create).await?;
-            (readers, None, clock_ahead_ms)
+            let (readers, clock) = postgres::open(options, name, create).await?;
+            (readers, None, clock)
         }
     };
-    let writer = Writer::start(&target, writing);
-    Ok(Opened { target, readers, writer, clock_ahead_ms })
+    let clock = Arc::new(clock);
+    let writer = Writer::start(&target, writing, &clock);
+    Ok(Opened { target, readers, writer, clock })
 }

@@ -1,11 +1,12 @@
 //! A library on a server.
 
+use super::clock::Clock;
 use super::{Connection, Readers};
 use crate::LibraryError;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
 use sqlx::{ConnectOptions, Connection as _, PgConnection};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations/postgres");
 
@@ -15,26 +16,25 @@ const READERS: u32 = 4;
 /// How long a reader waits for a free connection, or for the server to come back.
 const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Opens the library in this database and brings its schema up to date; answers also what the
-/// server's clock is ahead of this machine's, in ms.
+/// Opens the library in this database and brings its schema up to date; answers also the server's clock.
 pub(super) async fn open(
     options: &PgConnectOptions,
     name: &str,
     create: bool,
-) -> Result<(Readers, i64), LibraryError> {
+) -> Result<(Readers, Clock), LibraryError> {
     let mut connection = options.connect().await.map_err(|error| unreachable(error, name))?;
     let is_there = refuse_strangers(&mut connection, name).await?;
     if !is_there && !create {
         return Err(LibraryError::Empty { library: name.to_owned() });
     }
     migrate(&mut connection, name, is_there).await?;
-    let clock_ahead_ms = clock_ahead_ms(&mut connection).await?;
+    let clock = Clock::server(unix_ms(&mut connection).await?);
     connection.close().await?;
     let readers = PgPoolOptions::new()
         .max_connections(READERS)
         .acquire_timeout(ACQUIRE_TIMEOUT)
         .connect_lazy_with(options.clone().options([("default_transaction_read_only", "on")]));
-    Ok((Readers::Postgres(readers), clock_ahead_ms))
+    Ok((Readers::Postgres(readers), clock))
 }
 
 /// A connection that writes.
@@ -102,16 +102,8 @@ async fn migrate(
     })
 }
 
-async fn clock_ahead_ms(connection: &mut PgConnection) -> Result<i64, LibraryError> {
-    let server: i64 =
-        sqlx::query_scalar("select (extract(epoch from clock_timestamp()) * 1000)::bigint")
-            .fetch_one(connection)
-            .await?;
-    Ok(server - unix_ms())
-}
-
-/// This machine's clock.
-pub(crate) fn unix_ms() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
+/// The server's time, in ms since 1970.
+pub(super) async fn unix_ms(connection: &mut PgConnection) -> Result<i64, LibraryError> {
+    let ask = "select (extract(epoch from clock_timestamp()) * 1000)::bigint";
+    Ok(sqlx::query_scalar(ask).fetch_one(connection).await?)
 }

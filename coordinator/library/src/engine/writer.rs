@@ -5,6 +5,7 @@
 //! another fills its transaction; and nobody is answered before the commit. A server that goes away
 //! is waited for, within a bound.
 
+use super::clock::Clock;
 use super::lanes::Lanes;
 use super::patience::Patience;
 use super::{Connection, Target, postgres};
@@ -63,13 +64,23 @@ struct Task {
 
 impl Writer {
     /// Starts the tasks; without a connection they make their own when there is something to write.
-    pub(super) fn start(target: &Target, connection: Option<Connection>) -> Self {
+    pub(super) fn start(
+        target: &Target,
+        connection: Option<Connection>,
+        clock: &Arc<Clock>,
+    ) -> Self {
         let count = match target {
             Target::Sqlite(_) => 1,
             Target::Postgres { .. } => SERVER_LANES,
         };
         let connections = std::iter::once(connection).chain(std::iter::repeat_with(|| None));
-        let tasks = connections.take(count).map(|it| Task::start(target.clone(), it)).collect();
+        let session = |connection| Session {
+            target: target.clone(),
+            connection,
+            clock: clock.clone(),
+            patient: true,
+        };
+        let tasks = connections.take(count).map(|it| Task::start(session(it))).collect();
         Self { tasks, lanes: Lanes::new(count) }
     }
 
@@ -99,10 +110,9 @@ impl Writer {
 }
 
 impl Task {
-    fn start(target: Target, connection: Option<Connection>) -> Self {
+    fn start(session: Session) -> Self {
         let (orders, receiver) = mpsc::channel(QUEUE_MAX);
         let closing = Arc::new(Notify::new());
-        let session = Session { target, connection, patient: true };
         let handle = tokio::spawn(write_all(session, receiver, closing.clone()));
         Self { orders, closing, handle: Mutex::new(Some(handle)) }
     }
@@ -166,6 +176,8 @@ async fn write_all(
 struct Session {
     target: Target,
     connection: Option<Connection>,
+    /// Kept right from here, where there is a connection anyway.
+    clock: Arc<Clock>,
     /// Whether to wait for the database: not after having waited in vain, until it is back.
     patient: bool,
 }
@@ -219,7 +231,15 @@ impl Session {
             }
             (None, Target::Sqlite(_)) => return Err(LibraryError::Closed),
         };
-        let transaction = transaction(connection, orders);
+        let clock = &self.clock;
+        let transaction = async {
+            if let Connection::Postgres(server) = connection
+                && clock.is_old()
+            {
+                clock.set(postgres::unix_ms(server).await?);
+            }
+            transaction(connection, orders).await
+        };
         match &self.target {
             Target::Sqlite(_) => transaction.await,
             Target::Postgres { .. } => {

@@ -145,12 +145,12 @@ struct Waiting {
     attempts: u32,
 }
 
-/// Which of the first waiting cases go into one lease: of those with more attempts without result than
-/// so many each goes alone.
+/// Which of the first waiting cases go into one lease: each of those with so many attempts without
+/// result goes alone.
 fn share(waiting: &[Waiting], alone_after: u32) -> Vec<u32> {
     match waiting {
-        [first, ..] if first.attempts > alone_after => vec![first.index],
-        _ => waiting.iter().filter(|it| it.attempts <= alone_after).map(|it| it.index).collect(),
+        [first, ..] if first.attempts >= alone_after => vec![first.index],
+        _ => waiting.iter().filter(|it| it.attempts < alone_after).map(|it| it.index).collect(),
     }
 }
 

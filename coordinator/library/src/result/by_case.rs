@@ -15,19 +15,21 @@ pub(super) async fn insert(
     connection: &mut Connection,
     report: &Report,
     finished: &[(&CaseReport, &[Features])],
+    flagged: Option<String>,
 ) -> Result<(), LibraryError> {
     let insert = "insert into case_result (campaign_id, worker, code_version, model_hash,
             experiment_hash, finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash,
-            levels_dB, log_power)
+            levels_dB, log_power, flagged)
         select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash,
             ($11)[levels * (place - 1) + 1:levels * place],
-            substring($12 from bytes * (place - 1) + 1 for bytes)
+            substring($12 from bytes * (place - 1) + 1 for bytes), $13
         from (
             select sobol_index, duration_s, parameter_hash, cast(place as integer) as place,
                 cardinality($11) / cardinality($8) as levels,
                 length($12) / cardinality($8) as bytes
             from unnest($8, $9, $10) with ordinality
-                as of (sobol_index, duration_s, parameter_hash, place)) as cases";
+                as of (sobol_index, duration_s, parameter_hash, place)) as cases
+        on conflict do nothing";
     let finished_at = iso_utc(report.now_unix_ms);
     for cases in finished.chunks(CASES_A_STATEMENT) {
         let passes = || cases.iter().flat_map(|(_, features)| features.iter());
@@ -45,7 +47,8 @@ pub(super) async fn insert(
             .bind(Value::Reals(cases.iter().map(|(case, _)| case.duration_s).collect()))
             .bind(Value::Texts(hashes))
             .bind(Value::Reals(passes().flat_map(|it| &it.band_levels_db).copied().collect()))
-            .bind(Value::series(passes().map(|it| &it.log_power[..])));
+            .bind(Value::series(passes().map(|it| &it.log_power[..])))
+            .bind(flagged.clone());
         connection.execute(insert).await?;
     }
     Ok(())

@@ -8,9 +8,9 @@ use tracktwin_signal::Features;
 
 /// The columns that are one for a whole report, and then those that are not.
 const INSERT: &str = "insert into result (campaign_id, worker, code_version, model_hash,
-    experiment_hash, finished_at, sobol_index, speed_km_h, duration_s, parameter_hash, log_power";
+    experiment_hash, finished_at, flagged, sobol_index, speed_km_h, duration_s, parameter_hash, log_power";
 
-/// Rows in one statement at most: 64 rows of 31 values stay well below the 32,766 that `SQLite` takes.
+/// Rows in one statement at most: 64 rows of 32 values stay well below the 32,766 that `SQLite` takes.
 const ROWS_MAX: usize = 64;
 
 /// Statements of as many rows as a power of two, so that there are few to prepare: each costs a turn
@@ -19,6 +19,7 @@ pub(super) async fn insert(
     connection: &mut Connection,
     report: &Report,
     finished: &[(&CaseReport, &[Features])],
+    flagged: Option<String>,
 ) -> Result<(), LibraryError> {
     let passes = finished.iter().flat_map(|&(case, features)| {
         let speeds = report.speeds_km_h.iter();
@@ -30,8 +31,11 @@ pub(super) async fn insert(
     while !rest.is_empty() {
         let largest = 1 << rest.len().ilog2();
         let (rows, after) = rest.split_at(ROWS_MAX.min(largest));
-        let places = Dialect::Sqlite.rows_of_values(rows.len(), 11 + LEVEL_COLUMNS.len());
-        let mut insert = sql(format!("{INSERT}, {}) values {places}", LEVEL_COLUMNS.join(", ")));
+        let places = Dialect::Sqlite.rows_of_values(rows.len(), 12 + LEVEL_COLUMNS.len());
+        let mut insert = sql(format!(
+            "{INSERT}, {}) values {places} on conflict do nothing",
+            LEVEL_COLUMNS.join(", ")
+        ));
         for (case, speed_km_h, features) in rows {
             insert = insert
                 .bind(&report.campaign)
@@ -40,6 +44,7 @@ pub(super) async fn insert(
                 .bind(&report.model_hash)
                 .bind(&report.experiment_hash)
                 .bind(&finished_at)
+                .bind(flagged.clone())
                 .bind(case.index)
                 .bind(*speed_km_h)
                 .bind(case.duration_s)

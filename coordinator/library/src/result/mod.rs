@@ -109,7 +109,8 @@ pub(crate) const fn table(dialect: Dialect) -> &'static str {
     }
 }
 
-/// Stores the results of cases that have none.
+/// Stores the results of cases that have none, flagged where there is a reason to. What came in from
+/// another library meanwhile stays.
 ///
 /// # Panics
 /// When features have another shape than the first: whoever took the message in looked at that.
@@ -117,6 +118,7 @@ pub(crate) async fn insert_results(
     connection: &mut Connection,
     report: &Report,
     finished: &[(&CaseReport, &[Features])],
+    flagged: Option<String>,
 ) -> Result<(), LibraryError> {
     let shape = |features: &Features| (features.log_power.len(), features.band_levels_db.len());
     let first = finished.iter().find_map(|(_, passes)| passes.first());
@@ -126,7 +128,7 @@ pub(crate) async fn insert_results(
         assert!(passes.iter().all(|pass| shape(pass) == expected), "passes of one shape");
     }
     match connection.dialect() {
-        Dialect::Sqlite => by_pass::insert(connection, report, finished).await,
-        Dialect::Postgres => by_case::insert(connection, report, finished).await,
+        Dialect::Sqlite => by_pass::insert(connection, report, finished, flagged).await,
+        Dialect::Postgres => by_case::insert(connection, report, finished, flagged).await,
     }
 }

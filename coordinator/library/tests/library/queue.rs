@@ -5,7 +5,7 @@ use crate::support::{
 };
 use std::collections::HashSet;
 use tokio::task::JoinSet;
-use tracktwin_library::{Held, LeaseRequest, State, Status, Verdict};
+use tracktwin_library::{Held, LeaseRequest, Retry, State, Status, Verdict};
 
 fn first_lease(index: u32) -> Held {
     Held { index, epoch: 1 }
@@ -78,7 +78,7 @@ on_both_databases! {
             library.release(CAMPAIGN, "w", others).await.unwrap();
         }
         for (worker, indices) in [("a", vec![0, 2, 3]), ("b", vec![1])] {
-            let request = LeaseRequest { alone_after: 1, ..request(worker, 4, 2000) };
+            let request = LeaseRequest { alone_after: 2, ..request(worker, 4, 2000) };
             let cases = library.lease(request).await.unwrap().unwrap().cases;
             assert_eq!(cases.iter().map(|it| it.case.index).collect::<Vec<_>>(), indices);
         }
@@ -97,6 +97,25 @@ on_both_databases! {
         }
         let status = library.status(CAMPAIGN).await.unwrap();
         assert_eq!(status, Status { failed: 1, ..Status::default() });
+    }
+
+    async fn a_case_that_has_lost_workers_may_fail_as_often_as_any(home: &Home) {
+        let library = home.library(1).await;
+        for now in [0, 1000] {
+            lease(&library, "w", 1, now).await;
+        }
+        for (failures, state) in [(1, State::Waiting), (2, State::Waiting), (3, State::Failed)] {
+            let leased = lease(&library, "w", 1, 2000).await;
+            report(&library, "w", vec![failed(&leased[0])]).await;
+            let record = library.case(CAMPAIGN, 0).await.unwrap().unwrap();
+            assert_eq!((record.state, record.attempts), (state, 2 + failures));
+        }
+        // What was before a retry does not count.
+        library.retry(CAMPAIGN, Retry::Failed).await.unwrap();
+        let leased = lease(&library, "w", 1, 3000).await;
+        report(&library, "w", vec![failed(&leased[0])]).await;
+        let record = library.case(CAMPAIGN, 0).await.unwrap().unwrap();
+        assert_eq!((record.state, record.attempts), (State::Waiting, 1));
     }
 
     async fn a_released_case_waits_without_an_attempt_counted(home: &Home) {

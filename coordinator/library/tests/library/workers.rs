@@ -51,7 +51,7 @@ on_both_databases! {
     async fn a_worker_in_quarantine_gets_nothing_until_it_is_pardoned(home: &Home) {
         let library = home.library(2).await;
         library.register_worker(registration("w", 0)).await.unwrap();
-        library.quarantine_worker("w", "nine failures in a row").await.unwrap();
+        library.flag_worker("w", "nine failures in a row").await.unwrap();
         assert_eq!(lease(&library, "w", 1, 0).await, []);
         // It comes again under its name, perhaps to another coordinator.
         let state = library.register_worker(registration("w", 9)).await.unwrap();
@@ -60,7 +60,7 @@ on_both_databases! {
         assert_eq!(record.reason.as_deref(), Some("nine failures in a row"));
         library.pardon_worker("w").await.unwrap();
         assert_eq!(lease(&library, "w", 1, 0).await.len(), 1);
-        let error = library.quarantine_worker("stranger", "why not").await.unwrap_err();
+        let error = library.flag_worker("stranger", "why not").await.unwrap_err();
         assert!(matches!(error, LibraryError::UnknownWorker { .. }), "{error}");
     }
 
@@ -88,12 +88,12 @@ on_both_databases! {
         assert_eq!(library.audit_sample(CAMPAIGN, "third", 9, 1000).await.unwrap(), []);
         let agrees = AuditFinding { agrees: true, difference_db: 1e-12 };
         let differs = AuditFinding { agrees: false, difference_db: 3.0 };
-        assert_eq!(library.audited(CAMPAIGN, 0, "third", differs).await.unwrap(), None);
-        let whose = library.audited(CAMPAIGN, 0, "second", agrees).await.unwrap();
+        assert_eq!(library.audited(CAMPAIGN, 0, "third", differs, None).await.unwrap(), None);
+        let whose = library.audited(CAMPAIGN, 0, "second", agrees, None).await.unwrap();
         assert_eq!(whose.as_deref(), Some("first"));
-        library.audited(CAMPAIGN, 1, "second", differs).await.unwrap();
+        library.audited(CAMPAIGN, 1, "second", differs, None).await.unwrap();
         // Said again, it is over.
-        assert_eq!(library.audited(CAMPAIGN, 1, "second", agrees).await.unwrap(), None);
+        assert_eq!(library.audited(CAMPAIGN, 1, "second", agrees, None).await.unwrap(), None);
         let counts = library.audits(CAMPAIGN).await.unwrap();
         assert_eq!(counts, AuditCounts { open: 0, agree: 1, differ: 1 });
     }
@@ -103,6 +103,49 @@ on_both_databases! {
         work_audited(&library, "first", 1).await;
         assert_eq!(library.audit_sample(CAMPAIGN, "second", 1, -1).await.unwrap().len(), 1);
         assert_eq!(library.audit_sample(CAMPAIGN, "third", 1, 1000).await.unwrap().len(), 1);
+    }
+
+    async fn who_is_wrong_by_an_audit_is_put_into_quarantine_with_it(home: &Home) {
+        let library = home.library(2).await;
+        for worker in ["first", "second"] {
+            library.register_worker(registration(worker, 0)).await.unwrap();
+        }
+        work_audited(&library, "first", 2).await;
+        library.audit_sample(CAMPAIGN, "second", 2, 1000).await.unwrap();
+        let differs = AuditFinding { agrees: false, difference_db: 3.0 };
+        let wrong = Some(("first", "differs by 3 dB"));
+        // Who was not asked blames nobody.
+        library.audited(CAMPAIGN, 0, "third", differs, wrong).await.unwrap();
+        assert_eq!(library.worker("first").await.unwrap().unwrap().state, WorkerState::Active);
+        library.audited(CAMPAIGN, 0, "second", differs, wrong).await.unwrap();
+        let first = library.worker("first").await.unwrap().unwrap();
+        assert_eq!(first.state, WorkerState::Quarantined);
+        assert_eq!(library.retry(CAMPAIGN, Retry::Flagged).await.unwrap(), 2);
+    }
+
+    async fn audits_wait_for_their_campaign_and_for_somebody_who_can_do_them(home: &Home) {
+        let library = home.library(1).await;
+        library.register_worker(registration("first", 0)).await.unwrap();
+        work_audited(&library, "first", 1).await;
+        assert_eq!(library.audits_to_do(CAMPAIGN, 0).await.unwrap(), 0, "not the first itself");
+        library.register_worker(registration("second", 0)).await.unwrap();
+        assert_eq!(library.audits_to_do(CAMPAIGN, 0).await.unwrap(), 1);
+        library.pause(CAMPAIGN).await.unwrap();
+        assert_eq!(library.audit_sample(CAMPAIGN, "second", 1, 1000).await.unwrap(), []);
+        library.resume(CAMPAIGN).await.unwrap();
+        assert_eq!(library.audit_sample(CAMPAIGN, "second", 1, 1000).await.unwrap().len(), 1);
+        // What is given back is the next one's at once.
+        library.release_audits(CAMPAIGN, "second", vec![0]).await.unwrap();
+        assert_eq!(library.audit_sample(CAMPAIGN, "third", 1, 1000).await.unwrap().len(), 1);
+    }
+
+    async fn what_a_worker_in_quarantine_still_hands_in_is_flagged(home: &Home) {
+        let library = home.library(1).await;
+        library.register_worker(registration("bad", 0)).await.unwrap();
+        let leased = lease(&library, "bad", 1, 0).await;
+        library.flag_worker("bad", "differs by 3 dB").await.unwrap();
+        assert_eq!(report(&library, "bad", vec![finished(&leased[0])]).await, [Verdict::Stored]);
+        assert_eq!(library.retry(CAMPAIGN, Retry::Flagged).await.unwrap(), 1);
     }
 
     async fn flagged_results_are_computed_again_when_asked_for(home: &Home) {

@@ -3,10 +3,10 @@
 use super::files::parquet_file;
 use super::{OrInput, Stop};
 use crate::commands::say;
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tracktwin_library::{Cell, Library, Table};
+use tracktwin_library::{Cell, Library, LibraryError, Table};
 
 /// What `library import` is told.
 #[derive(Args)]
@@ -54,9 +54,12 @@ async fn import(
         added += library.write_table(table, rows).await?;
         Ok::<(), anyhow::Error>(())
     };
-    parquet_file::read(path, table, take)
-        .await
-        .with_context(|| format!("{}", path.display()))
-        .or_input()?;
+    let taken = parquet_file::read(path, table, take).await;
+    taken.map_err(|error| {
+        // The file is to blame, unless the library could not be written.
+        let is_input = error.downcast_ref().is_none_or(LibraryError::is_wrong_input);
+        let error = error.context(path.display().to_string());
+        if is_input { Stop::Input(error) } else { Stop::Failure(error) }
+    })?;
     Ok((read, added))
 }

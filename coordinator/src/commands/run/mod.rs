@@ -60,11 +60,12 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         .with_context(|| format!("{}: the folder cannot be made", out.display()))
         .or_input()?;
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
-    let library = Library::open_or_create(&url).await.or_input()?;
+    let library = Library::open_or_create(&url).await.map_err(Stop::from_library)?;
     simulate(&library, &campaign, arguments.cores.unwrap_or_else(all_cores)).await?;
     if arguments.no_train {
+        let name = library.name();
         library.close().await;
-        say(&format!("library: {url}"));
+        say(&format!("library: {name}"));
         return Ok(());
     }
 

@@ -23,8 +23,8 @@ impl Dispatch {
             tracing::error!("no cases can be handed out: {error:?}");
             Status::unavailable(error.to_string())
         };
-        let audit = self.audits.lease(worker, &self.campaigns).await;
-        if let Some(lease) = audit.map_err(|error| failed(&error))? {
+        let audit = self.audits.lease(worker, cases_max, &self.campaigns).await;
+        if let Some(lease) = audit.map_err(|error| unavailable(&error))? {
             return Ok(Lease::Cases(lease));
         }
         if self.had_nothing() {
@@ -53,7 +53,7 @@ impl Dispatch {
                 self.counts.leased.inc_by(leased.cases.len() as u64);
                 let cases = leased.cases.into_iter();
                 let cases = cases.map(|it| LeasedCase { case: it.case, epoch: it.epoch });
-                Ok(Lease::Cases(served.lease(cases.collect(), self.settings.timing.lease)))
+                Ok(Lease::Cases(served.lease(cases.collect())))
             }
             Err(error) => {
                 self.give_up_campaign(worker, &leased).await;
@@ -86,13 +86,12 @@ impl Dispatch {
 }
 
 impl Served {
-    /// These cases, for a while.
-    pub(crate) fn lease(&self, cases: Vec<LeasedCase>, lease: Duration) -> CaseLease {
+    /// These cases, as they are handed out.
+    pub(crate) fn lease(&self, cases: Vec<LeasedCase>) -> CaseLease {
         CaseLease {
             campaign: self.record.id.clone(),
             experiment_json: self.record.experiment_json.clone(),
             experiment_hash: self.record.experiment_hash.clone(),
-            lease_s: lease.as_secs_f64(),
             cases,
             traceparent: String::new(),
         }

@@ -9,7 +9,7 @@ use super::campaigns::{Campaigns, DispatchError};
 use super::messages::{held, malformed, unavailable, unfit, verdict_message};
 use super::roster::{Roster, Standing};
 use super::settings::Settings;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 use tokio::time::Instant;
 use tonic::{Request, Response, Status};
@@ -24,7 +24,7 @@ pub struct Dispatch {
     settings: Settings,
     campaigns: Campaigns,
     roster: Roster,
-    audits: Audits,
+    audits: Arc<Audits>,
     nothing_until: Mutex<Option<Instant>>,
     counts: Counts,
 }
@@ -34,7 +34,7 @@ impl Dispatch {
     pub fn new(library: Library, settings: Settings, counts: Counts) -> Self {
         Self {
             campaigns: Campaigns::new(library.clone()),
-            audits: Audits::new(library.clone(), &settings),
+            audits: Arc::new(Audits::new(library.clone(), &settings)),
             roster: Roster::default(),
             nothing_until: Mutex::default(),
             library,
@@ -193,10 +193,15 @@ impl Farm for Dispatch {
         request: Request<farm::ReleaseRequest>,
     ) -> Result<Response<farm::ReleaseResponse>, Status> {
         let farm::ReleaseRequest { worker, campaign_id, cases } = request.into_inner();
-        self.library
-            .release(&campaign_id, &worker, held(cases)?)
-            .await
-            .map_err(|error| unavailable(&error))?;
+        let (audits, held): (Vec<_>, Vec<_>) =
+            held(cases)?.into_iter().partition(|held| held.epoch == audits::EPOCH);
+        if !audits.is_empty() {
+            let indices = audits.into_iter().map(|held| held.index).collect();
+            let released = self.audits.release(&worker, &campaign_id, indices).await;
+            released.map_err(|error| unavailable(&error))?;
+        }
+        let released = self.library.release(&campaign_id, &worker, held).await;
+        released.map_err(|error| unavailable(&error))?;
         Ok(Response::new(farm::ReleaseResponse {}))
     }
 }

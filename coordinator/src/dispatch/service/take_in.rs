@@ -26,7 +26,7 @@ impl Dispatch {
         let (mut places, mut ordinary) = (Vec::new(), Vec::new());
         for (place, report) in reports.into_iter().enumerate() {
             if report.epoch == audits::EPOCH {
-                verdicts[place] = self.audited(worker, served, &report).await?;
+                verdicts[place] = self.audited(worker, served, report).await?;
             } else {
                 places.push(place);
                 ordinary.push(report);
@@ -49,9 +49,8 @@ impl Dispatch {
         reports: Vec<CaseReport>,
         step: &Step,
     ) -> Result<Vec<Verdict>, Status> {
-        let failed: Vec<bool> =
-            reports.iter().map(|it| matches!(it.outcome, Outcome::Failed { .. })).collect();
-        let durations_s: Vec<f64> = reports.iter().map(|it| it.duration_s).collect();
+        let ended = |it: &CaseReport| (matches!(it.outcome, Outcome::Failed { .. }), it.duration_s);
+        let ended: Vec<_> = reports.iter().map(ended).collect();
         let step = Step::after("store", [&step.traceparent()]);
         let report = Report {
             campaign: served.record.id.clone(),
@@ -69,8 +68,10 @@ impl Dispatch {
             step.fail(&error.to_string());
             unavailable(&error)
         })?;
-        let rows = verdicts.iter().filter(|it| matches!(it, Verdict::Stored)).count();
-        step.count("cases_stored", rows);
+        // What is said again counts once.
+        let stored = ended.iter().zip(&verdicts).filter(|(_, it)| matches!(it, Verdict::Stored));
+        let (failed, durations_s): (Vec<bool>, Vec<f64>) = stored.map(|(ended, _)| *ended).unzip();
+        step.count("cases_stored", failed.len());
         drop(step);
         served.measured(durations_s);
         if self.settings.put_aside && self.roster.reported(worker, &failed) {
@@ -84,13 +85,18 @@ impl Dispatch {
         &self,
         worker: &str,
         served: &Arc<Served>,
-        report: &CaseReport,
+        report: CaseReport,
     ) -> Result<Verdict, Status> {
         let found = self.audits.report(worker, served, report).await;
         Ok(match found.map_err(|error| unavailable(&error))? {
             None => Verdict::Refused,
             Some(Found::Agreement) => {
                 self.counts.audited.inc();
+                Verdict::Duplicate
+            }
+            Some(Found::Unjudged) => {
+                self.counts.audited.inc();
+                self.counts.differed.inc();
                 Verdict::Duplicate
             }
             Some(Found::Wrong { worker, reason }) => {
