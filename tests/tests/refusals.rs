@@ -5,7 +5,7 @@
 
 use std::fs;
 use std::path::Path;
-use system_tests::{Answer, run};
+use system_tests::{Answer, free_port, run};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
@@ -81,6 +81,16 @@ fn a_library_that_is_not_there_or_something_else_is_refused() {
     assert_refused(&status(&url("text.sqlite")), &["text.sqlite", "not a tracktwin library"]);
     assert_refused(&status("library.sqlite"), &["sqlite:PATH"]);
     assert_eq!(contents(folder.path()), ["text.sqlite"]);
+}
+
+#[test]
+fn a_server_that_does_not_answer_is_a_failure_and_no_wrong_input() {
+    let nobody = format!("postgres://w@127.0.0.1:{}/library", free_port());
+    for command in [&["status"][..], &["coordinator"], &["library", "status"]] {
+        let answer = run(PROGRAM, &[command, &["--library", &nobody]].concat());
+        // Whoever starts programs again is to start this one again.
+        assert_eq!(answer.code, Some(3), "{command:?}: {}", answer.err);
+    }
 }
 
 /// A small recording, with one file changed before it is evaluated.

@@ -121,7 +121,7 @@ impl Roster {
         put_aside
     }
 
-    /// Cores of the workers that are present, and how many these are.
+    /// How many workers are present, and their cores.
     pub(crate) fn present(&self) -> (usize, u32) {
         let workers = self.lock();
         let present = workers.values().filter(|worker| worker.heard_of.elapsed() < PRESENT);

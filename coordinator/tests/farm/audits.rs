@@ -1,10 +1,14 @@
 //! A worker that computes wrongly is found out, and one that fails is put aside.
 
 use crate::support::{
-    CORES, Coordinator, StandIn, coordinator_with, lease, registered, registration, stand_in,
+    CORES, Coordinator, StandIn, coordinator_with, lease, library, registered, registration,
+    report, stand_in,
 };
+use std::net::Ipv4Addr;
 use std::time::Duration;
+use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
+use tracktwin::campaign::Campaign;
 use tracktwin::dispatch::Settings;
 use tracktwin::service::Security;
 use tracktwin_library::WorkerState;
@@ -81,6 +85,72 @@ async fn a_worker_that_differs_is_quarantined_and_its_results_are_flagged_whoeve
         let answer = lease(&mut client, wrong).await;
         assert!(answer.cases.is_empty() && answer.reason.contains("quarantine"), "{answer:?}");
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn where_nobody_can_judge_nobody_is_blamed() {
+    let cannot = |_: &Experiment| Err(ExperimentError::Speeds { speeds: Vec::new() });
+    let settings = Settings { prepare: cannot, audit_share: 0.2, ..Settings::default() };
+    let coordinator = coordinator_with(settings, Security::default(), 40).await;
+    work(&coordinator, "first", stand_in).await;
+    work(&coordinator, "second", faulty).await;
+    let audits = coordinator.library.audits(&coordinator.campaign.id()).await.unwrap();
+    assert!(audits.differ > 0, "{audits:?}");
+    for name in ["first", "second"] {
+        let worker = coordinator.library.worker(name).await.unwrap().unwrap();
+        assert_eq!(worker.state, WorkerState::Active, "{name}: {:?}", worker.reason);
+    }
+}
+
+#[tokio::test]
+async fn what_an_auditor_gives_back_goes_to_the_next_at_once() {
+    let coordinator = serving(1.0).await;
+    let mut client = registered(&coordinator, "first").await;
+    let leased = lease(&mut client, "first").await;
+    client.report(report(&leased, "first")).await.unwrap();
+    // There was nothing to audit when the first one asked; for a while nobody looks again.
+    tokio::time::sleep(Duration::from_millis(2100)).await;
+    for auditor in ["second", "third"] {
+        client.register(registration(auditor, MODEL_HASH)).await.unwrap();
+        let audits = lease(&mut client, auditor).await;
+        assert!(!audits.cases.is_empty() && audits.cases.iter().all(|case| case.epoch == 0));
+        let held = |case: &messages::LeasedCase| messages::HeldCase {
+            sobol_index: case.sobol_index,
+            epoch: case.epoch,
+        };
+        let request = messages::ReleaseRequest {
+            worker: auditor.to_owned(),
+            campaign_id: audits.campaign_id.clone(),
+            cases: audits.cases.iter().map(held).collect(),
+        };
+        client.release(request).await.unwrap();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn audits_that_nobody_can_do_are_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let campaign = Campaign::built_in(Some(8)).unwrap();
+    let library = library(&folder, &campaign).await;
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    let coordinator = tracktwin::service::Coordinator {
+        library: library.clone(),
+        listener,
+        dashboard: None,
+        security: Security::default(),
+        settings: Settings { prepare: stand_in, audit_share: 1.0, ..Settings::default() },
+        exit_when_done: true,
+    };
+    let served = tokio::spawn(coordinator.run(CancellationToken::new()));
+    let stop = CancellationToken::new();
+    let config = Config { prepare: stand_in, ..Config::new(url, CORES) };
+    let worker = tokio::spawn(agent::run(config, stop.clone()));
+    tokio::time::timeout(Duration::from_secs(20), served).await.unwrap().unwrap().unwrap();
+    let audits = library.audits(&campaign.id()).await.unwrap();
+    assert_eq!((audits.open, audits.agree), (8, 0));
+    stop.cancel();
+    worker.await.unwrap().unwrap();
 }
 
 #[tokio::test]

@@ -53,6 +53,7 @@ fn worker_is_stopped_and_continued(engine: Engine) {
     let other = farm.worker();
     // Two leases later everything it held is with the other.
     std::thread::sleep(Duration::from_secs(3));
+    assert!(farm.leased_again() > 0, "the other has cases of it");
     sleeper.signal("CONT");
     Farm::finish(&mut coordinator);
     drop((sleeper, other));

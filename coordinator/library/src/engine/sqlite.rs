@@ -16,7 +16,7 @@ const APPLICATION_ID: i64 = 0x7477_696e;
 
 /// How long to wait for another process that writes.
 ///
-/// The longest write is a thousand cases; anything beyond half a minute is a stuck process.
+/// The longest writes take seconds; anything beyond half a minute is a stuck process.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Size of a new library's pages in bytes: three to five results fit, where with `SQLite`'s 4096 one does
