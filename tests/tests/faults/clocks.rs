@@ -1,8 +1,9 @@
-//! A worker whose time of day jumps by an hour, and back.
+//! A worker or a coordinator whose time of day jumps by an hour, and back.
 
 use crate::farm::{Engine, Farm};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use system_tests::Process;
 use test_needs::skipped;
 
 /// Where Debian puts the library that tells a program another time of day.
@@ -50,6 +51,17 @@ impl Clock {
         let date = Command::new("date").arg("+%s").envs(self.environment()).output().unwrap();
         String::from_utf8(date.stdout).unwrap().trim().parse().unwrap()
     }
+
+    /// Sets it ahead, back and right again while a farm is at work.
+    fn jumps_during(&self, farm: &Farm) {
+        let before = self.now_unix_s();
+        for (ahead, finished) in [("+1h", 4), ("-1h", 16), ("+0", 28)] {
+            farm.reach(finished);
+            self.set(ahead);
+            let jumped = self.now_unix_s() - before;
+            assert_eq!(jumped > 3500, ahead == "+1h", "the clock did not jump: {jumped} s");
+        }
+    }
 }
 
 fn clock_jumps(engine: Engine) {
@@ -59,15 +71,27 @@ fn clock_jumps(engine: Engine) {
     farm.lease = "12";
     let mut coordinator = farm.coordinator(0);
     let worker = Farm::worker_in(&farm.urls(), &clock.environment());
-    let before = clock.now_unix_s();
-    for (ahead, finished) in [("+1h", 4), ("-1h", 16), ("+0", 28)] {
-        farm.reach(finished);
-        clock.set(ahead);
-        let jumped = clock.now_unix_s() - before;
-        assert_eq!(jumped > 3500, ahead == "+1h", "the clock did not jump: {jumped} s");
-    }
+    clock.jumps_during(&farm);
     Farm::finish(&mut coordinator);
     drop(worker);
+    farm.assert_undisturbed();
+    assert_eq!(farm.attempts(), 0, "no lease was lost to the jumps");
+}
+
+#[test]
+fn a_coordinator_whose_clock_jumps_by_an_hour_ends_no_lease_of_another() {
+    let Some(clock) = Clock::right() else { return };
+    let Some(mut farm) = Farm::new(Engine::Postgres) else { return };
+    farm.lease = "12";
+    let url = |number| format!("127.0.0.1:{}", farm.port(number));
+    let mut jumping = farm.coordinating(&url(0));
+    let mut jumping = Process::start(jumping.envs(clock.environment()), "coordinator");
+    let mut sound = farm.coordinator(1);
+    let workers = [0, 1].map(|number| Farm::worker_of(&format!("http://{}", url(number))));
+    clock.jumps_during(&farm);
+    Farm::finish(&mut jumping);
+    Farm::finish(&mut sound);
+    drop(workers);
     farm.assert_undisturbed();
     assert_eq!(farm.attempts(), 0, "no lease was lost to the jumps");
 }
