@@ -70,10 +70,18 @@ impl<'a> Task<'a> {
 /// # Errors
 /// [`FarmError`] when the library fails or the campaign has not so many cases.
 pub async fn prepare(library: &Library, campaign: &Campaign) -> Result<(), FarmError> {
+    introduce(library, campaign).await?;
+    add_cases(library, campaign, |_| true).await
+}
+
+/// Stores a campaign, without cases if it is new.
+///
+/// # Errors
+/// [`FarmError`] when the library fails.
+pub async fn introduce(library: &Library, campaign: &Campaign) -> Result<(), FarmError> {
     let definition = &campaign.definition;
-    let id = campaign.id();
     let record = CampaignRecord {
-        id: id.clone(),
+        id: campaign.id(),
         name: campaign.name.clone(),
         definition_json: campaign.definition_json(),
         definition_hash: campaign.definition_hash(),
@@ -82,10 +90,23 @@ pub async fn prepare(library: &Library, campaign: &Campaign) -> Result<(), FarmE
         speeds_km_h: definition.experiment.speeds_km_h.clone(),
         seed: definition.seed,
     };
-    library.insert_campaign(&record).await?;
+    Ok(library.insert_campaign(&record).await?)
+}
+
+/// Stores those of a campaign's cases that the library does not have yet, for as long as `goes_on`,
+/// which is told how many are stored.
+///
+/// # Errors
+/// As [`prepare`]; what was stored before stays.
+pub async fn add_cases(
+    library: &Library,
+    campaign: &Campaign,
+    mut goes_on: impl FnMut(u32) -> bool,
+) -> Result<(), FarmError> {
+    let id = campaign.id();
     // Cases are stored in order, so the ones that are there are the first.
     let mut stored = library.status(&id).await?.total();
-    while stored < campaign.cases {
+    while goes_on(stored) && stored < campaign.cases {
         let end = campaign.cases.min(stored.saturating_add(CASES_AT_A_TIME));
         library.insert_cases(&id, &cases(campaign, stored..end)?).await?;
         stored = end;

@@ -87,6 +87,10 @@ fn an_answer_comes_as_a_table_as_csv_and_as_json() {
     assert_done(&json);
     let rows: serde_json::Value = serde_json::from_str(&json.out).unwrap();
     assert_eq!(rows[1], serde_json::json!({ "sobol_index": 3, "speed_km_h": 13.0 }));
+    assert!(json.out.contains(r#"{"sobol_index":3,"speed_km_h":7.0}"#), "in order: {}", json.out);
+    let twice = sql("select 1 as a, 2 as a", &library, "json");
+    assert_eq!(twice.code, Some(2), "{}", twice.out);
+    assert!(twice.err.contains("two columns are called a"), "{}", twice.err);
     let table = sql(ask, &library, "table");
     assert_done(&table);
     assert!(table.out.starts_with("sobol_index"), "{}", table.out);
@@ -134,6 +138,18 @@ fn exported_tables_make_the_same_library_again() {
     assert_done(&self::library(&["import", &tables, "--library", &again]));
     assert_eq!(digest(&again), digest(&library));
     assert_done(&self::library(&["verify", "--library", &again]));
+    // A folder without all of it is refused before anything is written.
+    let part = folder.path().join("part");
+    fs::create_dir(&part).unwrap();
+    for file in fs::read_dir(&tables).unwrap().map(Result::unwrap) {
+        if file.file_name() != "result.parquet" {
+            fs::copy(file.path(), part.join(file.file_name())).unwrap();
+        }
+    }
+    let none = folder.path().join("none.sqlite");
+    let answer = self::library(&["import", &part.display().to_string(), "--library", &url(&none)]);
+    assert_eq!(answer.code, Some(2), "{}", answer.err);
+    assert!(answer.err.contains("result.parquet") && !none.exists(), "{}", answer.err);
     // What is there already stays as it is.
     let twice = self::library(&["import", &tables, "--library", &again]);
     assert_done(&twice);

@@ -143,7 +143,8 @@ impl Coordinators {
         if contact.warned.is_none_or(|warned| warned.elapsed() >= WARN_EVERY) {
             contact.warned = Some(Instant::now());
             let reason = chain(status);
-            tracing::warn!(coordinator = url, "the coordinator does not answer: {reason}");
+            let hint = hint(url, &reason);
+            tracing::warn!(coordinator = url, "the coordinator does not answer: {reason}{hint}");
         }
     }
 
@@ -171,6 +172,23 @@ const fn is_silence(code: Code) -> bool {
             | Code::Aborted
             | Code::DataLoss
     )
+}
+
+/// What may be amiss where a line breaks before anything is said: TLS tells little of it.
+fn hint(url: &str, reason: &str) -> &'static str {
+    let tls = url.starts_with("https:");
+    match reason {
+        _ if reason.contains("UnknownIssuer") => {
+            "; it shows a certificate of another authority than --tls-ca"
+        }
+        _ if tls && reason.contains("connection closed") => {
+            "; it may demand a certificate: --tls-cert and --tls-key"
+        }
+        _ if tls && reason.contains("InvalidContentType") => "; it may speak plain text: http://",
+        _ if !tls && reason.contains("frame with invalid size") => "; it may speak TLS: https://",
+        _ if reason.contains("compression flag") => "; this port may be its dashboard's",
+        _ => "",
+    }
 }
 
 /// What failed and why, in one line: a failed connection hides its reason in its sources.

@@ -46,6 +46,11 @@ pub enum CredentialsError {
         /// The address.
         url: String,
     },
+    /// A file for the authority that holds something else.
+    #[error(
+        "--tls-ca: there is no certificate in it; it is the ca.pem that `tracktwin certs` made"
+    )]
+    NoCertificate,
     /// Neither `http` nor `https`.
     #[error("coordinator {url}: not an address; write http://HOST:PORT or https://HOST:PORT")]
     Address {
@@ -89,6 +94,9 @@ impl Credentials {
             Some("https") => {
                 let ca = self.ca_pem.as_ref();
                 let ca = ca.ok_or_else(|| CredentialsError::NoAuthority { url: url.to_owned() })?;
+                if !String::from_utf8_lossy(ca).contains("-----BEGIN CERTIFICATE-----") {
+                    return Err(CredentialsError::NoCertificate);
+                }
                 let tls = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(ca));
                 Ok(Some(match &self.identity_pem {
                     Some([certificate, key]) => tls.identity(Identity::from_pem(certificate, key)),
@@ -144,6 +152,9 @@ mod tests {
         }
         let error = careful.tls_for("https://node7:7000").unwrap_err();
         assert!(matches!(error, CredentialsError::NoAuthority { .. }), "{error}");
+        let token = Credentials { ca_pem: Some(b"a token".to_vec()), ..careful };
+        let error = token.tls_for("https://node7:7000").unwrap_err();
+        assert_eq!(error, CredentialsError::NoCertificate);
     }
 
     #[test]

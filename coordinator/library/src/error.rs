@@ -131,6 +131,12 @@ pub enum LibraryError {
     /// A statement that would write, where only reading is done.
     #[error("`library sql` only reads; this statement would write")]
     OnlyReads,
+    /// Whoever asks may not write.
+    #[error("the library can only be read from here: {reason}")]
+    NotWritable {
+        /// What the database said.
+        reason: String,
+    },
     /// A statement that the database does not understand.
     #[error("the database refuses the statement: {reason}")]
     BadQuery {
@@ -193,6 +199,7 @@ impl LibraryError {
                 | Self::OtherTruth { .. }
                 | Self::SeedTooLarge { .. }
                 | Self::OnlyReads
+                | Self::NotWritable { .. }
                 | Self::BadQuery { .. }
                 | Self::BadRow { .. }
         )
@@ -224,6 +231,9 @@ const SQLITE_FULL: [&str; 2] = ["13", "4874"];
 const POSTGRES_BROKEN: &str = "08";
 const POSTGRES_LATER: [&str; 6] = ["57P01", "57P02", "57P03", "53300", "40001", "40P01"];
 
+/// A file or a folder that may only be read; a transaction that only reads; a role without the right.
+const NOT_WRITABLE: [&str; 5] = ["8", "776", "1544", "25006", "42501"];
+
 /// Server-side disk full.
 const POSTGRES_FULL: &str = "53100";
 
@@ -247,6 +257,10 @@ impl From<sqlx::Error> for LibraryError {
                     || (code.len() == 5 && code.starts_with(POSTGRES_BROKEN)) =>
             {
                 Self::Unavailable { reason: error.to_string() }
+            }
+            Some(code) if NOT_WRITABLE.contains(&code) => {
+                let reason = error.as_database_error().map(DatabaseError::message);
+                Self::NotWritable { reason: reason.unwrap_or_default().to_owned() }
             }
             _ => Self::Database(error),
         }

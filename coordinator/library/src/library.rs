@@ -1,7 +1,7 @@
 //! Opening and closing a library; the connections to it.
 
 use crate::LibraryError;
-use crate::engine::{self, Opened, Readers, Target, Write};
+use crate::engine::{self, Connection, Opened, Readers, Target, Write, sql};
 use crate::lease::Horizon;
 use std::fs::File;
 use std::path::PathBuf;
@@ -93,6 +93,14 @@ impl Library {
         }
     }
 
+    /// Finds out whether this program may write at all.
+    ///
+    /// # Errors
+    /// [`LibraryError::NotWritable`] when it may not, or when the library does not answer.
+    pub async fn check_writable(&self) -> Result<(), LibraryError> {
+        self.write(Touch).await
+    }
+
     pub(crate) fn target(&self) -> &Target {
         &self.opened.target
     }
@@ -107,5 +115,19 @@ impl Library {
 
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
         self.opened.writer.write(write).await
+    }
+}
+
+/// Changes nothing.
+struct Touch;
+
+impl Write for Touch {
+    type Answer = ();
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        connection
+            .execute(sql("update campaign set state = state where id is null"))
+            .await
+            .map(drop)
     }
 }

@@ -93,19 +93,26 @@ impl FarmCampaign {
         if self.is_done() { "done" } else { &self.state }
     }
 
+    /// Whether its cases are handed out and some are left.
+    pub fn is_at_work(&self) -> bool {
+        self.state == "running" && !self.is_done()
+    }
+
     /// How long the rest takes at the present rate, in s; none where nothing is handed out.
     pub fn eta_s(&self) -> Option<f64> {
         let left = f64::from(self.waiting + self.leased);
-        let goes_on = self.state == "running" && self.per_second > 0.0 && left > 0.0;
-        goes_on.then(|| left / self.per_second)
+        (self.is_at_work() && self.per_second > 0.0).then(|| left / self.per_second)
     }
 
     /// What there is to say of the rest, for people.
     pub fn left(&self) -> String {
         match self.eta_s() {
             Some(eta_s) => format!("{} left", duration(eta_s)),
+            None if self.is_done() && self.failed > 0 => {
+                "done but for what was given up".to_owned()
+            }
             None if self.is_done() => "nothing left to do".to_owned(),
-            None if self.state != "running" => "nothing is handed out".to_owned(),
+            None if !self.is_at_work() => "nothing is handed out".to_owned(),
             None => "rate not known yet".to_owned(),
         }
     }
@@ -139,6 +146,11 @@ mod tests {
         assert_eq!(running.left(), "35 s left");
         let paused = FarmCampaign { state: "paused".to_owned(), ..running };
         assert_eq!((paused.eta_s(), paused.left().as_str()), (None, "nothing is handed out"));
+        let done = FarmCampaign { waiting: 0, leased: 0, failed: 1, ..paused };
+        assert_eq!(
+            (done.standing(), done.left().as_str()),
+            ("done", "done but for what was given up")
+        );
     }
 
     #[test]

@@ -57,20 +57,20 @@ pub fn farm_view(farm: &Farm) -> Markup {
 
 /// What a reader in a hurry needs, in one sentence.
 fn summary(farm: &Farm) -> String {
-    let running = farm.campaigns.iter().filter(|it| it.state == "running" && !it.is_done());
-    let rate: f64 = farm.campaigns.iter().map(|campaign| campaign.per_second).sum();
+    let at_work: Vec<_> = farm.campaigns.iter().filter(|it| it.is_at_work()).collect();
+    let rate: f64 = at_work.iter().map(|campaign| campaign.per_second).sum();
     let present = farm.workers.iter().filter(|worker| worker.is_present()).count();
     format!(
         "Campaigns with work to do: {} of {}; workers: {present}; {} cases a second.",
-        running.count(),
+        at_work.len(),
         farm.campaigns.len(),
         significant(rate)
     )
 }
 
 /// Below the pictures of a campaign.
-const CAPTION: &str = "Left: local wavelet power spectra of the newest cases at the fastest speed. \
-    Right: finished cases in the parameter space; given-up ones in the second colour.";
+const CAPTION: &str = "Left: local wavelet power spectra of the newest cases, by their index, at the \
+    fastest speed. Right: finished cases in the parameter space, and in orange those given up.";
 
 fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
     let FarmCampaign { waiting, leased, finished, failed, .. } = campaign;
@@ -83,7 +83,8 @@ fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
                 (finished) " of " (campaign.cases()) " cases finished, " (leased) " in work, "
                 (waiting) " waiting, "
                 span.bad[*failed > 0] { (failed) " given up" } "; "
-                (significant(campaign.per_second)) " a second, " (campaign.left())
+                @if campaign.is_at_work() { (significant(campaign.per_second)) " a second, " }
+                (campaign.left())
                 @if campaign.priority != 0 { ", priority " (campaign.priority) }
             }
             @if may_control { (buttons(campaign)) }
@@ -128,10 +129,10 @@ fn buttons(campaign: &FarmCampaign) -> Markup {
 
 fn causes(causes: &[(String, u32)]) -> Markup {
     html! {
-        table {
+        div.scroll { table {
             thead { tr { th.words { "given up because" } th { "cases" } } }
             tbody { @for (cause, count) in causes { tr { td.words { (cause) } td { (count) } } } }
-        }
+        } }
     }
 }
 

@@ -11,6 +11,9 @@ use tracktwin_signal::FeatureDefinition;
 use tracktwin_track::extension::SampledExtension;
 use tracktwin_worker::{Experiment, ExperimentError};
 
+/// Longest name of a campaign.
+const NAME_CHARACTERS_MAX: usize = 64;
+
 /// The campaign that `tracktwin run` simulates where none is named.
 pub const DEFAULT: &str = include_str!("default.toml");
 
@@ -86,6 +89,17 @@ pub enum SpecError {
         line: usize,
         /// What the parser said.
         message: String,
+    },
+    /// A name that terminals, pages and commands can't take.
+    #[error(
+        "{path}: name: {name:?} must begin with a letter or digit and have up to {NAME_CHARACTERS_MAX} \
+         letters, digits, spaces, and . _ - +"
+    )]
+    Name {
+        /// The file.
+        path: String,
+        /// The name.
+        name: String,
     },
     /// A range is wrong.
     #[error("{path}: parameters.{source}")]
@@ -227,6 +241,12 @@ impl Campaign {
 
 impl File {
     fn check(self, path: &str, cases: Option<u32>) -> Result<Campaign, SpecError> {
+        let is_name = |c: char| c.is_alphanumeric() || " ._-+".contains(c);
+        let fits = (1..=NAME_CHARACTERS_MAX).contains(&self.name.chars().count());
+        let begins = self.name.starts_with(char::is_alphanumeric);
+        if !fits || !begins || !self.name.chars().all(is_name) {
+            return Err(SpecError::Name { path: path.to_owned(), name: self.name });
+        }
         let cases = cases.unwrap_or(self.cases);
         if cases == 0 {
             return Err(SpecError::NoCases { path: path.to_owned() });
@@ -319,6 +339,19 @@ mod tests {
         let message = refusal(|text| format!("speeed_km_h = [7]\n{text}"));
         assert!(message.starts_with("c.toml:1: unknown field `speeed_km_h`"), "{message}");
         assert!(message.contains("speeds_km_h") && !message.contains('\n'), "{message}");
+    }
+
+    #[test]
+    fn a_name_is_one_that_can_be_shown_and_typed() {
+        for good in ["v-track", "Gleis 2.1", "Übung_1+"] {
+            Campaign::parse(&format!("name = \"{good}\"\nseed = 1\ncases = 1"), "f", None).unwrap();
+        }
+        for wrong in ["", " ", "-rf", "\\u001b[31mred", "a\\nb", "a/b", &"x".repeat(65)] {
+            let text = format!("name = \"{wrong}\"\nseed = 1\ncases = 1");
+            let error = Campaign::parse(&text, "f", None).unwrap_err();
+            assert!(matches!(error, SpecError::Name { .. }), "{wrong}: {error}");
+            assert!(!error.to_string().contains('\u{1b}'), "{error}");
+        }
     }
 
     #[test]

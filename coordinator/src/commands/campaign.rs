@@ -1,11 +1,14 @@
 //! `tracktwin campaign`: adds campaigns to a library and steers them, whoever serves it.
 
-use super::{OrInput, Stop, say};
+use super::progress::Progress;
+use super::signals::stop_on_signal;
+use super::{OrInput, Stop, note, say};
 use crate::campaign::Campaign;
 use crate::farm;
+use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
-use tracktwin_library::{Library, Retry};
+use tracktwin_library::{CampaignState, Library, Retry, State};
 
 /// What is to be done.
 #[derive(Subcommand)]
@@ -100,6 +103,9 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
                 (false, true) => Retry::Failed,
                 (false, false) => Retry::Cases(cases),
             };
+            if let Retry::Cases(indices) = &which {
+                refuse_others(&library, &id, indices).await?;
+            }
             let again = library.retry(&id, which).await?;
             done(library, &format!("{id}: {again} cases are tried again")).await
         }
@@ -124,28 +130,102 @@ async fn add(
 ) -> Result<(), Stop> {
     let campaign = Campaign::read(&file, cases).or_input()?;
     let library = Library::open_or_create(&which.library).await.map_err(Stop::from_library)?;
-    farm::prepare(&library, &campaign).await?;
     let id = campaign.id();
+    note_namesakes(&library, &campaign).await?;
+    farm::introduce(&library, &campaign).await.map_err(Stop::from_farm)?;
+    // Before there is anything to hand out.
     if let Some(priority) = priority {
         library.set_priority(&id, priority).await?;
     }
+    add_cases(&library, &campaign).await?;
     let status = library.status(&id).await?;
     let (cases, left) = (status.total(), status.total() - status.done());
-    done(library, &format!("{id}: {cases} cases, {left} of them to be simulated")).await
+    let all = library.overview().await?;
+    let state = all.iter().find(|it| it.id == id).map(|it| it.state);
+    let waits = match state {
+        Some(CampaignState::Running) | None => String::new(),
+        Some(state) => {
+            format!("; it is {}, `tracktwin campaign resume` hands them out", state.name())
+        }
+    };
+    done(library, &format!("{id}: {cases} cases, {left} of them to be simulated{waits}")).await
+}
+
+/// A file that was changed is another campaign.
+async fn note_namesakes(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
+    let id = campaign.id();
+    let all = library.campaigns().await?;
+    let others = all.iter().filter(|it| it.name == campaign.name && it.id != id);
+    for other in others {
+        note(&format!("{} has the same name and another definition; both are worked on", other.id));
+    }
+    Ok(())
+}
+
+/// Adds cases with progress; says how far it came where that is not to the end.
+async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
+    let shutdown = stop_on_signal("stopping")?;
+    let (mut stored, total) = (0, campaign.cases);
+    let mut progress = None::<Progress>;
+    let added = farm::add_cases(library, campaign, |now| {
+        stored = now;
+        let begin = || Progress::begin("adding cases", now.into(), total.into());
+        progress.get_or_insert_with(begin).at(now.into(), "");
+        !shutdown.is_cancelled()
+    });
+    let added = added.await;
+    let so_far = || {
+        let id = campaign.id();
+        format!("{stored} of {total} cases of {id} were added; the same command goes on")
+    };
+    added.with_context(so_far)?;
+    if stored < total {
+        return Err(anyhow!(so_far()).into());
+    }
+    Ok(())
 }
 
 impl Named {
     async fn open(self) -> Result<(Library, String), Stop> {
         let library = Library::open(&self.which.library).await.map_err(Stop::from_library)?;
-        let named = self.campaign.as_deref();
         let all = library.campaigns().await?;
-        let mut same = all.iter().filter(|it| Some(it.name.as_str()) == named);
-        if let (Some(only), None) = (same.next(), same.next()) {
-            return Ok((library, only.id.clone()));
+        let Some(named) = self.campaign.as_deref() else {
+            let record = super::library::only(&library, &all, "name one").or_input()?;
+            return Ok((library, record.id.clone()));
+        };
+        let meant: Vec<&str> = all
+            .iter()
+            .filter(|it| it.id == named || it.name == named)
+            .map(|it| it.id.as_str())
+            .collect();
+        let ids = |ids: &[&str]| ids.join(", ");
+        match meant[..] {
+            [id] => Ok((library, id.to_owned())),
+            [] if all.is_empty() => Err(anyhow!("the library holds no campaign yet")).or_input(),
+            [] => {
+                let all: Vec<&str> = all.iter().map(|it| it.id.as_str()).collect();
+                Err(anyhow!("the library has no campaign {named}; it has {}", ids(&all))).or_input()
+            }
+            _ => Err(anyhow!("several campaigns are called {named}; give the id: {}", ids(&meant)))
+                .or_input(),
         }
-        let record = super::library::choose(&library, named).await?;
-        Ok((library, record.id))
     }
+}
+
+/// Refuses cases that were not given up.
+async fn refuse_others(library: &Library, id: &str, indices: &[u32]) -> Result<(), Stop> {
+    for &index in indices {
+        let is = match library.case(id, index).await?.map(|case| case.state) {
+            Some(State::Failed) => continue,
+            Some(State::Waiting) => "waits already",
+            Some(State::Leased) => "is in work",
+            Some(State::Finished) => "is finished",
+            None => "is not there",
+        };
+        return Err(anyhow!("{id}: case {index} {is}; only what was given up is tried again"))
+            .or_input();
+    }
+    Ok(())
 }
 
 async fn done(library: Library, line: &str) -> Result<(), Stop> {

@@ -89,7 +89,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
     let library = Library::open_or_create(&arguments.library).await.map_err(Stop::from_library)?;
     for campaign in &campaigns {
-        farm::prepare(&library, campaign).await?;
+        farm::prepare(&library, campaign).await.map_err(Stop::from_farm)?;
     }
     let coordinator = Coordinator {
         library: library.clone(),
@@ -157,7 +157,8 @@ fn share(text: &str) -> Result<f64, String> {
     };
     let share = number.trim().parse::<f64>().map(|number| number / divisor);
     match share {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        // A bare 1 may mean either.
+        Ok(share) if (0.0..=1.0).contains(&share) && (divisor > 1.0 || share < 1.0) => Ok(share),
         _ => Err("write a share from 0% to 100%, such as 1%".to_owned()),
     }
 }
@@ -178,7 +179,7 @@ mod tests {
     fn shares_are_written_as_percent_or_as_numbers() {
         assert_eq!(share("1%").unwrap(), 0.01);
         assert_eq!(share("0.5").unwrap(), 0.5);
-        for wrong in ["", "-1%", "200%", "NaN", "some"] {
+        for wrong in ["", "-1%", "200%", "1", "NaN", "some"] {
             assert!(share(wrong).is_err(), "{wrong}");
         }
     }

@@ -173,15 +173,17 @@ fn say(line: &str) {
     answer(format!("{line}\n").as_bytes());
 }
 
-/// Who reads may have gone, as `head` does once it has its lines: then nothing is amiss.
-fn answer(text: &[u8]) {
+/// Whether anybody reads: who did may have gone, as `head` does once it has its lines, and then nothing
+/// is amiss.
+fn answer(text: &[u8]) -> bool {
     let mut out = std::io::stdout().lock();
     match out.write_all(text).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+        Ok(()) => true,
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => false,
+        Err(error) => {
             note(&format!("tracktwin: standard output: {error}"));
             std::process::exit(3);
         }
-        _ => {}
     }
 }
 

@@ -1,6 +1,6 @@
 //! `tracktwin status`: how far a farm is, once or all the time.
 
-use super::{Stop, say};
+use super::{Stop, answer};
 use crate::dashboard::{Detail, farm};
 use clap::Args;
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ use tracktwin_library::Library;
 use tracktwin_report::{Farm, FarmCampaign, FarmWorker, duration};
 
 /// Characters of a progress bar.
-const BAR: usize = 40;
+const BAR: usize = 30;
 
 /// Causes of failure shown for a campaign.
 const CAUSES: usize = 3;
@@ -45,14 +45,15 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let terminal = std::io::stdout().is_terminal();
     loop {
         let farm = farm(&library, Detail::Counts).await?;
-        if arguments.json {
-            say(&format!("{:#}", as_json(&farm)));
+        let text = if arguments.json {
+            format!("{:#}\n", as_json(&farm))
         } else if arguments.watch && terminal {
-            say(&format!("{CLEAR}{}", text(&farm)));
+            format!("{CLEAR}{}\n", text(&farm))
         } else {
-            say(&text(&farm));
-        }
-        if !arguments.watch {
+            format!("{}\n", text(&farm))
+        };
+        let is_read = answer(text.as_bytes());
+        if !(arguments.watch && is_read) {
             library.close().await;
             return Ok(());
         }
@@ -81,17 +82,25 @@ fn campaign_text(text: &mut String, campaign: &FarmCampaign) {
     let share = f64::from(*finished) / f64::from(cases.max(1));
     let full = (share * BAR as f64) as usize;
     let bar = format!("{}{}", "█".repeat(full), "░".repeat(BAR - full));
+    let rate = format!("{:.1} cases/s  ", campaign.per_second);
+    let rate = if campaign.is_at_work() { rate } else { String::new() };
+    let priority = match campaign.priority {
+        0 => String::new(),
+        priority => format!(", priority {priority}"),
+    };
     let _ = write!(
         text,
-        "\n{id}  ({})\n{bar} {:5.1} %  {:.1} cases/s  {}\n\
+        "\n{id}  ({}{priority})\n{bar} {:5.1} %  {rate}{}\n\
          {cases} cases: {finished} finished, {leased} in work, {waiting} waiting, {failed} given up\n",
         campaign.standing(),
         100.0 * share,
-        campaign.per_second,
         campaign.left(),
     );
     for (cause, count) in campaign.causes.iter().take(CAUSES) {
         let _ = writeln!(text, "  {count} given up: {cause}");
+    }
+    if campaign.causes.len() > CAUSES {
+        let _ = writeln!(text, "  and {} further causes", campaign.causes.len() - CAUSES);
     }
 }
 

@@ -1,5 +1,6 @@
 //! Why a command ends without being done.
 
+use crate::farm::FarmError;
 use tracktwin_library::LibraryError;
 
 /// The end of a command that is not success; each has its exit code.
@@ -23,6 +24,14 @@ impl Stop {
     /// Wrong input or a failure, as the library says.
     pub(super) fn from_library(error: LibraryError) -> Self {
         if error.is_wrong_input() { Self::Input(error.into()) } else { Self::Failure(error.into()) }
+    }
+
+    /// As [`Stop::from_library`], of what fails in a farm.
+    pub(super) fn from_farm(error: FarmError) -> Self {
+        match error {
+            FarmError::Library(error) => Self::from_library(error),
+            other => Self::Failure(other.into()),
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Between the values of messages and those of the library.
 
+use std::error::Error;
 use tonic::Status;
 use tracktwin_library::{self as library, Held, LibraryError, Verdict};
 use tracktwin_protocol::{
@@ -59,6 +60,6 @@ pub(crate) fn malformed(error: &BadMessage) -> Status {
 
 /// The worker asks again; what is wrong with the library is the coordinator's to say.
 pub(crate) fn unavailable(error: &LibraryError) -> Status {
-    tracing::error!("the library does not answer: {error:?}");
+    tracing::error!(error = error as &dyn Error, "the library does not do what is asked");
     Status::unavailable(error.to_string())
 }

@@ -7,6 +7,7 @@ use rcgen::{
 use std::fs::{File, OpenOptions};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{Read, Write};
+use std::net::IpAddr;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use time::{Duration, OffsetDateTime};
@@ -34,6 +35,14 @@ pub enum CertificatesError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A host that workers can't call.
+    #[error(
+        "{host:?} is no host; write a name such as head.cluster or an address such as 10.0.0.1"
+    )]
+    Host {
+        /// What was given.
+        host: String,
+    },
     /// A name that certificates can't hold, or a key that is none.
     #[error("no certificate can be made of it: {0}")]
     Certificate(#[from] rcgen::Error),
@@ -60,6 +69,13 @@ pub fn issue(
     days: u32,
     now: OffsetDateTime,
 ) -> Result<(), CertificatesError> {
+    let is_host = |host: &str| {
+        let is_name = |c: char| c.is_ascii_alphanumeric() || "-_.*".contains(c);
+        host.parse::<IpAddr>().is_ok() || (!host.is_empty() && host.chars().all(is_name))
+    };
+    if let Some(wrong) = hosts.iter().find(|host| !is_host(host)) {
+        return Err(CertificatesError::Host { host: wrong.clone() });
+    }
     std::fs::create_dir_all(folder).map_err(at(folder))?;
     let authority = authority(folder, now)?;
     let end = now + Duration::days(i64::from(days));

@@ -1,21 +1,12 @@
 //! A coordinator's life: it claims the library, serves workers, watches, and ends.
 
+use super::watch::watch;
 use super::{Security, SecurityError, ServeError, serve};
 use crate::dashboard::{self, Dashboard};
 use crate::dispatch::{Counts, Dispatch, Settings};
-use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
-use tracktwin_library::{CampaignState, Library, LibraryError};
-
-/// How often the campaigns are looked at.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
-
-/// Between two lines of the log about how far it is.
-const TELL_EVERY: Duration = Duration::from_mins(1);
-
-/// A worker heard of within this many ms is there.
-const PRESENT_MS: i64 = 60_000;
+use tracktwin_library::{Library, LibraryError};
 
 /// What a coordinator is started with.
 pub struct Coordinator {
@@ -61,6 +52,8 @@ impl Coordinator {
         let address = self.listener.local_addr()?;
         self.security.check(address)?;
         let _claim = self.library.claim()?;
+        // Workers should not find that out one by one.
+        self.library.check_writable().await?;
         let stop = stop.child_token();
         // However this ends, nothing goes on behind its back.
         let _guard = stop.clone().drop_guard();
@@ -85,64 +78,4 @@ impl Coordinator {
         tracing::info!("coordinator ends");
         Ok(served?)
     }
-}
-
-/// Looks at the campaigns until told to stop, or until there is nothing left to do.
-async fn watch(library: Library, exit_when_done: bool, stop: CancellationToken) {
-    let mut told = None::<tokio::time::Instant>;
-    while !stop.is_cancelled() {
-        match left(&library).await {
-            Ok(left) => {
-                if told.is_none_or(|told| told.elapsed() >= TELL_EVERY) {
-                    told = Some(tokio::time::Instant::now());
-                    tracing::info!(left = left.cases, "cases left");
-                }
-                if left.is_done() && exit_when_done {
-                    match left.audits {
-                        0 => tracing::info!("everything is done"),
-                        audits => tracing::warn!(
-                            audits,
-                            "done but for audits that no other worker is there for"
-                        ),
-                    }
-                    stop.cancel();
-                }
-            }
-            Err(error) => tracing::error!("the library does not answer: {error}"),
-        }
-        tokio::select! {
-            () = tokio::time::sleep(LOOK_EVERY) => {}
-            () = stop.cancelled() => {}
-        }
-    }
-}
-
-/// What is left to be simulated, in campaigns that run.
-#[derive(Default)]
-struct Left {
-    cases: u64,
-    /// Open audits.
-    audits: u64,
-    /// Those of them that a worker who is there could do.
-    audits_to_do: u64,
-}
-
-impl Left {
-    const fn is_done(&self) -> bool {
-        self.cases + self.audits_to_do == 0
-    }
-}
-
-async fn left(library: &Library) -> Result<Left, LibraryError> {
-    let mut left = Left::default();
-    let since_unix_ms = library.now_unix_ms() - PRESENT_MS;
-    for campaign in library.overview().await? {
-        if campaign.state == CampaignState::Running {
-            left.cases += u64::from(campaign.status.total() - campaign.status.done());
-            left.audits += u64::from(library.audits(&campaign.id).await?.open);
-            let to_do = library.audits_to_do(&campaign.id, since_unix_ms).await?;
-            left.audits_to_do += u64::from(to_do);
-        }
-    }
-    Ok(left)
 }

@@ -10,6 +10,7 @@ mod listener;
 mod peer;
 mod security;
 mod serve;
+mod watch;
 
 pub use certificates::{CertificatesError, issue};
 pub use coordinator::{Coordinator, CoordinatorError};

@@ -114,12 +114,14 @@ fn integer(cell: &Cell) -> Option<i64> {
     }
 }
 
-/// A row as it stands where nobody works on it.
+/// A row as it stands where nobody works on it; that a case is finished is said by
+/// [`Library::settle`], when its results are there.
 fn at_rest(table: &Table, mut row: Vec<Cell>) -> Vec<Cell> {
     let state = table.column("state");
     let expires = table.column("lease_expires_unix_ms");
     if let (Some(state), Some(expires)) = (state, expires)
-        && row.get(state) == Some(&Cell::Text("leased".to_owned()))
+        && let Some(Cell::Text(name)) = row.get(state)
+        && ["leased", "finished"].contains(&name.as_str())
     {
         row[state] = Cell::Text("waiting".to_owned());
         row[expires] = Cell::Null;

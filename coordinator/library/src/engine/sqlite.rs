@@ -40,7 +40,7 @@ pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryEr
         .page_size(PAGE_BYTES)
         .busy_timeout(BUSY_TIMEOUT)
         .foreign_keys(true);
-    let mut connection = options.connect().await.map_err(|error| not_a_database(error, path))?;
+    let mut connection = options.connect().await.map_err(|error| closed_to_us(error, path))?;
     refuse_strangers(&mut connection, path).await?;
     connection.close().await?;
 
@@ -51,7 +51,7 @@ pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryEr
         .pragma("wal_autocheckpoint", LOG_PAGES);
     let mut patience = Patience::new(true);
     let mut connection = loop {
-        match options.connect().await.map_err(LibraryError::from) {
+        match options.connect().await.map_err(|error| closed_to_us(error, path)) {
             // A log begins only where nobody else looks, and doesn't wait for that itself.
             Err(error) if error.is_temporary() && patience.wait().await.is_ok() => {}
             opened => break opened?,
@@ -64,13 +64,26 @@ pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryEr
     Ok((Readers::Sqlite(readers), Connection::Sqlite(connection)))
 }
 
-/// `SQLITE_NOTADB`, the result code for a file that is no database.
-fn not_a_database(error: sqlx::Error, path: &Path) -> LibraryError {
-    match error.as_database_error().and_then(sqlx::error::DatabaseError::code) {
-        Some(code) if code == "26" => {
-            LibraryError::NotALibrary { library: path.display().to_string() }
+/// Why a file cannot be opened, as far as a user can mend it.
+fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
+    let library = path.display().to_string();
+    let code = error.as_database_error().and_then(sqlx::error::DatabaseError::code);
+    match code.as_deref() {
+        // SQLITE_NOTADB.
+        Some("26") => LibraryError::NotALibrary { library },
+        // SQLITE_CANTOPEN.
+        Some("14") => {
+            let reason = "the file can't be opened or made; look at the rights of its folder";
+            LibraryError::NotLetIn { library, reason: reason.to_owned() }
         }
-        _ => error.into(),
+        _ => match error.into() {
+            LibraryError::NotWritable { .. } => {
+                let reason =
+                    "its folder can't be written, which SQLite needs even to read; copy it";
+                LibraryError::NotLetIn { library, reason: reason.to_owned() }
+            }
+            other => other,
+        },
     }
 }
 
@@ -86,7 +99,7 @@ async fn refuse_strangers(
     )
     .fetch_one(connection)
     .await
-    .map_err(|error| not_a_database(error, path))?;
+    .map_err(|error| closed_to_us(error, path))?;
     if application_id != APPLICATION_ID && tables > 0 {
         return Err(LibraryError::NotALibrary { library: path.display().to_string() });
     }

@@ -22,21 +22,19 @@ pub(in crate::commands) struct Arguments {
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let folder = &arguments.folder;
     let file = |table: &Table| folder.join(format!("{}.parquet", table.name));
-    if !file(Table::ALL[0]).is_file() {
+    // Before anything is written.
+    if let Some(missing) = Table::ALL.iter().find(|table| !file(table).is_file()) {
         return Err(anyhow!(
-            "{}: there is no {} in it; `tracktwin library export --out FOLDER` writes one",
+            "{}: there is no {}.parquet in it; `tracktwin library export --out FOLDER` writes all tables",
             folder.display(),
-            file(Table::ALL[0]).file_name().unwrap_or_default().display()
+            missing.name
         ))
         .or_input();
     }
     let library = Library::open_or_create(&arguments.library).await.map_err(Stop::from_library)?;
     for table in Table::ALL {
-        let path = file(table);
-        if path.is_file() {
-            let (read, added) = import(&library, table, &path).await?;
-            say(&format!("{}: {added} of {read} rows added", table.name));
-        }
+        let (read, added) = import(&library, table, &file(table)).await?;
+        say(&format!("{}: {added} of {read} rows added", table.name));
     }
     library.settle().await?;
     library.close().await;

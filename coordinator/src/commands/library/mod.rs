@@ -73,20 +73,28 @@ pub(super) async fn choose(library: &Library, id: Option<&str>) -> Result<Campai
     if let Some(id) = id {
         return library.campaign(id).await.map_err(Stop::from_library);
     }
-    let mut campaigns = library.campaigns().await?;
-    let names: Vec<_> = campaigns.iter().map(|campaign| campaign.id.as_str()).collect();
+    let campaigns = library.campaigns().await?;
+    only(library, &campaigns, "choose one with --campaign").or_input().cloned()
+}
+
+/// The only campaign of a library that has these; `mend` says how to name one of several.
+pub(super) fn only<'a>(
+    library: &Library,
+    campaigns: &'a [CampaignRecord],
+    mend: &str,
+) -> anyhow::Result<&'a CampaignRecord> {
     let name = library.name();
-    match campaigns.len() {
-        0 => Err(anyhow::anyhow!(
-            "library {name}: it holds no campaign yet; `tracktwin run` adds one"
-        ))
-        .or_input(),
-        1 => Ok(campaigns.remove(0)),
-        _ => Err(anyhow::anyhow!(
-            "library {name}: it holds several campaigns; choose one with --campaign: {}",
-            names.join(", ")
-        ))
-        .or_input(),
+    match campaigns {
+        [] => Err(anyhow::anyhow!(
+            "library {name}: it holds no campaign yet; `tracktwin run` or `tracktwin campaign add` \
+             adds one"
+        )),
+        [only] => Ok(only),
+        _ => {
+            let ids: Vec<_> = campaigns.iter().map(|campaign| campaign.id.as_str()).collect();
+            let ids = ids.join(", ");
+            Err(anyhow::anyhow!("library {name}: it holds several campaigns; {mend}: {ids}"))
+        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! `tracktwin library sql`: the library asked in SQL.
 
 use super::files::text;
-use super::{Stop, open_library};
+use super::{OrInput, Stop, open_library};
+use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use std::io::{self, BufWriter, StdoutLock, Write};
 use tracktwin_library::{Answer, Cell, LibraryError};
@@ -51,6 +52,10 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
         Err(Ended::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(Ended::Output(error)) => Err(error.into()),
         Err(Ended::Library(error)) => Err(Stop::from_library(error)),
+        Err(Ended::Twice(column)) => {
+            Err(anyhow!("two columns are called {column}; rename one with `as` for JSON"))
+                .or_input()
+        }
     }
 }
 
@@ -58,6 +63,8 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
 enum Ended {
     Library(LibraryError),
     Output(io::Error),
+    /// JSON has each name once in an object.
+    Twice(String),
 }
 
 impl From<LibraryError> for Ended {
@@ -89,7 +96,14 @@ impl Answer for Printer {
         match self.format {
             Format::Table => self.rows.push(self.names.clone()),
             Format::Csv => writeln!(self.out, "{}", text::csv_line(&self.names))?,
-            Format::Json => write!(self.out, "[")?,
+            Format::Json => {
+                if let Some(twice) =
+                    names.iter().find(|it| names.iter().filter(|n| n == it).count() > 1)
+                {
+                    return Err(Ended::Twice(twice.clone()));
+                }
+                write!(self.out, "[")?;
+            }
         }
         Ok(())
     }
@@ -103,10 +117,10 @@ impl Answer for Printer {
             }
             Format::Json => {
                 let before = if self.printed == 0 { "\n" } else { ",\n" };
-                let names = self.names.iter().cloned();
-                let object: serde_json::Map<_, _> =
-                    names.zip(cells.into_iter().map(text::json)).collect();
-                write!(self.out, "{before}  {}", serde_json::Value::from(object))?;
+                let names = self.names.iter().map(String::as_str).map(serde_json::Value::from);
+                let pairs = names.zip(cells.into_iter().map(text::json));
+                let pairs: Vec<_> = pairs.map(|(name, cell)| format!("{name}:{cell}")).collect();
+                write!(self.out, "{before}  {{{}}}", pairs.join(","))?;
             }
         }
         self.printed += 1;

@@ -92,7 +92,7 @@ fn all_cores() -> NonZeroUsize {
 
 /// Simulates what the library lacks of a campaign; Ctrl-C leaves it to be gone on with.
 async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -> Result<(), Stop> {
-    farm::prepare(library, campaign).await?;
+    farm::prepare(library, campaign).await.map_err(Stop::from_farm)?;
     let id = campaign.id();
     let shutdown = stop_on_signal("stopping: cases that are begun go back to the library")?;
     let mut progress = None::<Progress>;
@@ -106,7 +106,8 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
         };
         bar.at(done, &remark);
     })
-    .await?;
+    .await
+    .map_err(Stop::from_farm)?;
     progress.into_iter().for_each(Progress::end);
     if status.done() < status.total() {
         let left = status.total() - status.done();

@@ -169,18 +169,17 @@ impl Farm for Dispatch {
             Err(DispatchError::Library(library::LibraryError::UnknownCampaign { .. })) => None,
             Err(error) => return Err(Status::unavailable(error.to_string())),
         };
-        let verdicts = match served {
-            Some(served) => {
-                let reports = CaseReport::all_checked(cases, &served.shape).map_err(|error| {
-                    tracing::warn!(worker, "report refused: {error}");
-                    self.counts.malformed.inc();
-                    malformed(&error)
-                })?;
-                self.take_in(&worker, standing, &served, reports, &step).await?
-            }
-            None => vec![Verdict::Refused; indices.len()],
+        let verdicts = if let Some(served) = served {
+            let reports = CaseReport::all_checked(cases, &served.shape).map_err(|error| {
+                tracing::warn!(worker, "report refused: {error}");
+                self.counts.malformed.inc();
+                malformed(&error)
+            })?;
+            self.take_in(&worker, standing, &served, reports, &step).await?
+        } else {
+            self.counts.refused.inc_by(indices.len() as u64);
+            vec![Verdict::Refused; indices.len()]
         };
-        self.count(&verdicts);
         let receipts = indices.into_iter().zip(verdicts).map(|(sobol_index, verdict)| {
             farm::Receipt { sobol_index, verdict: verdict_message(verdict).into() }
         });

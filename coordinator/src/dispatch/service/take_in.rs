@@ -34,6 +34,7 @@ impl Dispatch {
         }
         if !ordinary.is_empty() {
             let stored = self.store(worker, standing, served, ordinary, step).await?;
+            self.count(&stored);
             for (place, verdict) in places.into_iter().zip(stored) {
                 verdicts[place] = verdict;
             }
@@ -89,7 +90,10 @@ impl Dispatch {
     ) -> Result<Verdict, Status> {
         let found = self.audits.report(worker, served, report).await;
         Ok(match found.map_err(|error| unavailable(&error))? {
-            None => Verdict::Refused,
+            None => {
+                self.counts.refused.inc();
+                Verdict::Refused
+            }
             Some(Found::Agreement) => {
                 self.counts.audited.inc();
                 Verdict::Duplicate
@@ -108,7 +112,7 @@ impl Dispatch {
         })
     }
 
-    pub(super) fn count(&self, verdicts: &[Verdict]) {
+    fn count(&self, verdicts: &[Verdict]) {
         for verdict in verdicts {
             match verdict {
                 Verdict::Stored => self.counts.stored.inc(),

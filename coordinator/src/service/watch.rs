@@ -1,0 +1,128 @@
+//! What a coordinator says of its campaigns, and when everything is done.
+
+use std::collections::HashMap;
+use std::error::Error;
+use std::time::Duration;
+use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
+use tracktwin_library::{CampaignOverview, CampaignState, Library, LibraryError};
+
+/// How often the campaigns are looked at.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// Between two lines of the log about how far it is.
+const TELL_EVERY: Duration = Duration::from_mins(1);
+
+/// A worker heard of within this many ms is there.
+const PRESENT_MS: i64 = 60_000;
+
+/// Looks at the campaigns until told to stop, or until there is nothing left to do.
+pub(super) async fn watch(library: Library, exit_when_done: bool, stop: CancellationToken) {
+    let mut said = Said::default();
+    while !stop.is_cancelled() {
+        match look(&library).await {
+            Ok((campaigns, left)) => {
+                for campaign in &campaigns {
+                    said.campaign(campaign);
+                }
+                said.left(&left);
+                if left.is_done() && exit_when_done {
+                    left.say_the_end();
+                    stop.cancel();
+                }
+            }
+            Err(error) => {
+                tracing::error!(error = &error as &dyn Error, "the library does not answer");
+            }
+        }
+        tokio::select! {
+            () = tokio::time::sleep(LOOK_EVERY) => {}
+            () = stop.cancelled() => {}
+        }
+    }
+}
+
+/// What was said last, so that it is said once.
+#[derive(Default)]
+struct Said {
+    /// Of each campaign: cases given up, and whether it is done.
+    campaigns: HashMap<String, (u32, bool)>,
+    left: Option<(u64, Instant)>,
+}
+
+impl Said {
+    fn campaign(&mut self, campaign: &CampaignOverview) {
+        let CampaignOverview { id, status, causes, .. } = campaign;
+        let now = (status.failed, status.done() == status.total());
+        let new = !self.campaigns.contains_key(id);
+        let before = self.campaigns.insert(id.clone(), now).unwrap_or((0, false));
+        if now.0 > before.0 {
+            let cause = causes.first().map_or("", |cause| cause.error.as_str());
+            tracing::warn!(campaign = id, cases = now.0, cause, "cases were given up");
+        }
+        // One that was done before this coordinator came is no news.
+        if now.1 && !before.1 && !new {
+            tracing::info!(campaign = id, finished = status.finished, "campaign done");
+        }
+    }
+
+    fn left(&mut self, left: &Left) {
+        let is_news = |&(cases, at): &(u64, Instant)| {
+            cases != left.cases && (at.elapsed() >= TELL_EVERY || left.cases == 0)
+        };
+        if self.left.as_ref().is_none_or(is_news) {
+            self.left = Some((left.cases, Instant::now()));
+            tracing::info!(cases = left.cases, "left to be simulated");
+        }
+    }
+}
+
+/// What is left to be simulated.
+#[derive(Default)]
+struct Left {
+    /// In campaigns that run.
+    cases: u64,
+    /// In paused ones.
+    paused: u64,
+    /// Open audits.
+    audits: u64,
+    /// Those of them that a worker who is there could do.
+    audits_to_do: u64,
+}
+
+impl Left {
+    const fn is_done(&self) -> bool {
+        self.cases + self.audits_to_do == 0
+    }
+
+    fn say_the_end(&self) {
+        let Self { paused, audits, .. } = *self;
+        if paused > 0 {
+            tracing::warn!(cases = paused, "done but for paused campaigns");
+        } else if audits > 0 {
+            tracing::warn!(audits, "done but for audits that no other worker is there for");
+        } else {
+            tracing::info!("everything is done");
+        }
+    }
+}
+
+async fn look(library: &Library) -> Result<(Vec<CampaignOverview>, Left), LibraryError> {
+    let mut left = Left::default();
+    let since_unix_ms = library.now_unix_ms() - PRESENT_MS;
+    let campaigns = library.overview().await?;
+    for campaign in &campaigns {
+        let cases = u64::from(campaign.status.total() - campaign.status.done());
+        match campaign.state {
+            CampaignState::Running => {
+                left.cases += cases;
+                left.audits += u64::from(library.audits(&campaign.id).await?.open);
+                let to_do = library.audits_to_do(&campaign.id, since_unix_ms).await?;
+                left.audits_to_do += u64::from(to_do);
+            }
+            CampaignState::Paused => left.paused += cases,
+            CampaignState::Cancelled => {}
+        }
+    }
+    Ok((campaigns, left))
+}
