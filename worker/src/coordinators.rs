@@ -142,9 +142,8 @@ impl Coordinators {
         let mut contact = self.contact();
         if contact.warned.is_none_or(|warned| warned.elapsed() >= WARN_EVERY) {
             contact.warned = Some(Instant::now());
-            let reason = chain(status);
-            let hint = hint(url, &reason);
-            tracing::warn!(coordinator = url, "the coordinator does not answer: {reason}{hint}");
+            let reason = reason(url, status);
+            tracing::warn!(coordinator = url, "the coordinator does not answer: {reason}");
         }
     }
 
@@ -152,7 +151,8 @@ impl Coordinators {
         let silent = self.silent_for();
         match self.patience {
             Some(patience) if silent >= patience => {
-                let reason = chain(status);
+                let (url, _) = &self.known[self.current.load(Ordering::Relaxed)];
+                let reason = reason(url, status);
                 Err(AgentError::GaveUp { silent_s: silent.as_secs(), reason })
             }
             _ => Ok(()),
@@ -174,21 +174,25 @@ const fn is_silence(code: Code) -> bool {
     )
 }
 
-/// What may be amiss where a line breaks before anything is said: TLS tells little of it.
-fn hint(url: &str, reason: &str) -> &'static str {
+/// What failed, and what may be amiss: where a line breaks before anything is said, TLS tells little.
+fn reason(url: &str, status: &Status) -> String {
+    let reason = chain(status);
     let tls = url.starts_with("https:");
-    match reason {
-        _ if reason.contains("UnknownIssuer") => {
-            "; it shows a certificate of another authority than --tls-ca"
-        }
-        _ if tls && reason.contains("connection closed") => {
-            "; it may demand a certificate: --tls-cert and --tls-key"
-        }
-        _ if tls && reason.contains("InvalidContentType") => "; it may speak plain text: http://",
-        _ if !tls && reason.contains("frame with invalid size") => "; it may speak TLS: https://",
-        _ if reason.contains("compression flag") => "; this port may be its dashboard's",
-        _ => "",
-    }
+    let says = |words: &[&str]| words.iter().any(|it| reason.contains(it));
+    let hint = if says(&["UnknownIssuer"]) {
+        "; it shows a certificate of another authority than --tls-ca"
+    } else if tls && says(&["CertificateRequired", "connection closed", "broken pipe"]) {
+        "; it may demand a certificate: --tls-cert and --tls-key"
+    } else if tls && says(&["InvalidContentType"]) {
+        "; it may speak plain text: http://"
+    } else if says(&["frame with invalid size", "broken pipe"]) {
+        "; it may speak TLS: https://"
+    } else if says(&["compression flag"]) {
+        "; this port may be its dashboard's"
+    } else {
+        ""
+    };
+    format!("{reason}{hint}")
 }
 
 /// What failed and why, in one line: a failed connection hides its reason in its sources.

@@ -6,8 +6,8 @@ use crate::support::{Home, features, on_both_databases, policy};
 use crate::upgrade::{CAMPAIGN, released};
 use sqlx::{Connection, PgConnection};
 use tracktwin_library::{
-    CaseReport, DiagnosisRecord, EvaluationRecord, LeaseRequest, Library, Registration, Report,
-    TrainingRecord,
+    CaseReport, DiagnosisRecord, EvaluationRecord, LeaseRequest, Library, LibraryError,
+    Registration, Report, TrainingRecord,
 };
 use tracktwin_signal::Features;
 
@@ -142,7 +142,10 @@ async fn the_pages_role_for_analysts_reads_and_does_not_write() {
     for query in blocks("sql") {
         analyst.query(query, &mut Kept::default()).await.unwrap();
     }
-    assert!(analyst.pause(CAMPAIGN).await.is_err());
+    for refused in [analyst.pause(CAMPAIGN).await, analyst.check_writable().await] {
+        let error = refused.unwrap_err();
+        assert!(matches!(error, LibraryError::NotWritable { .. }), "{error:?}");
+    }
     let mut connection = PgConnection::connect(&url).await.unwrap();
     for attempt in [
         "delete from case_result",
