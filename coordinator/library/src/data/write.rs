@@ -93,7 +93,8 @@ impl Library {
         Ok(())
     }
 
-    /// Says of cases whose results have come in from elsewhere that they are finished.
+    /// Says of all cases whose results are here that they are finished, as [`Self::write_table`] does of
+    /// those whose results it adds; that a copy was cut off between the passes of a case is mended so.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -114,8 +115,7 @@ fn integer(cell: &Cell) -> Option<i64> {
     }
 }
 
-/// A row as it stands where nobody works on it; that a case is finished is said by
-/// [`Library::settle`], when its results are there.
+/// A row as it stands where nobody works on it; a case is finished when its results are there as well.
 fn at_rest(table: &Table, mut row: Vec<Cell>) -> Vec<Cell> {
     let state = table.column("state");
     let expires = table.column("lease_expires_unix_ms");
@@ -146,16 +146,38 @@ impl Write for Rows {
             result::lock(connection, self.texts("campaign_id"), self.integers("sobol_index"))
                 .await?;
             let rows = connection.rows(gather).await?;
+            self.settle(connection).await?;
             return rows.first().map_or(Ok(0), |row| row.get_u32("added").map(u64::from));
         }
         let (table, key) = (self.table.name, self.table.key.join(", "));
         let insert =
             format!("insert into {table} ({list}) values {values} on conflict ({key}) do nothing");
-        connection.execute(self.bound(insert)?).await
+        let added = connection.execute(self.bound(insert)?).await?;
+        if table == "result" {
+            self.settle(connection).await?;
+        }
+        Ok(added)
     }
 }
 
 impl Rows {
+    /// Says of these rows' cases that they are finished, where all their passes are here.
+    async fn settle(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let mut campaigns = self.texts("campaign_id");
+        campaigns.dedup();
+        let settle = format!(
+            "{} and campaign_id = $1 and sobol_index {}",
+            settle(connection.dialect()),
+            connection.dialect().listed("$2")
+        );
+        let indices = self.integers("sobol_index");
+        for campaign in campaigns {
+            let settle = sql(settle.clone()).bind(campaign).bind(indices.clone());
+            connection.execute(settle).await?;
+        }
+        Ok(())
+    }
+
     /// A statement with the cells of all rows.
     fn bound(&self, statement: String) -> Result<Statement, LibraryError> {
         let columns = self.table.columns;
@@ -197,15 +219,18 @@ impl Write for Settle {
     type Answer = u64;
 
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        let settle = format!(
-            "update campaign_case set state = 'finished', error = null,
-                lease_expires_unix_ms = null
-            where state <> 'finished' and (
-                select count(*) from result where result.campaign_id = campaign_case.campaign_id
-                    and result.sobol_index = campaign_case.sobol_index)
-            = (select {} from campaign where campaign.id = campaign_case.campaign_id)",
-            connection.dialect().json_length("speeds_km_h")
-        );
-        connection.execute(sql(settle)).await
+        connection.execute(sql(settle(connection.dialect()))).await
     }
+}
+
+/// Cases that have a result at each speed are finished.
+fn settle(dialect: Dialect) -> String {
+    format!(
+        "update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
+        where state <> 'finished' and (
+            select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                and result.sobol_index = campaign_case.sobol_index)
+        = (select {} from campaign where campaign.id = campaign_case.campaign_id)",
+        dialect.json_length("speeds_km_h")
+    )
 }

@@ -28,8 +28,7 @@ pub(super) async fn insert(
                 cardinality($11) / cardinality($8) as levels,
                 length($12) / cardinality($8) as bytes
             from unnest($8, $9, $10) with ordinality
-                as of (sobol_index, duration_s, parameter_hash, place)) as cases
-        on conflict do nothing";
+                as of (sobol_index, duration_s, parameter_hash, place)) as cases";
     let finished_at = iso_utc(report.now_unix_ms);
     for cases in finished.chunks(CASES_A_STATEMENT) {
         let passes = || cases.iter().flat_map(|(_, features)| features.iter());

@@ -32,10 +32,7 @@ pub(super) async fn insert(
         let largest = 1 << rest.len().ilog2();
         let (rows, after) = rest.split_at(ROWS_MAX.min(largest));
         let places = Dialect::Sqlite.rows_of_values(rows.len(), 12 + LEVEL_COLUMNS.len());
-        let mut insert = sql(format!(
-            "{INSERT}, {}) values {places} on conflict do nothing",
-            LEVEL_COLUMNS.join(", ")
-        ));
+        let mut insert = sql(format!("{INSERT}, {}) values {places}", LEVEL_COLUMNS.join(", ")));
         for (case, speed_km_h, features) in rows {
             insert = insert
                 .bind(&report.campaign)

@@ -109,8 +109,7 @@ pub(crate) const fn table(dialect: Dialect) -> &'static str {
     }
 }
 
-/// Stores the results of cases that have none, flagged where there is a reason to. What came in from
-/// another library meanwhile stays.
+/// Stores the results of cases that have none, flagged where there is a reason to.
 ///
 /// # Panics
 /// When features have another shape than the first: whoever took the message in looked at that.
