@@ -127,7 +127,8 @@ fn config(arguments: &Arguments) -> anyhow::Result<Config> {
         _ => None,
     };
     Ok(Config {
-        coordinators: arguments.coordinators.clone(),
+        // A comma at the end names nobody.
+        coordinators: arguments.coordinators.iter().filter(|it| !it.is_empty()).cloned().collect(),
         credentials: Credentials {
             token,
             ca_pem: arguments.tls_ca.as_deref().map(read).transpose()?,

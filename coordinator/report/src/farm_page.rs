@@ -68,6 +68,9 @@ fn summary(farm: &Farm) -> String {
     )
 }
 
+/// Finished cases up to which each is drawn boldly.
+const FEW: usize = 300;
+
 /// Below the pictures of a campaign.
 const CAPTION: &str = "Left: local wavelet power spectra of the newest cases, by their index, at the \
     fastest speed. Right: finished cases in the parameter space, and in orange those given up.";
@@ -187,7 +190,7 @@ fn spectra(campaign: &FarmCampaign) -> String {
     let levels = campaign.newest.iter().flat_map(|(_, values)| values);
     let y = Axis::around("LWPS in dB re 1 (m/s²)²", levels.map(|value| decibel * value));
     let x = Axis::logarithmic("frequency in Hz", low, high);
-    let mut chart = Chart::new("Newest", SPECTRUM, x, y);
+    let mut chart = Chart::new("Newest cases", SPECTRUM, x, y);
     for ((name, values), class) in campaign.newest.iter().zip(CLASSES) {
         let points = frequencies.iter().zip(values);
         chart.line(&format!("{class} thin"), points.map(|(&f, value)| (f, decibel * value)));
@@ -208,7 +211,9 @@ fn scatter(campaign: &FarmCampaign, [x, y]: [Parameter; 2]) -> String {
         sets.iter().map(|set| (set[x] / x_divisor, set[y] / y_divisor)).collect()
     };
     let mut chart = Chart::new("Parameter space", SCATTER, axis(x), axis(y));
-    chart.dots("c pale", 1.6, &points(&campaign.covered));
+    let few = campaign.covered.len() < FEW;
+    let (class, radius) = if few { ("c", 2.2) } else { ("c pale", 1.6) };
+    chart.dots(class, radius, &points(&campaign.covered));
     chart.dots("b", 3.0, &points(&campaign.given_up));
     chart.into_svg()
 }

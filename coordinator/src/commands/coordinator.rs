@@ -42,11 +42,11 @@ pub(super) struct Arguments {
     /// Library to fill: sqlite:PATH or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
     library: String,
-    /// Address for workers.
-    #[arg(long, value_name = "ADDR", env = "TRACKTWIN_LISTEN", default_value = "127.0.0.1:7700")]
+    /// Address for workers, as IP:PORT.
+    #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_LISTEN", default_value = "127.0.0.1:7700")]
     listen: SocketAddr,
-    /// Address for people and Prometheus: pages at /, /metrics, /healthz.
-    #[arg(long, value_name = "ADDR", env = "TRACKTWIN_DASHBOARD")]
+    /// Address for people and Prometheus, as IP:PORT: pages at /, /metrics, /healthz.
+    #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_DASHBOARD")]
     dashboard: Option<SocketAddr>,
     /// End when every running campaign is done.
     #[arg(long)]
@@ -147,6 +147,11 @@ fn token(path: &Path) -> anyhow::Result<String> {
 async fn bind(argument: &str, address: SocketAddr) -> anyhow::Result<TcpListener> {
     let bound = TcpListener::bind(address).await;
     bound.with_context(|| format!("{argument} {address}: no port to be had"))
+}
+
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let mend = "write IP:PORT, such as 127.0.0.1:7700, or 0.0.0.0:7700 for all of this machine's";
+    text.parse().map_err(|_| mend.to_owned())
 }
 
 /// A share: `1%` or `0.01`.

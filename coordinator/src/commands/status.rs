@@ -100,7 +100,8 @@ fn campaign_text(text: &mut String, campaign: &FarmCampaign) {
         let _ = writeln!(text, "  {count} given up: {cause}");
     }
     if campaign.causes.len() > CAUSES {
-        let _ = writeln!(text, "  and {} further causes", campaign.causes.len() - CAUSES);
+        let others = campaign.causes[CAUSES..].iter().map(|(_, count)| count).sum::<u32>();
+        let _ = writeln!(text, "  {others} given up for other reasons");
     }
 }
 
