@@ -33,6 +33,7 @@ mod suggestion;
 mod transfer;
 pub mod wheel;
 
+pub use along::tells_waves;
 pub use bands::Bands;
 pub use baseline::Unknowns;
 pub use behaviour::{Behaviour, Element};

@@ -4,7 +4,7 @@ use super::{OrInput, Stop, say};
 use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
-use tracktwin_diagnosis::{FirstLook, Place, first_look};
+use tracktwin_diagnosis::{FirstLook, Place, first_look, tells_waves};
 use tracktwin_report::{Inspected, InspectedCurve, Inspection, inspection_page};
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_signal::{PowerSpectrum, Signal};
@@ -15,8 +15,6 @@ const LINES_HZ: f64 = 20.0;
 const POINTS: usize = 400;
 /// Samples per second that the features up to 4 kHz need.
 const FEATURES_HZ: f64 = 20_000.0;
-/// Ratio of two speeds that tells structure from geometry.
-const SPEED_RATIO: f64 = 1.25;
 
 /// What `inspect` is told.
 #[derive(Args)]
@@ -178,12 +176,11 @@ fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
             0.4 * rate
         ));
     }
-    let speeds = recording.speeds_km_h();
-    let ratio = speeds.last().copied().unwrap_or(1.0) / speeds.first().copied().unwrap_or(1.0);
-    if ratio < SPEED_RATIO {
+    if !tells_waves(&recording.passes) {
+        let fastest = recording.speeds_km_h().into_iter().fold(0.0, f64::max);
         uses.push(format!(
-            "one speed only: what is fixed in frequency (structure) and in wavelength (surface) can't be told apart; add a pass {:.0} km/h slower",
-            0.25 * speeds.first().copied().unwrap_or(0.0)
+            "one speed only: what is fixed in frequency (structure) and in wavelength (surface) can't be told apart, so neither corrugation nor orders of a known wheel are looked for; add a pass {:.0} km/h slower",
+            0.25 * fastest
         ));
     }
     if look.offsets.is_empty() {

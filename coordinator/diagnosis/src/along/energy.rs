@@ -40,6 +40,10 @@ impl<'a> Energy<'a> {
     }
 }
 
+/// Ratio of two speeds from which on a line in wavelength and one in frequency lie apart: further
+/// than a resonance of track or vehicle is wide.
+const SPEED_RATIO: f64 = 1.2;
+
 /// Mean speed of a pass in m/s by its positions.
 pub(crate) fn speed_m_s(pass: &Pass) -> f64 {
     let positions = &pass.position_m;
@@ -62,4 +66,11 @@ pub(crate) fn by_speed(passes: &[Pass]) -> Vec<Vec<usize>> {
         }
     }
     groups
+}
+
+/// Whether the fastest pass is fast enough over the slowest to tell what stays in wavelength (surface,
+/// wheel) from what stays in frequency (track, vehicle).
+pub fn tells_waves(passes: &[Pass]) -> bool {
+    let speeds = || passes.iter().map(|pass| pass.speed_km_h);
+    speeds().fold(0.0, f64::max) >= SPEED_RATIO * speeds().fold(f64::MAX, f64::min)
 }

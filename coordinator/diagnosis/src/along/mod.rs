@@ -11,6 +11,7 @@ mod tail;
 pub(crate) mod testing;
 
 pub(crate) use background::{Background, hann, median, whitened};
+pub use energy::tells_waves;
 pub(crate) use energy::{Energy, by_speed, speed_m_s};
 pub(crate) use line::{Line, Ruler, Spectrum, amplitude, on_even_places};
 pub(crate) use tail::{

@@ -1,10 +1,12 @@
 //! What each test found, as a finding with a sentence.
 
+use crate::along::by_speed;
 use crate::chain::{Clipping, Gain, Hum, Offsets, Scale};
 use crate::finding::{Finding, Place};
 use crate::impact::{Corrugation, Form, Impact};
 use crate::wheel::{Comb, Flat, Order};
 use std::collections::BTreeMap;
+use tracktwin_signal::recording::Pass;
 
 /// Lead of one form over the other, in nats, below which an impact may be either.
 const FORM_LEAD: f64 = 3.0;
@@ -44,7 +46,7 @@ pub(super) fn hum_finding(lines: &[Hum]) -> Option<Finding> {
             ("amplitude_m_s2", first.amplitude_m_s2),
         ]),
         evidence: format!(
-            "lines at frequencies of the mains at every speed, {:.0} times above their neighbours: {}",
+            "lines at frequencies of the mains, {:.0} times above their neighbours: {}",
             first.ratio,
             names.join(", ")
         ),
@@ -163,7 +165,16 @@ pub(super) fn comb_finding(comb: &Comb) -> Finding {
     }
 }
 
-pub(super) fn impact_finding(impact: &Impact, passes: usize) -> Finding {
+/// Who hears an impact.
+fn who(passes: &[Pass]) -> &'static str {
+    match (passes.len(), by_speed(passes).len()) {
+        (1, _) => "the only pass",
+        (_, 1) => "every pass",
+        _ => "every pass at every speed",
+    }
+}
+
+pub(super) fn impact_finding(impact: &Impact, passes: &[Pass]) -> Finding {
     let (x, deviation) = impact.x_m;
     let physics = match &impact.shape {
         Some(shape) if shape.form == Form::Hollow => "squat",
@@ -185,7 +196,6 @@ pub(super) fn impact_finding(impact: &Impact, passes: usize) -> Finding {
             shape.lead
         );
     }
-    let who = if passes > 1 { "every pass at every speed" } else { "the only pass" };
     // Three standard deviations, and 10 mm for the length of the defect itself.
     let reach = 3.0 * deviation.max(3e-3);
     Finding {
@@ -194,7 +204,8 @@ pub(super) fn impact_finding(impact: &Impact, passes: usize) -> Finding {
         place: Place::Stretch { from_m: x - reach, to_m: x + reach },
         parameters,
         evidence: format!(
-            "at {x:.4} m (sd {deviation:.4}) {who} is {:.0} times louder than around it{form}",
+            "at {x:.4} m (sd {deviation:.4}) {} is {:.0} times louder than around it{form}",
+            who(passes),
             impact.power_ratio
         ),
     }

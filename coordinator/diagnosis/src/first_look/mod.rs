@@ -137,7 +137,7 @@ fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     findings.extend(
         impact::impacts(recording, EACH_TEST, &blows)
             .iter()
-            .map(|impact| impact_finding(impact, recording.passes.len())),
+            .map(|impact| impact_finding(impact, &recording.passes)),
     );
     // Lines of an uneven wheel are not the rail's.
     let known = turn.or(circumference.filter(|_| !orders.is_empty()));
@@ -179,6 +179,15 @@ mod tests {
         for recording in ["dev-01", "dev-04", "dev-08"] {
             let Some(names) = names(recording) else { return };
             assert!(names.is_empty(), "{recording}: {names:?}");
+        }
+    }
+
+    #[test]
+    fn the_wheel_bouncing_on_the_track_is_no_wave_where_there_is_one_speed() {
+        for (recording, speed_km_h) in [("dev-01", 7.0), ("dev-10", 13.0)] {
+            let Some(mut recording) = shared(recording) else { return };
+            recording.passes.retain(|pass| pass.speed_km_h.total_cmp(&speed_km_h).is_eq());
+            assert_eq!(first_look(&recording).findings, [], "{}", recording.name);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::along::{
     Background, Line, Ruler, Spectrum, amplitude, by_speed, combined, median, of_best,
-    on_even_places, speed_m_s, whitened,
+    on_even_places, speed_m_s, tells_waves, whitened,
 };
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -59,12 +59,16 @@ struct Candidate {
 
 /// The most certain corrugation that is less likely than `alpha` on a rail without.
 ///
-/// `orders_m` is the circumference of a wheel whose orders are not to be called corrugation.
+/// None where speeds are too much alike ([`tells_waves`]): a resonance is a line too. `orders_m` is the
+/// circumference of a wheel whose orders are not to be called corrugation.
 pub fn corrugation(
     recording: &Recording,
     alpha: f64,
     orders_m: Option<f64>,
 ) -> Option<Corrugation> {
+    if !tells_waves(&recording.passes) {
+        return None;
+    }
     let [shortest, longest] = WAVELENGTHS.map(|share| share * recording.spacing_m);
     let whitened: Vec<(Vec<Complex64>, [f64; 2])> = recording
         .passes
@@ -255,6 +259,40 @@ impl Search<'_> {
         let loud = |level: &f64| *level >= 0.25 * full;
         let first = levels.iter().position(loud).unwrap_or(0);
         let last = levels.iter().rposition(loud).unwrap_or(count - 1);
-        [middles[first], middles[last]]
+        let extent = [middles[first], middles[last]];
+        // Windows that are loud by themselves tell no length.
+        if extent[1] - extent[0] < half { best.stretch_m } else { extent }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::along::testing::{Rolled, noise};
+
+    #[test]
+    fn waves_in_a_single_loud_window_have_the_stretch_that_was_looked_at() {
+        let recording = Rolled::faultless(1).recording();
+        let wave_number = 100.0;
+        // Blows at both ends of the window around 1.5 m drown the waves in all the others.
+        let value = |(x, noise): (&f64, f64)| {
+            let blow = (x - 1.25).abs().min((x - 1.75).abs()) < 1e-4;
+            let waves = if (1.25..1.75).contains(x) { (TAU * wave_number * x).cos() } else { 0.0 };
+            Complex64::from(0.1 * noise + waves + if blow { 1e4 } else { 0.0 })
+        };
+        let of_pass = |pass: &Pass| {
+            let noise = noise(2, pass.position_m.len());
+            (pass.position_m.iter().zip(noise).map(value).collect(), [16.0, 500.0])
+        };
+        let whitened: Vec<_> = recording.passes.iter().map(of_pass).collect();
+        let search = Search {
+            recording: &recording,
+            whitened: &whitened,
+            orders_m: None,
+            lengths: [2e-3, 62e-3],
+        };
+        let (stretch_m, ruler) = ([1.0, 2.0], Ruler::Odometer);
+        let found = Candidate { stretch_m, wave_number, ln_p: -20.0, ratio: 10.0, ruler };
+        assert_eq!(search.describe(&found, -20.0).stretch_m, stretch_m);
     }
 }

@@ -6,6 +6,7 @@
 
 use crate::along::{
     Line, Ruler, Spectrum, amplitude, by_speed, combined, of_best, on_even_places, speed_m_s,
+    tells_waves,
 };
 use rustfft::num_complex::Complex64;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
@@ -93,12 +94,14 @@ impl AtSpeed {
 }
 
 /// The orders that are less likely than `alpha` on a round wheel, lowest first.
+///
+/// None where speeds are too much alike ([`tells_waves`]): a resonance is a line too.
 pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> Vec<Order> {
     let passes = &recording.passes;
     let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
     let ends = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
     let to = ends.fold(f64::MAX, f64::min);
-    if to - from < TURNS_MIN * circumference_m {
+    if !tells_waves(passes) || to - from < TURNS_MIN * circumference_m {
         return Vec::new();
     }
     let search = Search { recording, circumference_m, stretch_m: [from, to] };
