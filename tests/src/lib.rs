@@ -2,7 +2,8 @@
 
 mod process;
 
-pub use process::{Process, free_port, until};
+pub use process::{Process, until};
+pub use test_needs::free_port;
 
 use std::process::{Command, Output};
 

@@ -1,7 +1,6 @@
 //! Programs that run while a test goes on.
 
 use std::io::{BufRead, BufReader};
-use std::net::{Ipv4Addr, TcpListener};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
@@ -80,13 +79,4 @@ pub fn until(what: &str, within: Duration, mut happened: impl FnMut() -> bool) {
         assert!(begun.elapsed() < within, "not within {within:?}: {what}");
         std::thread::sleep(LOOK_EVERY);
     }
-}
-
-/// A port that nobody listens on now.
-///
-/// # Panics
-/// When the loopback interface has none.
-pub fn free_port() -> u16 {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("loopback has ports");
-    listener.local_addr().expect("a bound socket has an address").port()
 }

@@ -1,9 +1,10 @@
-//! What tests need beyond the checkout, such as reference data or a server.
+//! What tests need beyond the checkout, such as reference data, a server or a port.
 //!
 //! Where it is missing, a test skips and the run says so in one line, unless it is demanded.
 
 use std::collections::BTreeSet;
 use std::io::Write;
+use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -38,4 +39,13 @@ pub fn skipped(what: &'static str) {
     if SAID.lock().expect("nobody panics while holding it").insert(what) {
         let _ = writeln!(std::io::stderr(), "skipped: {what}");
     }
+}
+
+/// A port that nobody listens on now.
+///
+/// # Panics
+/// When the loopback interface has none.
+pub fn free_port() -> u16 {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("loopback has ports");
+    listener.local_addr().expect("a bound socket has an address").port()
 }

@@ -2,13 +2,13 @@
 
 use crate::installation::{as_somebody, programs};
 use std::io::Write;
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
-use test_needs::missing;
+use test_needs::{free_port, missing};
 
 /// What is said where no server is installed.
 const WITHOUT: &str = "tests on PostgreSQL; install postgresql, or set PG_BIN to its folder";
@@ -169,12 +169,6 @@ fn initialise(programs: &Path, data: &Path) {
     let mut command = as_somebody(&programs.join("initdb"));
     command.args(["--no-sync", "--auth=trust", "--username=postgres", "--encoding=UTF8"]);
     succeed(command.args(["--locale=C", "-D"]).arg(data).current_dir("/"));
-}
-
-/// A port that nobody listens on now.
-fn free_port() -> u16 {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("loopback has ports");
-    listener.local_addr().expect("a bound socket has an address").port()
 }
 
 fn succeed(command: &mut Command) {

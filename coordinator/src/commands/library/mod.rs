@@ -9,7 +9,7 @@ mod sql;
 mod status;
 mod verify;
 
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, note, say};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use tracktwin_library::{CampaignRecord, Library};
@@ -103,6 +103,9 @@ fn answer<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> String) 
         let json = serde_json::to_string_pretty(answers).expect("counts and names become JSON");
         say(&json);
     } else {
+        if answers.is_empty() {
+            note("it holds no campaign yet; `tracktwin campaign add FILE` adds one");
+        }
         for answer in answers {
             say(&text(answer));
         }
