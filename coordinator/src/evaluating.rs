@@ -3,6 +3,7 @@
 use crate::training::{self, TrainingError};
 use tracktwin_evaluation::{Error, Evaluation, Twin};
 use tracktwin_library::{Library, LibraryError};
+use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureError};
 use tracktwin_surrogate::{Trained, TrainingSet};
@@ -13,6 +14,7 @@ pub struct Evaluator {
     pub extractor: Extractor,
     models: Trained,
     set: TrainingSet,
+    design: TrackDesign,
 }
 
 /// Why models can't evaluate.
@@ -38,8 +40,9 @@ impl Evaluator {
         let campaign =
             library.campaign(models.campaign()).await.map_err(EvaluatorError::Foreign)?;
         let set = training::set(library, &campaign).await?;
-        let extractor = Extractor::new(&training::feature_definition(&campaign)?)?;
-        Ok(Self { extractor, models, set })
+        let experiment = training::experiment(&campaign)?;
+        let extractor = Extractor::new(&experiment.features)?;
+        Ok(Self { extractor, models, set, design: experiment.design })
     }
 
     /// The models.
@@ -50,6 +53,11 @@ impl Evaluator {
     /// The results they were trained and tested on.
     pub const fn set(&self) -> &TrainingSet {
         &self.set
+    }
+
+    /// The track of the models' campaign.
+    pub const fn design(&self) -> &TrackDesign {
+        &self.design
     }
 
     /// What models and selector say of a recording.

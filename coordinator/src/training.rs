@@ -125,7 +125,14 @@ pub fn tested_by(
 /// # Errors
 /// [`TrainingError::Experiment`].
 pub fn feature_definition(campaign: &CampaignRecord) -> Result<FeatureDefinition, TrainingError> {
-    let experiment: Experiment = serde_json::from_str(&campaign.experiment_json)
-        .map_err(|source| TrainingError::Experiment { campaign: campaign.id.clone(), source })?;
-    Ok(experiment.features)
+    Ok(experiment(campaign)?.features)
+}
+
+/// What a campaign's cases are simulated with.
+///
+/// # Errors
+/// [`TrainingError::Experiment`].
+pub fn experiment(campaign: &CampaignRecord) -> Result<Experiment, TrainingError> {
+    serde_json::from_str(&campaign.experiment_json)
+        .map_err(|source| TrainingError::Experiment { campaign: campaign.id.clone(), source })
 }

@@ -27,6 +27,25 @@ pub enum Error {
         /// The definition at hand, as JSON.
         offered: String,
     },
+    /// The sensor's gain is not known.
+    #[error(
+        "recording.json: nominal.gain_known: is false; stiffness is told from levels, so give accelerations in m/s2"
+    )]
+    GainUnknown,
+    /// The recording is of another track or vehicle.
+    #[error(
+        "{quantity} {found} {unit}, the models are of {known} {unit}; train models of such a track"
+    )]
+    OtherTrack {
+        /// What differs, with its verb.
+        quantity: &'static str,
+        /// The recording's value.
+        found: f64,
+        /// The campaign's.
+        known: f64,
+        /// Their unit.
+        unit: &'static str,
+    },
     /// There is no model for these features.
     #[error("there is no {feature} model for {} km/h; train it", join(speeds_km_h))]
     NoModel {

@@ -14,6 +14,9 @@ use tracktwin_surrogate::{Trained, TrainingSet};
 /// The feature set whose models speak: the global one (paper, eq. 9).
 pub const METHOD_FEATURE: &str = "GF";
 
+/// Part of a parameter's range in the library from its ends within which a mean is at the edge.
+const EDGE: f64 = 0.02;
+
 const ALL_SPEEDS: &str = "one model of all speeds together";
 const SINGLE_SPEEDS: &str = "models of single speeds: means weighted by precision; variance their harmonic mean, as if errors were common to all";
 
@@ -61,6 +64,7 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
         provenance: provenance(twin, &sleepers),
         sleepers,
         unevaluated: unseen.iter().map(|sleeper| unevaluated(recording, sleeper)).collect(),
+        notes: Vec::new(),
         frequencies_hz: twin.models.frequencies_hz().to_vec(),
     })
 }
@@ -146,6 +150,9 @@ fn evaluated(
     if sleeper.speeds.len() < twin.models.speeds_km_h().len() {
         flags.push(Flag::MissingSpeed);
     }
+    if is_at_edge(&estimates, twin.library) {
+        flags.push(Flag::AtEdgeOfRange);
+    }
     let measured = sleeper.speeds.into_iter().map(|known| Measured {
         speed_km_h: twin.models.speeds_km_h()[known.speed],
         passes: known.passes,
@@ -160,6 +167,15 @@ fn evaluated(
         selector,
         flags,
         measured,
+    })
+}
+
+/// Whether a mean lies at an end of its range in the library.
+fn is_at_edge(estimates: &Estimates, library: &TrainingSet) -> bool {
+    library.varied.iter().enumerate().any(|(column, parameter)| {
+        let [low, high] = library.range(column);
+        let inside = low + EDGE * (high - low)..=high - EDGE * (high - low);
+        estimates.get(parameter).is_some_and(|estimate| !inside.contains(&estimate.mean))
     })
 }
 
@@ -212,6 +228,19 @@ mod tests {
     }
 
     #[test]
+    fn a_mean_at_an_end_of_the_library_s_range_is_flagged() {
+        let (extractor, library) = (testing::extractor(), testing::library());
+        let models = testing::models(&library);
+        let twin = Twin { extractor: &extractor, models: &models, library: &library };
+        let flagged = |level: f64| {
+            let evaluation = evaluate(&testing::recording(level, &[10.0, 13.0]), &twin).unwrap();
+            evaluation.sleepers[3].flags.contains(&Flag::AtEdgeOfRange)
+        };
+        // Levels of the library are 1 to 5.
+        assert!(flagged(40.0) && !flagged(3.0));
+    }
+
+    #[test]
     fn json_and_csv_hold_every_sleeper_under_the_agreed_names() {
         let (extractor, library) = (testing::extractor(), testing::library());
         let models = testing::models(&library);
@@ -230,6 +259,8 @@ mod tests {
         assert_eq!(sleeper["irregularity_level"]["sd"], level.sd);
         let csv = std::fs::read_to_string(folder.path().join("evaluation.csv")).unwrap();
         assert!(csv.starts_with("id,x_m,railpad_stiffness_N_m_mean,"), "{csv}");
+        assert_eq!(json["sleepers"][0]["flags"][0], "incomplete_window");
+        assert!(csv.contains(",incomplete_window;short_margin"), "{csv}");
         assert_eq!(csv.lines().count(), 1 + evaluation.sleepers.len());
         let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
         assert_eq!(names.len(), 2, "no partial file is left");

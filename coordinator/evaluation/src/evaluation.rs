@@ -34,6 +34,8 @@ pub struct Evaluation {
     pub sleepers: Vec<SleeperEvaluation>,
     /// The sleepers that no pass covers.
     pub unevaluated: Vec<Unevaluated>,
+    /// What was left out of the recording, and why.
+    pub notes: Vec<String>,
     /// Frequencies of the bins in Hz, ascending; for pictures.
     #[serde(skip)]
     pub frequencies_hz: Vec<f64>,
@@ -115,6 +117,8 @@ pub enum Flag {
     ShortMargin,
     /// A speed is missing: single-speed models were combined.
     MissingSpeed,
+    /// A mean lies at an end of what the library's tracks have: the track may lie beyond.
+    AtEdgeOfRange,
 }
 
 /// A sleeper without estimates.
@@ -135,6 +139,17 @@ impl Flag {
             Self::IncompleteWindow => "incomplete window",
             Self::ShortMargin => "short margin",
             Self::MissingSpeed => "missing speed",
+            Self::AtEdgeOfRange => "at edge of range",
+        }
+    }
+
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::IncompleteWindow => "incomplete_window",
+            Self::ShortMargin => "short_margin",
+            Self::MissingSpeed => "missing_speed",
+            Self::AtEdgeOfRange => "at_edge_of_range",
         }
     }
 }

@@ -67,7 +67,7 @@ fn row(sleeper: &SleeperEvaluation, parameters: &[Parameter]) -> Vec<String> {
         }
     }
     row.push(sleeper.selector.mape.first().map(ToString::to_string).unwrap_or_default());
-    row.push(sleeper.flags.iter().map(|flag| flag.label()).collect::<Vec<_>>().join("; "));
+    row.push(sleeper.flags.iter().map(|flag| flag.name()).collect::<Vec<_>>().join(";"));
     row
 }
 

@@ -11,6 +11,7 @@ mod files;
 mod matches;
 #[cfg(test)]
 mod testing;
+mod track;
 mod windows;
 
 pub use error::Error;
@@ -20,4 +21,5 @@ pub use evaluation::{
     SleeperEvaluation, Unevaluated,
 };
 pub use matches::MATCHES;
+pub use track::check_track;
 pub use windows::{SleeperFeatures, SpeedFeatures, features};

@@ -16,13 +16,16 @@ const SLEEPERS_SHOWN: usize = 4;
 
 /// The report of an evaluation: one sentence, pictures, estimates, provenance.
 ///
-/// `recording` and `extractor` are those of the evaluation; of them come signal and maps.
+/// `recording` and `extractor` are those of the evaluation; of them come signal and maps. `command`
+/// is the command line that repeats it.
 pub fn evaluation_page(
     evaluation: &Evaluation,
     recording: &Recording,
     extractor: &Extractor,
+    command: &str,
 ) -> String {
     let body = html! {
+        @for note in &evaluation.notes { p { (note) } }
         h2 { "Along the track" }
         (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a band of two standard deviations, and the average over the ten library entries that match best."))
         h2 { "What was measured" }
@@ -33,7 +36,7 @@ pub fn evaluation_page(
         p.note { "Mean ± one standard deviation. Match: mean absolute percentage error of the best library entry (paper, eq. 10)." }
         div.scroll { (table(evaluation)) }
         h2 { "Provenance" }
-        (provenance(evaluation))
+        (provenance(evaluation, command))
     };
     page(&format!("Track under {}", evaluation.recording), &summary(evaluation, recording), &body)
 }
@@ -53,6 +56,7 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
     let flagged = evaluation.sleepers.iter().filter(|sleeper| !sleeper.flags.is_empty()).count();
     let remark = match flagged {
         0 => String::new(),
+        all if all == evaluation.sleepers.len() => "; all are flagged (see the table)".to_owned(),
         1 => "; 1 sleeper is flagged (see the table) and left out of these ranges".to_owned(),
         _ => {
             format!("; {flagged} sleepers are flagged (see the table) and left out of these ranges")
@@ -71,11 +75,12 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
     )
 }
 
-/// Lowest to highest mean of a parameter over the sleepers without flags.
+/// Lowest to highest mean of a parameter over the sleepers without flags, or over all if there are none.
 fn range(evaluation: &Evaluation, parameter: Parameter) -> Option<String> {
-    let clean = evaluation.sleepers.iter().filter(|sleeper| sleeper.flags.is_empty());
+    let none = evaluation.sleepers.iter().all(|sleeper| !sleeper.flags.is_empty());
+    let told = evaluation.sleepers.iter().filter(|sleeper| none || sleeper.flags.is_empty());
     let mut means: Vec<f64> =
-        clean.filter_map(|sleeper| Some(sleeper.estimates.get(&parameter)?.mean)).collect();
+        told.filter_map(|sleeper| Some(sleeper.estimates.get(&parameter)?.mean)).collect();
     means.sort_by(f64::total_cmp);
     let shown = Shown::of(parameter);
     let text = |value: f64| significant(value / shown.divisor);
@@ -136,7 +141,7 @@ fn table(evaluation: &Evaluation) -> Markup {
     }
 }
 
-fn provenance(evaluation: &Evaluation) -> Markup {
+fn provenance(evaluation: &Evaluation, command: &str) -> Markup {
     let of = &evaluation.provenance;
     html! {
         dl {
@@ -148,6 +153,6 @@ fn provenance(evaluation: &Evaluation) -> Markup {
             dt { "program" } dd { "tracktwin " (of.code_version) }
         }
         p { "To reproduce, with the library of that digest and the models trained on it:" }
-        pre { "tracktwin evaluate " (evaluation.recording) " --models DIR --library URL --out DIR" }
+        pre { (command) }
     }
 }

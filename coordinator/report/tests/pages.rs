@@ -89,6 +89,7 @@ fn evaluation(recording: &Recording, extractor: &Extractor) -> Evaluation {
         },
         sleepers: (0..recording.sleepers.len()).map(sleeper).collect(),
         unevaluated: Vec::new(),
+        notes: vec!["left out: pass 2".to_owned()],
         frequencies_hz: extractor.definition().frequencies_hz(),
     }
 }
@@ -142,8 +143,8 @@ fn keep(name: &str, text: &str) {
 fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
     let recording = recording();
     let extractor = Extractor::new(&FeatureDefinition::default()).expect("default features");
-    let evaluation = evaluation(&recording, &extractor);
-    let page = evaluation_page(&evaluation, &recording, &extractor);
+    let mut evaluation = evaluation(&recording, &extractor);
+    let page = evaluation_page(&evaluation, &recording, &extractor, "tracktwin evaluate ride");
     keep("report.html", &page);
     for sleeper in &evaluation.sleepers {
         assert!(page.contains(&format!("<td>{}</td>", sleeper.id)), "{}", sleeper.id);
@@ -153,6 +154,12 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
     assert_eq!(page.matches("data:image/png;base64,").count(), 2);
     assert!(page.contains("ring &lt;1&gt;") && !page.contains("ring <1>"));
     assert!(page.contains("1 sleeper is flagged"), "the summary counts flags");
+    assert!(
+        page.contains("left out: pass 2") && page.contains("<pre>tracktwin evaluate ride</pre>")
+    );
+    evaluation.sleepers.iter_mut().for_each(|sleeper| sleeper.flags = vec![Flag::MissingSpeed]);
+    let page = evaluation_page(&evaluation, &recording, &extractor, "");
+    assert!(!page.contains("km/h: ;") && page.contains("all are flagged"));
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, note, say};
 use crate::evaluating::{Evaluator, EvaluatorError};
 use crate::provenance;
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tracktwin_evaluation::Evaluation;
+use tracktwin_diagnosis::chain;
+use tracktwin_evaluation::{Evaluation, check_track};
 use tracktwin_library::Library;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
@@ -30,13 +31,17 @@ pub(super) struct Arguments {
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, models, library, out } = arguments;
     // The recording first: it is what most often needs mending, and quickest to check.
+    let folder = recording.display().to_string();
     let recording = Recording::open(&recording).or_input()?;
     if recording.sleepers.is_empty() {
-        let text = "recording.json: sleepers: is []; give their places, or import with --sleeper";
-        return Err(Stop::Input(anyhow::anyhow!(text)));
+        return Err(Stop::Input(anyhow!(
+            "{folder}/recording.json: sleepers: is []; give their places, or import with --sleeper"
+        )));
     }
     let library = Library::open(&library).await.map_err(Stop::from_library)?;
-    let models = Trained::load(&models).or_input()?;
+    let models = Trained::load(&models)
+        .with_context(|| format!("{}: no models; `tracktwin train` makes them", models.display()))
+        .or_input()?;
     let evaluation = evaluate(&recording, &library, models, &out).await?;
     let sleepers = evaluation.sleepers.len();
     say(&format!("{sleepers} sleepers evaluated; report: {}", out.join("report.html").display()));
@@ -51,18 +56,41 @@ pub(super) async fn evaluate(
     folder: &Path,
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
-    let evaluation = evaluator.evaluate(recording).or_input()?;
+    check_track(recording, evaluator.design()).or_input()?;
+    let (recording, notes) = usable(recording)?;
+    let mut evaluation = evaluator.evaluate(&recording).or_input()?;
+    evaluation.notes = notes;
     std::fs::create_dir_all(folder)
         .with_context(|| format!("{}: the folder cannot be made", folder.display()))
         .or_input()?;
     evaluation.write(folder)?;
-    let page = tracktwin_report::evaluation_page(&evaluation, recording, &evaluator.extractor);
+    let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
+    let page = tracktwin_report::evaluation_page(
+        &evaluation,
+        &recording,
+        &evaluator.extractor,
+        &format!("tracktwin {command}"),
+    );
     std::fs::write(folder.join("report.html"), page)?;
     if let Err(error) = library.record_evaluation(provenance::evaluation(&evaluation)).await {
         // The answer stands in the folder; somebody who may only read the library has it all the same.
         tracing::warn!("the library does not keep this evaluation: {error:?}");
     }
     Ok(evaluation)
+}
+
+/// The recording without the passes that tell nothing of the track, and a note for what is wrong with
+/// them.
+fn usable(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
+    let (kept, troubles) = chain::usable(recording);
+    if let (true, Some(first)) = (kept.passes.is_empty(), troubles.first()) {
+        return Err(Stop::Input(anyhow!("{}: no pass can be used: {first}", recording.name)));
+    }
+    let notes: Vec<String> = troubles.iter().map(|why| format!("left out: {why}")).collect();
+    for line in &notes {
+        note(line);
+    }
+    Ok((kept, notes))
 }
 
 /// A library that can't be read is a failure; models that don't fit are mended by who gave them.

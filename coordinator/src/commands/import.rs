@@ -32,7 +32,7 @@ pub(super) struct Arguments {
     /// or speed=NAME.
     #[arg(long = "column", value_name = "QUANTITY=NAME")]
     columns: Vec<Meaning>,
-    /// Unit of the accelerations; with `unknown` levels mean something within the recording only.
+    /// Unit of the accelerations, m/s2 if nothing is said; with `unknown` levels mean something within the recording only.
     #[arg(long, value_enum)]
     unit: Option<Unit>,
     /// Accelerations are positive upwards.
@@ -121,13 +121,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let layout = layout(arguments).or_input()?;
     let imported = import(&arguments.files, &layout).or_input()?;
     let several = imported.len() > 1;
+    let folder = |column: &str| {
+        if several { arguments.out.join(column) } else { arguments.out.clone() }
+    };
     for one in &imported {
-        let folder = if several { arguments.out.join(&one.column) } else { arguments.out.clone() };
+        refuse_another(&folder(&one.column)).or_input()?;
+    }
+    if arguments.unit.is_none() && arguments.layout.is_none() {
+        say("unit: taken as m/s2 (say --unit g or --unit unknown)");
+    }
+    for one in &imported {
+        let folder = folder(&one.column);
         one.recording.write(&folder).or_input()?;
         for note in &one.notes {
             say(note);
         }
         say(&format!("recording: {}; look at it: tracktwin inspect {0}", folder.display()));
+    }
+    Ok(())
+}
+
+/// Somebody's recording is not written over.
+fn refuse_another(folder: &Path) -> Result<(), anyhow::Error> {
+    if folder.join("recording.json").exists() {
+        let folder = folder.display();
+        return Err(anyhow!(
+            "{folder}: holds a recording already; remove it or give another --out"
+        ));
     }
     Ok(())
 }

@@ -110,12 +110,12 @@ fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
     Inspection {
         name: recording.name.clone(),
         summary: format!(
-            "{} passes at {} km/h, {seconds:.1} s at {} Hz in all, {} sleepers, {} findings.",
-            recording.passes.len(),
+            "{} at {} km/h, {seconds:.1} s at {} Hz in all, {}, {}.",
+            counted(recording.passes.len(), "pass", "passes"),
             speeds.join(", "),
             recording.sample_rate_hz,
-            recording.sleepers.len(),
-            look.findings.len()
+            counted(recording.sleepers.len(), "sleeper", "sleepers"),
+            counted(look.findings.len(), "finding", "findings")
         ),
         passes: passes(recording, look),
         found: look.findings.iter().map(found).collect(),
@@ -125,6 +125,10 @@ fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
         levels: curves(recording, levels),
         unit: unit.to_owned(),
     }
+}
+
+fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 fn found(finding: &tracktwin_diagnosis::Finding) -> Inspected {

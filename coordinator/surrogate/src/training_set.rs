@@ -70,7 +70,7 @@ impl TrainingSet {
     }
 
     /// Lowest and highest value of a varied parameter.
-    pub(crate) fn range(&self, column: usize) -> [f64; 2] {
+    pub fn range(&self, column: usize) -> [f64; 2] {
         let values = self.parameters.iter().skip(column).step_by(self.varied.len());
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
     }

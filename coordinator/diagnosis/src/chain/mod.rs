@@ -12,6 +12,7 @@ mod scale;
 mod still;
 mod stranger;
 mod trouble;
+mod usable;
 
 pub use clipping::{Clipping, clipping};
 pub use gain::{Gain, gains};
@@ -19,6 +20,7 @@ pub use hum::{Hum, hum};
 pub use offset::{Offset, Offsets, offsets};
 pub use scale::{Scale, scale};
 pub use trouble::{Trouble, troubles};
+pub use usable::usable;
 
 use crate::along::Background;
 use tracktwin_signal::recording::Recording;

@@ -122,6 +122,13 @@ impl fmt::Display for Trouble {
 
 /// Everything that makes passes unusable; `offsets` are those of the same recording.
 pub fn troubles(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
+    let mut all = of_passes(recording);
+    all.extend(between_passes(recording, offsets));
+    all
+}
+
+/// What each pass suffers from by itself.
+pub(super) fn of_passes(recording: &Recording) -> Vec<Trouble> {
     let passes = recording.passes.iter().enumerate();
     let mut all: Vec<Trouble> =
         passes.flat_map(|(index, pass)| of_pass(index, pass, recording.spacing_m)).collect();
@@ -129,14 +136,20 @@ pub fn troubles(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
     let alone = speeds.iter().filter(|passes| passes.len() == 1).map(|passes| passes[0]);
     let noise = alone.filter(|&pass| is_noise(&recording.passes[pass]));
     all.extend(noise.map(|pass| Trouble::Noise { pass }));
+    all
+}
+
+/// Passes that have no track in common.
+pub(super) fn between_passes(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
     let unlike = |offsets: &&Offsets| {
         // Where half of the stretches match, the rest is noise or a worn clock, not another track.
         2 * offsets.matched.len() < offsets.stretches && offsets.correlation < UNLIKE
     };
-    all.extend(offsets.iter().filter(unlike).map(|offsets| Trouble::Unlike {
-        passes: offsets.passes,
-        correlation: offsets.correlation,
-    }));
+    let mut all: Vec<Trouble> = offsets
+        .iter()
+        .filter(unlike)
+        .map(|offsets| Trouble::Unlike { passes: offsets.passes, correlation: offsets.correlation })
+        .collect();
     let companies = companies(recording);
     let strangers = companies.iter().filter(|company| company.coherence < STRANGE);
     all.extend(strangers.map(|company| Trouble::Stranger {

@@ -11,7 +11,11 @@ use tracktwin_signal::recording::Pass;
 /// Lead of one form over the other, in nats, below which an impact may be either.
 const FORM_LEAD: f64 = 3.0;
 
-pub(super) fn clipping_finding(passes: &[Clipping], recorded: usize) -> Option<Finding> {
+pub(super) fn clipping_finding(
+    passes: &[Clipping],
+    recorded: usize,
+    unit: &str,
+) -> Option<Finding> {
     let worst = passes.iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
     let limit = passes.iter().map(|pass| pass.level_m_s2.abs()).fold(f64::MAX, f64::min);
     Some(Finding {
@@ -20,7 +24,7 @@ pub(super) fn clipping_finding(passes: &[Clipping], recorded: usize) -> Option<F
         place: Place::Everywhere,
         parameters: BTreeMap::from([("limit_m_s2", (limit, 0.01 * limit))]),
         evidence: format!(
-            "{} of {} passes are cut off: in pass {}, {} crests end within 1 % of {:.3} m/s2 ({:.2} % of the samples)",
+            "{} of {} passes are cut off: in pass {}, {} crests end within 1 % of {:.3} {unit} ({:.2} % of the samples)",
             passes.len(),
             recorded,
             worst.pass + 1,
@@ -31,11 +35,11 @@ pub(super) fn clipping_finding(passes: &[Clipping], recorded: usize) -> Option<F
     })
 }
 
-pub(super) fn hum_finding(lines: &[Hum]) -> Option<Finding> {
+pub(super) fn hum_finding(lines: &[Hum], unit: &str) -> Option<Finding> {
     let first = lines.first()?;
     let names: Vec<String> = lines
         .iter()
-        .map(|l| format!("{:.1} Hz ({:.3} m/s2)", l.frequency_hz, l.amplitude_m_s2.0))
+        .map(|l| format!("{:.1} Hz ({:.3} {unit})", l.frequency_hz, l.amplitude_m_s2.0))
         .collect();
     Some(Finding {
         physics: "electrical_hum",

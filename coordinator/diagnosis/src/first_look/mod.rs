@@ -78,14 +78,15 @@ impl FirstLook {
 ///
 /// On a recording without defects a finding comes up at most with probability [`FALSE_ALARMS`].
 pub fn first_look(recording: &Recording) -> FirstLook {
+    let unit = unit(recording);
     let gains = chain::gains(recording);
     let offsets = chain::offsets(recording);
     let (flat, on_surface) = surface(recording);
     let turn_m = flat.as_ref().map(|flat| flat.circumference_m.0);
     let clipping = chain::clipping(recording, EACH_TEST);
     let mut findings: Vec<Finding> =
-        clipping_finding(&clipping, recording.passes.len()).into_iter().collect();
-    findings.extend(hum_finding(&chain::hum(recording, turn_m, EACH_TEST)));
+        clipping_finding(&clipping, recording.passes.len(), unit).into_iter().collect();
+    findings.extend(hum_finding(&chain::hum(recording, turn_m, EACH_TEST), unit));
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let scale = chain::scale(recording).filter(|scale| scale.ln_p <= EACH_TEST.ln());
     findings.extend(scale.as_ref().map(scale_finding));
@@ -117,6 +118,12 @@ fn unknown_wheel(recording: &Recording) -> Option<Comb> {
     }
     let alpha = EACH_TEST / recording.passes.len().max(1) as f64;
     recording.passes.iter().find_map(|pass| wheel::comb(pass, alpha))
+}
+
+/// Unit of the accelerations, as sentences have it.
+fn unit(recording: &Recording) -> &'static str {
+    let is_known = recording.nominal.get("gain_known").and_then(serde_json::Value::as_bool);
+    if is_known == Some(false) { "of the unknown unit" } else { "m/s2" }
 }
 
 /// What wheel and rail surface show.

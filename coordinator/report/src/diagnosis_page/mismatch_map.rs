@@ -222,7 +222,7 @@ fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
     );
     let scatter = usual_scatter(&diagnosis.levels).map_or_else(String::new, |db| {
         format!(
-            " The rail's roughness alone scatters a level by about {} dB, so a pale speckle is to be expected everywhere; what stands out in one place, or in one band all along, is not chance.",
+            " The rail's roughness alone scatters a level by about {} dB, and by more at low frequencies, of which a sleeper bay holds few waves: a speckle is to be expected everywhere, paler above, and what stands out of it in one place or in one band all along is not chance.",
             digits(db, 2)
         )
     });

@@ -27,7 +27,7 @@ pub(super) fn times(
     let times = &columns.time_s;
     let duration = times[times.len() - 1] - times[0];
     let observed = (times.len() - 1) as f64 / duration;
-    let even = uneven_step(times, duration / (times.len() - 1) as f64);
+    let even = uneven_step(times, duration / (times.len() - 1) as f64, 1.0 / declared);
     if let Some(fault) = even {
         return Err(RecordingError::new(path, "time_s", fault));
     }
@@ -38,7 +38,7 @@ pub(super) fn times(
     Ok(())
 }
 
-fn uneven_step(times: &[f64], mean: f64) -> Option<Fault> {
+fn uneven_step(times: &[f64], mean: f64, declared: f64) -> Option<Fault> {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let index = steps.len() / 2;
     // The median step is what a gap cannot move; the mean is what rounding cannot move.
@@ -46,6 +46,9 @@ fn uneven_step(times: &[f64], mean: f64) -> Option<Fault> {
     let expected = if (mean / median - 1.0).abs() < STEP_TOLERANCE { mean } else { median };
     let odd = |step: f64| !(step > 0.0 && (step - expected).abs() <= STEP_TOLERANCE * expected);
     let row = steps.iter().position(|&step| odd(step))?;
+    // What the declared rate says, unless that is wrong too.
+    let expected =
+        if (declared / median - 1.0).abs() < STEP_TOLERANCE { declared } else { expected };
     Some(Fault::UnevenTime { row: row + 2, step: steps.swap_remove(row), expected })
 }
 

@@ -18,6 +18,11 @@ pub(super) fn read<const N: usize>(
         .map_err(unreadable)?;
     let present: Vec<String> =
         reader.headers().map_err(unreadable)?.iter().map(str::to_owned).collect();
+    if let [only] = present.as_slice()
+        && only.contains([';', '\t'])
+    {
+        return Err(RecordingError::new(path, "file", Fault::Separator));
+    }
     let mut places = [0; N];
     for (place, name) in places.iter_mut().zip(names) {
         *place = present.iter().position(|column| column == name).ok_or_else(|| {

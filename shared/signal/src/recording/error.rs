@@ -72,6 +72,12 @@ pub enum Fault {
         /// The name.
         id: String,
     },
+    /// A file stands where a folder should.
+    #[error("is a file; a recording is a folder, and `tracktwin import` makes one")]
+    NoFolder,
+    /// Columns of a CSV file are separated by something else than commas.
+    #[error("its columns are not separated by commas; do so, or run `tracktwin import`")]
+    Separator,
     /// The kind of file is not one that is read.
     #[error("its name ends in neither .parquet nor .csv; convert it to one of these")]
     UnknownKind,
@@ -101,7 +107,7 @@ pub enum Fault {
         value: String,
     },
     /// The file has no rows, or a single one.
-    #[error("has {rows} rows; a pass needs at least two")]
+    #[error("has {rows} row{}; a pass needs at least two", if *rows == 1 { "" } else { "s" })]
     Empty {
         /// How many there are.
         rows: usize,
@@ -128,7 +134,7 @@ pub enum Fault {
     },
     /// A step in time differs from the sample interval.
     #[error(
-        "steps by {step:e} s to row {row} where {expected:e} s is expected; resample evenly or split the pass there"
+        "steps by {step:.3e} s to row {row} where {expected:.3e} s is expected; resample evenly or split the pass there"
     )]
     UnevenTime {
         /// The row, counted from 1, that the step leads to.
@@ -161,6 +167,14 @@ pub enum Fault {
         observed: f64,
         /// The file of the positions.
         file: String,
+    },
+    /// The positions advance at a speed that no train has.
+    #[error(
+        "advance at {observed:.1} km/h, which no pass does; check their unit, and turn a backward pass round"
+    )]
+    Impossible {
+        /// The mean speed in km/h that the positions say.
+        observed: f64,
     },
     /// The pass is shorter than a sleeper's window.
     #[error("covers {length_m:.4} m; one sleeper's window needs {spacing_m} m, record more")]

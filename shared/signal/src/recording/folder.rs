@@ -62,6 +62,9 @@ impl Recording {
     /// The first thing that is wrong: its file, its field and how to mend it.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let folder = path.as_ref();
+        if folder.is_file() {
+            return Err(RecordingError::new(folder, "recording", Fault::NoFolder));
+        }
         let manifest_path = folder.join(FILE_NAME);
         let manifest = Manifest::read(&manifest_path)?;
         let spacing_m = spacing(&manifest_path, &manifest)?;
@@ -161,11 +164,11 @@ impl Recording {
 
     /// Names such as `pass-07kmh-2.parquet`: speed and number among the passes at that speed.
     fn file_names(&self) -> Vec<String> {
+        let tenths = |pass: &Pass| (10.0 * pass.speed_km_h).round();
         let name = |(index, pass): (usize, &Pass)| {
-            let earlier = &self.passes[..index];
-            let number =
-                earlier.iter().filter(|other| other.speed_km_h == pass.speed_km_h).count() + 1;
-            format!("pass-{:02}kmh-{number}.parquet", pass.speed_km_h)
+            let earlier = self.passes[..index].iter();
+            let number = earlier.filter(|other| tenths(other) == tenths(pass)).count() + 1;
+            format!("pass-{:02}kmh-{number}.parquet", tenths(pass) / 10.0)
         };
         self.passes.iter().enumerate().map(name).collect()
     }

@@ -235,6 +235,23 @@ fn a_gap_in_time_is_named_by_its_row() {
 }
 
 #[test]
+fn a_short_gap_in_time_is_told_by_the_declared_rate() {
+    // The mean step is longer by a tenth.
+    let text = csv_message(&csv(|index, values| {
+        if index >= 900 {
+            values[0] += 0.01;
+        }
+    }));
+    assert!(text.contains("where 1.000e-4 s is expected"), "{text}");
+}
+
+#[test]
+fn columns_between_semicolons_are_told_by_their_mend() {
+    let text = csv_message(&csv(|_, _| ()).replace(',', ";"));
+    assert!(text.contains("not separated by commas"), "{text}");
+}
+
+#[test]
 fn a_position_that_runs_back_is_named_by_its_row() {
     let text = csv_message(&csv(|index, values| {
         if index == 100 {

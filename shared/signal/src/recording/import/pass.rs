@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 /// Relative difference of time steps from their mean above which a file was not sampled evenly.
 const UNEVEN: f64 = 0.5;
+/// Speed in km/h that no pass exceeds; the fastest train ran 575 km/h once.
+const SPEED_MAX_KM_H: f64 = 500.0;
 
 /// A recording made of foreign files, and what was done or assumed on the way.
 #[derive(Clone, Debug)]
@@ -127,6 +129,10 @@ fn pass(
     }
     let seconds = (values.len() - 1) as f64 / rate;
     let speed_km_h = 3.6 * (position_m[values.len() - 1] - position_m[0]) / seconds;
+    if !(speed_km_h > 0.0 && speed_km_h <= SPEED_MAX_KM_H) {
+        let fault = Fault::Impossible { observed: speed_km_h };
+        return Err(RecordingError::new(&table.path, "positions", fault));
+    }
     let unit = layout.acceleration_unit.in_si() * if layout.upwards { -1.0 } else { 1.0 };
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     // Gravity and the amplifier's offset; nothing of the track is that slow.

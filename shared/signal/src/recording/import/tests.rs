@@ -180,16 +180,17 @@ fn units_signs_and_places_come_out_in_si() {
     let g = Layout { acceleration_unit: AccelerationUnit::G, upwards: true, ..layout() };
     let (found, expected) = (samples(&path, &g), expected());
     assert!(found.iter().zip(&expected).all(|(a, b)| (a + 9.80665 * b).abs() < 1e-12));
-    // A column of times read as kilometres: 0.2 km in 0.2 s.
-    let far = Layout {
-        position: Some("t".to_owned()),
-        position_unit: PositionUnit::Kilometre,
-        ..layout()
-    };
-    let recording = import(&[path], &far).unwrap().remove(0).recording;
+    // A column of times read as millimetres: 0.2 mm in 0.2 s.
+    let places_in =
+        |unit| Layout { position: Some("t".to_owned()), position_unit: unit, ..layout() };
+    let slow = places_in(PositionUnit::Millimetre);
+    let recording = import(std::slice::from_ref(&path), &slow).unwrap().remove(0).recording;
     let places = &recording.passes[0].position_m;
-    assert!((places[ROWS - 1] - 1e3 * (ROWS - 1) as f64 / RATE_HZ).abs() < 1e-9);
-    assert!((recording.passes[0].speed_km_h - 3600.0).abs() < 1e-6);
+    assert!((places[ROWS - 1] - 1e-3 * (ROWS - 1) as f64 / RATE_HZ).abs() < 1e-9);
+    assert!((recording.passes[0].speed_km_h - 0.0036).abs() < 1e-9);
+    // As kilometres it is 3600 km/h.
+    let refusal = import(&[path], &places_in(PositionUnit::Kilometre)).unwrap_err().to_string();
+    assert!(refusal.contains("3600.0 km/h, which no pass does"), "{refusal}");
 }
 
 #[test]

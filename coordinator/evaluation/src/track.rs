@@ -1,0 +1,81 @@
+//! Whether a recording is of the track that the models know.
+
+use crate::Error;
+use serde_json::Value;
+use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::recording::Recording;
+
+/// Relative difference up to which two tracks are alike.
+const ALIKE: f64 = 0.02;
+
+/// Compares what a recording says of its track, vehicle and sensor with the models' design.
+///
+/// What `recording.json` doesn't say is not compared.
+///
+/// # Errors
+/// [`Error::GainUnknown`], or [`Error::OtherTrack`] with the first quantity that differs by more
+/// than 2 %.
+pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Error> {
+    if recording.nominal.get("gain_known") == Some(&Value::Bool(false)) {
+        return Err(Error::GainUnknown);
+    }
+    let stated = |part: &str, name: &str| recording.nominal.get(part)?.get(name)?.as_f64();
+    let known = design.sleeper.spacing_m;
+    let quantities = [
+        ("nominal.sleeper.spacing_m is", Some(recording.spacing_m), known, "m"),
+        ("the sleepers of the recording lie", median_distance_m(recording), known, "m"),
+        ("nominal.rail.area_m2 is", stated("rail", "area_m2"), design.rail.area_m2, "m2"),
+        (
+            "nominal.rail.second_moment_m4 is",
+            stated("rail", "second_moment_m4"),
+            design.rail.second_moment_m4,
+            "m4",
+        ),
+        ("nominal.wheel.mass_kg is", stated("wheel", "mass_kg"), design.wheel.mass_kg, "kg"),
+    ];
+    for (quantity, found, known, unit) in quantities {
+        let Some(found) = found.filter(|found| (found / known - 1.0).abs() > ALIKE) else {
+            continue;
+        };
+        return Err(Error::OtherTrack { quantity, found, known, unit });
+    }
+    Ok(())
+}
+
+/// Median distance of neighbouring sleepers in m, to a tenth of a millimetre.
+fn median_distance_m(recording: &Recording) -> Option<f64> {
+    let pairs = recording.sleepers.windows(2);
+    let mut distances: Vec<f64> = pairs.map(|pair| pair[1].x_m - pair[0].x_m).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.get(distances.len() / 2).map(|distance| (1e4 * distance).round() / 1e4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+    use serde_json::json;
+
+    fn refusal(change: impl Fn(&mut Recording)) -> String {
+        let mut recording = testing::recording(3.0, &[10.0]);
+        change(&mut recording);
+        check_track(&recording, &TrackDesign::v_track()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn another_track_vehicle_or_gain_is_refused_and_what_is_not_said_is_not() {
+        let same = testing::recording(3.0, &[10.0]);
+        assert!(check_track(&same, &TrackDesign::v_track()).is_ok());
+        let text = refusal(|recording| recording.spacing_m = 0.6);
+        assert!(text.starts_with("nominal.sleeper.spacing_m is 0.6 m, the models are of 0.125 m"));
+        let text = refusal(|recording| recording.sleepers.iter_mut().for_each(|s| s.x_m *= 1.12));
+        assert!(text.contains("lie 0.14 m, the models are of 0.125 m"), "{text}");
+        let nominal = |part: &str, value: Value| {
+            refusal(|recording| drop(recording.nominal.insert(part.to_owned(), value.clone())))
+        };
+        let text = nominal("rail", json!({"area_m2": 7.67e-3, "second_moment_m4": 5.15e-7}));
+        assert!(text.contains("0.00767 m2") && text.contains("0.000865 m2"), "{text}");
+        assert!(nominal("wheel", json!({"mass_kg": 600})).contains("600 kg"));
+        assert!(nominal("gain_known", json!(false)).contains("nominal.gain_known"));
+    }
+}
