@@ -1,6 +1,6 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
-use super::{OrInput, Stop, note, say};
+use super::{OrInput, Stop, note, say, without_password};
 use crate::evaluating::{Evaluator, EvaluatorError};
 use crate::provenance;
 use anyhow::{Context, anyhow};
@@ -64,12 +64,13 @@ pub(super) async fn evaluate(
         .with_context(|| format!("{}: the folder cannot be made", folder.display()))
         .or_input()?;
     evaluation.write(folder)?;
-    let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
+    let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
+    let command = std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>();
     let page = tracktwin_report::evaluation_page(
         &evaluation,
         &recording,
         &evaluator.extractor,
-        &format!("tracktwin {command}"),
+        &command.join(" "),
     );
     std::fs::write(folder.join("report.html"), page)?;
     if let Err(error) = library.record_evaluation(provenance::evaluation(&evaluation)).await {

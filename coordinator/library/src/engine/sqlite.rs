@@ -78,8 +78,7 @@ fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
         }
         _ => match error.into() {
             LibraryError::NotWritable { .. } => {
-                let reason =
-                    "its folder can't be written, which SQLite needs even to read; copy the library";
+                let reason = "its folder can't be written, which SQLite needs even to read; copy the library";
                 LibraryError::NotLetIn { library, reason: reason.to_owned() }
             }
             other => other,

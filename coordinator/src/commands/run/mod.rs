@@ -11,6 +11,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use tracktwin_evaluation::check_track;
 use tracktwin_library::{Library, Status};
 use tracktwin_signal::recording::Recording;
 
@@ -55,6 +56,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     .or_input()?;
     // A recording that can't be used should not be found out after the simulation.
     let given = arguments.recording.as_ref().map(Recording::open).transpose().or_input()?;
+    let design = &campaign.definition.experiment.design;
+    if let Some(recording) = &given {
+        check_track(recording, design).or_input()?;
+    }
     let out = &arguments.out;
     std::fs::create_dir_all(out)
         .with_context(|| format!("{}: the folder cannot be made", out.display()))
@@ -75,6 +80,13 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         Some(recording) => recording,
         None => sample::open(&out.join("sample"))?,
     };
+    if let Err(other) = check_track(&recording, design) {
+        library.close().await;
+        note(&format!("the sample recording is of another track: {other}"));
+        let models = out.join("models");
+        say(&format!("models: {}; `tracktwin evaluate` takes a recording", models.display()));
+        return Ok(());
+    }
     evaluate::evaluate(&recording, &library, models, out).await?;
     // What the library holds is then in one file, fit to be copied.
     library.close().await;
