@@ -6,7 +6,7 @@ use crate::page::{figure, page};
 use crate::spectrum_picture::{chosen, spectrum_chart};
 use crate::track_picture::track_charts;
 use maud::{Markup, html};
-use tracktwin_evaluation::{Estimate, Evaluation, SleeperEvaluation};
+use tracktwin_evaluation::{Estimate, Evaluation, Flag, SleeperEvaluation};
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::Recording;
@@ -53,17 +53,25 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
         })
         .filter_map(|parameter| range(evaluation, parameter))
         .collect();
-    let flagged = evaluation.sleepers.iter().filter(|sleeper| !sleeper.flags.is_empty()).count();
-    let remark = match flagged {
+    let left_out = evaluation.sleepers.iter().filter(|sleeper| !is_whole(sleeper)).count();
+    let remark = match left_out {
         0 => String::new(),
         all if all == evaluation.sleepers.len() => "; all are flagged (see the table)".to_owned(),
         1 => "; 1 sleeper is flagged (see the table) and left out of these ranges".to_owned(),
         _ => {
-            format!("; {flagged} sleepers are flagged (see the table) and left out of these ranges")
+            format!(
+                "; {left_out} sleepers are flagged (see the table) and left out of these ranges"
+            )
         }
     };
+    let at_edge = |sleeper: &&SleeperEvaluation| sleeper.flags.contains(&Flag::AtEdgeOfRange);
+    let edge = match evaluation.sleepers.iter().filter(at_edge).count() {
+        0 => String::new(),
+        1 => "; 1 has a mean at an end of what the models know".to_owned(),
+        count => format!("; {count} have a mean at an end of what the models know"),
+    };
     format!(
-        "{} sleepers evaluated from {} at {} km/h: {}{remark}.",
+        "{} sleepers evaluated from {} at {} km/h: {}{remark}{edge}.",
         evaluation.sleepers.len(),
         if recording.passes.len() == 1 {
             "one pass".to_owned()
@@ -75,10 +83,16 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
     )
 }
 
-/// Lowest to highest mean of a parameter over the sleepers without flags, or over all if there are none.
+/// Whether a sleeper was heard in all of its windows at all speeds.
+fn is_whole(sleeper: &SleeperEvaluation) -> bool {
+    sleeper.flags.iter().all(|&flag| flag == Flag::AtEdgeOfRange)
+}
+
+/// Lowest to highest mean of a parameter over the sleepers that were heard as a whole, or over all if
+/// none was.
 fn range(evaluation: &Evaluation, parameter: Parameter) -> Option<String> {
-    let none = evaluation.sleepers.iter().all(|sleeper| !sleeper.flags.is_empty());
-    let told = evaluation.sleepers.iter().filter(|sleeper| none || sleeper.flags.is_empty());
+    let none = !evaluation.sleepers.iter().any(is_whole);
+    let told = evaluation.sleepers.iter().filter(|sleeper| none || is_whole(sleeper));
     let mut means: Vec<f64> =
         told.filter_map(|sleeper| Some(sleeper.estimates.get(&parameter)?.mean)).collect();
     means.sort_by(f64::total_cmp);
