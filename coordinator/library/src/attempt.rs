@@ -71,9 +71,7 @@ pub(crate) async fn end_all(
         order by sobol_index {}",
         dialect.locking()
     );
-    let leased = connection.rows(sql(leased).bind(campaign)).await?;
-    let leased = leased.iter().map(|row| row.get("sobol_index"));
-    let leased = leased.collect::<Result<Vec<i64>, _>>()?;
+    let leased = connection.indices(sql(leased).bind(campaign)).await?;
     let note = format!(
         "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
             ended_unix_ms, ending)

@@ -150,9 +150,7 @@ impl RetryCases {
             order by sobol_index {}",
             dialect.locking()
         );
-        let flagged = connection.rows(sql(flagged).bind(&self.campaign)).await?;
-        let flagged = flagged.iter().map(|row| row.get("sobol_index"));
-        let flagged = flagged.collect::<Result<Vec<i64>, _>>()?;
+        let flagged = connection.indices(sql(flagged).bind(&self.campaign)).await?;
         let again = "update campaign_case set state = 'waiting', attempts = 0, error = null";
         // Their audits looked at results that are no more.
         let discard = ["audit", results].map(|table| format!("delete from {table}"));

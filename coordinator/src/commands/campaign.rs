@@ -182,6 +182,7 @@ async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
     if stored < total {
         return Err(anyhow!(so_far()).into());
     }
+    progress.into_iter().for_each(Progress::end);
     Ok(())
 }
 

@@ -50,6 +50,11 @@ impl Connection {
         Ok(self.rows(statement).await?.into_iter().next())
     }
 
+    /// The places of cases that a statement answers, in its order.
+    pub(crate) async fn indices(&mut self, statement: Statement) -> Result<Vec<i64>, LibraryError> {
+        self.rows(statement).await?.iter().map(|row| row.get("sobol_index")).collect()
+    }
+
     /// Begins a transaction; with `SQLite` as one that writes, for a reading one that becomes a
     /// writing one may be refused despite any timeout.
     pub(super) async fn begin(&mut self) -> Result<(), LibraryError> {
