@@ -137,10 +137,16 @@ pub async fn embedded(
     // However this ends, nothing goes on behind its back.
     let _guards = [stop_working.clone().drop_guard(), stop_serving.clone().drop_guard()];
     let stop = stop_serving.clone();
-    let server =
-        tokio::spawn(async { serve(listener, dispatch, &Security::default(), stop).await });
-    let config =
-        agent::Config { prepare: task.prepare, ..agent::Config::new(coordinator, task.cores) };
+    // Other users of the machine reach the port as well.
+    let token = random_token()?.to_string();
+    let credentials = Credentials { token: Some(Token::new(&token)?), ..Credentials::default() };
+    let security = Security { token: Some(token), ..Security::default() };
+    let server = tokio::spawn(async move { serve(listener, dispatch, &security, stop).await });
+    let config = agent::Config {
+        prepare: task.prepare,
+        credentials,
+        ..agent::Config::new(coordinator, task.cores)
+    };
     let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
 
     let ended = loop {

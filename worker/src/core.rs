@@ -43,7 +43,7 @@ impl Core {
 
     /// Waits for work, or ends the worker where that has lasted too long.
     async fn wait(&self, retry_after_s: f64) {
-        let mut wait = Duration::try_from_secs_f64(retry_after_s).unwrap_or(Duration::MAX);
+        let mut wait = Duration::try_from_secs_f64(retry_after_s).unwrap_or(WAIT_MAX).min(WAIT_MAX);
         if let Some(limit) = self.idle_exit {
             let idle = self.session.idle_for();
             if idle >= limit {

@@ -1,7 +1,6 @@
 //! Whether a recording is of the track that the models know.
 
 use crate::Error;
-use serde_json::Value;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 
@@ -16,14 +15,16 @@ const ALIKE: f64 = 0.02;
 /// [`Error::GainUnknown`], or [`Error::OtherTrack`] with the first quantity that differs by more
 /// than 2 %.
 pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Error> {
-    if recording.nominal.get("gain_known") == Some(&Value::Bool(false)) {
+    if !recording.gain_known() {
         return Err(Error::GainUnknown);
     }
-    let stated = |part: &str, name: &str| recording.nominal.get(part)?.get(name)?.as_f64();
     let known = design.sleeper.spacing_m;
+    // To a tenth of a millimetre, as a message can show it.
+    let distance_m = recording.median_distance_m().map(|distance| (1e4 * distance).round() / 1e4);
+    let stated = |part, name| recording.nominal_value(part, name);
     let quantities = [
         ("nominal.sleeper.spacing_m is", Some(recording.spacing_m), known, "m"),
-        ("the sleepers of the recording lie", median_distance_m(recording), known, "m"),
+        ("the sleepers of the recording lie", distance_m, known, "m"),
         ("nominal.rail.area_m2 is", stated("rail", "area_m2"), design.rail.area_m2, "m2"),
         (
             "nominal.rail.second_moment_m4 is",
@@ -42,19 +43,11 @@ pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Er
     Ok(())
 }
 
-/// Median distance of neighbouring sleepers in m, to a tenth of a millimetre.
-fn median_distance_m(recording: &Recording) -> Option<f64> {
-    let pairs = recording.sleepers.windows(2);
-    let mut distances: Vec<f64> = pairs.map(|pair| pair[1].x_m - pair[0].x_m).collect();
-    distances.sort_by(f64::total_cmp);
-    distances.get(distances.len() / 2).map(|distance| (1e4 * distance).round() / 1e4)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing;
-    use serde_json::json;
+    use serde_json::{Value, json};
 
     fn refusal(change: impl Fn(&mut Recording)) -> String {
         let mut recording = testing::recording(3.0, &[10.0]);

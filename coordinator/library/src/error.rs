@@ -168,6 +168,15 @@ pub enum LibraryError {
         /// What was found.
         reason: String,
     },
+    /// The file was removed or replaced while it was open.
+    #[error(
+        "library {library}: its file was removed, moved or replaced while it was open; put it back, or \
+         stop and begin anew"
+    )]
+    FileGone {
+        /// The library.
+        library: String,
+    },
     /// There is no room for what should be written.
     #[error("the library's disk is full; nothing is lost: make room and go on")]
     DiskFull,
@@ -208,7 +217,7 @@ impl LibraryError {
     /// Whether the same may succeed later, when somebody has mended the machine.
     pub fn is_temporary(&self) -> bool {
         match self {
-            Self::Unavailable { .. } | Self::DiskFull => true,
+            Self::Unavailable { .. } | Self::DiskFull | Self::FileGone { .. } => true,
             Self::Database(error) => code(error).as_deref() == Some(SQLITE_BUSY),
             _ => false,
         }

@@ -1,7 +1,7 @@
 //! `tracktwin diagnose`: where recording and simulation differ, and what physics was left out.
 
 use super::progress::Progress;
-use super::{OrInput, Stop, say, without_password};
+use super::{OrInput, Stop, say};
 use crate::diagnosing::{DiagnosingError, Setting, diagnose};
 use crate::provenance;
 use anyhow::Context;
@@ -104,14 +104,14 @@ fn origin(arguments: &Arguments) -> Origin {
     let Arguments { recording, models, library, out, without } = arguments;
     let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
     command.extend(models.as_ref().map(|models| format!("--models {}", models.display())));
-    command
-        .extend(library.as_ref().map(|library| format!("--library {}", without_password(library))));
+    let library = library.as_deref().map(without_password);
+    command.extend(library.as_ref().map(|library| format!("--library {library}")));
     command.extend(without.iter().map(|physics| format!("--without {physics}")));
     command.push(format!("--out {}", out.display()));
     Origin {
         command: command.join(" "),
         version: format!("tracktwin {CODE_VERSION}"),
-        library: library.clone().unwrap_or_default(),
+        library: library.unwrap_or_default(),
     }
 }
 

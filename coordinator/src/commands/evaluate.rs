@@ -1,6 +1,6 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
-use super::{OrInput, Stop, note, say, without_password};
+use super::{OrInput, Stop, note, say};
 use crate::evaluating::{Evaluator, EvaluatorError};
 use crate::provenance;
 use anyhow::{Context, anyhow};

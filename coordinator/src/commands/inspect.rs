@@ -104,8 +104,7 @@ fn json(recording: &Recording, look: &FirstLook, inspection: &Inspection) -> ser
 fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
     let speeds: Vec<String> =
         recording.speeds_km_h().iter().map(|speed| format!("{speed:.1}")).collect();
-    let gain_known = recording.nominal.get("gain_known").and_then(serde_json::Value::as_bool);
-    let unit = if gain_known == Some(false) { "unit" } else { "m/s²" };
+    let unit = if recording.gain_known() { "m/s²" } else { "unit" };
     let seconds: f64 = recording.passes.iter().map(|pass| pass.signal.duration_s()).sum();
     Inspection {
         name: recording.name.clone(),

@@ -168,16 +168,6 @@ fn completions(shell: clap_complete::Shell) {
     answer(&script);
 }
 
-/// An argument as it may be shown: passwords in URLs stay with who gave them.
-fn without_password(argument: &str) -> String {
-    let login = argument
-        .split_once("://")
-        .and_then(|(scheme, rest)| rest.split_once('@').map(|(login, host)| (scheme, login, host)));
-    let Some((scheme, login, host)) = login else { return argument.to_owned() };
-    let user = login.split(':').next().unwrap_or_default();
-    format!("{scheme}://{user}@{host}")
-}
-
 /// Says a line of the command's answer on standard output.
 fn say(line: &str) {
     answer(format!("{line}\n").as_bytes());
@@ -200,18 +190,4 @@ fn answer(text: &[u8]) -> bool {
 /// Says a line beside the answer on standard error, if anybody reads that.
 fn note(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
-}
-
-#[cfg(test)]
-mod tests {
-    use super::without_password;
-
-    #[test]
-    fn a_url_is_shown_without_its_password() {
-        let url = "postgres://me:secret@host:5432/db";
-        assert_eq!(without_password(url), "postgres://me@host:5432/db");
-        for same in ["postgres://host/db", "sqlite:a@b.sqlite", "--library"] {
-            assert_eq!(without_password(same), same);
-        }
-    }
 }

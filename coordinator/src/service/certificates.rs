@@ -138,7 +138,7 @@ fn named(name: &str) -> DistinguishedName {
 }
 
 /// A token of 256 bits, in hexadecimal.
-fn random_token() -> std::io::Result<blake3::Hash> {
+pub(crate) fn random_token() -> std::io::Result<blake3::Hash> {
     let mut chance = [0; TOKEN_BYTES];
     File::open("/dev/urandom")?.read_exact(&mut chance)?;
     // A second source costs nothing.

@@ -1,6 +1,6 @@
 //! Checks the token of every call.
 
-use super::peer::PeerAddress;
+use super::peer::Caller;
 use tonic::service::Interceptor;
 use tonic::{Request, Status};
 
@@ -27,11 +27,12 @@ impl Guard {
 impl Interceptor for Guard {
     fn call(&mut self, request: Request<()>) -> Result<Request<()>, Status> {
         let header = request.metadata().get("authorization");
+        let caller = request.extensions().get::<Caller>();
         if self.admits(header.map(tonic::metadata::MetadataValue::as_bytes)) {
+            caller.inspect(|caller| caller.admit());
             return Ok(request);
         }
-        let peer = request.extensions().get::<PeerAddress>();
-        let peer = peer.map_or_else(|| "unknown".to_owned(), |peer| peer.0.to_string());
+        let peer = caller.map_or_else(|| "unknown".to_owned(), |caller| caller.address.to_string());
         let fault = if header.is_some() { "the token is wrong" } else { "no token was shown" };
         tracing::warn!(peer, "call refused: {fault}");
         Err(Status::permission_denied(format!("{fault}; give the worker --token-file")))

@@ -5,10 +5,12 @@ use super::security::HTTP2;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::io::AsyncReadExt;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio_rustls::TlsAcceptor;
 use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::either::Either;
 
 /// Connections at a time: a few thousand nodes. Each costs a file descriptor and some 100 kB.
 const CONNECTIONS_MAX: usize = 4096;
@@ -80,27 +82,32 @@ async fn let_in(
     let greeted = tokio::time::timeout(GREETING, greet(stream, tls)).await;
     match greeted.unwrap_or(Err(Refusal::Silent)) {
         // Who would take it may be stopping.
-        Ok(stream) => drop(peers.send(Ok(Peer::new(stream, address, share))).await),
+        Ok(stream) => drop(peers.send(Ok(Peer::new(stream, PREFACE, address, share))).await),
         Err(refusal) => tracing::warn!(peer = %address, "connection refused: {refusal}"),
     }
 }
 
+/// Takes the beginning of a connection, up to the end of [`PREFACE`].
 async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>) -> Result<Stream, Refusal> {
     stream.set_nodelay(true)?;
-    let Some(tls) = tls else {
-        let mut first = [0; PREFACE.len()];
-        let length = stream.peek(&mut first).await?;
-        // The rest, if it has not come yet, is HTTP/2's to judge.
-        return if length > 0 && PREFACE.starts_with(&first[..length]) {
-            Ok(Stream::Plain(stream))
-        } else {
-            Err(Refusal::Stranger)
-        };
+    let mut stream = match tls {
+        None => Either::Left(stream),
+        Some(tls) => {
+            let stream = tls.accept(stream).await.map_err(Refusal::Tls)?;
+            if stream.get_ref().1.alpn_protocol() != Some(HTTP2) {
+                return Err(Refusal::NoHttp2);
+            }
+            Either::Right(Box::new(stream))
+        }
     };
-    let stream = tls.accept(stream).await.map_err(Refusal::Tls)?;
-    if stream.get_ref().1.alpn_protocol() == Some(HTTP2) {
-        Ok(Stream::Tls(Box::new(stream)))
-    } else {
-        Err(Refusal::NoHttp2)
+    let mut begin = [0; PREFACE.len()];
+    let mut length = 0;
+    while length < begin.len() {
+        let more = stream.read(&mut begin[length..]).await?;
+        length += more;
+        if more == 0 || !PREFACE.starts_with(&begin[..length]) {
+            return Err(Refusal::Stranger);
+        }
     }
+    Ok(stream)
 }

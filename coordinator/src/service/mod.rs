@@ -16,6 +16,6 @@ pub use certificates::{CertificatesError, issue};
 pub use coordinator::{Coordinator, CoordinatorError};
 pub use guard::Guard;
 pub use listener::accept;
-pub use peer::{Peer, PeerAddress};
+pub use peer::{Caller, Peer};
 pub use security::{Security, SecurityError};
 pub use serve::{ServeError, serve};

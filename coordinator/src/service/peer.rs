@@ -2,44 +2,82 @@
 
 use std::net::SocketAddr;
 use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll};
+use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::sync::OwnedSemaphorePermit;
+use tokio::time::Sleep;
 use tokio_rustls::server::TlsStream;
+use tokio_util::either::Either;
 use tonic::transport::server::Connected;
 
+/// How long a connection may last without a call that was admitted.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Plain text or TLS.
+pub(crate) type Stream = Either<TcpStream, Box<TlsStream<TcpStream>>>;
+
 /// Who calls; every request carries it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PeerAddress(pub SocketAddr);
+#[derive(Clone, Debug)]
+pub struct Caller {
+    /// Where it calls from.
+    pub address: SocketAddr,
+    admitted: Arc<AtomicBool>,
+}
+
+impl Caller {
+    /// Notes that a call of its connection was admitted: the connection may last.
+    pub(crate) fn admit(&self) {
+        self.admitted.store(true, Ordering::Relaxed);
+    }
+}
 
 /// A connection that was let in, and its share of the connections there may be.
 pub struct Peer {
     stream: Stream,
-    address: PeerAddress,
+    caller: Caller,
+    /// What was read of it already.
+    begin: &'static [u8],
+    /// Runs until a call was admitted.
+    patience: Option<Pin<Box<Sleep>>>,
     _share: OwnedSemaphorePermit,
 }
 
-pub(crate) enum Stream {
-    Plain(TcpStream),
-    Tls(Box<TlsStream<TcpStream>>),
-}
-
 impl Peer {
-    pub(crate) const fn new(
+    /// A connection of which `begin` was read.
+    pub(crate) fn new(
         stream: Stream,
+        begin: &'static [u8],
         address: SocketAddr,
         share: OwnedSemaphorePermit,
     ) -> Self {
-        Self { stream, address: PeerAddress(address), _share: share }
+        let caller = Caller { address, admitted: Arc::default() };
+        let patience = Some(Box::pin(tokio::time::sleep(PATIENCE)));
+        Self { stream, caller, begin, patience, _share: share }
+    }
+
+    /// Ends the connection of a caller that has shown nothing.
+    fn check_patience(&mut self, context: &mut Context<'_>) -> std::io::Result<()> {
+        let Some(patience) = &mut self.patience else { return Ok(()) };
+        if self.caller.admitted.load(Ordering::Relaxed) {
+            self.patience = None;
+        } else if patience.as_mut().poll(context).is_ready() {
+            let reason = format!("no call was admitted for {} s", PATIENCE.as_secs());
+            tracing::warn!(peer = %self.caller.address, "connection ended: {reason}");
+            return Err(std::io::Error::new(std::io::ErrorKind::TimedOut, reason));
+        }
+        Ok(())
     }
 }
 
 impl Connected for Peer {
-    type ConnectInfo = PeerAddress;
+    type ConnectInfo = Caller;
 
-    fn connect_info(&self) -> PeerAddress {
-        self.address
+    fn connect_info(&self) -> Caller {
+        self.caller.clone()
     }
 }
 
@@ -49,10 +87,14 @@ impl AsyncRead for Peer {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<std::io::Result<()>> {
-        match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_read(context, buffer),
-            Stream::Tls(stream) => Pin::new(stream).poll_read(context, buffer),
+        if !self.begin.is_empty() {
+            let (now, later) = self.begin.split_at(self.begin.len().min(buffer.remaining()));
+            buffer.put_slice(now);
+            self.begin = later;
+            return Poll::Ready(Ok(()));
         }
+        self.check_patience(context)?;
+        Pin::new(&mut self.stream).poll_read(context, buffer)
     }
 }
 
@@ -62,30 +104,21 @@ impl AsyncWrite for Peer {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<std::io::Result<usize>> {
-        match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_write(context, bytes),
-            Stream::Tls(stream) => Pin::new(stream).poll_write(context, bytes),
-        }
+        Pin::new(&mut self.stream).poll_write(context, bytes)
     }
 
     fn poll_flush(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<std::io::Result<()>> {
-        match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_flush(context),
-            Stream::Tls(stream) => Pin::new(stream).poll_flush(context),
-        }
+        Pin::new(&mut self.stream).poll_flush(context)
     }
 
     fn poll_shutdown(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<std::io::Result<()>> {
-        match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_shutdown(context),
-            Stream::Tls(stream) => Pin::new(stream).poll_shutdown(context),
-        }
+        Pin::new(&mut self.stream).poll_shutdown(context)
     }
 
     fn poll_write_vectored(
@@ -93,16 +126,10 @@ impl AsyncWrite for Peer {
         context: &mut Context<'_>,
         slices: &[std::io::IoSlice<'_>],
     ) -> Poll<std::io::Result<usize>> {
-        match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_write_vectored(context, slices),
-            Stream::Tls(stream) => Pin::new(stream).poll_write_vectored(context, slices),
-        }
+        Pin::new(&mut self.stream).poll_write_vectored(context, slices)
     }
 
     fn is_write_vectored(&self) -> bool {
-        match &self.stream {
-            Stream::Plain(stream) => stream.is_write_vectored(),
-            Stream::Tls(stream) => stream.is_write_vectored(),
-        }
+        self.stream.is_write_vectored()
     }
 }

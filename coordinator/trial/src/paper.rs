@@ -1,5 +1,6 @@
 //! Whether the paper's own pipeline looks content with a recording in which something is hidden.
 
+use crate::rate::median;
 use crate::score::near;
 use serde::{Deserialize, Serialize};
 use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
@@ -37,7 +38,7 @@ impl Paper {
 
     /// Median of the errors.
     fn median(&self) -> f64 {
-        self.mape[self.mape.len() / 2]
+        median(self.mape.clone()).expect("there is one sleeper at least")
     }
 }
 

@@ -1,7 +1,13 @@
-//! Rates with what chance alone makes of them.
+//! Rates with what chance alone makes of them, and medians.
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{Beta, ContinuousCDF};
+use statrs::statistics::{Data, Median};
+
+/// The middle value, the mean of the middle two of an even number; none of none.
+pub(crate) fn median(values: Vec<f64>) -> Option<f64> {
+    (!values.is_empty()).then(|| Data::new(values).median())
+}
 
 /// How often something was so.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

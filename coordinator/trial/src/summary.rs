@@ -2,7 +2,7 @@
 
 use crate::draw::Class;
 use crate::paper::Usual;
-use crate::rate::Rate;
+use crate::rate::{Rate, median};
 use crate::score::{KnockedOut, Named, Placed, Score};
 use serde::{Deserialize, Serialize};
 use tracktwin_diagnosis::Verdict;
@@ -216,13 +216,13 @@ fn bias(scores: &[Score]) -> Row {
 }
 
 fn cost(scores: &[Score]) -> Row {
-    let mut seconds: Vec<f64> = scores.iter().map(|score| score.cpu_s).collect();
-    seconds.sort_by(f64::total_cmp);
-    let value = match (seconds.get(seconds.len() / 2), seconds.last()) {
+    let seconds: Vec<f64> = scores.iter().map(|score| score.cpu_s).collect();
+    let most = seconds.iter().copied().max_by(f64::total_cmp);
+    let value = match (median(seconds), most) {
         (Some(median), Some(most)) => format!("median {median:.0} s, most {most:.0} s"),
         _ => "none".to_owned(),
     };
-    let reached = seconds.last().map(|most| *most <= 600.0);
+    let reached = most.map(|most| most <= 600.0);
     let measure = "CPU time of a diagnosis".to_owned();
     Row { measure, value, goal: "5 minutes on two cores".to_owned(), reached }
 }
@@ -238,15 +238,13 @@ fn kinds(scores: &[Score]) -> Vec<KindRow> {
         all().map(|(_, named)| named.physics.as_str()).collect();
     let kind = |physics: &str| {
         let of = || all().filter(|(_, named)| named.physics == physics);
-        let mut lengths: Vec<f64> = of().filter_map(|(_, named)| named.detectability).collect();
-        lengths.sort_by(f64::total_cmp);
         let placed = of().filter(|(score, _)| alarmed(score)).filter_map(|(_, named)| named.place);
         KindRow {
             physics: physics.to_owned(),
             detected: Rate::of(of().map(|(score, _)| alarmed(score))),
             first: Rate::of(of().map(|(_, named)| named.first)),
             placed: Rate::of(placed.map(Placed::within_a_sleeper)),
-            detectability: lengths.get(lengths.len() / 2).copied(),
+            detectability: median(of().filter_map(|(_, named)| named.detectability).collect()),
             concealed: Rate::of(of().map(|(s, _)| s.parameters_inside && s.cells_inside)),
             content: Rate::of(
                 of().filter_map(|(score, _)| Some(usual?.is_content(score.paper.as_ref()?))),

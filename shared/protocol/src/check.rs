@@ -27,13 +27,23 @@ pub enum BadMessage {
         /// The field.
         field: &'static str,
     },
-    /// A number is NaN, infinite or negative where it can't be.
+    /// A number is NaN, infinite, negative or beyond all measure where it can't be.
     #[error("{field} is {value}")]
     NotANumber {
         /// The field.
         field: &'static str,
         /// What stands there.
         value: f64,
+    },
+    /// A count that nobody can have.
+    #[error("{field} is {value}; it must be below {limit}")]
+    TooLarge {
+        /// The field.
+        field: &'static str,
+        /// What stands there.
+        value: u32,
+        /// The least that is not allowed.
+        limit: u32,
     },
     /// An enum value this program doesn't know.
     #[error("{field} is {value}, which this program does not know")]
@@ -104,8 +114,11 @@ pub enum BadMessage {
 /// Longest name of a worker, version or hash, in bytes.
 const NAME_BYTES_MAX: usize = 256;
 
-/// A name: not empty, not too long, fit to be printed and stored.
-pub(crate) fn name(field: &'static str, text: String) -> Result<String, BadMessage> {
+/// A name: not empty, at most 256 bytes, fit to be printed and stored.
+///
+/// # Errors
+/// [`BadMessage`] names the field and what is wrong with it.
+pub fn name(field: &'static str, text: String) -> Result<String, BadMessage> {
     match text.len() {
         0 => Err(BadMessage::Missing { field }),
         length if length > NAME_BYTES_MAX => {
@@ -124,9 +137,12 @@ pub(crate) fn bounded<T>(field: &'static str, cases: Vec<T>) -> Result<Vec<T>, B
     }
 }
 
-/// A finite number that is not negative.
+/// Longest time that a case may have taken, in s: ten years.
+const DURATION_MAX_S: f64 = 3e8;
+
+/// A time in s that somebody can have measured.
 pub(crate) fn duration(field: &'static str, value: f64) -> Result<f64, BadMessage> {
-    if value.is_finite() && value >= 0.0 {
+    if (0.0..=DURATION_MAX_S).contains(&value) {
         Ok(value)
     } else {
         Err(BadMessage::NotANumber { field, value })

@@ -8,7 +8,7 @@ mod lease;
 mod register;
 mod report;
 
-pub use check::BadMessage;
+pub use check::{BadMessage, name};
 pub use lease::{CaseLease, Lease, LeasedCase, held_from_messages, held_to_messages};
 pub use register::Registration;
 pub use report::{CaseReport, Outcome, PassFeatures, Shape};

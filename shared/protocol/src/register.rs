@@ -3,6 +3,9 @@
 use crate::check::{BadMessage, name};
 use crate::farm;
 
+/// No machine has so many cores; who says so would have the others wait.
+const CORES_MAX: u32 = 1 << 14;
+
 /// A worker, as it introduces itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Registration {
@@ -30,8 +33,16 @@ impl TryFrom<farm::RegisterRequest> for Registration {
     type Error = BadMessage;
 
     fn try_from(message: farm::RegisterRequest) -> Result<Self, BadMessage> {
-        if message.cores == 0 {
-            return Err(BadMessage::Missing { field: "cores" });
+        match message.cores {
+            0 => return Err(BadMessage::Missing { field: "cores" }),
+            CORES_MAX.. => {
+                return Err(BadMessage::TooLarge {
+                    field: "cores",
+                    value: message.cores,
+                    limit: CORES_MAX,
+                });
+            }
+            _ => {}
         }
         Ok(Self {
             worker: name("worker", message.worker)?,

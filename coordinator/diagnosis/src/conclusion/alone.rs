@@ -44,7 +44,7 @@ pub fn passes_alone(
     if let [speed_km_h] = recording.speeds_km_h()[..] {
         notes.push(one_speed(speed_km_h));
     }
-    if recording.nominal.get("gain_known").and_then(serde_json::Value::as_bool) == Some(false) {
+    if !recording.gain_known() {
         notes.push("The unit of the signal is not known: amplitudes are relative.".to_owned());
     }
     notes.extend(look.troubles.iter().map(ToString::to_string));

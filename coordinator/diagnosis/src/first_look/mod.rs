@@ -122,8 +122,7 @@ fn unknown_wheel(recording: &Recording) -> Option<Comb> {
 
 /// Unit of the accelerations, as sentences have it.
 fn unit(recording: &Recording) -> &'static str {
-    let is_known = recording.nominal.get("gain_known").and_then(serde_json::Value::as_bool);
-    if is_known == Some(false) { "of the unknown unit" } else { "m/s2" }
+    if recording.gain_known() { "m/s2" } else { "of the unknown unit" }
 }
 
 /// What wheel and rail surface show.

@@ -18,7 +18,7 @@ use tracktwin_signal::recording::Recording;
 
 /// The wheel's circumference in m by its nominal radius, where the recording states one.
 pub fn nominal_circumference_m(recording: &Recording) -> Option<f64> {
-    let radius = recording.nominal.get("wheel")?.get("radius_m")?.as_f64()?;
+    let radius = recording.nominal_value("wheel", "radius_m")?;
     (radius.is_finite() && radius > 0.0).then_some(TAU * radius)
 }
 

@@ -1,6 +1,7 @@
 //! The connection that writes, and the connections that read.
 
 use super::patience::Patience;
+use super::sqlite::OpenFile;
 use super::{Dialect, Row, Statement, sql};
 use crate::LibraryError;
 use sqlx::{Connection as _, PgConnection, PgPool, SqliteConnection, SqlitePool};
@@ -9,14 +10,14 @@ use tokio_stream::{Stream, StreamExt};
 
 /// A connection that writes, inside a transaction.
 pub(crate) enum Connection {
-    Sqlite(SqliteConnection),
+    Sqlite(SqliteConnection, OpenFile),
     Postgres(PgConnection),
 }
 
 impl Connection {
     pub(crate) const fn dialect(&self) -> Dialect {
         match self {
-            Self::Sqlite(_) => Dialect::Sqlite,
+            Self::Sqlite(..) => Dialect::Sqlite,
             Self::Postgres(_) => Dialect::Postgres,
         }
     }
@@ -24,7 +25,7 @@ impl Connection {
     /// Runs a statement; answers how many rows it changed.
     pub(crate) async fn execute(&mut self, statement: Statement) -> Result<u64, LibraryError> {
         Ok(match self {
-            Self::Sqlite(connection) => {
+            Self::Sqlite(connection, _) => {
                 statement.for_sqlite().execute(connection).await?.rows_affected()
             }
             Self::Postgres(connection) => {
@@ -35,7 +36,7 @@ impl Connection {
 
     pub(crate) async fn rows(&mut self, statement: Statement) -> Result<Vec<Row>, LibraryError> {
         Ok(match self {
-            Self::Sqlite(connection) => {
+            Self::Sqlite(connection, _) => {
                 let rows = statement.for_sqlite().fetch_all(connection).await?;
                 rows.into_iter().map(Row::Sqlite).collect()
             }
@@ -59,13 +60,17 @@ impl Connection {
     /// writing one may be refused despite any timeout.
     pub(super) async fn begin(&mut self) -> Result<(), LibraryError> {
         let text = match self {
-            Self::Sqlite(_) => "begin immediate",
+            Self::Sqlite(..) => "begin immediate",
             Self::Postgres(_) => "begin",
         };
         self.execute(sql(text)).await.map(drop)
     }
 
+    /// Commits the transaction; with `SQLite` only to a file that others still find.
     pub(super) async fn commit(&mut self) -> Result<(), LibraryError> {
+        if let Self::Sqlite(_, file) = self {
+            file.check()?;
+        }
         self.execute(sql("commit")).await.map(drop)
     }
 
@@ -78,7 +83,7 @@ impl Connection {
     pub(super) async fn close(self) {
         // What is committed is on the disk already; closing only tidies up.
         let _ = match self {
-            Self::Sqlite(connection) => connection.close().await,
+            Self::Sqlite(connection, _) => connection.close().await,
             Self::Postgres(connection) => connection.close().await,
         };
     }

@@ -24,4 +24,5 @@ pub(crate) use open::{Opened, open, open_or_create};
 pub(crate) use row::Row;
 pub(crate) use statement::{Statement, Value, series, sql};
 pub(crate) use target::Target;
+pub use target::without_password;
 pub(crate) use writer::{Write, Writer};

@@ -6,7 +6,8 @@ use crate::LibraryError;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
-use std::path::Path;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations/sqlite");
@@ -61,7 +62,42 @@ pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryEr
     let readers = SqlitePoolOptions::new()
         .max_connections(READERS)
         .connect_lazy_with(options.create_if_missing(false).pragma("query_only", "on"));
-    Ok((Readers::Sqlite(readers), Connection::Sqlite(connection)))
+    let file = OpenFile::at(path)?;
+    Ok((Readers::Sqlite(readers), Connection::Sqlite(connection, file)))
+}
+
+/// The file that is open, to notice when its path leads to it no longer: what is written to a file that
+/// was removed or replaced is gone with the process that has it open.
+pub(crate) struct OpenFile {
+    path: PathBuf,
+    /// Device and inode.
+    identity: [u64; 2],
+}
+
+impl OpenFile {
+    fn at(path: &Path) -> Result<Self, LibraryError> {
+        let identity = identity(path).ok_or_else(|| gone(path))?;
+        Ok(Self { path: path.to_owned(), identity })
+    }
+
+    /// Whether the path still leads to the file.
+    ///
+    /// # Errors
+    /// [`LibraryError::FileGone`].
+    pub(super) fn check(&self) -> Result<(), LibraryError> {
+        match identity(&self.path) {
+            Some(found) if found == self.identity => Ok(()),
+            _ => Err(gone(&self.path)),
+        }
+    }
+}
+
+fn identity(path: &Path) -> Option<[u64; 2]> {
+    std::fs::metadata(path).ok().map(|file| [file.dev(), file.ino()])
+}
+
+fn gone(path: &Path) -> LibraryError {
+    LibraryError::FileGone { library: path.display().to_string() }
 }
 
 /// Why a file cannot be opened, as far as a user can mend it.

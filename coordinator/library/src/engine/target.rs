@@ -12,7 +12,7 @@ pub(crate) enum Target {
     Postgres {
         // Several hundred bytes, and a library has one.
         options: Box<PgConnectOptions>,
-        /// The URL without user, password and settings.
+        /// The URL without password and settings.
         name: String,
     },
 }
@@ -20,8 +20,8 @@ pub(crate) enum Target {
 impl Target {
     /// What `sqlite:PATH` (or `sqlite://PATH`) or `postgres://[USER[:PASSWORD]@]HOST/DATABASE` means.
     pub(crate) fn parse(url: &str) -> Result<Self, LibraryError> {
-        if let Some((scheme @ ("postgres" | "postgresql"), rest)) = url.split_once("://") {
-            let name = format!("{scheme}://{}", public(rest));
+        if let Some(("postgres" | "postgresql", _)) = url.split_once("://") {
+            let name = without_password(url);
             let options = PgConnectOptions::from_str(url).map_err(|source| {
                 LibraryError::BadPostgresUrl { url: name.clone(), reason: source.to_string() }
             })?;
@@ -55,10 +55,18 @@ impl Target {
     }
 }
 
-/// Host and database: what stands before may hold a password, and so may what comes after.
-fn public(rest: &str) -> &str {
+/// A library's URL as anybody may see it, in a message, on a page or as an argument of a command: without
+/// password, and without settings, which may hold one.
+pub fn without_password(url: &str) -> String {
+    let Some((scheme, rest)) =
+        url.split_once("://").filter(|(scheme, _)| scheme.contains("postgres"))
+    else {
+        return url.to_owned();
+    };
     let rest = rest.split_once('?').map_or(rest, |(rest, _)| rest);
-    rest.rsplit_once('@').map_or(rest, |(_, host)| host)
+    let Some((login, host)) = rest.rsplit_once('@') else { return format!("{scheme}://{rest}") };
+    let user = login.split_once(':').map_or(login, |(user, _)| user);
+    format!("{scheme}://{user}@{host}")
 }
 
 #[cfg(test)]
@@ -88,7 +96,11 @@ mod tests {
     #[test]
     fn no_message_shows_a_password() {
         let name = Target::parse("postgres://me:sec@ret@host:1/db?password=secret").unwrap().name();
-        assert_eq!(name, "postgres://host:1/db");
+        assert_eq!(name, "postgres://me@host:1/db");
+        assert_eq!(without_password("--library=postgres://me:x@host/db"), "--library=postgres://me@host/db");
+        for same in ["postgres://host/db", "sqlite:a@b.sqlite", "sqlite://a:b@c?d", "--library"] {
+            assert_eq!(without_password(same), same);
+        }
         let message = refusal("postgres://me:secret@host:port/db");
         assert!(message.contains("host:port") && !message.contains("secret"), "{message}");
     }

@@ -128,6 +128,30 @@ impl Drop for SmallDisk {
 }
 
 #[tokio::test]
+async fn nothing_is_written_to_a_file_that_was_moved_away() {
+    const CASES: u32 = 4;
+    let folder = tempfile::tempdir().unwrap();
+    let [path, aside] = ["library.sqlite", "aside.sqlite"].map(|name| folder.path().join(name));
+    let library =
+        Library::open_or_create(&format!("sqlite:{}", path.display())).await.unwrap();
+    fill(&library, CAMPAIGN, CASES).await;
+    let leased = lease(&library, "w", CASES, library.now_unix_ms()).await;
+    let results = || crate::support::message("w", leased.iter().map(finished).collect());
+
+    std::fs::rename(&path, &aside).unwrap();
+    let error = library.report(results()).await.unwrap_err();
+    assert!(matches!(error, LibraryError::FileGone { .. }), "{error:?}");
+    assert!(error.is_temporary());
+    // Another file in its place is not the library either.
+    std::fs::write(&path, "").unwrap();
+    library.report(results()).await.unwrap_err();
+
+    std::fs::rename(&aside, &path).unwrap();
+    library.report(results()).await.unwrap();
+    assert_eq!(library.digest(CAMPAIGN).await.unwrap(), undisturbed(CASES).await);
+}
+
+#[tokio::test]
 async fn a_full_disk_is_said_and_survived() {
     const CASES: u32 = 120;
     let Some(disk) = SmallDisk::new() else { return };

@@ -13,6 +13,9 @@ use tracktwin_protocol::{CaseLease, Lease, LeasedCase};
 /// After the library had no case to give, it is not asked again for so long.
 const NOTHING: Duration = Duration::from_millis(100);
 
+/// The longest that a worker without work is told to wait: new campaigns are to find it.
+const WAIT_MAX: Duration = Duration::from_mins(1);
+
 /// Workers without work that may ask once a second all together.
 const IDLE_CALLS_S: f64 = 400.0;
 
@@ -80,7 +83,8 @@ impl Dispatch {
     fn none_now(&self) -> Lease {
         let (workers, cores) = self.roster.present();
         let crowd = f64::from(cores).max(workers as f64) / IDLE_CALLS_S;
-        let retry_after_s = self.settings.timing.retry.as_secs_f64().max(crowd);
+        let wait = crowd.min(WAIT_MAX.as_secs_f64());
+        let retry_after_s = self.settings.timing.retry.as_secs_f64().max(wait);
         Lease::NoneNow { retry_after_s, reason: None }
     }
 }

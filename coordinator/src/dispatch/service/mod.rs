@@ -15,7 +15,7 @@ use tokio::time::Instant;
 use tonic::{Request, Response, Status};
 use tracktwin_library::{self as library, Library, Verdict, WorkerState};
 use tracktwin_protocol::farm::farm_server::Farm;
-use tracktwin_protocol::{CaseReport, Lease, Registration, farm, held_to_messages};
+use tracktwin_protocol::{BadMessage, CaseReport, Lease, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
 
 /// The farm's service, for the campaigns of a library.
@@ -65,11 +65,17 @@ impl Dispatch {
         if !standing.to_be_noted {
             return Ok(standing);
         }
+        self.note(worker).await?;
+        self.roster.standing(worker).ok_or_else(stranger)
+    }
+
+    /// Tells the library that a worker is alive, and hears whether it is in quarantine.
+    async fn note(&self, worker: &str) -> Result<(), Status> {
         let known = self.library.heartbeat(worker, self.now_unix_ms()).await;
         if let Some(record) = known.map_err(|error| unavailable(&error))? {
             self.roster.quarantine(worker, record.state, record.reason);
         }
-        self.roster.standing(worker).ok_or_else(stranger)
+        Ok(())
     }
 }
 
@@ -115,6 +121,9 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::LeaseResponse>, Status> {
         let (begun, begun_at) = (Instant::now(), SystemTime::now());
         let farm::LeaseRequest { worker, cases_max } = request.into_inner();
+        if cases_max == 0 {
+            return Err(malformed(&BadMessage::Missing { field: "cases_max" }));
+        }
         let standing = self.standing(&worker).await?;
         let mut lease = match standing.aside {
             Some((wait, reason)) => {
@@ -141,14 +150,14 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::RenewResponse>, Status> {
         // Without registration too: leases outlive a restart of the coordinator.
         let farm::RenewRequest { worker, campaign_id, cases } = request.into_inner();
+        let [worker, campaign_id] = names(worker, campaign_id)?;
         let until = self.now_unix_ms().saturating_add(unix_ms(self.settings.timing.lease));
         // Audits are not leases of the library, and long enough.
         let held = held(cases)?.into_iter().filter(|held| held.epoch != audits::EPOCH).collect();
         let lost = self.library.renew(&campaign_id, &worker, held, until).await;
         let lost = lost.map_err(|error| unavailable(&error))?;
         if self.roster.standing(&worker).is_some_and(|standing| standing.to_be_noted) {
-            let noted = self.library.heartbeat(&worker, self.now_unix_ms()).await;
-            noted.map_err(|error| unavailable(&error))?;
+            self.note(&worker).await?;
         }
         let lost = held_to_messages(lost.into_iter().map(|held| (held.index, held.epoch)));
         Ok(Response::new(farm::RenewResponse { lost }))
@@ -161,6 +170,7 @@ impl Farm for Dispatch {
         let begun = Instant::now();
         let farm::ReportRequest { worker, campaign_id, experiment_hash, cases, traceparent } =
             request.into_inner();
+        let [worker, campaign_id] = names(worker, campaign_id)?;
         let step = Step::after("report", [&traceparent]);
         let standing = self.standing(&worker).await?;
         let indices: Vec<u32> = cases.iter().map(|case| case.sobol_index).collect();
@@ -192,6 +202,7 @@ impl Farm for Dispatch {
         request: Request<farm::ReleaseRequest>,
     ) -> Result<Response<farm::ReleaseResponse>, Status> {
         let farm::ReleaseRequest { worker, campaign_id, cases } = request.into_inner();
+        let [worker, campaign_id] = names(worker, campaign_id)?;
         let (audits, held): (Vec<_>, Vec<_>) =
             held(cases)?.into_iter().partition(|held| held.epoch == audits::EPOCH);
         if !audits.is_empty() {
@@ -203,6 +214,12 @@ impl Farm for Dispatch {
         released.map_err(|error| unavailable(&error))?;
         Ok(Response::new(farm::ReleaseResponse {}))
     }
+}
+
+/// A worker's name and a campaign's, fit for the library.
+fn names(worker: String, campaign_id: String) -> Result<[String; 2], Status> {
+    let checked = |field, text| tracktwin_protocol::name(field, text).map_err(|it| malformed(&it));
+    Ok([checked("worker", worker)?, checked("campaign_id", campaign_id)?])
 }
 
 fn unix_ms(duration: Duration) -> i64 {

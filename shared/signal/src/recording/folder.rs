@@ -140,6 +140,21 @@ impl Recording {
         speeds
     }
 
+    /// Whether accelerations are in m/s2: everywhere but where `nominal.gain_known` is false.
+    pub fn gain_known(&self) -> bool {
+        self.nominal.get("gain_known") != Some(&Value::Bool(false))
+    }
+
+    /// What is known of a quantity `name` of `part`, such as `mass_kg` of the `wheel`.
+    pub fn nominal_value(&self, part: &str, name: &str) -> Option<f64> {
+        self.nominal.get(part)?.get(name)?.as_f64()
+    }
+
+    /// Median distance of neighbouring sleepers in m; none with fewer than two.
+    pub fn median_distance_m(&self) -> Option<f64> {
+        median_distance_m(&self.sleepers)
+    }
+
     /// Begin and end in m of the sleeper's window.
     fn window_ends(&self, sleeper: usize) -> [f64; 2] {
         let x = self.sleepers[sleeper].x_m;
@@ -225,13 +240,16 @@ fn spacing(path: &Path, manifest: &Manifest) -> Result<f64, RecordingError> {
             RecordingError::new(path, FIELD, fault)
         });
     }
-    let pairs = manifest.sleepers.windows(2);
-    let mut distances: Vec<f64> = pairs.map(|pair| pair[1].x_m - pair[0].x_m).collect();
-    distances.sort_by(f64::total_cmp);
-    let median = distances.get(distances.len() / 2).copied().filter(|&spacing| spacing > 0.0);
-    median.ok_or_else(|| {
+    median_distance_m(&manifest.sleepers).filter(|&spacing| spacing > 0.0).ok_or_else(|| {
         RecordingError::new(path, FIELD, Fault::NoField { expected: expected.to_owned() })
     })
+}
+
+fn median_distance_m(sleepers: &[Sleeper]) -> Option<f64> {
+    let pairs = sleepers.windows(2);
+    let mut distances: Vec<f64> = pairs.map(|pair| pair[1].x_m - pair[0].x_m).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.get(distances.len() / 2).copied()
 }
 
 fn name_of(folder: &Path) -> String {
