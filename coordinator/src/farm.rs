@@ -2,7 +2,7 @@
 
 use crate::campaign::{Campaign, cases};
 use crate::dispatch::{Counts, Dispatch, DispatchError, Scope, Settings, Timing};
-use crate::service::{Security, ServeError, serve};
+use crate::service::{Security, ServeError, random_token, serve};
 use std::net::Ipv4Addr;
 use std::num::NonZeroUsize;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use tokio_util::sync::CancellationToken;
 use tracktwin_library::{CampaignRecord, Claim, Library, LibraryError, Status};
 use tracktwin_parameters::SobolError;
 use tracktwin_worker::agent::{self, AgentError};
-use tracktwin_worker::{Prepare, prepare_simulation};
+use tracktwin_worker::{Credentials, Prepare, Token, prepare_simulation};
 
 /// Cases stored at a time, so that a million need no more memory than these.
 const CASES_AT_A_TIME: u32 = 4096;
@@ -139,7 +139,10 @@ pub async fn embedded(
     let stop = stop_serving.clone();
     // Other users of the machine reach the port as well.
     let token = random_token()?.to_string();
-    let credentials = Credentials { token: Some(Token::new(&token)?), ..Credentials::default() };
+    let credentials = Credentials {
+        token: Some(Token::new(&token).expect("hexadecimal digits are fit for a token")),
+        ..Credentials::default()
+    };
     let security = Security { token: Some(token), ..Security::default() };
     let server = tokio::spawn(async move { serve(listener, dispatch, &security, stop).await });
     let config = agent::Config {

@@ -39,6 +39,25 @@ impl Process {
         assert!(sent.expect("kill starts").success());
     }
 
+    /// A TCP port on which it listens, once there is one.
+    ///
+    /// # Panics
+    /// When the system doesn't say.
+    pub fn port(&self) -> Option<u16> {
+        let proc = |what: &str| format!("/proc/{}/{what}", self.0.id());
+        let files = std::fs::read_dir(proc("fd")).expect("it runs").flatten();
+        let files = files.filter_map(|file| std::fs::read_link(file.path()).ok());
+        let files: Vec<String> = files.map(|it| it.display().to_string()).collect();
+        let sockets = std::fs::read_to_string(proc("net/tcp")).expect("it runs");
+        // Of proc(5)'s `net/tcp`: local address (field 1), state (3, 0A listens) and inode (9).
+        sockets.lines().map(|line| line.split_whitespace().collect::<Vec<_>>()).find_map(|it| {
+            let ours = it.get(3) == Some(&"0A") && files.contains(&format!("socket:[{}]", it[9]));
+            ours.then(|| it[1].split_once(':'))
+                .flatten()
+                .map(|(_, port)| u16::from_str_radix(port, 16).expect("ports are hexadecimal"))
+        })
+    }
+
     /// Ends it at once (SIGKILL).
     pub fn kill(self) {
         drop(self);

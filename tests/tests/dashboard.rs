@@ -29,6 +29,11 @@ struct Farm {
 
 impl Farm {
     fn start(token: Option<&str>) -> Self {
+        Self::start_with(token, &[])
+    }
+
+    /// The same with further arguments, in which `DIR` is the farm's folder of certificates.
+    fn start_with(token: Option<&str>, more: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).display().to_string();
         let campaign = format!("name = \"pages\"\ncases = 24\n{COARSE_MODEL}");
@@ -38,6 +43,10 @@ impl Farm {
         let mut coordinator = Command::new(PROGRAM);
         coordinator.args(["coordinator", "--campaign", &path("campaign.toml")]);
         coordinator.args(["--library", &library, "--listen", &listen, "--dashboard", &dashboard]);
+        if !more.is_empty() {
+            run(PROGRAM, &["certs", &path("certs"), "--host", "127.0.0.1"]).succeeded();
+            coordinator.args(more.iter().map(|argument| argument.replace("DIR", &path("certs"))));
+        }
         if let Some(token) = token {
             std::fs::write(path("token"), token).unwrap();
             coordinator.args(["--token-file", &path("token")]);
@@ -158,6 +167,20 @@ fn buttons_are_pressed_by_those_who_have_shown_the_token_and_by_nobody_else() {
 }
 
 #[test]
+fn where_workers_must_show_certificates_nobody_presses_buttons_without_a_token() {
+    let pem = |what: &str, file: &str| [format!("--tls-{what}"), format!("DIR/{file}.pem")];
+    let demand =
+        [pem("cert", "coordinator"), pem("key", "coordinator-key"), pem("client-ca", "ca")];
+    let demand: Vec<&str> = demand.iter().flatten().map(String::as_str).collect();
+    let farm = Farm::start_with(None, &demand);
+    let name = farm.name();
+    let paused = farm.post("/campaign/pause", [("campaign", name.as_str())], PLAIN);
+    assert_eq!(paused.status(), 403);
+    assert!(!farm.get("/").contains("campaign/pause"));
+    assert_eq!(farm.state(), "running");
+}
+
+#[test]
 fn other_sites_and_other_names_are_turned_away() {
     let farm = Farm::start(None);
     let name = farm.name();
@@ -168,8 +191,10 @@ fn other_sites_and_other_names_are_turned_away() {
         assert_eq!(answer.status(), 403, "{elsewhere}");
     }
     // A name of somebody else's that leads to this machine.
-    let named = farm.agent().get(farm.at("/")).header("Host", "elsewhere.example").call();
-    assert_eq!(named.unwrap().status(), 403);
+    for path in ["/", "/metrics", "/healthz"] {
+        let named = farm.agent().get(farm.at(path)).header("Host", "elsewhere.example").call();
+        assert_eq!(named.unwrap().status(), 403, "{path}");
+    }
     assert_eq!(farm.state(), "running");
     let answer = farm.agent().get(farm.at("/")).call().unwrap();
     let policy = answer.headers()["content-security-policy"].to_str().unwrap();

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use system_tests::{Answer, Process, free_port, run, until};
+use system_tests::{Answer, COARSE_MODEL, Process, free_port, run, until};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
@@ -70,4 +70,19 @@ fn a_worker_without_work_is_done() {
     let token = folder.path().join("token").display().to_string();
     let answer = worker(&["--coordinator", &address, "--token-file", &token, "--idle-exit", "1"]);
     assert_eq!(answer.code, Some(0), "{}", answer.err);
+}
+
+#[test]
+fn a_run_on_one_machine_takes_results_of_nobody_else_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let campaign = format!("name = \"alone\"\ncases = 2000\n{COARSE_MODEL}");
+    fs::write(folder.path().join("campaign.toml"), campaign).unwrap();
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(folder.path()).args(["run", "campaign.toml", "--cores", "1"]);
+    let running = Process::start(&mut command, "run");
+    until("it has a port", LONG, || running.port().is_some());
+    let address = format!("http://127.0.0.1:{}", running.port().unwrap());
+    let answer = worker(&["--coordinator", &address, "--give-up-after", "5"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.err);
+    assert!(answer.err.contains("no token was shown"), "{}", answer.err);
 }

@@ -12,6 +12,9 @@ use std::time::{Duration, Instant};
 use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase};
 use tracktwin_traces::{Step, Value};
 
+/// The longest wait for work, whatever a coordinator says: as long as one that was put aside waits.
+const WAIT_MAX: Duration = Duration::from_mins(10);
+
 /// One core's share of a worker.
 pub(crate) struct Core {
     pub(crate) session: Arc<Session>,

@@ -16,6 +16,7 @@ mod health;
 mod holdings;
 mod logging;
 mod outbox;
+mod port;
 mod session;
 mod simulate;
 
@@ -23,6 +24,7 @@ pub use counters::Counters;
 pub use credentials::{Credentials, CredentialsError, Token};
 pub use experiment::{Experiment, ExperimentError};
 pub use logging::{LogFormat, log_to_stderr};
+pub use port::Port;
 pub use simulate::{Prepare, Simulate, Simulation, prepare_simulation};
 pub use tracktwin_parameters::Case;
 pub use tracktwin_protocol::{Outcome, PassFeatures};

@@ -34,6 +34,7 @@ pub use campaign::CampaignRecord;
 pub use case::{CaseRecord, Status};
 pub use control::Retry;
 pub use data::{Answer, Cell, Column, ColumnKind, Finding, Table};
+pub use engine::without_password;
 pub use error::LibraryError;
 pub use lease::{Held, Lease, LeaseRequest, Leased};
 pub use library::{Claim, Library};

@@ -1,5 +1,6 @@
 //! `tracktwin campaign`: adds campaigns to a library and steers them, whoever serves it.
 
+use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, note, say};
@@ -24,7 +25,7 @@ pub(super) enum Action {
         #[arg(long, value_name = "N", allow_negative_numbers = true)]
         priority: Option<i32>,
         #[command(flatten)]
-        which: Which,
+        library: LibraryUrl,
     },
     /// Hand out no more of a campaign's cases; those in work are finished.
     Pause(Named),
@@ -56,16 +57,8 @@ pub(super) enum Action {
         /// The worker's name.
         worker: String,
         #[command(flatten)]
-        which: Which,
+        library: LibraryUrl,
     },
-}
-
-/// Which library is meant.
-#[derive(Args)]
-pub(super) struct Which {
-    /// The library: sqlite:PATH or `postgres://USER@HOST/DATABASE`.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
 }
 
 /// Which campaign is meant.
@@ -75,12 +68,14 @@ pub(super) struct Named {
     /// out where there is only one.
     campaign: Option<String>,
     #[command(flatten)]
-    which: Which,
+    library: LibraryUrl,
 }
 
 pub(super) async fn run(action: Action) -> Result<(), Stop> {
     match action {
-        Action::Add { file, cases, priority, which } => add(file, cases, priority, &which).await,
+        Action::Add { file, cases, priority, library } => {
+            add(file, cases, priority, &library).await
+        }
         Action::Pause(named) => {
             let (library, id) = named.open().await?;
             library.pause(&id).await?;
@@ -114,8 +109,8 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
             library.set_priority(&id, to).await?;
             done(library, &format!("{id} has priority {to}")).await
         }
-        Action::Pardon { worker, which } => {
-            let library = Library::open(&which.library).await.map_err(Stop::from_library)?;
+        Action::Pardon { worker, library } => {
+            let library = library.open().await?;
             library.pardon_worker(&worker).await.map_err(Stop::from_library)?;
             done(library, &format!("{worker} gets cases again")).await
         }
@@ -126,10 +121,10 @@ async fn add(
     file: PathBuf,
     cases: Option<u32>,
     priority: Option<i32>,
-    which: &Which,
+    url: &LibraryUrl,
 ) -> Result<(), Stop> {
     let campaign = Campaign::read(&file, cases).or_input()?;
-    let library = Library::open_or_create(&which.library).await.map_err(Stop::from_library)?;
+    let library = url.open_or_create().await?;
     let id = campaign.id();
     note_namesakes(&library, &campaign).await?;
     farm::introduce(&library, &campaign).await.map_err(Stop::from_farm)?;
@@ -188,7 +183,7 @@ async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
 
 impl Named {
     async fn open(self) -> Result<(Library, String), Stop> {
-        let library = Library::open(&self.which.library).await.map_err(Stop::from_library)?;
+        let library = self.library.open().await?;
         let all = library.campaigns().await?;
         let Some(named) = self.campaign.as_deref() else {
             let record = super::library::only(&library, &all, "name one").or_input()?;

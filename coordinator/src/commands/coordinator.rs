@@ -1,5 +1,6 @@
 //! `tracktwin coordinator`: serves campaigns to workers on other machines.
 
+use super::library_url::LibraryUrl;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop};
 use crate::campaign::Campaign;
@@ -12,7 +13,6 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::net::TcpListener;
-use tracktwin_library::Library;
 use tracktwin_traces::Export;
 use tracktwin_worker::Token;
 
@@ -39,9 +39,8 @@ pub(super) struct Arguments {
     /// How many cases, instead of the campaigns' own number.
     #[arg(long, value_name = "N", requires = "campaigns")]
     cases: Option<u32>,
-    /// Library to fill: sqlite:PATH or `postgres://USER@HOST/DATABASE`.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
     /// Address for workers, as IP:PORT.
     #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_LISTEN", default_value = "127.0.0.1:7700")]
     listen: SocketAddr,
@@ -87,7 +86,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let _traces = Export::from_environment("tracktwin-coordinator").or_input()?;
     let campaigns = arguments.campaigns.iter().map(|path| Campaign::read(path, arguments.cases));
     let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
-    let library = Library::open_or_create(&arguments.library).await.map_err(Stop::from_library)?;
+    let library = arguments.library.open_or_create().await?;
     for campaign in &campaigns {
         farm::prepare(&library, campaign).await.map_err(Stop::from_farm)?;
     }

@@ -10,7 +10,7 @@ use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use tracktwin_diagnosis::Verdict;
-use tracktwin_library::Library;
+use tracktwin_library::{Library, without_password};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     models: Option<PathBuf>,
     /// The library that keeps null simulations and diagnoses, made if it is not there:
     /// sqlite:PATH or postgres://...
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
     /// Folder for diagnosis.json and report.html.
     #[arg(long, value_name = "DIR")]

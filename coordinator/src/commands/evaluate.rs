@@ -1,5 +1,6 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
+use super::library_url::LibraryUrl;
 use super::{OrInput, Stop, note, say};
 use crate::evaluating::{Evaluator, EvaluatorError};
 use crate::provenance;
@@ -8,7 +9,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::chain;
 use tracktwin_evaluation::{Evaluation, check_track};
-use tracktwin_library::Library;
+use tracktwin_library::{Library, without_password};
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
 
@@ -20,9 +21,8 @@ pub(super) struct Arguments {
     /// Folder of the models, as `train` or `run` wrote it.
     #[arg(long, value_name = "DIR")]
     models: PathBuf,
-    /// The library the models were trained on: sqlite:PATH.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
     /// Folder for evaluation.json, evaluation.csv and report.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -38,7 +38,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
             "{folder}/recording.json: sleepers: is []; give their places, or import with --sleeper"
         )));
     }
-    let library = Library::open(&library).await.map_err(Stop::from_library)?;
+    let library = library.open().await?;
     let models = Trained::load(&models)
         .with_context(|| format!("{}: no models; `tracktwin train` makes them", models.display()))
         .or_input()?;

@@ -9,6 +9,7 @@ mod extend;
 mod import;
 mod inspect;
 mod library;
+mod library_url;
 mod progress;
 mod receptance;
 mod reproduce;
@@ -190,4 +191,20 @@ fn answer(text: &[u8]) -> bool {
 /// Says a line beside the answer on standard error, if anybody reads that.
 fn note(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_help_shows_what_the_environment_holds_of_a_library() {
+        fn check(command: &clap::Command) {
+            for argument in command.get_arguments().filter(|it| it.get_id() == "library") {
+                assert!(argument.is_hide_env_values_set(), "{}", command.get_name());
+            }
+            command.get_subcommands().for_each(check);
+        }
+        check(&Program::command());
+    }
 }

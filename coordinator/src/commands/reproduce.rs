@@ -1,6 +1,7 @@
 //! `tracktwin reproduce`: the paper's results beside this program's.
 
 use super::library::choose;
+use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::{OrInput, Stop, evaluate, say, train};
 use crate::evaluating::Evaluator;
@@ -39,9 +40,8 @@ pub(super) struct Arguments {
     /// Figures of the paper, `fig9` to `fig19` [default: all that are known].
     #[arg(value_name = "FIGURE")]
     figures: Vec<String>,
-    /// The library to compare with: sqlite:PATH.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
     /// Folder for reproduce.json and reproduce.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -58,7 +58,7 @@ const SEED: u64 = 0;
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let figures = figures(&arguments.figures).or_input()?;
-    let library = Library::open(&arguments.library).await.map_err(Stop::from_library)?;
+    let library = arguments.library.open().await?;
     let given = arguments.models.as_deref().map(Trained::load).transpose().or_input()?;
     let campaign = campaign(&library, arguments.campaign.as_deref(), given.as_ref()).await?;
     let experiment = Experiment::from_json(&campaign.experiment_json).or_input()?;

@@ -1,5 +1,6 @@
 //! `tracktwin status`: how far a farm is, once or all the time.
 
+use super::library_url::LibraryUrl;
 use super::{Stop, answer};
 use crate::dashboard::{Detail, farm};
 use clap::Args;
@@ -7,7 +8,6 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::IsTerminal;
 use std::time::Duration;
-use tracktwin_library::Library;
 use tracktwin_report::{Farm, FarmCampaign, FarmWorker, duration};
 
 /// Characters of a progress bar.
@@ -25,9 +25,8 @@ const CLEAR: &str = "\x1b[2J\x1b[H";
 /// What `status` is told.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// The library: sqlite:PATH or `postgres://USER@HOST/DATABASE`.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
     /// Look again and again, until Ctrl-C.
     #[arg(long, conflicts_with = "json")]
     watch: bool,
@@ -41,7 +40,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let library = Library::open(&arguments.library).await.map_err(Stop::from_library)?;
+    let library = arguments.library.open().await?;
     let terminal = std::io::stdout().is_terminal();
     loop {
         let farm = farm(&library, Detail::Counts).await?;

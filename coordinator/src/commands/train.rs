@@ -1,6 +1,7 @@
 //! `tracktwin train`: Gaussian-process models from a library.
 
 use super::library::choose;
+use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
 use crate::{provenance, training};
@@ -13,9 +14,8 @@ use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Trained};
 /// What `train` is told.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// The library to train on: sqlite:PATH.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
     /// Folder for the models.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -28,7 +28,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let library = Library::open(&arguments.library).await.map_err(Stop::from_library)?;
+    let library = arguments.library.open().await?;
     let campaign = choose(&library, arguments.campaign.as_deref()).await?;
     let trained = train(&library, &campaign, arguments.seed, &arguments.out).await?;
     say(&table(&trained));

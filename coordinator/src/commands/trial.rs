@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     out: PathBuf,
     /// The library that keeps answers and null simulations; by default one in DIR. Nodes that share
     /// it share the trial.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
     /// Diagnose every single effect once more with its kind left out of the catalogue: the answer
     /// should then be "unknown".

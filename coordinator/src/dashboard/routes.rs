@@ -3,7 +3,7 @@
 use super::metrics;
 use super::view::{Detail, farm};
 use crate::dispatch::Counts;
-use crate::service::Guard;
+use crate::service::{Guard, Security};
 use axum::extract::{Form, Path, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
@@ -17,6 +17,7 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tracktwin_library::{Library, LibraryError, Retry};
 use tracktwin_report::{farm_page, farm_view};
+use tracktwin_worker::Port;
 
 /// The cookie of those who have shown the token.
 const COOKIE: &str = "tracktwin";
@@ -35,25 +36,30 @@ struct Inner {
     guard: Guard,
     /// What the cookie must hold: a hash of the token, so that the token itself is not kept.
     key: Option<String>,
+    /// Whether whoever reaches the farm's ports may do what there is to do.
+    open: bool,
     /// Whether only this machine can reach the port.
     loopback: bool,
 }
 
 impl Dashboard {
-    /// Pages about a library; with a token, only who has shown it may press buttons.
-    pub fn new(library: Library, counts: Counts, token: Option<&str>, address: SocketAddr) -> Self {
+    /// Pages about a library. Only who has shown the token may press buttons; without one nobody, where
+    /// workers must show certificates, for no page can ask for those.
+    pub fn new(library: Library, counts: Counts, security: &Security, address: SocketAddr) -> Self {
+        let token = security.token.as_deref();
+        let open = token.is_none() && security.client_ca_pem.is_none();
         let key =
             |token: &str| blake3::derive_key("tracktwin dashboard 1", token.trim().as_bytes());
         let key = token.map(|token| blake3::Hash::from_bytes(key(token)).to_hex().to_string());
         let (guard, loopback) = (Guard::new(token), address.ip().is_loopback());
-        Self(Arc::new(Inner { library, counts, guard, key, loopback }))
+        Self(Arc::new(Inner { library, counts, guard, key, open, loopback }))
     }
 
     /// Whether the caller may press buttons: by the cookie, or by the token itself.
     ///
-    /// Without a token nobody else can reach the port, or the network was said to be trusted.
+    /// Where nothing is demanded, nobody else can reach the port, or the network was said to be trusted.
     fn admits(&self, headers: &HeaderMap) -> bool {
-        let Some(key) = &self.0.key else { return true };
+        let Some(key) = &self.0.key else { return self.0.open };
         let authorization = headers.get(header::AUTHORIZATION).map(HeaderValue::as_bytes);
         let cookies = headers.get_all(header::COOKIE).iter().filter_map(|it| it.to_str().ok());
         let mut cookies = cookies.flat_map(|it| it.split(';')).map(str::trim);
@@ -71,11 +77,12 @@ pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: Cancellati
         .route("/view", get(view))
         .route("/login", post(login))
         .route("/campaign/{action}", post(control))
-        .layer(middleware::from_fn_with_state(dashboard.clone(), same_origin))
         .route("/metrics", get(numbers))
         .route("/healthz", get(healthz))
+        .layer(middleware::from_fn_with_state(dashboard.clone(), same_origin))
         .with_state(dashboard);
-    let served = axum::serve(listener, routes).with_graceful_shutdown(stop.cancelled_owned());
+    let served =
+        axum::serve(Port::new(listener), routes).with_graceful_shutdown(stop.cancelled_owned());
     if let Err(error) = served.await {
         tracing::error!("the dashboard is no longer served: {error}");
     }

@@ -4,6 +4,7 @@ use super::watch::watch;
 use super::{Security, SecurityError, ServeError, serve};
 use crate::dashboard::{self, Dashboard};
 use crate::dispatch::{Counts, Dispatch, Settings};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tracktwin_library::{Library, LibraryError};
@@ -50,6 +51,7 @@ impl Coordinator {
     /// its database admits only one.
     pub async fn run(self, stop: CancellationToken) -> Result<(), CoordinatorError> {
         let address = self.listener.local_addr()?;
+        raise_descriptors();
         self.security.check(address)?;
         let _claim = self.library.claim()?;
         // Workers should not find that out one by one.
@@ -61,12 +63,8 @@ impl Coordinator {
         let dispatch = Dispatch::new(self.library.clone(), self.settings, counts.clone());
         if let Some(listener) = self.dashboard {
             let dashboard_address = listener.local_addr()?;
-            let dashboard = Dashboard::new(
-                self.library.clone(),
-                counts,
-                self.security.token.as_deref(),
-                dashboard_address,
-            );
+            let dashboard =
+                Dashboard::new(self.library.clone(), counts, &self.security, dashboard_address);
             tracing::info!(%dashboard_address, "the dashboard is at http://{dashboard_address}/");
             tokio::spawn(dashboard::serve(listener, dashboard, stop.clone()));
         }
@@ -77,5 +75,14 @@ impl Coordinator {
         watch.await.expect("watching does not panic");
         tracing::info!("coordinator ends");
         Ok(served?)
+    }
+}
+
+/// Lets this process have as many descriptors as it may: each connection takes one, and the usual bound is
+/// 1024.
+fn raise_descriptors() {
+    let Rlimit { maximum, .. } = getrlimit(Resource::Nofile);
+    if let Err(error) = setrlimit(Resource::Nofile, Rlimit { current: maximum, maximum }) {
+        tracing::warn!("the number of open files stays bounded as it is: {error}");
     }
 }

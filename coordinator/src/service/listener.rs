@@ -111,3 +111,49 @@ async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>) -> Result<Stream, Re
     }
     Ok(stream)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tokio::io::AsyncWriteExt;
+    use tokio_stream::StreamExt;
+
+    /// A port with a caller on it that has said `begin`.
+    async fn called(begin: &[u8]) -> (ReceiverStream<std::io::Result<Peer>>, TcpStream) {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let mut caller = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
+        caller.write_all(begin).await.unwrap();
+        (accept(listener, None), caller)
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_does_not_finish_its_greeting_is_not_waited_for() {
+        let (_peers, mut caller) = called(&PREFACE[..5]).await;
+        assert_eq!(caller.read(&mut [0; 8]).await.unwrap(), 0, "it is turned away");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_connection_lasts_if_a_call_of_it_was_admitted() {
+        for admitted in [false, true] {
+            let (mut peers, mut caller) = called(&[PREFACE, b"more"].concat()).await;
+            let mut peer = peers.next().await.unwrap().unwrap();
+            let mut begin = [0; PREFACE.len() + 4];
+            peer.read_exact(&mut begin).await.unwrap();
+            assert_eq!(begin, *[PREFACE, b"more"].concat());
+            if admitted {
+                tonic::transport::server::Connected::connect_info(&peer).admit();
+            }
+            let minute = tokio::time::sleep(Duration::from_mins(1));
+            let later = async {
+                minute.await;
+                caller.write_all(b"x").await.unwrap();
+                std::future::pending::<()>().await;
+            };
+            let mut one = [0; 1];
+            tokio::select! {
+                read = peer.read_exact(&mut one) => assert_eq!(read.is_ok(), admitted),
+                () = later => {}
+            }
+        }
+    }
+}

@@ -12,6 +12,7 @@ mod security;
 mod serve;
 mod watch;
 
+pub(crate) use certificates::random_token;
 pub use certificates::{CertificatesError, issue};
 pub use coordinator::{Coordinator, CoordinatorError};
 pub use guard::Guard;

@@ -7,7 +7,9 @@ use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 use tonic::Code;
 use tracktwin_protocol::farm::farm_client::FarmClient;
-use tracktwin_protocol::farm::{self as messages, LeaseRequest, ReportRequest, Verdict};
+use tracktwin_protocol::farm::{
+    self as messages, LeaseRequest, RegisterRequest, ReportRequest, Verdict,
+};
 use tracktwin_worker::MODEL_HASH;
 use tracktwin_worker::agent::{self, AgentError, Config};
 
@@ -127,6 +129,29 @@ async fn a_worker_that_is_not_registered_gets_and_gives_nothing() {
     assert_eq!(known.lease(stranger).await.unwrap_err().code(), Code::Unauthenticated);
     let refused = known.report(report(&leased, "stranger")).await.unwrap_err();
     assert_eq!(refused.code(), Code::Unauthenticated);
+}
+
+#[tokio::test]
+async fn what_no_worker_asks_is_refused_and_holds_up_nobody() {
+    let coordinator = coordinator().await;
+    let mut client = registered(&coordinator, "w").await;
+    let liar = RegisterRequest { cores: u32::MAX, ..registration("liar", MODEL_HASH) };
+    assert_eq!(client.register(liar).await.unwrap_err().code(), Code::InvalidArgument);
+    let nothing = LeaseRequest { worker: "w".to_owned(), cases_max: 0 };
+    assert_eq!(client.lease(nothing).await.unwrap_err().code(), Code::InvalidArgument);
+    let leased = lease(&mut client, "w").await;
+    assert_eq!(leased.cases.len(), 4);
+    for worker in ["a\0b".to_owned(), "w".repeat(100_000)] {
+        let renewal = messages::RenewRequest {
+            worker,
+            campaign_id: leased.campaign_id.clone(),
+            cases: Vec::new(),
+        };
+        assert_eq!(client.renew(renewal).await.unwrap_err().code(), Code::InvalidArgument);
+    }
+    let mut long = report(&leased, "w");
+    long.cases[0].duration_s = 1e308;
+    assert_eq!(client.report(long).await.unwrap_err().code(), Code::InvalidArgument);
 }
 
 #[tokio::test]

@@ -1,7 +1,7 @@
 //! Anybody's SQL, which only reads.
 
 use super::{Cell, decode, question, schema};
-use crate::engine::{Row, Target};
+use crate::engine::{Dialect, Row, Target};
 use crate::{Library, LibraryError};
 use sqlx::postgres::PgConnectOptions;
 use sqlx::sqlite::SqliteConnectOptions;
@@ -45,7 +45,7 @@ impl Library {
 }
 
 async fn sqlite<A: Answer>(path: &Path, text: &str, answer: &mut A) -> Result<(), A::Error> {
-    question::check(text)?;
+    question::check(text, Dialect::Sqlite)?;
     // Opened for reading, so that no pragma can undo it.
     let options = SqliteConnectOptions::new().filename(path).read_only(true);
     let options = options.pragma("query_only", "on");
@@ -67,6 +67,7 @@ async fn postgres<A: Answer>(
     text: &str,
     answer: &mut A,
 ) -> Result<(), A::Error> {
+    question::check(text, Dialect::Postgres)?;
     let mut connection: PgConnection = options.connect().await.map_err(LibraryError::from)?;
     // The protocol takes one statement at a time, so this transaction is all that it can end.
     connection.execute("begin transaction read only").await.map_err(LibraryError::from)?;

@@ -1,26 +1,38 @@
 //! Whether a text is one statement that asks.
 //!
-//! A file that is opened for reading can't be changed, whatever the statement; but `vacuum into` writes
-//! another file, and `SQLite` runs statements one after the other where several are given.
+//! A file that is opened for reading can't be changed, nor can a database in a transaction that reads,
+//! whatever the statement. But `vacuum into` and `copy` write other files, and `SQLite` runs statements one
+//! after the other where several are given.
 
 use crate::LibraryError;
+use crate::engine::Dialect;
 
 /// Words that statements begin with that only ask.
-const ASKING: [&str; 5] = ["select", "with", "values", "explain", "pragma"];
+const ASKING: [&str; 4] = ["select", "with", "values", "explain"];
+
+/// More of them.
+const ASKING_SQLITE: [&str; 1] = ["pragma"];
+const ASKING_POSTGRES: [&str; 2] = ["show", "table"];
 
 /// Refuses what is not a single asking statement.
-pub(super) fn check(text: &str) -> Result<(), LibraryError> {
-    let bare = bare(text);
+pub(super) fn check(text: &str, dialect: Dialect) -> Result<(), LibraryError> {
+    let bare = bare(text, dialect);
     let bare = bare.trim().trim_end_matches(';').trim();
     let refused = |reason: &str| LibraryError::BadQuery { reason: reason.to_owned() };
-    if bare.contains(';') {
+    // PostgreSQL takes one only, and has texts between dollars that are not understood here.
+    if bare.contains(';') && matches!(dialect, Dialect::Sqlite) {
         return Err(refused("one statement at a time"));
     }
+    let bare = bare.trim_start_matches(|it: char| it == '(' || it.is_whitespace());
     if bare.is_empty() {
         return Err(refused("there is no statement"));
     }
     let word: String = bare.chars().take_while(char::is_ascii_alphabetic).collect();
-    if ASKING.contains(&word.to_lowercase().as_str()) {
+    let more: &[&str] = match dialect {
+        Dialect::Sqlite => &ASKING_SQLITE,
+        Dialect::Postgres => &ASKING_POSTGRES,
+    };
+    if ASKING.iter().chain(more).any(|asking| asking.eq_ignore_ascii_case(&word)) {
         Ok(())
     } else {
         Err(LibraryError::OnlyReads)
@@ -28,30 +40,46 @@ pub(super) fn check(text: &str) -> Result<(), LibraryError> {
 }
 
 /// The text without what stands in quotes and in remarks.
-fn bare(text: &str) -> String {
+fn bare(text: &str, dialect: Dialect) -> String {
     let mut bare = String::new();
     let mut rest = text;
     while let Some(first) = rest.chars().next() {
-        let inside = &rest[first.len_utf8()..];
-        let end = match first {
+        let (begin, end) = match first {
             // A doubled quote is one text's end and the next one's begin: the same to us.
-            '\'' => Some("'"),
-            '"' => Some("\""),
-            '`' => Some("`"),
-            '[' => Some("]"),
-            '-' if rest.starts_with("--") => Some("\n"),
-            '/' if rest.starts_with("/*") => Some("*/"),
-            _ => None,
+            '\'' => ("'", "'"),
+            '"' => ("\"", "\""),
+            '`' => ("`", "`"),
+            '[' => ("[", "]"),
+            '-' if rest.starts_with("--") => ("--", "\n"),
+            '/' if rest.starts_with("/*") => {
+                rest = after_remark(rest, dialect);
+                bare.push(' ');
+                continue;
+            }
+            _ => {
+                bare.push(first);
+                rest = &rest[first.len_utf8()..];
+                continue;
+            }
         };
-        if let Some(end) = end {
-            rest = inside.split_once(end).map_or("", |(_, after)| after);
-            bare.push(' ');
-        } else {
-            rest = inside;
-            bare.push(first);
-        }
+        rest = rest[begin.len()..].split_once(end).map_or("", |(_, after)| after);
+        bare.push(' ');
     }
     bare
+}
+
+/// What follows the remark that a text begins with; PostgreSQL's may hold others.
+fn after_remark(text: &str, dialect: Dialect) -> &str {
+    let mut rest = &text[2..];
+    let mut depth = 1;
+    while depth > 0 {
+        let Some(end) = rest.find("*/") else { return "" };
+        match rest.find("/*").filter(|begin| *begin < end && matches!(dialect, Dialect::Postgres)) {
+            Some(begin) => (rest, depth) = (&rest[begin + 2..], depth + 1),
+            None => (rest, depth) = (&rest[end + 2..], depth - 1),
+        }
+    }
+    rest
 }
 
 #[cfg(test)]
@@ -65,9 +93,14 @@ mod tests {
             " SELECT ';' as \"a;b\" ;\n",
             "-- why; not\nwith a as (select 1) select * from a /* ; */",
             "values (1), ('it''s; fine')",
+            "(select 1) union (select 2)",
         ] {
-            assert!(check(text).is_ok(), "{text}");
+            for dialect in [Dialect::Sqlite, Dialect::Postgres] {
+                assert!(check(text, dialect).is_ok(), "{text}");
+            }
         }
+        assert!(check("select $$;$$", Dialect::Postgres).is_ok());
+        assert!(check("show search_path", Dialect::Postgres).is_ok());
     }
 
     #[test]
@@ -76,11 +109,23 @@ mod tests {
             "",
             "-- nothing",
             "vacuum into 'x'",
+            "copy (select 1) to program 'id'",
             "/* select */ vacuum",
+            "/*/ select ' */ pragma query_only=off; vacuum into 'x' -- '",
+        ] {
+            for dialect in [Dialect::Sqlite, Dialect::Postgres] {
+                assert!(check(text, dialect).is_err(), "{text}");
+            }
+        }
+        for text in [
             "select 1; vacuum into 'x'",
             "select ''';'; vacuum",
+            "/*/ select /*/ vacuum into 'x'",
+            "/* /* */ vacuum /* select */",
         ] {
-            assert!(check(text).is_err(), "{text}");
+            assert!(check(text, Dialect::Sqlite).is_err(), "{text}");
         }
+        let nested = "/* /* */ select */ copy campaign to '/tmp/x'";
+        assert!(check(nested, Dialect::Postgres).is_err());
     }
 }

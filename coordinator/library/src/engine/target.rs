@@ -97,7 +97,10 @@ mod tests {
     fn no_message_shows_a_password() {
         let name = Target::parse("postgres://me:sec@ret@host:1/db?password=secret").unwrap().name();
         assert_eq!(name, "postgres://me@host:1/db");
-        assert_eq!(without_password("--library=postgres://me:x@host/db"), "--library=postgres://me@host/db");
+        assert_eq!(
+            without_password("--library=postgres://me:x@host/db"),
+            "--library=postgres://me@host/db"
+        );
         for same in ["postgres://host/db", "sqlite:a@b.sqlite", "sqlite://a:b@c?d", "--library"] {
             assert_eq!(without_password(same), same);
         }

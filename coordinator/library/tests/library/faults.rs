@@ -132,8 +132,7 @@ async fn nothing_is_written_to_a_file_that_was_moved_away() {
     const CASES: u32 = 4;
     let folder = tempfile::tempdir().unwrap();
     let [path, aside] = ["library.sqlite", "aside.sqlite"].map(|name| folder.path().join(name));
-    let library =
-        Library::open_or_create(&format!("sqlite:{}", path.display())).await.unwrap();
+    let library = Library::open_or_create(&format!("sqlite:{}", path.display())).await.unwrap();
     fill(&library, CAMPAIGN, CASES).await;
     let leased = lease(&library, "w", CASES, library.now_unix_ms()).await;
     let results = || crate::support::message("w", leased.iter().map(finished).collect());

@@ -101,7 +101,7 @@ async fn a_server_that_is_not_there_or_lets_nobody_in_is_told_apart() {
     assert!(matches!(error, LibraryError::Unreachable { .. }), "{error:?}");
     assert_eq!(
         error.to_string(),
-        "library postgres://127.0.0.1:1/tracks: the server cannot be reached"
+        "library postgres://me@127.0.0.1:1/tracks: the server cannot be reached"
     );
     let Some(home) = Home::postgres() else { return };
     let elsewhere = format!("{}_that_is_not_there", home.url);

@@ -1,6 +1,6 @@
 //! `tracktwin library copy`: a library into another, of either kind.
 
-use super::{OrInput, Stop, open_library};
+use super::{OrInput, Stop};
 use crate::commands::progress::Progress;
 use crate::commands::say;
 use anyhow::anyhow;
@@ -30,7 +30,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     if arguments.from == arguments.to {
         return Err(anyhow!("--from and --to are the same library")).or_input();
     }
-    let from = open_library(&arguments.from).await?;
+    let from = Library::open(&arguments.from).await.map_err(Stop::from_library)?;
     let to = Library::open_or_create(&arguments.to).await.map_err(Stop::from_library)?;
     let mut total = 0;
     for table in Table::ALL {

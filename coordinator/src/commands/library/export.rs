@@ -2,7 +2,8 @@
 
 use super::files::csv_file::CsvFile;
 use super::files::parquet_file::ParquetFile;
-use super::{OrInput, Stop, open_library};
+use super::{OrInput, Stop};
+use crate::commands::library_url::LibraryUrl;
 use crate::commands::say;
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
@@ -21,9 +22,8 @@ const ROWS_A_GROUP: usize = 8192;
     python3 -c \"import pandas; print(pandas.read_parquet('training.parquet'))\""
 )]
 pub(in crate::commands) struct Arguments {
-    /// The library: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
     /// A folder for all tables, or a file for the training set.
     #[arg(long, value_name = "DIR|FILE")]
     out: PathBuf,
@@ -56,7 +56,7 @@ impl Format {
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let out = &arguments.out;
-    let library = open_library(&arguments.library).await?;
+    let library = arguments.library.open().await?;
     let named = Format::of(out).filter(|_| !out.is_dir());
     let format = arguments.format.or(named).unwrap_or(Format::Parquet);
     if named.is_some() {

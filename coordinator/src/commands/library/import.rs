@@ -2,6 +2,7 @@
 
 use super::files::parquet_file;
 use super::{OrInput, Stop};
+use crate::commands::library_url::LibraryUrl;
 use crate::commands::say;
 use anyhow::anyhow;
 use clap::Args;
@@ -13,10 +14,8 @@ use tracktwin_library::{Cell, Library, LibraryError, Table};
 pub(in crate::commands) struct Arguments {
     /// The folder that `library export --format parquet` wrote.
     folder: PathBuf,
-    /// The library, made where there is none: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`. What it
-    /// holds stays as it is.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
 }
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
@@ -31,7 +30,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
         ))
         .or_input();
     }
-    let library = Library::open_or_create(&arguments.library).await.map_err(Stop::from_library)?;
+    let library = arguments.library.open_or_create().await?;
     for table in Table::ALL {
         let (read, added) = import(&library, table, &file(table)).await?;
         say(&format!("{}: {added} of {read} rows added", table.name));

@@ -10,6 +10,7 @@ mod status;
 mod verify;
 
 use super::{OrInput, Stop, note, say};
+use crate::commands::library_url::LibraryUrl;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use tracktwin_library::{CampaignRecord, Library};
@@ -37,9 +38,8 @@ pub(super) enum Question {
 /// Which library is asked, and how it answers.
 #[derive(Args)]
 pub(super) struct Which {
-    /// The library: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -57,15 +57,10 @@ pub(super) async fn run(question: Question) -> Result<(), Stop> {
     }
 }
 
-async fn open(url: &str) -> Result<(Library, Vec<CampaignRecord>), Stop> {
-    let library = open_library(url).await?;
+async fn open(url: &LibraryUrl) -> Result<(Library, Vec<CampaignRecord>), Stop> {
+    let library = url.open().await?;
     let campaigns = library.campaigns().await?;
     Ok((library, campaigns))
-}
-
-/// A library that is there.
-async fn open_library(url: &str) -> Result<Library, Stop> {
-    Library::open(url).await.map_err(Stop::from_library)
 }
 
 /// One campaign of a library: the named one, or the only one.

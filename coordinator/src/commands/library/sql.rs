@@ -1,7 +1,8 @@
 //! `tracktwin library sql`: the library asked in SQL.
 
 use super::files::text;
-use super::{OrInput, Stop, open_library};
+use super::{OrInput, Stop};
+use crate::commands::library_url::LibraryUrl;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use std::io::{self, BufWriter, StdoutLock, Write};
@@ -18,9 +19,8 @@ use tracktwin_library::{Answer, Cell, LibraryError};
 pub(in crate::commands) struct Arguments {
     /// The statement.
     statement: String,
-    /// The library: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
-    library: String,
+    #[command(flatten)]
+    library: LibraryUrl,
     /// How the answer is written.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -37,7 +37,7 @@ enum Format {
 }
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
-    let library = open_library(&arguments.library).await?;
+    let library = arguments.library.open().await?;
     let mut printer = Printer {
         out: BufWriter::new(io::stdout().lock()),
         format: arguments.format,

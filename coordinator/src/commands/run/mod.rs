@@ -25,7 +25,7 @@ pub(super) struct Arguments {
     cases: Option<u32>,
     /// Library to fill: sqlite:PATH; one that holds part of the campaign is gone on with
     /// [default: sqlite:OUT/library.sqlite].
-    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY")]
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
     /// Folder for models and report.
     #[arg(long, value_name = "DIR", default_value = "out")]
