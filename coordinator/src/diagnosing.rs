@@ -3,7 +3,7 @@
 //! Owns the order of the stages; what each does is the diagnosis crate's, where null simulations
 //! are kept the library's.
 
-use crate::null_campaign;
+use crate::null_models;
 use anyhow::Context;
 use tracktwin_diagnosis::{
     Candidate, Diagnosis, Evidence, FirstLook, Search, Stage, Subject, SubjectError,
@@ -91,9 +91,9 @@ pub async fn diagnose(
     let start = first_calibration(&subject).context("no baseline fits")?;
     subject.forward.allow_beyond(&start).context("no baseline fits")?;
     watch("null model", 0.0);
-    let surfaces = f64::from(null_campaign::SURFACES);
+    let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
-    let null = null_campaign::of(&subject, &start, library, share).await?;
+    let null = null_models::of(&subject, &start, library, share).await?;
     let mut all = tracktwin_diagnosis::candidates(&subject.forward.section);
     all.extend(suggested);
     all.retain(|candidate: &Candidate| allowed(candidate.kind.physics));

@@ -9,7 +9,7 @@
 //! - [`training`]: from a library to a training set.
 //! - [`diagnosing`]: from a recording to its diagnosis, stage by stage.
 //! - [`evaluating`]: from models and their library to what evaluates recordings.
-//! - [`null_campaign`]: simulations of a track with nothing left out, kept in the library.
+//! - [`null_models`]: simulations of a track with nothing left out, kept in the library.
 //! - [`reproducing`]: from a library and models to the paper's figures.
 //! - [`provenance`]: what a library keeps of trainings, evaluations and diagnoses.
 //! - [`commands`]: what `tracktwin` can be told to do; load, compute, store, report.
@@ -23,7 +23,7 @@ pub mod diagnosing;
 pub mod dispatch;
 pub mod evaluating;
 pub mod farm;
-pub mod null_campaign;
+pub mod null_models;
 pub mod provenance;
 pub mod reproducing;
 pub mod service;

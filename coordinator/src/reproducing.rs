@@ -248,10 +248,8 @@ impl<'a> Section<'a> {
 }
 
 fn recorded(record: time::PassRecord, speed_km_h: f64) -> Result<Pass, ReproducingError> {
-    let step_m = record.speed_m_s * record.time_step_s;
-    let position_m = (1..=record.acceleration_m_s2.len())
-        .map(|index| record.start_m + index as f64 * step_m)
-        .collect();
+    let position_m =
+        (0..record.acceleration_m_s2.len()).map(|index| record.position_m(index)).collect();
     let signal = Signal::new(1.0 / record.time_step_s, record.acceleration_m_s2)?;
     Ok(Pass { file: format!("{speed_km_h} km/h"), speed_km_h, signal, position_m })
 }

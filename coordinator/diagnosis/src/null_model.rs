@@ -56,9 +56,21 @@ pub struct NullModel {
 }
 
 impl NullModel {
-    /// How it is simulated, for the names under which results are kept.
-    pub const SIMULATION: &'static str =
-        "8 spans beyond, 4 elements a span, 8 a half sleeper, 10 us";
+    /// What says how it is simulated and predicted, for the names under which results are kept: others
+    /// where a change of the program may make other numbers of the same track.
+    pub const SOURCES: [&str; 11] = [
+        include_str!("null_model.rs"),
+        include_str!("spectra.rs"),
+        include_str!("bands.rs"),
+        include_str!("section.rs"),
+        include_str!("transfer.rs"),
+        include_str!("profile.rs"),
+        include_str!("baseline.rs"),
+        include_str!("forward/mod.rs"),
+        include_str!("forward/beyond.rs"),
+        include_str!("forward/derivatives.rs"),
+        include_str!("forward/supports.rs"),
+    ];
 
     /// Simulates passes over `surfaces` random surfaces with the values of `values`, levels apart,
     /// which are all the mean one.

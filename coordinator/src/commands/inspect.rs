@@ -6,6 +6,7 @@ use clap::Args;
 use std::path::PathBuf;
 use tracktwin_diagnosis::{FirstLook, Place, first_look, tells_waves};
 use tracktwin_report::{Inspected, InspectedCurve, Inspection, inspection_page};
+use tracktwin_signal::SAMPLES_A_PERIOD;
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_signal::{PowerSpectrum, Signal};
 
@@ -14,7 +15,7 @@ const LINES_HZ: f64 = 20.0;
 /// Points of a drawn curve.
 const POINTS: usize = 400;
 /// Samples per second that the features up to 4 kHz need.
-const FEATURES_HZ: f64 = 20_000.0;
+const FEATURES_HZ: f64 = SAMPLES_A_PERIOD * 4000.0;
 
 /// What `inspect` is told.
 #[derive(Args)]
@@ -176,7 +177,7 @@ fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
     if rate < FEATURES_HZ {
         uses.push(format!(
             "sampled at {rate} Hz it says nothing above {:.0} Hz; features up to 4000 Hz need {FEATURES_HZ:.0} Hz",
-            0.4 * rate
+            rate / SAMPLES_A_PERIOD
         ));
     }
     if !tells_waves(&recording.passes) {

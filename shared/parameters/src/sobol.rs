@@ -31,7 +31,7 @@ pub enum SobolError {
         index: u32,
     },
     /// More dimensions than the sequence has.
-    #[error("{dimensions} axes are more than a Sobol sequence has here (256)")]
+    #[error("{dimensions} axes are more than a Sobol sequence has here ({DIMENSIONS_MAX})")]
     TooManyDimensions {
         /// The dimensions asked for.
         dimensions: usize,

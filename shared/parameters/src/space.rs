@@ -14,6 +14,16 @@ pub enum Scale {
     Logarithmic,
 }
 
+impl Scale {
+    /// The value of a range, from lowest to highest, at `x` from 0 to 1.
+    pub fn at(self, [low, high]: [f64; 2], x: f64) -> f64 {
+        match self {
+            Self::Linear => low + x * (high - low),
+            Self::Logarithmic => low * (high / low).powf(x),
+        }
+    }
+}
+
 /// One varied parameter and its range, in the parameter's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -101,11 +111,7 @@ impl ParameterSpace {
     pub fn values(&self, point: &[f64], fixed: &ParameterSet) -> ParameterSet {
         assert_eq!(point.len(), self.axes.len(), "a coordinate an axis");
         self.axes.iter().zip(point).fold(*fixed, |set, (axis, &x)| {
-            let value = match axis.scale {
-                Scale::Linear => axis.low + x * (axis.high - axis.low),
-                Scale::Logarithmic => axis.low * (axis.high / axis.low).powf(x),
-            };
-            set.with(axis.parameter, value)
+            set.with(axis.parameter, axis.scale.at([axis.low, axis.high], x))
         })
     }
 }

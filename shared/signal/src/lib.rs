@@ -14,8 +14,8 @@ mod wavelet;
 mod welch;
 
 pub use features::{
-    DefinitionError, Extractor, FeatureDefinition, FeatureError, FeatureSet, Features, ThirdOctave,
-    TimeFrequencyMap,
+    DefinitionError, Extractor, FeatureDefinition, FeatureError, FeatureSet, Features,
+    SAMPLES_A_PERIOD, ThirdOctave, TimeFrequencyMap,
 };
 pub use signal::{Signal, SignalError};
 pub use squeeze::{Conventions, Normalisation, squeeze};

@@ -74,10 +74,10 @@ fn after_remark(text: &str, dialect: Dialect) -> &str {
     let mut depth = 1;
     while depth > 0 {
         let Some(end) = rest.find("*/") else { return "" };
-        match rest.find("/*").filter(|begin| *begin < end && matches!(dialect, Dialect::Postgres)) {
-            Some(begin) => (rest, depth) = (&rest[begin + 2..], depth + 1),
-            None => (rest, depth) = (&rest[end + 2..], depth - 1),
-        }
+        let nested =
+            rest.find("/*").filter(|begin| *begin < end && matches!(dialect, Dialect::Postgres));
+        depth = if nested.is_some() { depth + 1 } else { depth - 1 };
+        rest = &rest[nested.unwrap_or(end) + 2..];
     }
     rest
 }

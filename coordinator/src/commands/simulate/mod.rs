@@ -50,10 +50,10 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Track::VTrack)]
     preset: Track,
     /// Passes at each speed.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     passes: u32,
     /// Share of the surface's power that differs from pass to pass, 0 to 1.
-    #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE", value_parser = share)]
     unrepeated: f64,
     #[command(flatten)]
     sensor: Sensor,
@@ -202,4 +202,10 @@ fn pass_seed(seed: u64, speed_km_h: f64, pass: u32) -> u64 {
     hasher.update(&pass.to_le_bytes());
     let hash = hasher.finalize();
     u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
+}
+
+/// A number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    let share: f64 = text.parse().map_err(|_| "write a number from 0 to 1".to_owned())?;
+    if (0.0..=1.0).contains(&share) { Ok(share) } else { Err("it goes from 0 to 1".to_owned()) }
 }

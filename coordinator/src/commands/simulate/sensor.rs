@@ -59,9 +59,8 @@ impl Sensor {
         from_m: f64,
         seed: u64,
     ) -> Result<Pass, Stop> {
-        let step_m = record.speed_m_s * record.time_step_s;
         let count = record.acceleration_m_s2.len();
-        let position = |index: usize| record.start_m + (index + 1) as f64 * step_m;
+        let position = |index: usize| record.position_m(index);
         let first = (0..count).find(|&index| position(index) >= from_m).unwrap_or(count);
         let mut measured = Measured {
             time_step_s: record.time_step_s,

@@ -16,7 +16,7 @@ use std::{
 
 /// Sample rate that the highest frequency needs, in units of it: two by Nyquist, and room for the
 /// upper half of the highest band and an anti-aliasing filter.
-const SAMPLES_A_PERIOD: f64 = 2.5;
+pub const SAMPLES_A_PERIOD: f64 = 2.5;
 
 /// Relative difference below which two frequencies are the same point of the grid.
 const GRID_ROUNDING: f64 = 1e-9;

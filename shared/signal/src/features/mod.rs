@@ -15,6 +15,6 @@ mod stretch;
 
 pub use band::ThirdOctave;
 pub use definition::{DefinitionError, FeatureDefinition};
-pub use extractor::{Extractor, FeatureError, Features};
+pub use extractor::{Extractor, FeatureError, Features, SAMPLES_A_PERIOD};
 pub use map::TimeFrequencyMap;
 pub use set::FeatureSet;

@@ -217,7 +217,8 @@ impl Inputs<'_> {
         let (x_m, sleepers) = (self.instance.x_m, self.instance.sleepers.as_deref());
         let on_track = |[from, to]: [f64; 2]| 0.0 <= from && from <= to && to <= self.length_m();
         let standing = |numbers: &[usize]| {
-            !numbers.is_empty() && numbers.iter().all(|&number| number < self.sleeper_count())
+            let ascending = numbers.is_sorted_by(|one, next| one < next);
+            ascending && numbers.last().is_some_and(|&last| last < self.sleeper_count())
         };
         let fits = match self.kind.place {
             PlaceKind::Nowhere => x_m.is_none() && sleepers.is_none(),

@@ -84,7 +84,7 @@ impl PlaceKind {
             Self::Nowhere => "no place",
             Self::Point => "a point of the rail, x_m = [x, x]",
             Self::Stretch => "a stretch of the rail, x_m = [from, to], or none for all of it",
-            Self::Sleepers => "sleepers = [numbers], or none for all of them",
+            Self::Sleepers => "sleepers = [numbers, ascending], or none for all of them",
         }
     }
 }

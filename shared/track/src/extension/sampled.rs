@@ -58,10 +58,22 @@ impl SampledValue {
     fn at(self, share: f64) -> f64 {
         match self {
             Self::Fixed(value) => value,
-            Self::Between([low, high]) | Self::Scaled { low, high, scale: Scale::Linear } => {
-                low + share * (high - low)
+            Self::Between(range) => Scale::Linear.at(range, share),
+            Self::Scaled { low, high, scale } => scale.at([low, high], share),
+        }
+    }
+
+    /// What can't be drawn from: a range whose end lies before its begin, or a logarithm of what is not
+    /// positive.
+    fn fault(self) -> Option<(f64, &'static str)> {
+        match self {
+            Self::Between([low, high]) | Self::Scaled { low, high, .. } if low > high => {
+                Some((high, "at least `low`"))
             }
-            Self::Scaled { low, high, scale: Scale::Logarithmic } => low * (high / low).powf(share),
+            Self::Scaled { low, scale: Scale::Logarithmic, .. } if low <= 0.0 => {
+                Some((low, "positive on a logarithmic scale"))
+            }
+            _ => None,
         }
     }
 }
@@ -89,6 +101,16 @@ impl SampledExtension {
                 value: self.share,
                 form: "from 0 to 1",
             });
+        }
+        for (name, value) in &self.parameters {
+            if let Some((value, form)) = value.fault() {
+                return Err(InstanceError::Value {
+                    physics: self.physics.clone(),
+                    parameter: name.clone(),
+                    value,
+                    form,
+                });
+            }
         }
         let built = |end: f64| -> Result<Arc<dyn Extension>, InstanceError> {
             self.instance(&mut || end).build(design, spans)
@@ -151,5 +173,19 @@ mod tests {
         negative.parameters.insert("gap_m".to_owned(), SampledValue::Between([-1e-5, 1e-4]));
         let refusal = negative.check(&design, 12).unwrap_err().to_string();
         assert!(refusal.contains("gap_m is -0.00001"), "{refusal}");
+        // Both ends can be built; what lies between is no number, or is drawn from the wrong end.
+        for (low, high) in [(-3.0, 3.0), (3.0, 1.0)] {
+            let slope = SampledValue::Scaled { low, high, scale: Scale::Logarithmic };
+            let mut rough = voids(0.5);
+            rough.physics = "roughness_spectrum".to_owned();
+            rough.sleepers = None;
+            rough.parameters = BTreeMap::from([("slope_dB_per_octave".to_owned(), slope)]);
+            let refusal = rough.check(&design, 12).unwrap_err().to_string();
+            assert!(refusal.contains("slope_dB_per_octave is"), "{refusal}");
+        }
+        let mut twice = voids(0.5);
+        twice.sleepers = Some(vec![5, 5]);
+        let refusal = twice.check(&design, 12).unwrap_err().to_string();
+        assert!(refusal.contains("ascending"), "{refusal}");
     }
 }

@@ -71,14 +71,18 @@ impl SupportVariation {
     /// Factors of mean one and coefficient of variation `cv`, one a sleeper.
     fn factors(&self, random: &mut impl Rng, cv: f64) -> Vec<f64> {
         let variance = (1.0 + cv * cv).ln();
-        let fresh = (1.0 - self.correlation * self.correlation).sqrt();
         let mut value = standard_normal(random);
-        let mut next = || {
-            let factor = (variance.sqrt() * value - 0.5 * variance).exp();
-            value = self.correlation * value + fresh * standard_normal(random);
-            factor
+        let mut last = self.sleepers.first().copied().unwrap_or_default();
+        let mut next = |sleeper: usize| {
+            if sleeper > last {
+                let correlation = self.correlation.powf((sleeper - last) as f64);
+                let fresh = (1.0 - correlation * correlation).sqrt();
+                value = correlation * value + fresh * standard_normal(random);
+                last = sleeper;
+            }
+            (variance.sqrt() * value - 0.5 * variance).exp()
         };
-        self.sleepers.iter().map(|_| next()).collect()
+        self.sleepers.iter().map(|&sleeper| next(sleeper)).collect()
     }
 }
 
@@ -95,8 +99,11 @@ mod tests {
     use crate::extension::testing::{assert_felt_alike_in_both_solvers, instance};
 
     fn draw(cv: f64, correlation: f64, count: usize) -> Vec<f64> {
+        draw_at(cv, correlation, (0..count).collect())
+    }
+
+    fn draw_at(cv: f64, correlation: f64, sleepers: Vec<usize>) -> Vec<f64> {
         let (ballast_cv, railpad_cv, seed) = (cv, cv, 7);
-        let sleepers = (0..count).collect();
         let variation = SupportVariation { sleepers, ballast_cv, railpad_cv, correlation, seed };
         variation.factors(&mut ChaCha8Rng::seed_from_u64(seed), cv)
     }
@@ -114,6 +121,15 @@ mod tests {
         assert!((cv - 0.2).abs() < 0.01, "{cv}");
         // The logarithm makes 0.7 into 0.695.
         assert!((shared / (mean * cv).powi(2) - 0.7).abs() < 0.03);
+    }
+
+    #[test]
+    fn sleepers_far_apart_have_nothing_in_common() {
+        let every_tenth = draw_at(0.2, 0.7, (0..20_000).map(|number| 10 * number).collect());
+        let shared: f64 =
+            every_tenth.windows(2).map(|pair| (pair[0] - 1.0) * (pair[1] - 1.0)).sum();
+        // 0.7^10 is 0.03; 0.007 is one standard error.
+        assert!((shared / 20_000.0 / 0.04).abs() < 0.06, "{shared}");
     }
 
     #[test]

@@ -37,6 +37,13 @@ pub struct PassRecord {
     pub contact_force_n: Vec<f64>,
 }
 
+impl PassRecord {
+    /// Where the wheel was at sample `index`, in m.
+    pub fn position_m(&self, index: usize) -> f64 {
+        self.start_m + index as f64 * self.speed_m_s * self.time_step_s
+    }
+}
+
 /// Why a pass has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PassError {

@@ -12,9 +12,13 @@ pub(super) fn read(path: &Path) -> Result<Vec<Column>, RecordingError> {
         |reason: String| RecordingError::new(path, "file", Fault::Unreadable { reason });
     let first = first_line(path).map_err(|error| unreadable(error.to_string()))?;
     let delimiter = delimiter(&first);
-    let named = first.split(char::from(delimiter)).all(|field| number(field, delimiter).is_none());
+    // Blanks separate however many there are.
+    let counts = |field: &&str| delimiter != b' ' || !field.is_empty();
+    let begin: Vec<&str> = first.split(char::from(delimiter)).filter(counts).collect();
+    let named = begin.iter().all(|field| number(field, delimiter).is_none());
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter)
+        .flexible(delimiter == b' ')
         .has_headers(named)
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
@@ -24,15 +28,18 @@ pub(super) fn read(path: &Path) -> Result<Vec<Column>, RecordingError> {
         let names = reader.headers().map_err(|error| unreadable(error.to_string()))?;
         // Some programs begin a file with a byte order mark.
         let name = |text: &str| text.trim_start_matches('\u{feff}').to_owned();
-        names.iter().map(|text| Column { name: name(text), ..Column::default() }).collect()
+        names
+            .iter()
+            .filter(counts)
+            .map(|text| Column { name: name(text), ..Column::default() })
+            .collect()
     } else {
-        let count = first.split(char::from(delimiter)).count();
         let name = |index| format!("column-{}", index + 1);
-        (0..count).map(|index| Column { name: name(index), ..Column::default() }).collect()
+        (0..begin.len()).map(|index| Column { name: name(index), ..Column::default() }).collect()
     };
     let mut record = csv::StringRecord::new();
     while reader.read_record(&mut record).map_err(|error| unreadable(error.to_string()))? {
-        for (column, text) in columns.iter_mut().zip(&record) {
+        for (column, text) in columns.iter_mut().zip(record.iter().filter(counts)) {
             let value = number(text, delimiter);
             if value.is_none() && column.oddity.is_none() {
                 column.oddity = Some((column.values.len() + 1, text.to_owned()));

@@ -67,7 +67,7 @@ fn numbers<R: Read>(array: NpyFile<R>, name: &str) -> Result<Vec<f64>, Error> {
         let text = format!("{name} has fields; save each as an array of its own");
         return Err(Error::new(ErrorKind::Unsupported, text));
     };
-    // `<f8`, `|i1` ...: kind and size are the last characters.
+    // `<f8`, `>i2` ...: kind and size are the last characters.
     let text = text.to_string();
     match text.trim_start_matches(['<', '>', '|', '=']) {
         "f8" => array.into_vec(),

@@ -107,9 +107,14 @@ fn text_tables_read_alike_whatever_separates_their_fields() {
         let path = csv(folder.path(), head, separator, comma);
         assert_eq!(samples(&path, &layout()), expected(), "{separator:?}");
     }
-    let path = csv(folder.path(), "", " ", false);
-    let unnamed = Layout { acceleration: vec!["column-2".to_owned()], ..layout() };
-    assert_eq!(samples(&path, &unnamed), expected());
+    for blanks in [" ", "    "] {
+        let path = csv(folder.path(), "", blanks, false);
+        let unnamed = Layout { acceleration: vec!["column-2".to_owned()], ..layout() };
+        assert_eq!(samples(&path, &unnamed), expected());
+    }
+    // Columns that are aligned by blanks.
+    let path = csv(folder.path(), "t      acc\n", "   ", false);
+    assert_eq!(samples(&path, &layout()), expected());
 }
 
 #[test]
