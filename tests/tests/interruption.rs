@@ -5,7 +5,7 @@
 
 use std::process::{Command, Stdio};
 use std::time::Duration;
-use system_tests::{COARSE_MODEL, run};
+use system_tests::{COARSE_MODEL, Process, run, until};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
@@ -61,4 +61,37 @@ fn ten_kills_at_random_moments_leave_the_digest_of_an_undisturbed_run() {
     let answer = run(PROGRAM, &arguments(&campaign, &disturbed, &out));
     assert_eq!(answer.code, Some(0), "{}", answer.err);
     assert_eq!(digest(&disturbed), digest(&undisturbed));
+}
+
+#[test]
+fn a_signal_stops_the_simulation_in_order_and_the_training_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let campaign = path("campaign.toml");
+    let text = format!("name = \"stop\"\ncases = {CASES}\n{COARSE_MODEL}");
+    std::fs::write(&campaign, text).unwrap();
+    let library = format!("sqlite:{}", path("library.sqlite"));
+    let out = path("out");
+    let arguments = ["run", &campaign, "--library", &library, "--out", &out];
+    let stopped_at = |cases: u32| {
+        let mut run = Process::start(Command::new(PROGRAM).args(arguments), "run");
+        until("so many cases are done", Duration::from_secs(60), || finished(&library) >= cases);
+        if cases == CASES {
+            // Until the farm has wound up; training takes longer than this.
+            std::thread::sleep(Duration::from_secs(1));
+        }
+        run.signal("INT");
+        run.ended(Duration::from_secs(10)).code()
+    };
+    assert_eq!(stopped_at(1), Some(3));
+    let left = CASES - finished(&library);
+    assert!((1..CASES).contains(&left), "{left} left");
+    // A slow machine may still have been winding up; then nothing is left of that the next time.
+    assert!((0..3).any(|_| stopped_at(CASES) == Some(130)));
+    assert!(!folder.path().join("out/models/models.html").exists());
+
+    let answer = run(PROGRAM, &arguments);
+    assert_eq!(answer.code, Some(0), "{}", answer.err);
+    assert!(answer.err.contains("sample recording"), "{}", answer.err);
+    assert!(answer.out.starts_with("models: "), "{}", answer.out);
 }

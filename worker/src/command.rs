@@ -178,17 +178,22 @@ fn serve(config: Config, health: Option<SocketAddr>) -> anyhow::Result<()> {
     served
 }
 
-/// Cancels `shutdown` on the first Ctrl-C or SIGTERM.
+/// Cancels `shutdown` on the first Ctrl-C or SIGTERM; the second ends the process at once.
 fn stop_on_signals(shutdown: CancellationToken) -> anyhow::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     tokio::spawn(async move {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
+        loop {
+            let kind = tokio::select! {
+                _ = terminate.recv() => SignalKind::terminate(),
+                _ = interrupt.recv() => SignalKind::interrupt(),
+            };
+            if shutdown.is_cancelled() {
+                std::process::exit(128 + kind.as_raw_value());
+            }
+            tracing::info!("stopping: what has begun is finished, the rest given back");
+            shutdown.cancel();
         }
-        tracing::info!("stopping: what has begun is finished, the rest given back");
-        shutdown.cancel();
     });
     Ok(())
 }

@@ -4,6 +4,7 @@
 //! selector, and the files that say the outcome. Leaves to others what a window and a feature is
 //! (signal), what a model predicts (surrogate) and how it looks on a page (report).
 
+mod check;
 mod error;
 mod estimate;
 mod evaluation;
@@ -11,9 +12,9 @@ mod files;
 mod matches;
 #[cfg(test)]
 mod testing;
-mod track;
 mod windows;
 
+pub use check::check_recording;
 pub use error::Error;
 pub use estimate::{METHOD_FEATURE, Twin, evaluate};
 pub use evaluation::{
@@ -21,5 +22,4 @@ pub use evaluation::{
     SleeperEvaluation, Unevaluated,
 };
 pub use matches::MATCHES;
-pub use track::check_track;
 pub use windows::{SleeperFeatures, SpeedFeatures, features};

@@ -59,7 +59,12 @@ pub fn features(
         .collect()
 }
 
-fn speed_index(recording: &Recording, speed_km_h: f64, known: &[f64]) -> Result<usize, Error> {
+/// Place among the `known` speeds of the one that a pass of the recording has.
+pub(crate) fn speed_index(
+    recording: &Recording,
+    speed_km_h: f64,
+    known: &[f64],
+) -> Result<usize, Error> {
     known.iter().position(|speed| (speed_km_h / speed - 1.0).abs() <= SPEED_TOLERANCE).ok_or_else(
         || Error::UnknownSpeed {
             recording: recording.name.clone(),

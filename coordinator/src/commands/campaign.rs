@@ -160,6 +160,7 @@ async fn note_namesakes(library: &Library, campaign: &Campaign) -> Result<(), St
 /// Adds cases with progress; says how far it came where that is not to the end.
 async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
     let shutdown = stop_on_signal("stopping")?;
+    let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
     let (mut stored, total) = (0, campaign.cases);
     let mut progress = None::<Progress>;
     let added = farm::add_cases(library, campaign, |now| {

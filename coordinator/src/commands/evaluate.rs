@@ -8,7 +8,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::chain;
-use tracktwin_evaluation::{Evaluation, check_track};
+use tracktwin_evaluation::{Evaluation, check_recording};
 use tracktwin_library::{Library, without_password};
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
@@ -56,8 +56,8 @@ pub(super) async fn evaluate(
     folder: &Path,
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
-    check_track(recording, evaluator.design()).or_input()?;
     let (recording, notes) = usable(recording)?;
+    check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
     evaluation.notes = notes;
     std::fs::create_dir_all(folder)

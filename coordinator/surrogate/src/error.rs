@@ -24,7 +24,7 @@ pub enum Error {
         entry: usize,
     },
     /// Too few entries to fit and to validate.
-    #[error("{found} library entries are too few to train on; at least {least} are needed")]
+    #[error("{found} cases are too few to train on; at least {least} are needed")]
     TooFewEntries {
         /// Entries there are.
         found: usize,

@@ -64,13 +64,11 @@ impl MeanFunction {
 ///
 /// The entries must be in random order: the first ones judge the scalings. A scaling is learned
 /// from other entries than those that judge it, because a likelihood of the entries it was made of
-/// would flatter the ones that learn most.
+/// would flatter the ones that learn most. Scalings whose mean would use up more than half of the
+/// `subset`'s degrees of freedom are left out.
 ///
 /// # Errors
-/// Those of [`InputMap::fit`] and [`Factor::new`].
-///
-/// # Panics
-/// When there is no scaling to choose from.
+/// Those of [`InputMap::fit`] and [`Factor::new`]; [`Error::TooFewEntries`] when no scaling is left.
 pub fn fit(
     features: MatRef<'_, f64>,
     targets: MatRef<'_, f64>,
@@ -102,6 +100,7 @@ fn choose(
     let judges = (features.subrows(0, subset), targets.subrows(0, subset));
     let makers = (features.subrows(subset, rest), targets.subrows(subset, rest));
     let mut best: Option<(f64, InputScaling, Vec<Rung>)> = None;
+    let mut least = usize::MAX;
     for &scaling in scalings {
         let map = InputMap::fit(scaling, makers.0, makers.1)?;
         // Twice the judges: enough to tell scalings apart, and an eighth of the cost of four times.
@@ -110,6 +109,11 @@ fn choose(
         let mean = MeanFunction::around(scaling);
         let climbers = inputs.subrows(0, subset);
         let search = Search::new(climbers, mean, makers.1.subrows(0, subset));
+        let needed = 2 * search.basis.ncols();
+        if needed > subset {
+            least = least.min(3 * needed);
+            continue;
+        }
         let mut tried = Tried::default();
         tried.climb(&[START], COARSE, &mut |rung| search.log_likelihoods(rung))?;
         let at: Vec<_> = tried.shared().into_iter().map(|rung| search.ladder.at(rung)).collect();
@@ -120,8 +124,8 @@ fn choose(
             best = Some((error, scaling, tried.best()));
         }
     }
-    let (_, scaling, rungs) = best.expect("there is a scaling to choose from");
-    Ok((scaling, rungs))
+    let too_few = Error::TooFewEntries { found: features.nrows(), least };
+    best.map(|(_, scaling, rungs)| (scaling, rungs)).ok_or(too_few)
 }
 
 /// Sum over the targets of the logarithm of their mean absolute error, when processes of the

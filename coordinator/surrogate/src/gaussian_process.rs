@@ -44,12 +44,16 @@ impl Factor {
     /// `basis` (n x q; q may be 0: a mean of zero).
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when inputs coincide without noise, or the basis is singular.
+    /// [`Error::NotPositiveDefinite`] when inputs coincide without noise, or the basis is singular,
+    /// [`Error::TooFewEntries`] when the mean alone passes through all of them.
     pub fn new(
         distances: MatRef<'_, f64>,
         basis: MatRef<'_, f64>,
         at: Hyperparameters,
     ) -> Result<Self, Error> {
+        if basis.nrows() <= basis.ncols() {
+            return Err(Error::TooFewEntries { found: basis.nrows(), least: basis.ncols() + 1 });
+        }
         let cholesky = Cholesky::new(covariance(distances, at))?;
         let solved_basis = cholesky.solve(basis);
         let information = Cholesky::new(basis.transpose() * &solved_basis)?;

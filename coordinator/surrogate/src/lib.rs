@@ -36,6 +36,6 @@ pub use kernel::{Hyperparameters, correlation};
 pub use selector::{Neighbour, Selection, Selector, mape};
 pub use spread::Spread;
 pub use store::{FORMAT, Trained};
-pub use train::{Progress, TrainOptions, train};
+pub use train::{ENTRIES_MIN, Progress, TrainOptions, train};
 pub use training_set::{Split, TrainingSet};
 pub use validate::{Folds, coverage, folds, mase};

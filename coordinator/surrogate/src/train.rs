@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 /// Standard deviations on either side that hold 90 % of a normal distribution.
 const WIDTH_90: f64 = 1.644_853_626_951_472_7;
 /// Fewest entries worth training on: a hundred to find hyper-parameters, a hundred to test.
-const ENTRIES_MIN: usize = 200;
+pub const ENTRIES_MIN: usize = 200;
 
 /// What to train, and how.
 #[derive(Clone, Debug)]

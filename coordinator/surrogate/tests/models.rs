@@ -5,7 +5,8 @@
 use std::sync::OnceLock;
 use tracktwin_parameters::Parameter;
 use tracktwin_surrogate::{
-    Error, FeatureColumns, InputScaling, ModelGroup, TrainOptions, Trained, TrainingSet, train,
+    ENTRIES_MIN, Error, FeatureColumns, InputScaling, ModelGroup, TrainOptions, Trained,
+    TrainingSet, train,
 };
 
 const ENTRIES: usize = 1600;
@@ -187,4 +188,21 @@ fn the_same_seed_gives_the_same_models() {
     for (a, b) in a.groups().iter().zip(b.groups()) {
         assert_eq!(a.models(), b.models());
     }
+}
+
+#[test]
+fn as_few_entries_as_are_allowed_can_be_trained_on() {
+    let few = |entries: usize| {
+        let mut set = spectra();
+        set.parameters.truncate(2 * entries);
+        set.log_power.iter_mut().for_each(|table| table.truncate(BINS * entries));
+        train(&set, &TrainOptions { subset: 1000, ..options() }, &|_| ())
+    };
+    for group in few(ENTRIES_MIN).unwrap().groups() {
+        for model in group.models() {
+            assert!(model.score.mase_test < 0.6, "{:?}: {:?}", group.key(), model.score);
+        }
+    }
+    let refusal = few(ENTRIES_MIN - 1).err().unwrap();
+    assert!(matches!(refusal, Error::TooFewEntries { found: 199, least: 200 }), "{refusal}");
 }

@@ -11,9 +11,10 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use tracktwin_evaluation::check_track;
+use tracktwin_evaluation::check_recording;
 use tracktwin_library::{Library, Status};
 use tracktwin_signal::recording::Recording;
+use tracktwin_surrogate::ENTRIES_MIN;
 
 /// What `run` is told.
 #[derive(Args)]
@@ -23,8 +24,8 @@ pub(super) struct Arguments {
     /// How many cases, instead of the campaign's own number.
     #[arg(long, value_name = "N")]
     cases: Option<u32>,
-    /// Library to fill: sqlite:PATH; one that holds part of the campaign is gone on with
-    /// [default: sqlite:OUT/library.sqlite].
+    /// Library to fill: sqlite:PATH or postgres://USER@HOST/DATABASE; one that holds part of the
+    /// campaign is gone on with [default: sqlite:OUT/library.sqlite].
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
     /// Folder for models and report.
@@ -56,9 +57,15 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     .or_input()?;
     // A recording that can't be used should not be found out after the simulation.
     let given = arguments.recording.as_ref().map(Recording::open).transpose().or_input()?;
-    let design = &campaign.definition.experiment.design;
     if let Some(recording) = &given {
-        check_track(recording, design).or_input()?;
+        check(recording, &campaign).or_input()?;
+    }
+    if !arguments.no_train && (campaign.cases as usize) < ENTRIES_MIN {
+        return Err(Stop::Input(anyhow!(
+            "{} cases are too few to train on: `--cases {ENTRIES_MIN}` or more, or `--no-train` to \
+             simulate only",
+            campaign.cases
+        )));
     }
     let out = &arguments.out;
     std::fs::create_dir_all(out)
@@ -66,32 +73,44 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         .or_input()?;
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
     let library = Library::open_or_create(&url).await.map_err(Stop::from_library)?;
-    simulate(&library, &campaign, arguments.cores.unwrap_or_else(all_cores)).await?;
-    if arguments.no_train {
-        let name = library.name();
-        library.close().await;
-        say(&format!("library: {name}"));
-        return Ok(());
-    }
+    let said = chain(&library, &campaign, given, &arguments).await;
+    // What the library holds is then in one file, fit to be copied.
+    library.close().await;
+    say(&said?);
+    Ok(())
+}
 
+/// Simulates, trains and evaluates; says what was made of it.
+async fn chain(
+    library: &Library,
+    campaign: &Campaign,
+    recording: Option<Recording>,
+    arguments: &Arguments,
+) -> Result<String, Stop> {
+    simulate(library, campaign, arguments.cores.unwrap_or_else(all_cores)).await?;
+    if arguments.no_train {
+        return Ok(format!("library: {}", library.name()));
+    }
+    let out = &arguments.out;
     let record = library.campaign(&campaign.id()).await?;
-    let models = train::train(&library, &record, 0, &out.join("models")).await?;
-    let recording = match given {
+    let models = train::train(library, &record, 0, &out.join("models")).await?;
+    let recording = match recording {
         Some(recording) => recording,
         None => sample::open(&out.join("sample"))?,
     };
-    if let Err(other) = check_track(&recording, design) {
-        library.close().await;
-        note(&format!("the sample recording is of another track: {other}"));
+    if let Err(other) = check(&recording, campaign) {
+        note(&format!("the sample recording is of another kind: {other}"));
         let models = out.join("models");
-        say(&format!("models: {}; `tracktwin evaluate` takes a recording", models.display()));
-        return Ok(());
+        return Ok(format!("models: {}; `tracktwin evaluate` takes a recording", models.display()));
     }
-    evaluate::evaluate(&recording, &library, models, out).await?;
-    // What the library holds is then in one file, fit to be copied.
-    library.close().await;
-    say(&format!("report: {}", out.join("report.html").display()));
-    Ok(())
+    evaluate::evaluate(&recording, library, models, out).await?;
+    Ok(format!("report: {}", out.join("report.html").display()))
+}
+
+/// Whether models of the campaign can evaluate the recording.
+fn check(recording: &Recording, campaign: &Campaign) -> Result<(), tracktwin_evaluation::Error> {
+    let experiment = &campaign.definition.experiment;
+    check_recording(recording, &experiment.design, &experiment.speeds_km_h)
 }
 
 fn default_library(out: &Path) -> String {
@@ -107,6 +126,8 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
     farm::prepare(library, campaign).await.map_err(Stop::from_farm)?;
     let id = campaign.id();
     let shutdown = stop_on_signal("stopping: cases that are begun go back to the library")?;
+    let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
+    let stopped = shutdown.clone();
     let mut progress = None::<Progress>;
     let task = Task::new(&id, campaign.cases, cores);
     let status = farm::embedded(library, task, shutdown, |status: Status| {
@@ -121,7 +142,7 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
     .await
     .map_err(Stop::from_farm)?;
     progress.into_iter().for_each(Progress::end);
-    if status.done() < status.total() {
+    if stopped.is_cancelled() || status.done() < status.total() {
         let left = status.total() - status.done();
         return Err(anyhow!("interrupted with {left} cases left; the same command goes on").into());
     }

@@ -1,20 +1,26 @@
-//! Whether a recording is of the track that the models know.
+//! Whether a recording is of the track and the speeds that the models know.
 
 use crate::Error;
+use crate::windows::speed_index;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 
 /// Relative difference up to which two tracks are alike.
 const ALIKE: f64 = 0.02;
 
-/// Compares what a recording says of its track, vehicle and sensor with the models' design.
+/// Compares what a recording says of its track, vehicle, sensor and speeds with what the models
+/// were trained on.
 ///
 /// What `recording.json` doesn't say is not compared.
 ///
 /// # Errors
-/// [`Error::GainUnknown`], or [`Error::OtherTrack`] with the first quantity that differs by more
-/// than 2 %.
-pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Error> {
+/// [`Error::GainUnknown`], [`Error::UnknownSpeed`] with the first pass at a speed that is none of
+/// `speeds_km_h`, or [`Error::OtherTrack`] with the first quantity that differs by more than 2 %.
+pub fn check_recording(
+    recording: &Recording,
+    design: &TrackDesign,
+    speeds_km_h: &[f64],
+) -> Result<(), Error> {
     if !recording.gain_known() {
         return Err(Error::GainUnknown);
     }
@@ -40,6 +46,9 @@ pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Er
         };
         return Err(Error::OtherTrack { quantity, found, known, unit });
     }
+    for pass in &recording.passes {
+        speed_index(recording, pass.speed_km_h, speeds_km_h)?;
+    }
     Ok(())
 }
 
@@ -52,13 +61,22 @@ mod tests {
     fn refusal(change: impl Fn(&mut Recording)) -> String {
         let mut recording = testing::recording(3.0, &[10.0]);
         change(&mut recording);
-        check_track(&recording, &TrackDesign::v_track()).unwrap_err().to_string()
+        check_recording(&recording, &TrackDesign::v_track(), &[10.0]).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_speed_that_no_model_knows_is_refused() {
+        let recording = testing::recording(3.0, &[10.1, 13.0]);
+        let check = |speeds: &[f64]| check_recording(&recording, &TrackDesign::v_track(), speeds);
+        check(&[10.0, 13.0]).unwrap();
+        let refusal = check(&[7.0, 10.0]).unwrap_err().to_string();
+        assert!(refusal.contains("passes at 13 km/h; the models know 7, 10 km/h"), "{refusal}");
     }
 
     #[test]
     fn another_track_vehicle_or_gain_is_refused_and_what_is_not_said_is_not() {
         let same = testing::recording(3.0, &[10.0]);
-        assert!(check_track(&same, &TrackDesign::v_track()).is_ok());
+        check_recording(&same, &TrackDesign::v_track(), &[10.0]).unwrap();
         let text = refusal(|recording| recording.spacing_m = 0.6);
         assert!(text.starts_with("nominal.sleeper.spacing_m is 0.6 m, the models are of 0.125 m"));
         let text = refusal(|recording| recording.sleepers.iter_mut().for_each(|s| s.x_m *= 1.12));
