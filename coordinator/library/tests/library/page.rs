@@ -2,12 +2,12 @@
 
 use crate::data::{Kept, copy};
 use crate::provenance::{diagnosis, evaluation, training};
-use crate::support::{Home, features, on_both_databases, policy};
+use crate::support::{Home, case, features, finished, message, on_both_databases, request};
 use crate::upgrade::{CAMPAIGN, released};
 use sqlx::{Connection, PgConnection};
 use tracktwin_library::{
-    CaseReport, DiagnosisRecord, EvaluationRecord, LeaseRequest, Library, LibraryError,
-    Registration, Report, TrainingRecord,
+    CampaignRecord, CaseReport, Cell, DiagnosisRecord, EvaluationRecord, LeaseRequest, Leased,
+    Library, LibraryError, Registration, Report, TrainingRecord,
 };
 use tracktwin_signal::Features;
 
@@ -26,7 +26,7 @@ async fn library(home: &Home) -> Library {
     let old = Library::open(&file.url).await.unwrap();
     let library = Library::open_or_create(&home.url).await.unwrap();
     copy(&old, &library).await;
-    work(&library).await;
+    work(&library, CAMPAIGN).await;
     let campaign = || CAMPAIGN.to_owned();
     library.record_training(TrainingRecord { campaign: campaign(), ..training() }).await.unwrap();
     let evaluation = EvaluationRecord { campaign: campaign(), ..evaluation() };
@@ -36,8 +36,34 @@ async fn library(home: &Home) -> Library {
     library
 }
 
-/// Finishes the case that waits.
-async fn work(library: &Library) {
+/// What the page's queries answer.
+async fn answers(library: &Library) -> Vec<Vec<Vec<Cell>>> {
+    let mut answers = Vec::new();
+    for query in blocks("sql") {
+        let mut answer = Kept::default();
+        let asked = library.query(query, &mut answer).await;
+        asked.unwrap_or_else(|error| panic!("{query}: {error}"));
+        answers.push(answer.rows);
+    }
+    answers
+}
+
+/// Adds a campaign like the first, with results, models, and an evaluation of the same recording.
+async fn another_campaign(library: &Library) {
+    let campaign = || "another-000000000000".to_owned();
+    let record = CampaignRecord { id: campaign(), ..library.campaign(CAMPAIGN).await.unwrap() };
+    library.insert_campaign(&record).await.unwrap();
+    library.insert_cases(&campaign(), &(0..4).map(case).collect::<Vec<_>>()).await.unwrap();
+    work(library, &campaign()).await;
+    let mut training = TrainingRecord { campaign: campaign(), ..training() };
+    training.surrogates[0].mase_test = 0.01;
+    library.record_training(training).await.unwrap();
+    let evaluation = EvaluationRecord { campaign: campaign(), ..evaluation() };
+    library.record_evaluation(evaluation).await.unwrap();
+}
+
+/// Finishes the cases of a campaign that wait.
+async fn work(library: &Library, campaign: &str) {
     let now_unix_ms = library.now_unix_ms();
     let registration = Registration {
         worker: "w".to_owned(),
@@ -47,38 +73,24 @@ async fn work(library: &Library) {
         now_unix_ms,
     };
     library.register_worker(registration).await.unwrap();
-    let request = LeaseRequest {
-        campaign: None,
-        indices_below: u32::MAX,
-        worker: "w".to_owned(),
-        cases_max: 1,
-        now_unix_ms,
-        lease_ms: 1000,
-        after_loss: policy,
-        alone_after: u32::MAX,
-    };
+    let request =
+        LeaseRequest { campaign: Some(campaign.to_owned()), ..request("w", 9, now_unix_ms) };
     let lease = library.lease(request).await.unwrap().unwrap();
-    let campaign = library.campaign(CAMPAIGN).await.unwrap();
-    let pass = |pass: Features| Features { log_power: vec![pass.log_power[0]; 303], ..pass };
-    let leased = &lease.cases[0];
-    let case = CaseReport {
-        index: leased.case.index,
-        epoch: leased.epoch,
-        parameter_hash: leased.case.parameter_hash(),
-        duration_s: 0.02,
-        outcome: Ok(features(leased.case.index).into_iter().map(pass).collect()),
+    let record = library.campaign(campaign).await.unwrap();
+    // As many bins as the experiment has, no two alike.
+    let bins = |first: f64| (0..303).map(|bin| first + f64::from(bin) / 303.0).collect();
+    let pass = |pass: Features| Features { log_power: bins(pass.log_power[0]), ..pass };
+    let done = |leased: &Leased| {
+        let passes = features(leased.case.index).into_iter().map(pass).collect();
+        CaseReport { duration_s: 0.02, outcome: Ok(passes), ..finished(leased) }
     };
     let report = Report {
-        campaign: CAMPAIGN.to_owned(),
-        worker: "w".to_owned(),
-        code_version: "0.1.0".to_owned(),
-        model_hash: "m".to_owned(),
-        experiment_hash: campaign.experiment_hash,
-        speeds_km_h: campaign.speeds_km_h,
-        cases: vec![case],
+        campaign: campaign.to_owned(),
+        experiment_hash: record.experiment_hash,
+        speeds_km_h: record.speeds_km_h,
         now_unix_ms,
-        after_failure: policy,
         audit_share: 1.0,
+        ..message("w", lease.cases.iter().map(done).collect())
     };
     library.report(report).await.unwrap();
 }
@@ -86,14 +98,13 @@ async fn work(library: &Library) {
 on_both_databases! {
     async fn every_query_of_the_page_has_an_answer(home: &Home) {
         let library = library(home).await;
-        let queries = blocks("sql");
-        assert_eq!(queries.len(), 12);
-        for query in queries {
-            let mut answer = Kept::default();
-            library.query(query, &mut answer).await.unwrap_or_else(|error| {
-                panic!("{query}: {error}")
-            });
-            assert!(!answer.rows.is_empty(), "{query}");
+        let alone = answers(&library).await;
+        assert_eq!(alone.len(), 12);
+        another_campaign(&library).await;
+        for (query, (before, after)) in blocks("sql").iter().zip(alone.iter().zip(answers(&library).await)) {
+            assert!(!before.is_empty(), "{query}");
+            // What it says of one campaign does not change with the other.
+            assert!(before.iter().all(|row| after.contains(row)), "{query}: {before:?} {after:?}");
         }
     }
 
