@@ -75,7 +75,7 @@ fn a_signal_stops_the_simulation_in_order_and_the_training_at_once() {
     let arguments = ["run", &campaign, "--library", &library, "--out", &out];
     let stopped_at = |cases: u32| {
         let mut run = Process::start(Command::new(PROGRAM).args(arguments), "run");
-        until("so many cases are done", Duration::from_secs(60), || finished(&library) >= cases);
+        until("so many cases are done", Duration::from_mins(1), || finished(&library) >= cases);
         if cases == CASES {
             // Until the farm has wound up; training takes longer than this.
             std::thread::sleep(Duration::from_secs(1));

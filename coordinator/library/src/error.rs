@@ -23,6 +23,14 @@ pub enum LibraryError {
         /// What is wrong with it.
         reason: String,
     },
+    /// There is a folder at this path.
+    #[error(
+        "library {library}: this is a folder; name a file, such as sqlite:{library}/library.sqlite"
+    )]
+    Folder {
+        /// The library.
+        library: String,
+    },
     /// There is nothing at this path.
     #[error(
         "library {library}: there is no such file; `tracktwin run --library sqlite:{library}` makes \
@@ -129,7 +137,10 @@ pub enum LibraryError {
         what: String,
     },
     /// A statement that would write, where only reading is done.
-    #[error("`library sql` only reads; this statement would write")]
+    #[error(
+        "`library sql` only asks: one statement that begins with select, with, values or explain, \
+         and writes nothing"
+    )]
     OnlyReads,
     /// Whoever asks may not write.
     #[error("the library can only be read from here: {reason}")]
@@ -208,6 +219,7 @@ impl LibraryError {
                 | Self::OtherTruth { .. }
                 | Self::SeedTooLarge { .. }
                 | Self::OnlyReads
+                | Self::Folder { .. }
                 | Self::NotWritable { .. }
                 | Self::BadQuery { .. }
                 | Self::BadRow { .. }

@@ -1,5 +1,6 @@
 //! `tracktwin campaign`: adds campaigns to a library and steers them, whoever serves it.
 
+use super::library::choose;
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
@@ -111,7 +112,7 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
         }
         Action::Pardon { worker, library } => {
             let library = library.open().await?;
-            library.pardon_worker(&worker).await.map_err(Stop::from_library)?;
+            library.pardon_worker(&worker).await?;
             done(library, &format!("{worker} gets cases again")).await
         }
     }
@@ -127,7 +128,7 @@ async fn add(
     let library = url.open_or_create().await?;
     let id = campaign.id();
     note_namesakes(&library, &campaign).await?;
-    farm::introduce(&library, &campaign).await.map_err(Stop::from_farm)?;
+    farm::introduce(&library, &campaign).await?;
     // Before there is anything to hand out.
     if let Some(priority) = priority {
         library.set_priority(&id, priority).await?;
@@ -185,27 +186,8 @@ async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
 impl Named {
     async fn open(self) -> Result<(Library, String), Stop> {
         let library = self.library.open().await?;
-        let all = library.campaigns().await?;
-        let Some(named) = self.campaign.as_deref() else {
-            let record = super::library::only(&library, &all, "name one").or_input()?;
-            return Ok((library, record.id.clone()));
-        };
-        let meant: Vec<&str> = all
-            .iter()
-            .filter(|it| it.id == named || it.name == named)
-            .map(|it| it.id.as_str())
-            .collect();
-        let ids = |ids: &[&str]| ids.join(", ");
-        match meant[..] {
-            [id] => Ok((library, id.to_owned())),
-            [] if all.is_empty() => Err(anyhow!("the library holds no campaign yet")).or_input(),
-            [] => {
-                let all: Vec<&str> = all.iter().map(|it| it.id.as_str()).collect();
-                Err(anyhow!("the library has no campaign {named}; it has {}", ids(&all))).or_input()
-            }
-            _ => Err(anyhow!("several campaigns are called {named}; give the id: {}", ids(&meant)))
-                .or_input(),
-        }
+        let campaign = choose(&library, self.campaign.as_deref(), "name one").await?;
+        Ok((library, campaign.id))
     }
 }
 

@@ -88,7 +88,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
     let library = arguments.library.open_or_create().await?;
     for campaign in &campaigns {
-        farm::prepare(&library, campaign).await.map_err(Stop::from_farm)?;
+        farm::prepare(&library, campaign).await?;
     }
     let coordinator = Coordinator {
         library: library.clone(),

@@ -56,10 +56,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let recording = Recording::open(&recording).or_input()?;
     let library = match library {
         // Models belong to a library that is there already.
-        Some(url) if models.is_some() => {
-            Some(Library::open(&url).await.map_err(Stop::from_library)?)
-        }
-        Some(url) => Some(Library::open_or_create(&url).await.map_err(Stop::from_library)?),
+        Some(url) if models.is_some() => Some(Library::open(&url).await?),
+        Some(url) => Some(Library::open_or_create(&url).await?),
         None => None,
     };
     let design = design(models, library.as_ref()).await?;

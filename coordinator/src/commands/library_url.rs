@@ -22,11 +22,11 @@ pub(super) struct LibraryUrl {
 impl LibraryUrl {
     /// The library, which is there.
     pub(super) async fn open(&self) -> Result<Library, Stop> {
-        Library::open(&self.url).await.map_err(Stop::from_library)
+        Ok(Library::open(&self.url).await?)
     }
 
     /// The library, made where there is none.
     pub(super) async fn open_or_create(&self) -> Result<Library, Stop> {
-        Library::open_or_create(&self.url).await.map_err(Stop::from_library)
+        Ok(Library::open_or_create(&self.url).await?)
     }
 }

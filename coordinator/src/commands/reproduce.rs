@@ -1,6 +1,6 @@
 //! `tracktwin reproduce`: the paper's results beside this program's.
 
-use super::library::choose;
+use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::{OrInput, Stop, evaluate, say, train};
@@ -48,8 +48,8 @@ pub(super) struct Arguments {
     /// Folder of models trained on this library [default: train them into OUT/models].
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// The campaign, where the library holds several.
-    #[arg(long, value_name = "ID")]
+    /// The campaign by its id or name, where the library holds several.
+    #[arg(long, value_name = "CAMPAIGN")]
     campaign: Option<String>,
 }
 
@@ -97,7 +97,7 @@ async fn campaign(
     id: Option<&str>,
     models: Option<&Trained>,
 ) -> Result<CampaignRecord, Stop> {
-    let campaign = choose(library, id.or(models.map(Trained::campaign))).await?;
+    let campaign = choose(library, id.or(models.map(Trained::campaign)), MEND).await?;
     match models {
         Some(models) if models.campaign() != campaign.id => {
             let (of, id) = (models.campaign(), &campaign.id);

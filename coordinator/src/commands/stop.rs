@@ -14,23 +14,18 @@ pub(super) enum Stop {
     Failure(anyhow::Error),
 }
 
+/// A library that says so was given something wrong; all else is a failure.
 impl<E: Into<anyhow::Error>> From<E> for Stop {
     fn from(error: E) -> Self {
-        Self::Failure(error.into())
-    }
-}
-
-impl Stop {
-    /// Wrong input or a failure, as the library says.
-    pub(super) fn from_library(error: LibraryError) -> Self {
-        if error.is_wrong_input() { Self::Input(error.into()) } else { Self::Failure(error.into()) }
-    }
-
-    /// As [`Stop::from_library`], of what fails in a farm.
-    pub(super) fn from_farm(error: FarmError) -> Self {
-        match error {
-            FarmError::Library(error) => Self::from_library(error),
-            other => Self::Failure(other.into()),
+        let error = error.into();
+        let library = match error.downcast_ref::<FarmError>() {
+            Some(FarmError::Library(library)) => Some(library),
+            _ => error.downcast_ref::<LibraryError>(),
+        };
+        if library.is_some_and(LibraryError::is_wrong_input) {
+            Self::Input(error)
+        } else {
+            Self::Failure(error)
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `tracktwin train`: Gaussian-process models from a library.
 
-use super::library::choose;
+use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
@@ -19,8 +19,8 @@ pub(super) struct Arguments {
     /// Folder for the models.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The campaign, where the library holds several.
-    #[arg(long, value_name = "ID")]
+    /// The campaign by its id or name, where the library holds several.
+    #[arg(long, value_name = "CAMPAIGN")]
     campaign: Option<String>,
     /// Decides which half of the cases trains; the other tests.
     #[arg(long, default_value_t = 0)]
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let library = arguments.library.open().await?;
-    let campaign = choose(&library, arguments.campaign.as_deref()).await?;
+    let campaign = choose(&library, arguments.campaign.as_deref(), MEND).await?;
     let trained = train(&library, &campaign, arguments.seed, &arguments.out).await?;
     say(&table(&trained));
     say(&format!("models: {}", arguments.out.display()));

@@ -57,7 +57,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     std::fs::create_dir_all(&out)
         .with_context(|| format!("{}: the folder cannot be made", out.display()))
         .or_input()?;
-    let library = Library::open_or_create(&url).await.map_err(Stop::from_library)?;
+    let library = Library::open_or_create(&url).await?;
     let paper = match models {
         Some(folder) => {
             let models = Trained::load(&folder).or_input()?;

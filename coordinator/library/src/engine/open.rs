@@ -16,7 +16,7 @@ pub(crate) struct Opened {
 
 /// Opens a library that is there.
 pub(crate) async fn open(url: &str) -> Result<Opened, LibraryError> {
-    let target = Target::parse(url)?;
+    let target = parse(url)?;
     if target.path().is_some_and(|path| !path.is_file()) {
         return Err(LibraryError::Missing { library: target.name() });
     }
@@ -25,13 +25,21 @@ pub(crate) async fn open(url: &str) -> Result<Opened, LibraryError> {
 
 /// Opens a library, or makes an empty one.
 pub(crate) async fn open_or_create(url: &str) -> Result<Opened, LibraryError> {
-    let target = Target::parse(url)?;
+    let target = parse(url)?;
     let folder = target.path().and_then(Path::parent);
     if let Some(folder) = folder.filter(|it| !it.as_os_str().is_empty() && !it.is_dir()) {
         let folder = folder.to_owned();
         return Err(LibraryError::NoFolder { library: target.name(), folder });
     }
     connect(target, true).await
+}
+
+fn parse(url: &str) -> Result<Target, LibraryError> {
+    let target = Target::parse(url)?;
+    if target.path().is_some_and(Path::is_dir) {
+        return Err(LibraryError::Folder { library: target.name() });
+    }
+    Ok(target)
 }
 
 async fn connect(target: Target, create: bool) -> Result<Opened, LibraryError> {

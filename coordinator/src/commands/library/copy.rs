@@ -30,8 +30,8 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     if arguments.from == arguments.to {
         return Err(anyhow!("--from and --to are the same library")).or_input();
     }
-    let from = Library::open(&arguments.from).await.map_err(Stop::from_library)?;
-    let to = Library::open_or_create(&arguments.to).await.map_err(Stop::from_library)?;
+    let from = Library::open(&arguments.from).await?;
+    let to = Library::open_or_create(&arguments.to).await?;
     let mut total = 0;
     for table in Table::ALL {
         total += from.count(table).await?;
@@ -42,7 +42,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     for table in Table::ALL {
         let take = async |rows: Vec<Vec<Cell>>| {
             done += rows.len() as u64;
-            added += to.write_table(table, rows).await.map_err(Stop::from_library)?;
+            added += to.write_table(table, rows).await?;
             progress.at(done, table.name);
             Ok::<(), Stop>(())
         };

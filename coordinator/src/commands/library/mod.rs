@@ -11,6 +11,7 @@ mod verify;
 
 use super::{OrInput, Stop, note, say};
 use crate::commands::library_url::LibraryUrl;
+use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use tracktwin_library::{CampaignRecord, Library};
@@ -63,34 +64,37 @@ async fn open(url: &LibraryUrl) -> Result<(Library, Vec<CampaignRecord>), Stop> 
     Ok((library, campaigns))
 }
 
-/// One campaign of a library: the named one, or the only one.
-pub(super) async fn choose(library: &Library, id: Option<&str>) -> Result<CampaignRecord, Stop> {
-    if let Some(id) = id {
-        return library.campaign(id).await.map_err(Stop::from_library);
-    }
-    let campaigns = library.campaigns().await?;
-    only(library, &campaigns, "choose one with --campaign").or_input().cloned()
-}
+/// How one of several campaigns is named with most commands.
+pub(super) const MEND: &str = "choose one with --campaign";
 
-/// The only campaign of a library that has these; `mend` says how to name one of several.
-pub(super) fn only<'a>(
+/// One campaign of a library: the one with this id or this name, or the only one; `mend` says how
+/// to name one of several.
+pub(super) async fn choose(
     library: &Library,
-    campaigns: &'a [CampaignRecord],
+    named: Option<&str>,
     mend: &str,
-) -> anyhow::Result<&'a CampaignRecord> {
-    let name = library.name();
-    match campaigns {
-        [] => Err(anyhow::anyhow!(
-            "library {name}: it holds no campaign yet; `tracktwin run` or `tracktwin campaign add` \
-             adds one"
-        )),
-        [only] => Ok(only),
-        _ => {
-            let ids: Vec<_> = campaigns.iter().map(|campaign| campaign.id.as_str()).collect();
-            let ids = ids.join(", ");
-            Err(anyhow::anyhow!("library {name}: it holds several campaigns; {mend}: {ids}"))
+) -> Result<CampaignRecord, Stop> {
+    let all = library.campaigns().await?;
+    let ids =
+        |of: &[&CampaignRecord]| of.iter().map(|it| it.id.as_str()).collect::<Vec<_>>().join(", ");
+    let is_meant =
+        |it: &&CampaignRecord| named.is_none_or(|named| it.id == named || it.name == named);
+    let meant: Vec<_> = all.iter().filter(is_meant).collect();
+    let wrong = match (&meant[..], named) {
+        ([one], _) => return Ok((*one).clone()),
+        ([], _) if all.is_empty() => "it holds no campaign yet; `tracktwin run` or `tracktwin \
+                                      campaign add` adds one"
+            .to_owned(),
+        ([], named) => {
+            let all: Vec<_> = all.iter().collect();
+            format!("it has no campaign {}; it has {}", named.unwrap_or_default(), ids(&all))
         }
-    }
+        (several, None) => format!("it holds several campaigns; {mend}: {}", ids(several)),
+        (several, Some(named)) => {
+            format!("several campaigns are called {named}; give the id: {}", ids(several))
+        }
+    };
+    Err(Stop::Input(anyhow!("library {}: {wrong}", library.name())))
 }
 
 fn answer<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> String) {

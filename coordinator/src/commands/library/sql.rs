@@ -3,10 +3,13 @@
 use super::files::text;
 use super::{OrInput, Stop};
 use crate::commands::library_url::LibraryUrl;
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use std::io::{self, BufWriter, StdoutLock, Write};
 use tracktwin_library::{Answer, Cell, LibraryError};
+
+/// Significant digits of a number in a table.
+const DIGITS: usize = 9;
 
 /// What `library sql` is told.
 #[derive(Args)]
@@ -17,7 +20,8 @@ use tracktwin_library::{Answer, Cell, LibraryError};
     --library sqlite:out/library.sqlite"
 )]
 pub(in crate::commands) struct Arguments {
-    /// The statement.
+    /// The statement; `-` reads it from standard input.
+    #[arg(allow_hyphen_values = true)]
     statement: String,
     #[command(flatten)]
     library: LibraryUrl,
@@ -28,11 +32,11 @@ pub(in crate::commands) struct Arguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Format {
-    /// Aligned columns, for people.
+    /// Aligned columns, for people: numbers with nine digits.
     Table,
-    /// Comma-separated values with a head.
+    /// Comma-separated values with a head, numbers with all their digits.
     Csv,
-    /// An array with an object a row.
+    /// An array with an object a row, numbers with all their digits.
     Json,
 }
 
@@ -45,13 +49,17 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
         rows: Vec::new(),
         printed: 0,
     };
-    let answered = library.query(&arguments.statement, &mut printer).await;
+    let statement = match arguments.statement.as_str() {
+        "-" => io::read_to_string(io::stdin()).context("standard input").or_input()?,
+        given => given.to_owned(),
+    };
+    let answered = library.query(&statement, &mut printer).await;
     match answered.and_then(|()| printer.end()) {
         Ok(()) => Ok(()),
         // Who reads has seen enough, as `head` has.
         Err(Ended::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(Ended::Output(error)) => Err(error.into()),
-        Err(Ended::Library(error)) => Err(Stop::from_library(error)),
+        Err(Ended::Library(error)) => Err(error.into()),
         Err(Ended::Twice(column)) => {
             Err(anyhow!("two columns are called {column}; rename one with `as` for JSON"))
                 .or_input()
@@ -110,7 +118,9 @@ impl Answer for Printer {
 
     fn row(&mut self, cells: Vec<Cell>) -> Result<(), Ended> {
         match self.format {
-            Format::Table => self.rows.push(cells.iter().map(text::cell).collect()),
+            Format::Table => {
+                self.rows.push(cells.iter().map(|cell| text::cell(&legible(cell))).collect());
+            }
             Format::Csv => {
                 let cells: Vec<_> = cells.iter().map(text::cell).collect();
                 writeln!(self.out, "{}", text::csv_line(&cells))?;
@@ -125,6 +135,17 @@ impl Answer for Printer {
         }
         self.printed += 1;
         Ok(())
+    }
+}
+
+/// A number with no more digits than people read; programs get all of them.
+fn legible(cell: &Cell) -> Cell {
+    match cell {
+        Cell::Real(real) => {
+            let rounded = format!("{real:.*e}", DIGITS - 1).parse();
+            Cell::Real(rounded.expect("it was a number"))
+        }
+        other => other.clone(),
     }
 }
 

@@ -17,8 +17,11 @@ pub(super) async fn run(which: &Which) -> Result<(), Stop> {
     }
     if findings.is_empty() {
         if !which.json {
-            let campaigns = campaigns.len();
-            say(&format!("nothing is wrong with {} ({campaigns} campaigns)", library.name()));
+            let campaigns = match campaigns.len() {
+                1 => "1 campaign".to_owned(),
+                count => format!("{count} campaigns"),
+            };
+            say(&format!("nothing is wrong with {} ({campaigns})", library.name()));
         }
         return Ok(());
     }

@@ -24,7 +24,7 @@ pub(super) struct Arguments {
     /// How many cases, instead of the campaign's own number.
     #[arg(long, value_name = "N")]
     cases: Option<u32>,
-    /// Library to fill: sqlite:PATH or postgres://USER@HOST/DATABASE; one that holds part of the
+    /// Library to fill: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`; one that holds part of the
     /// campaign is gone on with [default: sqlite:OUT/library.sqlite].
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
@@ -72,7 +72,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         .with_context(|| format!("{}: the folder cannot be made", out.display()))
         .or_input()?;
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
-    let library = Library::open_or_create(&url).await.map_err(Stop::from_library)?;
+    let library = Library::open_or_create(&url).await?;
     let said = chain(&library, &campaign, given, &arguments).await;
     // What the library holds is then in one file, fit to be copied.
     library.close().await;
@@ -123,7 +123,7 @@ fn all_cores() -> NonZeroUsize {
 
 /// Simulates what the library lacks of a campaign; Ctrl-C leaves it to be gone on with.
 async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -> Result<(), Stop> {
-    farm::prepare(library, campaign).await.map_err(Stop::from_farm)?;
+    farm::prepare(library, campaign).await?;
     let id = campaign.id();
     let shutdown = stop_on_signal("stopping: cases that are begun go back to the library")?;
     let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
@@ -139,8 +139,7 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
         };
         bar.at(done, &remark);
     })
-    .await
-    .map_err(Stop::from_farm)?;
+    .await?;
     progress.into_iter().for_each(Progress::end);
     if stopped.is_cancelled() || status.done() < status.total() {
         let left = status.total() - status.done();
