@@ -11,7 +11,8 @@ const END_SPANS: f64 = 8.0;
 /// Km/h in a m/s.
 const KM_H: f64 = 3.6;
 
-/// Shortest and longest wavelength of the irregularity in m (paper, App. B).
+/// Shortest and longest wavelength of the irregularity in m. The paper gives none; at 7 km/h what is
+/// 0.5 mm long sounds at 3.9 kHz, inside the features.
 const WAVELENGTHS_M: [f64; 2] = [0.25e-3, 1.0];
 
 /// A virtual measurement: a track, a vehicle, its speeds, and what is taken from the signal.

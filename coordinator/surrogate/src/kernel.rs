@@ -15,7 +15,7 @@ pub struct Hyperparameters {
     pub noise_ratio: f64,
 }
 
-/// Correlation `exp(-r / l)` of two points at a Euclidean `distance` r (paper, App. E: the
+/// Correlation `exp(-r / l)` of two points at a Euclidean `distance` r (paper, 6.1.2: the
 /// exponential kernel; Rasmussen & Williams 2006, eq. 4.18 with nu = 1/2).
 pub fn correlation(distance: f64, length: f64) -> f64 {
     (-distance / length).exp()

@@ -34,7 +34,13 @@ fn main() -> Result<(), Error> {
     )?;
     save("cases.svg", "A time step by cases at once", "cases", step, &[by_cases()])?;
     save("library.svg", "Ten nearest by library size", "entries", "ms", &[by_library()?])?;
-    save("regression.svg", "A likelihood by entries", "entries", "ms", &[by_entries()?])?;
+    save(
+        "regression.svg",
+        "A covariance and its factor by entries",
+        "entries",
+        "ms",
+        &[by_entries()?],
+    )?;
     Ok(())
 }
 
