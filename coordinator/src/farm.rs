@@ -153,6 +153,9 @@ pub async fn embedded(
     let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
 
     let ended = loop {
+        if !library.takes_writes() {
+            return Err(LibraryError::Closed.into());
+        }
         let status = library.status_of(task.campaign, task.cases).await?;
         progress(status);
         if status.done() == status.total() || shutdown.is_cancelled() {

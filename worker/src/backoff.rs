@@ -2,6 +2,7 @@
 
 use std::hash::{BuildHasher, DefaultHasher, Hash, Hasher, RandomState};
 use std::time::Duration;
+use tracktwin_parameters::unit;
 
 /// The first wait.
 const FIRST: Duration = Duration::from_millis(100);
@@ -43,11 +44,6 @@ fn hash(input: impl Hash) -> u64 {
 /// A number in [0, 1) from the system's randomness. It makes names, never results.
 pub(crate) fn random_unit() -> f64 {
     unit(RandomState::new().hash_one(()))
-}
-
-/// The upper 53 bits as a number in [0, 1).
-fn unit(bits: u64) -> f64 {
-    (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[cfg(test)]

@@ -139,7 +139,7 @@ impl Session {
         let step = Step::after("hand in", &traceparents);
         let held: Vec<_> = reports.iter().map(|report| (report.index, report.epoch)).collect();
         let failed = reports.iter().filter(|it| matches!(it.outcome, Outcome::Failed { .. }));
-        let failed = failed.count() as u64;
+        let failed: Vec<u32> = failed.map(|report| report.index).collect();
         let request = farm::ReportRequest {
             worker: self.worker.clone(),
             campaign_id: campaign.clone(),
@@ -168,9 +168,7 @@ impl Session {
                     break;
                 }
                 Ok(Some(answer)) => {
-                    warn_of_refusals(&answer);
-                    self.counters.failed.inc_by(failed);
-                    self.counters.finished.inc_by(held.len() as u64 - failed);
+                    self.count(&answer, &failed);
                     break;
                 }
             }
@@ -178,6 +176,19 @@ impl Session {
         self.counters.unsent.dec_by(i64::try_from(held.len()).unwrap_or(i64::MAX));
         self.holdings.let_go(&campaign, held);
         Ok(())
+    }
+
+    /// Counts what was taken, and warns of what was refused.
+    fn count(&self, answer: &farm::ReportResponse, failed: &[u32]) {
+        let refused = |it: &&farm::Receipt| it.verdict() == farm::Verdict::Refused;
+        let (refused, taken): (Vec<&farm::Receipt>, Vec<_>) =
+            answer.receipts.iter().partition(refused);
+        if !refused.is_empty() {
+            tracing::warn!("{} results refused: not cases of this coordinator", refused.len());
+        }
+        let of_failures = taken.iter().filter(|it| failed.contains(&it.sobol_index)).count();
+        self.counters.failed.inc_by(of_failures as u64);
+        self.counters.finished.inc_by((taken.len() - of_failures) as u64);
     }
 
     /// Gives back cases that were not simulated. What cannot be given back soon expires.
@@ -243,13 +254,5 @@ impl Session {
             return Duration::ZERO;
         }
         self.last_work.lock().expect("nobody panics while holding it").elapsed()
-    }
-}
-
-fn warn_of_refusals(answer: &farm::ReportResponse) {
-    let refused = |it: &&farm::Receipt| it.verdict() == farm::Verdict::Refused;
-    let refused = answer.receipts.iter().filter(refused).count();
-    if refused > 0 {
-        tracing::warn!("{refused} results refused: not cases of this coordinator");
     }
 }

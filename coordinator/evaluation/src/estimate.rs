@@ -1,12 +1,13 @@
 //! One recording through surrogates and model selector.
 
 use crate::evaluation::{
-    Estimate, Estimates, Evaluation, FORMAT, Flag, Measured, Provenance, SleeperEvaluation,
+    Estimate, Estimates, Evaluation, FORMAT, Flag, Known, Measured, Provenance, SleeperEvaluation,
     Unevaluated,
 };
 use crate::matches::Matcher;
 use crate::{Error, SleeperFeatures, features};
 use std::collections::BTreeMap;
+use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::{Trained, TrainingSet};
@@ -103,7 +104,7 @@ fn predict(
     models: &Trained,
     speeds: &[usize],
     chosen: Vec<usize>,
-    out: &mut [BTreeMap<tracktwin_parameters::Parameter, Vec<Estimate>>],
+    out: &mut [BTreeMap<Parameter, Vec<Estimate>>],
 ) -> Result<(), Error> {
     if chosen.is_empty() {
         return Ok(());
@@ -199,15 +200,43 @@ fn provenance(twin: &Twin<'_>, sleepers: &[SleeperEvaluation]) -> Provenance {
         feature: METHOD_FEATURE,
         feature_definition: models.feature_definition().clone(),
         combination: if together { ALL_SPEEDS } else { SINGLE_SPEEDS },
+        parameters: known(twin, &speeds_km_h),
         speeds_km_h,
     }
+}
+
+/// What the models of these speeds, together or each alone, know of the parameters.
+fn known(twin: &Twin<'_>, speeds_km_h: &[f64]) -> BTreeMap<Parameter, Known> {
+    let Twin { models, library, .. } = twin;
+    let groups: Vec<_> = match models.group(speeds_km_h, METHOD_FEATURE) {
+        Some(together) => vec![together],
+        None => {
+            speeds_km_h.iter().filter_map(|&speed| models.group(&[speed], METHOD_FEATURE)).collect()
+        }
+    };
+    let of = |(column, &parameter): (usize, &Parameter)| {
+        let [low, high] = library.range(column);
+        let scores = groups.iter().flat_map(|group| group.models());
+        let errors = scores.filter(|it| it.parameter == parameter).map(|it| it.score.mase_test);
+        let mut values: Vec<f64> =
+            library.parameters.iter().skip(column).step_by(library.varied.len()).copied().collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let median = values[values.len() / 2];
+        let away: f64 = values.iter().map(|value| (value - median).abs()).sum();
+        let known = Known {
+            range: [low, high],
+            mase_test: errors.fold(f64::INFINITY, f64::min),
+            mase_constant: away / values.len() as f64 / (high - low),
+        };
+        (parameter, known)
+    };
+    library.varied.iter().enumerate().map(of).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing;
-    use tracktwin_parameters::Parameter;
 
     #[test]
     fn the_level_of_an_unseen_recording_lies_within_three_standard_deviations() {
@@ -221,6 +250,8 @@ mod tests {
                 let level = evaluation.sleepers[3].estimates[&Parameter::IrregularityLevel];
                 assert!((level.mean - truth).abs() < 3.0 * level.sd, "{truth}: {level:?}");
                 assert!(level.sd > 0.0 && level.sd < 1.0, "{level:?}");
+                let known = evaluation.provenance.parameters[&Parameter::IrregularityLevel];
+                assert!(known.is_told() && (known.mase_constant - 0.25).abs() < 0.02, "{known:?}");
                 let missing = evaluation.sleepers[3].flags.contains(&Flag::MissingSpeed);
                 assert_eq!(missing, speeds.len() == 1);
             }

@@ -60,6 +60,30 @@ pub struct Provenance {
     pub speeds_km_h: Vec<f64>,
     /// Which models speak where a sleeper has all of these speeds.
     pub combination: &'static str,
+    /// What the models know of each parameter.
+    pub parameters: BTreeMap<Parameter, Known>,
+}
+
+/// What the models know of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Known {
+    /// Lowest and highest value in the library, in the parameter's unit. Means stay inside.
+    pub range: [f64; 2],
+    /// Mean absolute error on the test half over that range (paper, eq. 11), of the best of the
+    /// models that speak.
+    pub mase_test: f64,
+    /// The same of an answer that is always the library's median.
+    pub mase_constant: f64,
+}
+
+impl Known {
+    /// Share of a constant answer's error above which a parameter is as good as not told.
+    const HARDLY: f64 = 0.9;
+
+    /// Whether the models tell the parameter noticeably better than a constant does.
+    pub fn is_told(&self) -> bool {
+        self.mase_test < Self::HARDLY * self.mase_constant
+    }
 }
 
 /// A sleeper that was evaluated.

@@ -18,7 +18,7 @@ pub use check::check_recording;
 pub use error::Error;
 pub use estimate::{METHOD_FEATURE, Twin, evaluate};
 pub use evaluation::{
-    Estimate, Estimates, Evaluation, FORMAT, Flag, Measured, Provenance, Selected,
+    Estimate, Estimates, Evaluation, FORMAT, Flag, Known, Measured, Provenance, Selected,
     SleeperEvaluation, Unevaluated,
 };
 pub use matches::MATCHES;

@@ -3,6 +3,9 @@
 use crate::engine::{Connection, sql};
 use crate::{LibraryError, Report, State};
 
+/// One case.
+const CASE: &str = "campaign_id = $1 and sobol_index = $2";
+
 /// A lease that ends without result, and where that leaves its case.
 pub(crate) struct Ended<'a> {
     pub(crate) campaign: &'a str,
@@ -15,14 +18,22 @@ pub(crate) struct Ended<'a> {
     pub(crate) now_unix_ms: i64,
 }
 
+/// Statement that puts leases of the cases `which` on record as ended so and then; a lease is on
+/// record once.
+pub(crate) fn ended(which: &str, ended_unix_ms: &str, ending: &str, error: &str) -> String {
+    format!(
+        "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
+            ended_unix_ms, ending, error)
+        select campaign_id, sobol_index, epoch, worker, leased_unix_ms,
+            {ended_unix_ms}, {ending}, {error}
+        from campaign_case where {which}
+        on conflict (campaign_id, sobol_index, epoch) do nothing"
+    )
+}
+
 /// Ends an attempt that counts.
 pub(crate) async fn end(connection: &mut Connection, it: Ended<'_>) -> Result<(), LibraryError> {
-    let note = "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
-            ended_unix_ms, ending, error)
-        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $3, $4, $5
-        from campaign_case where campaign_id = $1 and sobol_index = $2
-        on conflict (campaign_id, sobol_index, epoch) do nothing";
-    let note = sql(note)
+    let note = sql(ended(CASE, "$3", "$4", "$5"))
         .bind(it.campaign)
         .bind(it.index)
         .bind(it.now_unix_ms)
@@ -72,20 +83,16 @@ pub(crate) async fn end_all(
         dialect.locking()
     );
     let leased = connection.indices(sql(leased).bind(campaign)).await?;
-    let note = format!(
-        "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
-            ended_unix_ms, ending)
-        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $3, $4
-        from campaign_case where campaign_id = $1 and sobol_index {}
-        on conflict (campaign_id, sobol_index, epoch) do nothing",
-        dialect.listed("$2")
-    );
-    let note = sql(note).bind(campaign).bind(leased.clone()).bind(now_unix_ms).bind(ending);
+    let cases = format!("campaign_id = $1 and sobol_index {}", dialect.listed("$2"));
+    let note = sql(ended(&cases, "$3", "$4", "null"))
+        .bind(campaign)
+        .bind(leased.clone())
+        .bind(now_unix_ms)
+        .bind(ending);
     connection.execute(note).await?;
     let end = format!(
         "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
-        where campaign_id = $1 and sobol_index {}",
-        dialect.listed("$2")
+        where {cases}"
     );
     connection.execute(sql(end).bind(campaign).bind(leased)).await.map(drop)
 }
@@ -96,11 +103,9 @@ pub(crate) async fn overtake(
     report: &Report,
     index: u32,
 ) -> Result<(), LibraryError> {
-    let note = "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
-            ended_unix_ms, ending)
-        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $3, 'overtaken'
-        from campaign_case where campaign_id = $1 and sobol_index = $2
-        on conflict (campaign_id, sobol_index, epoch) do nothing";
-    let note = sql(note).bind(&report.campaign).bind(index).bind(report.now_unix_ms);
+    let note = sql(ended(CASE, "$3", "'overtaken'", "null"))
+        .bind(&report.campaign)
+        .bind(index)
+        .bind(report.now_unix_ms);
     connection.execute(note).await.map(drop)
 }

@@ -58,6 +58,12 @@ impl Library {
         self.opened.readers.close().await;
     }
 
+    /// Whether it can still be written from here: not after [`Library::close`], nor after a fault of
+    /// this program in the midst of writing.
+    pub fn takes_writes(&self) -> bool {
+        self.opened.writer.runs()
+    }
+
     /// What it is called: its file, or its URL without user and password.
     pub fn name(&self) -> String {
         self.opened.target.name()

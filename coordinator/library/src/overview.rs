@@ -3,9 +3,14 @@
 use crate::engine::{Row, sql};
 use crate::pace::Pace;
 use crate::{CampaignState, Library, LibraryError, Status};
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
 /// Causes of failure that are told apart for one campaign.
-const CAUSES_MAX: u32 = 20;
+const CAUSES_MAX: usize = 20;
+
+/// Errors of a campaign that are read for its causes, the most frequent first.
+const ERRORS_MAX: u32 = 2000;
 
 /// How a campaign stands.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +39,8 @@ pub struct CampaignOverview {
 /// Why cases were given up.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cause {
-    /// What the last attempt ended with.
+    /// What the last attempt ended with; where several errors differ in their numbers only, such as
+    /// a place, with dots for these.
     pub error: String,
     /// How many cases.
     pub cases: u32,
@@ -64,11 +70,41 @@ impl Library {
         let ask = "select error, count(*) as cases from campaign_case
             where campaign_id = $1 and state = 'failed'
             group by error order by cases desc, error limit $2";
-        let rows = self.readers().rows(sql(ask).bind(campaign).bind(CAUSES_MAX)).await?;
+        let rows = self.readers().rows(sql(ask).bind(campaign).bind(ERRORS_MAX)).await?;
         let cause =
             |row: &Row| Ok(Cause { error: row.get("error")?, cases: row.get_u32("cases")? });
-        rows.iter().map(cause).collect()
+        Ok(alike(rows.iter().map(cause).collect::<Result<_, LibraryError>>()?))
     }
+}
+
+/// Errors that differ in their numbers only taken together; the most frequent first.
+fn alike(errors: Vec<Cause>) -> Vec<Cause> {
+    let mut kinds: BTreeMap<String, Vec<Cause>> = BTreeMap::new();
+    for cause in errors {
+        kinds.entry(without_numbers(&cause.error)).or_default().push(cause);
+    }
+    let together = |(kind, causes): (String, Vec<Cause>)| {
+        let cases = causes.iter().map(|cause| cause.cases).sum();
+        let error = if let [one] = &causes[..] { one.error.clone() } else { kind };
+        Cause { error, cases }
+    };
+    let mut causes: Vec<_> = kinds.into_iter().map(together).collect();
+    causes.sort_by_key(|cause| Reverse(cause.cases));
+    causes.truncate(CAUSES_MAX);
+    causes
+}
+
+/// The text with dots for its numbers; digits of a name, as in `level_50_Hz`, stay.
+fn without_numbers(text: &str) -> String {
+    let is_name = |it: char| it.is_alphanumeric() || it == '_';
+    let words = text.split_inclusive(|it: char| !is_name(it) && !".+-".contains(it));
+    let shown = words.map(|word| {
+        let bare = word.trim_end_matches(|it: char| !is_name(it));
+        let is_number =
+            bare.contains(|it: char| it.is_ascii_digit()) && bare.parse::<f64>().is_ok();
+        if is_number { format!("...{}", &word[bare.len()..]) } else { word.to_owned() }
+    });
+    shown.collect()
 }
 
 /// What a row says of a campaign that goes at this pace.
@@ -91,4 +127,26 @@ fn overview(row: &Row, pace: Pace) -> Result<CampaignOverview, LibraryError> {
         mean_case_s: pace.mean_case_s,
         causes: Vec::new(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_that_differ_in_a_place_are_one_cause() {
+        let cause = |error: &str, cases| Cause { error: error.to_owned(), cases };
+        let found = alike(vec![
+            cause("bins_50 are too few", 2),
+            cause("the wheel is 1.25 m off at -0.75 m", 1),
+            cause("the wheel is 3e-5 m off at 12.5 m.", 1),
+            cause("the wheel is 7 m off at 1 m", 3),
+        ]);
+        let expected = [
+            cause("the wheel is ... m off at ... m", 4),
+            cause("bins_50 are too few", 2),
+            cause("the wheel is 3e-5 m off at 12.5 m.", 1),
+        ];
+        assert_eq!(found, expected);
+    }
 }

@@ -27,7 +27,7 @@ pub fn evaluation_page(
     let body = html! {
         @for note in &evaluation.notes { p { (note) } }
         h2 { "Along the track" }
-        (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a band of two standard deviations, and the average over the ten library entries that match best."))
+        (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a band of two standard deviations inside the library's range, and the average over the ten library entries that match best. Not told: on the library's test half the models are hardly better than a constant answer."))
         h2 { "What was measured" }
         (figure(&maps(evaluation, recording, extractor), "Five sleeper bays in the middle of the recording (paper, Fig. 2); dashed lines are sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet transform (CWT), sharpened in frequency."))
         h2 { "Measured and matched spectra" }

@@ -72,8 +72,8 @@ fn summary(farm: &Farm) -> String {
 const FEW: usize = 300;
 
 /// Below the pictures of a campaign.
-const CAPTION: &str = "Left: local wavelet power spectra of the newest cases, by their index, at the \
-    fastest speed. Right: finished cases in the parameter space, and in orange those given up.";
+const CAPTION: &str = "Local wavelet power spectra of the newest cases, by their index, at the fastest \
+    speed; finished cases in the parameter space, and in orange those given up.";
 
 fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
     let FarmCampaign { waiting, leased, finished, failed, .. } = campaign;

@@ -33,16 +33,22 @@ fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
         };
         evaluation.sleepers.iter().filter_map(value).collect()
     };
+    let known = &evaluation.provenance.parameters[&parameter];
+    let range = known.range.map(|end| end / shown.divisor);
     let process = estimates(|sleeper| &sleeper.estimates);
     let selector = estimates(|sleeper| &sleeper.selector.estimates);
-    let band: Vec<_> = process.iter().map(|&(x, mean, two)| (x, mean - two, mean + two)).collect();
-    let range = parameter.range().map(|end| end / shown.divisor);
-    let values = band.iter().flat_map(|&(_, low, high)| [low.max(0.0), high]);
+    // The models know nothing beyond the library's range.
+    let within = |value: f64| value.clamp(range[0], range[1]);
+    let band: Vec<_> =
+        process.iter().map(|&(x, mean, two)| (x, within(mean - two), within(mean + two))).collect();
     let label = format!("{} in {}", parameter.symbol(), shown.unit);
     let x = Axis::around("position in m", process.iter().map(|point| point.0));
-    let y = Axis::around(&label, values.chain(range));
+    let y = Axis::around(&label, range);
     let mut label = parameter.label().to_owned();
     label[..1].make_ascii_uppercase();
+    if !known.is_told() {
+        label += " (not told)";
+    }
     let mut chart = Chart::new(&label, SIZE, x, y);
     chart.band("a", &band);
     let means = |of: &[(f64, f64, f64)]| of.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>();

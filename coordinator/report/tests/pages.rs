@@ -1,10 +1,11 @@
 //! Pages made of small synthetic results: whole, self-contained, and left in the target folder
 //! for a look.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
 use tracktwin_evaluation::{
-    Estimate, Estimates, Evaluation, FORMAT, Flag, Measured, Provenance, Selected,
+    Estimate, Estimates, Evaluation, FORMAT, Flag, Known, Measured, Provenance, Selected,
     SleeperEvaluation,
 };
 use tracktwin_parameters::Parameter;
@@ -49,6 +50,15 @@ fn estimates(place: f64, spread: f64) -> Estimates {
     Parameter::ALL.iter().map(estimate).collect()
 }
 
+/// The nominal range of every parameter, told well except for the railpad's damping.
+fn known() -> BTreeMap<Parameter, Known> {
+    let of = |&parameter: &Parameter| {
+        let mase_test = if parameter == Parameter::RailpadDamping { 0.24 } else { 0.1 };
+        (parameter, Known { range: parameter.range(), mase_test, mase_constant: 0.25 })
+    };
+    Parameter::ALL.iter().map(of).collect()
+}
+
 fn evaluation(recording: &Recording, extractor: &Extractor) -> Evaluation {
     let sleeper = |index: usize| {
         let Sleeper { id, x_m } = recording.sleepers[index].clone();
@@ -86,6 +96,7 @@ fn evaluation(recording: &Recording, extractor: &Extractor) -> Evaluation {
             feature_definition: serde_json::json!({"margin_s": 0.06}),
             speeds_km_h: vec![13.0],
             combination: "one model of all speeds together",
+            parameters: known(),
         },
         sleepers: (0..recording.sleepers.len()).map(sleeper).collect(),
         unevaluated: Vec::new(),
@@ -154,6 +165,8 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
     assert_eq!(page.matches("data:image/png;base64,").count(), 2);
     assert!(page.contains("ring &lt;1&gt;") && !page.contains("ring <1>"));
     assert!(page.contains("1 sleeper is flagged"), "the summary counts flags");
+    assert_eq!(page.matches("(not told)").count(), 1);
+    assert!(page.contains("Railpad damping (not told)"));
     assert!(
         page.contains("left out: pass 2") && page.contains("<pre>tracktwin evaluate ride</pre>")
     );

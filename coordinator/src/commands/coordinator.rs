@@ -1,5 +1,6 @@
 //! `tracktwin coordinator`: serves campaigns to workers on other machines.
 
+use super::files::read;
 use super::library_url::LibraryUrl;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop};
@@ -125,10 +126,6 @@ impl Arguments {
         let client_ca_pem = self.tls_client_ca.as_deref().map(read).transpose()?;
         Ok(Security { identity_pem, client_ca_pem, token, insecure: self.insecure })
     }
-}
-
-fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-    std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))
 }
 
 fn token(path: &Path) -> anyhow::Result<String> {

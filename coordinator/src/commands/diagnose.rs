@@ -1,5 +1,6 @@
 //! `tracktwin diagnose`: where recording and simulation differ, and what physics was left out.
 
+use super::files::make_folder;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
 use crate::diagnosing::{DiagnosingError, Setting, diagnose};
@@ -61,9 +62,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None => None,
     };
     let design = design(models, library.as_ref()).await?;
-    std::fs::create_dir_all(&out)
-        .with_context(|| format!("{}: the folder cannot be made", out.display()))
-        .or_input()?;
+    make_folder(&out).or_input()?;
     let shown = Shown::default();
     let setting =
         Setting { design: &design, library: library.as_ref(), without: &without, shuffle: None };

@@ -1,5 +1,6 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
+use super::files::make_folder;
 use super::library_url::LibraryUrl;
 use super::{OrInput, Stop, note, say};
 use crate::evaluating::{Evaluator, EvaluatorError};
@@ -60,9 +61,7 @@ pub(super) async fn evaluate(
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
     evaluation.notes = notes;
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("{}: the folder cannot be made", folder.display()))
-        .or_input()?;
+    make_folder(folder).or_input()?;
     evaluation.write(folder)?;
     let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
     let command = std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>();

@@ -1,5 +1,6 @@
 //! `tracktwin extend`: a campaign whose parameter space has what a diagnosis found.
 
+use super::files::{read, read_text};
 use super::{OrInput, Stop, say};
 use crate::campaign::Campaign;
 use anyhow::{Context, anyhow};
@@ -36,11 +37,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { campaign: path, from, out } = arguments;
-    let text = std::fs::read_to_string(&path)
-        .with_context(|| format!("{}: cannot be read", path.display()))
-        .or_input()?;
+    let text = read_text(&path).or_input()?;
     let campaign = Campaign::parse(&text, &path.display().to_string(), None).or_input()?;
-    let diagnosis = read(&from).or_input()?;
+    let diagnosis = diagnosis(&from).or_input()?;
     let accepted: Vec<_> = diagnosis
         .hypotheses
         .iter()
@@ -72,11 +71,10 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-fn read(path: &Path) -> anyhow::Result<Diagnosis> {
+fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {
     let name = path.display();
-    let text = std::fs::read(path).with_context(|| format!("{name}: cannot be read"))?;
     let diagnosis: Diagnosis =
-        serde_json::from_slice(&text).with_context(|| format!("{name}: is no diagnosis"))?;
+        serde_json::from_slice(&read(path)?).with_context(|| format!("{name}: is no diagnosis"))?;
     if diagnosis.format != FORMAT {
         return Err(anyhow!("{name}: format: {:?} is not {FORMAT:?}", diagnosis.format));
     }

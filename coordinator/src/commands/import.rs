@@ -1,5 +1,6 @@
 //! `tracktwin import`: recordings of other makes.
 
+use super::files::read_text;
 use super::{OrInput, Stop, say};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
@@ -154,7 +155,7 @@ fn refuse_another(folder: &Path) -> Result<(), anyhow::Error> {
 
 /// The layout file's entries under the flags.
 fn layout(arguments: &Arguments) -> Result<Layout, anyhow::Error> {
-    let mut layout = arguments.layout.as_deref().map(read).transpose()?.unwrap_or_default();
+    let mut layout = arguments.layout.as_deref().map(layout_of).transpose()?.unwrap_or_default();
     if arguments.columns.iter().any(|m| matches!(m.quantity, Quantity::Acceleration)) {
         layout.acceleration.clear();
     }
@@ -190,10 +191,8 @@ fn layout(arguments: &Arguments) -> Result<Layout, anyhow::Error> {
     Ok(layout)
 }
 
-fn read(path: &Path) -> Result<Layout, anyhow::Error> {
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("{}: cannot be read", path.display()))?;
-    toml::from_str(&text).with_context(|| format!("{}: is no layout", path.display()))
+fn layout_of(path: &Path) -> Result<Layout, anyhow::Error> {
+    toml::from_str(&read_text(path)?).with_context(|| format!("{}: is no layout", path.display()))
 }
 
 /// Numbers that must be positive where they are given.

@@ -6,6 +6,7 @@ mod coordinator;
 mod diagnose;
 mod evaluate;
 mod extend;
+mod files;
 mod import;
 mod inspect;
 mod library;

@@ -1,5 +1,6 @@
 //! `tracktwin reproduce`: the paper's results beside this program's.
 
+use super::files::make_folder;
 use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
@@ -7,7 +8,7 @@ use super::{OrInput, Stop, evaluate, say, train};
 use crate::evaluating::Evaluator;
 use crate::reproducing::{self, ReproducingError};
 use crate::training;
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use tracktwin_library::{CampaignRecord, Library};
@@ -64,9 +65,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let experiment = Experiment::from_json(&campaign.experiment_json).or_input()?;
     reproducing::check(&experiment, &figures).or_input()?;
     let out = &arguments.out;
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("{}: the folder cannot be made", out.display()))
-        .or_input()?;
+    make_folder(out).or_input()?;
     let needed = figures.iter().any(|figure| figure.needs_models());
     let models = match given {
         Some(models) => Some(models),

@@ -132,7 +132,7 @@ fn as_json(farm: &Farm) -> Value {
     let campaign = |it: &FarmCampaign| {
         let causes = it.causes.iter().map(|(error, cases)| json!({"error": error, "cases": cases}));
         json!({
-            "campaign": it.id, "state": it.state, "priority": it.priority, "cases": it.cases(),
+            "campaign": it.id, "state": it.state, "done": it.is_done(), "priority": it.priority, "cases": it.cases(),
             "finished": it.finished, "leased": it.leased, "waiting": it.waiting,
             "failed": it.failed, "cases_per_s": it.per_second, "remaining_s": it.eta_s(),
             "causes": causes.collect::<Vec<_>>(),

@@ -1,10 +1,10 @@
 //! `tracktwin trial`: how often a diagnosis is right, on recordings whose truth it does not know.
 
+use super::files::make_folder;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
 use crate::evaluating::Evaluator;
 use crate::trial::{Trial, TrialError};
-use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_library::Library;
@@ -54,9 +54,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         arguments;
     let own = || format!("sqlite:{}", out.join("library.sqlite").display());
     let url = library.unwrap_or_else(own);
-    std::fs::create_dir_all(&out)
-        .with_context(|| format!("{}: the folder cannot be made", out.display()))
-        .or_input()?;
+    make_folder(&out).or_input()?;
     let library = Library::open_or_create(&url).await?;
     let paper = match models {
         Some(folder) => {

@@ -72,9 +72,10 @@ impl Coordinator {
         let watch = tokio::spawn(watch(self.library, self.exit_when_done, stop.clone()));
         let served = serve(self.listener, dispatch, &self.security, stop.clone()).await;
         stop.cancel();
-        watch.await.expect("watching does not panic");
+        let watched = watch.await.expect("watching does not panic");
         tracing::info!("coordinator ends");
-        Ok(served?)
+        served?;
+        Ok(watched?)
     }
 }
 

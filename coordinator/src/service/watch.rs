@@ -17,9 +17,20 @@ const TELL_EVERY: Duration = Duration::from_mins(1);
 const PRESENT_MS: i64 = 60_000;
 
 /// Looks at the campaigns until told to stop, or until there is nothing left to do.
-pub(super) async fn watch(library: Library, exit_when_done: bool, stop: CancellationToken) {
+///
+/// # Errors
+/// [`LibraryError::Closed`] when nothing can be written any more, which only a new start mends.
+pub(super) async fn watch(
+    library: Library,
+    exit_when_done: bool,
+    stop: CancellationToken,
+) -> Result<(), LibraryError> {
     let mut said = Said::default();
     while !stop.is_cancelled() {
+        if !library.takes_writes() {
+            stop.cancel();
+            return Err(LibraryError::Closed);
+        }
         match look(&library).await {
             Ok((campaigns, left)) => {
                 for campaign in &campaigns {
@@ -40,6 +51,7 @@ pub(super) async fn watch(library: Library, exit_when_done: bool, stop: Cancella
             () = stop.cancelled() => {}
         }
     }
+    Ok(())
 }
 
 /// What was said last, so that it is said once.

@@ -1,5 +1,6 @@
 //! Space-filling points: a function of index, dimension and seed alone.
 
+use crate::unit;
 use serde::{Deserialize, Serialize};
 
 /// Points of the Owen-scrambled sequence: `sobol_burley` repeats itself silently beyond.
@@ -81,7 +82,7 @@ fn owen_point(index: u32, dimensions: usize, seed: u64) -> Vec<f64> {
 
 fn rotated_points(indices: std::ops::Range<u32>, dimensions: usize, seed: u64) -> Vec<Vec<f64>> {
     let parameters = sobol::params::JoeKuoD6::minimal();
-    let rotation: Vec<f64> = (0..dimensions).map(|axis| unit(seed, axis as u64)).collect();
+    let rotation: Vec<f64> = (0..dimensions).map(|axis| rotation(seed, axis as u64)).collect();
     sobol::Sobol::<f64>::new(dimensions, &parameters)
         .skip(indices.start as usize)
         .take(indices.len())
@@ -96,8 +97,8 @@ fn fold(seed: u64) -> u32 {
 }
 
 /// A number in [0, 1) from a seed and a stream.
-fn unit(seed: u64, stream: u64) -> f64 {
-    (mix(mix(seed) ^ stream) >> 11) as f64 / (1_u64 << 53) as f64
+fn rotation(seed: u64, stream: u64) -> f64 {
+    unit(mix(mix(seed) ^ stream))
 }
 
 /// Finaliser of `SplitMix64` (Steele, Lea & Flood 2014): every bit of the input reaches every bit.

@@ -1,35 +1,9 @@
 //! Tail probabilities in logarithms, since those of real defects underflow.
 
-use std::f64::consts::PI;
+use libm::lgamma as ln_gamma;
 
 /// Terms after which a series or continued fraction is taken as it stands.
 const TERMS_MAX: usize = 500;
-
-/// Logarithm of the gamma function for `x` > 0, to 1e-13.
-///
-/// Source: Lanczos 1964 with the coefficients of Godfrey (g = 7, n = 9).
-fn ln_gamma(x: f64) -> f64 {
-    const COEFFICIENTS: [f64; 8] = [
-        676.520_368_121_885_1,
-        -1_259.139_216_722_402_8,
-        771.323_428_777_653_1,
-        -176.615_029_162_140_6,
-        12.507_343_278_686_905,
-        -0.138_571_095_265_720_12,
-        9.984_369_578_019_572e-6,
-        1.505_632_735_149_311_6e-7,
-    ];
-    if x < 0.5 {
-        return (PI / (PI * x).sin()).ln() - ln_gamma(1.0 - x);
-    }
-    let x = x - 1.0;
-    let sum = COEFFICIENTS
-        .iter()
-        .enumerate()
-        .fold(0.999_999_999_999_809_9, |sum, (i, c)| sum + c / (x + i as f64 + 1.0));
-    let t = x + 7.5;
-    0.5 * (2.0 * PI).ln() + (x + 0.5) * t.ln() - t + sum.ln()
-}
 
 /// `ln P(X >= x)` of a gamma variable of this shape and mean one.
 ///

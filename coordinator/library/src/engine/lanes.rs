@@ -1,13 +1,14 @@
 //! Which of several transactions at a time a write goes into.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Writes on their way, by lane.
 ///
 /// Those of one worker are in one lane, for they change the same rows; whoever has none under way
 /// takes the emptiest.
-pub(super) struct Lanes(Mutex<UnderWay>);
+#[derive(Clone)]
+pub(super) struct Lanes(Arc<Mutex<UnderWay>>);
 
 struct UnderWay {
     /// Writes in each lane.
@@ -17,8 +18,8 @@ struct UnderWay {
 }
 
 /// A write's place in a lane, until it is dropped.
-pub(super) struct Place<'a> {
-    lanes: &'a Lanes,
+pub(super) struct Place {
+    lanes: Lanes,
     number: usize,
     worker: String,
 }
@@ -26,18 +27,19 @@ pub(super) struct Place<'a> {
 impl Lanes {
     /// So many empty ones, at least one.
     pub(super) fn new(count: usize) -> Self {
-        Self(Mutex::new(UnderWay { counts: vec![0; count], workers: HashMap::new() }))
+        let under_way = UnderWay { counts: vec![0; count], workers: HashMap::new() };
+        Self(Arc::new(Mutex::new(under_way)))
     }
 
     /// A place for a write of a worker.
-    pub(super) fn enter(&self, worker: &str) -> Place<'_> {
+    pub(super) fn enter(&self, worker: &str) -> Place {
         let mut under_way = self.lock();
         let UnderWay { counts, workers } = &mut *under_way;
         let emptiest = (0..counts.len()).min_by_key(|&lane| counts[lane]).unwrap_or(0);
         let (number, of_worker) = workers.entry(worker.to_owned()).or_insert((emptiest, 0));
         *of_worker += 1;
         counts[*number] += 1;
-        Place { lanes: self, number: *number, worker: worker.to_owned() }
+        Place { lanes: self.clone(), number: *number, worker: worker.to_owned() }
     }
 
     fn lock(&self) -> MutexGuard<'_, UnderWay> {
@@ -45,14 +47,14 @@ impl Lanes {
     }
 }
 
-impl Place<'_> {
+impl Place {
     /// The lane, from 0.
     pub(super) const fn number(&self) -> usize {
         self.number
     }
 }
 
-impl Drop for Place<'_> {
+impl Drop for Place {
     fn drop(&mut self) {
         let mut under_way = self.lanes.lock();
         under_way.counts[self.number] -= 1;

@@ -6,7 +6,7 @@
 //! is waited for, within a bound.
 
 use super::clock::Clock;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, Place};
 use super::patience::Patience;
 use super::{Connection, Target, postgres};
 use crate::LibraryError;
@@ -87,11 +87,16 @@ impl Writer {
     /// Makes a change and waits until it is on the disk.
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
         let (reply, answer) = oneshot::channel();
-        let lane = self.lanes.enter(write.worker().unwrap_or_default());
-        let order = Pending { write, answer: None, reply };
-        let orders = &self.tasks[lane.number()].orders;
+        let place = self.lanes.enter(write.worker().unwrap_or_default());
+        let orders = &self.tasks[place.number()].orders;
+        let order = Pending { write, answer: None, reply, _place: place };
         orders.send(Box::new(order)).await.map_err(|_| LibraryError::Closed)?;
         answer.await.map_err(|_| LibraryError::Closed)?
+    }
+
+    /// Whether all tasks run: one that panicked, or was closed, writes no more.
+    pub(crate) fn runs(&self) -> bool {
+        self.tasks.iter().all(Task::runs)
     }
 
     /// Finishes what was ordered and closes the connections.
@@ -116,6 +121,11 @@ impl Task {
         let handle = tokio::spawn(write_all(session, receiver, closing.clone()));
         Self { orders, closing, handle: Mutex::new(Some(handle)) }
     }
+
+    fn runs(&self) -> bool {
+        let handle = self.handle.lock().expect("nobody panics while holding it");
+        handle.as_ref().is_some_and(|handle| !handle.is_finished())
+    }
 }
 
 /// An ordered write of any kind.
@@ -132,6 +142,8 @@ struct Pending<W: Write> {
     write: W,
     answer: Option<W::Answer>,
     reply: oneshot::Sender<Result<W::Answer, LibraryError>>,
+    /// Kept until the write is done, whether who asked still waits or not.
+    _place: Place,
 }
 
 impl<W: Write> Order for Pending<W> {
@@ -271,4 +283,30 @@ async fn transaction(
         connection.rollback().await;
     }
     done
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Breaks;
+
+    impl Write for Breaks {
+        type Answer = ();
+
+        async fn apply(&self, _: &mut Connection) -> Result<(), LibraryError> {
+            panic!("a fault of the program")
+        }
+    }
+
+    #[tokio::test]
+    async fn a_task_that_breaks_down_is_known_to_have_ended() {
+        let folder = tempfile::tempdir().unwrap();
+        let url = format!("sqlite:{}", folder.path().join("library.sqlite").display());
+        let writer = crate::engine::open_or_create(&url).await.unwrap().writer;
+        assert!(writer.runs());
+        assert!(matches!(writer.write(Breaks).await, Err(LibraryError::Closed)));
+        tokio::task::yield_now().await;
+        assert!(!writer.runs());
+    }
 }

@@ -72,13 +72,7 @@ impl Write for Release {
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let theirs = is_held(connection.dialect());
-        let note = format!(
-            "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
-                ended_unix_ms, ending)
-            select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $5, 'returned'
-            from campaign_case where {theirs}
-            on conflict (campaign_id, sobol_index, epoch) do nothing"
-        );
+        let note = attempt::ended(&theirs, "$5", "'returned'", "null");
         let end = format!(
             "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
             where {theirs}"

@@ -174,7 +174,12 @@ impl<'a> Farm<'a> {
             let stored = u32::from(record.state == State::Finished);
             assert_eq!(self.stored[index as usize], stored, "case {index}: {record:?}");
             assert_eq!(entries.iter().filter(|it| **it == index).count() as u32, stored);
-            assert!(stored == 1 || record.attempts == ATTEMPTS_MAX, "case {index}: {record:?}");
+            // Failures are counted by themselves, so that losses between them may add to what it takes.
+            let given_up_at = ATTEMPTS_MAX..2 * ATTEMPTS_MAX;
+            assert!(
+                stored == 1 || given_up_at.contains(&record.attempts),
+                "case {index}: {record:?}"
+            );
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::files::csv_file::CsvFile;
 use super::files::parquet_file::ParquetFile;
 use super::{OrInput, Stop};
+use crate::commands::files::make_folder;
 use crate::commands::library_url::LibraryUrl;
 use crate::commands::say;
 use anyhow::{Context, anyhow};
@@ -69,9 +70,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
         return Err(anyhow!("--out {}: {extension} is neither parquet nor csv", out.display()))
             .or_input();
     }
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("--out {}: the folder cannot be made", out.display()))
-        .or_input()?;
+    make_folder(out).or_input()?;
     for table in Table::ALL {
         let path = out.join(format!("{}.{}", table.name, format.extension()));
         let rows = export(&library, table, &path, format).await?;
@@ -106,14 +105,14 @@ async fn export(
 /// A file of either format.
 enum Sink {
     Parquet(Box<ParquetFile>),
-    Csv(CsvFile),
+    Csv(Box<CsvFile>),
 }
 
 impl Sink {
     fn create(path: &Path, table: &'static Table, format: Format) -> anyhow::Result<Self> {
         Ok(match format {
             Format::Parquet => Self::Parquet(Box::new(ParquetFile::create(path, table)?)),
-            Format::Csv => Self::Csv(CsvFile::create(path, table)?),
+            Format::Csv => Self::Csv(Box::new(CsvFile::create(path, table)?)),
         })
     }
 

@@ -103,7 +103,7 @@ impl Answer for Printer {
         self.names = names.to_vec();
         match self.format {
             Format::Table => self.rows.push(self.names.clone()),
-            Format::Csv => writeln!(self.out, "{}", text::csv_line(&self.names))?,
+            Format::Csv => csv_record(&mut self.out, names)?,
             Format::Json => {
                 if let Some(twice) =
                     names.iter().find(|it| names.iter().filter(|n| n == it).count() > 1)
@@ -123,7 +123,7 @@ impl Answer for Printer {
             }
             Format::Csv => {
                 let cells: Vec<_> = cells.iter().map(text::cell).collect();
-                writeln!(self.out, "{}", text::csv_line(&cells))?;
+                csv_record(&mut self.out, &cells)?;
             }
             Format::Json => {
                 let before = if self.printed == 0 { "\n" } else { ",\n" };
@@ -136,6 +136,13 @@ impl Answer for Printer {
         self.printed += 1;
         Ok(())
     }
+}
+
+fn csv_record(out: &mut impl Write, cells: &[String]) -> io::Result<()> {
+    // Nothing is kept back: `out` has a buffer of its own.
+    let mut writer = csv::WriterBuilder::new().buffer_capacity(256).from_writer(out);
+    writer.write_record(cells)?;
+    writer.flush()
 }
 
 /// A number with no more digits than people read; programs get all of them.

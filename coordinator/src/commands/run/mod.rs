@@ -2,12 +2,13 @@
 
 mod sample;
 
+use super::files::make_folder;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, evaluate, note, say, train};
 use crate::campaign::{Campaign, DEFAULT};
 use crate::farm::{self, Task};
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -68,9 +69,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         )));
     }
     let out = &arguments.out;
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("{}: the folder cannot be made", out.display()))
-        .or_input()?;
+    make_folder(out).or_input()?;
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
     let library = Library::open_or_create(&url).await?;
     let said = chain(&library, &campaign, given, &arguments).await;

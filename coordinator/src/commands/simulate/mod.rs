@@ -15,7 +15,7 @@ pub(super) use setting::Setting;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 use track::SimulatedTrack;
-use tracktwin_parameters::Preset;
+use tracktwin_parameters::{Preset, unit};
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::extension::Class;
 use tracktwin_track::model::{Roughness, Surface};
@@ -138,8 +138,7 @@ fn drives(arguments: &Arguments, track: &SimulatedTrack) -> Vec<Drive> {
     let circumference_m = TAU * track.design().wheel.radius_m;
     let drive = |speed_km_h: f64, pass: u32, first: bool| {
         let seed = pass_seed(arguments.seed, speed_km_h, pass);
-        let share = (seed >> 11) as f64 / (1_u64 << 53) as f64;
-        let wheel_turned_m = if turns && !first { share * circumference_m } else { 0.0 };
+        let wheel_turned_m = if turns && !first { unit(seed) * circumference_m } else { 0.0 };
         Drive { speed_km_h, seed, wheel_turned_m }
     };
     let mut drives = Vec::new();

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use std::f64::consts::TAU;
+use tracktwin_parameters::unit;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Pass;
 use tracktwin_track::extension::Measured;
@@ -90,7 +91,6 @@ impl Sensor {
 
     /// Waves of random phase whose sum never exceeds the limit.
     fn wander(&self, position_m: &mut [f64], random: &mut impl Rng) {
-        let unit = |bits: u64| (bits >> 11) as f64 / (1_u64 << 53) as f64;
         let phases = WANDER_M.map(|_| TAU * unit(random.next_u64()));
         let amplitude_m = self.odometer / WANDER_M.len() as f64;
         for position in position_m {

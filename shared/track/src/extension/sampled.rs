@@ -6,7 +6,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tracktwin_parameters::{Scale, TrackDesign};
+use tracktwin_parameters::{Scale, TrackDesign, unit};
 
 /// An extension that a share of the cases has, with values drawn in their ranges.
 ///
@@ -82,7 +82,7 @@ impl SampledExtension {
     /// The extension of the case of this seed; `None` if the case goes without.
     pub fn draw(&self, seed: u64) -> Option<ExtensionInstance> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut unit = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        let mut unit = || unit(random.next_u64());
         let present = unit() < self.share;
         // Drawn whether present or not: another share changes no value.
         let instance = self.instance(&mut unit);

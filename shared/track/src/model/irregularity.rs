@@ -8,6 +8,7 @@ use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
+use tracktwin_parameters::unit;
 
 /// Factor `k` of eq. B.6.
 const SPECTRUM_FACTOR: f64 = 0.25;
@@ -83,7 +84,7 @@ impl Roughness {
             }
             let density = self.density(wave_number) * gain(wave_number);
             let amplitude = (2.0 * density * wave_number_step).sqrt();
-            let phase = TAU * unit(&mut random);
+            let phase = TAU * unit(random.next_u64());
             *harmonic = Complex64::from_polar(amplitude / spline_gain(wave_number * step_m), phase);
         }
         // The portable planner: the same bits on every processor.
@@ -169,11 +170,6 @@ fn spline_gain(phase_per_step: f64) -> f64 {
 fn grid_points(at_least: f64) -> usize {
     let points = (at_least.ceil() as usize).max(4).next_power_of_two();
     if points as f64 * 0.75 >= at_least { points / 4 * 3 } else { points }
-}
-
-/// A number in [0, 1) of 53 random bits.
-fn unit(random: &mut impl Rng) -> f64 {
-    (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[cfg(test)]

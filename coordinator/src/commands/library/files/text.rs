@@ -40,18 +40,6 @@ pub(in crate::commands::library) fn json(cell: Cell) -> Value {
     }
 }
 
-/// A line of a CSV file, without its end; as RFC 4180 has it.
-pub(in crate::commands::library) fn csv_line(cells: &[String]) -> String {
-    let quoted = cells.iter().map(|cell| {
-        if cell.contains([',', '"', '\n', '\r']) {
-            format!("\"{}\"", cell.replace('"', "\"\""))
-        } else {
-            cell.clone()
-        }
-    });
-    quoted.collect::<Vec<_>>().join(",")
-}
-
 /// Rows in aligned columns, the first of them being the heads. What looks like a number stands to
 /// the right.
 pub(in crate::commands::library) fn table(
@@ -86,12 +74,6 @@ mod tests {
             assert_eq!(number(value).parse::<f64>().unwrap(), value);
         }
         assert_eq!([number(7.0), number(1.5e-7)], ["7", "1.5e-7"]);
-    }
-
-    #[test]
-    fn what_would_break_a_line_is_quoted() {
-        let cells = ["a".to_owned(), "b,c".to_owned(), "say \"so\"".to_owned()];
-        assert_eq!(csv_line(&cells), "a,\"b,c\",\"say \"\"so\"\"\"");
     }
 
     #[test]
