@@ -5,7 +5,7 @@ use tracktwin_parameters::Parameter;
 use tracktwin_report::Tested;
 use tracktwin_signal::{FeatureDefinition, FeatureSet};
 use tracktwin_surrogate::{FeatureColumns, ModelGroup, Split, TrainOptions, Trained, TrainingSet};
-use tracktwin_worker::Experiment;
+use tracktwin_worker::{Experiment, ExperimentError};
 
 /// The feature vectors of the paper, each trained at every speed (paper, eq. 9).
 const PAPER: [FeatureSet; 5] =
@@ -25,8 +25,8 @@ pub enum TrainingError {
     Experiment {
         /// The campaign.
         campaign: String,
-        /// What the parser said.
-        source: serde_json::Error,
+        /// What is wrong with it.
+        source: ExperimentError,
     },
 }
 
@@ -133,6 +133,6 @@ pub fn feature_definition(campaign: &CampaignRecord) -> Result<FeatureDefinition
 /// # Errors
 /// [`TrainingError::Experiment`].
 pub fn experiment(campaign: &CampaignRecord) -> Result<Experiment, TrainingError> {
-    serde_json::from_str(&campaign.experiment_json)
+    Experiment::from_json(&campaign.experiment_json)
         .map_err(|source| TrainingError::Experiment { campaign: campaign.id.clone(), source })
 }

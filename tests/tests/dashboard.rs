@@ -130,7 +130,7 @@ fn pages_and_numbers_tell_how_a_campaign_stands() {
     farm.work();
     until("all is done", || farm.get("/view").contains("24 of 24 cases finished"));
     let (page, numbers) = (farm.get("/"), farm.get("/metrics"));
-    assert!(page.contains("local wavelet power spectra of the newest cases"), "{page}");
+    assert!(page.contains("Local wavelet power spectra of the newest cases"), "{page}");
     assert!(numbers.contains(&format!("{} 24\n", cases("finished"))), "{numbers}");
     assert!(numbers.contains("tracktwin_queue_depth 0\n"), "{numbers}");
 }

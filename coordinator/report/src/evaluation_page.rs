@@ -33,7 +33,7 @@ pub fn evaluation_page(
         h2 { "Measured and matched spectra" }
         (figure(&spectra(evaluation), "Local wavelet power spectra (LWPS) of some sleepers, mean over the passes of one speed, and those of the library entries nearest to them (paper, Fig. 11)."))
         h2 { "Estimates" }
-        p.note { "Mean ± one standard deviation. Match: mean absolute percentage error of the best library entry (paper, eq. 10)." }
+        p.note { "Mean ± one standard deviation. Match: how far the best library entry is off on average, in dB and as mean absolute percentage error of the logarithm (paper, eq. 10)." }
         div.scroll { (table(evaluation)) }
         h2 { "Provenance" }
         (provenance(evaluation, command))
@@ -124,6 +124,19 @@ fn spectra(evaluation: &Evaluation) -> Vec<String> {
         .collect()
 }
 
+/// Mean absolute difference in dB between what was measured and the best match.
+fn match_db(sleeper: &SleeperEvaluation) -> Option<f64> {
+    let differences: Vec<f64> = sleeper
+        .measured
+        .iter()
+        .filter_map(|measured| Some((measured, measured.matches.first()?)))
+        .flat_map(|(measured, best)| measured.log_power.iter().zip(best))
+        .map(|(measured, best)| (measured - best).abs() * 10.0 / std::f64::consts::LN_10)
+        .collect();
+    let count = differences.len() as f64;
+    (count > 0.0).then(|| differences.iter().sum::<f64>() / count)
+}
+
 fn table(evaluation: &Evaluation) -> Markup {
     let parameters = evaluation.parameters();
     let cell = |parameter: Parameter, estimate: Option<&Estimate>| {
@@ -136,19 +149,20 @@ fn table(evaluation: &Evaluation) -> Markup {
                 @for &parameter in &parameters {
                     th { (parameter.label()) small { (parameter.symbol()) " in " (Shown::of(parameter).unit) } }
                 }
-                th { "match" small { "%" } } th.words { "flags" }
+                th { "match" small { "dB" } } th { "match" small { "%" } } th.words { "flags" }
             } }
             tbody {
                 @for sleeper in &evaluation.sleepers {
                     tr {
                         td { (sleeper.id) } td { (format!("{:.3}", sleeper.x_m)) }
                         @for &parameter in &parameters { td { (cell(parameter, sleeper.estimates.get(&parameter))) } }
+                        td { @if let Some(best) = match_db(sleeper) { (significant(best)) } }
                         td { @if let Some(best) = sleeper.selector.mape.first() { (significant(100.0 * best)) } }
                         td.words { (sleeper.flags.iter().map(|flag| flag.label()).collect::<Vec<_>>().join(", ")) }
                     }
                 }
                 @for sleeper in &evaluation.unevaluated {
-                    tr { td { (sleeper.id) } td { (format!("{:.3}", sleeper.x_m)) } td.words colspan=(parameters.len() + 2) { (sleeper.reason) } }
+                    tr { td { (sleeper.id) } td { (format!("{:.3}", sleeper.x_m)) } td.words colspan=(parameters.len() + 3) { (sleeper.reason) } }
                 }
             }
         }

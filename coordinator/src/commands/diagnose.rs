@@ -4,7 +4,7 @@ use super::files::make_folder;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
 use crate::diagnosing::{DiagnosingError, Setting, diagnose};
-use crate::provenance;
+use crate::{provenance, training};
 use anyhow::Context;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
@@ -17,7 +17,7 @@ use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
 use tracktwin_track::extension::KINDS;
-use tracktwin_worker::{CODE_VERSION, Experiment};
+use tracktwin_worker::CODE_VERSION;
 
 /// Steps of a stage's progress bar.
 const STEPS: u64 = 100;
@@ -123,7 +123,7 @@ async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<Tr
         .await
         .context("the models belong to another library; train on this one")
         .or_input()?;
-    Ok(Experiment::from_json(&campaign.experiment_json).or_input()?.design)
+    Ok(training::experiment(&campaign).or_input()?.design)
 }
 
 /// A line or bar for the stage that goes on, the last one ended when another begins.

@@ -62,7 +62,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let library = arguments.library.open().await?;
     let given = arguments.models.as_deref().map(Trained::load).transpose().or_input()?;
     let campaign = campaign(&library, arguments.campaign.as_deref(), given.as_ref()).await?;
-    let experiment = Experiment::from_json(&campaign.experiment_json).or_input()?;
+    let experiment = training::experiment(&campaign).or_input()?;
     reproducing::check(&experiment, &figures).or_input()?;
     let out = &arguments.out;
     make_folder(out).or_input()?;
