@@ -2,7 +2,7 @@
 //! for a look.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_10, PI, TAU};
 use std::path::Path;
 use tracktwin_evaluation::{
     Estimate, Estimates, Evaluation, FORMAT, Flag, Known, Measured, Provenance, Selected,
@@ -165,8 +165,13 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
     assert_eq!(page.matches("data:image/png;base64,").count(), 2);
     assert!(page.contains("ring &lt;1&gt;") && !page.contains("ring <1>"));
     assert!(page.contains("1 sleeper is flagged"), "the summary counts flags");
-    assert_eq!(page.matches("(not told)").count(), 1);
-    assert!(page.contains("Railpad damping (not told)"));
+    // Heading and label of one chart.
+    assert_eq!(page.matches("(not told)").count(), 2);
+    assert_eq!(page.matches("Railpad damping (not told)").count(), 2);
+    // The best match is |sin| off, 2/pi of ln of a power on average.
+    let decibel = 2.0 / PI * 10.0 / LN_10;
+    let cells = page.matches(&format!("<td>{decibel:.2}</td>")).count();
+    assert_eq!(cells, evaluation.sleepers.len());
     assert!(
         page.contains("left out: pass 2") && page.contains("<pre>tracktwin evaluate ride</pre>")
     );
