@@ -3,8 +3,8 @@
 //!
 //! `cargo bench -p tracktwin --bench farm -- [throughput|sqlite|postgres|workers|memory] [--cases N]`
 //!
-//! Coordinator and workers run in this process; CPU time is its own and that of the PostgreSQL server
-//! it has started. Libraries are made in `$TRACKTWIN_BENCH_DIR`, or here.
+//! Coordinator and workers run in this process; CPU time is its own and, also told alone, that of the
+//! PostgreSQL server it has started. Libraries are made in `$TRACKTWIN_BENCH_DIR`, or here.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark reports by stopping")]
 
@@ -53,15 +53,22 @@ fn stand_in(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentErro
 /// What a run cost.
 struct Cost {
     seconds: f64,
-    cpu_s: f64,
+    cpu: Cpu,
     memory_mb: f64,
 }
 
-/// CPU time so far of this process and of all that it has started, in s.
+/// CPU time in s.
+struct Cpu {
+    total_s: f64,
+    /// Of processes that this one has started.
+    server_s: f64,
+}
+
+/// CPU time so far of this process and of all that it has started.
 ///
 /// Of proc(5)'s `stat`: parent (field 4) and times in hundredths, its own (14, 15) and those of
 /// children that have ended (16, 17).
-fn cpu_s() -> f64 {
+fn cpu() -> Cpu {
     let mut parents = HashMap::new();
     for entry in std::fs::read_dir("/proc").unwrap().flatten() {
         let Ok(stat) = std::fs::read_to_string(entry.path().join("stat")) else { continue };
@@ -74,7 +81,9 @@ fn cpu_s() -> f64 {
         let parent = |&pid: &u32| parents.get(&pid).map(|(parent, _)| *parent);
         std::iter::successors(Some(pid), parent).any(|it| it == std::process::id())
     };
-    parents.iter().filter(|(pid, _)| mine(pid)).map(|(_, (_, time))| time).sum()
+    let mine = parents.iter().filter(|(pid, _)| mine(pid));
+    let total_s: f64 = mine.map(|(_, (_, time))| time).sum();
+    Cpu { total_s, server_s: total_s - parents[&std::process::id()].1 }
 }
 
 /// Memory this process holds now, in MB.
@@ -99,7 +108,7 @@ async fn pass_through(url: &str, cases: u32, workers: usize) -> Cost {
     let server =
         tokio::spawn(async move { serve(listener, dispatch, &Security::default(), end).await });
 
-    let (begun, cpu) = (Instant::now(), cpu_s());
+    let (begun, before) = (Instant::now(), cpu());
     let done = CancellationToken::new();
     let workers: Vec<_> = (0..workers)
         .map(|_| {
@@ -112,7 +121,9 @@ async fn pass_through(url: &str, cases: u32, workers: usize) -> Cost {
     while library.status(&id).await.unwrap().finished < cases {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
-    let (seconds, cpu_s) = (begun.elapsed().as_secs_f64(), cpu_s() - cpu);
+    let (seconds, after) = (begun.elapsed().as_secs_f64(), cpu());
+    let cpu =
+        Cpu { total_s: after.total_s - before.total_s, server_s: after.server_s - before.server_s };
     let memory_mb = memory_mb();
     done.cancel();
     for worker in workers {
@@ -121,32 +132,49 @@ async fn pass_through(url: &str, cases: u32, workers: usize) -> Cost {
     stop.cancel();
     server.await.unwrap().unwrap();
     library.close().await;
-    Cost { seconds, cpu_s, memory_mb }
+    Cost { seconds, cpu, memory_mb }
 }
 
 fn tell(name: &str, cases: u32, workers: usize, cost: &Cost) {
-    let Cost { seconds, cpu_s, memory_mb } = cost;
+    let Cost { seconds, cpu, memory_mb } = cost;
     let cases = f64::from(cases);
     println!(
-        "| {name} | {cases} | {workers} | {:.0} | {:.3} | {memory_mb:.0} |",
+        "| {name} | {cases} | {workers} | {:.0} | {:.3} | {:.3} | {memory_mb:.0} |",
         cases / seconds,
-        1000.0 * cpu_s / cases
+        1000.0 * cpu.total_s / cases,
+        1000.0 * cpu.server_s / cases
     );
 }
 
-async fn measure(engine: &str, cases: u32, workers: usize) {
+async fn through_sqlite(name: &str, cases: u32, workers: usize) {
     let folder =
         tempfile::tempdir_in(std::env::var("TRACKTWIN_BENCH_DIR").unwrap_or_else(|_| ".".into()))
             .unwrap();
+    let url = format!("sqlite:{}", folder.path().join("l.sqlite").display());
+    tell(name, cases, workers, &pass_through(&url, cases, workers).await);
+}
+
+async fn through_postgres(server: &Server, name: &str, cases: u32, workers: usize) {
+    let database = server.database();
+    tell(name, cases, workers, &pass_through(&database, cases, workers).await);
+    server.remove(&database);
+    server.checkpoint();
+}
+
+/// Passes cases through a first library and, when that is removed, through a second one: with the first
+/// the machine finds memory for files, and a fresh server fills the files of its log with zeros.
+async fn measure(engine: &str, cases: u32) {
     if engine == "sqlite" {
-        let url = format!("sqlite:{}", folder.path().join("l.sqlite").display());
-        let cost = pass_through(&url, cases, workers).await;
-        return tell("SQLite, synchronous=FULL", cases, workers, &cost);
+        for name in ["SQLite, synchronous=FULL, first", "SQLite, synchronous=FULL"] {
+            through_sqlite(name, cases, 2).await;
+        }
+        return;
     }
     let durable = test_postgres::Settings { durable: true };
     let Some(server) = Server::start(durable) else { return };
-    let cost = pass_through(&server.database(), cases, workers).await;
-    tell("PostgreSQL, fsync", cases, workers, &cost);
+    for name in ["PostgreSQL, fsync, first", "PostgreSQL, fsync"] {
+        through_postgres(&server, name, cases, 2).await;
+    }
 }
 
 fn main() {
@@ -155,20 +183,22 @@ fn main() {
     let cases: u32 = cases.map_or(20_000, |text| text.parse().expect("--cases N"));
     let what = arguments.first().filter(|it| !it.starts_with('-')).map_or("throughput", |it| it);
     let runtime = tokio::runtime::Runtime::new().unwrap();
-    println!("| library | cases | workers | cases a second | CPU in ms a case | memory in MB |");
-    println!("|---|---|---|---|---|---|");
+    println!(
+        "| library | cases | workers | cases a second | CPU in ms a case | of it the server's | memory in MB |"
+    );
+    println!("|---|---|---|---|---|---|---|");
     runtime.block_on(async {
         match what {
-            "sqlite" | "postgres" => measure(what, cases, 2).await,
-            "workers" => measure("sqlite", cases, 1000).await,
+            "sqlite" | "postgres" => measure(what, cases).await,
+            "workers" => through_sqlite("SQLite, synchronous=FULL", cases, 1000).await,
             "memory" => {
                 for cases in [cases / 10, cases] {
-                    measure("sqlite", cases, 2).await;
+                    through_sqlite("SQLite, synchronous=FULL", cases, 2).await;
                 }
             }
             _ => {
-                measure("sqlite", cases, 2).await;
-                measure("postgres", cases, 2).await;
+                measure("sqlite", cases).await;
+                measure("postgres", cases).await;
             }
         }
     });

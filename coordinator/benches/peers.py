@@ -102,7 +102,7 @@ def of_farm(cases):
     )
     for line in said.stdout.splitlines():
         fields = [field.strip() for field in line.strip("| \n").split("|")]
-        if len(fields) == 6 and fields[1].isdigit():
+        if len(fields) == 7 and fields[1].isdigit():
             yield fields[0], float(fields[3]), float(fields[4])
 
 

@@ -10,7 +10,9 @@ const PROTO_ROOT: &str = "../../proto";
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed={PROTO_ROOT}");
     let mut descriptors = protox::compile(["farm/v1/farm.proto"], [PROTO_ROOT])?;
-    take_as_it_lies(&mut descriptors, "PassFeatures", "log_power")?;
+    for field in ["log_power", "band_levels_db"] {
+        take_as_it_lies(&mut descriptors, "PassFeatures", field)?;
+    }
     tonic_prost_build::configure().bytes(".farm.v1.PassFeatures").compile_fds(descriptors)?;
     Ok(())
 }

@@ -10,6 +10,7 @@ use tracktwin_protocol::farm::farm_client::FarmClient;
 use tracktwin_protocol::farm::{
     self as messages, LeaseRequest, RegisterRequest, ReportRequest, Verdict,
 };
+use tracktwin_signal::ThirdOctave;
 use tracktwin_worker::MODEL_HASH;
 use tracktwin_worker::agent::{self, AgentError, Config};
 
@@ -173,7 +174,7 @@ async fn malformed_reports_are_refused_and_the_service_goes_on() {
     nan.cases[0].outcome = Some(messages::case_report::Outcome::Passes(changed));
     let mut short = good.clone();
     let mut changed = passes(&mut short);
-    changed.passes[0].band_levels_db.pop();
+    changed.passes[0].band_levels_db.truncate((ThirdOctave::COUNT - 1) * size_of::<f64>());
     short.cases[0].outcome = Some(messages::case_report::Outcome::Passes(changed));
     let mut empty = good.clone();
     empty.cases[0].outcome = None;

@@ -75,7 +75,8 @@ impl From<CaseReport> for farm::CaseReport {
 impl From<PassFeatures> for farm::PassFeatures {
     fn from(PassFeatures { speed_km_h, features }: PassFeatures) -> Self {
         let Features { log_power, band_levels_db } = features;
-        Self { speed_km_h, log_power: as_bytes(&log_power), band_levels_db }
+        let (log_power, band_levels_db) = (as_bytes(&log_power), as_bytes(&band_levels_db));
+        Self { speed_km_h, log_power, band_levels_db }
     }
 }
 
@@ -126,13 +127,16 @@ fn checked_passes(
     if found != shape.speeds_km_h {
         return Err(BadMessage::WrongSpeeds { index, found, expected: shape.speeds_km_h.clone() });
     }
-    let of_length = |field, values: Vec<f64>, expected| match values.len() {
-        found if found == expected => finite(field, values),
-        found => Err(BadMessage::WrongLength { index, field, found, expected }),
+    let of_length = |field, bytes: &[u8], expected| {
+        let values = from_bytes(bytes);
+        match values.len() {
+            found if found == expected => finite(field, values),
+            found => Err(BadMessage::WrongLength { index, field, found, expected }),
+        }
     };
     let pass = |message: farm::PassFeatures| {
-        let log_power = of_length("log_power", from_bytes(&message.log_power), shape.bins)?;
-        let levels = of_length("band_levels_db", message.band_levels_db, ThirdOctave::COUNT)?;
+        let log_power = of_length("log_power", &message.log_power, shape.bins)?;
+        let levels = of_length("band_levels_db", &message.band_levels_db, ThirdOctave::COUNT)?;
         let features = Features { log_power, band_levels_db: levels };
         Ok(PassFeatures { speed_km_h: message.speed_km_h, features })
     };
@@ -147,8 +151,9 @@ fn as_bytes(numbers: &[f64]) -> Bytes {
 /// The numbers that lie in a message; a piece at the end is not a number.
 fn from_bytes(bytes: &[u8]) -> Vec<f64> {
     let (whole, piece) = bytes.as_chunks();
-    let piece = (!piece.is_empty()).then_some(f64::NAN);
-    whole.iter().map(|number| f64::from_le_bytes(*number)).chain(piece).collect()
+    let mut numbers: Vec<f64> = whole.iter().map(|number| f64::from_le_bytes(*number)).collect();
+    numbers.extend((!piece.is_empty()).then_some(f64::NAN));
+    numbers
 }
 
 /// In one line that is not endless, and that any database takes.

@@ -106,6 +106,17 @@ impl Server {
         succeed(command.args(["-h", "127.0.0.1", "-U", "postgres", "-p", &port, "--force", name]));
     }
 
+    /// Has everything written to the files of tables, so that the log's can be used again.
+    ///
+    /// # Panics
+    /// When that fails.
+    pub fn checkpoint(&self) {
+        let mut command = Command::new(self.programs.join("psql"));
+        let port = self.port.to_string();
+        command.args(["-h", "127.0.0.1", "-U", "postgres", "-p", &port, "-qc", "checkpoint"]);
+        succeed(&mut command);
+    }
+
     /// Stops the server, as an administrator would: connections end, data stay.
     ///
     /// # Panics

@@ -59,6 +59,29 @@ const FAULTS: [(&str, &str); 6] = [
     ),
 ];
 
+/// Statements that count what lies about in a server's library, where no foreign key looks for a result's case
+/// or a series' result (docs/decisions/0035), and find its first index.
+const LOOSE: [(&str, &str); 3] = [
+    (
+        "results of cases that are not there",
+        "select count(*) as n, min(sobol_index) as first_index from case_result
+        left join campaign_case using (campaign_id, sobol_index) where state is null",
+    ),
+    (
+        "results without their series",
+        "select count(*) as n, min(sobol_index) as first_index from case_result
+        cross join unnest(speeds_km_h) as of (speed_km_h)
+        left join case_series
+            on result_id = id and case_series.speed_km_h = of.speed_km_h
+        where result_id is null",
+    ),
+    (
+        "series without their results",
+        "select count(*) as n, cast(null as bigint) as first_index from case_series
+        left join case_result on id = result_id where id is null",
+    ),
+];
+
 impl Library {
     /// Looks over everything: hashes, gaps, duplicates, numbers that are none, counts, and with
     /// `SQLite` the file itself. Empty when nothing is wrong.
@@ -66,7 +89,10 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
     pub async fn verify(&self) -> Result<Vec<Finding>, LibraryError> {
-        let mut findings = self.damage_of_the_file().await?;
+        let mut findings = match self.readers().dialect() {
+            Dialect::Sqlite => self.damage_of_the_file().await?,
+            Dialect::Postgres => self.what_lies_about().await?,
+        };
         for campaign in self.campaigns().await? {
             verify_definition(&campaign, &mut findings);
             for (what, ask) in FAULTS {
@@ -82,9 +108,6 @@ impl Library {
     }
 
     async fn damage_of_the_file(&self) -> Result<Vec<Finding>, LibraryError> {
-        if self.readers().dialect() == Dialect::Postgres {
-            return Ok(Vec::new());
-        }
         let rows =
             self.readers().rows(sql("select integrity_check from pragma_integrity_check")).await?;
         let mut findings = Vec::new();
@@ -94,6 +117,20 @@ impl Library {
                 findings.push(Finding { place: self.name(), what, count: 1, first_index: None });
             }
         }
+        Ok(findings)
+    }
+
+    async fn what_lies_about(&self) -> Result<Vec<Finding>, LibraryError> {
+        let mut findings = Vec::new();
+        for (what, ask) in LOOSE {
+            let Some(row) = self.readers().row(sql(ask)).await? else { continue };
+            let count = row.get_u32("n")?.into();
+            let first: Option<i64> = row.get("first_index")?;
+            let first_index = first.and_then(|index| u32::try_from(index).ok());
+            let place = self.name();
+            findings.push(Finding { place, what: what.to_owned(), count, first_index });
+        }
+        findings.retain(|finding| finding.count > 0);
         Ok(findings)
     }
 
@@ -141,8 +178,8 @@ impl Library {
         findings: &mut Vec<Finding>,
     ) -> Result<(), LibraryError> {
         let bins = self.bins(&campaign.experiment_hash).await?;
-        let ask =
-            sql("select * from result where campaign_id = $1 order by sobol_index, speed_km_h");
+        let ask = sql("select * from result where campaign_id = $1 and log_power is not null
+                order by sobol_index, speed_km_h");
         let mut rows = self.readers().stream(ask.bind(&campaign.id));
         let (mut finite, mut shape) = (Fault::default(), Fault::default());
         while let Some(row) = rows.next().await {

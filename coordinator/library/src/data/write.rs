@@ -143,8 +143,7 @@ impl Write for Rows {
         let values = dialect.rows_of_values(self.rows.len(), self.table.columns.len());
         if self.table.name == "result" && dialect == Dialect::Postgres {
             let gather = self.bound(result::gathering(&list, &values))?;
-            result::lock(connection, self.texts("campaign_id"), self.integers("sobol_index"))
-                .await?;
+            self.lock_cases(connection).await?;
             let rows = connection.rows(gather).await?;
             self.settle(connection).await?;
             return rows.first().map_or(Ok(0), |row| row.get_u32("added").map(u64::from));
@@ -176,6 +175,19 @@ impl Rows {
             connection.execute(settle).await?;
         }
         Ok(())
+    }
+
+    /// Locks the cases of these results, which must all be there.
+    async fn lock_cases(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let (campaigns, indices) = (self.texts("campaign_id"), self.integers("sobol_index"));
+        let cases: HashSet<_> = campaigns.iter().zip(&indices).collect();
+        let expected = cases.len() as u64;
+        let found = result::lock(connection, campaigns.clone(), indices.clone()).await?;
+        if found == expected {
+            return Ok(());
+        }
+        let what = format!("{} of {expected} cases are not in campaign_case", expected - found);
+        Err(LibraryError::BadRow { table: self.table.name, what })
     }
 
     /// A statement with the cells of all rows.

@@ -72,11 +72,11 @@ impl Value {
     /// Series after each other, as one.
     pub(crate) fn series<'a>(parts: impl IntoIterator<Item = &'a [f64], IntoIter: Clone>) -> Self {
         let parts = parts.into_iter();
-        let mut bytes = Vec::with_capacity(parts.clone().map(size_of_val).sum());
-        for number in parts.flatten() {
-            bytes.extend_from_slice(&number.to_be_bytes());
+        let mut numbers = Vec::with_capacity(parts.clone().map(<[f64]>::len).sum());
+        for part in parts {
+            numbers.extend(part.iter().map(|number| number.to_be_bytes()));
         }
-        Self::Series(Some(bytes))
+        Self::Series(Some(numbers.into_flattened()))
     }
 }
 

@@ -1,4 +1,4 @@
-//! A row a case, as a server has it.
+//! A row a case, and a row for the series of a pass, as a server has it.
 
 use super::LEVEL_COLUMNS;
 use crate::LibraryError;
@@ -7,28 +7,34 @@ use crate::report::{CaseReport, Report};
 use tracktwin_signal::Features;
 
 /// Cases in one statement: what is read and copied again and again on both sides stays in the cache.
-const CASES_A_STATEMENT: usize = 32;
+const CASES_A_STATEMENT: usize = 64;
 
-/// A row a case. Over a network many go in one statement: their levels and series travel one after the
-/// other, and every row takes its stretch.
+/// Over a network many cases go in one statement: their levels and series travel one after the other, and
+/// every row takes its stretch.
 pub(super) async fn insert(
     connection: &mut Connection,
     report: &Report,
     finished: &[(&CaseReport, &[Features])],
     flagged: Option<String>,
 ) -> Result<(), LibraryError> {
-    let insert = "insert into case_result (campaign_id, worker, code_version, model_hash,
-            experiment_hash, finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash,
-            levels_dB, log_power, flagged)
-        select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash,
-            ($11)[levels * (place - 1) + 1:levels * place],
-            substring($12 from bytes * (place - 1) + 1 for bytes), $13
-        from (
-            select sobol_index, duration_s, parameter_hash, cast(place as integer) as place,
-                cardinality($11) / cardinality($8) as levels,
-                length($12) / cardinality($8) as bytes
+    let insert = "with given as (
+            select sobol_index, duration_s, parameter_hash, cast(place as integer) as place
             from unnest($8, $9, $10) with ordinality
-                as of (sobol_index, duration_s, parameter_hash, place)) as cases";
+                as of (sobol_index, duration_s, parameter_hash, place)),
+        size as (
+            select cardinality($7) as passes, cardinality($11) / cardinality($8) as levels,
+                length($12) / (cardinality($8) * cardinality($7)) as bytes),
+        stored as (
+            insert into case_result (campaign_id, worker, code_version, model_hash, experiment_hash,
+                finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash, levels_dB, flagged)
+            select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash,
+                ($11)[levels * (place - 1) + 1:levels * place], $13
+            from given, size
+            returning id, sobol_index)
+        insert into case_series (result_id, speed_km_h, log_power)
+        select id, ($7)[pass],
+            substring($12 from bytes * (passes * (place - 1) + pass - 1) + 1 for bytes)
+        from stored join given using (sobol_index), size, generate_series(1, passes) as pass";
     let finished_at = iso_utc(report.now_unix_ms);
     for cases in finished.chunks(CASES_A_STATEMENT) {
         let passes = || cases.iter().flat_map(|(_, features)| features.iter());
@@ -53,16 +59,17 @@ pub(super) async fn insert(
     Ok(())
 }
 
-/// Keeps others from writing results of these cases before this transaction ends.
+/// Keeps others from writing results of these cases before this transaction ends; answers how many of them
+/// are there.
 pub(crate) async fn lock(
     connection: &mut Connection,
     campaigns: Vec<String>,
     indices: Vec<i64>,
-) -> Result<(), LibraryError> {
+) -> Result<u64, LibraryError> {
     let lock = "select sobol_index from campaign_case
-        where campaign_id = any($1) and sobol_index = any($2)
+        where (campaign_id, sobol_index) in (select * from unnest($1, $2))
         order by campaign_id, sobol_index for update";
-    connection.execute(sql(lock).bind(Value::Texts(campaigns)).bind(indices)).await.map(drop)
+    connection.execute(sql(lock).bind(Value::Texts(campaigns)).bind(indices)).await
 }
 
 /// A statement that adds passes which stand in `values` in the columns `columns` of `result`, and answers
@@ -78,19 +85,18 @@ pub(crate) fn gathering(columns: &str, values: &str) -> String {
             where (campaign_id, sobol_index, speed_km_h)
                 not in (select campaign_id, sobol_index, speed_km_h from here)),
         gathered as (
-            insert into case_result (campaign_id, sobol_index, speeds_km_h, levels_dB, log_power,
-                duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash,
-                finished_at, flagged)
+            insert into case_result (campaign_id, sobol_index, speeds_km_h, levels_dB, duration_s,
+                worker, code_version, model_hash, experiment_hash, parameter_hash, finished_at,
+                flagged)
             select campaign_id, sobol_index, speeds_km_h,
                 array(select level from unnest(levels) with ordinality as of (level, place)
                     order by place),
-                log_power, duration_s, worker, code_version, model_hash, experiment_hash,
-                parameter_hash, finished_at, flagged
+                duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash,
+                finished_at, flagged
             from (
                 select campaign_id, sobol_index,
                     array_agg(speed_km_h order by speed_km_h) as speeds_km_h,
                     array_agg(array[{levels}] order by speed_km_h) as levels,
-                    string_agg(log_power, ''::bytea order by speed_km_h) as log_power,
                     max(duration_s) as duration_s, max(worker) as worker,
                     max(code_version) as code_version, max(model_hash) as model_hash,
                     max(experiment_hash) as experiment_hash,
@@ -99,8 +105,12 @@ pub(crate) fn gathering(columns: &str, values: &str) -> String {
                 from (select * from here union all select * from added) as passes
                 group by campaign_id, sobol_index) as cases
             on conflict (campaign_id, sobol_index) do update set
-                speeds_km_h = excluded.speeds_km_h, levels_dB = excluded.levels_dB,
-                log_power = excluded.log_power)
+                speeds_km_h = excluded.speeds_km_h, levels_dB = excluded.levels_dB
+            returning id, campaign_id, sobol_index),
+        series as (
+            insert into case_series (result_id, speed_km_h, log_power)
+            select id, speed_km_h, log_power
+            from added join gathered using (campaign_id, sobol_index))
         select count(*) as added from added",
         levels = LEVEL_COLUMNS.join(", ")
     )

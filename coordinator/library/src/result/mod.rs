@@ -1,7 +1,7 @@
 //! `result`: what came out of each case at each speed.
 //!
-//! With `SQLite` a table of a row a pass, with PostgreSQL a view of `case_result`, which has a row a
-//! case: docs/decisions/0030.
+//! With `SQLite` a table of a row a pass; with PostgreSQL a view of `case_result`, which has a row a
+//! case, and `case_series`, which has a row a pass: docs/decisions/0030 and 0035.
 
 mod by_case;
 mod by_pass;
