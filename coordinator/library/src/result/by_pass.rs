@@ -2,15 +2,17 @@
 
 use super::LEVEL_COLUMNS;
 use crate::LibraryError;
-use crate::engine::{Connection, Dialect, iso_utc, sql};
+use crate::engine::{Connection, iso_utc, sql};
 use crate::report::{CaseReport, Report};
 use tracktwin_signal::Features;
 
-/// The columns that are one for a whole report, and then those that are not.
+/// The columns that are one for a whole report, and then those that are not, without the levels.
 const INSERT: &str = "insert into result (campaign_id, worker, code_version, model_hash,
     experiment_hash, finished_at, flagged, sobol_index, speed_km_h, duration_s, parameter_hash, log_power";
+const OF_A_REPORT: usize = 7;
+const OF_A_PASS: usize = 5 + LEVEL_COLUMNS.len();
 
-/// Rows in one statement at most: 64 rows of 32 values stay well below the 32,766 that `SQLite` takes.
+/// Rows in one statement at most: 64 rows of 25 values stay well below the 32,766 that `SQLite` takes.
 const ROWS_MAX: usize = 64;
 
 /// Statements of as many rows as a power of two, so that there are few to prepare: each costs a turn
@@ -31,17 +33,10 @@ pub(super) async fn insert(
     while !rest.is_empty() {
         let largest = 1 << rest.len().ilog2();
         let (rows, after) = rest.split_at(ROWS_MAX.min(largest));
-        let places = Dialect::Sqlite.rows_of_values(rows.len(), 12 + LEVEL_COLUMNS.len());
-        let mut insert = sql(format!("{INSERT}, {}) values {places}", LEVEL_COLUMNS.join(", ")));
+        let mut insert =
+            sql(format!("{INSERT}, {}) values {}", LEVEL_COLUMNS.join(", "), places(rows.len())));
         for (case, speed_km_h, features) in rows {
             insert = insert
-                .bind(&report.campaign)
-                .bind(&report.worker)
-                .bind(&report.code_version)
-                .bind(&report.model_hash)
-                .bind(&report.experiment_hash)
-                .bind(&finished_at)
-                .bind(flagged.clone())
                 .bind(case.index)
                 .bind(*speed_km_h)
                 .bind(case.duration_s)
@@ -50,8 +45,26 @@ pub(super) async fn insert(
             let levels = &features.band_levels_db;
             insert = levels.iter().fold(insert, |insert, &level| insert.bind(level));
         }
+        let insert = insert
+            .bind(&report.campaign)
+            .bind(&report.worker)
+            .bind(&report.code_version)
+            .bind(&report.model_hash)
+            .bind(&report.experiment_hash)
+            .bind(&finished_at)
+            .bind(flagged.clone());
         connection.execute(insert).await?;
         rest = after;
     }
     Ok(())
+}
+
+/// So many rows of a report's values, which stand once behind those of all passes, and of a pass's own.
+///
+/// Values without a name are taken in order, whatever names stand between them.
+fn places(rows: usize) -> String {
+    let of_report: Vec<_> =
+        (1..=OF_A_REPORT).map(|value| format!("${}", rows * OF_A_PASS + value)).collect();
+    let row = format!("({}, {})", of_report.join(", "), ["?"; OF_A_PASS].join(", "));
+    vec![row; rows].join(", ")
 }
