@@ -76,18 +76,24 @@ fn is_series(name: &str) -> bool {
     columns.any(|column| column.kind == ColumnKind::Doubles && column.name == name)
 }
 
+/// Types that [`postgres_cell`] reads otherwise than as text.
+const POSTGRES_NUMBERS: [&str; 9] =
+    ["BOOL", "INT2", "INT4", "INT8", "FLOAT4", "FLOAT8", "FLOAT8[]", "BYTEA", "NUMERIC"];
+
+/// Types that PostgreSQL sends as the text itself.
+const POSTGRES_TEXTS: [&str; 6] = ["TEXT", "VARCHAR", "CHAR", "NAME", "UNKNOWN", "JSON"];
+
+/// Whether there are cells for a type of PostgreSQL's.
+pub(super) fn is_postgres_cell(kind: &str) -> bool {
+    POSTGRES_NUMBERS.contains(&kind) || POSTGRES_TEXTS.contains(&kind)
+}
+
 fn postgres_cell(row: &PgRow, place: usize, name: &str) -> Result<Cell, LibraryError> {
     let value = row.try_get_raw(place)?;
     if value.is_null() {
         return Ok(Cell::Null);
     }
-    let kind = value.type_info().name().to_owned();
-    let unknown = || LibraryError::BadQuery {
-        reason: format!(
-            "column {name} is of type {kind}: cast it to text, as in cast({name} as text)"
-        ),
-    };
-    Ok(match kind.as_str() {
+    Ok(match value.type_info().name() {
         "BOOL" => Cell::Boolean(row.try_get(place)?),
         "INT2" => Cell::Integer(row.try_get::<i16, _>(place)?.into()),
         "INT4" => Cell::Integer(row.try_get::<i32, _>(place)?.into()),
@@ -96,11 +102,11 @@ fn postgres_cell(row: &PgRow, place: usize, name: &str) -> Result<Cell, LibraryE
         "FLOAT8" => Cell::Real(row.try_get(place)?),
         "FLOAT8[]" => Cell::Doubles(row.try_get(place)?),
         "BYTEA" => bytes_cell(row.try_get(place)?, name),
-        "NUMERIC" => numeric(&value).ok_or_else(unknown)?,
-        "TEXT" | "VARCHAR" | "CHAR" | "NAME" | "UNKNOWN" | "JSON" => {
-            Cell::Text(row.try_get_unchecked(place)?)
+        "NUMERIC" => {
+            let unreadable = || LibraryError::BadQuery { reason: format!("{name} is no number") };
+            numeric(&value).ok_or_else(unreadable)?
         }
-        _ => return Err(unknown()),
+        _ => Cell::Text(row.try_get_unchecked(place)?),
     })
 }
 

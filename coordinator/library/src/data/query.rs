@@ -3,10 +3,11 @@
 use super::{Cell, decode, question, schema};
 use crate::engine::{Dialect, Row, Target};
 use crate::{Library, LibraryError};
-use sqlx::postgres::PgConnectOptions;
+use sqlx::postgres::{PgColumn, PgConnectOptions};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{
-    AssertSqlSafe, ConnectOptions, Executor, PgConnection, SqlSafeStr, SqliteConnection, Statement,
+    AssertSqlSafe, Column, ConnectOptions, Executor, PgConnection, SqlSafeStr, SqliteConnection,
+    Statement, TypeInfo,
 };
 use std::path::Path;
 use tokio_stream::StreamExt;
@@ -71,10 +72,14 @@ async fn postgres<A: Answer>(
     let mut connection: PgConnection = options.connect().await.map_err(LibraryError::from)?;
     // The protocol takes one statement at a time, so this transaction is all that it can end.
     connection.execute("begin transaction read only").await.map_err(LibraryError::from)?;
-    let text = AssertSqlSafe(text.to_owned()).into_sql_str();
-    let statement = connection.prepare(text).await.map_err(refused)?;
+    let asked = AssertSqlSafe(text.to_owned()).into_sql_str();
+    let mut statement = connection.prepare(asked).await.map_err(refused)?;
     let columns = names(statement.columns());
     answer.columns(&columns)?;
+    if let Some(text) = with_texts(text, statement.columns()) {
+        let text = AssertSqlSafe(text).into_sql_str();
+        statement = connection.prepare(text).await.map_err(refused)?;
+    }
     let mut rows = statement.query().fetch(&mut connection);
     while let Some(row) = rows.next().await {
         let row = Row::Postgres(row.map_err(refused)?);
@@ -83,7 +88,27 @@ async fn postgres<A: Answer>(
     Ok(())
 }
 
-fn names<C: sqlx::Column>(columns: &[C]) -> Vec<String> {
+/// The same question with times, arrays of integers and whatever else no cell is made for as texts, as the
+/// server writes them; none where there are no such columns.
+fn with_texts(text: &str, columns: &[PgColumn]) -> Option<String> {
+    let is_cell = |column: &PgColumn| decode::is_postgres_cell(column.type_info().name());
+    if columns.iter().all(is_cell) {
+        return None;
+    }
+    // Names need not be different.
+    let places: Vec<_> = (1..=columns.len()).map(|place| format!("column_{place}")).collect();
+    let shown = columns.iter().zip(&places).map(|(column, place)| {
+        if is_cell(column) { place.clone() } else { format!("cast({place} as text)") }
+    });
+    Some(format!(
+        "select {} from ({}\n) as asked ({})",
+        shown.collect::<Vec<_>>().join(", "),
+        text.trim_end().trim_end_matches(';'),
+        places.join(", ")
+    ))
+}
+
+fn names<C: Column>(columns: &[C]) -> Vec<String> {
     columns.iter().map(|column| schema::spelled(column.name()).to_owned()).collect()
 }
 

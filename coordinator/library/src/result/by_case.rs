@@ -9,6 +9,27 @@ use tracktwin_signal::Features;
 /// Cases in one statement: what is read and copied again and again on both sides stays in the cache.
 const CASES_A_STATEMENT: usize = 64;
 
+/// Rows of cases and passes out of lists: what is one for a report in $1 to $7 and $13, cases in $8 to $10,
+/// their levels ($11) and series ($12) one after the other.
+const INSERT: &str = "with given as (
+        select sobol_index, duration_s, parameter_hash, cast(place as integer) as place
+        from unnest($8, $9, $10) with ordinality
+            as of (sobol_index, duration_s, parameter_hash, place)),
+    size as (
+        select cardinality($7) as passes, cardinality($11) / cardinality($8) as levels,
+            length($12) / (cardinality($8) * cardinality($7)) as bytes),
+    stored as (
+        insert into case_result (campaign_id, worker, code_version, model_hash, experiment_hash,
+            finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash, levels_dB, flagged)
+        select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash,
+            ($11)[levels * (place - 1) + 1:levels * place], $13
+        from given, size
+        returning id, sobol_index)
+    insert into case_series (result_id, speed_km_h, log_power)
+    select id, ($7)[pass],
+        substring($12 from bytes * (passes * (place - 1) + pass - 1) + 1 for bytes)
+    from stored join given using (sobol_index), size, generate_series(1, passes) as pass";
+
 /// Over a network many cases go in one statement: their levels and series travel one after the other, and
 /// every row takes its stretch.
 pub(super) async fn insert(
@@ -17,30 +38,12 @@ pub(super) async fn insert(
     finished: &[(&CaseReport, &[Features])],
     flagged: Option<String>,
 ) -> Result<(), LibraryError> {
-    let insert = "with given as (
-            select sobol_index, duration_s, parameter_hash, cast(place as integer) as place
-            from unnest($8, $9, $10) with ordinality
-                as of (sobol_index, duration_s, parameter_hash, place)),
-        size as (
-            select cardinality($7) as passes, cardinality($11) / cardinality($8) as levels,
-                length($12) / (cardinality($8) * cardinality($7)) as bytes),
-        stored as (
-            insert into case_result (campaign_id, worker, code_version, model_hash, experiment_hash,
-                finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash, levels_dB, flagged)
-            select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash,
-                ($11)[levels * (place - 1) + 1:levels * place], $13
-            from given, size
-            returning id, sobol_index)
-        insert into case_series (result_id, speed_km_h, log_power)
-        select id, ($7)[pass],
-            substring($12 from bytes * (passes * (place - 1) + pass - 1) + 1 for bytes)
-        from stored join given using (sobol_index), size, generate_series(1, passes) as pass";
     let finished_at = iso_utc(report.now_unix_ms);
     for cases in finished.chunks(CASES_A_STATEMENT) {
         let passes = || cases.iter().flat_map(|(_, features)| features.iter());
         let indices: Vec<i64> = cases.iter().map(|(case, _)| case.index.into()).collect();
         let hashes = cases.iter().map(|(case, _)| case.parameter_hash.clone()).collect();
-        let insert = sql(insert)
+        let insert = sql(INSERT)
             .bind(&report.campaign)
             .bind(&report.worker)
             .bind(&report.code_version)

@@ -349,6 +349,29 @@ async fn what_no_foreign_key_keeps_together_on_a_server_is_looked_over() {
 }
 
 #[tokio::test]
+async fn what_only_a_server_has_types_for_is_shown_as_it_writes_it() {
+    let Some(home) = Home::postgres() else { return };
+    let library = home.library(2).await;
+    let answer = ask(
+        &library,
+        "select sobol_index as n, 7 as n, to_timestamp(0) at time zone 'utc' as began,
+            date '2026-11-24' as day, interval '90 s' as lasted, array[1, 2] as \"both\",
+            cast(null as date) as never
+        from campaign_case order by sobol_index desc; ",
+    )
+    .await;
+    assert_eq!(answer.columns, ["n", "n", "began", "day", "lasted", "both", "never"]);
+    let row = |n| {
+        let texts = ["1970-01-01 00:00:00", "2026-11-24", "00:01:30", "{1,2}"];
+        let mut row = vec![Cell::Integer(n), Cell::Integer(7)];
+        row.extend(texts.map(|text| Cell::Text(text.to_owned())));
+        row.push(Cell::Null);
+        row
+    };
+    assert_eq!(answer.rows, [row(1), row(0)]);
+}
+
+#[tokio::test]
 async fn no_statement_writes_another_file() {
     let home = Home::sqlite();
     let library = some_of_all(&home).await;
