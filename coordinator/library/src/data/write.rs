@@ -180,9 +180,8 @@ impl Rows {
     /// Locks the cases of these results, which must all be there.
     async fn lock_cases(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let (campaigns, indices) = (self.texts("campaign_id"), self.integers("sobol_index"));
-        let cases: HashSet<_> = campaigns.iter().zip(&indices).collect();
-        let expected = cases.len() as u64;
-        let found = result::lock(connection, campaigns.clone(), indices.clone()).await?;
+        let expected = campaigns.iter().zip(&indices).collect::<HashSet<_>>().len() as u64;
+        let found = result::lock(connection, campaigns, indices).await?;
         if found == expected {
             return Ok(());
         }

@@ -1,8 +1,8 @@
 //! A row a case, and a row for the series of a pass, as a server has it.
 
-use super::LEVEL_COLUMNS;
+use super::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
-use crate::engine::{Connection, Value, iso_utc, sql};
+use crate::engine::{Connection, Value, sql};
 use crate::report::{CaseReport, Report};
 use tracktwin_signal::Features;
 
@@ -38,18 +38,11 @@ pub(super) async fn insert(
     finished: &[(&CaseReport, &[Features])],
     flagged: Option<String>,
 ) -> Result<(), LibraryError> {
-    let finished_at = iso_utc(report.now_unix_ms);
     for cases in finished.chunks(CASES_A_STATEMENT) {
         let passes = || cases.iter().flat_map(|(_, features)| features.iter());
         let indices: Vec<i64> = cases.iter().map(|(case, _)| case.index.into()).collect();
         let hashes = cases.iter().map(|(case, _)| case.parameter_hash.clone()).collect();
-        let insert = sql(INSERT)
-            .bind(&report.campaign)
-            .bind(&report.worker)
-            .bind(&report.code_version)
-            .bind(&report.model_hash)
-            .bind(&report.experiment_hash)
-            .bind(&finished_at)
+        let insert = of_report(sql(INSERT), report)
             .bind(Value::Reals(report.speeds_km_h.clone()))
             .bind(indices)
             .bind(Value::Reals(cases.iter().map(|(case, _)| case.duration_s).collect()))

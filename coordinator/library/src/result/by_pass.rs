@@ -1,8 +1,8 @@
 //! A row a pass, as a file has it.
 
-use super::LEVEL_COLUMNS;
+use super::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
-use crate::engine::{Connection, iso_utc, sql};
+use crate::engine::{Connection, sql};
 use crate::report::{CaseReport, Report};
 use tracktwin_signal::Features;
 
@@ -28,7 +28,6 @@ pub(super) async fn insert(
         speeds.zip(features).map(move |(&speed_km_h, features)| (case, speed_km_h, features))
     });
     let passes: Vec<_> = passes.collect();
-    let finished_at = iso_utc(report.now_unix_ms);
     let mut rest = &passes[..];
     while !rest.is_empty() {
         let largest = 1 << rest.len().ilog2();
@@ -45,14 +44,7 @@ pub(super) async fn insert(
             let levels = &features.band_levels_db;
             insert = levels.iter().fold(insert, |insert, &level| insert.bind(level));
         }
-        let insert = insert
-            .bind(&report.campaign)
-            .bind(&report.worker)
-            .bind(&report.code_version)
-            .bind(&report.model_hash)
-            .bind(&report.experiment_hash)
-            .bind(&finished_at)
-            .bind(flagged.clone());
+        let insert = of_report(insert, report).bind(flagged.clone());
         connection.execute(insert).await?;
         rest = after;
     }

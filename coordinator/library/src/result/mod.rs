@@ -9,7 +9,7 @@ mod by_pass;
 pub(crate) use by_case::{gathering, lock};
 
 use crate::case::case_of;
-use crate::engine::{Connection, Dialect, Row, sql};
+use crate::engine::{Connection, Dialect, Row, Statement, iso_utc, sql};
 use crate::report::{CaseReport, Report};
 use crate::{Library, LibraryError};
 use tokio_stream::StreamExt;
@@ -99,6 +99,17 @@ pub(crate) fn features_of(row: &Row) -> Result<Features, LibraryError> {
     let levels = LEVEL_COLUMNS.iter().map(|&column| row.get(column));
     let band_levels_db = levels.collect::<Result<_, _>>()?;
     Ok(Features { log_power: row.doubles("log_power")?, band_levels_db })
+}
+
+/// Binds what both databases keep of a report: campaign, worker, version, model, experiment and time.
+fn of_report(insert: Statement, report: &Report) -> Statement {
+    insert
+        .bind(&report.campaign)
+        .bind(&report.worker)
+        .bind(&report.code_version)
+        .bind(&report.model_hash)
+        .bind(&report.experiment_hash)
+        .bind(iso_utc(report.now_unix_ms))
 }
 
 /// The table that results are written to.
