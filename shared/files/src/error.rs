@@ -1,0 +1,94 @@
+//! What may go wrong with files, and who is to mend it.
+
+use crate::{Kind, NameError};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// A file that is not written or not read.
+#[derive(Debug, thiserror::Error)]
+pub enum FilesError {
+    /// A file that the program did not make stands where one is to be written.
+    #[error(
+        "{}: tracktwin did not write this file, or it was changed since, and does not replace it; \
+         give another --out, or --force to replace it",
+        path.display()
+    )]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file of another kind stands where one is to be written.
+    #[error(
+        "{}: belongs to {kind}, which is not replaced; give another --out, or --force to replace it",
+        path.display()
+    )]
+    OtherKind {
+        /// The file.
+        path: PathBuf,
+        /// What it belongs to.
+        kind: Kind,
+    },
+    /// A folder stands where a file is to be written.
+    #[error("{}: is a folder, where a file is to be written; give another --out", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A text can't be the name of a file.
+    #[error("{name:?}: {fault}")]
+    Name {
+        /// The text.
+        name: String,
+        /// Why not.
+        fault: NameError,
+    },
+    /// A file that another file names lies outside its folder.
+    #[error(
+        "{name:?} lies outside {}; a file that is named there must lie in that folder, \
+         and a link must not lead out of it: copy the file into it",
+        folder.display()
+    )]
+    Outside {
+        /// The folder.
+        folder: PathBuf,
+        /// The name.
+        name: String,
+    },
+    /// The operating system refuses.
+    #[error("{}: cannot be {action}: {source}", path.display())]
+    System {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried: "written", "read", "made".
+        action: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+impl FilesError {
+    pub(crate) fn written(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        Self::system(path, "written")
+    }
+
+    pub(crate) fn system(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::System { path, action, source }
+    }
+
+    /// Whether whoever named the file can mend it; all else is the machine's.
+    pub fn is_wrong_input(&self) -> bool {
+        match self {
+            Self::System { source, .. } => matches!(
+                source.kind(),
+                ErrorKind::NotFound
+                    | ErrorKind::NotADirectory
+                    | ErrorKind::IsADirectory
+                    | ErrorKind::AlreadyExists
+                    | ErrorKind::InvalidInput
+                    | ErrorKind::InvalidFilename
+            ),
+            _ => true,
+        }
+    }
+}

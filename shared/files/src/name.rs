@@ -1,0 +1,265 @@
+//! Names of files that are made of foreign text: of columns, speeds, campaigns.
+
+use crate::FilesError;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use unicode_normalization::UnicodeNormalization as _;
+
+/// Most bytes of a name: file systems take 255, and suffixes are added to it.
+const BYTES_MAX: usize = 100;
+
+/// Bytes of it that are kept where digits of a hash follow.
+const BYTES_CUT: usize = 80;
+
+/// Hexadecimal digits of a hash that tell two texts with the same name apart.
+const DIGITS: usize = 8;
+
+/// What a name without one usable character becomes.
+const NAMELESS: &str = "unnamed";
+
+/// Names that Windows keeps for devices, with whatever ending.
+const DEVICES: [&str; 6] = ["con", "prn", "aux", "nul", "conin$", "conout$"];
+
+/// The name of a file or folder, without its folder: the only way from foreign text to a path.
+///
+/// It has letters and digits of any script, spaces, and `. _ - +`; it begins with a letter, digit or
+/// underscore and does not end in a dot or space; it is composed (Unicode NFC), of at most 100
+/// bytes, and no name that an operating system keeps for itself.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct FileName(String);
+
+/// Why a text is no file's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NameError {
+    /// Nothing, or nothing but dots.
+    #[error("is no name of a file; give one")]
+    Empty,
+    /// Too long.
+    #[error("is longer than {BYTES_MAX} bytes; give a shorter name")]
+    Long,
+    /// A character that can't stand there.
+    #[error(
+        "has {0:?} where a file's name cannot; use letters, digits, spaces and . _ - +, and begin \
+         with a letter or digit"
+    )]
+    Character(char),
+    /// A name that operating systems keep for themselves.
+    #[error("is a name that operating systems keep for themselves; give another")]
+    Reserved,
+    /// Letters in pieces: they look like others and are not.
+    #[error("has decomposed letters; write them composed (Unicode NFC)")]
+    Decomposed,
+}
+
+impl FileName {
+    /// The name that a text is.
+    ///
+    /// # Errors
+    /// [`FilesError::Name`] says what can't stand in a name.
+    pub fn new(text: &str) -> Result<Self, FilesError> {
+        match fault(text) {
+            None => Ok(Self(text.to_owned())),
+            Some(fault) => Err(FilesError::Name { name: shown(text), fault }),
+        }
+    }
+
+    /// The file that a user's own path names, and its folder. Only that it is a file's name is
+    /// asked for: who writes it may call it as they like.
+    ///
+    /// # Errors
+    /// [`FilesError::Name`] for a path without a file's name, such as `..` or `/`.
+    pub fn of_path(path: &Path) -> Result<(PathBuf, Self), FilesError> {
+        // A link stays, and what it leads to is written.
+        let real = if path.is_symlink() { path.canonicalize().ok() } else { None };
+        let path = real.as_deref().unwrap_or(path);
+        let name = path.file_name().and_then(|name| name.to_str()).ok_or_else(|| {
+            FilesError::Name { name: shown(&path.to_string_lossy()), fault: NameError::Empty }
+        })?;
+        Ok((crate::partial::folder_of(path).to_owned(), Self(name.to_owned())))
+    }
+
+    /// The name as text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// Where it is in a folder.
+    pub fn within(&self, folder: &Path) -> PathBuf {
+        folder.join(&self.0)
+    }
+
+    /// The same name with the first digits of a hash before its ending.
+    #[must_use]
+    pub(crate) fn marked(&self, hash: &str) -> Self {
+        let digits = &hash[..DIGITS.min(hash.len())];
+        match self.0.rsplit_once('.') {
+            Some((stem, ending)) if !stem.is_empty() => Self(format!("{stem}-{digits}.{ending}")),
+            _ => Self(format!("{}-{digits}", self.0)),
+        }
+    }
+}
+
+impl std::fmt::Display for FileName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// Makes names of texts, no two the same within a folder, whatever the case of their letters.
+#[derive(Clone, Debug, Default)]
+pub struct Names {
+    taken: HashSet<String>,
+}
+
+impl Names {
+    /// A name like `text`: what can't stand in a name becomes an underscore. Of two texts that would
+    /// have one name the second gets digits of its hash.
+    pub fn make(&mut self, text: &str) -> FileName {
+        let mut name = like(text);
+        let mut attempt = 0_u32;
+        while !self.taken.insert(name.to_lowercase()) {
+            attempt += 1;
+            let hash = blake3::hash(format!("{text}\0{attempt}").as_bytes()).to_hex();
+            name = format!("{}-{}", within_bytes(&like(text), BYTES_CUT), &hash[..DIGITS]);
+        }
+        FileName(name)
+    }
+}
+
+/// The longest name that looks like a text.
+fn like(text: &str) -> String {
+    let mut name = String::new();
+    for c in text.nfc() {
+        match c {
+            c if is_usual(c) => name.push(c),
+            // One for several: `/'ABA'/'acc_l'` is ABA_acc_l.
+            _ if name.ends_with('_') => {}
+            _ => name.push('_'),
+        }
+    }
+    let name = name.trim_matches(|c: char| !c.is_alphanumeric());
+    let mut name = within_bytes(name, BYTES_MAX).to_owned();
+    name.truncate(name.trim_end_matches(['.', ' ']).len());
+    if name.is_empty() {
+        NAMELESS.clone_into(&mut name);
+    }
+    if is_reserved(&name) {
+        name.insert(0, '_');
+    }
+    name
+}
+
+fn within_bytes(text: &str, bytes: usize) -> &str {
+    &text[..text.floor_char_boundary(bytes)]
+}
+
+fn is_usual(c: char) -> bool {
+    c.is_alphanumeric() || " ._-+".contains(c)
+}
+
+fn fault(text: &str) -> Option<NameError> {
+    if text.trim_matches(['.', ' ']).is_empty() {
+        return Some(NameError::Empty);
+    }
+    if text.len() > BYTES_MAX {
+        return Some(NameError::Long);
+    }
+    if let Some(wrong) = text.chars().find(|&c| !is_usual(c)) {
+        return Some(NameError::Character(wrong));
+    }
+    if let Some(first) = text.chars().next().filter(|&c| !c.is_alphanumeric() && c != '_') {
+        return Some(NameError::Character(first));
+    }
+    if let Some(last) = text.chars().next_back().filter(|c| ". ".contains(*c)) {
+        return Some(NameError::Character(last));
+    }
+    if !unicode_normalization::is_nfc(text) {
+        return Some(NameError::Decomposed);
+    }
+    is_reserved(text).then_some(NameError::Reserved)
+}
+
+fn is_reserved(name: &str) -> bool {
+    let stem = name.split('.').next().unwrap_or(name).trim_end().to_lowercase();
+    let numbered = |device: &str| {
+        stem.strip_prefix(device).is_some_and(|rest| {
+            rest.chars().count() == 1
+                && rest.chars().all(|c| c.is_ascii_digit() || "¹²³".contains(c))
+        })
+    };
+    DEVICES.contains(&stem.as_str()) || numbered("com") || numbered("lpt")
+}
+
+/// The beginning of a text, for a message.
+fn shown(text: &str) -> String {
+    within_bytes(text, BYTES_MAX).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn foreign_names_become_names_of_files() {
+        for (text, name) in [
+            ("acc", "acc"),
+            ("/x/a", "x_a"),
+            ("../a", "a"),
+            ("/'ABA'/'acc_l'", "ABA_acc_l"),
+            ("..", NAMELESS),
+            ("", NAMELESS),
+            (".hidden", "hidden"),
+            ("-rf", "rf"),
+            ("a\u{202e}b\0c\nd", "a_b_c_d"),
+            ("con.csv", "_con.csv"),
+            ("COM1", "_COM1"),
+            ("Beschl. [m/s²]", "Beschl. _m_s²"),
+            ("u\u{308}ber", "über"),
+            ("加速度", "加速度"),
+        ] {
+            assert_eq!(Names::default().make(text).as_str(), name, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn two_texts_never_have_one_name() {
+        let mut names = Names::default();
+        let texts = ["a/b", "a_b", "A/B", "a:b", "a/b", "a/b", &"x".repeat(300), &"x".repeat(301)];
+        let made: HashSet<String> =
+            texts.iter().map(|text| names.make(text).as_str().to_lowercase()).collect();
+        assert_eq!(made.len(), texts.len(), "{made:?}");
+    }
+
+    #[test]
+    fn what_is_no_name_is_refused_with_the_reason() {
+        let refused = |text: &str| match FileName::new(text).unwrap_err() {
+            FilesError::Name { fault, .. } => fault,
+            other => panic!("{other}"),
+        };
+        for text in ["", ".", "..", " "] {
+            assert_eq!(refused(text), NameError::Empty);
+        }
+        assert_eq!(refused("a/b"), NameError::Character('/'));
+        assert_eq!(refused("a\\b"), NameError::Character('\\'));
+        assert_eq!(refused(".a"), NameError::Character('.'));
+        assert_eq!(refused("a\0"), NameError::Character('\0'));
+        assert_eq!(refused("NUL.txt"), NameError::Reserved);
+        assert_eq!(refused(&"a".repeat(101)), NameError::Long);
+        // A letter and a combining mark that is a letter of its own: Unicode's composition exists.
+        assert_eq!(refused("\u{1100}\u{1161}"), NameError::Decomposed);
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_is_made_is_a_name_and_stays_in_its_folder(texts in prop::collection::vec(".*", 1..8)) {
+            let mut names = Names::default();
+            for text in &texts {
+                let name = names.make(text);
+                prop_assert_eq!(fault(name.as_str()), None, "{:?}", name);
+                let path = name.within(Path::new("/f"));
+                prop_assert_eq!(path.parent(), Some(Path::new("/f")));
+            }
+        }
+    }
+}

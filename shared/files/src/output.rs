@@ -1,0 +1,242 @@
+//! Files that come into being together.
+
+use crate::ownership::{Entry, LIST, List, hash};
+use crate::partial::Staging;
+use crate::single::sync_folder;
+use crate::{FileName, FilesError, Kind, lock::Lock};
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+
+/// Files of one kind that appear in a folder together or not at all.
+///
+/// They are written into a hidden folder beside their places and get their names when all are
+/// whole ([`Output::commit`]). A set with a manifest, a file that names the others, never replaces
+/// one of the others ([`Output::settle`]): until the manifest is replaced, which is one step, the
+/// old set is whole, and afterwards the new one. What the new set leaves over of the old one is then
+/// removed. A file that the program did not make is replaced with `force` only.
+#[derive(Debug)]
+pub struct Output {
+    folder: PathBuf,
+    is_new: bool,
+    kind: Kind,
+    force: bool,
+    staging: Option<Staging>,
+    names: Vec<FileName>,
+    manifest: Option<FileName>,
+}
+
+impl Output {
+    /// Begins a set of files in `folder`, which is made if need be.
+    ///
+    /// # Errors
+    /// [`FilesError::System`] when the folder can't be made or written to.
+    pub fn begin(folder: &Path, kind: Kind, force: bool) -> Result<Self, FilesError> {
+        let is_new = !folder.exists();
+        std::fs::create_dir_all(folder).map_err(FilesError::system(folder, "made"))?;
+        let mut output = Self {
+            folder: folder.to_owned(),
+            is_new,
+            kind,
+            force,
+            staging: None,
+            names: Vec::new(),
+            manifest: None,
+        };
+        output.staging = Some(Staging::new(folder)?);
+        Ok(output)
+    }
+
+    /// Where to write the file that will be called `name`.
+    pub fn stage(&mut self, name: &FileName) -> PathBuf {
+        if !self.names.contains(name) {
+            self.names.push(name.clone());
+        }
+        self.staged(name)
+    }
+
+    /// Adds a file.
+    ///
+    /// # Errors
+    /// [`FilesError::System`] when it can't be written.
+    pub fn add(&mut self, name: &FileName, bytes: &[u8]) -> Result<(), FilesError> {
+        let path = self.stage(name);
+        std::fs::write(path, bytes).map_err(FilesError::written(&name.within(&self.folder)))
+    }
+
+    /// Adds a file that only its owner is to read.
+    ///
+    /// # Errors
+    /// [`FilesError::System`] when it can't be written.
+    pub fn add_secret(&mut self, name: &FileName, bytes: &[u8]) -> Result<(), FilesError> {
+        let path = self.stage(name);
+        let file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path);
+        let written = file.and_then(|mut file| file.write_all(bytes));
+        written.map_err(FilesError::written(&name.within(&self.folder)))
+    }
+
+    /// Adds the file that names the others; it gets its place last.
+    ///
+    /// # Errors
+    /// [`FilesError::System`] when it can't be written.
+    pub fn add_manifest(&mut self, name: &FileName, bytes: &[u8]) -> Result<(), FilesError> {
+        self.add(name, bytes)?;
+        self.manifest = Some(name.clone());
+        Ok(())
+    }
+
+    /// The name that a staged file gets so that it replaces none: its own, or that with digits of
+    /// its content's hash where another content has its own name already.
+    ///
+    /// # Errors
+    /// [`FilesError::System`] when the file can't be read.
+    pub fn settle(&mut self, name: &FileName) -> Result<FileName, FilesError> {
+        let content = hash(&self.staged(name))?;
+        if self.stands(name, &content)? {
+            return Ok(name.clone());
+        }
+        let marked = name.marked(&content);
+        let [from, to] = [name, &marked].map(|it| self.staged(it));
+        std::fs::rename(from, to).map_err(FilesError::written(&marked.within(&self.folder)))?;
+        self.names.retain(|it| it != name);
+        self.names.push(marked.clone());
+        Ok(marked)
+    }
+
+    /// Gives all files their names.
+    ///
+    /// # Errors
+    /// [`FilesError::Foreign`], [`FilesError::OtherKind`] or [`FilesError::Folder`] for what stands
+    /// in the way, [`FilesError::System`] when the system refuses; then the old files stand.
+    pub fn commit(mut self) -> Result<(), FilesError> {
+        let _others_wait = Lock::wait(&self.folder);
+        if let Some(manifest) = self.manifest.clone() {
+            self.names.retain(|name| *name != manifest);
+            self.names.push(manifest);
+        }
+        let mut list = List::of(&self.folder);
+        let mut moved = Vec::new();
+        for name in &self.names {
+            let staged = self.staged(name);
+            let path = name.within(&self.folder);
+            sync(&staged).map_err(FilesError::written(&path))?;
+            let new = hash(&staged)?;
+            if let Some(old) = self.replaced(&list, name, &new)? {
+                let entry = list.files.remove(name.as_str());
+                let mut contents = entry.map(|entry| entry.blake3).unwrap_or_default();
+                // Whoever dies between the list and the file leaves either content.
+                contents.retain(|content| *content == old);
+                contents.insert(new);
+                let entry = Entry { kind: self.kind, blake3: contents };
+                list.files.insert(name.as_str().to_owned(), entry);
+                moved.push((staged, path));
+            }
+        }
+        self.place(list, moved)?;
+        self.is_new = false;
+        Ok(())
+    }
+
+    /// The list first: a file that is on it and not yet there does no harm.
+    fn place(&self, mut list: List, moved: Vec<(PathBuf, PathBuf)>) -> Result<(), FilesError> {
+        let leftovers = self.leftovers(&list);
+        if moved.is_empty() && leftovers.is_empty() {
+            return Ok(());
+        }
+        self.put(&list)?;
+        for (staged, path) in moved {
+            std::fs::rename(staged, &path).map_err(FilesError::written(&path))?;
+        }
+        sync_folder(&self.folder);
+        for name in leftovers {
+            // One that can't be removed stays on the list.
+            if std::fs::remove_file(self.folder.join(&name)).is_ok() {
+                list.files.remove(&name);
+            }
+        }
+        self.put(&list)
+    }
+
+    /// Writes the list of the folder's own files.
+    fn put(&self, list: &List) -> Result<(), FilesError> {
+        let place = self.folder.join(LIST);
+        let staged = self.staging().join(LIST);
+        let put = || -> std::io::Result<()> {
+            std::fs::write(&staged, list.to_json())?;
+            sync(&staged)?;
+            std::fs::rename(&staged, &place)
+        };
+        put().map_err(FilesError::written(&place))
+    }
+
+    /// Own files of the kind that a set with a manifest no longer has, unchanged.
+    fn leftovers(&self, list: &List) -> Vec<String> {
+        if self.manifest.is_none() {
+            return Vec::new();
+        }
+        let is_left = |(name, entry): &(&String, &Entry)| {
+            entry.kind == self.kind
+                && self.names.iter().all(|it| it.as_str() != name.as_str())
+                && hash(&self.folder.join(name)).is_ok_and(|it| entry.blake3.contains(&it))
+        };
+        list.files.iter().filter(is_left).map(|(name, _)| name.clone()).collect()
+    }
+
+    /// The hash of what a new content replaces, empty for nothing; `None` where it is there already.
+    fn replaced(
+        &self,
+        list: &List,
+        name: &FileName,
+        new: &str,
+    ) -> Result<Option<String>, FilesError> {
+        let path = name.within(&self.folder);
+        match std::fs::symlink_metadata(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Some(String::new())),
+            Err(source) => return Err(FilesError::written(&path)(source)),
+            Ok(found) if found.is_dir() => return Err(FilesError::Folder { path }),
+            Ok(_) => {}
+        }
+        let old = hash(&path)?;
+        if old == new {
+            return Ok(None);
+        }
+        if !self.force {
+            list.allows(name.as_str(), self.kind, &path)?;
+        }
+        Ok(Some(old))
+    }
+
+    /// Whether a name is free, or has this very content.
+    fn stands(&self, name: &FileName, content: &str) -> Result<bool, FilesError> {
+        let path = name.within(&self.folder);
+        match std::fs::symlink_metadata(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(true),
+            Ok(found) if found.is_file() => Ok(hash(&path)? == content),
+            _ => Ok(false),
+        }
+    }
+
+    fn staged(&self, name: &FileName) -> PathBuf {
+        name.within(self.staging())
+    }
+
+    fn staging(&self) -> &Path {
+        self.staging.as_ref().expect("it is there from begin to commit").path()
+    }
+}
+
+impl Drop for Output {
+    fn drop(&mut self) {
+        self.staging = None;
+        if self.is_new {
+            // A folder that was made for what did not come; one that others use stays.
+            let _ = std::fs::remove_dir(&self.folder);
+        }
+    }
+}
+
+/// Makes a file's content last over a power cut.
+fn sync(path: &Path) -> std::io::Result<()> {
+    File::open(path)?.sync_all()
+}
