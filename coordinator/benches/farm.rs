@@ -46,6 +46,7 @@ fn stand_in(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentErro
             log_power: (0..bins).map(|bin| (bin as f64 * speed_km_h).sin()).collect(),
             band_levels_db: vec![speed_km_h; ThirdOctave::COUNT],
         },
+        contact_loss_share: Some(0.0),
     };
     Ok(Box::new(StandIn(experiment.speeds_km_h.iter().map(pass).collect())))
 }

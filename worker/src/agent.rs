@@ -98,6 +98,12 @@ pub enum AgentError {
         /// Why.
         reason: String,
     },
+    /// The coordinator can't make sense of what the worker says.
+    #[error("the coordinator does not understand this worker: {reason}")]
+    NotUnderstood {
+        /// What it says.
+        reason: String,
+    },
     /// No coordinator has answered for longer than was asked for.
     #[error("no coordinator answered for {silent_s} s: {reason}")]
     GaveUp {

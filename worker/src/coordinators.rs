@@ -77,8 +77,10 @@ impl Coordinators {
             };
             match status.code() {
                 Code::Unauthenticated => return Err(AgentError::Unknown),
+                Code::InvalidArgument => {
+                    return Err(AgentError::NotUnderstood { reason: status.message().to_owned() });
+                }
                 Code::FailedPrecondition
-                | Code::InvalidArgument
                 | Code::OutOfRange
                 | Code::PermissionDenied
                 | Code::Unimplemented => {

@@ -9,7 +9,7 @@ use crate::{Case, Experiment, Outcome};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase};
+use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase, checksum};
 use tracktwin_traces::{Step, Value};
 
 /// The longest wait for work, whatever a coordinator says: as long as one that was put aside waits.
@@ -67,14 +67,14 @@ impl Core {
         let simulation = match self.prepared.of(lease) {
             Ok(simulation) => simulation,
             Err(error) => {
-                session.release(lease, held(&lease.cases)).await;
+                session.release(&lease.campaign, held(&lease.cases)).await;
                 return Err(error);
             }
         };
         for (number, group) in lease.cases.chunks(GROUP).enumerate() {
             let rest = &lease.cases[number * GROUP..];
             if session.shutdown.is_cancelled() {
-                session.release(lease, held(rest)).await;
+                session.release(&lease.campaign, held(rest)).await;
                 break;
             }
             let ours =
@@ -91,7 +91,7 @@ impl Core {
             let outcomes = tokio::select! {
                 outcomes = self.compute(simulation.clone(), cases) => outcomes,
                 () = session.give_up.cancelled() => {
-                    session.release(lease, held(rest)).await;
+                    session.release(&lease.campaign, held(rest)).await;
                     break;
                 }
             };
@@ -137,12 +137,16 @@ fn held(cases: &[LeasedCase]) -> Vec<(u32, u32)> {
 
 fn reports(group: &[LeasedCase], outcomes: Vec<Outcome>, duration_s: f64) -> Vec<CaseReport> {
     assert_eq!(group.len(), outcomes.len(), "one outcome a case");
-    let report = |(leased, outcome): (&LeasedCase, Outcome)| CaseReport {
-        index: leased.case.index,
-        epoch: leased.epoch,
-        parameter_hash: leased.case.parameter_hash(),
-        duration_s,
-        outcome,
+    let report = |(leased, outcome): (&LeasedCase, Outcome)| {
+        let parameter_hash = leased.case.parameter_hash();
+        CaseReport {
+            index: leased.case.index,
+            epoch: leased.epoch,
+            duration_s,
+            checksum: checksum(leased.case.index, &parameter_hash, &outcome),
+            parameter_hash,
+            outcome,
+        }
     };
     group.iter().zip(outcomes).map(report).collect()
 }

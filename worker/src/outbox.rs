@@ -104,6 +104,7 @@ mod tests {
             parameter_hash: String::new(),
             duration_s: 0.0,
             outcome: Outcome::Finished(Vec::new()),
+            checksum: String::new(),
         };
         Finished {
             campaign: campaign.to_owned(),
@@ -129,7 +130,11 @@ mod tests {
             let features = Features { log_power, band_levels_db: Vec::new() };
             let mut finished = finished("a", 7);
             for report in &mut finished.reports {
-                let pass = PassFeatures { speed_km_h: 7.0, features: features.clone() };
+                let pass = PassFeatures {
+                    speed_km_h: 7.0,
+                    features: features.clone(),
+                    contact_loss_share: None,
+                };
                 report.outcome = Outcome::Finished(vec![pass]);
             }
             finished

@@ -6,15 +6,14 @@ use crate::counters::Counters;
 use crate::holdings::Holdings;
 use crate::outbox::Finished;
 use crate::{CODE_VERSION, MODEL_HASH};
+use std::collections::HashSet;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::RwLock;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::Code;
-use tracktwin_protocol::{
-    CaseLease, Lease, Outcome, PROTOCOL_VERSION, Registration, farm, held_to_messages,
-};
+use tracktwin_protocol::{Lease, Outcome, PROTOCOL_VERSION, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
 
 /// Cases asked for at a time; the coordinator, who knows how long they take, gives fewer.
@@ -25,6 +24,13 @@ const FIRST_HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Heartbeats lie between a twentieth of a second and a minute, whatever a coordinator says.
 const HEARTBEATS_S: [f64; 2] = [0.05, 60.0];
+
+/// How often something is said or asked whose message arrives damaged. Then results are let go, and their leases
+/// expire; and who says what makes no sense is taken for another version.
+const DAMAGED_MAX: u32 = 5;
+
+/// Between two such times, growing with their number.
+const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
 /// Whoever is told to stop does not wait for longer: a scheduler gives ten seconds in all.
 const RELEASE_TIMEOUT: Duration = Duration::from_millis(1500);
@@ -105,6 +111,7 @@ impl Session {
 
     /// Cases to simulate, or when to ask again; nothing at shutdown.
     pub(crate) async fn lease(&self) -> Result<Option<Lease>, AgentError> {
+        let mut damaged = 0;
         loop {
             let seen = *self.registrations.read().await;
             let request =
@@ -119,12 +126,28 @@ impl Session {
             match answer {
                 Ok(None) => return Ok(None),
                 Ok(Some(message)) => {
-                    let lease = Lease::try_from(message)?;
-                    if let Lease::Cases(lease) = &lease {
-                        self.holdings.take(lease);
-                        self.worked();
+                    let held = message.cases.iter().map(|it| (it.sobol_index, it.epoch)).collect();
+                    let campaign = message.campaign_id.clone();
+                    match Lease::try_from(message) {
+                        Ok(lease) => {
+                            if let Lease::Cases(lease) = &lease {
+                                self.holdings.take(lease);
+                                self.worked();
+                            }
+                            return Ok(Some(lease));
+                        }
+                        Err(error) => {
+                            damaged += 1;
+                            tracing::warn!(
+                                "a lease arrived damaged, {damaged} of {DAMAGED_MAX} times: {error}"
+                            );
+                            self.release(&campaign, held).await;
+                            if damaged == DAMAGED_MAX {
+                                return Err(error.into());
+                            }
+                            tokio::time::sleep(AGAIN_AFTER * damaged).await;
+                        }
                     }
-                    return Ok(Some(lease));
                 }
                 // It has been restarted since, or it is another; it knows nobody.
                 Err(AgentError::Unknown) => self.register(seen, &self.shutdown).await?,
@@ -140,13 +163,14 @@ impl Session {
         let held: Vec<_> = reports.iter().map(|report| (report.index, report.epoch)).collect();
         let failed = reports.iter().filter(|it| matches!(it.outcome, Outcome::Failed { .. }));
         let failed: Vec<u32> = failed.map(|report| report.index).collect();
-        let request = farm::ReportRequest {
+        let mut request = farm::ReportRequest {
             worker: self.worker.clone(),
             campaign_id: campaign.clone(),
             experiment_hash,
             cases: reports.into_iter().map(Into::into).collect(),
             traceparent: step.traceparent(),
         };
+        let mut damaged = 0;
         loop {
             let seen = *self.registrations.read().await;
             let answer = self
@@ -158,6 +182,13 @@ impl Session {
                 .await;
             match answer {
                 Err(AgentError::Unknown) => self.register(seen, &self.give_up).await?,
+                Err(AgentError::NotUnderstood { reason }) if damaged + 1 < DAMAGED_MAX => {
+                    damaged += 1;
+                    tracing::warn!(
+                        "results were not understood, {damaged} of {DAMAGED_MAX} times: {reason}"
+                    );
+                    tokio::time::sleep(AGAIN_AFTER * damaged).await;
+                }
                 Err(error) => {
                     step.fail(&error.to_string());
                     return Err(error);
@@ -169,7 +200,20 @@ impl Session {
                 }
                 Ok(Some(answer)) => {
                     self.count(&answer, &failed);
-                    break;
+                    keep_unsettled(&mut request.cases, &answer);
+                    if request.cases.is_empty() {
+                        break;
+                    }
+                    damaged += 1;
+                    let count = request.cases.len();
+                    tracing::warn!(
+                        "{count} results arrived damaged, {damaged} of {DAMAGED_MAX} times"
+                    );
+                    if damaged == DAMAGED_MAX {
+                        step.fail("results arrived damaged");
+                        break;
+                    }
+                    tokio::time::sleep(AGAIN_AFTER * damaged).await;
                 }
             }
         }
@@ -181,8 +225,8 @@ impl Session {
     /// Counts what was taken, and warns of what was refused.
     fn count(&self, answer: &farm::ReportResponse, failed: &[u32]) {
         let refused = |it: &&farm::Receipt| it.verdict() == farm::Verdict::Refused;
-        let (refused, taken): (Vec<&farm::Receipt>, Vec<_>) =
-            answer.receipts.iter().partition(refused);
+        let settled = answer.receipts.iter().filter(|it| is_settled(it));
+        let (refused, taken): (Vec<&farm::Receipt>, Vec<_>) = settled.partition(refused);
         if !refused.is_empty() {
             tracing::warn!("{} results refused: not cases of this coordinator", refused.len());
         }
@@ -192,11 +236,11 @@ impl Session {
     }
 
     /// Gives back cases that were not simulated. What cannot be given back soon expires.
-    pub(crate) async fn release(&self, lease: &CaseLease, held: Vec<(u32, u32)>) {
-        self.holdings.let_go(&lease.campaign, held.iter().copied());
+    pub(crate) async fn release(&self, campaign: &str, held: Vec<(u32, u32)>) {
+        self.holdings.let_go(campaign, held.iter().copied());
         let request = farm::ReleaseRequest {
             worker: self.worker.clone(),
-            campaign_id: lease.campaign.clone(),
+            campaign_id: campaign.to_owned(),
             cases: held_to_messages(held),
         };
         let release = |mut client: crate::connection::Client| {
@@ -255,4 +299,16 @@ impl Session {
         }
         self.last_work.lock().expect("nobody panics while holding it").elapsed()
     }
+}
+
+/// Whether a case need not be sent again.
+fn is_settled(receipt: &farm::Receipt) -> bool {
+    !matches!(receipt.verdict(), farm::Verdict::Unspecified | farm::Verdict::Damaged)
+}
+
+/// Leaves the cases that are to be sent again: a case whose index was damaged has no receipt at all.
+fn keep_unsettled(cases: &mut Vec<farm::CaseReport>, answer: &farm::ReportResponse) {
+    let settled: HashSet<u32> =
+        answer.receipts.iter().filter(|it| is_settled(it)).map(|it| it.sobol_index).collect();
+    cases.retain(|case| !settled.contains(&case.sobol_index));
 }

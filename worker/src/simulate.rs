@@ -92,7 +92,7 @@ impl Simulation {
                 .map_err(|source| CaseError::Pass { speed_km_h, source })?;
             for ((passes, record), model) in passes.iter_mut().zip(records).zip(&models) {
                 let features = self.features(&measured(record, model), speed_km_h)?;
-                passes.push(PassFeatures { speed_km_h, features });
+                passes.push(PassFeatures { speed_km_h, features, contact_loss_share: None });
             }
         }
         Ok(passes.into_iter().map(Outcome::Finished).collect())

@@ -5,10 +5,10 @@
 
 use crate::case::case_of;
 use crate::engine::{Connection, Row, Write, sql};
-use crate::report::CaseReport;
 use crate::worker::Flag;
 use crate::{Library, LibraryError, Report};
 use tracktwin_parameters::Case;
+use tracktwin_protocol::CaseReport;
 
 /// A finished case to be simulated again.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use crate::campaign::{seed_from_sql, sql_seed};
 use crate::engine::{Connection, Row, Statement, Write, sql};
-use crate::{Library, LibraryError, State};
+use crate::{Cell, Library, LibraryError, State};
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 
 /// Cases in one statement: ten values each, well below the 32,766 that `SQLite` takes.
@@ -140,6 +140,23 @@ pub(crate) fn case_of(row: &Row) -> Result<Case, LibraryError> {
         parameters,
         surface_seed: seed_from_sql(row.get("surface_seed")?)?,
     })
+}
+
+/// The case in the cells of a table's row, which are found by their columns; none where one is missing or of
+/// another kind.
+pub(crate) fn case_in<'a>(cell: impl Fn(&str) -> Option<&'a Cell>) -> Option<Case> {
+    let mut parameters = ParameterSet::nominal();
+    for &parameter in Parameter::ALL {
+        let Some(Cell::Real(value)) = cell(parameter.name()) else { return None };
+        parameters[parameter] = *value;
+    }
+    let integer = |column| match cell(column) {
+        Some(Cell::Integer(integer)) => Some(*integer),
+        _ => None,
+    };
+    let index = u32::try_from(integer("sobol_index")?).ok()?;
+    let surface_seed = seed_from_sql(integer("surface_seed")?).ok()?;
+    Some(Case { index, parameters, surface_seed })
 }
 
 fn record(row: &Row) -> Result<CaseRecord, LibraryError> {

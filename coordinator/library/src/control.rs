@@ -3,7 +3,9 @@
 
 use crate::attempt;
 use crate::engine::{Connection, Write, sql};
+use crate::result::{Attested, StoredCase};
 use crate::{CampaignState, Library, LibraryError, result};
+use std::collections::BTreeMap;
 
 /// Which cases are tried again.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,6 +16,8 @@ pub enum Retry {
     Cases(Vec<u32>),
     /// All whose results were flagged; the results are thrown away.
     Flagged,
+    /// All whose results do not have their checksum; the results are thrown away.
+    Altered,
 }
 
 impl Library {
@@ -61,7 +65,42 @@ impl Library {
     /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
     pub async fn retry(&self, campaign: &str, which: Retry) -> Result<u64, LibraryError> {
         self.campaign(campaign).await?;
+        if which == Retry::Altered {
+            return self.retry_altered(campaign).await;
+        }
         self.write(RetryCases { campaign: campaign.to_owned(), which }).await
+    }
+
+    async fn retry_altered(&self, campaign: &str) -> Result<u64, LibraryError> {
+        let mut indices = Vec::new();
+        let look = |case: StoredCase| {
+            if case.attested() == Attested::Altered {
+                indices.push(i64::from(case.case.index));
+            }
+            Ok(())
+        };
+        self.stored_cases(campaign, look).await?;
+        self.write(Discard { campaign: campaign.to_owned(), indices }).await
+    }
+
+    /// Takes away results of cases that have not all their passes; answers of how many cases. A copy that is at
+    /// its end leaves such where the rest could not be read.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read or written.
+    pub async fn discard_incomplete(&self) -> Result<u64, LibraryError> {
+        let ask = "select distinct campaign_id, sobol_index
+            from result join campaign_case using (campaign_id, sobol_index)
+            where state <> 'finished' order by campaign_id, sobol_index";
+        let mut of_campaign: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+        for row in self.readers().rows(sql(ask)).await? {
+            of_campaign.entry(row.get("campaign_id")?).or_default().push(row.get("sobol_index")?);
+        }
+        let mut count = 0;
+        for (campaign, indices) in of_campaign {
+            count += self.write(Discard { campaign, indices }).await?;
+        }
+        Ok(count)
     }
 }
 
@@ -133,7 +172,7 @@ impl Write for RetryCases {
                 let indices: Vec<i64> = indices.iter().copied().map(i64::from).collect();
                 connection.execute(sql(again).bind(&self.campaign).bind(indices)).await
             }
-            Retry::Flagged => self.discard_flagged(connection).await,
+            Retry::Flagged | Retry::Altered => self.discard_flagged(connection).await,
         }
     }
 }
@@ -141,24 +180,50 @@ impl Write for RetryCases {
 impl RetryCases {
     async fn discard_flagged(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
         let dialect = connection.dialect();
-        let results = result::table(dialect);
         // What is flagged after this waits for the next retry.
         let flagged = format!(
             "select sobol_index from campaign_case
             where campaign_id = $1 and state = 'finished' and sobol_index in (
-                select sobol_index from {results} where campaign_id = $1 and flagged is not null)
+                select sobol_index from {} where campaign_id = $1 and flagged is not null)
             order by sobol_index {}",
+            result::table(dialect),
             dialect.locking()
         );
         let flagged = connection.indices(sql(flagged).bind(&self.campaign)).await?;
-        let again = "update campaign_case set state = 'waiting', attempts = 0, error = null";
-        // Their audits looked at results that are no more.
-        let discard = ["audit", results].map(|table| format!("delete from {table}"));
-        for change in [again].into_iter().chain(discard.iter().map(String::as_str)) {
-            let change =
-                format!("{change} where campaign_id = $1 and sobol_index {}", dialect.listed("$2"));
-            connection.execute(sql(change).bind(&self.campaign).bind(flagged.clone())).await?;
-        }
-        Ok(flagged.len() as u64)
+        discard(connection, &self.campaign, &flagged).await
     }
+}
+
+/// Throws results away, and lets their cases be simulated anew.
+struct Discard {
+    campaign: String,
+    indices: Vec<i64>,
+}
+
+impl Write for Discard {
+    type Answer = u64;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
+        discard(connection, &self.campaign, &self.indices).await
+    }
+}
+
+async fn discard(
+    connection: &mut Connection,
+    campaign: &str,
+    indices: &[i64],
+) -> Result<u64, LibraryError> {
+    let of = format!("campaign_id = $1 and sobol_index {}", connection.dialect().listed("$2"));
+    for change in [
+        // Their audits looked at results that are no more.
+        format!("delete from audit where {of}"),
+        format!(
+            "update campaign_case set state = 'waiting', attempts = 0, error = null
+            where state = 'finished' and {of}"
+        ),
+    ] {
+        connection.execute(sql(change).bind(campaign).bind(indices.to_vec())).await?;
+    }
+    result::discard(connection, campaign, indices).await?;
+    Ok(indices.len() as u64)
 }

@@ -136,6 +136,25 @@ pub enum LibraryError {
         /// What was found.
         what: String,
     },
+    /// Results that are not what their worker reported.
+    #[error(
+        "the results of case {index} do not have their checksum: a number was altered or a pass lost since they \
+         were stored; `tracktwin library verify` counts such cases, `tracktwin campaign retry --altered` lets \
+         them be simulated anew"
+    )]
+    Altered {
+        /// The first case found so.
+        index: u32,
+    },
+    /// The database is not whole.
+    #[error(
+        "the library's database is malformed ({reason}); nothing more is written to it: `tracktwin library \
+         verify` says what is wrong, `tracktwin library copy` saves what is whole in another library"
+    )]
+    Malformed {
+        /// What was found.
+        reason: String,
+    },
     /// A statement that would write, where only reading is done.
     #[error(
         "`library sql` only asks: one statement that begins with select, with, values or explain, \
@@ -235,6 +254,31 @@ impl LibraryError {
         }
     }
 
+    /// Whether what was read is to blame, not the way to it.
+    pub(crate) fn is_of_the_data(&self) -> bool {
+        match self {
+            Self::Malformed { .. } | Self::Damaged { .. } | Self::Altered { .. } => true,
+            Self::Database(error) => {
+                matches!(error, sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_))
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether what is in the database is to blame, its schema included.
+    pub(crate) fn is_of_the_database(&self) -> bool {
+        matches!(self, Self::Database(_)) || self.is_of_the_data()
+    }
+
+    /// Whether rows that were to be written are to blame: their cells, or what they refer to.
+    pub(crate) fn is_about_rows(&self) -> bool {
+        match self {
+            Self::BadRow { .. } | Self::OtherDefinition { .. } => true,
+            Self::Database(error) => code(error).is_some_and(|code| is_constraint(&code)),
+            _ => false,
+        }
+    }
+
     pub(crate) const fn is_unavailable(&self) -> bool {
         matches!(self, Self::Unavailable { .. })
     }
@@ -255,8 +299,19 @@ const POSTGRES_LATER: [&str; 6] = ["57P01", "57P02", "57P03", "53300", "40001", 
 /// A file or a folder that may only be read; a transaction that only reads; a role without the right.
 const NOT_WRITABLE: [&str; 5] = ["8", "776", "1544", "25006", "42501"];
 
+/// `SQLite`'s codes for a malformed file, PostgreSQL's for a malformed page, index or a missing file.
+const MALFORMED: [&str; 8] = ["11", "26", "267", "523", "779", "XX001", "XX002", "58P01"];
+
 /// Server-side disk full.
 const POSTGRES_FULL: &str = "53100";
+
+/// Constraints that a row breaks: all of `SQLite`'s kinds of it; PostgreSQL's classes of constraints and of data.
+fn is_constraint(code: &str) -> bool {
+    if code.len() == 5 {
+        return code.starts_with("23") || code.starts_with("22");
+    }
+    code.parse::<u32>().is_ok_and(|code| code % 256 == 19)
+}
 
 fn code(error: &sqlx::Error) -> Option<String> {
     error.as_database_error().and_then(DatabaseError::code).map(Cow::into_owned)
@@ -278,6 +333,10 @@ impl From<sqlx::Error> for LibraryError {
                     || (code.len() == 5 && code.starts_with(POSTGRES_BROKEN)) =>
             {
                 Self::Unavailable { reason: error.to_string() }
+            }
+            Some(code) if MALFORMED.contains(&code) => {
+                let reason = error.as_database_error().map(DatabaseError::message);
+                Self::Malformed { reason: reason.unwrap_or_default().to_owned() }
             }
             Some(code) if NOT_WRITABLE.contains(&code) => {
                 let reason = error.as_database_error().map(DatabaseError::message);

@@ -33,7 +33,7 @@ pub use audit::{Audit, AuditCounts, AuditFinding};
 pub use campaign::CampaignRecord;
 pub use case::{CaseRecord, Status};
 pub use control::Retry;
-pub use data::{Answer, Cell, Column, ColumnKind, Finding, Table};
+pub use data::{Answer, Cell, Column, ColumnKind, Finding, Lost, Table, Verified};
 pub use engine::without_password;
 pub use error::LibraryError;
 pub use lease::{Held, Lease, LeaseRequest, Leased};
@@ -43,8 +43,8 @@ pub use provenance::{
     DiagnosisRecord, EvaluationRecord, HypothesisRecord, MismatchRecord, SleeperRecord,
     SurrogateRecord, TrainingRecord,
 };
-pub use report::{CaseReport, Report, Verdict};
-pub use result::LibraryEntry;
+pub use report::{Report, Verdict};
+pub use result::{ContactLoss, LibraryEntry};
 pub use state::{CampaignState, Ending, Policy, State};
 pub use trial::{Question, TrialAnswer, TrialRecord};
 pub use worker::{Registration, WorkerRecord, WorkerState};

@@ -35,8 +35,11 @@ impl Library {
     /// version of the program has written it.
     pub async fn open(url: &str) -> Result<Self, LibraryError> {
         let library = Self::of(engine::open(url).await?);
-        library.add_missing_bins().await?;
-        Ok(library)
+        match library.add_missing_bins().await {
+            // A damaged library is opened all the same: to be looked over, and to save what is whole.
+            Err(error) if !error.is_of_the_database() => Err(error),
+            _ => Ok(library),
+        }
     }
 
     /// Opens the library at `sqlite:PATH` or `postgres://...`, or makes an empty one there.
@@ -105,6 +108,15 @@ impl Library {
     /// [`LibraryError::NotWritable`] when it may not, or when the library does not answer.
     pub async fn check_writable(&self) -> Result<(), LibraryError> {
         self.write(Touch).await
+    }
+
+    /// Finds out whether the database is whole, so that nothing is added to one that isn't: with `SQLite` by
+    /// reading the file once; a server looks at what it reads itself.
+    ///
+    /// # Errors
+    /// [`LibraryError::Malformed`] when it is not.
+    pub async fn check_whole(&self) -> Result<(), LibraryError> {
+        self.readers().refuse_malformed().await
     }
 
     pub(crate) fn target(&self) -> &Target {

@@ -6,7 +6,7 @@ use crate::result::insert_results;
 use crate::tally::Tally;
 use crate::{Ending, Held, Library, LibraryError, Policy, State, audit};
 use std::collections::{HashMap, HashSet};
-use tracktwin_signal::Features;
+use tracktwin_protocol::{CaseReport, Outcome, PassFeatures};
 
 /// What a worker hands in.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct Report {
     pub experiment_hash: String,
     /// The speeds of the experiment in km/h, as many as every case has passes.
     pub speeds_km_h: Vec<f64>,
-    /// The cases.
+    /// The cases, each with the checksum that came with it.
     pub cases: Vec<CaseReport>,
     /// The library's clock.
     pub now_unix_ms: i64,
@@ -31,21 +31,6 @@ pub struct Report {
     pub after_failure: Policy,
     /// Share of the stored cases that another worker is to simulate again, 0 to 1.
     pub audit_share: f64,
-}
-
-/// What became of one case.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CaseReport {
-    /// Place in the campaign.
-    pub index: u32,
-    /// The lease under which it was simulated.
-    pub epoch: u32,
-    /// Hash of the parameters and seed that were simulated.
-    pub parameter_hash: String,
-    /// Computing time at all speeds together, in s.
-    pub duration_s: f64,
-    /// Features, one a speed; or why there are none.
-    pub outcome: Result<Vec<Features>, String>,
 }
 
 /// What was done with the report of a case.
@@ -94,14 +79,14 @@ impl Write for Report {
             verdicts.push(verdict);
             let (Verdict::Stored, Some(standing)) = (verdict, standing) else { continue };
             match &case.outcome {
-                Ok(features) => {
+                Outcome::Finished(passes) => {
                     if self.overtakes(case, standing) {
                         attempt::overtake(connection, self, case.index).await?;
                     }
-                    finished.push((case, &**features));
+                    finished.push((case, &**passes));
                     standing.state = State::Finished;
                 }
-                Err(reason) => {
+                Outcome::Failed { reason } => {
                     standing.state = self.fail(connection, case, standing, reason).await?;
                 }
             }
@@ -196,9 +181,9 @@ impl Report {
         }
         match (&case.outcome, standing.state) {
             (_, State::Finished) => Verdict::Duplicate,
-            (Ok(_), _) => Verdict::Stored,
-            (Err(_), State::Leased) if present => Verdict::Stored,
-            (Err(_), _) => Verdict::Late,
+            (Outcome::Finished(_), _) => Verdict::Stored,
+            (Outcome::Failed { .. }, State::Leased) if present => Verdict::Stored,
+            (Outcome::Failed { .. }, _) => Verdict::Late,
         }
     }
 
@@ -228,7 +213,7 @@ impl Report {
     async fn finish(
         &self,
         connection: &mut Connection,
-        finished: &[(&CaseReport, &[Features])],
+        finished: &[(&CaseReport, &[PassFeatures])],
         flagged: Option<String>,
     ) -> Result<(), LibraryError> {
         if finished.is_empty() {

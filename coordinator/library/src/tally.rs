@@ -2,6 +2,7 @@
 
 use crate::engine::{Connection, sql};
 use crate::{LibraryError, Report, Verdict};
+use tracktwin_protocol::Outcome;
 
 /// Length of the intervals in which progress is told, in s.
 pub(crate) const INTERVAL_S: i64 = 10;
@@ -22,12 +23,12 @@ impl<'a> Tally<'a> {
         let mut tally = Self { report, finished: 0, failed: 0, busy_s: 0.0, failed_since: 0 };
         for (case, verdict) in report.cases.iter().zip(verdicts) {
             match (&case.outcome, verdict) {
-                (Ok(_), Verdict::Stored) => {
+                (Outcome::Finished(_), Verdict::Stored) => {
                     tally.finished += 1;
                     tally.busy_s += case.duration_s;
                     tally.failed_since = 0;
                 }
-                (Err(_), Verdict::Stored) => {
+                (Outcome::Failed { .. }, Verdict::Stored) => {
                     tally.failed += 1;
                     tally.failed_since += 1;
                 }

@@ -44,6 +44,9 @@ pub(super) enum Action {
         /// Cases whose results were flagged by an audit; those results are thrown away.
         #[arg(long)]
         flagged: bool,
+        /// Cases whose results do not have their checksum; those results are thrown away.
+        #[arg(long, conflicts_with_all = ["cases", "flagged"])]
+        altered: bool,
     },
     /// Say how urgent a campaign is.
     Priority {
@@ -92,12 +95,13 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
             library.cancel(&id).await?;
             done(library, &format!("{id} is cancelled; its results stay")).await
         }
-        Action::Retry { named, cases, flagged } => {
+        Action::Retry { named, cases, flagged, altered } => {
             let (library, id) = named.open().await?;
-            let which = match (flagged, cases.is_empty()) {
-                (true, _) => Retry::Flagged,
-                (false, true) => Retry::Failed,
-                (false, false) => Retry::Cases(cases),
+            let which = match (flagged, altered, cases.is_empty()) {
+                (true, ..) => Retry::Flagged,
+                (_, true, _) => Retry::Altered,
+                (.., true) => Retry::Failed,
+                (.., false) => Retry::Cases(cases),
             };
             if let Retry::Cases(indices) = &which {
                 refuse_others(&library, &id, indices).await?;
@@ -185,7 +189,7 @@ async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
 
 impl Named {
     async fn open(self) -> Result<(Library, String), Stop> {
-        let library = self.library.open().await?;
+        let library = self.library.open_whole().await?;
         let campaign = choose(&library, self.campaign.as_deref(), "name one").await?;
         Ok((library, campaign.id))
     }

@@ -1,6 +1,7 @@
 //! `tracktwin diagnose`: where recording and simulation differ, and what physics was left out.
 
 use super::files::make_folder;
+use super::library_url::{open_or_create, open_whole};
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
 use crate::diagnosing::{DiagnosingError, Setting, diagnose};
@@ -57,8 +58,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let recording = Recording::open(&recording).or_input()?;
     let library = match library {
         // Models belong to a library that is there already.
-        Some(url) if models.is_some() => Some(Library::open(&url).await?),
-        Some(url) => Some(Library::open_or_create(&url).await?),
+        Some(url) if models.is_some() => Some(open_whole(&url).await?),
+        Some(url) => Some(open_or_create(&url).await?),
         None => None,
     };
     let design = design(models, library.as_ref()).await?;

@@ -39,7 +39,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
             "{folder}/recording.json: sleepers: is []; give their places, or import with --sleeper"
         )));
     }
-    let library = library.open().await?;
+    let library = library.open_whole().await?;
     let models = Trained::load(&models)
         .with_context(|| format!("{}: no models; `tracktwin train` makes them", models.display()))
         .or_input()?;

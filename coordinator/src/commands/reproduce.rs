@@ -59,7 +59,7 @@ const SEED: u64 = 0;
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let figures = figures(&arguments.figures).or_input()?;
-    let library = arguments.library.open().await?;
+    let library = arguments.library.open_whole().await?;
     let given = arguments.models.as_deref().map(Trained::load).transpose().or_input()?;
     let campaign = campaign(&library, arguments.campaign.as_deref(), given.as_ref()).await?;
     let experiment = training::experiment(&campaign).or_input()?;

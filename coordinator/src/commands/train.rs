@@ -28,7 +28,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let library = arguments.library.open().await?;
+    let library = arguments.library.open_whole().await?;
     let campaign = choose(&library, arguments.campaign.as_deref(), MEND).await?;
     let trained = train(&library, &campaign, arguments.seed, &arguments.out).await?;
     say(&table(&trained));

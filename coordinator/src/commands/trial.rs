@@ -1,13 +1,13 @@
 //! `tracktwin trial`: how often a diagnosis is right, on recordings whose truth it does not know.
 
 use super::files::make_folder;
+use super::library_url::open_or_create;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
 use crate::evaluating::Evaluator;
 use crate::trial::{Trial, TrialError};
 use clap::Args;
 use std::path::PathBuf;
-use tracktwin_library::Library;
 use tracktwin_surrogate::Trained;
 
 /// What `trial` is told.
@@ -55,7 +55,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let own = || format!("sqlite:{}", out.join("library.sqlite").display());
     let url = library.unwrap_or_else(own);
     make_folder(&out).or_input()?;
-    let library = Library::open_or_create(&url).await?;
+    let library = open_or_create(&url).await?;
     let paper = match models {
         Some(folder) => {
             let models = Trained::load(&folder).or_input()?;

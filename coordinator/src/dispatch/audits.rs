@@ -233,7 +233,11 @@ mod tests {
     fn outcomes_differ_by_their_worst_level() {
         let features =
             |levels: [f64; 2]| Features { log_power: vec![0.0], band_levels_db: levels.to_vec() };
-        let pass = |levels| PassFeatures { speed_km_h: 7.0, features: features(levels) };
+        let pass = |levels| PassFeatures {
+            speed_km_h: 7.0,
+            features: features(levels),
+            contact_loss_share: None,
+        };
         let stored = [features([1.0, 2.0]), features([3.0, 4.0])];
         let found = Outcome::Finished(vec![pass([1.0, 2.5]), pass([2.8, 4.0])]);
         assert!((difference(&stored, &found) - 0.5).abs() < 1e-12);

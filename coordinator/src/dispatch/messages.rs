@@ -2,10 +2,8 @@
 
 use std::error::Error;
 use tonic::Status;
-use tracktwin_library::{self as library, Held, LibraryError, Verdict};
-use tracktwin_protocol::{
-    BadMessage, CaseReport, Outcome, PROTOCOL_VERSION, Registration, farm, held_from_messages,
-};
+use tracktwin_library::{Held, LibraryError, Verdict};
+use tracktwin_protocol::{BadMessage, PROTOCOL_VERSION, Registration, farm, held_from_messages};
 use tracktwin_worker::{CODE_VERSION, MODEL_HASH};
 
 /// Why a worker is of no use here, if so, and what mends it.
@@ -34,15 +32,6 @@ pub(crate) fn unfit(registration: &Registration) -> Option<String> {
 pub(crate) fn held(messages: Vec<farm::HeldCase>) -> Result<Vec<Held>, Status> {
     let held = held_from_messages(messages).map_err(|error| malformed(&error))?;
     Ok(held.into_iter().map(|(index, epoch)| Held { index, epoch }).collect())
-}
-
-pub(crate) fn library_report(report: CaseReport) -> library::CaseReport {
-    let CaseReport { index, epoch, parameter_hash, duration_s, outcome } = report;
-    let outcome = match outcome {
-        Outcome::Finished(passes) => Ok(passes.into_iter().map(|pass| pass.features).collect()),
-        Outcome::Failed { reason } => Err(reason),
-    };
-    library::CaseReport { index, epoch, parameter_hash, duration_s, outcome }
 }
 
 pub(crate) const fn verdict_message(verdict: Verdict) -> farm::Verdict {

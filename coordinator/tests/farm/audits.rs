@@ -2,7 +2,7 @@
 
 use crate::support::{
     CORES, Coordinator, StandIn, coordinator_with, lease, library, registered, registration,
-    report, stand_in,
+    report, stand_in, with_checksum,
 };
 use std::net::Ipv4Addr;
 use std::time::Duration;
@@ -160,14 +160,17 @@ async fn a_worker_that_fails_where_another_does_not_is_put_aside() {
     client.register(registration("good", MODEL_HASH)).await.unwrap();
     for _ in 0..2 {
         let leased = lease(&mut client, "bad").await;
-        let failed = |case: &messages::LeasedCase| CaseReport {
-            sobol_index: case.sobol_index,
-            epoch: case.epoch,
-            parameter_hash: case.parameter_hash.clone(),
-            duration_s: 0.1,
-            outcome: Some(messages::case_report::Outcome::Failure(messages::Failure {
-                reason: "out of memory".to_owned(),
-            })),
+        let failed = |case: &messages::LeasedCase| {
+            with_checksum(CaseReport {
+                sobol_index: case.sobol_index,
+                epoch: case.epoch,
+                parameter_hash: case.parameter_hash.clone(),
+                duration_s: 0.1,
+                outcome: Some(messages::case_report::Outcome::Failure(messages::Failure {
+                    reason: "out of memory".to_owned(),
+                })),
+                checksum: String::new(),
+            })
         };
         let request = ReportRequest {
             worker: "bad".to_owned(),

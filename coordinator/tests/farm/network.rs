@@ -1,9 +1,10 @@
 //! The farm over a simulated network, in simulated time: delays, cuts, crashes, and messages that
-//! come twice or late. What a seed does it does again.
+//! come twice, late or damaged. What a seed does it does again.
 //!
 //! `TRACKTWIN_SEEDS=1000` runs as many seeds instead of a few, `TRACKTWIN_SEED=7` that one.
 
 use crate::support::{CORES, library_at, stand_in, undisturbed};
+use prost::Message;
 use std::future::{Future, ready};
 use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -83,7 +84,7 @@ fn at_once<F: Future>(future: F) -> F::Output {
     }
 }
 
-/// The service, whose callers' messages may come twice, and again long after.
+/// The service, whose callers' messages may come twice, and again long after, and both sides' damaged.
 struct Troubled {
     dispatch: Dispatch,
     chance: Chance,
@@ -98,6 +99,20 @@ impl Troubled {
         all.push(newest.clone());
         let count = all.len() as u64;
         (self.chance.below(4) == 0).then(|| all[self.chance.below(count) as usize].clone())
+    }
+
+    /// A message one bit of which is another, now and then, as a network without TLS may bring it.
+    fn damaged<M: Message + Default>(&self, message: M) -> Result<M, Status> {
+        if self.chance.below(8) > 0 {
+            return Ok(message);
+        }
+        let mut bytes = message.encode_to_vec();
+        let bit = self.chance.below(8 * bytes.len().max(1) as u64) as usize;
+        if let Some(byte) = bytes.get_mut(bit / 8) {
+            *byte ^= 1 << (bit % 8);
+        }
+        // As tonic says it.
+        M::decode(&*bytes).map_err(|error| Status::internal(error.to_string()))
     }
 }
 
@@ -119,7 +134,8 @@ impl Farm for Troubled {
             let twin = Request::new(request.get_ref().clone());
             let _ = at_once(self.dispatch.lease(twin));
         }
-        ready(at_once(self.dispatch.lease(request))).await
+        let answer = at_once(self.dispatch.lease(request));
+        answer.and_then(|answer| self.damaged(answer.into_inner())).map(Response::new)
     }
 
     async fn renew(
@@ -136,6 +152,7 @@ impl Farm for Troubled {
         if let Some(earlier) = self.earlier(&self.reports, request.get_ref()) {
             let _ = at_once(self.dispatch.report(Request::new(earlier)));
         }
+        let request = Request::new(self.damaged(request.into_inner())?);
         let answer = at_once(self.dispatch.report(request));
         if self.chance.below(10) == 0 {
             // Stored, but the answer is lost.

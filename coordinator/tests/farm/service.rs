@@ -2,6 +2,7 @@
 
 use crate::support::{
     CORES, coordinator, lease, pass, registered, registration, report, stand_in, verdicts,
+    with_checksum,
 };
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
@@ -156,6 +157,28 @@ async fn what_no_worker_asks_is_refused_and_holds_up_nobody() {
 }
 
 #[tokio::test]
+async fn a_case_with_another_checksum_stays_leased_and_spoils_no_other() {
+    let coordinator = coordinator().await;
+    let mut client = registered(&coordinator, "w").await;
+    let leased = lease(&mut client, "w").await;
+    let good = report(&leased, "w");
+    let mut damaged = good.clone();
+    damaged.cases[0].checksum = damaged.cases[1].checksum.clone();
+    damaged.cases[1].outcome = None;
+    damaged.cases[2].sobol_index += 100;
+    let expected = [Verdict::Damaged, Verdict::Damaged, Verdict::Damaged, Verdict::Stored];
+    assert_eq!(verdicts(&mut client, damaged).await, expected);
+    let status = coordinator.library.status(&coordinator.campaign.id()).await.unwrap();
+    assert_eq!((status.finished, status.leased), (1, 3));
+    // Sent again, whole.
+    let expected = [Verdict::Stored, Verdict::Stored, Verdict::Stored, Verdict::Duplicate];
+    assert_eq!(verdicts(&mut client, good).await, expected);
+    let verified = coordinator.library.verify(|| ()).await.unwrap();
+    assert_eq!((verified.attested, verified.unattested), (4, 0));
+    assert_eq!(verified.findings, []);
+}
+
+#[tokio::test]
 async fn malformed_reports_are_refused_and_the_service_goes_on() {
     let coordinator = coordinator().await;
     let mut client = registered(&coordinator, "w").await;
@@ -176,10 +199,10 @@ async fn malformed_reports_are_refused_and_the_service_goes_on() {
     let mut changed = passes(&mut short);
     changed.passes[0].band_levels_db.truncate((ThirdOctave::COUNT - 1) * size_of::<f64>());
     short.cases[0].outcome = Some(messages::case_report::Outcome::Passes(changed));
-    let mut empty = good.clone();
-    empty.cases[0].outcome = None;
-    for bad in [nan, short, empty] {
-        assert_eq!(client.report(bad).await.unwrap_err().code(), Code::InvalidArgument);
+    for bad in [&mut nan, &mut short] {
+        bad.cases[0] = with_checksum(bad.cases[0].clone());
+        let refused = client.report(bad.clone()).await.unwrap_err();
+        assert_eq!(refused.code(), Code::InvalidArgument);
     }
     assert_eq!(coordinator.library.status(&coordinator.campaign.id()).await.unwrap().finished, 0);
     assert_eq!(verdicts(&mut client, good).await, [Verdict::Stored; 4]);
@@ -195,6 +218,7 @@ async fn results_of_other_cases_or_experiments_are_not_stored() {
     assert_eq!(verdicts(&mut client, other_experiment).await, [Verdict::Refused; 4]);
     let mut not_leased = good.clone();
     not_leased.cases[0].sobol_index = 15;
+    not_leased.cases[0] = with_checksum(not_leased.cases[0].clone());
     assert_eq!(verdicts(&mut client, not_leased).await[0], Verdict::Refused);
 }
 

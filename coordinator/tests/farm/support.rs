@@ -12,11 +12,11 @@ use tracktwin::dispatch::{Counts, Dispatch, Settings, Timing};
 use tracktwin::farm::{self, Task};
 use tracktwin::service::{Security, serve};
 use tracktwin_library::{Library, Status};
-use tracktwin_protocol::PROTOCOL_VERSION;
 use tracktwin_protocol::farm::farm_client::FarmClient;
 use tracktwin_protocol::farm::{
     self as messages, CaseReport, LeaseRequest, RegisterRequest, ReportRequest, Verdict,
 };
+use tracktwin_protocol::{PROTOCOL_VERSION, checksum};
 use tracktwin_signal::{Features, ThirdOctave};
 use tracktwin_worker::{
     Case, Experiment, ExperimentError, MODEL_HASH, Outcome, PassFeatures, Simulate,
@@ -34,6 +34,7 @@ impl StandIn {
                 log_power: vec![(f64::from(case.index) * speed_km_h).sin(); bins],
                 band_levels_db: vec![case.parameters.values()[0] / 1e7; ThirdOctave::COUNT],
             },
+            contact_loss_share: Some(0.0),
         };
         Outcome::Finished(self.0.speeds_km_h.iter().map(pass).collect())
     }
@@ -139,7 +140,22 @@ pub(crate) async fn lease(
 /// The message of a pass.
 pub(crate) fn pass(speed_km_h: f64, log_power: Vec<f64>) -> messages::PassFeatures {
     let features = Features { log_power, band_levels_db: vec![1.0; ThirdOctave::COUNT] };
-    PassFeatures { speed_km_h, features }.into()
+    PassFeatures { speed_km_h, features, contact_loss_share: None }.into()
+}
+
+/// A message with the checksum that a worker makes of what it says.
+pub(crate) fn with_checksum(message: CaseReport) -> CaseReport {
+    let outcome = match message.outcome.clone() {
+        Some(messages::case_report::Outcome::Passes(passes)) => {
+            Outcome::Finished(passes.passes.into_iter().map(PassFeatures::from).collect())
+        }
+        Some(messages::case_report::Outcome::Failure(failure)) => {
+            Outcome::Failed { reason: failure.reason }
+        }
+        None => return message,
+    };
+    let checksum = checksum(message.sobol_index, &message.parameter_hash, &outcome);
+    CaseReport { checksum, ..message }
 }
 
 pub(crate) fn report(lease: &messages::LeaseResponse, worker: &str) -> ReportRequest {
@@ -147,12 +163,15 @@ pub(crate) fn report(lease: &messages::LeaseResponse, worker: &str) -> ReportReq
     let bins = experiment.features.frequencies_hz().len();
     let pass = |&speed_km_h: &f64| pass(speed_km_h, vec![0.5; bins]);
     let passes = messages::Passes { passes: experiment.speeds_km_h.iter().map(pass).collect() };
-    let case = |case: &messages::LeasedCase| CaseReport {
-        sobol_index: case.sobol_index,
-        epoch: case.epoch,
-        parameter_hash: case.parameter_hash.clone(),
-        duration_s: 0.1,
-        outcome: Some(messages::case_report::Outcome::Passes(passes.clone())),
+    let case = |case: &messages::LeasedCase| {
+        with_checksum(CaseReport {
+            sobol_index: case.sobol_index,
+            epoch: case.epoch,
+            parameter_hash: case.parameter_hash.clone(),
+            duration_s: 0.1,
+            outcome: Some(messages::case_report::Outcome::Passes(passes.clone())),
+            checksum: String::new(),
+        })
     };
     ReportRequest {
         worker: worker.to_owned(),

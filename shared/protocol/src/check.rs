@@ -35,6 +35,14 @@ pub enum BadMessage {
         /// What stands there.
         value: f64,
     },
+    /// A share that is not a number from 0 to 1.
+    #[error("{field} is {value}; a share lies in 0 to 1")]
+    NotAShare {
+        /// The field.
+        field: &'static str,
+        /// What stands there.
+        value: f64,
+    },
     /// A count that nobody can have.
     #[error("{field} is {value}; it must be below {limit}")]
     TooLarge {
@@ -76,6 +84,12 @@ pub enum BadMessage {
     WrongHash {
         /// What was hashed.
         what: String,
+    },
+    /// The report of a case is not what its worker sent.
+    #[error("case {index}: the report was damaged on its way; its checksum is another")]
+    Damaged {
+        /// The case.
+        index: u32,
     },
     /// More cases than a message may hold.
     #[error("{field} has {count} cases; at most {max} are allowed")]
@@ -149,10 +163,19 @@ pub(crate) fn duration(field: &'static str, value: f64) -> Result<f64, BadMessag
     }
 }
 
-/// Finite numbers.
-pub(crate) fn finite(field: &'static str, values: Vec<f64>) -> Result<Vec<f64>, BadMessage> {
+/// A share, 0 to 1.
+pub(crate) fn share(field: &'static str, value: f64) -> Result<f64, BadMessage> {
+    if (0.0..=1.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(BadMessage::NotAShare { field, value })
+    }
+}
+
+/// That all numbers are finite.
+pub(crate) fn finite(field: &'static str, values: &[f64]) -> Result<(), BadMessage> {
     match values.iter().find(|value| !value.is_finite()) {
         Some(&value) => Err(BadMessage::NotANumber { field, value }),
-        None => Ok(values),
+        None => Ok(()),
     }
 }

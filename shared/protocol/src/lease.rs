@@ -115,6 +115,10 @@ impl TryFrom<farm::LeaseResponse> for CaseLease {
     type Error = BadMessage;
 
     fn try_from(message: farm::LeaseResponse) -> Result<Self, BadMessage> {
+        let hash = blake3::hash(message.experiment_json.as_bytes());
+        if hash.to_hex().as_str() != message.experiment_hash {
+            return Err(BadMessage::WrongHash { what: "the experiment".to_owned() });
+        }
         Ok(Self {
             campaign: name("campaign_id", message.campaign_id)?,
             experiment_json: message.experiment_json,
@@ -208,6 +212,22 @@ mod tests {
         assert_eq!(held_from_messages(held(CASES_MAX)).unwrap().len(), CASES_MAX);
         let error = held_from_messages(held(CASES_MAX + 1)).unwrap_err();
         assert!(matches!(error, BadMessage::TooMany { field: "cases", .. }), "{error}");
+    }
+
+    #[test]
+    fn an_experiment_that_changed_on_the_way_is_refused() {
+        let lease = Lease::Cases(CaseLease {
+            campaign: "c".to_owned(),
+            experiment_json: "{}".to_owned(),
+            experiment_hash: blake3::hash(b"{}").to_hex().to_string(),
+            cases: vec![leased()],
+            traceparent: String::new(),
+        });
+        let mut message = farm::LeaseResponse::from(lease.clone());
+        assert_eq!(Lease::try_from(message.clone()), Ok(lease));
+        message.experiment_json = "[]".to_owned();
+        let error = Lease::try_from(message).unwrap_err();
+        assert!(matches!(error, BadMessage::WrongHash { .. }), "{error}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Results on their way to the coordinator.
 
-use crate::check::{BadMessage, bounded, duration, finite, name};
-use crate::farm;
+use crate::check::{BadMessage, bounded, duration, finite, name, share};
+use crate::{checksum, farm};
 use farm::case_report::Outcome as OutcomeMessage;
 use prost::bytes::Bytes;
 use tracktwin_signal::{Features, ThirdOctave};
@@ -28,6 +28,9 @@ pub struct PassFeatures {
     pub speed_km_h: f64,
     /// The features.
     pub features: Features,
+    /// Share of the recorded time, 0 to 1, in which the wheel did not touch the rail; none where the worker
+    /// did not tell it.
+    pub contact_loss_share: Option<f64>,
 }
 
 /// What a worker hands in for one case.
@@ -43,6 +46,8 @@ pub struct CaseReport {
     pub duration_s: f64,
     /// What became of it.
     pub outcome: Outcome,
+    /// [`checksum`] of index, parameters and outcome, as the worker made it.
+    pub checksum: String,
 }
 
 /// The shape that an experiment gives to results.
@@ -68,79 +73,112 @@ impl From<CaseReport> for farm::CaseReport {
             parameter_hash: report.parameter_hash,
             duration_s: report.duration_s,
             outcome: Some(outcome),
+            checksum: report.checksum,
         }
     }
 }
 
 impl From<PassFeatures> for farm::PassFeatures {
-    fn from(PassFeatures { speed_km_h, features }: PassFeatures) -> Self {
+    fn from(PassFeatures { speed_km_h, features, contact_loss_share }: PassFeatures) -> Self {
         let Features { log_power, band_levels_db } = features;
         let (log_power, band_levels_db) = (as_bytes(&log_power), as_bytes(&band_levels_db));
-        Self { speed_km_h, log_power, band_levels_db }
+        Self { speed_km_h, log_power, band_levels_db, contact_loss_share }
     }
 }
 
 impl CaseReport {
-    /// The reports of a message; see [`CaseReport::checked`].
+    /// The reports of a message, none for those that were damaged on their way; see [`CaseReport::checked`].
     ///
     /// # Errors
-    /// [`BadMessage`] when there are too many, or one is wrong.
+    /// [`BadMessage`] when there are too many, or a whole one is wrong.
     pub fn all_checked(
         messages: Vec<farm::CaseReport>,
         shape: &Shape,
-    ) -> Result<Vec<Self>, BadMessage> {
-        let messages = bounded("cases", messages)?;
-        messages.into_iter().map(|message| Self::checked(message, shape)).collect()
+    ) -> Result<Vec<Option<Self>>, BadMessage> {
+        let checked = |message| match Self::checked(message, shape) {
+            Err(BadMessage::Damaged { .. }) => Ok(None),
+            checked => checked.map(Some),
+        };
+        bounded("cases", messages)?.into_iter().map(checked).collect()
     }
 
-    /// The report in a message, which must have the shape of its experiment.
+    /// The report in a message, which must have its checksum and the shape of its experiment.
     ///
     /// # Errors
-    /// [`BadMessage`] when something is missing, not finite, or of another shape.
+    /// [`BadMessage::Damaged`] when it did not arrive as it was sent; other [`BadMessage`]s when something
+    /// is missing, not finite, or of another shape.
     pub fn checked(message: farm::CaseReport, shape: &Shape) -> Result<Self, BadMessage> {
         let index = message.sobol_index;
-        let outcome = match message.outcome {
-            None => return Err(BadMessage::Missing { field: "outcome" }),
-            Some(OutcomeMessage::Failure(failure)) => {
-                Outcome::Failed { reason: in_one_line(failure.reason) }
+        let damaged = BadMessage::Damaged { index };
+        let report = Self::as_received(message).filter(Self::has_its_checksum).ok_or(damaged)?;
+        let outcome = match report.outcome {
+            Outcome::Finished(passes) => {
+                check_passes(index, &passes, shape)?;
+                Outcome::Finished(passes)
             }
-            Some(OutcomeMessage::Passes(passes)) => {
-                Outcome::Finished(checked_passes(index, passes.passes, shape)?)
-            }
+            Outcome::Failed { reason } => Outcome::Failed { reason: in_one_line(reason) },
         };
         Ok(Self {
-            index,
-            epoch: message.epoch,
-            parameter_hash: name("parameter_hash", message.parameter_hash)?,
-            duration_s: duration("duration_s", message.duration_s)?,
+            parameter_hash: name("parameter_hash", report.parameter_hash)?,
+            duration_s: duration("duration_s", report.duration_s)?,
             outcome,
+            ..report
         })
+    }
+
+    /// What a message says, right or wrong; none where it lacks the outcome.
+    fn as_received(message: farm::CaseReport) -> Option<Self> {
+        let outcome = match message.outcome? {
+            OutcomeMessage::Failure(failure) => Outcome::Failed { reason: failure.reason },
+            OutcomeMessage::Passes(passes) => {
+                Outcome::Finished(passes.passes.into_iter().map(Into::into).collect())
+            }
+        };
+        Some(Self {
+            index: message.sobol_index,
+            epoch: message.epoch,
+            parameter_hash: message.parameter_hash,
+            duration_s: message.duration_s,
+            outcome,
+            checksum: message.checksum,
+        })
+    }
+
+    fn has_its_checksum(&self) -> bool {
+        checksum(self.index, &self.parameter_hash, &self.outcome) == self.checksum
     }
 }
 
-fn checked_passes(
-    index: u32,
-    messages: Vec<farm::PassFeatures>,
-    shape: &Shape,
-) -> Result<Vec<PassFeatures>, BadMessage> {
-    let found: Vec<f64> = messages.iter().map(|pass| pass.speed_km_h).collect();
+impl From<farm::PassFeatures> for PassFeatures {
+    fn from(message: farm::PassFeatures) -> Self {
+        let features = Features {
+            log_power: from_bytes(&message.log_power),
+            band_levels_db: from_bytes(&message.band_levels_db),
+        };
+        let farm::PassFeatures { speed_km_h, contact_loss_share, .. } = message;
+        Self { speed_km_h, features, contact_loss_share }
+    }
+}
+
+fn check_passes(index: u32, passes: &[PassFeatures], shape: &Shape) -> Result<(), BadMessage> {
+    let found: Vec<f64> = passes.iter().map(|pass| pass.speed_km_h).collect();
     if found != shape.speeds_km_h {
         return Err(BadMessage::WrongSpeeds { index, found, expected: shape.speeds_km_h.clone() });
     }
-    let of_length = |field, bytes: &[u8], expected| {
-        let values = from_bytes(bytes);
-        match values.len() {
-            found if found == expected => finite(field, values),
-            found => Err(BadMessage::WrongLength { index, field, found, expected }),
+    for PassFeatures { features, contact_loss_share, .. } in passes {
+        for (field, values, expected) in [
+            ("log_power", &features.log_power, shape.bins),
+            ("band_levels_db", &features.band_levels_db, ThirdOctave::COUNT),
+        ] {
+            if values.len() != expected {
+                let found = values.len();
+                return Err(BadMessage::WrongLength { index, field, found, expected });
+            }
+            finite(field, values)?;
         }
-    };
-    let pass = |message: farm::PassFeatures| {
-        let log_power = of_length("log_power", &message.log_power, shape.bins)?;
-        let levels = of_length("band_levels_db", &message.band_levels_db, ThirdOctave::COUNT)?;
-        let features = Features { log_power, band_levels_db: levels };
-        Ok(PassFeatures { speed_km_h: message.speed_km_h, features })
-    };
-    messages.into_iter().map(pass).collect()
+        contact_loss_share.map_or(Ok(0.0), |it| share("contact_loss_share", it))?;
+    }
+    Ok(())
 }
 
 /// Numbers as they lie in a message.
@@ -181,19 +219,29 @@ mod tests {
                 log_power: vec![-1.0, 0.1, 2.0],
                 band_levels_db: vec![speed_km_h; ThirdOctave::COUNT],
             },
+            contact_loss_share: (speed_km_h > 10.0).then_some(0.25),
         };
+        with(Outcome::Finished(vec![pass(7.0), pass(13.0)]))
+    }
+
+    /// A report of an outcome, with its checksum.
+    fn with(outcome: Outcome) -> CaseReport {
         CaseReport {
             index: 5,
             epoch: 1,
             parameter_hash: "ab".to_owned(),
             duration_s: 0.1,
-            outcome: Outcome::Finished(vec![pass(7.0), pass(13.0)]),
+            checksum: checksum(5, "ab", &outcome),
+            outcome,
         }
     }
 
+    /// Why a message is refused that its worker sent so.
     fn refusal(change: impl FnOnce(&mut farm::CaseReport)) -> BadMessage {
         let mut message = farm::CaseReport::from(report());
         change(&mut message);
+        let sent = CaseReport::as_received(message.clone()).unwrap();
+        message.checksum = checksum(sent.index, &sent.parameter_hash, &sent.outcome);
         CaseReport::checked(message, &shape()).unwrap_err()
     }
 
@@ -221,12 +269,15 @@ mod tests {
             log_power: Vec<f64>,
             #[prost(double, repeated, tag = "3")]
             band_levels_db: Vec<f64>,
+            #[prost(double, optional, tag = "4")]
+            contact_loss_share: Option<f64>,
         }
         let message = passes(&mut report().into())[1].clone();
         let contract = Contract {
             speed_km_h: 13.0,
             log_power: vec![-1.0, 0.1, 2.0],
             band_levels_db: vec![13.0; ThirdOctave::COUNT],
+            contact_loss_share: Some(0.25),
         };
         assert_eq!(message.encode_to_vec(), contract.encode_to_vec());
         assert_eq!(farm::PassFeatures::decode(&*contract.encode_to_vec()), Ok(message));
@@ -253,20 +304,70 @@ mod tests {
     }
 
     #[test]
-    fn a_report_without_outcome_is_refused() {
-        let error = refusal(|message| message.outcome = None);
-        assert_eq!(error, BadMessage::Missing { field: "outcome" });
+    fn a_share_of_time_that_cannot_be_is_refused() {
+        for share in [f64::NAN, f64::INFINITY, -1e-9, 1.0 + 1e-9] {
+            let error = refusal(|message| passes(message)[0].contact_loss_share = Some(share));
+            let field = "contact_loss_share";
+            assert!(
+                matches!(error, BadMessage::NotAShare { field: it, .. } if it == field),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_bit_that_changes_a_result_on_its_way_is_noticed() {
+        let sent = farm::CaseReport::from(report()).encode_to_vec();
+        let (mut damaged, mut harmless, mut unreadable) = (0, 0, 0);
+        for place in 0..8 * sent.len() {
+            let mut bytes = sent.clone();
+            bytes[place / 8] ^= 1 << (place % 8);
+            let Ok(message) = farm::CaseReport::decode(&*bytes) else {
+                unreadable += 1;
+                continue;
+            };
+            match CaseReport::checked(message, &shape()) {
+                Err(_) => damaged += 1,
+                // What a checksum is not made of: which lease it was, and how long it took.
+                Ok(CaseReport { epoch, duration_s, .. }) if (epoch, duration_s) != (1, 0.1) => {
+                    harmless += 1;
+                }
+                Ok(received) => assert_eq!(received, report(), "bit {place}"),
+            }
+        }
+        assert!(
+            damaged > 3000 && unreadable > 0 && harmless < 150,
+            "{damaged} {unreadable} {harmless}"
+        );
+    }
+
+    #[test]
+    fn a_damaged_report_spoils_no_other() {
+        let mut messages: Vec<_> = [report(), report()].map(Into::into).into();
+        passes(&mut messages[0])[0].speed_km_h = 8.0;
+        let checked = CaseReport::all_checked(messages, &shape()).unwrap();
+        assert_eq!(checked, [None, Some(report())]);
+    }
+
+    #[test]
+    fn a_report_without_outcome_or_checksum_is_damaged() {
+        for change in [(|message| message.outcome = None) as fn(&mut farm::CaseReport), |message| {
+            message.checksum.clear()
+        }] {
+            let mut message = farm::CaseReport::from(report());
+            change(&mut message);
+            let error = CaseReport::checked(message, &shape()).unwrap_err();
+            assert_eq!(error, BadMessage::Damaged { index: 5 });
+        }
     }
 
     #[test]
     fn a_reason_is_one_line_that_is_not_endless() {
-        let long =
-            CaseReport { outcome: Outcome::Failed { reason: "ä".repeat(5000) }, ..report() };
-        let back = CaseReport::checked(long.into(), &shape()).unwrap();
-        assert_eq!(back.outcome, Outcome::Failed { reason: "ä".repeat(1000) });
-        let report =
-            CaseReport { outcome: Outcome::Failed { reason: "a\nb\0".to_owned() }, ..report() };
-        let back = CaseReport::checked(report.into(), &shape()).unwrap();
-        assert_eq!(back.outcome, Outcome::Failed { reason: "a b ".to_owned() });
+        let stored = |reason: String| {
+            let report = with(Outcome::Failed { reason });
+            CaseReport::checked(report.into(), &shape()).unwrap().outcome
+        };
+        assert_eq!(stored("ä".repeat(5000)), Outcome::Failed { reason: "ä".repeat(1000) });
+        assert_eq!(stored("a\nb\0".to_owned()), Outcome::Failed { reason: "a b ".to_owned() });
     }
 }

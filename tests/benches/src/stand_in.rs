@@ -2,10 +2,9 @@
 
 use tempfile::TempDir;
 use tokio::task::JoinSet;
-use tracktwin_library::{
-    CampaignRecord, CaseReport, LeaseRequest, Leased, Library, Report, State, Verdict,
-};
+use tracktwin_library::{CampaignRecord, LeaseRequest, Leased, Library, Report, State, Verdict};
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
+use tracktwin_protocol::{CaseReport, Outcome, PassFeatures, checksum};
 use tracktwin_signal::{Features, ThirdOctave};
 
 /// Why a measurement stops.
@@ -129,15 +128,22 @@ pub async fn lease(
 
 fn finished(leased: &Leased) -> CaseReport {
     let phase = f64::from(leased.case.index);
-    let features = |speed: f64| Features {
-        log_power: (0..BINS).map(|bin| (phase + speed * bin as f64).sin()).collect(),
-        band_levels_db: vec![phase.cos(); ThirdOctave::COUNT],
+    let pass = |speed_km_h: f64| PassFeatures {
+        speed_km_h,
+        features: Features {
+            log_power: (0..BINS).map(|bin| (phase + speed_km_h * bin as f64).sin()).collect(),
+            band_levels_db: vec![phase.cos(); ThirdOctave::COUNT],
+        },
+        contact_loss_share: Some(0.0),
     };
+    let outcome = Outcome::Finished(SPEEDS_KM_H.map(pass).to_vec());
+    let parameter_hash = leased.case.parameter_hash();
     CaseReport {
         index: leased.case.index,
         epoch: leased.epoch,
-        parameter_hash: leased.case.parameter_hash(),
         duration_s: 0.02,
-        outcome: Ok(SPEEDS_KM_H.map(features).to_vec()),
+        checksum: checksum(leased.case.index, &parameter_hash, &outcome),
+        parameter_hash,
+        outcome,
     }
 }

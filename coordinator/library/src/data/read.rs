@@ -1,7 +1,8 @@
 //! Reading tables out, whole.
 
+use super::attest::Attestation;
 use super::{Cell, Table, decode};
-use crate::engine::sql;
+use crate::engine::{Statement, sql};
 use crate::{Library, LibraryError};
 use tokio_stream::StreamExt;
 
@@ -9,28 +10,50 @@ impl Library {
     /// Hands the rows of a table to `take`, by its key, at most `rows_max` at a time.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library cannot be read; or what `take` says.
+    /// [`LibraryError`] when the library cannot be read, or results do not have their checksum; or what `take`
+    /// says.
     pub async fn read_table<E: From<LibraryError>>(
         &self,
         table: &Table,
         rows_max: usize,
         mut take: impl AsyncFnMut(Vec<Vec<Cell>>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let ask = format!(
-            "select {} from {} order by {}",
-            table.column_list(),
-            table.name,
-            table.key.join(", ")
-        );
-        let mut stream = self.readers().stream(sql(ask));
+        let mut attestation = Attestation::of(table);
+        let attested = async |rows: Vec<Vec<Cell>>| {
+            attestation.take(&rows)?;
+            take(rows).await
+        };
+        self.read(table, by_key(table, ""), rows_max, attested).await??;
+        Ok(attestation.end()?)
+    }
+
+    /// Hands the rows that a statement answers to `take`; tells failing to read from what `take` says.
+    pub(super) async fn read<E>(
+        &self,
+        table: &Table,
+        ask: Statement,
+        rows_max: usize,
+        mut take: impl AsyncFnMut(Vec<Vec<Cell>>) -> Result<(), E>,
+    ) -> Result<Result<(), LibraryError>, E> {
+        let mut stream = self.readers().stream(ask);
         let mut rows = Vec::new();
         while let Some(row) = stream.next().await {
-            rows.push(decode::table_row(table, &row?)?);
+            match row.and_then(|row| decode::table_row(table, &row)) {
+                Ok(row) => rows.push(row),
+                Err(error) => {
+                    // What came before is whole.
+                    take(rows).await?;
+                    return Ok(Err(error));
+                }
+            }
             if rows.len() == rows_max {
                 take(std::mem::take(&mut rows)).await?;
             }
         }
-        if rows.is_empty() { Ok(()) } else { take(rows).await }
+        if !rows.is_empty() {
+            take(rows).await?;
+        }
+        Ok(Ok(()))
     }
 
     /// How many rows a table has.
@@ -43,4 +66,11 @@ impl Library {
         let count = row.map_or(Ok(0), |row| row.get::<i64>("n"))?;
         Ok(count.unsigned_abs())
     }
+}
+
+/// Asks for all of a table by its key, in this direction (`desc`, or nothing).
+pub(super) fn by_key(table: &Table, direction: &str) -> Statement {
+    let key: Vec<_> = table.key.iter().map(|column| format!("{column} {direction}")).collect();
+    let (columns, name, key) = (table.column_list(), table.name, key.join(", "));
+    sql(format!("select {columns} from {name} order by {key}"))
 }

@@ -128,6 +128,7 @@ tables! {
         "level_3150_Hz_dB" Real, "level_4000_Hz_dB" Real, "duration_s" Real, "worker" Text,
         "code_version" Text, "model_hash" Text, "experiment_hash" Text, "parameter_hash" Text,
         "finished_at" Text, "flagged" Text,
+        "contact_loss_share" Real, "checksum" Text,
     }
     RESULT_WITH_PARAMETERS = "result_with_parameters" by
         ["campaign_id", "sobol_index", "speed_km_h"]
@@ -145,6 +146,7 @@ tables! {
         "level_3150_Hz_dB" Real, "level_4000_Hz_dB" Real, "log_power" Doubles,
         "duration_s" Real, "worker" Text, "code_version" Text, "model_hash" Text,
         "experiment_hash" Text, "parameter_hash" Text, "finished_at" Text, "flagged" Text,
+        "contact_loss_share" Real, "checksum" Text,
     }
     ATTEMPT = "attempt" by ["campaign_id", "sobol_index", "epoch"] {
         "campaign_id" Text, "sobol_index" Integer, "epoch" Integer, "worker" Text,

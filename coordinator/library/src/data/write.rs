@@ -1,7 +1,9 @@
 //! Writing rows in that came from another library.
 
 use super::{Cell, Column, Table, decode};
+use crate::case::case_in;
 use crate::engine::{Connection, Dialect, Statement, Write, sql};
+use crate::result::{Attested, Gathering};
 use crate::{Library, LibraryError, result};
 use std::collections::HashSet;
 
@@ -16,8 +18,8 @@ impl Library {
     ///
     /// # Errors
     /// [`LibraryError::OtherDefinition`] for a campaign that is another here;
-    /// [`LibraryError::BadRow`] for cells that don't fit their columns; or when the library cannot be
-    /// written.
+    /// [`LibraryError::BadRow`] for cells that don't fit their columns, a case that doesn't have its hash or
+    /// results that don't have their checksum; or when the library cannot be written.
     pub async fn write_table(
         &self,
         table: &'static Table,
@@ -26,15 +28,48 @@ impl Library {
         let mut added = 0;
         let mut rows = rows.into_iter().peekable();
         while rows.peek().is_some() {
-            let rows = rows.by_ref().take(ROWS_A_STATEMENT);
-            let rows = rows.map(|row| at_rest(table, row)).collect::<Vec<_>>();
-            self.refuse_other_campaigns(table, &rows).await?;
-            let rows = self.without_those_here(table, rows).await?;
-            if !rows.is_empty() {
-                added += self.write(Rows { table, rows }).await?;
-            }
+            added += self.write_rows(table, rows.by_ref().take(ROWS_A_STATEMENT).collect()).await?;
         }
         Ok(added)
+    }
+
+    /// As [`Library::write_table`], but leaves out the rows that are refused: answers how many were added, and
+    /// why others were not.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be written.
+    pub async fn write_what_is_whole(
+        &self,
+        table: &'static Table,
+        rows: Vec<Vec<Cell>>,
+    ) -> Result<(u64, Vec<LibraryError>), LibraryError> {
+        let (mut added, mut refused) = (0, Vec::new());
+        let mut parts: Vec<_> = rows.chunks(ROWS_A_STATEMENT).rev().map(<[_]>::to_vec).collect();
+        while let Some(mut part) = parts.pop() {
+            match self.write_rows(table, part.clone()).await {
+                Ok(count) => added += count,
+                Err(error) if !error.is_about_rows() => return Err(error),
+                Err(error) if part.len() == 1 => refused.push(error),
+                Err(_) => {
+                    let second = part.split_off(part.len() / 2);
+                    parts.extend([second, part]);
+                }
+            }
+        }
+        Ok((added, refused))
+    }
+
+    /// Rows of one statement.
+    async fn write_rows(
+        &self,
+        table: &'static Table,
+        rows: Vec<Vec<Cell>>,
+    ) -> Result<u64, LibraryError> {
+        let rows: Vec<_> = rows.into_iter().map(|row| at_rest(table, row)).collect();
+        self.refuse_other_campaigns(table, &rows).await?;
+        refuse_other_parameters(table, &rows)?;
+        let rows = self.without_those_here(table, rows).await?;
+        if rows.is_empty() { Ok(0) } else { self.write(Rows { table, rows }).await }
     }
 
     /// Leaves out rows of cases that are here, so that going on with a copy costs little.
@@ -103,6 +138,25 @@ impl Library {
     }
 }
 
+/// Refuses cases that do not have their hash.
+fn refuse_other_parameters(table: &Table, rows: &[Vec<Cell>]) -> Result<(), LibraryError> {
+    let Some(hash) = table.column("parameter_hash").filter(|_| table.name == "campaign_case")
+    else {
+        return Ok(());
+    };
+    for row in rows {
+        let Some(case) = case_in(|column| table.column(column).and_then(|place| row.get(place)))
+        else {
+            continue;
+        };
+        if row.get(hash) != Some(&Cell::Text(case.parameter_hash())) {
+            let what = format!("case {} does not have the hash of its parameters", case.index);
+            return Err(LibraryError::BadRow { table: table.name, what });
+        }
+    }
+    Ok(())
+}
+
 /// A key as text; numbers in one way only, so equal keys have equal texts.
 fn key(cells: &[Cell]) -> String {
     format!("{cells:?}")
@@ -145,6 +199,7 @@ impl Write for Rows {
             let gather = self.bound(result::gathering(&list, &values))?;
             self.lock_cases(connection).await?;
             let rows = connection.rows(gather).await?;
+            self.refuse_altered(connection).await?;
             self.settle(connection).await?;
             return rows.first().map_or(Ok(0), |row| row.get_u32("added").map(u64::from));
         }
@@ -153,6 +208,7 @@ impl Write for Rows {
             format!("insert into {table} ({list}) values {values} on conflict ({key}) do nothing");
         let added = connection.execute(self.bound(insert)?).await?;
         if table == "result" {
+            self.refuse_altered(connection).await?;
             self.settle(connection).await?;
         }
         Ok(added)
@@ -173,6 +229,44 @@ impl Rows {
         for campaign in campaigns {
             let settle = sql(settle.clone()).bind(campaign).bind(indices.clone());
             connection.execute(settle).await?;
+        }
+        Ok(())
+    }
+
+    /// Reads these rows' cases again as they are stored now, and refuses them where one whose passes are all
+    /// here does not have its checksum.
+    async fn refuse_altered(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let dialect = connection.dialect();
+        let ask = format!(
+            "select *, (select {} from campaign where id = $1) as speeds
+            from result_with_parameters where campaign_id = $1 and sobol_index {}
+            order by sobol_index, speed_km_h",
+            dialect.json_length("speeds_km_h"),
+            dialect.listed("$2")
+        );
+        let mut campaigns = self.texts("campaign_id");
+        campaigns.dedup();
+        for campaign in campaigns {
+            let ask = sql(ask.clone()).bind(&campaign).bind(self.integers("sobol_index"));
+            let rows = connection.rows(ask).await?;
+            let speeds = rows.first().map_or(Ok(0), |row| row.get_count("speeds"))?;
+            let mut gathering = Gathering::default();
+            let mut cases = Vec::new();
+            for row in &rows {
+                cases.extend(gathering.take(row)?);
+            }
+            cases.extend(gathering.end());
+            let altered = cases
+                .iter()
+                .find(|case| case.passes.len() == speeds && case.attested() == Attested::Altered);
+            if let Some(altered) = altered {
+                let index = altered.case.index;
+                let what = format!(
+                    "the results of case {index} of {campaign} do not have their checksum: a number was \
+                     altered"
+                );
+                return Err(LibraryError::BadRow { table: self.table.name, what });
+            }
         }
         Ok(())
     }

@@ -140,6 +140,18 @@ impl Readers {
         }
     }
 
+    /// Refuses a database whose pages do not fit together. A server looks at its pages itself, at each that it
+    /// reads.
+    ///
+    /// # Errors
+    /// [`LibraryError::Malformed`].
+    pub(crate) async fn refuse_malformed(&self) -> Result<(), LibraryError> {
+        match self {
+            Self::Sqlite(pool) => super::sqlite::refuse_malformed(pool).await,
+            Self::Postgres(_) => Ok(()),
+        }
+    }
+
     pub(crate) async fn close(&self) {
         match self {
             Self::Sqlite(pool) => pool.close().await,

@@ -22,6 +22,7 @@ pub(crate) use dialect::Dialect;
 pub(crate) use iso::iso_utc;
 pub(crate) use open::{Opened, open, open_or_create};
 pub(crate) use row::Row;
+pub(crate) use sqlite::schema_objects;
 pub(crate) use statement::{Statement, Value, series, sql};
 pub(crate) use target::Target;
 pub use target::without_password;

@@ -45,7 +45,7 @@ fn parse(url: &str) -> Result<Target, LibraryError> {
 async fn connect(target: Target, create: bool) -> Result<Opened, LibraryError> {
     let (readers, writing, clock) = match &target {
         Target::Sqlite(path) => {
-            let (readers, writing) = sqlite::open(path).await?;
+            let (readers, writing) = sqlite::open(path, create).await?;
             (readers, Some(writing), Clock::Machine)
         }
         Target::Postgres { options, name } => {

@@ -40,6 +40,16 @@ impl Row {
             .map_err(|_| LibraryError::Damaged { what: format!("{column} is {value}") })
     }
 
+    /// How many elements something has.
+    pub(crate) fn get_count(&self, column: &str) -> Result<usize, LibraryError> {
+        // PostgreSQL counts elements in 32 bits.
+        let count = match self {
+            Self::Sqlite(row) => sqlx::Row::try_get::<i64, _>(row, column)?,
+            Self::Postgres(row) => sqlx::Row::try_get::<i32, _>(row, column)?.into(),
+        };
+        Ok(usize::try_from(count).unwrap_or(0))
+    }
+
     /// A series of numbers.
     pub(crate) fn doubles(&self, column: &str) -> Result<Vec<f64>, LibraryError> {
         let bytes: &[u8] = match self {

@@ -5,7 +5,9 @@ use super::{Connection, Readers};
 use crate::LibraryError;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
-use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
+use sqlx::{ConnectOptions, Connection as _, SqliteConnection, SqliteExecutor};
+use std::ffi::OsStr;
+use std::io::Read;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -33,8 +35,10 @@ const LOG_PAGES: &str = "2048";
 /// Connections that read beside the one that writes.
 const READERS: u32 = 4;
 
-/// Opens the file, made where there is none, and brings its schema up to date.
-pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryError> {
+/// Opens the file and brings its schema up to date; fills one that is empty, or makes one, where `create` says
+/// so.
+pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connection), LibraryError> {
+    refuse_what_seems_empty(path)?;
     let options = SqliteConnectOptions::new()
         .filename(path)
         .create_if_missing(true)
@@ -42,8 +46,11 @@ pub(super) async fn open(path: &Path) -> Result<(Readers, Connection), LibraryEr
         .busy_timeout(BUSY_TIMEOUT)
         .foreign_keys(true);
     let mut connection = options.connect().await.map_err(|error| closed_to_us(error, path))?;
-    refuse_strangers(&mut connection, path).await?;
+    let is_empty = refuse_strangers(&mut connection, path).await?;
     connection.close().await?;
+    if is_empty && !create {
+        return Err(LibraryError::Empty { library: path.display().to_string() });
+    }
 
     // Only now, since it changes the file.
     let options = options
@@ -122,11 +129,46 @@ fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
     }
 }
 
-/// Refuses a database of somebody else, before anything is written to it.
+/// What every file of `SQLite` begins with, and the least bytes that one has.
+const HEAD: &[u8] = b"SQLite format 3\0";
+const BYTES_MIN: usize = 512;
+
+/// Refuses what `SQLite` would take for an empty database and write over: a short file of something else, the
+/// beginning of one of its own, and an empty one whose log is not.
+fn refuse_what_seems_empty(path: &Path) -> Result<(), LibraryError> {
+    let mut log = path.as_os_str().to_owned();
+    log.push("-wal");
+    let Some(begin) = begin(path) else { return Ok(()) };
+    let lost = |reason: &str| Err(LibraryError::Malformed { reason: reason.to_owned() });
+    match begin.len() {
+        0 if begin_of_log(&log) => {
+            lost("the file is empty, its log is not: what was in it is lost")
+        }
+        0 | BYTES_MIN.. => Ok(()),
+        length if begin[..length.min(HEAD.len())] != HEAD[..length.min(HEAD.len())] => {
+            Err(LibraryError::NotALibrary { library: path.display().to_string() })
+        }
+        length => lost(&format!("the file is cut off after {length} bytes")),
+    }
+}
+
+/// The first bytes of a file, if it can be read.
+fn begin(path: &Path) -> Option<Vec<u8>> {
+    let mut begin = Vec::new();
+    let file = std::fs::File::open(path).ok()?;
+    file.take(BYTES_MIN as u64).read_to_end(&mut begin).ok()?;
+    Some(begin)
+}
+
+fn begin_of_log(log: &OsStr) -> bool {
+    begin(Path::new(log)).is_some_and(|begin| !begin.is_empty())
+}
+
+/// Refuses a database of somebody else, before anything is written to it; answers whether it is empty.
 async fn refuse_strangers(
     connection: &mut SqliteConnection,
     path: &Path,
-) -> Result<(), LibraryError> {
+) -> Result<bool, LibraryError> {
     let (application_id, tables): (i64, i64) = sqlx::query_as(
         "select application_id,
             (select count(*) from sqlite_schema where type = 'table' and name <> '_sqlx_migrations')
@@ -138,7 +180,7 @@ async fn refuse_strangers(
     if application_id != APPLICATION_ID && tables > 0 {
         return Err(LibraryError::NotALibrary { library: path.display().to_string() });
     }
-    Ok(())
+    Ok(application_id != APPLICATION_ID && tables == 0)
 }
 
 async fn migrate(connection: &mut SqliteConnection, path: &Path) -> Result<(), LibraryError> {
@@ -155,8 +197,36 @@ async fn migrate(connection: &mut SqliteConnection, path: &Path) -> Result<(), L
     if found >= known {
         return MIGRATIONS.run(connection).await.map_err(newer);
     }
+    if found > 0 {
+        refuse_malformed(&mut *connection).await?;
+    }
     // One of those who open it at once does it; the others wait, and find it done.
     let mut alone = connection.begin_with("begin immediate").await?;
     MIGRATIONS.run(&mut *alone).await.map_err(newer)?;
     Ok(alone.commit().await?)
+}
+
+/// Refuses a file whose pages do not fit together, before anything is written to it.
+///
+/// # Errors
+/// [`LibraryError::Malformed`] with the first thing that `SQLite` finds.
+pub(super) async fn refuse_malformed<'c>(
+    connection: impl SqliteExecutor<'c>,
+) -> Result<(), LibraryError> {
+    let found: String = sqlx::query_scalar("pragma quick_check(1)").fetch_one(connection).await?;
+    if found == "ok" {
+        return Ok(());
+    }
+    let last = found.lines().last().unwrap_or_default();
+    Err(LibraryError::Malformed { reason: last.to_owned() })
+}
+
+/// Kind, name and text of what the present schema consists of.
+pub(crate) async fn schema_objects() -> Result<Vec<(String, String, String)>, LibraryError> {
+    let mut memory = SqliteConnectOptions::new().in_memory(true).connect().await?;
+    MIGRATIONS.run(&mut memory).await?;
+    let ask = "select type, name, sql from sqlite_schema where sql is not null";
+    let objects = sqlx::query_as(ask).fetch_all(&mut memory).await?;
+    memory.close().await?;
+    Ok(objects)
 }

@@ -20,6 +20,8 @@ pub(crate) enum Value {
     Texts(Vec<String>),
     /// The same of numbers.
     Reals(Vec<f64>),
+    /// The same of numbers that may be missing.
+    OptionalReals(Vec<Option<f64>>),
 }
 
 /// A statement of this crate's own making.
@@ -51,6 +53,7 @@ impl Statement {
             Value::Integers(integers) => query.bind(format!("{integers:?}")),
             Value::Texts(texts) => query.bind(serde_json::Value::from(texts).to_string()),
             Value::Reals(reals) => query.bind(serde_json::Value::from(reals).to_string()),
+            Value::OptionalReals(reals) => query.bind(serde_json::Value::from(reals).to_string()),
         })
     }
 
@@ -64,6 +67,7 @@ impl Statement {
             Value::Integers(integers) => query.bind(integers),
             Value::Texts(texts) => query.bind(texts),
             Value::Reals(reals) => query.bind(reals),
+            Value::OptionalReals(reals) => query.bind(reals),
         })
     }
 }
@@ -118,6 +122,12 @@ impl From<u32> for Value {
 impl From<f64> for Value {
     fn from(real: f64) -> Self {
         Self::Real(Some(real))
+    }
+}
+
+impl From<Option<f64>> for Value {
+    fn from(real: Option<f64>) -> Self {
+        Self::Real(real)
     }
 }
 

@@ -3,31 +3,33 @@
 use super::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
 use crate::engine::{Connection, Value, sql};
-use crate::report::{CaseReport, Report};
-use tracktwin_signal::Features;
+use crate::report::Report;
+use tracktwin_protocol::{CaseReport, PassFeatures};
 
 /// Cases in one statement: what is read and copied again and again on both sides stays in the cache.
 const CASES_A_STATEMENT: usize = 64;
 
-/// Rows of cases and passes out of lists: what is one for a report in $1 to $7 and $13, cases in $8 to $10,
-/// their levels ($11) and series ($12) one after the other.
+/// Rows of cases and passes out of lists: what is one for a report in $1 to $7 and $15, cases in $8 to $11,
+/// their levels ($12), series ($13) and shares of lost contact ($14) one after the other.
 const INSERT: &str = "with given as (
-        select sobol_index, duration_s, parameter_hash, cast(place as integer) as place
-        from unnest($8, $9, $10) with ordinality
-            as of (sobol_index, duration_s, parameter_hash, place)),
+        select sobol_index, duration_s, parameter_hash, checksum, cast(place as integer) as place
+        from unnest($8, $9, $10, $11) with ordinality
+            as of (sobol_index, duration_s, parameter_hash, checksum, place)),
     size as (
-        select cardinality($7) as passes, cardinality($11) / cardinality($8) as levels,
-            length($12) / (cardinality($8) * cardinality($7)) as bytes),
+        select cardinality($7) as passes, cardinality($12) / cardinality($8) as levels,
+            length($13) / (cardinality($8) * cardinality($7)) as bytes),
     stored as (
         insert into case_result (campaign_id, worker, code_version, model_hash, experiment_hash,
-            finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash, levels_dB, flagged)
-        select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash,
-            ($11)[levels * (place - 1) + 1:levels * place], $13
+            finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash, checksum, levels_dB,
+            contact_loss_shares, flagged)
+        select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash, checksum,
+            ($12)[levels * (place - 1) + 1:levels * place],
+            ($14)[passes * (place - 1) + 1:passes * place], $15
         from given, size
         returning id, sobol_index)
     insert into case_series (result_id, speed_km_h, log_power)
     select id, ($7)[pass],
-        substring($12 from bytes * (passes * (place - 1) + pass - 1) + 1 for bytes)
+        substring($13 from bytes * (passes * (place - 1) + pass - 1) + 1 for bytes)
     from stored join given using (sobol_index), size, generate_series(1, passes) as pass";
 
 /// Over a network many cases go in one statement: their levels and series travel one after the other, and
@@ -35,20 +37,24 @@ const INSERT: &str = "with given as (
 pub(super) async fn insert(
     connection: &mut Connection,
     report: &Report,
-    finished: &[(&CaseReport, &[Features])],
+    finished: &[(&CaseReport, &[PassFeatures])],
     flagged: Option<String>,
 ) -> Result<(), LibraryError> {
     for cases in finished.chunks(CASES_A_STATEMENT) {
-        let passes = || cases.iter().flat_map(|(_, features)| features.iter());
+        let passes = || cases.iter().flat_map(|(_, passes)| passes.iter());
+        let features = || passes().map(|pass| &pass.features);
         let indices: Vec<i64> = cases.iter().map(|(case, _)| case.index.into()).collect();
         let hashes = cases.iter().map(|(case, _)| case.parameter_hash.clone()).collect();
+        let checksums = cases.iter().map(|(case, _)| case.checksum.clone()).collect();
         let insert = of_report(sql(INSERT), report)
             .bind(Value::Reals(report.speeds_km_h.clone()))
             .bind(indices)
             .bind(Value::Reals(cases.iter().map(|(case, _)| case.duration_s).collect()))
             .bind(Value::Texts(hashes))
-            .bind(Value::Reals(passes().flat_map(|it| &it.band_levels_db).copied().collect()))
-            .bind(Value::series(passes().map(|it| &it.log_power[..])))
+            .bind(Value::Texts(checksums))
+            .bind(Value::Reals(features().flat_map(|it| &it.band_levels_db).copied().collect()))
+            .bind(Value::series(features().map(|it| &it.log_power[..])))
+            .bind(Value::OptionalReals(passes().map(|it| it.contact_loss_share).collect()))
             .bind(flagged.clone());
         connection.execute(insert).await?;
     }
@@ -83,12 +89,12 @@ pub(crate) fn gathering(columns: &str, values: &str) -> String {
         gathered as (
             insert into case_result (campaign_id, sobol_index, speeds_km_h, levels_dB, duration_s,
                 worker, code_version, model_hash, experiment_hash, parameter_hash, finished_at,
-                flagged)
+                flagged, contact_loss_shares, checksum)
             select campaign_id, sobol_index, speeds_km_h,
                 array(select level from unnest(levels) with ordinality as of (level, place)
                     order by place),
                 duration_s, worker, code_version, model_hash, experiment_hash, parameter_hash,
-                finished_at, flagged
+                finished_at, flagged, contact_loss_shares, checksum
             from (
                 select campaign_id, sobol_index,
                     array_agg(speed_km_h order by speed_km_h) as speeds_km_h,
@@ -97,11 +103,14 @@ pub(crate) fn gathering(columns: &str, values: &str) -> String {
                     max(code_version) as code_version, max(model_hash) as model_hash,
                     max(experiment_hash) as experiment_hash,
                     max(parameter_hash) as parameter_hash, max(finished_at) as finished_at,
-                    max(flagged) as flagged
+                    max(flagged) as flagged,
+                    array_agg(contact_loss_share order by speed_km_h) as contact_loss_shares,
+                    max(checksum) as checksum
                 from (select * from here union all select * from added) as passes
                 group by campaign_id, sobol_index) as cases
             on conflict (campaign_id, sobol_index) do update set
-                speeds_km_h = excluded.speeds_km_h, levels_dB = excluded.levels_dB
+                speeds_km_h = excluded.speeds_km_h, levels_dB = excluded.levels_dB,
+                contact_loss_shares = excluded.contact_loss_shares, checksum = excluded.checksum
             returning id, campaign_id, sobol_index),
         series as (
             insert into case_series (result_id, speed_km_h, log_power)

@@ -3,16 +3,17 @@
 use super::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
 use crate::engine::{Connection, sql};
-use crate::report::{CaseReport, Report};
-use tracktwin_signal::Features;
+use crate::report::Report;
+use tracktwin_protocol::{CaseReport, PassFeatures};
 
 /// The columns that are one for a whole report, and then those that are not, without the levels.
 const INSERT: &str = "insert into result (campaign_id, worker, code_version, model_hash,
-    experiment_hash, finished_at, flagged, sobol_index, speed_km_h, duration_s, parameter_hash, log_power";
+    experiment_hash, finished_at, flagged, sobol_index, speed_km_h, duration_s, parameter_hash, checksum,
+    contact_loss_share, log_power";
 const OF_A_REPORT: usize = 7;
-const OF_A_PASS: usize = 5 + LEVEL_COLUMNS.len();
+const OF_A_PASS: usize = 7 + LEVEL_COLUMNS.len();
 
-/// Rows in one statement at most: 64 rows of 25 values stay well below the 32,766 that `SQLite` takes.
+/// Rows in one statement at most: 64 rows of 27 values stay well below the 32,766 that `SQLite` takes.
 const ROWS_MAX: usize = 64;
 
 /// Statements of as many rows as a power of two, so that there are few to prepare: each costs a turn
@@ -20,13 +21,11 @@ const ROWS_MAX: usize = 64;
 pub(super) async fn insert(
     connection: &mut Connection,
     report: &Report,
-    finished: &[(&CaseReport, &[Features])],
+    finished: &[(&CaseReport, &[PassFeatures])],
     flagged: Option<String>,
 ) -> Result<(), LibraryError> {
-    let passes = finished.iter().flat_map(|&(case, features)| {
-        let speeds = report.speeds_km_h.iter();
-        speeds.zip(features).map(move |(&speed_km_h, features)| (case, speed_km_h, features))
-    });
+    let passes =
+        finished.iter().flat_map(|&(case, passes)| passes.iter().map(move |it| (case, it)));
     let passes: Vec<_> = passes.collect();
     let mut rest = &passes[..];
     while !rest.is_empty() {
@@ -34,14 +33,16 @@ pub(super) async fn insert(
         let (rows, after) = rest.split_at(ROWS_MAX.min(largest));
         let mut insert =
             sql(format!("{INSERT}, {}) values {}", LEVEL_COLUMNS.join(", "), places(rows.len())));
-        for (case, speed_km_h, features) in rows {
+        for (case, pass) in rows {
             insert = insert
                 .bind(case.index)
-                .bind(*speed_km_h)
+                .bind(pass.speed_km_h)
                 .bind(case.duration_s)
                 .bind(&case.parameter_hash)
-                .bind(&features.log_power[..]);
-            let levels = &features.band_levels_db;
+                .bind(&case.checksum)
+                .bind(pass.contact_loss_share)
+                .bind(&pass.features.log_power[..]);
+            let levels = &pass.features.band_levels_db;
             insert = levels.iter().fold(insert, |insert, &level| insert.bind(level));
         }
         let insert = of_report(insert, report).bind(flagged.clone());

@@ -5,15 +5,19 @@
 
 mod by_case;
 mod by_pass;
+mod contact;
+mod stored;
+
+pub use contact::ContactLoss;
 
 pub(crate) use by_case::{gathering, lock};
+pub(crate) use stored::{Attested, Gathering, StoredCase, passes_of};
 
-use crate::case::case_of;
 use crate::engine::{Connection, Dialect, Row, Statement, iso_utc, sql};
-use crate::report::{CaseReport, Report};
+use crate::report::Report;
 use crate::{Library, LibraryError};
-use tokio_stream::StreamExt;
 use tracktwin_parameters::Case;
+use tracktwin_protocol::{CaseReport, PassFeatures};
 use tracktwin_signal::Features;
 
 /// The columns of one-third-octave levels, ascending; 50 to 4000 Hz.
@@ -55,43 +59,24 @@ impl Library {
     /// One entry is held at a time, so a million cases need no more memory than one.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library cannot be read or a case lacks a speed.
+    /// [`LibraryError`] when the library cannot be read, a case lacks a speed, or its results do not have
+    /// their checksum.
     pub async fn training_set(
         &self,
         campaign: &str,
         mut take: impl FnMut(LibraryEntry),
     ) -> Result<(), LibraryError> {
         let speeds = self.campaign(campaign).await?.speeds_km_h.len();
-        let ask = "select * from result_with_parameters where campaign_id = $1
-            order by sobol_index, speed_km_h";
-        let mut rows = self.readers().stream(sql(ask).bind(campaign));
-        let mut entry: Option<LibraryEntry> = None;
-        while let Some(row) = rows.next().await {
-            let row = row?;
-            let index = row.get_u32("sobol_index")?;
-            match &mut entry {
-                Some(entry) if entry.case.index == index => entry.features.push(features_of(&row)?),
-                _ => {
-                    let next =
-                        LibraryEntry { case: case_of(&row)?, features: vec![features_of(&row)?] };
-                    if let Some(done) = entry.replace(next) {
-                        take(complete(done, speeds)?);
-                    }
-                }
-            }
-        }
-        if let Some(done) = entry {
-            take(complete(done, speeds)?);
-        }
-        Ok(())
+        let complete = |case: StoredCase| complete(case, speeds).map(&mut take);
+        self.stored_cases(campaign, complete).await
     }
 }
 
-fn complete(entry: LibraryEntry, speeds: usize) -> Result<LibraryEntry, LibraryError> {
-    if entry.features.len() == speeds {
-        return Ok(entry);
+fn complete(case: StoredCase, speeds: usize) -> Result<LibraryEntry, LibraryError> {
+    let (index, found) = (case.case.index, case.passes.len());
+    if found == speeds {
+        return case.entry();
     }
-    let (index, found) = (entry.case.index, entry.features.len());
     Err(LibraryError::Damaged { what: format!("case {index} has {found} of {speeds} results") })
 }
 
@@ -120,6 +105,28 @@ pub(crate) const fn table(dialect: Dialect) -> &'static str {
     }
 }
 
+/// Takes the results of cases away.
+pub(crate) async fn discard(
+    connection: &mut Connection,
+    campaign: &str,
+    indices: &[i64],
+) -> Result<(), LibraryError> {
+    let dialect = connection.dialect();
+    let of = format!("campaign_id = $1 and sobol_index {}", dialect.listed("$2"));
+    let series = format!(
+        "delete from case_series where result_id in (select id from case_result where {of})"
+    );
+    let results = format!("delete from {} where {of}", table(dialect));
+    let both = match dialect {
+        Dialect::Sqlite => vec![results],
+        Dialect::Postgres => vec![series, results],
+    };
+    for delete in both {
+        connection.execute(sql(delete).bind(campaign).bind(indices.to_vec())).await?;
+    }
+    Ok(())
+}
+
 /// Stores the results of cases that have none, flagged where there is a reason to.
 ///
 /// # Panics
@@ -127,15 +134,18 @@ pub(crate) const fn table(dialect: Dialect) -> &'static str {
 pub(crate) async fn insert_results(
     connection: &mut Connection,
     report: &Report,
-    finished: &[(&CaseReport, &[Features])],
+    finished: &[(&CaseReport, &[PassFeatures])],
     flagged: Option<String>,
 ) -> Result<(), LibraryError> {
     let shape = |features: &Features| (features.log_power.len(), features.band_levels_db.len());
     let first = finished.iter().find_map(|(_, passes)| passes.first());
-    let expected = (first.map_or(0, |it| it.log_power.len()), LEVEL_COLUMNS.len());
+    let expected = (first.map_or(0, |it| it.features.log_power.len()), LEVEL_COLUMNS.len());
     for (_, passes) in finished {
-        assert_eq!(passes.len(), report.speeds_km_h.len(), "a pass at each speed");
-        assert!(passes.iter().all(|pass| shape(pass) == expected), "passes of one shape");
+        assert!(
+            passes.iter().map(|it| it.speed_km_h).eq(report.speeds_km_h.iter().copied()),
+            "a pass at each speed"
+        );
+        assert!(passes.iter().all(|it| shape(&it.features) == expected), "passes of one shape");
     }
     match connection.dialect() {
         Dialect::Sqlite => by_pass::insert(connection, report, finished, flagged).await,

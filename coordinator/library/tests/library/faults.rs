@@ -178,7 +178,7 @@ async fn a_full_disk_is_said_and_survived() {
     let verdicts = report(&library, "w", reports).await;
     assert!(verdicts.iter().all(|it| matches!(it, Verdict::Stored | Verdict::Duplicate)));
     assert_eq!(library.digest(CAMPAIGN).await.unwrap(), undisturbed(CASES).await);
-    let findings = library.verify().await.unwrap();
+    let findings = library.verify(|| ()).await.unwrap().findings;
     assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
     library.close().await;
 }
@@ -214,7 +214,7 @@ async fn kill_writers(home: &Home) {
         victim.wait().unwrap();
     }
     let library = home.open().await;
-    let findings = library.verify().await.unwrap();
+    let findings = library.verify(|| ()).await.unwrap().findings;
     assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
     // The victims' leases have long expired.
     let later = library.now_unix_ms() + 3_600_000;

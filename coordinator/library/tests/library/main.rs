@@ -3,9 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 mod campaigns;
+mod checksums;
 mod data;
 mod faults;
 mod histories;
+mod malformed;
 mod opening;
 mod page;
 mod provenance;

@@ -2,13 +2,14 @@
 
 use crate::data::{Kept, copy};
 use crate::provenance::{diagnosis, evaluation, training};
-use crate::support::{Home, case, features, finished, message, on_both_databases, request};
+use crate::support::{Home, case, features, message, on_both_databases, passes, reported, request};
 use crate::upgrade::{CAMPAIGN, released};
 use sqlx::{Connection, PgConnection};
 use tracktwin_library::{
-    CampaignRecord, CaseReport, Cell, DiagnosisRecord, EvaluationRecord, LeaseRequest, Leased,
-    Library, LibraryError, Registration, Report, TrainingRecord,
+    CampaignRecord, Cell, DiagnosisRecord, EvaluationRecord, LeaseRequest, Leased, Library,
+    LibraryError, Registration, Report, TrainingRecord,
 };
+use tracktwin_protocol::{CaseReport, Outcome};
 use tracktwin_signal::Features;
 
 const PAGE: &str = include_str!("../../../../docs/how-to/query-the-library.md");
@@ -81,8 +82,8 @@ async fn work(library: &Library, campaign: &str) {
     let bins = |first: f64| (0..303).map(|bin| first + f64::from(bin) / 303.0).collect();
     let pass = |pass: Features| Features { log_power: bins(pass.log_power[0]), ..pass };
     let done = |leased: &Leased| {
-        let passes = features(leased.case.index).into_iter().map(pass).collect();
-        CaseReport { duration_s: 0.02, outcome: Ok(passes), ..finished(leased) }
+        let features = features(leased.case.index).into_iter().map(pass).collect();
+        CaseReport { duration_s: 0.02, ..reported(leased, Outcome::Finished(passes(features))) }
     };
     let report = Report {
         campaign: campaign.to_owned(),

@@ -1,9 +1,11 @@
 //! Reports: the first result of a case stays, and the digest knows nothing of how it came.
 
 use crate::support::{
-    CAMPAIGN, Home, case, failed, features, finished, lease, on_both_databases, report,
+    CAMPAIGN, Home, case, failed, features, finished, lease, on_both_databases, passes, report,
+    reported,
 };
-use tracktwin_library::{CaseReport, LibraryEntry, LibraryError, Verdict};
+use tracktwin_library::{LibraryEntry, LibraryError, Verdict};
+use tracktwin_protocol::{CaseReport, Outcome};
 
 on_both_databases! {
     async fn a_second_report_changes_nothing(home: &Home) {
@@ -12,8 +14,9 @@ on_both_databases! {
         let reports: Vec<_> = leased.iter().map(finished).collect();
         assert_eq!(report(&library, "w", reports.clone()).await, [Verdict::Stored; 2]);
         let digest = library.digest(CAMPAIGN).await.unwrap();
-        let mut other = reports[0].clone();
-        other.outcome.as_mut().unwrap()[0].log_power[0] += 1.0;
+        let mut other = passes(features(0));
+        other[0].features.log_power[0] += 1.0;
+        let other = reported(&leased[0], Outcome::Finished(other));
         assert_eq!(report(&library, "w", vec![other]).await, [Verdict::Duplicate]);
         assert_eq!(report(&library, "w", vec![failed(&leased[1])]).await, [Verdict::Duplicate]);
         assert_eq!(library.digest(CAMPAIGN).await.unwrap(), digest);
@@ -71,12 +74,13 @@ on_both_databases! {
         for nudged in [false, true] {
                 let home = home.another();
             let library = home.library(1).await;
-            let mut case = finished(&lease(&library, "w", 1, 0).await[0]);
+            let leased = lease(&library, "w", 1, 0).await;
+            let mut passes = passes(features(0));
             if nudged {
-                let value = &mut case.outcome.as_mut().unwrap()[1].log_power[4];
+                let value = &mut passes[1].features.log_power[4];
                 *value = value.next_up();
             }
-            report(&library, "w", vec![case]).await;
+            report(&library, "w", vec![reported(&leased[0], Outcome::Finished(passes))]).await;
             digests.push(library.digest(CAMPAIGN).await.unwrap());
         }
         assert_ne!(digests[0], digests[1]);

@@ -3,9 +3,10 @@
 use tempfile::TempDir;
 use test_postgres::Server;
 use tracktwin_library::{
-    CampaignRecord, CaseReport, Ending, Held, LeaseRequest, Leased, Library, Report, State, Verdict,
+    CampaignRecord, Ending, Held, LeaseRequest, Leased, Library, Report, State, Verdict,
 };
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
+use tracktwin_protocol::{CaseReport, Outcome, PassFeatures, checksum};
 use tracktwin_signal::{Features, ThirdOctave};
 
 pub(crate) const CAMPAIGN: &str = "test-000000000000";
@@ -154,18 +155,35 @@ pub(crate) fn held(leased: &Leased) -> Held {
     Held { index: leased.case.index, epoch: leased.epoch }
 }
 
-pub(crate) fn finished(leased: &Leased) -> CaseReport {
+/// The passes of features, as a worker reports them.
+pub(crate) fn passes(features: Vec<Features>) -> Vec<PassFeatures> {
+    let pass = |(speed_km_h, features)| PassFeatures {
+        speed_km_h,
+        features,
+        contact_loss_share: Some(0.0),
+    };
+    record().speeds_km_h.into_iter().zip(features).map(pass).collect()
+}
+
+/// A report with the checksum that its worker makes.
+pub(crate) fn reported(leased: &Leased, outcome: Outcome) -> CaseReport {
+    let parameter_hash = leased.case.parameter_hash();
     CaseReport {
         index: leased.case.index,
         epoch: leased.epoch,
-        parameter_hash: leased.case.parameter_hash(),
         duration_s: 0.25,
-        outcome: Ok(features(leased.case.index)),
+        checksum: checksum(leased.case.index, &parameter_hash, &outcome),
+        parameter_hash,
+        outcome,
     }
 }
 
+pub(crate) fn finished(leased: &Leased) -> CaseReport {
+    reported(leased, Outcome::Finished(passes(features(leased.case.index))))
+}
+
 pub(crate) fn failed(leased: &Leased) -> CaseReport {
-    CaseReport { outcome: Err("it does not stand".to_owned()), ..finished(leased) }
+    reported(leased, Outcome::Failed { reason: "it does not stand".to_owned() })
 }
 
 pub(crate) async fn report(

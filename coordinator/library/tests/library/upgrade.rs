@@ -22,7 +22,7 @@ async fn a_library_of_the_first_schema_keeps_all_it_holds() {
     // As a program in another language works it out from the file before.
     assert_eq!(
         library.digest(CAMPAIGN).await.unwrap(),
-        "1135fcd10b7b155789ce1cb0d0609df965284442f6ff283f8e78470d5a3d8eac"
+        "c24f8103cab5b073b4e54c6fed3983706acdd0dc7b0906fcab182fbccdc17274"
     );
     let status = library.status(CAMPAIGN).await.unwrap();
     assert_eq!(status, Status { leased: 1, finished: 1, failed: 1, waiting: 0 });
@@ -114,10 +114,32 @@ async fn results_of_a_server_s_library_of_the_fifth_schema_stay_as_they_were() {
     assert_eq!(before.1, 6);
     for version in migrations.iter().map(|it| it.version).filter(|version| *version > 5) {
         migrations.run_to(version, &mut connection).await.unwrap();
-        let after: (Vec<String>, i64) =
+        let mut after: (Vec<String>, i64) =
             sqlx::query_as(all).fetch_one(&mut connection).await.unwrap();
+        if version > 7 {
+            // Two columns more, in which nothing stands.
+            for row in &mut after.0 {
+                let shorter = row.strip_suffix(",,)").map(|row| format!("{row})"));
+                *row = shorter.expect("nobody made up what was not known");
+            }
+        }
         assert_eq!(after, before, "{version}");
     }
     connection.close().await.unwrap();
-    Library::open(&home.url).await.unwrap().close().await;
+    let library = Library::open(&home.url).await.unwrap();
+    assert_eq!(library.verify(|| ()).await.unwrap().unattested, 2);
+    library.close().await;
+}
+
+#[tokio::test]
+async fn results_of_the_first_schema_have_no_checksum_and_pass() {
+    let home = Home::sqlite();
+    released(&home).await;
+    let library = Library::open(&home.url).await.unwrap();
+    let verified = library.verify(|| ()).await.unwrap();
+    assert_eq!((verified.attested, verified.unattested), (0, 1));
+    assert_eq!(verified.findings, []);
+    let mut entries = 0;
+    library.training_set(CAMPAIGN, |_| entries += 1).await.unwrap();
+    assert_eq!(entries, 1);
 }

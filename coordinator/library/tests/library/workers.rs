@@ -2,9 +2,10 @@
 
 use crate::support::{CAMPAIGN, Home, failed, finished, lease, message, on_both_databases, report};
 use tracktwin_library::{
-    AuditCounts, AuditFinding, CaseReport, Library, LibraryError, Registration, Report, Retry,
-    State, Verdict, WorkerState,
+    AuditCounts, AuditFinding, Library, LibraryError, Registration, Report, Retry, State, Verdict,
+    WorkerState,
 };
+use tracktwin_protocol::CaseReport;
 
 fn registration(worker: &str, now_unix_ms: i64) -> Registration {
     Registration {

@@ -1,11 +1,12 @@
 //! `tracktwin library copy`: a library into another, of either kind.
 
 use super::{OrInput, Stop};
+use crate::commands::library_url::open_or_create;
 use crate::commands::progress::Progress;
 use crate::commands::say;
 use anyhow::anyhow;
 use clap::Args;
-use tracktwin_library::{Cell, Library, Table};
+use tracktwin_library::{Cell, Library, LibraryError, Lost, Table};
 
 /// Rows held at a time: 4 MB of results.
 const ROWS_AT_A_TIME: usize = 1000;
@@ -15,7 +16,9 @@ const ROWS_AT_A_TIME: usize = 1000;
 #[command(
     after_help = "Rows that are there already stay as they are, so a copy that was interrupted \
     is gone on with,\nand two libraries can be joined in a third. In the end the digests are compared: \
-    exit code 1\nwhere a campaign is not the same in both."
+    exit code 1\nwhere a campaign is not the same in both.\n\n\
+    Of a malformed library, what is whole is copied: what cannot be read, and results that do not have\n\
+    their checksum, are left out and told (exit code 1). `tracktwin run` on the copy simulates them anew."
 )]
 pub(in crate::commands) struct Arguments {
     /// The library to copy: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
@@ -26,46 +29,93 @@ pub(in crate::commands) struct Arguments {
     to: String,
 }
 
+/// What was copied, and what could not be.
+#[derive(Default)]
+struct Copied {
+    done: u64,
+    added: u64,
+    left_out: Vec<String>,
+}
+
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     if arguments.from == arguments.to {
         return Err(anyhow!("--from and --to are the same library")).or_input();
     }
     let from = Library::open(&arguments.from).await?;
-    let to = Library::open_or_create(&arguments.to).await?;
-    let mut total = 0;
-    for table in Table::ALL {
-        total += from.count(table).await?;
-    }
-    let mut progress = Progress::begin("copying", 0, total);
-    let mut done = 0;
-    let mut added = 0;
-    for table in Table::ALL {
-        let take = async |rows: Vec<Vec<Cell>>| {
-            done += rows.len() as u64;
-            added += to.write_table(table, rows).await?;
-            progress.at(done, table.name);
-            Ok::<(), Stop>(())
-        };
-        from.read_table(table, ROWS_AT_A_TIME, take).await?;
-    }
-    progress.end();
+    let to = open_or_create(&arguments.to).await?;
+    let mut copied = copy(&from, &to).await?;
     to.settle().await?;
-    say(&format!("{added} of {done} rows copied; the others were there"));
+    if !copied.left_out.is_empty() {
+        let incomplete = to.discard_incomplete().await?;
+        if incomplete > 0 {
+            copied.left_out.push(format!("{incomplete} cases have only some of their results"));
+        }
+    }
+    say(&format!("{} of {} rows copied; the others were there", copied.added, copied.done));
+    for what in &copied.left_out {
+        say(&format!("left out: {what}"));
+    }
     let same = compare(&from, &to).await;
     to.close().await;
-    same
+    if copied.left_out.is_empty() { same } else { Err(Stop::Negative) }
+}
+
+async fn copy(from: &Library, to: &Library) -> Result<Copied, Stop> {
+    let mut total = 0;
+    for table in Table::ALL {
+        // Of what cannot be counted, it is found out how much can be read.
+        total += from.count(table).await.unwrap_or(0);
+    }
+    let mut progress = Progress::begin("copying", 0, total);
+    let mut copied = Copied::default();
+    for table in Table::ALL {
+        let mut refused = Vec::new();
+        let take = async |rows: Vec<Vec<Cell>>| {
+            copied.done += rows.len() as u64;
+            let (added, errors) = to.write_what_is_whole(table, rows).await?;
+            copied.added += added;
+            refused.extend(errors);
+            progress.at(copied.done, table.name);
+            Ok::<(), Stop>(())
+        };
+        let lost = from.read_what_is_whole(table, ROWS_AT_A_TIME, take).await?;
+        copied.left_out.extend(lost.map(|lost| unread(table, &lost)));
+        copied.left_out.extend(unwritten(table, &refused));
+    }
+    progress.end();
+    Ok(copied)
+}
+
+fn unread(table: &Table, lost: &Lost) -> String {
+    let rows = lost.rows.map_or_else(|| "some".to_owned(), |rows| format!("up to {rows}"));
+    format!("{rows} rows of {} that cannot be read: {}", table.name, lost.reason)
+}
+
+fn unwritten(table: &Table, refused: &[LibraryError]) -> Option<String> {
+    let first = refused.first()?;
+    let reason = format!("{:#}", anyhow!(first.to_string()));
+    Some(format!(
+        "{} rows of {} that are not whole; the first: {reason}",
+        refused.len(),
+        table.name
+    ))
 }
 
 /// Says of each campaign whether it is the same in both.
 async fn compare(from: &Library, to: &Library) -> Result<(), Stop> {
     let mut differ = false;
-    for campaign in from.campaigns().await? {
-        let (here, there) = (from.digest(&campaign.id).await?, to.digest(&campaign.id).await?);
-        if here == there {
-            say(&format!("{here}  {}: the same in both", campaign.id));
-        } else {
-            differ = true;
-            say(&format!("{}: differs: {here} and {there}", campaign.id));
+    for campaign in from.campaigns().await.unwrap_or_default() {
+        let there = to.digest(&campaign.id).await?;
+        match from.digest(&campaign.id).await {
+            Ok(here) if here == there => say(&format!("{here}  {}: the same in both", campaign.id)),
+            Ok(here) => {
+                differ = true;
+                say(&format!("{}: differs: {here} and {there}", campaign.id));
+            }
+            Err(error) => {
+                differ = true;
+                say(&format!("{}: cannot be compared: {error}", campaign.id));
+            }
         }
     }
     if differ { Err(Stop::Negative) } else { Ok(()) }

@@ -1,31 +1,81 @@
 //! `tracktwin library verify`: whether the library is what it says it is.
 
-use super::{Stop, Which, open};
-use crate::commands::say;
-use tracktwin_library::Finding;
+use super::{Stop, Which};
+use crate::commands::progress::Progress;
+use crate::commands::{note, say};
+use tracktwin_library::{Finding, Library, LibraryError, Verified};
+
+/// What no checksum is made of, and no hash.
+const UNCHECKED: &str = "not checked: who computed a case, when and for how long; attempts, audits, workers, \
+                         progress; scores of trainings; what estimates, findings and trials say";
 
 pub(super) async fn run(which: &Which) -> Result<(), Stop> {
-    let (library, campaigns) = open(&which.library).await?;
-    let findings = library.verify().await?;
-    if which.json {
-        let findings: Vec<_> = findings.iter().map(json).collect();
+    let (name, verified) = match which.library.open().await {
+        Ok(library) => (library.name(), verify(&library).await?),
+        Err(Stop::Input(error) | Stop::Failure(error)) if says_what_is_there(&error) => {
+            let (place, what) = (which.library.name(), format!("{error:#}"));
+            let finding = Finding { place, what, count: 1, first_index: None };
+            (String::new(), Verified { findings: vec![finding], ..Verified::default() })
+        }
+        Err(stop) => return Err(stop),
+    };
+    tell(which.json, &name, &verified);
+    if verified.findings.is_empty() { Ok(()) } else { Err(Stop::Negative) }
+}
+
+async fn verify(library: &Library) -> Result<Verified, Stop> {
+    // What the counts are worth is found out in between.
+    let mut cases = 0;
+    for campaign in library.campaigns().await.unwrap_or_default() {
+        cases += library.status(&campaign.id).await.map_or(0, |it| u64::from(it.finished));
+    }
+    let mut progress = Progress::begin("verifying", 0, cases);
+    let mut done = 0;
+    let looked_at = || {
+        done += 1;
+        progress.at(done, "cases");
+    };
+    let verified = library.verify(looked_at).await?;
+    progress.end();
+    Ok(verified)
+}
+
+/// Whether a library can't be opened for what is there, rather than because nothing is or answers.
+fn says_what_is_there(error: &anyhow::Error) -> bool {
+    error.downcast_ref().is_some_and(|error| {
+        matches!(
+            error,
+            LibraryError::Empty { .. }
+                | LibraryError::NotALibrary { .. }
+                | LibraryError::Malformed { .. }
+                | LibraryError::Migration(_)
+                | LibraryError::Damaged { .. }
+        )
+    })
+}
+
+fn tell(json: bool, name: &str, verified: &Verified) {
+    let Verified { findings, attested, unattested, notes } = verified;
+    if json {
+        let findings: Vec<_> = findings.iter().map(self::json).collect();
         say(&format!("{:#}", serde_json::Value::from(findings)));
     } else {
-        for finding in &findings {
+        for finding in findings {
             say(&text(finding));
         }
-    }
-    if findings.is_empty() {
-        if !which.json {
-            let campaigns = match campaigns.len() {
-                1 => "1 campaign".to_owned(),
-                count => format!("{count} campaigns"),
-            };
-            say(&format!("nothing is wrong with {} ({campaigns})", library.name()));
+        if findings.is_empty() {
+            say(&format!("nothing is wrong with {name} ({attested} cases have their checksums)"));
         }
-        return Ok(());
     }
-    Err(Stop::Negative)
+    if *unattested > 0 {
+        note(&format!(
+            "{unattested} cases have results without checksum, of before schema 8: nothing tells whether they \
+             were altered"
+        ));
+    }
+    for note in notes.iter().map(String::as_str).chain([UNCHECKED]) {
+        self::note(note);
+    }
 }
 
 fn text(finding: &Finding) -> String {

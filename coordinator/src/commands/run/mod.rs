@@ -3,6 +3,7 @@
 mod sample;
 
 use super::files::make_folder;
+use super::library_url::open_or_create;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, evaluate, note, say, train};
@@ -71,7 +72,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let out = &arguments.out;
     make_folder(out).or_input()?;
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
-    let library = Library::open_or_create(&url).await?;
+    let library = open_or_create(&url).await?;
     let said = chain(&library, &campaign, given, &arguments).await;
     // What the library holds is then in one file, fit to be copied.
     library.close().await;

@@ -6,14 +6,14 @@ mod take_in;
 use super::Counts;
 use super::audits::{self, Audits};
 use super::campaigns::{Campaigns, DispatchError};
-use super::messages::{held, malformed, unavailable, unfit, verdict_message};
+use super::messages::{held, malformed, unavailable, unfit};
 use super::roster::{Roster, Standing};
 use super::settings::Settings;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 use tokio::time::Instant;
 use tonic::{Request, Response, Status};
-use tracktwin_library::{self as library, Library, Verdict, WorkerState};
+use tracktwin_library::{self as library, Library, WorkerState};
 use tracktwin_protocol::farm::farm_server::Farm;
 use tracktwin_protocol::{BadMessage, CaseReport, Lease, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
@@ -188,11 +188,12 @@ impl Farm for Dispatch {
             self.take_in(&worker, standing, &served, reports, &step).await?
         } else {
             self.counts.refused.inc_by(indices.len() as u64);
-            vec![Verdict::Refused; indices.len()]
+            vec![farm::Verdict::Refused; indices.len()]
         };
-        let receipts = indices.into_iter().zip(verdicts).map(|(sobol_index, verdict)| {
-            farm::Receipt { sobol_index, verdict: verdict_message(verdict).into() }
-        });
+        let receipts = indices
+            .into_iter()
+            .zip(verdicts)
+            .map(|(sobol_index, verdict)| farm::Receipt { sobol_index, verdict: verdict.into() });
         self.counts.report_s.observe(begun.elapsed().as_secs_f64());
         Ok(Response::new(farm::ReportResponse { receipts: receipts.collect() }))
     }

@@ -4,29 +4,35 @@ use super::Dispatch;
 use crate::dispatch::after_attempt;
 use crate::dispatch::audits::{self, Found};
 use crate::dispatch::campaigns::Served;
-use crate::dispatch::messages::{library_report, unavailable};
+use crate::dispatch::messages::{unavailable, verdict_message};
 use crate::dispatch::roster::Standing;
 use std::sync::Arc;
 use tonic::Status;
 use tracktwin_library::{Report, Verdict, WorkerState};
-use tracktwin_protocol::{CaseReport, Outcome};
+use tracktwin_protocol::{CaseReport, Outcome, farm};
 use tracktwin_traces::Step;
 
 impl Dispatch {
-    /// Stores checked reports; those of audits are compared instead.
+    /// Stores checked reports; those of audits are compared instead, and those that arrived damaged (none)
+    /// stay with their worker.
     pub(super) async fn take_in(
         &self,
         worker: &str,
         standing: Standing,
         served: &Arc<Served>,
-        reports: Vec<CaseReport>,
+        reports: Vec<Option<CaseReport>>,
         step: &Step,
-    ) -> Result<Vec<Verdict>, Status> {
-        let mut verdicts = vec![Verdict::Refused; reports.len()];
+    ) -> Result<Vec<farm::Verdict>, Status> {
+        let mut verdicts = vec![farm::Verdict::Damaged; reports.len()];
         let (mut places, mut ordinary) = (Vec::new(), Vec::new());
         for (place, report) in reports.into_iter().enumerate() {
+            let Some(report) = report else {
+                tracing::warn!(worker, "a case arrived damaged; its worker is to send it again");
+                self.counts.malformed.inc();
+                continue;
+            };
             if report.epoch == audits::EPOCH {
-                verdicts[place] = self.audited(worker, served, report).await?;
+                verdicts[place] = verdict_message(self.audited(worker, served, report).await?);
             } else {
                 places.push(place);
                 ordinary.push(report);
@@ -36,7 +42,7 @@ impl Dispatch {
             let stored = self.store(worker, standing, served, ordinary, step).await?;
             self.count(&stored);
             for (place, verdict) in places.into_iter().zip(stored) {
-                verdicts[place] = verdict;
+                verdicts[place] = verdict_message(verdict);
             }
         }
         Ok(verdicts)
@@ -60,7 +66,7 @@ impl Dispatch {
             model_hash: standing.model_hash,
             experiment_hash: served.record.experiment_hash.clone(),
             speeds_km_h: served.shape.speeds_km_h.clone(),
-            cases: reports.into_iter().map(library_report).collect(),
+            cases: reports,
             now_unix_ms: self.now_unix_ms(),
             after_failure: after_attempt,
             audit_share: self.settings.audit_share,

@@ -1,0 +1,122 @@
+//! Cases and what belongs to them, as the schema promises it.
+
+use super::{Fault, Survey};
+use crate::case::case_of;
+use crate::engine::sql;
+use crate::{CampaignRecord, LibraryError};
+use tokio_stream::StreamExt;
+
+/// Statements that find the indices of cases with a fault; `$1` is the campaign.
+const FAULTS: [(&str, &str); 7] = [
+    (
+        "finished cases without result at every speed",
+        "select sobol_index from campaign_case where campaign_id = $1 and state = 'finished'
+            and (select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                and result.sobol_index = campaign_case.sobol_index)
+            <> (select {speeds} from campaign where id = $1)",
+    ),
+    (
+        "results of cases that are not finished",
+        "select distinct sobol_index from result join campaign_case using (campaign_id, sobol_index)
+        where campaign_id = $1 and campaign_case.state <> 'finished'",
+    ),
+    (
+        "results of other parameters than their case has",
+        "select distinct sobol_index from result join campaign_case using (campaign_id, sobol_index)
+        where campaign_id = $1 and result.parameter_hash <> campaign_case.parameter_hash",
+    ),
+    (
+        "results of another experiment than the campaign's",
+        "select distinct sobol_index from result
+        where campaign_id = $1
+            and experiment_hash <> (select experiment_hash from campaign where id = $1)",
+    ),
+    (
+        "cases with the parameters and surface of an earlier one",
+        "select max(sobol_index) as sobol_index from campaign_case where campaign_id = $1
+        group by parameter_hash having count(*) > 1",
+    ),
+    (
+        "gaps in the cases' indices",
+        "select sobol_index from campaign_case as after_gap
+        where campaign_id = $1 and sobol_index > 0 and not exists (
+            select 1 from campaign_case as before_gap where before_gap.campaign_id = $1
+                and before_gap.sobol_index = after_gap.sobol_index - 1)",
+    ),
+    (
+        "leases that their case never had",
+        "select distinct sobol_index from attempt join campaign_case using (campaign_id, sobol_index)
+        where campaign_id = $1 and attempt.epoch not between 1 and campaign_case.epoch",
+    ),
+];
+
+impl<F: FnMut()> Survey<'_, F> {
+    pub(super) async fn faults(&mut self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
+        let readers = self.library.readers();
+        for (what, ask) in FAULTS {
+            let speeds = readers.dialect().json_length("speeds_km_h");
+            let ask = sql(ask.replace("{speeds}", &speeds)).bind(&campaign.id);
+            let mut fault = Fault::default();
+            let mut rows = readers.stream(ask);
+            while let Some(row) = rows.next().await {
+                match row.and_then(|row| row.get_u32("sobol_index")) {
+                    Ok(index) => fault.at(index),
+                    Err(error) => {
+                        self.unreadable(&campaign.id, what, error)?;
+                        break;
+                    }
+                }
+            }
+            self.fault(&campaign.id, what, &fault);
+        }
+        Ok(())
+    }
+
+    pub(super) fn fault(&mut self, campaign: &str, what: &str, fault: &Fault) {
+        if fault.count > 0 {
+            self.add(campaign, what, fault.count, fault.first_index);
+        }
+    }
+
+    pub(super) async fn cases(&mut self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
+        let ask = sql("select * from campaign_case where campaign_id = $1 order by sobol_index");
+        let mut rows = self.library.readers().stream(ask.bind(&campaign.id));
+        let (mut hash, mut finite) = (Fault::default(), Fault::default());
+        while let Some(row) = rows.next().await {
+            let read =
+                row.and_then(|row| Ok((case_of(&row)?, row.get::<String>("parameter_hash")?)));
+            let (case, told) = match read {
+                Ok(read) => read,
+                Err(error) => {
+                    self.unreadable(&campaign.id, "cases", error)?;
+                    break;
+                }
+            };
+            if case.parameter_hash() != told {
+                hash.at(case.index);
+            }
+            if !case.parameters.values().iter().all(|value| value.is_finite()) {
+                finite.at(case.index);
+            }
+        }
+        self.fault(&campaign.id, "cases that do not have their hash", &hash);
+        self.fault(&campaign.id, "cases with parameters that are no numbers", &finite);
+        Ok(())
+    }
+
+    pub(super) async fn counts(&mut self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
+        let count = sql("select state, count(*) as cases from campaign_case
+            where campaign_id = $1 group by state");
+        let library = self.library;
+        let counted = library.counts(count.bind(&campaign.id)).await;
+        let kept = library.status(&campaign.id).await;
+        match counted.and_then(|counted| Ok(counted == kept?)) {
+            Ok(true) => {}
+            Ok(false) => {
+                self.add(&campaign.id, "the counts of cases are not those of the cases", 1, None);
+            }
+            Err(error) => self.unreadable(&campaign.id, "counts of cases", error)?,
+        }
+        Ok(())
+    }
+}

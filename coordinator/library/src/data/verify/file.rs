@@ -1,0 +1,85 @@
+//! The file of a library, and its schema.
+
+use super::Survey;
+use crate::LibraryError;
+use crate::engine::{schema_objects, sql};
+
+impl<F: FnMut()> Survey<'_, F> {
+    pub(super) async fn file(&mut self) -> Result<(), LibraryError> {
+        self.integrity().await?;
+        self.schema().await?;
+        self.references().await
+    }
+
+    /// What `SQLite` itself finds.
+    async fn integrity(&mut self) -> Result<(), LibraryError> {
+        let name = self.library.name();
+        let check = sql("select integrity_check as said from pragma_integrity_check");
+        let rows = match self.library.readers().rows(check).await {
+            Ok(rows) => rows,
+            Err(error) => return self.unreadable(&name, "the file", error),
+        };
+        for row in rows {
+            let said: String = row.get("said")?;
+            // Its heads say which database is meant; there is one.
+            for line in said.lines().filter(|line| *line != "ok" && !line.starts_with("***")) {
+                self.add(&name, line, 1, None);
+            }
+        }
+        Ok(())
+    }
+
+    /// Tables, views, indices and triggers are those that this program makes.
+    async fn schema(&mut self) -> Result<(), LibraryError> {
+        let name = self.library.name();
+        let ask = sql("select type as kind, name, sql from sqlite_schema where sql is not null");
+        let read = self.library.readers().rows(ask).await.and_then(|rows| {
+            let object = |row: &crate::engine::Row| {
+                Ok((row.get("kind")?, row.get("name")?, row.get::<String>("sql")?))
+            };
+            rows.iter().map(object).collect::<Result<Vec<(String, String, String)>, LibraryError>>()
+        });
+        let found = match read {
+            Ok(found) => found,
+            Err(error) => return self.unreadable(&name, "the schema", error),
+        };
+        for (kind, object, expected) in schema_objects().await? {
+            match found.iter().find(|(_, name, _)| *name == object) {
+                None => self.add(&name, format!("the {kind} {object} is missing"), 1, None),
+                Some((_, _, sql)) if !same(sql, &expected) => {
+                    self.add(
+                        &name,
+                        format!("the {kind} {object} is another than this program's"),
+                        1,
+                        None,
+                    );
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Rows that refer to others which are not there: a program that doesn't look may have left them.
+    async fn references(&mut self) -> Result<(), LibraryError> {
+        let name = self.library.name();
+        let ask =
+            sql("select \"table\" as child, parent, count(*) as n from pragma_foreign_key_check
+            group by 1, 2");
+        let rows = match self.library.readers().rows(ask).await {
+            Ok(rows) => rows,
+            Err(error) => return self.unreadable(&name, "what refers to other rows", error),
+        };
+        for row in rows {
+            let (child, parent): (String, String) = (row.get("child")?, row.get("parent")?);
+            let what = format!("rows of {child} whose row of {parent} is not there");
+            self.add(&name, what, row.get_u32("n")?.into(), None);
+        }
+        Ok(())
+    }
+}
+
+/// Whether two statements differ by blanks at most.
+fn same(a: &str, b: &str) -> bool {
+    a.split_whitespace().eq(b.split_whitespace())
+}

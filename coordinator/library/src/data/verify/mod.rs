@@ -1,0 +1,164 @@
+//! Looking a library over: what it holds is what it says it holds.
+//!
+//! What can't be read is a finding like any other, and what comes after it is looked over all the same.
+
+mod cases;
+mod file;
+mod server;
+mod values;
+
+use crate::engine::{Dialect, sql};
+use crate::{CampaignRecord, Library, LibraryError};
+use std::error::Error;
+use tokio_stream::StreamExt;
+
+/// Something that is wrong, and how often.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// Where: a campaign, or the library.
+    pub place: String,
+    /// What.
+    pub what: String,
+    /// How often.
+    pub count: u64,
+    /// The first case that shows it.
+    pub first_index: Option<u32>,
+}
+
+/// What came of looking a library over.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Verified {
+    /// What is wrong; nothing in a sound library.
+    pub findings: Vec<Finding>,
+    /// Cases whose results have the checksum that came with them.
+    pub attested: u64,
+    /// Cases whose results came without one, so that nothing tells whether they were altered.
+    pub unattested: u64,
+    /// What was not looked at, and why.
+    pub notes: Vec<String>,
+}
+
+impl Library {
+    /// Looks over everything: the file with `SQLite`, the schema, whether all can be read, checksums, hashes,
+    /// gaps, duplicates, numbers that are none, and counts. `looked_at` hears of each case whose results were.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library does not answer; what is wrong with it is a finding.
+    pub async fn verify(&self, looked_at: impl FnMut()) -> Result<Verified, LibraryError> {
+        let mut survey = Survey { library: self, found: Verified::default(), looked_at };
+        match self.readers().dialect() {
+            Dialect::Sqlite => survey.file().await?,
+            Dialect::Postgres => survey.server().await?,
+        }
+        survey.tables().await?;
+        match self.campaigns().await {
+            Ok(campaigns) => {
+                for campaign in &campaigns {
+                    survey.campaign(campaign).await?;
+                }
+            }
+            Err(error) => survey.unreadable(&self.name(), "campaigns", error)?,
+        }
+        Ok(survey.found)
+    }
+}
+
+/// A library that is being looked over.
+struct Survey<'a, F> {
+    library: &'a Library,
+    found: Verified,
+    looked_at: F,
+}
+
+impl<F: FnMut()> Survey<'_, F> {
+    fn add(&mut self, place: &str, what: impl Into<String>, count: u64, first_index: Option<u32>) {
+        let (place, what) = (place.to_owned(), what.into());
+        self.found.findings.push(Finding { place, what, count, first_index });
+    }
+
+    /// Takes a failure to read for a finding, unless the library is only away.
+    fn unreadable(
+        &mut self,
+        place: &str,
+        what: &str,
+        error: LibraryError,
+    ) -> Result<(), LibraryError> {
+        if error.is_temporary() || matches!(error, LibraryError::Closed) {
+            return Err(error);
+        }
+        let reason = reason(&error);
+        self.add(place, format!("{what} cannot be read: {reason}"), 1, None);
+        Ok(())
+    }
+
+    async fn campaign(&mut self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
+        self.definition(campaign);
+        self.faults(campaign).await?;
+        self.cases(campaign).await?;
+        self.values(campaign).await?;
+        self.counts(campaign).await
+    }
+
+    fn definition(&mut self, campaign: &CampaignRecord) {
+        let hashes = [
+            ("definition", &campaign.definition_json, &campaign.definition_hash),
+            ("experiment", &campaign.experiment_json, &campaign.experiment_hash),
+        ];
+        for (what, json, hash) in hashes {
+            if blake3::hash(json.as_bytes()).to_hex().as_str() != hash {
+                self.add(&campaign.id, format!("the {what} does not have its hash"), 1, None);
+            }
+        }
+    }
+
+    /// Reads every row of the tables that nothing else here reads whole.
+    async fn tables(&mut self) -> Result<(), LibraryError> {
+        for table in super::Table::ALL {
+            if ["campaign", "campaign_case", "result"].contains(&table.name) {
+                continue;
+            }
+            let library = self.library;
+            let ask = format!("select {} from {}", table.column_list(), table.name);
+            let mut rows = library.readers().stream(sql(ask));
+            while let Some(row) = rows.next().await {
+                let cells = row.and_then(|row| super::decode::table_row(table, &row));
+                if let Err(error) = cells {
+                    self.unreadable(&library.name(), &format!("rows of {}", table.name), error)?;
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What the database said, in one line.
+pub(super) fn reason(error: &LibraryError) -> String {
+    let mut reason = error.to_string();
+    if let LibraryError::Malformed { reason: said } = error {
+        reason.clone_from(said);
+    }
+    let mut source = error.source();
+    while let Some(error) = source {
+        let said = error.to_string();
+        if !reason.contains(&said) {
+            reason = format!("{reason}: {said}");
+        }
+        source = error.source();
+    }
+    reason.replace('\n', " ")
+}
+
+/// How often a fault was met.
+#[derive(Default)]
+struct Fault {
+    count: u64,
+    first_index: Option<u32>,
+}
+
+impl Fault {
+    fn at(&mut self, index: u32) {
+        self.count += 1;
+        self.first_index = Some(self.first_index.map_or(index, |first| first.min(index)));
+    }
+}

@@ -1,0 +1,40 @@
+//! How many cases lost the rail.
+
+use crate::engine::{Dialect, sql};
+use crate::{Library, LibraryError};
+
+/// Cases of a campaign whose wheel was in the air for some of the recorded time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactLoss {
+    /// How many, at one speed at least.
+    pub cases: u32,
+    /// The largest share of a pass's recorded time, 0 to 1.
+    pub largest_share: f64,
+}
+
+impl Library {
+    /// How many cases of a campaign lost the rail. Results stored before schema 8 do not tell, and are not
+    /// counted.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn contact_loss(&self, campaign: &str) -> Result<ContactLoss, LibraryError> {
+        // Both read an index of these cases alone.
+        let ask = match self.readers().dialect() {
+            Dialect::Sqlite => {
+                "select count(distinct sobol_index) as cases, max(contact_loss_share) as share
+                from result where campaign_id = $1 and contact_loss_share > 0"
+            }
+            Dialect::Postgres => {
+                "select count(*) as cases,
+                    max((select max(share) from unnest(contact_loss_shares) as of (share))) as share
+                from case_result where campaign_id = $1 and 0 < any (contact_loss_shares)"
+            }
+        };
+        let Some(row) = self.readers().row(sql(ask).bind(campaign)).await? else {
+            return Ok(ContactLoss::default());
+        };
+        let largest_share = row.get::<Option<f64>>("share")?.unwrap_or(0.0);
+        Ok(ContactLoss { cases: row.get_u32("cases")?, largest_share })
+    }
+}

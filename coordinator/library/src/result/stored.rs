@@ -1,0 +1,122 @@
+//! What is stored of a case, put together again from its passes, beside the checksum it came with.
+
+use super::{LibraryEntry, features_of};
+use crate::case::case_of;
+use crate::engine::{Row, Statement, sql};
+use crate::{Library, LibraryError};
+use tokio_stream::StreamExt;
+use tracktwin_parameters::Case;
+use tracktwin_protocol::{PassFeatures, checksum_of_passes};
+
+/// A case with results, as it is stored.
+pub(crate) struct StoredCase {
+    pub(crate) case: Case,
+    /// One a speed.
+    pub(crate) passes: Vec<PassFeatures>,
+    /// What its worker made; none where the result was stored before there were checksums.
+    checksum: Option<String>,
+}
+
+/// Whether what is stored has the checksum that came with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Attested {
+    /// It has.
+    Whole,
+    /// It has another: something was altered since.
+    Altered,
+    /// No checksum came with it.
+    Unknown,
+}
+
+impl StoredCase {
+    fn of(row: &Row) -> Result<Self, LibraryError> {
+        let (case, passes) = (case_of(row)?, vec![pass_of(row)?]);
+        Ok(Self { case, passes, checksum: row.get("checksum")? })
+    }
+
+    fn add(&mut self, row: &Row) -> Result<(), LibraryError> {
+        self.passes.push(pass_of(row)?);
+        // One pass of another checksum speaks against all.
+        if row.get::<Option<String>>("checksum")? != self.checksum {
+            self.checksum = Some(String::new());
+        }
+        Ok(())
+    }
+
+    /// The checksum of what is stored: parameters, seed and every pass.
+    pub(crate) fn checksum(&self) -> String {
+        checksum_of_passes(self.case.index, &self.case.parameter_hash(), &self.passes)
+    }
+
+    pub(crate) fn attested(&self) -> Attested {
+        match &self.checksum {
+            None => Attested::Unknown,
+            Some(told) if *told == self.checksum() => Attested::Whole,
+            Some(_) => Attested::Altered,
+        }
+    }
+
+    /// The case and its features, unless something was altered.
+    pub(super) fn entry(self) -> Result<LibraryEntry, LibraryError> {
+        if self.attested() == Attested::Altered {
+            return Err(LibraryError::Altered { index: self.case.index });
+        }
+        let features = self.passes.into_iter().map(|pass| pass.features).collect();
+        Ok(LibraryEntry { case: self.case, features })
+    }
+}
+
+fn pass_of(row: &Row) -> Result<PassFeatures, LibraryError> {
+    Ok(PassFeatures {
+        speed_km_h: row.get("speed_km_h")?,
+        features: features_of(row)?,
+        contact_loss_share: row.get("contact_loss_share")?,
+    })
+}
+
+/// Asks for the passes of a campaign's cases, in the order in which [`Gathering`] takes them.
+pub(crate) fn passes_of(campaign: &str) -> Statement {
+    let ask = "select * from result_with_parameters where campaign_id = $1
+        order by sobol_index, speed_km_h";
+    sql(ask).bind(campaign)
+}
+
+/// Puts cases together from rows of `result_with_parameters` of one campaign, by index and speed.
+#[derive(Default)]
+pub(crate) struct Gathering(Option<StoredCase>);
+
+impl Gathering {
+    /// Takes a row; answers the case before, once a row is of another.
+    pub(crate) fn take(&mut self, row: &Row) -> Result<Option<StoredCase>, LibraryError> {
+        match &mut self.0 {
+            Some(case) if case.case.index == row.get_u32("sobol_index")? => {
+                case.add(row)?;
+                Ok(None)
+            }
+            before => Ok(before.replace(StoredCase::of(row)?)),
+        }
+    }
+
+    /// The last case.
+    pub(crate) fn end(self) -> Option<StoredCase> {
+        self.0
+    }
+}
+
+impl Library {
+    /// Hands a campaign's cases with results to `take`, by ascending index, one at a time.
+    pub(crate) async fn stored_cases(
+        &self,
+        campaign: &str,
+        mut take: impl FnMut(StoredCase) -> Result<(), LibraryError>,
+    ) -> Result<(), LibraryError> {
+        let mut rows = self.readers().stream(passes_of(campaign));
+        let mut gathering = Gathering::default();
+        while let Some(row) = rows.next().await {
+            if let Some(case) = gathering.take(&row?)? {
+                take(case)?;
+            }
+        }
+        gathering.end().map_or(Ok(()), take)
+    }
+}
