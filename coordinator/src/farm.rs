@@ -5,19 +5,22 @@ use crate::dispatch::{Counts, Dispatch, DispatchError, Scope, Settings, Timing};
 use crate::service::{Security, ServeError, random_token, serve};
 use std::net::Ipv4Addr;
 use std::num::NonZeroUsize;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tracktwin_library::{CampaignRecord, Claim, Library, LibraryError, Status};
 use tracktwin_parameters::SobolError;
 use tracktwin_worker::agent::{self, AgentError};
-use tracktwin_worker::{Credentials, Prepare, Token, prepare_simulation};
+use tracktwin_worker::{Credentials, Holdings, Prepare, Token, prepare_simulation};
 
 /// Cases stored at a time, so that a million need no more memory than these.
 const CASES_AT_A_TIME: u32 = 4096;
 
 /// How often the counts are looked at: often enough for a progress bar.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
+
+/// How long a library that does not answer is waited for; as long as a blind trial waits for one.
+const PATIENCE: Duration = Duration::from_mins(10);
 
 /// Why the farm stops.
 #[derive(Debug, thiserror::Error)]
@@ -114,21 +117,48 @@ pub async fn add_cases(
     Ok(())
 }
 
-/// Simulates what a library lacks, by workers in this process, until every case is finished or
-/// given up, or until `shutdown`. Either way the library can be gone on with; it loses no finished
-/// case however the process ends.
-///
-/// `progress` sees the counts now and then.
+/// The right to hand out a library's cases, which can be written. Whoever has it may add cases: nobody else
+/// will refuse to hand them out.
 ///
 /// # Errors
-/// [`FarmError`]; [`LibraryError::InUse`] when another process works on the library.
+/// [`LibraryError::InUse`] when another process works on the library, [`LibraryError::NotWritable`].
+pub async fn claim(library: &Library) -> Result<Claim, FarmError> {
+    let claim = library.claim()?;
+    library.check_writable().await?;
+    Ok(claim)
+}
+
+/// [`claim`] and [`work`] in one.
+///
+/// # Errors
+/// As both.
 pub async fn embedded(
     library: &Library,
     task: Task<'_>,
     shutdown: CancellationToken,
+    progress: impl FnMut(Status),
+) -> Result<Status, FarmError> {
+    let claim = claim(library).await?;
+    work(library, &claim, task, shutdown, progress).await
+}
+
+/// Simulates what a claimed library lacks, by workers in this process, until every case is finished or
+/// given up, or until `shutdown`. Either way the library can be gone on with; it loses no finished
+/// case however the process ends. A library that does not answer is waited for, as the workers do.
+///
+/// `progress` sees the counts now and then.
+///
+/// # Errors
+/// [`FarmError`].
+pub async fn work(
+    library: &Library,
+    claim: &Claim,
+    task: Task<'_>,
+    shutdown: CancellationToken,
     mut progress: impl FnMut(Status),
 ) -> Result<Status, FarmError> {
-    let (_claim, dispatch) = claimed(library, &task).await?;
+    let own = agent::Config::new(String::new(), task.cores);
+    let dispatch = dispatch(library, claim, &task, own.holdings.clone()).await?;
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
     let coordinator = format!("http://{}", listener.local_addr()?);
 
@@ -148,17 +178,25 @@ pub async fn embedded(
     let config = agent::Config {
         prepare: task.prepare,
         credentials,
-        ..agent::Config::new(coordinator, task.cores)
+        coordinators: vec![coordinator],
+        ..own
     };
     let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
 
+    let mut outage = Outage::default();
     let ended = loop {
-        if !library.takes_writes() {
-            return Err(LibraryError::Closed.into());
+        library.takes_writes()?;
+        match library.status_of(task.campaign, task.cases).await {
+            Ok(status) => {
+                outage = Outage::default();
+                progress(status);
+                if status.done() == status.total() {
+                    break None;
+                }
+            }
+            Err(error) => outage.goes_on(error)?,
         }
-        let status = library.status_of(task.campaign, task.cases).await?;
-        progress(status);
-        if status.done() == status.total() || shutdown.is_cancelled() {
+        if shutdown.is_cancelled() {
             break None;
         }
         tokio::select! {
@@ -181,9 +219,34 @@ pub async fn embedded(
     Ok(status)
 }
 
-/// The right to hand out a campaign's cases, and what hands them out.
-async fn claimed(library: &Library, task: &Task<'_>) -> Result<(Claim, Dispatch), FarmError> {
-    let claim = library.claim()?;
+/// A library that does not answer, since when.
+#[derive(Default)]
+struct Outage(Option<Instant>);
+
+impl Outage {
+    /// Whether the library may answer later: what has begun meanwhile is not lost, for the workers keep it.
+    ///
+    /// # Errors
+    /// The library's error where no waiting helps, or after [`PATIENCE`].
+    fn goes_on(&mut self, error: LibraryError) -> Result<(), LibraryError> {
+        if !error.is_temporary() {
+            return Err(error);
+        }
+        let since = *self.0.get_or_insert_with(|| {
+            tracing::warn!("{error}; waiting for it for up to {} minutes", PATIENCE.as_secs() / 60);
+            Instant::now()
+        });
+        if since.elapsed() < PATIENCE { Ok(()) } else { Err(error) }
+    }
+}
+
+/// What hands out a campaign's cases.
+async fn dispatch(
+    library: &Library,
+    claim: &Claim,
+    task: &Task<'_>,
+    own: Holdings,
+) -> Result<Dispatch, FarmError> {
     if claim.is_exclusive() {
         // Whoever held these died with the process that served it.
         library.release_all(task.campaign).await?;
@@ -195,9 +258,10 @@ async fn claimed(library: &Library, task: &Task<'_>) -> Result<(Claim, Dispatch)
         scope: Some(Scope { campaign: task.campaign.to_owned(), cases: task.cases }),
         // There is no other machine to turn to.
         put_aside: false,
+        own: Some(own),
         ..Settings::default()
     };
     let dispatch = Dispatch::new(library.clone(), settings, Counts::default());
     dispatch.check(task.campaign).await?;
-    Ok((claim, dispatch))
+    Ok(dispatch)
 }

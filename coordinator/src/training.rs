@@ -1,15 +1,13 @@
 //! From a library to what surrogates are trained on.
 
+use crate::campaign::TRAINED;
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 use tracktwin_parameters::Parameter;
 use tracktwin_report::Tested;
 use tracktwin_signal::{FeatureDefinition, FeatureSet};
+use tracktwin_surrogate::ENTRIES_MIN;
 use tracktwin_surrogate::{FeatureColumns, ModelGroup, Split, TrainOptions, Trained, TrainingSet};
 use tracktwin_worker::{Experiment, ExperimentError};
-
-/// The feature vectors of the paper, each trained at every speed (paper, eq. 9).
-const PAPER: [FeatureSet; 5] =
-    [FeatureSet::Gf, FeatureSet::Lf1, FeatureSet::Lf2, FeatureSet::Lf3, FeatureSet::Lf4];
 
 /// Test cases that a picture can show without becoming a blot.
 const TESTED_SHOWN: usize = 1000;
@@ -20,6 +18,26 @@ pub enum TrainingError {
     /// The library can't be read.
     #[error(transparent)]
     Library(#[from] LibraryError),
+    /// No parameter varies.
+    #[error(
+        "campaign {campaign}: no parameter varies over its finished cases, so that there is nothing to learn; \
+         train on a campaign that gives at least one parameter a range"
+    )]
+    NothingVaries {
+        /// The campaign.
+        campaign: String,
+    },
+    /// Too few cases are finished.
+    #[error(
+        "campaign {campaign}: {finished} of its cases are finished and training takes {ENTRIES_MIN}; let more be \
+         simulated: `tracktwin run --cases N`, or a coordinator and `tracktwin campaign add --cases N`"
+    )]
+    TooFew {
+        /// The campaign.
+        campaign: String,
+        /// Cases that are finished.
+        finished: u32,
+    },
     /// The campaign's experiment isn't understood by this version.
     #[error("campaign {campaign}: its experiment is not understood: {source}")]
     Experiment {
@@ -28,6 +46,25 @@ pub enum TrainingError {
         /// What is wrong with it.
         source: ExperimentError,
     },
+}
+
+/// All finished cases of a campaign, if there are enough of them to train on and they differ.
+///
+/// # Errors
+/// [`TrainingError`]; what can be told without reading the results is told before they are read.
+pub async fn set_to_train_on(
+    library: &Library,
+    campaign: &CampaignRecord,
+) -> Result<TrainingSet, TrainingError> {
+    let finished = library.status(&campaign.id).await?.finished;
+    if (finished as usize) < ENTRIES_MIN {
+        return Err(TrainingError::TooFew { campaign: campaign.id.clone(), finished });
+    }
+    let set = set(library, campaign).await?;
+    if set.varied.is_empty() {
+        return Err(TrainingError::NothingVaries { campaign: campaign.id.clone() });
+    }
+    Ok(set)
 }
 
 /// All finished cases of a campaign, and what training on them must know.
@@ -75,7 +112,7 @@ pub fn options(set: &TrainingSet) -> TrainOptions {
         name: feature.name().to_owned(),
         columns: feature.bins(&set.frequencies_hz),
     };
-    TrainOptions::new(PAPER.into_iter().map(columns).collect())
+    TrainOptions::new(TRAINED.into_iter().map(columns).collect())
 }
 
 /// True and predicted values of cases that no model was trained on, by the models that read most

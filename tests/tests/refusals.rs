@@ -64,6 +64,89 @@ fn a_campaign_with_speeds_in_disorder_is_refused() {
     );
 }
 
+/// Every parameter of the catalogue held at one value.
+const HELD: &str = "[parameters]\nrailpad_stiffness_N_m = 1e8\nrailpad_damping_N_s_m = 6e3\n\
+                    ballast_stiffness_N_m = 1e7\nballast_damping_N_s_m = 5e3\nsleeper_EI_N_m2 = 1e4\n\
+                    irregularity_level = 1.0\n";
+
+#[test]
+fn what_training_would_lack_is_found_out_before_anything_is_simulated() {
+    let head = "name = \"c\"\nseed = 1\n";
+    refused_campaign(
+        &format!("{head}cases = 400\n{HELD}"),
+        &["parameters", "held at one value", "--no-train"],
+    );
+    refused_campaign(&format!("{head}cases = 199\n"), &["199", "--cases 200", "--no-train"]);
+}
+
+#[test]
+fn a_library_that_cannot_be_trained_on_is_refused_before_it_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (file, url) = (path("campaign.toml"), format!("sqlite:{}", path("l.sqlite")));
+    fs::write(&file, "name = \"c\"\nseed = 1\ncases = 300\n").unwrap();
+    run(PROGRAM, &["campaign", "add", &file, "--library", &url]).succeeded();
+    let answer = run(PROGRAM, &["train", "--library", &url, "--out", &path("models")]);
+    assert_refused(&answer, &["0 of its cases are finished", "200"]);
+}
+
+#[test]
+fn cases_that_would_begin_another_campaign_are_refused_with_the_way_to_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (file, url) = (path("campaign.toml"), format!("sqlite:{}", path("l.sqlite")));
+    fs::write(&file, "name = \"c\"\nseed = 1\ncases = 300\n").unwrap();
+    run(PROGRAM, &["campaign", "add", &file, "--library", &url]).succeeded();
+    let out = path("out");
+    let more = ["--cases", "65537", "--library", &url];
+    for command in [
+        &["run", &file, "--no-train", "--out", &out][..],
+        &["campaign", "add", &file],
+        &["coordinator", "--listen", "127.0.0.1:0", "--campaign", &file],
+    ] {
+        let answer = run(PROGRAM, &[command, &more].concat());
+        assert_refused(
+            &answer,
+            &["from case 0", "`--cases 65536` goes on", "sequence = \"rotated\""],
+        );
+    }
+    let ask =
+        "select count(*) as cases, count(distinct campaign_id) as campaigns from campaign_case";
+    let counted = run(PROGRAM, &["library", "sql", ask, "--format", "csv", "--library", &url]);
+    assert!(counted.succeeded().contains("300,1"));
+    // Whoever asks for the other sequence gets it, and is told.
+    fs::write(&file, "name = \"c\"\nseed = 1\ncases = 300\nsequence = \"rotated\"\n").unwrap();
+    let anew = run(PROGRAM, &["campaign", "add", &file, "--library", &url]);
+    assert!(
+        anew.err.contains("begins from case 0") && anew.err.contains("sequence"),
+        "{}",
+        anew.err
+    );
+    anew.succeeded();
+}
+
+#[test]
+fn a_trial_s_seals_that_cannot_be_read_are_left_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("trial");
+    fs::create_dir(&out).unwrap();
+    let seals = out.join("seals.sha256");
+    let unreadable = b"\xff\xfe is no text";
+    fs::write(&seals, unreadable).unwrap();
+    let trial = || run(PROGRAM, &["trial", "--cases", "1", "--out", &out.display().to_string()]);
+    let answer = trial();
+    assert_eq!(answer.code, Some(3), "{}", answer.err);
+    assert!(answer.err.contains("seals.sha256"), "{}", answer.err);
+    assert_eq!(fs::read(&seals).unwrap(), unreadable);
+    // Neither is a trial begun where it can't be told which one is there.
+    fs::remove_file(&seals).unwrap();
+    fs::remove_file(out.join("trial.json")).unwrap();
+    fs::create_dir(out.join("trial.json")).unwrap();
+    let answer = trial();
+    assert_eq!(answer.code, Some(3), "{}", answer.err);
+    assert!(answer.err.contains("trial.json"), "{}", answer.err);
+}
+
 #[test]
 fn a_campaign_that_is_not_there_is_refused() {
     let answer = run(PROGRAM, &["run", "/nowhere/campaign.toml"]);

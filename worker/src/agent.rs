@@ -3,6 +3,7 @@
 use crate::core::{Core, Prepared};
 use crate::counters::Counters;
 use crate::credentials::{Credentials, CredentialsError};
+use crate::holdings::Holdings;
 use crate::outbox::{outbox, send};
 use crate::session::Session;
 use crate::simulate::Prepare;
@@ -54,11 +55,15 @@ pub struct Config {
     pub inline: bool,
     /// What it counts.
     pub counters: Arc<Counters>,
+    /// What it holds.
+    pub holdings: Holdings,
 }
 
 impl Config {
     /// A worker that simulates with the track model for a coordinator on this machine.
     pub fn new(coordinator: String, cores: NonZeroUsize) -> Self {
+        let counters = Arc::<Counters>::default();
+        let holdings = Holdings::new(&counters);
         Self {
             coordinators: vec![coordinator],
             cores,
@@ -70,7 +75,8 @@ impl Config {
             model_hash: None,
             dial: Endpoint::connect_lazy,
             inline: false,
-            counters: Arc::default(),
+            counters,
+            holdings,
         }
     }
 }

@@ -64,7 +64,7 @@ impl Core {
     /// Simulates and reports what was leased, or gives back what is left at shutdown.
     async fn work(&self, lease: &CaseLease) -> Result<(), AgentError> {
         let session = &self.session;
-        let simulation = match self.prepared.of(lease) {
+        let simulation = match self.prepare(lease).await {
             Ok(simulation) => simulation,
             Err(error) => {
                 session.release(&lease.campaign, held(&lease.cases)).await;
@@ -104,6 +104,17 @@ impl Core {
             self.put(finished).await;
         }
         Ok(())
+    }
+
+    /// What simulates the lease's experiment. Preparing it takes as long as it takes, and holds up neither
+    /// heartbeats nor reports.
+    async fn prepare(&self, lease: &CaseLease) -> Result<Arc<dyn Simulate>, AgentError> {
+        if self.inline {
+            return self.prepared.of(lease);
+        }
+        let (prepared, lease) = (self.prepared.clone(), lease.clone());
+        let preparing = tokio::task::spawn_blocking(move || prepared.of(&lease));
+        preparing.await.expect("preparing does not panic")
     }
 
     async fn compute(&self, simulation: Arc<dyn Simulate>, cases: Vec<Case>) -> Vec<Outcome> {

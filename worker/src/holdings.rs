@@ -1,6 +1,7 @@
 //! The cases a worker holds.
 
 use crate::counters::Counters;
+use prometheus_client::metrics::gauge::Gauge;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard};
 use tracktwin_protocol::{CASES_MAX, CaseLease, farm};
@@ -8,15 +9,24 @@ use tracktwin_protocol::{CASES_MAX, CaseLease, farm};
 /// A case this worker holds: campaign, index, epoch.
 type Held = (String, u32, u32);
 
-/// What a worker has leased and not yet handed in or given back.
-pub(crate) struct Holdings {
-    held: Mutex<BTreeSet<Held>>,
-    counters: Arc<Counters>,
+/// What a worker has leased and not yet handed in or given back. Clones are of the same worker: a
+/// coordinator in the same process sees through one what its worker holds.
+#[derive(Clone, Debug)]
+pub struct Holdings {
+    held: Arc<Mutex<BTreeSet<Held>>>,
+    count: Gauge,
 }
 
 impl Holdings {
-    pub(crate) fn new(counters: Arc<Counters>) -> Self {
-        Self { held: Mutex::default(), counters }
+    pub(crate) fn new(counters: &Counters) -> Self {
+        Self { held: Arc::default(), count: counters.held.clone() }
+    }
+
+    /// The cases of a campaign that the worker holds, as (index, epoch).
+    pub fn of(&self, campaign: &str) -> Vec<(u32, u32)> {
+        let held = self.lock();
+        let of_campaign = held.iter().filter(|(of, ..)| of == campaign);
+        of_campaign.map(|&(_, index, epoch)| (index, epoch)).collect()
     }
 
     /// Takes what was leased.
@@ -26,13 +36,17 @@ impl Holdings {
         self.change(|all| all.extend(held));
     }
 
-    /// Lets go of cases, whatever became of them.
-    pub(crate) fn let_go(&self, campaign: &str, cases: impl IntoIterator<Item = (u32, u32)>) {
+    /// Lets go of cases, whatever became of them; answers how many of them were held.
+    pub(crate) fn let_go(
+        &self,
+        campaign: &str,
+        cases: impl IntoIterator<Item = (u32, u32)>,
+    ) -> usize {
         self.change(|all| {
-            for (index, epoch) in cases {
-                all.remove(&(campaign.to_owned(), index, epoch));
-            }
-        });
+            let held =
+                |(index, epoch): &(u32, u32)| all.remove(&(campaign.to_owned(), *index, *epoch));
+            cases.into_iter().filter(held).count()
+        })
     }
 
     /// Whether a case is still this worker's, as far as it knows.
@@ -65,10 +79,11 @@ impl Holdings {
         requests
     }
 
-    fn change(&self, change: impl FnOnce(&mut BTreeSet<Held>)) {
+    fn change<T>(&self, change: impl FnOnce(&mut BTreeSet<Held>) -> T) -> T {
         let mut held = self.lock();
-        change(&mut held);
-        self.counters.held.set(i64::try_from(held.len()).unwrap_or(i64::MAX));
+        let changed = change(&mut held);
+        self.count.set(i64::try_from(held.len()).unwrap_or(i64::MAX));
+        changed
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeSet<Held>> {
@@ -95,15 +110,16 @@ mod tests {
 
     #[test]
     fn renewals_are_of_one_campaign_and_no_larger_than_a_message_may_be() {
-        let holdings = Holdings::new(Arc::default());
+        let holdings = Holdings::new(&Counters::default());
         let many = CASES_MAX as u32 + 1;
         holdings.take(&lease("a", 0..many));
         holdings.take(&lease("b", 0..3));
-        holdings.let_go("b", [(1, 1), (2, 7)]);
+        assert_eq!(holdings.let_go("b", [(1, 1), (2, 7)]), 1, "one of them was held");
         let renewals = holdings.renewals("w");
         let sizes: Vec<_> =
             renewals.iter().map(|it| (it.campaign_id.as_str(), it.cases.len())).collect();
         assert_eq!(sizes, [("a", CASES_MAX), ("a", 1), ("b", 2)]);
         assert!(holdings.has("b", 2, 1) && !holdings.has("b", 1, 1));
+        assert_eq!(holdings.clone().of("b"), [(0, 1), (2, 1)]);
     }
 }

@@ -23,6 +23,7 @@ mod simulate;
 pub use counters::Counters;
 pub use credentials::{Credentials, CredentialsError, Token};
 pub use experiment::{Experiment, ExperimentError};
+pub use holdings::Holdings;
 pub use logging::{LogFormat, log_to_stderr};
 pub use port::Port;
 pub use simulate::{Prepare, Simulate, Simulation, prepare_simulation};

@@ -64,7 +64,7 @@ impl Session {
             cores: u32::try_from(config.cores.get()).unwrap_or(u32::MAX),
             model_hash: config.model_hash.clone().unwrap_or_else(|| MODEL_HASH.to_owned()),
             coordinators: Coordinators::new(config, give_up.clone())?,
-            holdings: Holdings::new(config.counters.clone()),
+            holdings: config.holdings.clone(),
             counters: config.counters.clone(),
             heartbeat: Mutex::new(FIRST_HEARTBEAT),
             last_work: Mutex::new(Instant::now()),
@@ -264,12 +264,18 @@ impl Session {
             tokio::time::sleep(heartbeat).await;
             for request in self.holdings.renewals(&self.worker) {
                 let campaign = request.campaign_id.clone();
+                let (cases, sent) = (request.cases.len(), Instant::now());
+                tracing::debug!(campaign, cases, "heartbeat sent");
                 let renew = |mut client: crate::connection::Client| {
                     let request = request.clone();
                     async move { client.renew(request).await }
                 };
                 match self.coordinators.once(renew).await {
-                    Ok(answer) => self.lose(&campaign, &answer.lost),
+                    Ok(answer) => {
+                        let (after_s, lost) = (sent.elapsed().as_secs_f64(), answer.lost.len());
+                        tracing::debug!(campaign, cases, lost, after_s, "heartbeat answered");
+                        self.lose(&campaign, &answer.lost);
+                    }
                     // A coordinator that knows nobody is told who this is at the next lease.
                     Err(status) if status.code() == Code::Unauthenticated => {}
                     Err(status) => tracing::info!("heartbeat failed: {}", status.message()),
@@ -278,12 +284,15 @@ impl Session {
         }
     }
 
-    /// Others have these cases now; what is not begun need not be.
+    /// These cases were taken back; what is not begun need not be.
     fn lose(&self, campaign: &str, lost: &[farm::HeldCase]) {
-        if !lost.is_empty() {
-            tracing::warn!("{} leases expired and went to others", lost.len());
-            self.counters.lost.inc_by(lost.len() as u64);
-            self.holdings.let_go(campaign, lost.iter().map(|it| (it.sobol_index, it.epoch)));
+        // What was handed in or given back while the heartbeat was under way is not lost.
+        let lost = self.holdings.let_go(campaign, lost.iter().map(|it| (it.sobol_index, it.epoch)));
+        if lost > 0 {
+            tracing::warn!(
+                "{lost} leases were taken back: they expired, or the campaign was cancelled"
+            );
+            self.counters.lost.inc_by(lost as u64);
         }
     }
 

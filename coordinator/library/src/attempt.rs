@@ -1,16 +1,21 @@
 //! The table `attempt`: leases that ended without a result.
 
-use crate::engine::{Connection, sql};
+use crate::engine::{Connection, Dialect, sql};
 use crate::{LibraryError, Report, State};
 
 /// One case.
 const CASE: &str = "campaign_id = $1 and sobol_index = $2";
 
-/// A lease that ends without result, and where that leaves its case.
+/// Cases, as many as are listed.
+fn cases(dialect: Dialect) -> String {
+    format!("campaign_id = $1 and sobol_index {}", dialect.listed("$2"))
+}
+
+/// Leases that end without result, and where that leaves their cases.
 pub(crate) struct Ended<'a> {
     pub(crate) campaign: &'a str,
-    pub(crate) index: u32,
-    /// Attempts that count, with this one.
+    pub(crate) indices: Vec<i64>,
+    /// Attempts of each case that count, with this one.
     pub(crate) attempts: u32,
     pub(crate) state: State,
     pub(crate) ending: &'static str,
@@ -31,21 +36,24 @@ pub(crate) fn ended(which: &str, ended_unix_ms: &str, ending: &str, error: &str)
     )
 }
 
-/// Ends an attempt that counts.
+/// Ends attempts that count.
 pub(crate) async fn end(connection: &mut Connection, it: Ended<'_>) -> Result<(), LibraryError> {
-    let note = sql(ended(CASE, "$3", "$4", "$5"))
+    let cases = cases(connection.dialect());
+    let note = sql(ended(&cases, "$3", "$4", "$5"))
         .bind(it.campaign)
-        .bind(it.index)
+        .bind(it.indices.clone())
         .bind(it.now_unix_ms)
         .bind(it.ending)
         .bind(it.error);
     connection.execute(note).await?;
-    let end = "update campaign_case set state = $3, attempts = $4, error = $5,
+    let end = format!(
+        "update campaign_case set state = $3, attempts = $4, error = $5,
             lease_expires_unix_ms = null
-        where campaign_id = $1 and sobol_index = $2";
+        where {cases}"
+    );
     let end = sql(end)
         .bind(it.campaign)
-        .bind(it.index)
+        .bind(it.indices)
         .bind(it.state.name())
         .bind(it.attempts)
         .bind(it.error);
@@ -83,7 +91,7 @@ pub(crate) async fn end_all(
         dialect.locking()
     );
     let leased = connection.indices(sql(leased).bind(campaign)).await?;
-    let cases = format!("campaign_id = $1 and sobol_index {}", dialect.listed("$2"));
+    let cases = cases(dialect);
     let note = sql(ended(&cases, "$3", "$4", "null"))
         .bind(campaign)
         .bind(leased.clone())

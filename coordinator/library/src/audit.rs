@@ -5,8 +5,10 @@
 
 use crate::case::case_of;
 use crate::engine::{Connection, Row, Write, sql};
+use crate::state::named;
 use crate::worker::Flag;
 use crate::{Library, LibraryError, Report};
+use std::collections::HashMap;
 use tracktwin_parameters::Case;
 use tracktwin_protocol::CaseReport;
 
@@ -30,6 +32,12 @@ pub struct AuditFinding {
     pub difference_db: f64,
 }
 
+impl AuditFinding {
+    const fn state(self) -> AuditState {
+        if self.agrees { AuditState::Agrees } else { AuditState::Differs }
+    }
+}
+
 /// Audits of a campaign, counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AuditCounts {
@@ -39,6 +47,31 @@ pub struct AuditCounts {
     pub agree: u32,
     /// They did not.
     pub differ: u32,
+}
+
+/// Where an audit stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum AuditState {
+    Waiting,
+    Leased,
+    Agrees,
+    Differs,
+}
+
+impl AuditState {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Waiting => "waiting",
+            Self::Leased => "leased",
+            Self::Agrees => "agrees",
+            Self::Differs => "differs",
+        }
+    }
+
+    fn from_name(name: &str) -> Result<Self, LibraryError> {
+        let all = [Self::Waiting, Self::Leased, Self::Agrees, Self::Differs];
+        named("an audit", name, all, Self::name)
+    }
 }
 
 impl Library {
@@ -122,10 +155,10 @@ impl Library {
         let mut counts = AuditCounts::default();
         for row in self.readers().rows(sql(ask).bind(campaign)).await? {
             let cases = row.get_u32("cases")?;
-            match row.get::<String>("state")?.as_str() {
-                "agrees" => counts.agree = cases,
-                "differs" => counts.differ = cases,
-                _ => counts.open += cases,
+            match AuditState::from_name(&row.get::<String>("state")?)? {
+                AuditState::Agrees => counts.agree = cases,
+                AuditState::Differs => counts.differ = cases,
+                AuditState::Waiting | AuditState::Leased => counts.open += cases,
             }
         }
         Ok(counts)
@@ -138,13 +171,20 @@ pub(crate) async fn sample<'a>(
     report: &Report,
     finished: impl Iterator<Item = &'a CaseReport>,
 ) -> Result<(), LibraryError> {
-    for case in finished.filter(|case| is_sampled(&case.parameter_hash, report.audit_share)) {
-        let mark = "insert into audit (campaign_id, sobol_index, worker) values ($1, $2, $3)
-            on conflict (campaign_id, sobol_index) do nothing";
-        let mark = sql(mark).bind(&report.campaign).bind(case.index).bind(&report.worker);
-        connection.execute(mark).await?;
+    let sampled = finished.filter(|case| is_sampled(&case.parameter_hash, report.audit_share));
+    let sampled: Vec<_> = sampled.map(|case| i64::from(case.index)).collect();
+    if sampled.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    let mark = format!(
+        "insert into audit (campaign_id, sobol_index, worker)
+        select campaign_id, sobol_index, $3 from campaign_case
+        where campaign_id = $1 and sobol_index {}
+        on conflict (campaign_id, sobol_index) do nothing",
+        connection.dialect().listed("$2")
+    );
+    let mark = sql(mark).bind(&report.campaign).bind(sampled).bind(&report.worker);
+    connection.execute(mark).await.map(drop)
 }
 
 /// Whether the case with this hash (hexadecimal) is among the share.
@@ -187,19 +227,37 @@ impl Write for Sample {
             .bind(self.now_unix_ms)
             .bind(self.cases_max)
             .bind(self.now_unix_ms.saturating_add(self.lease_ms));
-        let mut audits = Vec::new();
-        for taken in connection.rows(take).await? {
-            let ask = "select * from campaign_case where campaign_id = $1 and sobol_index = $2";
-            let ask = sql(ask).bind(&self.campaign).bind(taken.get::<i64>("sobol_index")?);
-            let audit = |row: &Row| -> Result<Audit, LibraryError> {
-                Ok(Audit {
-                    campaign: self.campaign.clone(),
-                    case: case_of(row)?,
-                    worker: taken.get("worker")?,
-                })
-            };
-            let row = connection.row(ask).await?;
-            audits.extend(row.as_ref().map(audit).transpose()?);
+        let taken = |row: &Row| Ok((row.get_u32("sobol_index")?, row.get("worker")?));
+        let rows = connection.rows(take).await?;
+        let taken =
+            rows.iter().map(taken).collect::<Result<HashMap<u32, String>, LibraryError>>()?;
+        self.audits(connection, taken).await
+    }
+}
+
+impl Sample {
+    /// The cases with these indices, each with whose result is looked at.
+    async fn audits(
+        &self,
+        connection: &mut Connection,
+        mut taken: HashMap<u32, String>,
+    ) -> Result<Vec<Audit>, LibraryError> {
+        if taken.is_empty() {
+            return Ok(Vec::new());
+        }
+        let ask = format!(
+            "select * from campaign_case where campaign_id = $1 and sobol_index {}
+            order by sobol_index",
+            connection.dialect().listed("$2")
+        );
+        let indices: Vec<_> = taken.keys().copied().map(i64::from).collect();
+        let rows = connection.rows(sql(ask).bind(&self.campaign).bind(indices)).await?;
+        let mut audits = Vec::with_capacity(rows.len());
+        for row in &rows {
+            let case = case_of(row)?;
+            if let Some(worker) = taken.remove(&case.index) {
+                audits.push(Audit { campaign: self.campaign.clone(), case, worker });
+            }
         }
         Ok(audits)
     }
@@ -230,7 +288,7 @@ impl Write for Found {
             .bind(&self.campaign)
             .bind(self.index)
             .bind(&self.auditor)
-            .bind(if self.finding.agrees { "agrees" } else { "differs" })
+            .bind(self.finding.state().name())
             .bind(self.finding.difference_db)
             .bind(self.now_unix_ms);
         let Some(kept) = connection.row(keep).await? else { return Ok(None) };

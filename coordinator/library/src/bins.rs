@@ -1,8 +1,11 @@
 //! The table `frequency_bin`: what the bins of results mean.
 
-use crate::engine::{Connection, Row, Write, sql};
+use crate::engine::{Connection, Row, Statement, Write, sql};
 use crate::{CampaignRecord, Library, LibraryError};
 use tracktwin_signal::FeatureDefinition;
+
+/// Bins in one statement, of three values each.
+const BINS_A_STATEMENT: usize = 1000;
 
 /// Frequencies in Hz of the bins of an experiment; none where this version does not understand it.
 fn frequencies_hz(experiment_json: &str) -> Vec<f64> {
@@ -18,12 +21,17 @@ pub(crate) async fn insert(
     connection: &mut Connection,
     campaign: &CampaignRecord,
 ) -> Result<(), LibraryError> {
-    let bins = (0_u32..).zip(frequencies_hz(&campaign.experiment_json));
-    for (bin, frequency_hz) in bins {
-        let insert = "insert into frequency_bin (experiment_hash, bin, frequency_Hz)
-            values ($1, $2, $3) on conflict (experiment_hash, bin) do nothing";
-        let insert = sql(insert).bind(&campaign.experiment_hash).bind(bin).bind(frequency_hz);
-        connection.execute(insert).await?;
+    let bins: Vec<_> = (0_u32..).zip(frequencies_hz(&campaign.experiment_json)).collect();
+    for some in bins.chunks(BINS_A_STATEMENT) {
+        let insert = format!(
+            "insert into frequency_bin (experiment_hash, bin, frequency_Hz) values {}
+            on conflict (experiment_hash, bin) do nothing",
+            connection.dialect().rows_of_values(some.len(), 3)
+        );
+        let bound = |insert: Statement, &(bin, frequency_hz): &(u32, f64)| {
+            insert.bind(&campaign.experiment_hash).bind(bin).bind(frequency_hz)
+        };
+        connection.execute(some.iter().fold(sql(insert), bound)).await?;
     }
     Ok(())
 }

@@ -89,7 +89,7 @@ impl Library {
         let mut status = Status::default();
         for row in self.readers().rows(ask).await? {
             let count = row.get_u32("cases")?;
-            match State::from_name(&row.get::<String>("state")?) {
+            match State::from_name(&row.get::<String>("state")?)? {
                 State::Waiting => status.waiting = count,
                 State::Leased => status.leased = count,
                 State::Finished => status.finished = count,
@@ -162,7 +162,7 @@ pub(crate) fn case_in<'a>(cell: impl Fn(&str) -> Option<&'a Cell>) -> Option<Cas
 fn record(row: &Row) -> Result<CaseRecord, LibraryError> {
     Ok(CaseRecord {
         case: case_of(row)?,
-        state: State::from_name(&row.get::<String>("state")?),
+        state: State::from_name(&row.get::<String>("state")?)?,
         attempts: row.get_u32("attempts")?,
         worker: row.get("worker")?,
         error: row.get("error")?,

@@ -1,8 +1,11 @@
 //! Why a library refuses, or fails.
 
+use crate::engine::{self, SQLITE_FULL};
 use sqlx::error::DatabaseError;
+use sqlx::migrate::MigrateError;
 use std::borrow::Cow;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Why something cannot be read from a library or written to it; one line each.
 ///
@@ -184,7 +187,16 @@ pub enum LibraryError {
     /// The library was closed meanwhile.
     #[error("the library is closed")]
     Closed,
-    /// The lock file beside the library.
+    /// The connection that writes to a file has broken.
+    #[error(
+        "the connection that writes to the library broke ({reason}); what was acknowledged is stored: \
+         start the program again"
+    )]
+    Lost {
+        /// What was found.
+        reason: String,
+    },
+    /// The lock of the library's file can't be taken, for want of rights or of room.
     #[error("library {library}: cannot be locked")]
     Lock {
         /// The library.
@@ -192,6 +204,42 @@ pub enum LibraryError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The file system has no locks, or no memory that processes share, which `SQLite` needs.
+    #[error(
+        "{library}: SQLite's locks do not work on its file system ({reason}), as on many that several hosts \
+         share: put the library on a disk of this machine (--library sqlite:/PATH/ON/A/LOCAL/DISK), or use a \
+         PostgreSQL server (--library postgres://USER@HOST/DATABASE)"
+    )]
+    NoLocks {
+        /// The library, and what its file system is called where that is known.
+        library: String,
+        /// What failed.
+        reason: String,
+    },
+    /// The disk, or the network that it is behind, fails.
+    #[error(
+        "reading or writing the library's file failed ({reason}): look for the disk's fault in the system's log; \
+         what was acknowledged is stored, and the same command goes on"
+    )]
+    Disk {
+        /// What failed.
+        reason: String,
+    },
+    /// A file of the library can't be opened though the library is.
+    #[error(
+        "a file of the library could not be opened ({reason}): look whether its folder is there and can be \
+         written, and whether more files may be open (ulimit -n)"
+    )]
+    NotOpened {
+        /// What failed.
+        reason: String,
+    },
+    /// Another process writes for longer than anybody waits.
+    #[error(
+        "another program has been writing to the library for longer than 30 s: end it, or try again later; on a \
+         network file system locks that do not work look the same, and a disk of this machine mends that"
+    )]
+    Busy,
     /// The database does not answer now, and may later.
     #[error("the library's database does not answer: {reason}")]
     Unavailable {
@@ -215,7 +263,7 @@ pub enum LibraryError {
     Database(#[source] sqlx::Error),
     /// A change of the schema failed.
     #[error("the library's schema cannot be brought up to date")]
-    Migration(#[from] sqlx::migrate::MigrateError),
+    Migration(#[source] MigrateError),
 }
 
 impl LibraryError {
@@ -239,6 +287,7 @@ impl LibraryError {
                 | Self::SeedTooLarge { .. }
                 | Self::OnlyReads
                 | Self::Folder { .. }
+                | Self::NoLocks { .. }
                 | Self::NotWritable { .. }
                 | Self::BadQuery { .. }
                 | Self::BadRow { .. }
@@ -246,10 +295,9 @@ impl LibraryError {
     }
 
     /// Whether the same may succeed later, when somebody has mended the machine.
-    pub fn is_temporary(&self) -> bool {
+    pub const fn is_temporary(&self) -> bool {
         match self {
-            Self::Unavailable { .. } | Self::DiskFull | Self::FileGone { .. } => true,
-            Self::Database(error) => code(error).as_deref() == Some(SQLITE_BUSY),
+            Self::Unavailable { .. } | Self::DiskFull | Self::FileGone { .. } | Self::Busy => true,
             _ => false,
         }
     }
@@ -279,16 +327,15 @@ impl LibraryError {
         }
     }
 
+    /// A database that has said nothing for so long.
+    pub(crate) fn silent(for_so_long: Duration) -> Self {
+        Self::Unavailable { reason: format!("no answer within {} s", for_so_long.as_secs()) }
+    }
+
     pub(crate) const fn is_unavailable(&self) -> bool {
         matches!(self, Self::Unavailable { .. })
     }
 }
-
-/// Another process wrote for longer than anybody waits.
-const SQLITE_BUSY: &str = "5";
-
-/// The disk is full: found in a file, or in the memory shared between processes.
-const SQLITE_FULL: [&str; 2] = ["13", "4874"];
 
 /// The class of PostgreSQL's codes for a connection that broke; and single codes for a server that
 /// stops, was stopped, or is not up yet, has no connection left, and for transactions that should
@@ -317,6 +364,18 @@ fn code(error: &sqlx::Error) -> Option<String> {
     error.as_database_error().and_then(DatabaseError::code).map(Cow::into_owned)
 }
 
+impl From<MigrateError> for LibraryError {
+    fn from(error: MigrateError) -> Self {
+        match error {
+            MigrateError::Execute(error) => match Self::from(error) {
+                Self::Database(error) => Self::Migration(MigrateError::Execute(error)),
+                known => known,
+            },
+            other => Self::Migration(other),
+        }
+    }
+}
+
 impl From<sqlx::Error> for LibraryError {
     fn from(error: sqlx::Error) -> Self {
         use sqlx::Error::{Io, PoolTimedOut, Protocol, Tls, WorkerCrashed};
@@ -325,6 +384,9 @@ impl From<sqlx::Error> for LibraryError {
         }
         if matches!(error, sqlx::Error::PoolClosed) {
             return Self::Closed;
+        }
+        if let Some(fault) = engine::sqlite_fault(&error) {
+            return fault;
         }
         match code(&error).as_deref() {
             Some(code) if SQLITE_FULL.contains(&code) || code == POSTGRES_FULL => Self::DiskFull,

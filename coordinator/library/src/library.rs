@@ -1,10 +1,9 @@
 //! Opening and closing a library; the connections to it.
 
 use crate::LibraryError;
-use crate::engine::{self, Connection, Opened, Readers, Target, Write, sql};
+use crate::engine::{self, Connection, FileLock, Opened, Readers, Target, Write, sql};
 use crate::lease::Horizon;
-use std::fs::File;
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Arc;
 
 /// A model library. Clones share its connections.
@@ -17,7 +16,7 @@ pub struct Library {
 /// The right to hand out a library's cases, until it is dropped.
 #[derive(Debug)]
 pub struct Claim {
-    lock: Option<File>,
+    lock: Option<FileLock>,
 }
 
 impl Claim {
@@ -62,14 +61,22 @@ impl Library {
     }
 
     /// Whether it can still be written from here: not after [`Library::close`], nor after a fault of
-    /// this program in the midst of writing.
-    pub fn takes_writes(&self) -> bool {
+    /// this program in the midst of writing, nor once the connection to its file broke.
+    ///
+    /// # Errors
+    /// Why not: [`LibraryError::Closed`] or [`LibraryError::Lost`]. Only a new start mends it.
+    pub fn takes_writes(&self) -> Result<(), LibraryError> {
         self.opened.writer.runs()
     }
 
     /// What it is called: its file, or its URL without user and password.
     pub fn name(&self) -> String {
         self.opened.target.name()
+    }
+
+    /// Its file, where it is in one.
+    pub fn path(&self) -> Option<&Path> {
+        self.opened.target.path()
     }
 
     /// The library's clock, in ms since 1970: what leases are given and ended by.
@@ -80,25 +87,20 @@ impl Library {
         self.opened.clock.unix_ms()
     }
 
-    /// Claims the right to hand out cases. With `SQLite` one process at a time has it; with
-    /// PostgreSQL any number has.
+    /// Claims the right to hand out cases. With `SQLite` one process at a time has it, whatever names the
+    /// file has; with PostgreSQL any number has.
     ///
     /// The system takes it back when the process ends, however it ends.
     ///
     /// # Errors
-    /// [`LibraryError::InUse`] when another process has it.
+    /// [`LibraryError::InUse`] when another process has it; [`LibraryError::NoLocks`] where the file system
+    /// has no locks.
     pub fn claim(&self) -> Result<Claim, LibraryError> {
         let Some(path) = self.opened.target.path() else { return Ok(Claim { lock: None }) };
-        let mut name = path.as_os_str().to_owned();
-        name.push("-lock");
-        let failed = |source| LibraryError::Lock { library: self.name(), source };
-        let lock = File::create(PathBuf::from(name)).map_err(failed)?;
-        match lock.try_lock() {
-            Ok(()) => Ok(Claim { lock: Some(lock) }),
-            Err(std::fs::TryLockError::WouldBlock) => {
-                Err(LibraryError::InUse { library: self.name() })
-            }
-            Err(std::fs::TryLockError::Error(source)) => Err(failed(source)),
+        match FileLock::try_take(path) {
+            Ok(Some(lock)) => Ok(Claim { lock: Some(lock) }),
+            Ok(None) => Err(LibraryError::InUse { library: self.name() }),
+            Err(source) => Err(engine::not_locked(path, source)),
         }
     }
 

@@ -113,7 +113,7 @@ fn overview(row: &Row, pace: Pace) -> Result<CampaignOverview, LibraryError> {
     Ok(CampaignOverview {
         id: row.get("campaign_id")?,
         name: row.get("name")?,
-        state: CampaignState::from_name(&row.get::<String>("state")?),
+        state: CampaignState::from_name(&row.get::<String>("state")?)?,
         priority: i32::try_from(priority)
             .map_err(|_| LibraryError::Damaged { what: format!("a priority of {priority}") })?,
         created_at: row.get("created_at")?,

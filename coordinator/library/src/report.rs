@@ -123,7 +123,7 @@ impl Report {
         let ask = sql(ask).bind(&self.campaign).bind(self.indices(|_| true));
         let standing = |row: &Row| {
             let standing = Standing {
-                state: State::from_name(&row.get::<String>("state")?),
+                state: State::from_name(&row.get::<String>("state")?)?,
                 epoch: row.get_u32("epoch")?,
                 attempts: row.get_u32("attempts")?,
                 worker: row.get("worker")?,
@@ -199,7 +199,7 @@ impl Report {
         let state = (self.after_failure)(Ending::Failed, failures);
         let ended = Ended {
             campaign: &self.campaign,
-            index: case.index,
+            indices: vec![case.index.into()],
             attempts: standing.attempts + 1,
             state,
             ending: "failed",

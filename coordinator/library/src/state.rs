@@ -2,6 +2,25 @@
 //!
 //! `docs/case-states.md` draws them.
 
+use crate::LibraryError;
+
+/// The one of `all` that is stored as `name`. What another version of the program, or another hand, has
+/// stored is not taken for something else.
+///
+/// # Errors
+/// [`LibraryError::Damaged`] says what `of` is in a state that nobody here knows.
+pub(crate) fn named<T: Copy, const N: usize>(
+    of: &str,
+    name: &str,
+    all: [T; N],
+    spelled: impl Fn(T) -> &'static str,
+) -> Result<T, LibraryError> {
+    let unknown = || LibraryError::Damaged {
+        what: format!("{of} is `{name}`, which this version of the program does not know"),
+    };
+    all.into_iter().find(|&it| spelled(it) == name).ok_or_else(unknown)
+}
+
 /// Where a case stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
@@ -25,12 +44,11 @@ impl State {
         }
     }
 
-    /// The schema admits no other names.
-    pub(crate) fn from_name(name: &str) -> Self {
-        [Self::Waiting, Self::Leased, Self::Finished]
-            .into_iter()
-            .find(|state| state.name() == name)
-            .unwrap_or(Self::Failed)
+    /// # Errors
+    /// [`LibraryError::Damaged`] where there is no such state.
+    pub(crate) fn from_name(name: &str) -> Result<Self, LibraryError> {
+        let all = [Self::Waiting, Self::Leased, Self::Finished, Self::Failed];
+        named("a case", name, all, Self::name)
     }
 }
 
@@ -55,12 +73,10 @@ impl CampaignState {
         }
     }
 
-    /// The schema admits no other names.
-    pub(crate) fn from_name(name: &str) -> Self {
-        [Self::Running, Self::Paused]
-            .into_iter()
-            .find(|state| state.name() == name)
-            .unwrap_or(Self::Cancelled)
+    /// # Errors
+    /// [`LibraryError::Damaged`] where there is no such state.
+    pub(crate) fn from_name(name: &str) -> Result<Self, LibraryError> {
+        named("a campaign", name, [Self::Running, Self::Paused, Self::Cancelled], Self::name)
     }
 }
 
@@ -78,3 +94,22 @@ pub enum Ending {
 ///
 /// It is to answer [`State::Waiting`] or [`State::Failed`].
 pub type Policy = fn(Ending, attempts: u32) -> State;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_state_is_read_as_it_is_written_and_no_other_is_known() {
+        for state in [State::Waiting, State::Leased, State::Finished, State::Failed] {
+            assert_eq!(State::from_name(state.name()).unwrap(), state);
+        }
+        for state in [CampaignState::Running, CampaignState::Paused, CampaignState::Cancelled] {
+            assert_eq!(CampaignState::from_name(state.name()).unwrap(), state);
+        }
+        let unknown = [State::from_name("parked").err(), CampaignState::from_name("").err()];
+        for error in unknown {
+            assert!(matches!(error, Some(LibraryError::Damaged { .. })), "{error:?}");
+        }
+    }
+}

@@ -4,11 +4,15 @@
 //! for it follows from the answers; who works on one stands here, and an answer is kept once.
 
 use crate::campaign::sql_seed;
-use crate::engine::{Connection, Row, Write, sql};
+use crate::engine::{Connection, Row, Statement, Write, sql};
+use crate::state::named;
 use crate::{DiagnosisRecord, Library, LibraryError};
 
 /// Hexadecimal digits of the hash in a trial's id.
 const HASH_DIGITS: usize = 12;
+
+/// Cases sealed in one statement, of three values each.
+const SEALS_A_STATEMENT: usize = 1000;
 
 /// A trial as the library keeps it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -160,11 +164,9 @@ impl Question {
 
 fn answer(row: &Row) -> Result<TrialAnswer, LibraryError> {
     let name: String = row.get("question")?;
-    let question = Question::ALL.into_iter().find(|question| question.name() == name);
-    let damaged = || LibraryError::Damaged { what: format!("a question `{name}` in a trial") };
     Ok(TrialAnswer {
         number: row.get_u32("case_number")?,
-        question: question.ok_or_else(damaged)?,
+        question: named("a trial's question", &name, Question::ALL, Question::name)?,
         score_json: row.get("score")?,
     })
 }
@@ -185,10 +187,17 @@ impl Write for TrialRecord {
             .bind(&self.code_version)
             .bind(&self.model_hash);
         connection.execute(insert).await?;
-        for (number, seal) in (0_u32..).zip(&self.seals) {
-            let insert = "insert into trial_case (trial_id, case_number, truth_sha256)
-                values ($1, $2, $3) on conflict (trial_id, case_number) do nothing";
-            connection.execute(sql(insert).bind(&id).bind(number).bind(seal)).await?;
+        let numbered: Vec<_> = (0_u32..).zip(&self.seals).collect();
+        for some in numbered.chunks(SEALS_A_STATEMENT) {
+            let insert = format!(
+                "insert into trial_case (trial_id, case_number, truth_sha256) values {}
+                on conflict (trial_id, case_number) do nothing",
+                connection.dialect().rows_of_values(some.len(), 3)
+            );
+            let bound = |insert: Statement, &(number, seal): &(u32, &String)| {
+                insert.bind(&id).bind(number).bind(seal)
+            };
+            connection.execute(some.iter().fold(sql(insert), bound)).await?;
         }
         let ask = "select case_number, truth_sha256 from trial_case where trial_id = $1";
         for row in connection.rows(sql(ask).bind(&id)).await? {

@@ -1,6 +1,7 @@
 //! The table `worker`: who works for the farm, as all coordinators see it.
 
 use crate::engine::{Connection, Row, Write, sql};
+use crate::state::named;
 use crate::{Library, LibraryError, result};
 
 /// Whether a worker is given cases.
@@ -140,9 +141,18 @@ fn record(row: &Row) -> Result<WorkerRecord, LibraryError> {
     })
 }
 
+impl WorkerState {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Active => "active",
+            Self::Quarantined => "quarantined",
+        }
+    }
+}
+
 fn state(row: &Row) -> Result<WorkerState, LibraryError> {
-    let active = row.get::<String>("state")? == "active";
-    Ok(if active { WorkerState::Active } else { WorkerState::Quarantined })
+    let name: String = row.get("state")?;
+    named("a worker", &name, [WorkerState::Active, WorkerState::Quarantined], WorkerState::name)
 }
 
 impl Write for Registration {
@@ -204,9 +214,10 @@ impl Write for Quarantine {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let state = if self.reason.is_some() { "quarantined" } else { "active" };
+        let state =
+            if self.reason.is_some() { WorkerState::Quarantined } else { WorkerState::Active };
         let set = "update worker set state = $2, reason = $3, failures_in_a_row = 0 where id = $1";
-        let set = sql(set).bind(&self.worker).bind(state).bind(self.reason.clone());
+        let set = sql(set).bind(&self.worker).bind(state.name()).bind(self.reason.clone());
         if connection.execute(set).await? == 0 {
             return Err(LibraryError::UnknownWorker { id: self.worker.clone() });
         }

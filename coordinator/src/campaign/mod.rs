@@ -4,7 +4,12 @@
 //! library's, running them the worker's.
 
 mod design;
+mod kinship;
 mod spec;
+mod training;
 
 pub use design::{case, cases};
+pub use kinship::Kinship;
 pub use spec::{Campaign, DEFAULT, Definition, SpecError, Surfaces};
+pub use training::Lack;
+pub(crate) use training::TRAINED;

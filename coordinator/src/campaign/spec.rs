@@ -27,6 +27,9 @@ pub struct Campaign {
     pub name: String,
     /// How many cases it has.
     pub cases: u32,
+    /// Whether the sequence of its points follows from that number, for the file names none.
+    #[serde(skip)]
+    pub sequence_by_cases: bool,
     /// What decides the results.
     #[serde(flatten)]
     pub definition: Definition,
@@ -262,7 +265,8 @@ impl File {
         let fixed = *fixed.values();
         let (seed, surfaces) = (self.seed, self.surfaces);
         let definition = Definition { seed, sequence, space, fixed, surfaces, experiment };
-        Ok(Campaign { name: self.name, cases, definition })
+        let sequence_by_cases = self.sequence.is_none();
+        Ok(Campaign { name: self.name, cases, sequence_by_cases, definition })
     }
 
     /// The sampled space, and the values of what isn't sampled.

@@ -4,7 +4,7 @@ use super::library::choose;
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
-use super::{OrInput, Stop, note, say};
+use super::{OrInput, Stop, continuity, note, say};
 use crate::campaign::Campaign;
 use crate::farm;
 use anyhow::{Context, anyhow};
@@ -131,7 +131,8 @@ async fn add(
     let campaign = Campaign::read(&file, cases).or_input()?;
     let library = url.open_or_create().await?;
     let id = campaign.id();
-    note_namesakes(&library, &campaign).await?;
+    continuity::check(&library, &campaign, note).await?;
+    continuity::tell_what_training_lacks(&campaign, note);
     farm::introduce(&library, &campaign).await?;
     // Before there is anything to hand out.
     if let Some(priority) = priority {
@@ -149,17 +150,6 @@ async fn add(
         }
     };
     done(library, &format!("{id}: {cases} cases, {left} of them to be simulated{waits}")).await
-}
-
-/// A file that was changed is another campaign.
-async fn note_namesakes(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
-    let id = campaign.id();
-    let all = library.campaigns().await?;
-    let others = all.iter().filter(|it| it.name == campaign.name && it.id != id);
-    for other in others {
-        note(&format!("{} has the same name and another definition; both are worked on", other.id));
-    }
-    Ok(())
 }
 
 /// Adds cases with progress; says how far it came where that is not to the end.

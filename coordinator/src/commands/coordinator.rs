@@ -3,7 +3,7 @@
 use super::files::read;
 use super::library_url::LibraryUrl;
 use super::signals::stop_on_signal;
-use super::{OrInput, Stop};
+use super::{OrInput, Stop, continuity};
 use crate::campaign::Campaign;
 use crate::dispatch::{Settings, Timing};
 use crate::farm;
@@ -14,6 +14,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::net::TcpListener;
+use tracktwin_library::Library;
 use tracktwin_traces::Export;
 use tracktwin_worker::Token;
 
@@ -87,17 +88,20 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let _traces = Export::from_environment("tracktwin-coordinator").or_input()?;
     let campaigns = arguments.campaigns.iter().map(|path| Campaign::read(path, arguments.cases));
     let campaigns = campaigns.collect::<Result<Vec<_>, _>>().or_input()?;
+    let listener = bind("--listen", arguments.listen).await.or_input()?;
+    let dashboard = match arguments.dashboard {
+        Some(address) => Some(bind("--dashboard", address).await.or_input()?),
+        None => None,
+    };
     let library = arguments.library.open_or_create().await?;
-    for campaign in &campaigns {
-        farm::prepare(&library, campaign).await?;
-    }
+    // A coordinator that can't serve the library adds nothing to it.
+    let claim = farm::claim(&library).await?;
+    add(&library, &campaigns).await?;
     let coordinator = Coordinator {
         library: library.clone(),
-        listener: bind("--listen", arguments.listen).await.or_input()?,
-        dashboard: match arguments.dashboard {
-            Some(address) => Some(bind("--dashboard", address).await.or_input()?),
-            None => None,
-        },
+        claim,
+        listener,
+        dashboard,
         security,
         settings: Settings {
             timing: Timing::of_lease(arguments.lease),
@@ -114,6 +118,19 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         CoordinatorError::Security(error) => Stop::Input(error.into()),
         error => Stop::Failure(error.into()),
     })
+}
+
+/// Adds campaigns, none where one of them is not to be.
+async fn add(library: &Library, campaigns: &[Campaign]) -> Result<(), Stop> {
+    let tell = |line: &str| tracing::warn!("{line}");
+    for campaign in campaigns {
+        continuity::check(library, campaign, tell).await?;
+        continuity::tell_what_training_lacks(campaign, tell);
+    }
+    for campaign in campaigns {
+        farm::prepare(library, campaign).await?;
+    }
+    Ok(())
 }
 
 impl Arguments {

@@ -32,13 +32,7 @@ pub(super) struct Arguments {
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, models, library, out } = arguments;
     // The recording first: it is what most often needs mending, and quickest to check.
-    let folder = recording.display().to_string();
-    let recording = Recording::open(&recording).or_input()?;
-    if recording.sleepers.is_empty() {
-        return Err(Stop::Input(anyhow!(
-            "{folder}/recording.json: sleepers: is []; give their places, or import with --sleeper"
-        )));
-    }
+    let recording = open(&recording)?;
     let library = library.open_whole().await?;
     let models = Trained::load(&models)
         .with_context(|| format!("{}: no models; `tracktwin train` makes them", models.display()))
@@ -47,6 +41,19 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let sleepers = evaluation.sleepers.len();
     say(&format!("{sleepers} sleepers evaluated; report: {}", out.join("report.html").display()));
     Ok(())
+}
+
+/// The recording in a folder, if there is something in it to evaluate.
+pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
+    let recording = Recording::open(folder).or_input()?;
+    if recording.sleepers.is_empty() {
+        return Err(Stop::Input(anyhow!(
+            "{}/recording.json: sleepers: is []; give their places, or import with --sleeper",
+            folder.display()
+        )));
+    }
+    usable(&recording)?;
+    Ok(recording)
 }
 
 /// Evaluates a recording with models of this library; writes files and report to `folder`.
@@ -58,10 +65,11 @@ pub(super) async fn evaluate(
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
     let (recording, notes) = usable(recording)?;
+    notes.iter().for_each(|line| note(line));
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
+    make_folder(folder).or_input()?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
     evaluation.notes = notes;
-    make_folder(folder).or_input()?;
     evaluation.write(folder)?;
     let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
     let command = std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>();
@@ -86,11 +94,7 @@ fn usable(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
     if let (true, Some(first)) = (kept.passes.is_empty(), troubles.first()) {
         return Err(Stop::Input(anyhow!("{}: no pass can be used: {first}", recording.name)));
     }
-    let notes: Vec<String> = troubles.iter().map(|why| format!("left out: {why}")).collect();
-    for line in &notes {
-        note(line);
-    }
-    Ok((kept, notes))
+    Ok((kept, troubles.iter().map(|why| format!("left out: {why}")).collect()))
 }
 
 /// A library that can't be read is a failure; models that don't fit are mended by who gave them.

@@ -2,6 +2,7 @@
 
 mod campaign;
 mod certs;
+mod continuity;
 mod coordinator;
 mod diagnose;
 mod evaluate;
@@ -58,7 +59,7 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Work out how the track answers a force: receptance by frequency (hammer test).
     Receptance(receptance::Arguments),
-    /// Train Gaussian-process models on a library.
+    /// Train Gaussian-process models on a library that has at least 200 finished cases.
     Train(train::Arguments),
     /// Tell the track's parameters under a recording, sleeper by sleeper.
     Evaluate(evaluate::Arguments),

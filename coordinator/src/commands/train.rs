@@ -1,10 +1,12 @@
 //! `tracktwin train`: Gaussian-process models from a library.
 
+use super::files::make_folder;
 use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
-use crate::{provenance, training};
+use crate::provenance;
+use crate::training::{self, TrainingError};
 use clap::Args;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -13,6 +15,10 @@ use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Trained};
 
 /// What `train` is told.
 #[derive(Args)]
+#[command(
+    after_help = "At least 200 cases of the campaign must be finished: half of them train, the other half tests. \
+Exit codes: 0 done, 2 wrong input (too few cases, or none of their parameters varies), 3 failure."
+)]
 pub(super) struct Arguments {
     #[command(flatten)]
     library: LibraryUrl,
@@ -43,7 +49,9 @@ pub(super) async fn train(
     seed: u64,
     folder: &Path,
 ) -> Result<Trained, Stop> {
-    let set = training::set(library, campaign).await?;
+    // Before hours of training.
+    make_folder(folder).or_input()?;
+    let set = training::set_to_train_on(library, campaign).await.map_err(stop)?;
     let mut options = training::options(&set);
     options.seed = seed;
     let (trained, tested) = tokio::task::spawn_blocking(move || {
@@ -63,8 +71,19 @@ pub(super) async fn train(
     let page = tracktwin_report::models_page(&trained, &tested);
     std::fs::write(folder.join("models.html"), page)?;
     std::fs::write(folder.join("mase.json"), mase_json(&trained))?;
-    library.record_training(provenance::training(&trained)).await?;
+    if let Err(error) = library.record_training(provenance::training(&trained)).await {
+        // The models stand in the folder; somebody who may only read the library has them all the same.
+        tracing::warn!("the library does not keep what was trained: {error:?}");
+    }
     Ok(trained)
+}
+
+/// A library that is away is the machine's fault; a campaign that can't be trained on is not.
+fn stop(error: TrainingError) -> Stop {
+    match error {
+        TrainingError::Library(error) => error.into(),
+        other => Stop::Input(other.into()),
+    }
 }
 
 /// MASE on the test set in per cent, a row a group of models (paper, eq. 11 and Fig. 14), and how

@@ -54,13 +54,12 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         arguments;
     let own = || format!("sqlite:{}", out.join("library.sqlite").display());
     let url = library.unwrap_or_else(own);
+    // Before anything is made.
+    let models = models.as_deref().map(Trained::load).transpose().or_input()?;
     make_folder(&out).or_input()?;
     let library = open_or_create(&url).await?;
     let paper = match models {
-        Some(folder) => {
-            let models = Trained::load(&folder).or_input()?;
-            Some(Evaluator::new(models, &library).await.or_input()?)
-        }
+        Some(models) => Some(Evaluator::new(models, &library).await.or_input()?),
         None => None,
     };
     let node = tracktwin_worker::agent::unique_name();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::time::Duration;
-use tracktwin_worker::{Prepare, prepare_simulation};
+use tracktwin_worker::{Holdings, Prepare, prepare_simulation};
 
 /// Tells the time in ms since 1970.
 pub type Clock = Arc<dyn Fn() -> i64 + Send + Sync>;
@@ -56,6 +56,9 @@ pub struct Settings {
     pub prepare: Prepare,
     /// The clock that leases go by; the library's if none.
     pub clock: Option<Clock>,
+    /// What the worker holds that runs in this very process, if there is one: its leases don't end
+    /// here while it holds them, however busy the machine is.
+    pub own: Option<Holdings>,
 }
 
 impl Default for Settings {
@@ -67,6 +70,7 @@ impl Default for Settings {
             put_aside: true,
             prepare: prepare_simulation,
             clock: None,
+            own: None,
         }
     }
 }

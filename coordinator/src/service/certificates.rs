@@ -90,7 +90,7 @@ pub fn issue(
         secret(&folder.join(format!("{name}-key.pem")), &key.serialize_pem())?;
     }
     let token = folder.join("token");
-    if !token.exists() {
+    if !token.try_exists().map_err(at(&token))? {
         secret(&token, &format!("{}\n", random_token().map_err(at(&token))?))?;
     }
     Ok(())
@@ -108,7 +108,7 @@ fn authority(
     (params.not_before, params.not_after) = (now - CLOCKS, now + Duration::days(AUTHORITY_DAYS));
     let key_path = folder.join("ca-key.pem");
     // The issuer's name and key are all that a certificate takes from its authority.
-    if key_path.exists() {
+    if key_path.try_exists().map_err(at(&key_path))? {
         let key = std::fs::read_to_string(&key_path).map_err(at(&key_path))?;
         return Ok(Issuer::new(params, KeyPair::from_pem(&key)?));
     }
@@ -153,7 +153,7 @@ fn public(path: &Path, text: &str) -> Result<(), CertificatesError> {
 /// Writes a file that only its owner reads.
 fn secret(path: &Path, text: &str) -> Result<(), CertificatesError> {
     // One that is there may have been readable by others.
-    if path.exists() {
+    if path.try_exists().map_err(at(path))? {
         std::fs::remove_file(path).map_err(at(path))?;
     }
     let file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path);

@@ -7,12 +7,14 @@ use crate::dispatch::{Counts, Dispatch, Settings};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
-use tracktwin_library::{Library, LibraryError};
+use tracktwin_library::{Claim, Library, LibraryError};
 
 /// What a coordinator is started with.
 pub struct Coordinator {
     /// The library it serves.
     pub library: Library,
+    /// The right to do so.
+    pub claim: Claim,
     /// The port for workers.
     pub listener: TcpListener,
     /// The port for people, if any.
@@ -47,15 +49,12 @@ impl Coordinator {
     /// with their workers: whoever serves the library next goes on where this ended.
     ///
     /// # Errors
-    /// [`CoordinatorError`]; [`LibraryError::InUse`] where another process serves the library and
-    /// its database admits only one.
+    /// [`CoordinatorError`].
     pub async fn run(self, stop: CancellationToken) -> Result<(), CoordinatorError> {
         let address = self.listener.local_addr()?;
         raise_descriptors();
         self.security.check(address)?;
-        let _claim = self.library.claim()?;
-        // Workers should not find that out one by one.
-        self.library.check_writable().await?;
+        let _claim = self.claim;
         let stop = stop.child_token();
         // However this ends, nothing goes on behind its back.
         let _guard = stop.clone().drop_guard();

@@ -19,7 +19,8 @@ const PRESENT_MS: i64 = 60_000;
 /// Looks at the campaigns until told to stop, or until there is nothing left to do.
 ///
 /// # Errors
-/// [`LibraryError::Closed`] when nothing can be written any more, which only a new start mends.
+/// [`LibraryError::Closed`] or [`LibraryError::Lost`] when nothing can be written any more, which only a
+/// new start mends.
 pub(super) async fn watch(
     library: Library,
     exit_when_done: bool,
@@ -27,9 +28,9 @@ pub(super) async fn watch(
 ) -> Result<(), LibraryError> {
     let mut said = Said::default();
     while !stop.is_cancelled() {
-        if !library.takes_writes() {
+        if let Err(error) = library.takes_writes() {
             stop.cancel();
-            return Err(LibraryError::Closed);
+            return Err(error);
         }
         match look(&library).await {
             Ok((campaigns, left)) => {

@@ -114,7 +114,7 @@ impl Trial {
     /// The case's recording, made if it is not there.
     fn record_case(&self, number: u32) -> Result<Recording, TrialError> {
         let folder = self.recording(number);
-        if !folder.exists() {
+        if !folder.try_exists().map_err(|source| file(&folder, source))? {
             // Whoever is stopped meanwhile leaves no half recording under its name.
             let unfinished = folder.with_extension("unfinished");
             let _ = std::fs::remove_dir_all(&unfinished);

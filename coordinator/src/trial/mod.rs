@@ -13,6 +13,7 @@ use crate::diagnosing::DiagnosingError;
 use crate::evaluating::Evaluator;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tracktwin_diagnosis::CalibrationError;
@@ -126,6 +127,9 @@ pub enum TrialError {
         /// Why.
         source: serde_json::Error,
     },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Unwritten(#[from] tracktwin_files::FilesError),
     /// A file cannot be read or written.
     #[error("{path}: {source}")]
     File {
@@ -173,8 +177,8 @@ impl Trial {
             let content = text(&tracktwin_trial::plan(self.seed, number).scene);
             seals.seal(&sealed(number), content.as_bytes());
             let truth = self.folder.join(sealed(number));
-            if !truth.exists() {
-                std::fs::write(&truth, content).map_err(|source| file(&truth, source))?;
+            if !truth.try_exists().map_err(|source| file(&truth, source))? {
+                replace(&truth, content.as_bytes())?;
             }
         }
         let digests = seals.digests().map(str::to_owned).collect();
@@ -261,7 +265,7 @@ impl Trial {
         let line = |score| serde_json::to_string(score).expect("plain data is plain JSON") + "\n";
         let path = self.folder.join("scores.jsonl");
         let lines: String = scores.iter().map(line).collect();
-        std::fs::write(&path, lines).map_err(|source| file(&path, source))?;
+        replace(&path, lines.as_bytes())?;
         let path = self.folder.join("trial.md");
         let tables = format!(
             "Trial of seed {}, {} cases, version {CODE_VERSION}.\n\n{}",
@@ -269,7 +273,7 @@ impl Trial {
             self.cases,
             summary.to_markdown(scores)
         );
-        std::fs::write(&path, tables).map_err(|source| file(&path, source))?;
+        replace(&path, tables.as_bytes())?;
         Ok(summary)
     }
 
@@ -277,7 +281,7 @@ impl Trial {
     fn begin_folder(&self) -> Result<(), TrialError> {
         let path = self.folder.join("trial.json");
         let terms = Terms { seed: self.seed, code_version: CODE_VERSION.to_owned() };
-        let Ok(content) = std::fs::read(&path) else { return write(&path, &terms) };
+        let Some(content) = read_if_there(&path)? else { return write(&path, &terms) };
         let known: Terms = serde_json::from_slice(&content)
             .map_err(|source| TrialError::Json { path: path.display().to_string(), source })?;
         if known == terms {
@@ -293,7 +297,9 @@ impl Trial {
     /// Writes the seals down, or makes sure that they are those that were; gives their digest.
     fn seal_folder(&self, seals: &Seals) -> Result<String, TrialError> {
         let path = self.folder.join(SEALS);
-        if let Ok(known) = std::fs::read_to_string(&path) {
+        if let Some(known) = read_if_there(&path)? {
+            let not_text = |error| std::io::Error::new(ErrorKind::InvalidData, error);
+            let known = String::from_utf8(known).map_err(|error| file(&path, not_text(error)))?;
             let known = Seals::from_text(&known)?;
             // A longer trial of the same seed has more seals, but none other.
             seals.agree(&known)?;
@@ -301,7 +307,7 @@ impl Trial {
                 return Ok(known.digest());
             }
         }
-        std::fs::write(&path, seals.to_text()).map_err(|source| file(&path, source))?;
+        replace(&path, seals.to_text().as_bytes())?;
         Ok(seals.digest())
     }
 
@@ -326,7 +332,21 @@ fn text(value: &impl Serialize) -> String {
 }
 
 fn write(path: &Path, value: &impl Serialize) -> Result<(), TrialError> {
-    std::fs::write(path, text(value)).map_err(|source| file(path, source))
+    replace(path, text(value).as_bytes())
+}
+
+/// What a file holds, if it is there. One that can't be read is there, and is no reason to make another.
+fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, TrialError> {
+    match std::fs::read(path) {
+        Ok(content) => Ok(Some(content)),
+        Err(source) if source.kind() == ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(file(path, source)),
+    }
+}
+
+/// Writes a file of the trial's own folder whole, or leaves the one that was there.
+fn replace(path: &Path, bytes: &[u8]) -> Result<(), TrialError> {
+    Ok(tracktwin_files::replace(path, bytes)?)
 }
 
 fn file(path: &Path, source: std::io::Error) -> TrialError {

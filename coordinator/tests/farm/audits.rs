@@ -10,6 +10,7 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tracktwin::campaign::Campaign;
 use tracktwin::dispatch::Settings;
+use tracktwin::farm;
 use tracktwin::service::Security;
 use tracktwin_library::WorkerState;
 use tracktwin_protocol::farm::{self as messages, CaseReport, ReportRequest};
@@ -135,6 +136,7 @@ async fn audits_that_nobody_can_do_are_not_waited_for() {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     let coordinator = tracktwin::service::Coordinator {
+        claim: farm::claim(&library).await.unwrap(),
         library: library.clone(),
         listener,
         dashboard: None,

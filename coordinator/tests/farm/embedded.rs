@@ -6,8 +6,8 @@ use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 use tracktwin::campaign::Campaign;
 use tracktwin::dispatch::Timing;
-use tracktwin::farm::{self, Task};
-use tracktwin_library::Status;
+use tracktwin::farm::{self, FarmError, Task};
+use tracktwin_library::{LibraryError, Status};
 use tracktwin_worker::{Case, Experiment, ExperimentError, Outcome, Simulate};
 
 /// Fails at case 3, panics at case 5.
@@ -94,31 +94,57 @@ async fn a_campaign_that_grows_keeps_what_it_has() {
     assert_eq!(library.digest(&id).await.unwrap(), undisturbed(&many).await);
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_computation_longer_than_its_lease_keeps_it_by_heartbeats() {
-    struct Slow(StandIn);
-    impl Simulate for Slow {
-        fn simulate(&self, cases: &[Case]) -> Vec<Outcome> {
-            std::thread::sleep(Duration::from_millis(1200));
-            self.0.simulate(cases)
-        }
+/// Takes three of the leases that the tests give.
+struct Slow(StandIn);
+
+impl Simulate for Slow {
+    fn simulate(&self, cases: &[Case]) -> Vec<Outcome> {
+        std::thread::sleep(Duration::from_millis(1200));
+        self.0.simulate(cases)
     }
-    let slow = |experiment: &Experiment| {
-        Ok(Box::new(Slow(StandIn(experiment.clone()))) as Box<dyn Simulate>)
-    };
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the signature is that of a preparation")]
+fn slow(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
+    Ok(Box::new(Slow(StandIn(experiment.clone()))))
+}
+
+/// Runs eight slow cases with leases of 400 ms and such heartbeats; none may be handed out twice.
+async fn no_lease_is_lost(heartbeat: Duration) {
     let campaign = Campaign::built_in(Some(8)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let library = library(&folder, &campaign).await;
     let id = campaign.id();
-    let timing = Timing {
-        lease: Duration::from_millis(400),
-        heartbeat: Duration::from_millis(100),
-        retry: Duration::from_millis(50),
-    };
+    let timing =
+        Timing { lease: Duration::from_millis(400), heartbeat, retry: Duration::from_millis(50) };
     // The second core asks for work all the while.
     let task = Task { prepare: slow, timing, ..Task::new(&id, 8, CORES) };
     farm::embedded(&library, task, CancellationToken::new(), |_| {}).await.unwrap();
     for index in 0..8 {
         assert_eq!(library.case(&id, index).await.unwrap().unwrap().attempts, 0);
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_computation_longer_than_its_lease_keeps_it_by_heartbeats() {
+    no_lease_is_lost(Duration::from_millis(100)).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn in_one_process_a_lease_needs_no_heartbeat() {
+    // As on a machine so busy that none gets through.
+    no_lease_is_lost(Duration::from_mins(1)).await;
+}
+
+#[tokio::test]
+async fn a_library_that_another_process_serves_is_left_as_it_is() {
+    let campaign = Campaign::built_in(Some(8)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let library = library(&folder, &campaign).await;
+    let claim = farm::claim(&library).await.unwrap();
+    let refused = farm::claim(&library).await.err().unwrap();
+    let in_use = matches!(refused, FarmError::Library(LibraryError::InUse { .. }));
+    assert!(in_use, "{refused:?}");
+    drop(claim);
+    farm::claim(&library).await.unwrap();
 }

@@ -1,19 +1,22 @@
 //! What the service answers, and what it refuses.
 
 use crate::support::{
-    CORES, coordinator, lease, pass, registered, registration, report, stand_in, verdicts,
-    with_checksum,
+    CORES, coordinator, coordinator_with, lease, pass, registered, registration, report, stand_in,
+    verdicts, with_checksum,
 };
+use std::num::NonZeroUsize;
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 use tonic::Code;
+use tracktwin::dispatch::{Settings, Timing};
+use tracktwin::service::Security;
 use tracktwin_protocol::farm::farm_client::FarmClient;
 use tracktwin_protocol::farm::{
     self as messages, LeaseRequest, RegisterRequest, ReportRequest, Verdict,
 };
 use tracktwin_signal::ThirdOctave;
-use tracktwin_worker::MODEL_HASH;
 use tracktwin_worker::agent::{self, AgentError, Config};
+use tracktwin_worker::{Experiment, ExperimentError, MODEL_HASH, Simulate};
 
 #[tokio::test]
 async fn a_worker_of_other_physics_is_refused_with_both_hashes() {
@@ -234,4 +237,38 @@ async fn a_silent_worker_s_cases_go_to_another_and_its_late_results_change_nothi
     assert_eq!((first.cases[0].epoch, second.cases[0].epoch), (1, 2));
     assert_eq!(verdicts(&mut client, report(&second, "quick")).await, [Verdict::Stored; 4]);
     assert_eq!(verdicts(&mut client, report(&first, "silent")).await, [Verdict::Duplicate; 4]);
+}
+
+/// Blocks its thread for three leases before it has prepared anything.
+fn slow_preparation(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
+    std::thread::sleep(Duration::from_millis(1200));
+    stand_in(experiment)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_worker_of_a_single_thread_keeps_its_leases_while_it_prepares() {
+    let timing = Timing::of_lease(Duration::from_millis(400));
+    let settings = Settings { timing, prepare: stand_in, ..Settings::default() };
+    let coordinator = coordinator_with(settings, Security::default(), 8).await;
+    let config = Config {
+        prepare: slow_preparation,
+        idle_exit: Some(Duration::from_millis(300)),
+        ..Config::new(coordinator.url.clone(), NonZeroUsize::MIN)
+    };
+    let holdings = config.holdings.clone();
+    let worker = std::thread::spawn(move || {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        runtime.block_on(agent::run(config, CancellationToken::new()))
+    });
+    let id = coordinator.campaign.id();
+    while holdings.of(&id).is_empty() {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    // Another asks for work all the while, and so ends what has expired.
+    let mut other = registered(&coordinator, "other").await;
+    while coordinator.library.status(&id).await.unwrap().finished < 8 {
+        assert!(lease(&mut other, "other").await.cases.is_empty(), "a lease was lost");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    tokio::task::spawn_blocking(move || worker.join().unwrap()).await.unwrap().unwrap();
 }

@@ -117,6 +117,7 @@ pub async fn lease(
         indices_below: u32::MAX,
         worker: worker.to_owned(),
         cases_max,
+        held: Vec::new(),
         now_unix_ms: library.now_unix_ms(),
         lease_ms: 12_000,
         after_loss: |_, _| State::Waiting,

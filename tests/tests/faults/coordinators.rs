@@ -3,6 +3,7 @@
 use crate::farm::{Engine, Farm};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
+use system_tests::Process;
 
 /// Kills the coordinator so many times and lets the last one finish.
 fn coordinator_is_killed(farm: &Farm, times: u32) {
@@ -68,6 +69,26 @@ fn a_second_coordinator_on_a_sqlite_library_is_refused_in_one_line() {
     farm.reach(1);
     let mut second = farm.coordinator(1);
     assert_eq!(second.ended(Duration::from_secs(10)).code(), Some(2));
+    drop((first, worker));
+}
+
+#[test]
+fn whoever_is_refused_adds_nothing_to_the_library() {
+    let Some(farm) = Farm::new(Engine::Sqlite) else { return };
+    let first = farm.coordinator(0);
+    let taken = format!("127.0.0.1:{}", farm.port(0));
+    let worker = farm.worker();
+    farm.reach(1);
+    let mut run = farm.run(&["--cases", "128"]);
+    assert_eq!(run.ended(Duration::from_secs(30)).code(), Some(2));
+    // One whose library is served already, and one whose port is taken.
+    for listen in ["127.0.0.1:0", &taken] {
+        let mut second = farm.coordinating(listen);
+        second.arg("--campaign").arg(farm.campaign()).args(["--cases", "128"]);
+        let mut second = Process::start(&mut second, "coordinator");
+        assert_eq!(second.ended(Duration::from_secs(30)).code(), Some(2));
+    }
+    assert_eq!(farm.cases(), 64);
     drop((first, worker));
 }
 

@@ -23,6 +23,21 @@ fn a_postgres_server_stopped_and_started_in_the_middle_loses_nothing() {
     farm.assert_undisturbed();
 }
 
+#[test]
+fn a_run_rides_out_a_server_that_is_away_for_twenty_seconds() {
+    let Some(server) = Server::start(Settings { durable: true }) else { return };
+    let farm = Farm::on(tempfile::tempdir().unwrap(), server.database(), 64);
+    let mut run = farm.run(&[]);
+    farm.reach(8);
+    server.stop();
+    // Longer than a single question waits for an answer.
+    std::thread::sleep(Duration::from_secs(20));
+    assert!(run.runs(), "it ended with the server");
+    server.start_again();
+    Farm::finish(&mut run);
+    farm.assert_undisturbed();
+}
+
 /// A small file system of its own.
 struct Tmpfs<'a>(&'a Path);
 

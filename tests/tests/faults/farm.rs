@@ -1,6 +1,7 @@
 //! A farm of processes: its library, its coordinators, its workers.
 
 use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
@@ -23,7 +24,7 @@ pub(crate) enum Engine {
 
 /// A library, and what runs on it.
 pub(crate) struct Farm {
-    _folder: TempDir,
+    folder: TempDir,
     pub(crate) library: String,
     cases: u32,
     /// The coordinators' ports: they keep them when they are started again.
@@ -54,7 +55,7 @@ impl Farm {
         std::fs::write(&campaign, campaign_of(cases)).unwrap();
         run(PROGRAM, &["campaign", "add", &campaign, "--library", &library]).succeeded();
         let ports = [free_port(), free_port()];
-        Self { _folder: folder, library, cases, ports, lease: "1.5" }
+        Self { folder, library, cases, ports, lease: "1.5" }
     }
 
     /// How a coordinator is started that listens there; it ends when everything is done.
@@ -63,6 +64,24 @@ impl Farm {
         coordinator.args(["coordinator", "--exit-when-done", "--library", &self.library]);
         coordinator.args(["--listen", listen, "--lease", self.lease]);
         coordinator
+    }
+
+    /// Starts the campaign in one process, with these arguments as well.
+    pub(crate) fn run(&self, arguments: &[&str]) -> Process {
+        let mut run = Command::new(PROGRAM);
+        run.arg("run").arg(self.campaign()).args(["--no-train", "--library", &self.library]);
+        run.arg("--out").arg(self.folder.path().join("out")).args(arguments);
+        Process::start(&mut run, "run")
+    }
+
+    /// The campaign's file.
+    pub(crate) fn campaign(&self) -> PathBuf {
+        self.folder.path().join("campaign.toml")
+    }
+
+    /// Cases in the library.
+    pub(crate) fn cases(&self) -> u64 {
+        self.count("1 = 1")
     }
 
     /// Starts the first or the second coordinator.

@@ -11,6 +11,7 @@ mod coordinators;
 mod databases;
 mod farm;
 mod hosts;
+mod locks;
 mod networks;
 mod proxy;
 mod workers;

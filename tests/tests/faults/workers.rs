@@ -71,6 +71,24 @@ fn a_worker_stopped_for_longer_than_its_lease_changes_nothing_when_it_goes_on_po
 }
 
 #[test]
+fn a_run_stopped_for_longer_than_a_lease_loses_none() {
+    let Some(farm) = Farm::new(Engine::Sqlite) else { return };
+    let mut run = farm.run(&[]);
+    farm.reach(4);
+    run.signal("STOP");
+    // A lease lasts 12 s.
+    std::thread::sleep(Duration::from_secs(14));
+    run.signal("CONT");
+    Farm::finish(&mut run);
+    farm.assert_undisturbed();
+    assert_eq!(
+        (farm.attempts(), farm.leased_again()),
+        (0, 0),
+        "one process tells by itself that it lives"
+    );
+}
+
+#[test]
 fn a_dead_worker_s_cases_are_leased_again_within_fifteen_seconds() {
     let Some(mut farm) = Farm::new(Engine::Sqlite) else { return };
     // What a coordinator is started with if nobody says otherwise.

@@ -2,6 +2,7 @@
 
 use super::patience::Patience;
 use super::sqlite::OpenFile;
+use super::writer::SERVER_TIMEOUT;
 use super::{Dialect, Row, Statement, sql};
 use crate::LibraryError;
 use sqlx::{Connection as _, PgConnection, PgPool, SqliteConnection, SqlitePool};
@@ -108,7 +109,8 @@ impl Readers {
     pub(crate) async fn rows(&self, statement: Statement) -> Result<Vec<Row>, LibraryError> {
         let mut patience = Patience::new(true);
         loop {
-            match self.stream(statement.clone()).collect::<Result<Vec<_>, _>>().await {
+            let asked = self.stream(statement.clone()).collect::<Result<Vec<_>, _>>();
+            match self.within_bounds(asked).await {
                 Err(error) if error.is_unavailable() => {
                     if patience.wait().await.is_err() {
                         return Err(error);
@@ -116,6 +118,19 @@ impl Readers {
                 }
                 done => return done,
             }
+        }
+    }
+
+    /// A server that does not answer has gone, whatever the network says.
+    async fn within_bounds<T>(
+        &self,
+        asked: impl Future<Output = Result<T, LibraryError>>,
+    ) -> Result<T, LibraryError> {
+        match self {
+            Self::Sqlite(_) => asked.await,
+            Self::Postgres(_) => tokio::time::timeout(SERVER_TIMEOUT, asked)
+                .await
+                .unwrap_or_else(|_| Err(LibraryError::silent(SERVER_TIMEOUT))),
         }
     }
 

@@ -16,13 +16,17 @@ const READERS: u32 = 4;
 /// How long a reader waits for a free connection, or for the server to come back.
 const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(10);
 
+/// How long a connection may take: a server on the other side of the world answers within a second or two.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
 /// Opens the library in this database and brings its schema up to date; answers also the server's clock.
 pub(super) async fn open(
     options: &PgConnectOptions,
     name: &str,
     create: bool,
 ) -> Result<(Readers, Clock), LibraryError> {
-    let mut connection = options.connect().await.map_err(|error| unreachable(error, name))?;
+    let connected = within_bounds(options).await;
+    let mut connection = connected.map_err(|error| unreachable(error, name))?;
     let is_there = refuse_strangers(&mut connection, name).await?;
     if !is_there && !create {
         return Err(LibraryError::Empty { library: name.to_owned() });
@@ -39,7 +43,18 @@ pub(super) async fn open(
 
 /// A connection that writes.
 pub(super) async fn connect(options: &PgConnectOptions) -> Result<Connection, LibraryError> {
-    Ok(Connection::Postgres(options.connect().await?))
+    Ok(Connection::Postgres(within_bounds(options).await?))
+}
+
+/// A connection, or an error within [`CONNECT_TIMEOUT`]: an address that swallows what is sent to it
+/// would be waited for for minutes, and a port that takes connections but never answers for ever.
+async fn within_bounds(options: &PgConnectOptions) -> Result<PgConnection, sqlx::Error> {
+    let silent = || {
+        let reason = format!("no answer within {} s", CONNECT_TIMEOUT.as_secs());
+        sqlx::Error::Io(std::io::Error::new(std::io::ErrorKind::TimedOut, reason))
+    };
+    let connecting = tokio::time::timeout(CONNECT_TIMEOUT, options.connect());
+    connecting.await.unwrap_or_else(|_| Err(silent()))
 }
 
 /// Why there is no connection: what the user can mend, or what may pass.

@@ -1,5 +1,7 @@
 //! A library in a file.
 
+use super::file_lock::{Identity, identity};
+use super::file_system::shared_between_hosts;
 use super::patience::Patience;
 use super::{Connection, Readers};
 use crate::LibraryError;
@@ -7,7 +9,7 @@ use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, Connection as _, SqliteConnection, SqliteExecutor};
 use std::ffi::OsStr;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -39,6 +41,7 @@ const READERS: u32 = 4;
 /// so.
 pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connection), LibraryError> {
     refuse_what_seems_empty(path)?;
+    warn_of_the_place(path);
     let options = SqliteConnectOptions::new()
         .filename(path)
         .create_if_missing(true)
@@ -77,8 +80,7 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connecti
 /// was removed or replaced is gone with the process that has it open.
 pub(crate) struct OpenFile {
     path: PathBuf,
-    /// Device and inode.
-    identity: [u64; 2],
+    identity: Identity,
 }
 
 impl OpenFile {
@@ -99,10 +101,6 @@ impl OpenFile {
     }
 }
 
-fn identity(path: &Path) -> Option<[u64; 2]> {
-    std::fs::metadata(path).ok().map(|file| [file.dev(), file.ino()])
-}
-
 fn gone(path: &Path) -> LibraryError {
     LibraryError::FileGone { library: path.display().to_string() }
 }
@@ -111,21 +109,66 @@ fn gone(path: &Path) -> LibraryError {
 fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
     let library = path.display().to_string();
     let code = error.as_database_error().and_then(sqlx::error::DatabaseError::code);
-    match code.as_deref() {
-        // SQLITE_NOTADB.
-        Some("26") => LibraryError::NotALibrary { library },
-        // SQLITE_CANTOPEN.
-        Some("14") => {
-            let reason = "the file can't be opened or made; look at the rights of its folder";
-            LibraryError::NotLetIn { library, reason: reason.to_owned() }
+    // SQLITE_NOTADB.
+    if code.as_deref() == Some("26") {
+        return LibraryError::NotALibrary { library };
+    }
+    let not_let_in = |reason: &str| LibraryError::NotLetIn {
+        library: path.display().to_string(),
+        reason: reason.to_owned(),
+    };
+    match error.into() {
+        LibraryError::NotOpened { .. } => {
+            not_let_in("the file can't be opened or made; look at the rights of its folder")
         }
-        _ => match error.into() {
-            LibraryError::NotWritable { .. } => {
-                let reason = "its folder can't be written, which SQLite needs even to read; copy the library";
-                LibraryError::NotLetIn { library, reason: reason.to_owned() }
-            }
-            other => other,
-        },
+        LibraryError::NotWritable { .. } => not_let_in(
+            "its folder can't be written, which SQLite needs even to read; copy the library",
+        ),
+        LibraryError::NoLocks { reason, .. } => {
+            LibraryError::NoLocks { library: place(path), reason }
+        }
+        other => other,
+    }
+}
+
+/// Why the lock that coordinators keep each other away with can't be taken.
+pub(crate) fn not_locked(path: &Path, source: std::io::Error) -> LibraryError {
+    match source.kind() {
+        // The rights of the folder, or its room, are another matter.
+        ErrorKind::PermissionDenied
+        | ErrorKind::ReadOnlyFilesystem
+        | ErrorKind::StorageFull
+        | ErrorKind::QuotaExceeded => {
+            LibraryError::Lock { library: path.display().to_string(), source }
+        }
+        _ => LibraryError::NoLocks { library: place(path), reason: source.to_string() },
+    }
+}
+
+/// A library, and the file system that it is on where several hosts may share that.
+fn place(path: &Path) -> String {
+    match shared_between_hosts(path) {
+        Some(name) => format!("library {} (on {name})", path.display()),
+        None => format!("library {}", path.display()),
+    }
+}
+
+/// Says what may go wrong with a file where it is, before anything does.
+fn warn_of_the_place(path: &Path) {
+    if let Some(name) = shared_between_hosts(path) {
+        tracing::warn!(
+            "library {}: it lies on {name}, which several hosts may share; only programs of one host at a time \
+             may use it there: a disk of this machine is safer, and for several hosts there is PostgreSQL",
+            path.display()
+        );
+    }
+    let links = std::fs::metadata(path).map_or(1, |file| file.nlink());
+    if links > 1 {
+        tracing::warn!(
+            "library {}: the file has {links} names (hard links), and SQLite keeps what it wrote last beside the \
+             name that it was opened by: always use the same one, or make the others symbolic links",
+            path.display()
+        );
     }
 }
 

@@ -11,7 +11,7 @@ use super::patience::Patience;
 use super::{Connection, Target, postgres};
 use crate::LibraryError;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 use tokio::sync::{Notify, mpsc, oneshot};
 use tokio::task::JoinHandle;
@@ -25,8 +25,8 @@ const GROUP_MAX: usize = 256;
 /// Writes that wait for the writer before those who ask have to wait themselves.
 const QUEUE_MAX: usize = 1024;
 
-/// A transaction on a server that takes longer has lost its server, whatever the network says.
-const SERVER_TIMEOUT: Duration = Duration::from_mins(1);
+/// A question or a transaction on a server that takes longer has lost its server, whatever the network says.
+pub(super) const SERVER_TIMEOUT: Duration = Duration::from_mins(1);
 
 /// Connections that write to a server.
 const SERVER_LANES: usize = 2;
@@ -60,6 +60,8 @@ struct Task {
     orders: mpsc::Sender<Box<dyn Order>>,
     closing: Arc<Notify>,
     handle: Mutex<Option<JoinHandle<()>>>,
+    /// What broke the connection of a file, if that is why the task has ended.
+    lost: Arc<OnceLock<String>>,
 }
 
 impl Writer {
@@ -79,6 +81,7 @@ impl Writer {
             connection,
             clock: clock.clone(),
             patient: true,
+            lost: Arc::default(),
         };
         let tasks = connections.take(count).map(|it| Task::start(session(it))).collect();
         Self { tasks, lanes: Lanes::new(count) }
@@ -88,15 +91,19 @@ impl Writer {
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
         let (reply, answer) = oneshot::channel();
         let place = self.lanes.enter(write.worker().unwrap_or_default());
-        let orders = &self.tasks[place.number()].orders;
+        let task = &self.tasks[place.number()];
         let order = Pending { write, answer: None, reply, _place: place };
-        orders.send(Box::new(order)).await.map_err(|_| LibraryError::Closed)?;
-        answer.await.map_err(|_| LibraryError::Closed)?
+        task.orders.send(Box::new(order)).await.map_err(|_| task.end())?;
+        answer.await.map_err(|_| task.end())?
     }
 
-    /// Whether all tasks run: one that panicked, or was closed, writes no more.
-    pub(crate) fn runs(&self) -> bool {
-        self.tasks.iter().all(Task::runs)
+    /// Whether all tasks run: one that panicked, was closed, or lost the connection of its file, writes no
+    /// more.
+    ///
+    /// # Errors
+    /// Why not: [`LibraryError::Closed`] or [`LibraryError::Lost`].
+    pub(crate) fn runs(&self) -> Result<(), LibraryError> {
+        self.tasks.iter().try_for_each(|task| if task.runs() { Ok(()) } else { Err(task.end()) })
     }
 
     /// Finishes what was ordered and closes the connections.
@@ -118,8 +125,17 @@ impl Task {
     fn start(session: Session) -> Self {
         let (orders, receiver) = mpsc::channel(QUEUE_MAX);
         let closing = Arc::new(Notify::new());
+        let lost = session.lost.clone();
         let handle = tokio::spawn(write_all(session, receiver, closing.clone()));
-        Self { orders, closing, handle: Mutex::new(Some(handle)) }
+        Self { orders, closing, handle: Mutex::new(Some(handle)), lost }
+    }
+
+    /// Why it writes no more.
+    fn end(&self) -> LibraryError {
+        match self.lost.get() {
+            Some(reason) => LibraryError::Lost { reason: reason.clone() },
+            None => LibraryError::Closed,
+        }
     }
 
     fn runs(&self) -> bool {
@@ -177,7 +193,13 @@ async fn write_all(
             count = orders.recv_many(&mut group, GROUP_MAX) => if count == 0 { break },
             () = closing.notified() => orders.close(),
         }
-        session.commit_and_reply(&mut group).await;
+        // Closing is no change, and begins no transaction.
+        if !group.is_empty() {
+            session.commit_and_reply(&mut group).await;
+        }
+        if session.lost.get().is_some() {
+            break;
+        }
     }
     if let Some(connection) = session.connection {
         connection.close().await;
@@ -192,9 +214,24 @@ struct Session {
     clock: Arc<Clock>,
     /// Whether to wait for the database: not after having waited in vain, until it is back.
     patient: bool,
+    /// What broke the connection of a file. It is not opened again, for nobody knows what became of it:
+    /// nothing can be written from here any more, and who supervises the program is to start it anew.
+    lost: Arc<OnceLock<String>>,
 }
 
 impl Session {
+    /// Drops a connection that has broken; answers what those are told whose file it led to.
+    fn disconnect(&mut self, error: &LibraryError) -> Result<(), LibraryError> {
+        self.connection = None;
+        if matches!(self.target, Target::Postgres { .. }) {
+            return Ok(());
+        }
+        let reason = self.lost.get_or_init(|| error.to_string()).clone();
+        let lost = LibraryError::Lost { reason };
+        tracing::error!("{lost}");
+        Err(lost)
+    }
+
     /// Commits a group, or each of it alone where one spoils it for the others.
     async fn commit_and_reply(&mut self, group: &mut Vec<Box<dyn Order>>) {
         match self.commit(group).await {
@@ -202,6 +239,10 @@ impl Session {
             Err(LibraryError::Unavailable { reason }) => {
                 let away = || LibraryError::Unavailable { reason: reason.clone() };
                 group.drain(..).for_each(|order| order.reply(Err(away())));
+            }
+            Err(LibraryError::Lost { reason }) => {
+                let lost = || LibraryError::Lost { reason: reason.clone() };
+                group.drain(..).for_each(|order| order.reply(Err(lost())));
             }
             Err(error) => match group.pop() {
                 Some(order) if group.is_empty() => order.reply(Err(error)),
@@ -221,7 +262,7 @@ impl Session {
         loop {
             match self.try_to_commit(orders).await {
                 Err(error) if error.is_unavailable() => {
-                    self.connection = None;
+                    self.disconnect(&error)?;
                     if patience.wait().await.is_err() {
                         self.patient = false;
                         return Err(error);
@@ -254,12 +295,9 @@ impl Session {
         };
         match &self.target {
             Target::Sqlite(_) => transaction.await,
-            Target::Postgres { .. } => {
-                tokio::time::timeout(SERVER_TIMEOUT, transaction).await.unwrap_or_else(|_| {
-                    let reason = format!("no answer within {} s", SERVER_TIMEOUT.as_secs());
-                    Err(LibraryError::Unavailable { reason })
-                })
-            }
+            Target::Postgres { .. } => tokio::time::timeout(SERVER_TIMEOUT, transaction)
+                .await
+                .unwrap_or_else(|_| Err(LibraryError::silent(SERVER_TIMEOUT))),
         }
     }
 }
@@ -299,14 +337,39 @@ mod tests {
         }
     }
 
+    /// As a connection whose thread has ended answers.
+    struct Crashes;
+
+    impl Write for Crashes {
+        type Answer = ();
+
+        async fn apply(&self, _: &mut Connection) -> Result<(), LibraryError> {
+            Err(sqlx::Error::WorkerCrashed.into())
+        }
+    }
+
+    #[tokio::test]
+    async fn a_file_whose_connection_is_lost_takes_no_more_writes_and_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let url = format!("sqlite:{}", folder.path().join("library.sqlite").display());
+        let writer = crate::engine::open_or_create(&url).await.unwrap().writer;
+        let error = writer.write(Crashes).await.unwrap_err();
+        assert!(matches!(error, LibraryError::Lost { .. }), "{error:?}");
+        assert!(!error.is_temporary() && !error.is_wrong_input(), "it is fatal");
+        let again = writer.write(Crashes).await;
+        assert!(matches!(again, Err(LibraryError::Lost { .. })), "{again:?}");
+        tokio::task::yield_now().await;
+        assert!(matches!(writer.runs(), Err(LibraryError::Lost { .. })));
+    }
+
     #[tokio::test]
     async fn a_task_that_breaks_down_is_known_to_have_ended() {
         let folder = tempfile::tempdir().unwrap();
         let url = format!("sqlite:{}", folder.path().join("library.sqlite").display());
         let writer = crate::engine::open_or_create(&url).await.unwrap().writer;
-        assert!(writer.runs());
+        assert!(writer.runs().is_ok());
         assert!(matches!(writer.write(Breaks).await, Err(LibraryError::Closed)));
         tokio::task::yield_now().await;
-        assert!(!writer.runs());
+        assert!(writer.runs().is_err());
     }
 }

@@ -3,6 +3,7 @@
 use super::Held;
 use crate::engine::{Connection, Dialect, Row, Statement, Write, sql};
 use crate::{LibraryError, attempt};
+use std::collections::HashSet;
 
 /// That a case is worker `$2`'s under one of its leases: their indices are `$3`, and these with their
 /// epochs as one number each `$4`.
@@ -41,19 +42,64 @@ impl Write for Renew {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Vec<Held>, LibraryError> {
-        let renew = format!(
-            "update campaign_case set lease_expires_unix_ms = $5 where {}
-            returning sobol_index, epoch",
-            is_held(connection.dialect())
-        );
-        let renew = about(renew, &self.campaign, &self.worker, &self.held).bind(self.until_unix_ms);
-        let rows = connection.rows(renew).await?;
-        let held = |row: &Row| {
-            Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? })
-        };
-        let renewed = rows.iter().map(held).collect::<Result<Vec<_>, LibraryError>>()?;
-        Ok(self.held.iter().copied().filter(|held| !renewed.contains(held)).collect())
+        let Self { campaign, worker, held, until_unix_ms } = self;
+        let renewed = renew(connection, campaign, worker, held, *until_unix_ms).await?;
+        let not_renewed: Vec<Held> =
+            self.held.iter().copied().filter(|it| !renewed.contains(it)).collect();
+        if not_renewed.is_empty() {
+            return Ok(not_renewed);
+        }
+        let ended = self.ended_by_the_worker(connection, &not_renewed).await?;
+        Ok(not_renewed.into_iter().filter(|it| !ended.contains(it)).collect())
     }
+}
+
+impl Renew {
+    /// Which of these leases the worker has ended itself: it reported the case, or gave it back.
+    ///
+    /// A heartbeat may name them still, for it was sent before the answer to that report came.
+    async fn ended_by_the_worker(
+        &self,
+        connection: &mut Connection,
+        held: &[Held],
+    ) -> Result<HashSet<Held>, LibraryError> {
+        let dialect = connection.dialect();
+        let (cases, numbers) = (dialect.listed("$3"), dialect.listed("$4"));
+        let ask = format!(
+            "select sobol_index, epoch from campaign_case
+            where campaign_id = $1 and worker = $2 and state = 'finished' and sobol_index {cases}
+                and ((sobol_index << 32) | epoch) {numbers}
+            union
+            select sobol_index, epoch from attempt
+            where campaign_id = $1 and worker = $2 and ending in ('failed', 'returned')
+                and sobol_index {cases} and ((sobol_index << 32) | epoch) {numbers}"
+        );
+        leases(&connection.rows(about(ask, &self.campaign, &self.worker, held)).await?)
+    }
+}
+
+/// The leases that rows tell.
+fn leases(rows: &[Row]) -> Result<HashSet<Held>, LibraryError> {
+    let held =
+        |row: &Row| Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? });
+    rows.iter().map(held).collect()
+}
+
+/// Lets those of a worker's leases that it still has last until then; answers which.
+pub(super) async fn renew(
+    connection: &mut Connection,
+    campaign: &str,
+    worker: &str,
+    held: &[Held],
+    until_unix_ms: i64,
+) -> Result<HashSet<Held>, LibraryError> {
+    let renew = format!(
+        "update campaign_case set lease_expires_unix_ms = $5 where {}
+        returning sobol_index, epoch",
+        is_held(connection.dialect())
+    );
+    let renew = about(renew, campaign, worker, held).bind(until_unix_ms);
+    leases(&connection.rows(renew).await?)
 }
 
 pub(super) struct Release {

@@ -23,6 +23,9 @@ pub struct LeaseRequest {
     pub worker: String,
     /// Most cases wanted.
     pub cases_max: u32,
+    /// Leases of this worker and this campaign that are known to be held, because the worker runs in
+    /// this very process: they last on, however late their heartbeats are.
+    pub held: Vec<Held>,
     /// The library's clock.
     pub now_unix_ms: i64,
     /// How long the lease lasts without renewal.
@@ -74,7 +77,9 @@ impl Library {
         self.write(Take { request, horizon: self.horizon() }).await
     }
 
-    /// Lets leases last until `until_unix_ms`; answers those that are no longer the worker's.
+    /// Lets leases last until `until_unix_ms`; answers those that were taken from the worker: they
+    /// expired, or their campaign was cancelled. A lease that the worker ended itself, by a report or by
+    /// giving the case back, is not among them.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.

@@ -1,10 +1,12 @@
 //! A lease: whose turn it is, and which cases.
 
+use super::hold::renew;
 use super::{Horizon, Lease, LeaseRequest, Leased};
 use crate::attempt::{self, Ended};
 use crate::case::case_of;
 use crate::engine::{Connection, Row, Write, sql};
 use crate::{Ending, LibraryError, Policy};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Campaigns that are looked at for one lease.
@@ -28,22 +30,33 @@ impl Write for Take {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Option<Lease>, LibraryError> {
-        let LeaseRequest { now_unix_ms, lease_ms, after_loss, .. } = self.request;
+        let LeaseRequest { now_unix_ms, lease_ms, .. } = self.request;
         let looks_at_all = self.horizon.is_due(now_unix_ms, lease_ms);
         if looks_at_all {
-            end_expired(connection, now_unix_ms, after_loss).await?;
+            self.end_expired(connection).await?;
         }
         let lease = self.first(connection).await?;
         if lease.is_some() || looks_at_all {
             return Ok(lease);
         }
         self.horizon.forget();
-        end_expired(connection, now_unix_ms, after_loss).await?;
+        self.end_expired(connection).await?;
         self.first(connection).await
     }
 }
 
 impl Take {
+    /// Ends leases that have expired, but for those that are known to be held.
+    async fn end_expired(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        let LeaseRequest { campaign, worker, held, now_unix_ms, lease_ms, after_loss, .. } =
+            &self.request;
+        if let (Some(campaign), false) = (campaign, held.is_empty()) {
+            let until_unix_ms = now_unix_ms.saturating_add(*lease_ms);
+            renew(connection, campaign, worker, held, until_unix_ms).await?;
+        }
+        end_expired(connection, *now_unix_ms, *after_loss).await
+    }
+
     /// The first cases that wait, of the most urgent campaign that has some.
     async fn first(&self, connection: &mut Connection) -> Result<Option<Lease>, LibraryError> {
         for campaign in self.candidates(connection).await? {
@@ -154,7 +167,15 @@ fn share(waiting: &[Waiting], alone_after: u32) -> Vec<u32> {
     }
 }
 
-/// Ends leases that have expired, of any campaign.
+/// A case whose lease has expired.
+struct Expired {
+    campaign: String,
+    index: i64,
+    attempts: u32,
+}
+
+/// Ends leases that have expired, of any campaign: two statements for all cases of a campaign that
+/// have the same number of attempts, so that many lost workers hold up nobody's report.
 async fn end_expired(
     connection: &mut Connection,
     now_unix_ms: i64,
@@ -166,11 +187,19 @@ async fn end_expired(
         order by lease_expires_unix_ms limit $2 {}",
         connection.dialect().skipping_locked()
     );
-    for row in connection.rows(sql(ask).bind(now_unix_ms).bind(EXPIRED_MAX)).await? {
-        let attempts = row.get_u32("attempts")? + 1;
+    let expired = |row: &Row| {
+        Ok(Expired {
+            campaign: row.get("campaign_id")?,
+            index: row.get("sobol_index")?,
+            attempts: row.get_u32("attempts")? + 1,
+        })
+    };
+    let rows = connection.rows(sql(ask).bind(now_unix_ms).bind(EXPIRED_MAX)).await?;
+    let expired = rows.iter().map(expired).collect::<Result<Vec<_>, LibraryError>>()?;
+    for ((campaign, attempts), indices) in alike(expired) {
         let ended = Ended {
-            campaign: &row.get::<String>("campaign_id")?,
-            index: row.get_u32("sobol_index")?,
+            campaign: &campaign,
+            indices,
             attempts,
             state: policy(Ending::Lost, attempts),
             ending: "lost",
@@ -180,4 +209,13 @@ async fn end_expired(
         attempt::end(connection, ended).await?;
     }
     Ok(())
+}
+
+/// The cases of each campaign that have had so many attempts.
+fn alike(expired: Vec<Expired>) -> BTreeMap<(String, u32), Vec<i64>> {
+    let mut alike = BTreeMap::<_, Vec<i64>>::new();
+    for Expired { campaign, index, attempts } in expired {
+        alike.entry((campaign, attempts)).or_default().push(index);
+    }
+    alike
 }

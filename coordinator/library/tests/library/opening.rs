@@ -137,6 +137,131 @@ async fn with_a_file_one_process_at_a_time_hands_out_cases() {
     other.claim().unwrap();
 }
 
+/// Where two names lead to one file.
+struct SecondName {
+    path: std::path::PathBuf,
+    /// To be unmounted.
+    mounted: Option<std::path::PathBuf>,
+}
+
+impl Drop for SecondName {
+    fn drop(&mut self) {
+        if let Some(folder) = &self.mounted {
+            let _ = std::process::Command::new("umount").arg("-l").arg(folder).status();
+        }
+    }
+}
+
+/// Other names of a file, each of another kind; a mounted one only where that is allowed.
+fn second_names(file: &std::path::Path, elsewhere: &std::path::Path) -> Vec<SecondName> {
+    let name = |name: &str| elsewhere.join(name);
+    std::fs::hard_link(file, name("hard.sqlite")).unwrap();
+    std::os::unix::fs::symlink(file, name("soft.sqlite")).unwrap();
+    let folder = file.parent().unwrap();
+    let round_about = elsewhere.join("..").join(folder.file_name().unwrap()).join("library.sqlite");
+    let paths = [name("hard.sqlite"), name("soft.sqlite"), round_about];
+    let mut names: Vec<_> =
+        paths.map(|path| SecondName { path, mounted: None }).into_iter().collect();
+    let mount = name("mounted");
+    std::fs::create_dir(&mount).unwrap();
+    let mut bind = std::process::Command::new("mount");
+    bind.arg("--bind").args([folder, &mount]).stderr(std::process::Stdio::null());
+    if bind.status().is_ok_and(|status| status.success()) {
+        names.push(SecondName { path: mount.join("library.sqlite"), mounted: Some(mount) });
+    } else {
+        test_needs::skipped("a file by a second mount; nothing may be mounted here");
+    }
+    names
+}
+
+#[tokio::test]
+async fn whatever_name_a_file_has_one_process_at_a_time_hands_out_its_cases() {
+    let home = Home::sqlite();
+    home.library(1).await.close().await;
+    let file = home.folder.as_ref().unwrap().path().join("library.sqlite");
+    let elsewhere = tempfile::tempdir().unwrap();
+    for second in second_names(&file, elsewhere.path()) {
+        let library = home.open().await;
+        let claim = library.claim().unwrap();
+        let other = Library::open(&format!("sqlite:{}", second.path.display())).await.unwrap();
+        let refused = other.claim().unwrap_err();
+        assert!(
+            matches!(refused, LibraryError::InUse { .. }),
+            "{}: {refused}",
+            second.path.display()
+        );
+        drop(claim);
+        let claim = other.claim().unwrap();
+        assert!(matches!(library.claim(), Err(LibraryError::InUse { .. })));
+        drop(claim);
+        other.close().await;
+        library.close().await;
+    }
+}
+
+#[tokio::test]
+async fn closing_a_library_that_was_only_read_waits_for_nobody_who_writes() {
+    let home = Home::sqlite();
+    home.library(1).await.close().await;
+    let library = home.open().await;
+    assert_eq!(library.status(CAMPAIGN).await.unwrap().total(), 1);
+    let mut writer = SqliteConnection::connect(&home.url).await.unwrap();
+    sqlx::raw_sql("begin immediate").execute(&mut writer).await.unwrap();
+    // A transaction would wait for half a minute for the one that is open, and end with an error.
+    let closing = tokio::time::timeout(std::time::Duration::from_secs(20), library.close());
+    closing.await.expect("closing waits for a lock that it does not need");
+    sqlx::raw_sql("rollback").execute(&mut writer).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_server_that_takes_connections_and_never_answers_is_given_up_within_a_bound() {
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("postgres://me@{}/tracks", silent.local_addr().unwrap());
+    let opening = tokio::time::timeout(std::time::Duration::from_mins(1), Library::open(&url));
+    let error = opening.await.expect("opening waits for ever").err().unwrap();
+    let LibraryError::Unreachable { source, .. } = &error else { panic!("{error:?}") };
+    assert!(source.to_string().contains("no answer within"), "{source}");
+}
+
+on_both_databases! {
+    async fn states_that_nobody_knows_are_told_and_not_taken_for_others(home: &Home) {
+        let library = home.library(2).await;
+        library.register_worker(crate::workers::registration("w", 0)).await.unwrap();
+        sql(home, match home.folder {
+            Some(_) => "pragma ignore_check_constraints = on;
+                update campaign_case set state = 'parked' where sobol_index = 1;
+                update worker set state = 'asleep', reason = '?';
+                insert into audit (campaign_id, sobol_index, worker, state)
+                    select campaign_id, 0, 'w', 'lost' from campaign_case where sobol_index = 0;
+                update campaign set state = 'stopped'",
+            None => "alter table campaign_case drop constraint state_is_known;
+                alter table campaign_case disable trigger user;
+                update campaign_case set state = 'parked' where sobol_index = 1;
+                alter table worker drop constraint worker_state_is_known;
+                update worker set state = 'asleep', reason = '?';
+                alter table audit drop constraint audit_state_is_known;
+                insert into audit (campaign_id, sobol_index, worker, state)
+                    select campaign_id, 0, 'w', 'lost' from campaign_case where sobol_index = 0;
+                alter table campaign drop constraint campaign_state_is_known;
+                update campaign set state = 'stopped'",
+        })
+        .await;
+        let told = [
+            library.case(CAMPAIGN, 1).await.map(drop),
+            library.worker("w").await.map(drop),
+            library.heartbeat("w", 0).await.map(drop),
+            library.audits(CAMPAIGN).await.map(drop),
+            library.overview().await.map(drop),
+        ];
+        for (told, state) in told.into_iter().zip(["parked", "asleep", "asleep", "lost", "stopped"]) {
+            let error = told.unwrap_err();
+            assert!(matches!(error, LibraryError::Damaged { .. }), "{error:?}");
+            assert!(error.to_string().contains(state), "{error}");
+        }
+        assert!(library.case(CAMPAIGN, 0).await.unwrap().is_some(), "what is known is read");
+    }
+}
+
 #[tokio::test]
 async fn with_a_server_any_number_of_processes_hands_out_cases() {
     let Some(home) = Home::postgres() else { return };

@@ -45,6 +45,68 @@ on_both_databases! {
         assert_eq!(lost, [held(&mine[1])]);
     }
 
+    async fn a_heartbeat_that_crosses_a_report_or_a_release_loses_nothing(home: &Home) {
+        let library = home.library(5).await;
+        let mine = lease(&library, "a", 5, 0).await;
+        report(&library, "a", vec![finished(&mine[0]), failed(&mine[1])]).await;
+        library.release(CAMPAIGN, "a", vec![held(&mine[2])]).await.unwrap();
+        let all: Vec<_> = mine.iter().map(held).collect();
+        // Sent before the answers came, it names what the worker has ended itself.
+        assert_eq!(library.renew(CAMPAIGN, "a", all.clone(), 1000).await.unwrap(), []);
+        // Another has the released one now, and a result of its own.
+        let theirs = lease(&library, "b", 2, 999).await;
+        report(&library, "b", theirs.iter().map(finished).collect()).await;
+        assert_eq!(library.renew(CAMPAIGN, "a", all.clone(), 1000).await.unwrap(), []);
+        // What expires is lost, and so is what is taken back.
+        library.cancel(CAMPAIGN).await.unwrap();
+        let lost = library.renew(CAMPAIGN, "a", all, 9000).await.unwrap();
+        assert_eq!(lost, [held(&mine[3]), held(&mine[4])]);
+    }
+
+    async fn a_lease_that_is_known_to_be_held_does_not_end_however_late_its_heartbeat_is(home: &Home) {
+        let library = home.library(4).await;
+        let mine = lease(&library, "a", 2, 0).await;
+        let ask = |held: Vec<Held>, now| LeaseRequest {
+            campaign: Some(CAMPAIGN.to_owned()),
+            held,
+            ..request("a", 1, now)
+        };
+        let next = library.lease(ask(vec![held(&mine[0])], 5000)).await.unwrap().unwrap();
+        // The first is held, the second was forgotten by its worker and has expired.
+        assert_eq!(next.cases.iter().map(held).collect::<Vec<_>>(), [Held { index: 1, epoch: 2 }]);
+        let lost = library.renew(CAMPAIGN, "a", mine.iter().map(held).collect(), 9000).await.unwrap();
+        assert_eq!(lost, [held(&mine[1])]);
+        // It lasts as any other from then on.
+        let other = lease(&library, "b", 9, 9000).await;
+        assert!(other.iter().any(|it| held(it) == Held { index: 0, epoch: 2 }), "{other:?}");
+    }
+
+    async fn many_leases_that_expire_at_once_end_each_with_its_own_count_of_attempts(home: &Home) {
+        const CASES: u32 = 700;
+        let library = home.library(CASES).await;
+        crate::support::fill(&library, "other-000000000000", 3).await;
+        // The first ten have lost a worker before.
+        assert_eq!(lease(&library, "w", 10, 0).await.len(), 10);
+        assert_eq!(lease(&library, "w", CASES, 1000).await.len(), CASES as usize);
+        let other = LeaseRequest {
+            campaign: Some("other-000000000000".to_owned()),
+            ..request("w", 3, 1000)
+        };
+        assert_eq!(library.lease(other).await.unwrap().unwrap().cases.len(), 3);
+        // More than end with one lease.
+        let mut again = 0;
+        for _ in 0..3 {
+            again += lease(&library, "v", CASES, 2000).await.len();
+        }
+        assert_eq!(again, CASES as usize);
+        for (index, attempts) in [(0, 2), (9, 2), (10, 1), (CASES - 1, 1)] {
+            let case = library.case(CAMPAIGN, index).await.unwrap().unwrap();
+            assert_eq!((case.state, case.attempts), (State::Leased, attempts), "case {index}");
+        }
+        let waiting = library.status("other-000000000000").await.unwrap();
+        assert_eq!(waiting, Status { waiting: 3, ..Status::default() });
+    }
+
     async fn a_heartbeat_of_an_ended_lease_keeps_none_that_followed(home: &Home) {
         let library = home.library(1).await;
         let first = lease(&library, "a", 1, 0).await;

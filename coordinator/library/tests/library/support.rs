@@ -139,6 +139,7 @@ pub(crate) fn request(worker: &str, max: u32, now: i64) -> LeaseRequest {
         indices_below: u32::MAX,
         worker: worker.to_owned(),
         cases_max: max,
+        held: Vec::new(),
         now_unix_ms: now,
         lease_ms: 1000,
         after_loss: policy,

@@ -41,6 +41,7 @@ async fn a_library_of_the_first_schema_is_gone_on_with() {
         indices_below: u32::MAX,
         worker: "w".to_owned(),
         cases_max: 9,
+        held: Vec::new(),
         // Its lease has expired long ago.
         now_unix_ms: library.now_unix_ms(),
         lease_ms: 1000,

@@ -7,7 +7,7 @@ use tracktwin_library::{
 };
 use tracktwin_protocol::CaseReport;
 
-fn registration(worker: &str, now_unix_ms: i64) -> Registration {
+pub(crate) fn registration(worker: &str, now_unix_ms: i64) -> Registration {
     Registration {
         worker: worker.to_owned(),
         code_version: "0.1.0".to_owned(),

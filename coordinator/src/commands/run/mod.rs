@@ -1,12 +1,13 @@
 //! `tracktwin run`: the whole chain, from a campaign to an evaluated recording.
 
+mod room;
 mod sample;
 
 use super::files::make_folder;
 use super::library_url::open_or_create;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
-use super::{OrInput, Stop, evaluate, note, say, train};
+use super::{OrInput, Stop, continuity, evaluate, note, say, train};
 use crate::campaign::{Campaign, DEFAULT};
 use crate::farm::{self, Task};
 use anyhow::anyhow;
@@ -16,14 +17,16 @@ use std::path::{Path, PathBuf};
 use tracktwin_evaluation::check_recording;
 use tracktwin_library::{Library, Status};
 use tracktwin_signal::recording::Recording;
-use tracktwin_surrogate::ENTRIES_MIN;
+
+/// Folder of the models in the folder for all.
+const MODELS: &str = "models";
 
 /// What `run` is told.
 #[derive(Args)]
 pub(super) struct Arguments {
     /// Campaign file (TOML) [default: a small campaign over the paper's Table D1].
     campaign: Option<PathBuf>,
-    /// How many cases, instead of the campaign's own number.
+    /// How many cases, instead of the campaign's own number; at least 200, unless --no-train is given.
     #[arg(long, value_name = "N")]
     cases: Option<u32>,
     /// Library to fill: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`; one that holds part of the
@@ -58,22 +61,27 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     .or_input()?;
     // A recording that can't be used should not be found out after the simulation.
-    let given = arguments.recording.as_ref().map(Recording::open).transpose().or_input()?;
+    let given = arguments.recording.as_deref().map(evaluate::open).transpose()?;
     if let Some(recording) = &given {
         check(recording, &campaign).or_input()?;
     }
-    if !arguments.no_train && (campaign.cases as usize) < ENTRIES_MIN {
-        return Err(Stop::Input(anyhow!(
-            "{} cases are too few to train on: `--cases {ENTRIES_MIN}` or more, or `--no-train` to \
-             simulate only",
-            campaign.cases
-        )));
+    let trains = !arguments.no_train;
+    if trains {
+        let lack = campaign.check_for_training();
+        lack.map_err(|lack| anyhow!("{lack}, or `--no-train` to simulate only")).or_input()?;
     }
     let out = &arguments.out;
     make_folder(out).or_input()?;
+    if trains {
+        make_folder(&out.join(MODELS)).or_input()?;
+    }
+    let recording = match given {
+        None if trains => sample_for(&campaign, out)?,
+        given => given,
+    };
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
     let library = open_or_create(&url).await?;
-    let said = chain(&library, &campaign, given, &arguments).await;
+    let said = chain(&library, &campaign, recording, &arguments).await;
     // What the library holds is then in one file, fit to be copied.
     library.close().await;
     say(&said?);
@@ -93,18 +101,29 @@ async fn chain(
     }
     let out = &arguments.out;
     let record = library.campaign(&campaign.id()).await?;
-    let models = train::train(library, &record, 0, &out.join("models")).await?;
-    let recording = match recording {
-        Some(recording) => recording,
-        None => sample::open(&out.join("sample"))?,
-    };
-    if let Err(other) = check(&recording, campaign) {
-        note(&format!("the sample recording is of another kind: {other}"));
-        let models = out.join("models");
+    let models = train::train(library, &record, 0, &out.join(MODELS)).await?;
+    let Some(recording) = recording else {
+        let models = out.join(MODELS);
         return Ok(format!("models: {}; `tracktwin evaluate` takes a recording", models.display()));
-    }
+    };
     evaluate::evaluate(&recording, library, models, out).await?;
     Ok(format!("report: {}", out.join("report.html").display()))
+}
+
+/// The bundled recording, if models of the campaign can evaluate it; else it is said at once that nothing
+/// will be evaluated.
+fn sample_for(campaign: &Campaign, out: &Path) -> Result<Option<Recording>, Stop> {
+    let recording = sample::open(&out.join("sample"))?;
+    match check(&recording, campaign) {
+        Ok(()) => Ok(Some(recording)),
+        Err(other) => {
+            note(&format!(
+                "models will be trained and nothing evaluated, for the sample recording is of another kind \
+                 ({other}); `--recording DIR` evaluates one of your own"
+            ));
+            Ok(None)
+        }
+    }
 }
 
 /// Whether models of the campaign can evaluate the recording.
@@ -123,6 +142,10 @@ fn all_cores() -> NonZeroUsize {
 
 /// Simulates what the library lacks of a campaign; Ctrl-C leaves it to be gone on with.
 async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -> Result<(), Stop> {
+    continuity::check(library, campaign, note).await?;
+    // Whoever is refused has added nothing.
+    let claim = farm::claim(library).await?;
+    room::check(library, campaign).await?;
     farm::prepare(library, campaign).await?;
     let id = campaign.id();
     let shutdown = stop_on_signal("stopping: cases that are begun go back to the library")?;
@@ -130,7 +153,7 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
     let stopped = shutdown.clone();
     let mut progress = None::<Progress>;
     let task = Task::new(&id, campaign.cases, cores);
-    let status = farm::embedded(library, task, shutdown, |status: Status| {
+    let status = farm::work(library, &claim, task, shutdown, |status: Status| {
         let (done, total) = (u64::from(status.done()), u64::from(status.total()));
         let bar = progress.get_or_insert_with(|| Progress::begin("simulating", done, total));
         let remark = match status.failed {

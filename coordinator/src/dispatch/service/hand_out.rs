@@ -39,6 +39,7 @@ impl Dispatch {
             indices_below: scope.map_or(u32::MAX, |scope| scope.cases),
             worker: worker.to_owned(),
             cases_max: cases_max.min(self.campaigns.cases_per_lease(self.roster.present().1)),
+            held: self.held_here(),
             now_unix_ms: self.now_unix_ms(),
             lease_ms: unix_ms(self.settings.timing.lease),
             after_loss: after_attempt,
@@ -72,6 +73,15 @@ impl Dispatch {
         let released = self.library.release(&leased.campaign, worker, held.collect()).await;
         let paused = self.library.pause(&leased.campaign).await;
         tracing::error!("campaign {} is paused: {released:?}, {paused:?}", leased.campaign);
+    }
+
+    /// What the worker in this process holds of the campaign that is handed out.
+    fn held_here(&self) -> Vec<library::Held> {
+        let (Some(own), Some(scope)) = (&self.settings.own, &self.settings.scope) else {
+            return Vec::new();
+        };
+        let held = own.of(&scope.campaign).into_iter();
+        held.map(|(index, epoch)| library::Held { index, epoch }).collect()
     }
 
     fn had_nothing(&self) -> bool {
