@@ -14,6 +14,8 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::filter::LevelFilter;
+use tracktwin_parameters::QuantityError;
+use tracktwin_parameters::quantity::{CORES, SECONDS};
 use tracktwin_traces::{Export, ExportError};
 
 /// Exit code for wrong arguments, and for a worker that is of no use to its coordinator.
@@ -60,14 +62,14 @@ struct Arguments {
     )]
     coordinators: Vec<String>,
     /// Cores to use [default: all].
-    #[arg(long, value_name = "N", env = "TRACKTWIN_CORES")]
+    #[arg(long, value_name = "N", env = "TRACKTWIN_CORES", value_parser = cores)]
     cores: Option<NonZeroUsize>,
     /// End, with exit code 0, when there was no work for so long.
-    #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_IDLE_EXIT")]
+    #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_IDLE_EXIT", value_parser = seconds)]
     idle_exit: Option<u64>,
     /// End, with exit code 3, when no coordinator has answered for so long [default: never; with
     /// --idle-exit after ten minutes, or as many seconds as that says if they are more].
-    #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_GIVE_UP_AFTER")]
+    #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_GIVE_UP_AFTER", value_parser = seconds)]
     give_up_after: Option<u64>,
     /// File with the farm's token.
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TOKEN_FILE")]
@@ -90,6 +92,15 @@ struct Arguments {
     /// How log lines look; which ones appear, `RUST_LOG` says.
     #[arg(long, value_enum, default_value_t = LogFormat::Text, env = "TRACKTWIN_LOG_FORMAT")]
     log_format: LogFormat,
+}
+
+fn cores(text: &str) -> Result<NonZeroUsize, QuantityError> {
+    let cores = usize::try_from(CORES.parse_count(text)?).ok().and_then(NonZeroUsize::new);
+    cores.ok_or(QuantityError::Range { value: 0.0, of: CORES })
+}
+
+fn seconds(text: &str) -> Result<u64, QuantityError> {
+    SECONDS.parse_count(text)
 }
 
 /// Reads the command line, works, and turns the end into an exit code.

@@ -1,12 +1,16 @@
 //! What is done with every case of a campaign: everything but its parameters that decides results.
 
 use serde::{Deserialize, Serialize};
-use tracktwin_parameters::{Case, TrackDesign};
+use tracktwin_parameters::quantity::SPEED;
+use tracktwin_parameters::{Case, QuantityError, TrackDesign};
 use tracktwin_signal::{DefinitionError, FeatureDefinition, ThirdOctave};
 use tracktwin_track::extension::{ExtensionInstance, InstanceError, SampledExtension};
 
 /// Spans between what is evaluated and the held ends of the rail, at least.
 const END_SPANS: f64 = 8.0;
+
+/// Time steps of a pass: a hundred times those of the built-in campaign, 16 MB a case and more.
+const STEPS_MAX: f64 = 2e6;
 
 /// Km/h in a m/s.
 const KM_H: f64 = 3.6;
@@ -68,6 +72,22 @@ pub enum ExperimentError {
         low: f64,
         /// Highest value.
         high: f64,
+    },
+    /// A speed that no vehicle has.
+    #[error("speeds_km_h: {0}")]
+    Speed(#[from] QuantityError),
+    /// A pass takes more time steps than can be held.
+    #[error(
+        "time_step_s: {time_step_s:e} makes {steps:.1e} steps at {speed_km_h} km/h; {STEPS_MAX:.0e} \
+         are the most: give a longer step or higher speeds"
+    )]
+    TooManySteps {
+        /// The time step, in s.
+        time_step_s: f64,
+        /// Steps of the slowest pass.
+        steps: f64,
+        /// Its speed, in km/h.
+        speed_km_h: f64,
     },
     /// Wavelengths are not positive or not in order.
     #[error("wavelengths_m: {wavelengths:?} must be two positive lengths, the shorter first")]
@@ -183,6 +203,7 @@ impl Experiment {
         range("time_step_s", self.time_step_s, [1e-8, 0.1 / self.features.highest_hz])?;
         range("run_in_spans", self.run_in_spans, [0.0, 1000.0])?;
         self.check_room()?;
+        self.check_steps()?;
         for extension in &self.extensions {
             extension.check(&self.design, self.spans)?;
         }
@@ -220,11 +241,25 @@ impl Experiment {
         let speeds = &self.speeds_km_h;
         let positive = speeds.iter().all(|speed| speed.is_finite() && *speed > 0.0);
         let ascending = speeds.windows(2).all(|pair| pair[0] < pair[1]);
-        if positive && ascending && !speeds.is_empty() {
-            Ok(())
-        } else {
-            Err(ExperimentError::Speeds { speeds: speeds.clone() })
+        if !positive || !ascending || speeds.is_empty() {
+            return Err(ExperimentError::Speeds { speeds: speeds.clone() });
         }
+        for &speed in speeds {
+            SPEED.check(speed)?;
+        }
+        Ok(())
+    }
+
+    /// The slowest pass is held in memory, a group of cases at a time.
+    fn check_steps(&self) -> Result<(), ExperimentError> {
+        let Some(&speed_km_h) = self.speeds_km_h.first() else { return Ok(()) };
+        let stretch = self.stretch(speed_km_h);
+        let way_m = stretch.end_m - stretch.start_m;
+        let steps = way_m / metres_per_second(speed_km_h) / self.time_step_s;
+        if steps <= STEPS_MAX {
+            return Ok(());
+        }
+        Err(ExperimentError::TooManySteps { time_step_s: self.time_step_s, steps, speed_km_h })
     }
 
     /// The way at one speed: the window is one spacing, centred at the middle sleeper.

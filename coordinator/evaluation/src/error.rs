@@ -1,6 +1,5 @@
 //! Why a recording cannot be evaluated.
 
-use std::path::PathBuf;
 use tracktwin_signal::FeatureError;
 
 /// What goes wrong between a recording and its evaluation.
@@ -73,14 +72,6 @@ pub enum Error {
     /// The models or the library refuse.
     #[error(transparent)]
     Surrogate(#[from] tracktwin_surrogate::Error),
-    /// A file cannot be written.
-    #[error("{path}: {source}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
 }
 
 fn join(speeds: &[f64]) -> String {

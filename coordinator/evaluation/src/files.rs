@@ -1,9 +1,7 @@
-//! `evaluation.json` and `evaluation.csv`, each there whole or not at all.
+//! `evaluation.json` and `evaluation.csv`.
 
-use crate::{Error, Evaluation, SleeperEvaluation};
-use std::fs::File;
-use std::io::Write as _;
-use std::path::Path;
+use crate::{Evaluation, SleeperEvaluation};
+use tracktwin_files::{FileName, FilesError, Output};
 use tracktwin_parameters::Parameter;
 
 impl Evaluation {
@@ -28,15 +26,13 @@ impl Evaluation {
         String::from_utf8(bytes).expect("names and numbers are text")
     }
 
-    /// Writes `evaluation.json` and `evaluation.csv` into `folder`, which is made if need be.
+    /// Adds `evaluation.csv` and `evaluation.json` to the files of a folder.
     ///
     /// # Errors
-    /// [`Error::File`] names the file that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), Error> {
-        std::fs::create_dir_all(folder)
-            .map_err(|source| Error::File { path: folder.to_owned(), source })?;
-        write_whole(&folder.join("evaluation.json"), &self.to_json())?;
-        write_whole(&folder.join("evaluation.csv"), &self.to_csv())
+    /// [`FilesError`] names the file that cannot be written.
+    pub fn add_to(&self, output: &mut Output) -> Result<(), FilesError> {
+        output.add(&FileName::new("evaluation.csv")?, self.to_csv().as_bytes())?;
+        output.add(&FileName::new("evaluation.json")?, self.to_json().as_bytes())
     }
 
     /// The parameters that were estimated, in catalogue order.
@@ -69,17 +65,4 @@ fn row(sleeper: &SleeperEvaluation, parameters: &[Parameter]) -> Vec<String> {
     row.push(sleeper.selector.mape.first().map(ToString::to_string).unwrap_or_default());
     row.push(sleeper.flags.iter().map(|flag| flag.name()).collect::<Vec<_>>().join(";"));
     row
-}
-
-/// Writes beside the file and renames, so that no reader meets half a file.
-fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let write = || -> std::io::Result<()> {
-        let mut file = File::create(&partial)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        std::fs::rename(&partial, path)
-    };
-    write().map_err(|source| Error::File { path: path.to_owned(), source })
 }

@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
+use tracktwin_parameters::quantity::CASES;
 use tracktwin_parameters::{
-    Axis, OWEN_POINTS_MAX, Parameter, ParameterSet, ParameterSpace, Preset, Scale, Sequence,
-    SpaceError,
+    Axis, OWEN_POINTS_MAX, Parameter, ParameterSet, ParameterSpace, Preset, QuantityError, Scale,
+    Sequence, SpaceError,
 };
 use tracktwin_signal::FeatureDefinition;
 use tracktwin_track::extension::SampledExtension;
@@ -76,13 +77,8 @@ impl Surfaces {
 #[derive(Debug, thiserror::Error)]
 pub enum SpecError {
     /// The file can't be read.
-    #[error("{path}: cannot be read: {source}")]
-    Unreadable {
-        /// The file.
-        path: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error("{0}")]
+    Unreadable(#[from] tracktwin_files::FilesError),
     /// Not TOML, an unknown key, or a value of the wrong type.
     #[error("{path}:{line}: {message}")]
     Malformed {
@@ -120,15 +116,15 @@ pub enum SpecError {
         /// What is wrong.
         source: ExperimentError,
     },
-    /// A fixed value can't be.
-    #[error("{path}: parameters.{parameter}: {value} must be a positive number")]
-    Fixed {
+    /// A number can't be what it is given for.
+    #[error("{path}: {key}: {source}")]
+    Number {
         /// The file.
         path: String,
-        /// The parameter.
-        parameter: Parameter,
-        /// Its value.
-        value: f64,
+        /// The key.
+        key: String,
+        /// Why not.
+        source: QuantityError,
     },
     /// No case at all.
     #[error("{path}: cases: a campaign needs at least one case")]
@@ -181,6 +177,17 @@ enum Range {
     Scaled { low: f64, high: f64, scale: Scale },
 }
 
+impl Range {
+    /// The numbers that were given.
+    fn values(self) -> Vec<f64> {
+        match self {
+            Self::Fixed(value) => vec![value],
+            Self::Between(ends) => ends.to_vec(),
+            Self::Scaled { low, high, .. } => vec![low, high],
+        }
+    }
+}
+
 /// The numerical settings that a campaign may change.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -200,8 +207,7 @@ impl Campaign {
     /// [`SpecError`] says in one line what is wrong, where, and how to mend it.
     pub fn read(path: &Path, cases: Option<u32>) -> Result<Self, SpecError> {
         let shown = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| SpecError::Unreadable { path: shown.clone(), source })?;
+        let text = tracktwin_files::read_text(path)?;
         Self::parse(&text, &shown, cases)
     }
 
@@ -254,6 +260,7 @@ impl File {
         if cases == 0 {
             return Err(SpecError::NoCases { path: path.to_owned() });
         }
+        CASES.check(f64::from(cases)).map_err(|source| number(path, "cases", source))?;
         let sequence = self.sequence.unwrap_or(Sequence::for_cases(cases));
         if sequence == Sequence::OwenScrambled && cases > OWEN_POINTS_MAX {
             return Err(SpecError::SequenceExhausted { path: path.to_owned(), cases });
@@ -281,12 +288,13 @@ impl File {
                 Some(&Range::Scaled { low, high, scale }) => {
                     axes.push(Axis { parameter, low, high, scale });
                 }
-                Some(&Range::Fixed(value)) if value.is_finite() && value > 0.0 => {
-                    fixed[parameter] = value;
-                }
-                Some(&Range::Fixed(value)) => {
-                    return Err(SpecError::Fixed { path: path.to_owned(), parameter, value });
-                }
+                Some(&Range::Fixed(value)) => fixed[parameter] = value,
+            }
+            let given = self.parameters.get(&parameter);
+            for value in given.map(|range| range.values()).unwrap_or_default() {
+                let key = format!("parameters.{parameter}");
+                let checked = parameter.quantity().check(value);
+                checked.map_err(|source| number(path, &key, source))?;
             }
         }
         let space = ParameterSpace::new(axes)
@@ -309,6 +317,10 @@ impl File {
         replace(&mut experiment.local_flexibility, simulation.local_flexibility);
         experiment.checked()
     }
+}
+
+fn number(path: &str, key: &str, source: QuantityError) -> SpecError {
+    SpecError::Number { path: path.to_owned(), key: key.to_owned(), source }
 }
 
 fn replace<T>(setting: &mut T, chosen: Option<T>) {

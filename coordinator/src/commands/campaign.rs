@@ -2,6 +2,7 @@
 
 use super::library::choose;
 use super::library_url::LibraryUrl;
+use super::numbers::count;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, continuity, note, say};
@@ -11,6 +12,7 @@ use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use tracktwin_library::{CampaignState, Library, Retry, State};
+use tracktwin_parameters::quantity::CASES;
 
 /// What is to be done.
 #[derive(Subcommand)]
@@ -20,7 +22,7 @@ pub(super) enum Action {
         /// Campaign file (TOML).
         file: PathBuf,
         /// How many cases, instead of the campaign's own number.
-        #[arg(long, value_name = "N")]
+        #[arg(long, value_name = "N", value_parser = count::<u32>(CASES))]
         cases: Option<u32>,
         /// Cases of the campaign with the largest priority are handed out first; 0 is the usual.
         #[arg(long, value_name = "N", allow_negative_numbers = true)]

@@ -1,5 +1,6 @@
 //! `tracktwin certs`: what a farm needs to trust its own.
 
+use super::files::Force;
 use super::{OrInput, Stop, say};
 use crate::service::issue;
 use clap::Args;
@@ -12,6 +13,8 @@ pub(super) struct Arguments {
     /// Folder to write to; an authority and a token that are there stay.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Name or address by which workers reach a coordinator; may be repeated.
     #[arg(long = "host", value_name = "NAME", required = true)]
     hosts: Vec<String>,
@@ -21,8 +24,8 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
-    let Arguments { folder, hosts, days } = arguments;
-    issue(folder, hosts, *days, OffsetDateTime::now_utc()).or_input()?;
+    let Arguments { folder, force, hosts, days } = arguments;
+    issue(folder, hosts, *days, OffsetDateTime::now_utc(), force.force).or_input()?;
     let dir = folder.display();
     say(&format!(
         "{dir}: certificates for {}, valid for {days} days\n\

@@ -2,6 +2,7 @@
 
 use super::files::read;
 use super::library_url::LibraryUrl;
+use super::numbers::count;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, continuity};
 use crate::campaign::Campaign;
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tracktwin_library::Library;
+use tracktwin_parameters::quantity::CASES;
 use tracktwin_traces::Export;
 use tracktwin_worker::Token;
 
@@ -39,7 +41,7 @@ pub(super) struct Arguments {
     #[arg(long = "campaign", value_name = "FILE")]
     campaigns: Vec<PathBuf>,
     /// How many cases, instead of the campaigns' own number.
-    #[arg(long, value_name = "N", requires = "campaigns")]
+    #[arg(long, value_name = "N", requires = "campaigns", value_parser = count::<u32>(CASES))]
     cases: Option<u32>,
     #[command(flatten)]
     library: LibraryUrl,

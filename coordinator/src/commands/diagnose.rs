@@ -1,6 +1,6 @@
 //! `tracktwin diagnose`: where recording and simulation differ, and what physics was left out.
 
-use super::files::make_folder;
+use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
@@ -12,6 +12,7 @@ use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use tracktwin_diagnosis::Verdict;
+use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Library, without_password};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_report::Origin;
@@ -41,6 +42,8 @@ pub(super) struct Arguments {
     /// Folder for diagnosis.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Leave a kind of physics out of the catalogue, to see what else explains the recording; may
     /// be given several times.
     #[arg(long, value_name = "PHYSICS", value_parser = PossibleValuesParser::new(names()))]
@@ -54,8 +57,9 @@ fn names() -> impl Iterator<Item = &'static str> {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let origin = origin(&arguments);
-    let Arguments { recording, models, library, out, without } = arguments;
+    let Arguments { recording, models, library, out, force, without } = arguments;
     let recording = Recording::open(&recording).or_input()?;
+    check(&out, Kind::Results, force, &["report.html", "diagnosis.json"])?;
     let library = match library {
         // Models belong to a library that is there already.
         Some(url) if models.is_some() => Some(open_whole(&url).await?),
@@ -63,7 +67,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None => None,
     };
     let design = design(models, library.as_ref()).await?;
-    make_folder(&out).or_input()?;
+    make_folder(&out)?;
     let shown = Shown::default();
     let setting =
         Setting { design: &design, library: library.as_ref(), without: &without, shuffle: None };
@@ -71,9 +75,11 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     shown.end();
     let diagnosis = diagnosed.map_err(stop)?.diagnosis;
     let json = serde_json::to_string_pretty(&diagnosis).context("a diagnosis is plain JSON")?;
-    std::fs::write(out.join("diagnosis.json"), &json)?;
     let page = tracktwin_report::diagnosis_page(&diagnosis, &origin);
-    std::fs::write(out.join("report.html"), page)?;
+    let mut output = Output::begin(&out, Kind::Results, force.force)?;
+    output.add(&FileName::new("report.html")?, page.as_bytes())?;
+    output.add(&FileName::new("diagnosis.json")?, json.as_bytes())?;
+    output.commit()?;
     if let Some(library) = &library {
         let record = provenance::diagnosis(&diagnosis, json)?;
         if let Err(error) = library.record_diagnosis(record).await {
@@ -99,7 +105,7 @@ fn stop(error: DiagnosingError) -> Stop {
 
 /// How the diagnosis is repeated.
 fn origin(arguments: &Arguments) -> Origin {
-    let Arguments { recording, models, library, out, without } = arguments;
+    let Arguments { recording, models, library, out, without, .. } = arguments;
     let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
     command.extend(models.as_ref().map(|models| format!("--models {}", models.display())));
     let library = library.as_deref().map(without_password);

@@ -1,6 +1,6 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
-use super::files::make_folder;
+use super::files::{Force, check};
 use super::library_url::LibraryUrl;
 use super::{OrInput, Stop, note, say};
 use crate::evaluating::{Evaluator, EvaluatorError};
@@ -10,6 +10,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::chain;
 use tracktwin_evaluation::{Evaluation, check_recording};
+use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_library::{Library, without_password};
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
@@ -27,17 +28,20 @@ pub(super) struct Arguments {
     /// Folder for evaluation.json, evaluation.csv and report.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { recording, models, library, out } = arguments;
+    let Arguments { recording, models, library, out, force } = arguments;
     // The recording first: it is what most often needs mending, and quickest to check.
     let recording = open(&recording)?;
+    check_files(&out, force)?;
     let library = library.open_whole().await?;
     let models = Trained::load(&models)
         .with_context(|| format!("{}: no models; `tracktwin train` makes them", models.display()))
         .or_input()?;
-    let evaluation = evaluate(&recording, &library, models, &out).await?;
+    let evaluation = evaluate(&recording, &library, models, &out, force).await?;
     let sleepers = evaluation.sleepers.len();
     say(&format!("{sleepers} sleepers evaluated; report: {}", out.join("report.html").display()));
     Ok(())
@@ -56,21 +60,26 @@ pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
     Ok(recording)
 }
 
+/// Makes sure that an evaluation may be written into a folder.
+pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
+    check(folder, Kind::Results, force, &["report.html", "evaluation.csv", "evaluation.json"])
+}
+
 /// Evaluates a recording with models of this library; writes files and report to `folder`.
 pub(super) async fn evaluate(
     recording: &Recording,
     library: &Library,
     models: Trained,
     folder: &Path,
+    force: Force,
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
     let (recording, notes) = usable(recording)?;
     notes.iter().for_each(|line| note(line));
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
-    make_folder(folder).or_input()?;
+    make_folder(folder)?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
     evaluation.notes = notes;
-    evaluation.write(folder)?;
     let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
     let command = std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>();
     let page = tracktwin_report::evaluation_page(
@@ -79,7 +88,10 @@ pub(super) async fn evaluate(
         &evaluator.extractor,
         &command.join(" "),
     );
-    std::fs::write(folder.join("report.html"), page)?;
+    let mut output = Output::begin(folder, Kind::Results, force.force)?;
+    output.add(&FileName::new("report.html")?, page.as_bytes())?;
+    evaluation.add_to(&mut output)?;
+    output.commit()?;
     if let Err(error) = library.record_evaluation(provenance::evaluation(&evaluation)).await {
         // The answer stands in the folder; somebody who may only read the library has it all the same.
         tracing::warn!("the library does not keep this evaluation: {error:?}");

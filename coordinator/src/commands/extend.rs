@@ -1,6 +1,6 @@
 //! `tracktwin extend`: a campaign whose parameter space has what a diagnosis found.
 
-use super::files::{read, read_text};
+use super::files::{Force, read, read_text, write_file};
 use super::{OrInput, Stop, say};
 use crate::campaign::Campaign;
 use anyhow::{Context, anyhow};
@@ -8,6 +8,7 @@ use clap::Args;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Diagnosis, Estimate, FORMAT, Hypothesis};
+use tracktwin_files::Kind as FileKind;
 use tracktwin_track::extension::{Kind, KindParameter, PlaceKind};
 
 /// Share of the cases that have the extension: models must hold without it as well.
@@ -33,10 +34,12 @@ pub(super) struct Arguments {
     /// The new campaign; by default CAMPAIGN-extended.toml beside the old one.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
 }
 
 pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { campaign: path, from, out } = arguments;
+    let Arguments { campaign: path, from, out, force } = arguments;
     let text = read_text(&path).or_input()?;
     let campaign = Campaign::parse(&text, &path.display().to_string(), None).or_input()?;
     let diagnosis = diagnosis(&from).or_input()?;
@@ -62,9 +65,7 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     let out = out.unwrap_or_else(|| beside(&path));
     Campaign::parse(&extended, &out.display().to_string(), None).or_input()?;
-    std::fs::write(&out, extended)
-        .with_context(|| format!("{}: cannot be written", out.display()))
-        .or_input()?;
+    write_file(&out, FileKind::Campaign, force, extended.as_bytes())?;
     let names: Vec<_> =
         accepted.iter().map(|(hypothesis, _)| hypothesis.physics.as_str()).collect();
     say(&format!("{}: half of the cases have {}", out.display(), names.join(" and ")));
@@ -96,7 +97,8 @@ fn table(
 ) -> String {
     let mut table = format!(
         "\n# Found in {} with a probability of {:.0} %.\n[[extension]]\nphysics = \"{}\"\nshare = {SHARE:?}\n",
-        diagnosis.recording,
+        // A line break would end the comment.
+        diagnosis.recording.replace(char::is_control, " "),
         100.0 * hypothesis.probability,
         kind.physics
     );

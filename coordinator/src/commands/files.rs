@@ -1,17 +1,28 @@
 //! Files and folders that the user names; what can't be had is said with its path.
 
-use anyhow::{Context, Result};
+use clap::Args;
+use std::fs::File;
+use std::io::Write as _;
 use std::path::Path;
+use tracktwin_files::{FileName, FilesError, Kind, Output};
+
+/// What happens to files that are there already.
+#[derive(Args, Clone, Copy, Debug)]
+pub(super) struct Force {
+    /// Replace files that tracktwin did not write, too; its own are replaced without.
+    #[arg(long)]
+    pub(super) force: bool,
+}
 
 /// Makes a folder and those above it, and makes sure that files can be written to it: before anything that
 /// takes time is done for them.
-pub(super) fn make_folder(path: &Path) -> Result<()> {
-    let unmakable = || format!("{}: the folder cannot be made", path.display());
-    std::fs::create_dir_all(path).with_context(unmakable)?;
+pub(super) fn make_folder(path: &Path) -> Result<(), FilesError> {
+    tracktwin_files::make_folder(path)?;
     let probe = path.join(format!(".tracktwin-{}", std::process::id()));
-    let unwritable = || format!("{}: nothing can be written to the folder", path.display());
-    std::fs::File::create_new(&probe).with_context(unwritable)?;
-    std::fs::remove_file(&probe).with_context(unwritable)
+    let unwritable =
+        |source| FilesError::System { path: path.to_owned(), action: "written to", source };
+    File::create_new(&probe).map_err(unwritable)?;
+    std::fs::remove_file(&probe).map_err(unwritable)
 }
 
 /// Bytes that may still be written where a folder is; nothing where the system does not tell.
@@ -20,18 +31,63 @@ pub(super) fn free_bytes(folder: &Path) -> Option<u64> {
     Some(disk.f_bavail.saturating_mul(disk.f_frsize))
 }
 
-/// What a file holds.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).with_context(|| unreadable(path))
+/// Makes sure, before anything is worked out, that a folder's files may be written.
+pub(super) fn check(
+    folder: &Path,
+    kind: Kind,
+    Force { force }: Force,
+    names: &[&str],
+) -> Result<(), FilesError> {
+    tracktwin_files::check(folder, kind, force, names)
 }
 
-/// What a file of text holds.
-pub(super) fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).with_context(|| unreadable(path))
+/// As [`check`], for a single file.
+pub(super) fn check_file(path: &Path, kind: Kind, force: Force) -> Result<(), FilesError> {
+    if is_stream(path) {
+        return Ok(());
+    }
+    let (folder, name) = FileName::of_path(path)?;
+    check(&folder, kind, force, &[name.as_str()])
 }
 
-fn unreadable(path: &Path) -> String {
-    format!("{}: cannot be read", path.display())
+/// Writes a single file, whole or not at all; into a pipe or a device as it comes.
+pub(super) fn write_file(
+    path: &Path,
+    kind: Kind,
+    Force { force }: Force,
+    bytes: &[u8],
+) -> Result<(), FilesError> {
+    if is_stream(path) {
+        return stream(path, bytes);
+    }
+    let (folder, name) = FileName::of_path(path)?;
+    let mut output = Output::in_folder(&folder, kind, force)?;
+    output.add(&name, bytes)?;
+    output.commit()
+}
+
+/// Whether a path is a pipe, a device or the like: nothing that could be replaced.
+pub(super) fn is_stream(path: &Path) -> bool {
+    path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+fn stream(path: &Path, bytes: &[u8]) -> Result<(), FilesError> {
+    let written = File::options().write(true).open(path).and_then(|mut it| it.write_all(bytes));
+    written.map_err(|source| FilesError::System {
+        path: path.to_owned(),
+        action: "written",
+        source,
+    })
+}
+
+/// What a small file holds.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
+    tracktwin_files::read(path)
+}
+
+/// What a small file of text holds.
+pub(super) fn read_text(path: &Path) -> Result<String, FilesError> {
+    tracktwin_files::read_text(path)
 }
 
 #[cfg(test)]

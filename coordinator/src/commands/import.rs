@@ -1,12 +1,17 @@
 //! `tracktwin import`: recordings of other makes.
 
-use super::files::read_text;
+use super::files::{Force, read_text};
+use super::numbers::number;
 use super::{OrInput, Stop, say};
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use tracktwin_signal::recording::import::{AccelerationUnit, Layout, PositionUnit, import};
+use tracktwin_files::{Kind, Names, Output};
+use tracktwin_parameters::quantity::{PLACE, SAMPLE_RATE, SPACING, SPEED, WHEEL_RADIUS};
+use tracktwin_signal::recording::import::{
+    AccelerationUnit, Imported, Layout, PositionUnit, import,
+};
 
 /// What `import` is told.
 #[derive(Args)]
@@ -26,6 +31,8 @@ pub(super) struct Arguments {
     /// Folder for the recording; of several columns of acceleration each gets a folder inside it.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// What the columns mean, as a TOML file.
     #[arg(long, value_name = "FILE.toml")]
     layout: Option<PathBuf>,
@@ -43,19 +50,19 @@ pub(super) struct Arguments {
     #[arg(long, value_enum)]
     position_unit: Option<LengthUnit>,
     /// Samples per second, where no column of times says it.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = number(SAMPLE_RATE))]
     sample_rate: Option<f64>,
     /// Speed in km/h, where there is neither a column of positions nor of speeds.
-    #[arg(long, value_name = "KMH")]
+    #[arg(long, value_name = "KMH", value_parser = number(SPEED))]
     speed: Option<f64>,
     /// Distance of the sleepers in m; 0.6 if nothing is said.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", value_parser = number(SPACING))]
     spacing: Option<f64>,
     /// Place of any one sleeper in m; without it the recording has no sleepers.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", value_parser = number(PLACE), allow_negative_numbers = true)]
     sleeper: Option<f64>,
     /// Radius of the wheel in m.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", value_parser = number(WHEEL_RADIUS))]
     wheel_radius: Option<f64>,
 }
 
@@ -121,19 +128,21 @@ impl FromStr for Meaning {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let layout = layout(arguments).or_input()?;
     let imported = import(&arguments.files, &layout).or_input()?;
-    let several = imported.len() > 1;
-    let folder = |column: &str| {
-        if several { arguments.out.join(column) } else { arguments.out.clone() }
-    };
-    for one in &imported {
-        refuse_another(&folder(&one.column)).or_input()?;
-    }
+    let folders = folders(&arguments.out, &imported);
+    let force = arguments.force.force;
     if arguments.unit.is_none() && arguments.layout.is_none() {
         say("unit: taken as m/s2 (say --unit g or --unit unknown)");
     }
-    for one in &imported {
-        let folder = folder(&one.column);
-        one.recording.write(&folder).or_input()?;
+    // All are written before the first gets its name.
+    let mut outputs = Vec::with_capacity(imported.len());
+    for (one, folder) in imported.iter().zip(&folders) {
+        let mut output = Output::begin(folder, Kind::MeasuredRecording, force)?;
+        one.recording.add_to(&mut output)?;
+        output.check()?;
+        outputs.push(output);
+    }
+    for ((one, folder), output) in imported.iter().zip(&folders).zip(outputs) {
+        output.commit()?;
         for note in &one.notes {
             say(note);
         }
@@ -142,15 +151,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Somebody's recording is not written over.
-fn refuse_another(folder: &Path) -> Result<(), anyhow::Error> {
-    if folder.join("recording.json").exists() {
-        let folder = folder.display();
-        return Err(anyhow!(
-            "{folder}: holds a recording already; remove it or give another --out"
-        ));
+/// Where the recordings go: of several columns each has a folder that is called like it.
+fn folders(out: &Path, imported: &[Imported]) -> Vec<PathBuf> {
+    if let [_] = imported {
+        return vec![out.to_owned()];
     }
-    Ok(())
+    let mut names = Names::default();
+    imported.iter().map(|one| names.make(&one.column).within(out)).collect()
 }
 
 /// The layout file's entries under the flags.
@@ -187,29 +194,12 @@ fn layout(arguments: &Arguments) -> Result<Layout, anyhow::Error> {
     layout.speed_km_h = arguments.speed.or(layout.speed_km_h);
     layout.sleeper_m = arguments.sleeper.or(layout.sleeper_m);
     layout.wheel_radius_m = arguments.wheel_radius.or(layout.wheel_radius_m);
-    check(&layout)?;
     Ok(layout)
 }
 
 fn layout_of(path: &Path) -> Result<Layout, anyhow::Error> {
-    toml::from_str(&read_text(path)?).with_context(|| format!("{}: is no layout", path.display()))
-}
-
-/// Numbers that must be positive where they are given.
-fn check(layout: &Layout) -> Result<(), anyhow::Error> {
-    let given = [
-        ("sample_rate_Hz", layout.sample_rate_hz),
-        ("speed_km_h", layout.speed_km_h),
-        ("spacing_m", Some(layout.spacing_m)),
-        ("wheel_radius_m", layout.wheel_radius_m),
-    ];
-    for (name, value) in given {
-        if value.is_some_and(|value| !(value.is_finite() && value > 0.0)) {
-            return Err(anyhow!(
-                "{name}: is {}; give a positive number",
-                value.unwrap_or_default()
-            ));
-        }
-    }
-    Ok(())
+    let layout: Layout = toml::from_str(&read_text(path)?)
+        .with_context(|| format!("{}: is no layout", path.display()))?;
+    layout.check().with_context(|| path.display().to_string())?;
+    Ok(layout)
 }

@@ -1,10 +1,11 @@
 //! `tracktwin inspect`: what is in a recording, and what it can be used for.
 
+use super::files::{Force, check_file, write_file};
 use super::{OrInput, Stop, say};
-use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_diagnosis::{FirstLook, Place, first_look, tells_waves};
+use tracktwin_files::Kind;
 use tracktwin_report::{Inspected, InspectedCurve, Inspection, inspection_page};
 use tracktwin_signal::SAMPLES_A_PERIOD;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -25,6 +26,8 @@ pub(super) struct Arguments {
     /// Page with pictures.
     #[arg(long, value_name = "FILE.html")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     /// Say it as JSON.
     #[arg(long)]
     json: bool,
@@ -32,6 +35,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let recording = Recording::open(&arguments.recording).or_input()?;
+    if let Some(path) = &arguments.out {
+        check_file(path, Kind::Results, arguments.force)?;
+    }
     let look = first_look(&recording);
     let inspection = inspection(&recording, &look);
     if arguments.json {
@@ -40,9 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
         print(&inspection);
     }
     if let Some(path) = &arguments.out {
-        std::fs::write(path, inspection_page(&inspection))
-            .with_context(|| format!("{}: cannot be written", path.display()))
-            .or_input()?;
+        write_file(path, Kind::Results, arguments.force, inspection_page(&inspection).as_bytes())?;
         if !arguments.json {
             say(&format!("page: {}", path.display()));
         }

@@ -12,6 +12,7 @@ mod import;
 mod inspect;
 mod library;
 mod library_url;
+mod numbers;
 mod progress;
 mod receptance;
 mod reproduce;

@@ -1,11 +1,15 @@
 //! `tracktwin receptance`: how the track answers a force (hammer test).
 
+use super::files::{Force, check, is_stream, write_file};
+use super::numbers::{count, number};
 use super::simulate::Track;
 use super::{OrInput, Stop, say};
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use tracktwin_files::{FileName, Kind, Output};
+use tracktwin_parameters::quantity::{FREQUENCY, PLACE, POINTS, SPANS};
 use tracktwin_parameters::{ParameterSet, Preset};
 use tracktwin_report::ReceptanceCurve;
 use tracktwin_track::frequency::{self, Place};
@@ -22,17 +26,19 @@ pub(super) struct Arguments {
     /// File for the receptances (CSV); a picture is written beside it (SVG).
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Sleeper spans; 25 as in the paper have standing waves, 200 are as good as endless.
-    #[arg(long, default_value_t = 200)]
+    #[arg(long, default_value_t = 200, value_parser = count::<usize>(SPANS))]
     spans: usize,
     /// Lowest frequency in Hz.
-    #[arg(long, default_value_t = 50.0, value_name = "HZ")]
+    #[arg(long, default_value_t = 50.0, value_name = "HZ", value_parser = number(FREQUENCY))]
     from: f64,
     /// Highest frequency in Hz.
-    #[arg(long, default_value_t = 8000.0, value_name = "HZ")]
+    #[arg(long, default_value_t = 8000.0, value_name = "HZ", value_parser = number(FREQUENCY))]
     to: f64,
     /// Frequencies, evenly spread on a logarithmic axis.
-    #[arg(long, default_value_t = 400)]
+    #[arg(long, default_value_t = 400, value_parser = count::<usize>(POINTS))]
     points: usize,
     /// A parameter's value: `railpad_stiffness_N_m=9e7`; may stand several times.
     #[arg(long = "set", value_name = "NAME=VALUE")]
@@ -71,13 +77,15 @@ fn spot(text: &str) -> Result<Spot, String> {
     match text {
         "sleeper" => Ok(Spot::Sleeper),
         "midspan" => Ok(Spot::Midspan),
-        _ => text.parse().map(Spot::At).map_err(|_| {
-            format!("`{text}` is no place; write sleeper, midspan or a position in m")
-        }),
+        _ => PLACE
+            .parse(text)
+            .map(Spot::At)
+            .map_err(|error| format!("{error}; write sleeper, midspan or a position in m")),
     }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
+    check_files(arguments)?;
     let frequencies = frequencies(arguments).or_input()?;
     let preset = Preset::from(arguments.preset);
     let set =
@@ -96,23 +104,58 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
         let values = frequency::receptance(&model, struck, measured, &frequencies).or_input()?;
         curves.push(ReceptanceCurve { name: test.name.clone(), values });
     }
-    write_csv(&arguments.out, &frequencies, &curves)
-        .with_context(|| format!("{}: cannot be written", arguments.out.display()))?;
-    let picture = arguments.out.with_extension("svg");
-    std::fs::write(&picture, tracktwin_report::receptance_chart(&frequencies, &curves))?;
-    say(&format!("receptance: {}; picture: {}", arguments.out.display(), picture.display()));
+    let table = csv(&frequencies, &curves)?;
+    let picture = tracktwin_report::receptance_chart(&frequencies, &curves);
+    write(arguments, &table, &picture)
+}
+
+/// Table and picture, together.
+fn write(arguments: &Arguments, table: &[u8], picture: &str) -> Result<(), Stop> {
+    let Arguments { out, force, .. } = arguments;
+    if is_stream(out) {
+        return Ok(write_file(out, Kind::Curves, *force, table)?);
+    }
+    let [table_name, picture_name] = names(out)?;
+    let (folder, _) = FileName::of_path(out)?;
+    let mut output = Output::in_folder(&folder, Kind::Curves, force.force)?;
+    output.add(&picture_name, picture.as_bytes())?;
+    output.add(&table_name, table)?;
+    output.commit()?;
+    let picture = picture_name.within(&folder);
+    say(&format!("receptance: {}; picture: {}", out.display(), picture.display()));
     Ok(())
+}
+
+/// What table and picture are called.
+fn names(out: &Path) -> Result<[FileName; 2], Stop> {
+    let (_, table) = FileName::of_path(out)?;
+    let (_, picture) = FileName::of_path(&out.with_extension("svg"))?;
+    if table == picture {
+        let table = anyhow!(
+            "--out {}: that is the picture's name; give the table's, such as ",
+            out.display()
+        );
+        return Err(anyhow!("{table}{}", out.with_extension("csv").display())).or_input();
+    }
+    Ok([table, picture])
+}
+
+/// Makes sure that both may be written.
+fn check_files(Arguments { out, force, .. }: &Arguments) -> Result<(), Stop> {
+    if is_stream(out) {
+        return Ok(());
+    }
+    let (folder, _) = FileName::of_path(out)?;
+    let names = names(out)?;
+    Ok(check(&folder, Kind::Curves, *force, &[names[0].as_str(), names[1].as_str()])?)
 }
 
 fn frequencies(arguments: &Arguments) -> Result<Vec<f64>, anyhow::Error> {
     let Arguments { from, to, points, .. } = *arguments;
-    if !(from > 0.0 && from < to && to.is_finite()) {
+    if from >= to {
         return Err(anyhow!(
             "--from {from} --to {to}: give two frequencies in Hz, the lower first"
         ));
-    }
-    if points < 2 {
-        return Err(anyhow!("--points: {points} are too few for a curve; give at least 2"));
     }
     let ratio = (to / from).powf(1.0 / (points - 1) as f64);
     Ok((0..points).map(|point| from * ratio.powf(point as f64)).collect())
@@ -123,26 +166,21 @@ fn model(spans: usize, preset: Preset, set: &ParameterSet) -> Result<TrackModel,
     TrackModel::build(&preset.design(), &Mesh::uniform(spans, 8, 8), &supports, &[]).or_input()
 }
 
-fn write_csv(
-    path: &Path,
-    frequencies: &[f64],
-    curves: &[ReceptanceCurve],
-) -> Result<(), anyhow::Error> {
-    let mut file = csv::Writer::from_path(path)?;
+fn csv(frequencies: &[f64], curves: &[ReceptanceCurve]) -> Result<Vec<u8>, anyhow::Error> {
+    let mut table = csv::Writer::from_writer(Vec::new());
     let mut heads = vec!["frequency_Hz".to_owned()];
     for curve in curves {
         heads.push(format!("{}_real_m_N", curve.name));
         heads.push(format!("{}_imag_m_N", curve.name));
     }
-    file.write_record(&heads)?;
+    table.write_record(&heads)?;
     for (row, frequency) in frequencies.iter().enumerate() {
         let mut record = vec![frequency.to_string()];
         for curve in curves {
             record.push(format!("{:e}", curve.values[row].re));
             record.push(format!("{:e}", curve.values[row].im));
         }
-        file.write_record(&record)?;
+        table.write_record(&record)?;
     }
-    file.flush()?;
-    Ok(())
+    Ok(table.into_inner()?)
 }

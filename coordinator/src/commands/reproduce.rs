@@ -1,6 +1,6 @@
 //! `tracktwin reproduce`: the paper's results beside this program's.
 
-use super::files::make_folder;
+use super::files::{Force, check, make_folder};
 use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
@@ -11,6 +11,7 @@ use crate::training;
 use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
 use tracktwin_reproduction::{Compared, Figure, Provenance, Reproduction, Verdict};
 use tracktwin_surrogate::{Trained, TrainingSet};
@@ -46,6 +47,8 @@ pub(super) struct Arguments {
     /// Folder for reproduce.json and reproduce.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Folder of models trained on this library [default: train them into OUT/models].
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
@@ -57,6 +60,10 @@ pub(super) struct Arguments {
 /// Which half of the cases trains and is searched where no models were given, as with `train`.
 const SEED: u64 = 0;
 
+/// The files that are written.
+const PAGE: &str = "reproduce.html";
+const ANSWER: &str = "reproduce.json";
+
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let figures = figures(&arguments.figures).or_input()?;
     let library = arguments.library.open_whole().await?;
@@ -65,17 +72,21 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let experiment = training::experiment(&campaign).or_input()?;
     reproducing::check(&experiment, &figures).or_input()?;
     let out = &arguments.out;
-    make_folder(out).or_input()?;
+    check(out, Kind::Results, arguments.force, &[PAGE, ANSWER])?;
+    make_folder(out)?;
     let needed = figures.iter().any(|figure| figure.needs_models());
     let models = match given {
         Some(models) => Some(models),
-        None if needed => Some(train::train(&library, &campaign, SEED, &out.join("models")).await?),
+        None if needed => {
+            let folder = out.join("models");
+            Some(train::train(&library, &campaign, SEED, &folder, arguments.force).await?)
+        }
         None => None,
     };
     let material = Material::read(&library, &campaign, models).await?;
     let compare = move || compare(&figures, &experiment, &material);
     let reproduction = tokio::task::spawn_blocking(compare).await?.or_input()?;
-    answer(&reproduction, out)
+    answer(&reproduction, out, arguments.force)
 }
 
 /// The figures of these names, each once and in the paper's order; all if there are no names.
@@ -185,10 +196,12 @@ fn compare(
 }
 
 /// Writes the files, says every row, and is negative if one differs.
-fn answer(reproduction: &Reproduction, out: &Path) -> Result<(), Stop> {
-    std::fs::write(out.join("reproduce.json"), reproduction.json())?;
-    let page = out.join("reproduce.html");
-    std::fs::write(&page, tracktwin_report::reproduction_page(reproduction))?;
+fn answer(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), Stop> {
+    let page = tracktwin_report::reproduction_page(reproduction);
+    let mut output = Output::begin(out, Kind::Results, force.force)?;
+    output.add(&FileName::new(PAGE)?, page.as_bytes())?;
+    output.add(&FileName::new(ANSWER)?, reproduction.json().as_bytes())?;
+    output.commit()?;
     for row in &reproduction.rows {
         let (figure, verdict) = (row.figure.name(), row.verdict.label());
         say(&format!("{figure:6} {verdict:12} {}: {} (paper: {})", row.claim, row.ours, row.paper));
@@ -199,7 +212,7 @@ fn answer(reproduction: &Reproduction, out: &Path) -> Result<(), Stop> {
         count(Verdict::Reproduced),
         count(Verdict::Differs),
         count(Verdict::CannotTell),
-        page.display()
+        out.join(PAGE).display()
     ));
     if count(Verdict::Differs) > 0 { Err(Stop::Negative) } else { Ok(()) }
 }

@@ -32,7 +32,7 @@ pub(super) struct Arguments {
     watch: bool,
     /// Between two looks.
     #[arg(long, value_name = "SECONDS", default_value_t = 2, requires = "watch",
-          value_parser = clap::value_parser!(u64).range(1..))]
+          value_parser = clap::value_parser!(u64).range(1..=86_400))]
     every: u64,
     /// Answer in JSON.
     #[arg(long)]

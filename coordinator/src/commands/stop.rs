@@ -1,6 +1,7 @@
 //! Why a command ends without being done.
 
 use crate::farm::FarmError;
+use tracktwin_files::FilesError;
 use tracktwin_library::LibraryError;
 
 /// The end of a command that is not success; each has its exit code.
@@ -14,15 +15,11 @@ pub(super) enum Stop {
     Failure(anyhow::Error),
 }
 
-/// A library that says so was given something wrong; all else is a failure.
+/// A library or a file that says so was given something wrong; all else is a failure.
 impl<E: Into<anyhow::Error>> From<E> for Stop {
     fn from(error: E) -> Self {
         let error = error.into();
-        let library = match error.downcast_ref::<FarmError>() {
-            Some(FarmError::Library(library)) => Some(library),
-            _ => error.downcast_ref::<LibraryError>(),
-        };
-        if library.is_some_and(LibraryError::is_wrong_input) {
+        if is_wrong_input(&error).unwrap_or(false) {
             Self::Input(error)
         } else {
             Self::Failure(error)
@@ -30,17 +27,37 @@ impl<E: Into<anyhow::Error>> From<E> for Stop {
     }
 }
 
-/// Blames an error on what the user gave.
+/// What libraries and files say of whose fault an error is.
+fn is_wrong_input(error: &anyhow::Error) -> Option<bool> {
+    let library = match error.downcast_ref::<FarmError>() {
+        Some(FarmError::Library(library)) => Some(library),
+        _ => error.downcast_ref::<LibraryError>(),
+    };
+    if let Some(library) = library {
+        return Some(library.is_wrong_input());
+    }
+    let file = error.chain().find_map(|cause| cause.downcast_ref::<FilesError>());
+    file.map(FilesError::is_wrong_input)
+}
+
+/// Blames an error on what the user gave, unless it says that the machine is to blame.
 pub(super) trait OrInput<T> {
     /// The value, or [`Stop::Input`].
     ///
     /// # Errors
-    /// [`Stop::Input`] with the error.
+    /// [`Stop::Input`] with the error; [`Stop::Failure`] for a full disk, a missing permission or a
+    /// library that fails.
     fn or_input(self) -> Result<T, Stop>;
 }
 
 impl<T, E: Into<anyhow::Error>> OrInput<T> for Result<T, E> {
     fn or_input(self) -> Result<T, Stop> {
-        self.map_err(|error| Stop::Input(error.into()))
+        self.map_err(|error| {
+            let error = error.into();
+            match is_wrong_input(&error) {
+                Some(false) => Stop::Failure(error),
+                _ => Stop::Input(error),
+            }
+        })
     }
 }

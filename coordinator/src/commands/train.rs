@@ -1,6 +1,6 @@
 //! `tracktwin train`: Gaussian-process models from a library.
 
-use super::files::make_folder;
+use super::files::{Force, check, make_folder};
 use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
@@ -10,6 +10,7 @@ use crate::training::{self, TrainingError};
 use clap::Args;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
 use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Trained};
 
@@ -25,6 +26,8 @@ pub(super) struct Arguments {
     /// Folder for the models.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// The campaign by its id or name, where the library holds several.
     #[arg(long, value_name = "CAMPAIGN")]
     campaign: Option<String>,
@@ -34,12 +37,19 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    check_files(&arguments.out, arguments.force)?;
     let library = arguments.library.open_whole().await?;
     let campaign = choose(&library, arguments.campaign.as_deref(), MEND).await?;
-    let trained = train(&library, &campaign, arguments.seed, &arguments.out).await?;
+    let trained =
+        train(&library, &campaign, arguments.seed, &arguments.out, arguments.force).await?;
     say(&table(&trained));
     say(&format!("models: {}", arguments.out.display()));
     Ok(())
+}
+
+/// Makes sure that models may be written into a folder.
+pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
+    check(folder, Kind::Models, force, &["models.html", "mase.json", "models.json"])
 }
 
 /// Trains on a campaign and saves models and their errors in `folder`.
@@ -48,9 +58,11 @@ pub(super) async fn train(
     campaign: &CampaignRecord,
     seed: u64,
     folder: &Path,
+    force: Force,
 ) -> Result<Trained, Stop> {
+    check_files(folder, force)?;
     // Before hours of training.
-    make_folder(folder).or_input()?;
+    make_folder(folder)?;
     let set = training::set_to_train_on(library, campaign).await.map_err(stop)?;
     let mut options = training::options(&set);
     options.seed = seed;
@@ -67,10 +79,12 @@ pub(super) async fn train(
     })
     .await?
     .or_input()?;
-    trained.save(folder)?;
     let page = tracktwin_report::models_page(&trained, &tested);
-    std::fs::write(folder.join("models.html"), page)?;
-    std::fs::write(folder.join("mase.json"), mase_json(&trained))?;
+    let mut output = Output::begin(folder, Kind::Models, force.force)?;
+    output.add(&FileName::new("models.html")?, page.as_bytes())?;
+    output.add(&FileName::new("mase.json")?, mase_json(&trained).as_bytes())?;
+    trained.add_to(&mut output)?;
+    output.commit()?;
     if let Err(error) = library.record_training(provenance::training(&trained)).await {
         // The models stand in the folder; somebody who may only read the library has them all the same.
         tracing::warn!("the library does not keep what was trained: {error:?}");

@@ -1,11 +1,11 @@
 //! `tracktwin trial`: how often a diagnosis is right, on recordings whose truth it does not know.
 
-use super::files::make_folder;
+use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
 use crate::evaluating::Evaluator;
-use crate::trial::{Trial, TrialError};
+use crate::trial::{Trial, TrialError, check_folder};
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_surrogate::Trained;
@@ -28,6 +28,8 @@ pub(super) struct Arguments {
     /// Folder of this node's files.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// The library that keeps answers and null simulations; by default one in DIR. Nodes that share
     /// it share the trial.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
@@ -50,13 +52,23 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { cases, seed, out, library, knock_out, shuffle, models, discard_recordings } =
-        arguments;
+    let Arguments {
+        cases,
+        seed,
+        out,
+        force,
+        library,
+        knock_out,
+        shuffle,
+        models,
+        discard_recordings,
+    } = arguments;
     let own = || format!("sqlite:{}", out.join("library.sqlite").display());
     let url = library.unwrap_or_else(own);
     // Before anything is made.
     let models = models.as_deref().map(Trained::load).transpose().or_input()?;
-    make_folder(&out).or_input()?;
+    check_folder(&out, force.force)?;
+    make_folder(&out)?;
     let library = open_or_create(&url).await?;
     let paper = match models {
         Some(models) => Some(Evaluator::new(models, &library).await.or_input()?),
@@ -73,6 +85,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         shuffle,
         paper,
         discard_recordings,
+        force: force.force,
     };
     let digest = trial.begin().await.map_err(stop)?;
     say(&format!("sealed: {cases} truths, SHA-256 of seals.sha256 {digest}"));
@@ -95,6 +108,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 fn stop(error: TrialError) -> Stop {
     match error {
         TrialError::Other { .. } | TrialError::Seal(_) => Stop::Input(error.into()),
+        TrialError::Files(ref reason) if reason.is_wrong_input() => Stop::Input(error.into()),
         TrialError::Library(ref reason) if reason.is_wrong_input() => Stop::Input(error.into()),
         _ => Stop::Failure(error.into()),
     }

@@ -4,13 +4,13 @@ use rcgen::{
     BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa,
     Issuer, KeyPair, KeyUsagePurpose,
 };
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::hash::{BuildHasher, RandomState};
-use std::io::{Read, Write};
+use std::io::Read;
 use std::net::IpAddr;
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use time::{Duration, OffsetDateTime};
+use tracktwin_files::{FileName, FilesError, Kind, Output};
 
 /// How long the authority is valid.
 const AUTHORITY_DAYS: i64 = 3650;
@@ -27,14 +27,17 @@ const TOKEN_BYTES: usize = 32;
 /// Why no certificates are made.
 #[derive(Debug, thiserror::Error)]
 pub enum CertificatesError {
-    /// The folder, or a file in it, can't be written or read.
-    #[error("{path}: cannot be written or read: {source}")]
+    /// The folder, or a file in it, can't be read.
+    #[error("{path}: cannot be read: {source}")]
     File {
         /// The file.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
     },
+    /// A file can't be written, or stands in the way.
+    #[error("{0}")]
+    Files(#[from] FilesError),
     /// A host that workers can't call.
     #[error(
         "{host:?} is no host; write a name such as head.cluster or an address such as 10.0.0.1"
@@ -51,7 +54,8 @@ pub enum CertificatesError {
 /// Writes a farm's authority, certificates and token into a folder.
 ///
 /// An authority and a token that are there stay, so that certificates can be renewed, or made for
-/// further hosts, without touching the others' machines.
+/// further hosts, without touching the others' machines. Files that are not of this program are
+/// replaced with `force` only.
 ///
 /// | file | whose |
 /// |---|---|
@@ -68,6 +72,7 @@ pub fn issue(
     hosts: &[String],
     days: u32,
     now: OffsetDateTime,
+    force: bool,
 ) -> Result<(), CertificatesError> {
     let is_host = |host: &str| {
         let is_name = |c: char| c.is_ascii_alphanumeric() || "-_.*".contains(c);
@@ -76,8 +81,8 @@ pub fn issue(
     if let Some(wrong) = hosts.iter().find(|host| !is_host(host)) {
         return Err(CertificatesError::Host { host: wrong.clone() });
     }
-    std::fs::create_dir_all(folder).map_err(at(folder))?;
-    let authority = authority(folder, now)?;
+    let mut output = Output::begin(folder, Kind::Certificates, force)?;
+    let authority = authority(folder, now, &mut output)?;
     let end = now + Duration::days(i64::from(days));
     let coordinator = leaf("tracktwin coordinator", hosts, ExtendedKeyUsagePurpose::ServerAuth);
     let worker = leaf("tracktwin worker", &[], ExtendedKeyUsagePurpose::ClientAuth);
@@ -86,20 +91,26 @@ pub fn issue(
         (params.not_before, params.not_after) = (now - CLOCKS, end);
         let key = KeyPair::generate()?;
         let certificate = params.signed_by(&key, &authority)?;
-        public(&folder.join(format!("{name}.pem")), &certificate.pem())?;
-        secret(&folder.join(format!("{name}-key.pem")), &key.serialize_pem())?;
+        let name = FileName::new(name)?;
+        output.add_secret(
+            &FileName::new(&format!("{name}-key.pem"))?,
+            key.serialize_pem().as_bytes(),
+        )?;
+        output.add(&name.with_ending("pem"), certificate.pem().as_bytes())?;
     }
     let token = folder.join("token");
     if !token.try_exists().map_err(at(&token))? {
-        secret(&token, &format!("{}\n", random_token().map_err(at(&token))?))?;
+        let text = format!("{}\n", random_token().map_err(at(&token))?);
+        output.add_secret(&FileName::new("token")?, text.as_bytes())?;
     }
-    Ok(())
+    Ok(output.commit()?)
 }
 
 /// The authority in the folder, or a new one.
 fn authority(
     folder: &Path,
     now: OffsetDateTime,
+    output: &mut Output,
 ) -> Result<Issuer<'static, KeyPair>, CertificatesError> {
     let mut params = CertificateParams::default();
     params.distinguished_name = named(AUTHORITY);
@@ -114,8 +125,8 @@ fn authority(
     }
     let key = KeyPair::generate()?;
     let certificate = params.self_signed(&key)?;
-    public(&folder.join("ca.pem"), &certificate.pem())?;
-    secret(&key_path, &key.serialize_pem())?;
+    output.add(&FileName::new("ca.pem")?, certificate.pem().as_bytes())?;
+    output.add_secret(&FileName::new("ca-key.pem")?, key.serialize_pem().as_bytes())?;
     Ok(Issuer::new(params, key))
 }
 
@@ -144,20 +155,6 @@ pub(crate) fn random_token() -> std::io::Result<blake3::Hash> {
     // A second source costs nothing.
     let more = RandomState::new().hash_one(()).to_le_bytes();
     Ok(blake3::Hasher::new().update(&chance).update(&more).finalize())
-}
-
-fn public(path: &Path, text: &str) -> Result<(), CertificatesError> {
-    std::fs::write(path, text).map_err(at(path))
-}
-
-/// Writes a file that only its owner reads.
-fn secret(path: &Path, text: &str) -> Result<(), CertificatesError> {
-    // One that is there may have been readable by others.
-    if path.try_exists().map_err(at(path))? {
-        std::fs::remove_file(path).map_err(at(path))?;
-    }
-    let file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path);
-    file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(at(path))
 }
 
 fn at(path: &Path) -> impl Fn(std::io::Error) -> CertificatesError {

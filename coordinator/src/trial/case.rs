@@ -7,6 +7,7 @@ use anyhow::Context;
 use rustix::time::{ClockId, clock_gettime};
 use std::path::PathBuf;
 use tracktwin_diagnosis::{Diagnosis, Verdict};
+use tracktwin_files::replace;
 use tracktwin_library::{DiagnosisRecord, Question};
 use tracktwin_parameters::Preset;
 use tracktwin_signal::recording::Recording;
@@ -142,7 +143,7 @@ impl Trial {
     ) -> Result<DiagnosisRecord, TrialError> {
         let path = self.folder.join(format!("diagnoses/{number:04}{control}.json"));
         let document = text(diagnosis);
-        std::fs::write(&path, &document).map_err(|source| file(&path, source))?;
+        replace(&path, document.as_bytes())?;
         let record = provenance::diagnosis(diagnosis, document)
             .map_err(|source| TrialError::Json { path: path.display().to_string(), source })?;
         Ok(DiagnosisRecord {

@@ -6,8 +6,11 @@
 //! was interrupted goes on.
 
 mod case;
+mod folder;
 mod lease;
 mod scores;
+
+pub use folder::check_folder;
 
 use crate::diagnosing::DiagnosingError;
 use crate::evaluating::Evaluator;
@@ -17,14 +20,23 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tracktwin_diagnosis::CalibrationError;
+use tracktwin_files::{FileName, FilesError, Kind, Output, replace};
 use tracktwin_library::{Library, LibraryError, TrialRecord};
 use tracktwin_signal::recording::RecordingError;
 use tracktwin_trial::{Score, SealError, Seals, Summary};
 use tracktwin_truth::TruthError;
 use tracktwin_worker::{CODE_VERSION, MODEL_HASH};
 
+/// File that says which trial the folder holds.
+const TERMS: &str = "trial.json";
+
 /// File of the seals.
 const SEALS: &str = "seals.sha256";
+
+/// What the trial comes to: tables for people, a line a case, the numbers.
+const TABLES: &str = "trial.md";
+const SCORES: &str = "scores.jsonl";
+const SUMMARY: &str = "summary.json";
 
 /// How long a node waits for the cases that others work on before it looks again.
 const WAIT: Duration = Duration::from_secs(2);
@@ -52,6 +64,8 @@ pub struct Trial {
     pub paper: Option<Evaluator>,
     /// Whether recordings are removed once they are scored.
     pub discard_recordings: bool,
+    /// Whether files that the program did not write are replaced.
+    pub force: bool,
 }
 
 /// What a folder's trial is.
@@ -127,10 +141,10 @@ pub enum TrialError {
         /// Why.
         source: serde_json::Error,
     },
-    /// A file cannot be written.
+    /// A file cannot be written, or stands in the way.
     #[error(transparent)]
-    Unwritten(#[from] tracktwin_files::FilesError),
-    /// A file cannot be read or written.
+    Files(#[from] FilesError),
+    /// A file cannot be read.
     #[error("{path}: {source}")]
     File {
         /// The file.
@@ -167,10 +181,7 @@ impl Trial {
     /// [`TrialError::Other`] when the folder holds another trial, [`TrialError::Seal`] when seals
     /// were changed.
     pub async fn begin(&self) -> Result<String, TrialError> {
-        for part in ["recordings", "sealed", "diagnoses"] {
-            let path = self.folder.join(part);
-            std::fs::create_dir_all(&path).map_err(|source| file(&path, source))?;
-        }
+        self.make_folder()?;
         self.begin_folder()?;
         let mut seals = Seals::default();
         for number in 0..self.cases {
@@ -261,25 +272,26 @@ impl Trial {
 
     fn sum_up(&self, scores: &[Score]) -> Result<Summary, TrialError> {
         let summary = Summary::new(self.cases, scores);
-        write(&self.folder.join("summary.json"), &summary)?;
         let line = |score| serde_json::to_string(score).expect("plain data is plain JSON") + "\n";
-        let path = self.folder.join("scores.jsonl");
         let lines: String = scores.iter().map(line).collect();
-        replace(&path, lines.as_bytes())?;
-        let path = self.folder.join("trial.md");
         let tables = format!(
             "Trial of seed {}, {} cases, version {CODE_VERSION}.\n\n{}",
             self.seed,
             self.cases,
             summary.to_markdown(scores)
         );
-        replace(&path, tables.as_bytes())?;
+        let mut output = Output::begin(&self.folder, Kind::Trial, self.force)?;
+        let files = [(TABLES, tables), (SCORES, lines), (SUMMARY, text(&summary))];
+        for (name, content) in files {
+            output.add(&FileName::new(name)?, content.as_bytes())?;
+        }
+        output.commit()?;
         Ok(summary)
     }
 
     /// Makes sure that the folder's trial is this one.
     fn begin_folder(&self) -> Result<(), TrialError> {
-        let path = self.folder.join("trial.json");
+        let path = self.folder.join(TERMS);
         let terms = Terms { seed: self.seed, code_version: CODE_VERSION.to_owned() };
         let Some(content) = read_if_there(&path)? else { return write(&path, &terms) };
         let known: Terms = serde_json::from_slice(&content)
@@ -332,7 +344,7 @@ fn text(value: &impl Serialize) -> String {
 }
 
 fn write(path: &Path, value: &impl Serialize) -> Result<(), TrialError> {
-    replace(path, text(value).as_bytes())
+    Ok(replace(path, text(value).as_bytes())?)
 }
 
 /// What a file holds, if it is there. One that can't be read is there, and is no reason to make another.
@@ -342,11 +354,6 @@ fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, TrialError> {
         Err(source) if source.kind() == ErrorKind::NotFound => Ok(None),
         Err(source) => Err(file(path, source)),
     }
-}
-
-/// Writes a file of the trial's own folder whole, or leaves the one that was there.
-fn replace(path: &Path, bytes: &[u8]) -> Result<(), TrialError> {
-    Ok(tracktwin_files::replace(path, bytes)?)
 }
 
 fn file(path: &Path, source: std::io::Error) -> TrialError {

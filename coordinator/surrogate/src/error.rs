@@ -61,8 +61,11 @@ pub enum Error {
         /// Its size.
         size: usize,
     },
-    /// A file cannot be read or written.
-    #[error("{path}: {source}")]
+    /// A file is not written, or not read for where it is.
+    #[error("{0}")]
+    Files(#[source] tracktwin_files::FilesError),
+    /// A file cannot be read.
+    #[error("{path}: cannot be read: {source}")]
     File {
         /// The file.
         path: PathBuf,

@@ -28,6 +28,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::OnceLock;
+use tracktwin_files::{FileName, Kind, Names, Output, inside};
 
 /// The format of `models.json`.
 pub const FORMAT: &str = "tracktwin-models/1";
@@ -150,18 +151,29 @@ impl Trained {
         })
     }
 
-    /// Writes the models into `folder`, which is made if need be; the index last, so that an
-    /// interrupted save leaves no index to files that are not there.
+    /// Writes the models into `folder`, which is made if need be: all of them or none.
     ///
     /// # Errors
-    /// [`Error::File`] names what cannot be written.
+    /// [`Error::Files`] names what cannot be written, or what stands in the way.
     pub fn save(&self, folder: &Path) -> Result<(), Error> {
-        std::fs::create_dir_all(folder).map_err(|source| file_error(folder, source))?;
-        let groups =
-            self.groups.iter().map(|group| save_group(group, folder)).collect::<Result<_, _>>()?;
+        let mut output = Output::begin(folder, Kind::Models, false).map_err(Error::Files)?;
+        self.add_to(&mut output)?;
+        output.commit().map_err(Error::Files)
+    }
+
+    /// Adds the models to the files of a folder. No file replaces another until the index does, which
+    /// names them all: a folder has the old models or the new ones.
+    ///
+    /// # Errors
+    /// [`Error::Files`] names what cannot be written.
+    pub fn add_to(&self, output: &mut Output) -> Result<(), Error> {
+        let mut names = Names::default();
+        let rows = self.groups.iter().map(|group| add_group(group, &mut names, output));
+        let groups = rows.collect::<Result<_, _>>()?;
         let index = Index { about: self.about.clone(), groups };
         let text = serde_json::to_vec_pretty(&index).expect("an index of numbers and names");
-        write(&folder.join(INDEX), &text)
+        let name = FileName::new(INDEX).map_err(Error::Files)?;
+        output.add_manifest(&name, &text).map_err(Error::Files)
     }
 
     /// Reads models from `folder`.
@@ -173,7 +185,8 @@ impl Trained {
         let path = folder.join(INDEX);
         let malformed = |reason: String| Error::Malformed { path: path.clone(), reason };
         let json: serde_json::Value =
-            serde_json::from_slice(&read(&path)?).map_err(|error| malformed(error.to_string()))?;
+            serde_json::from_slice(&tracktwin_files::read(&path).map_err(Error::Files)?)
+                .map_err(|error| malformed(error.to_string()))?;
         match json.get("format").and_then(serde_json::Value::as_str) {
             Some(FORMAT) => {}
             Some(other) => {
@@ -195,10 +208,14 @@ impl Trained {
     }
 }
 
-fn save_group(group: &ModelGroup, folder: &Path) -> Result<GroupRow, Error> {
+fn add_group(
+    group: &ModelGroup,
+    names: &mut Names,
+    output: &mut Output,
+) -> Result<GroupRow, Error> {
     let speeds: Vec<String> = group.key.speeds_km_h.iter().map(ToString::to_string).collect();
-    let file = format!("{}_{}.safetensors", group.key.feature, speeds.join("_"));
-    let path = folder.join(&file);
+    let file = names.make(&format!("{}_{}", group.key.feature, speeds.join("_")));
+    let file = file.with_ending("safetensors");
     let offset =
         MatRef::from_row_major_slice(&group.input_map.offset, 1, group.input_map.offset.len());
     let tables = [
@@ -213,8 +230,10 @@ fn save_group(group: &ModelGroup, folder: &Path) -> Result<GroupRow, Error> {
         let view = TensorView::new(Dtype::F64, shape.to_vec(), bytes);
         (*name, view.expect("eight bytes a number"))
     });
-    let bytes = safetensors::serialize(views, None).map_err(|error| malformed(&path, &error))?;
-    write(&path, &bytes)?;
+    let serialized = safetensors::serialize(views, None);
+    let bytes = serialized.map_err(|error| malformed(Path::new(file.as_str()), &error))?;
+    output.add(&file, &bytes).map_err(Error::Files)?;
+    let file = output.settle(&file).map_err(Error::Files)?.to_string();
     Ok(GroupRow {
         key: group.key.clone(),
         file,
@@ -226,7 +245,7 @@ fn save_group(group: &ModelGroup, folder: &Path) -> Result<GroupRow, Error> {
 }
 
 fn load_group(row: GroupRow, bins: usize, folder: &Path) -> Result<ModelGroup, Error> {
-    let path = folder.join(&row.file);
+    let path = inside(folder, &row.file).map_err(Error::Files)?;
     let bytes = read(&path)?;
     if blake3::hash(&bytes).to_hex().as_str() != row.blake3 {
         return Err(Error::Changed { path });
@@ -266,15 +285,7 @@ fn table(tensors: &SafeTensors<'_>, name: &str) -> Result<Mat<f64>, String> {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    std::fs::read(path).map_err(|source| file_error(path, source))
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    std::fs::write(path, bytes).map_err(|source| file_error(path, source))
-}
-
-fn file_error(path: &Path, source: std::io::Error) -> Error {
-    Error::File { path: path.to_owned(), source }
+    std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })
 }
 
 fn malformed(path: &Path, reason: &dyn std::fmt::Display) -> Error {

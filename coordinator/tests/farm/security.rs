@@ -16,7 +16,7 @@ use tracktwin_worker::{Credentials, Token};
 /// A folder of certificates for this machine, issued at this moment and valid for a day.
 fn certificates(now: OffsetDateTime) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    issue(folder.path(), &["127.0.0.1".to_owned()], 1, now).unwrap();
+    issue(folder.path(), &["127.0.0.1".to_owned()], 1, now, false).unwrap();
     folder
 }
 
@@ -142,7 +142,7 @@ fn certificates_can_be_renewed_without_touching_authority_and_token() {
     let folder = certificates.path();
     let names = ["ca.pem", "ca-key.pem", "token", "coordinator.pem"];
     let before = names.map(|name| read(folder, name));
-    issue(folder, &["head".to_owned()], 30, now).unwrap();
+    issue(folder, &["head".to_owned()], 30, now, false).unwrap();
     let after = names.map(|name| read(folder, name));
     assert_eq!(before[..3], after[..3]);
     assert_ne!(before[3], after[3]);

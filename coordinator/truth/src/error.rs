@@ -1,6 +1,6 @@
 //! Why a scene gives no recording, in one line each.
 
-use tracktwin_signal::recording::RecordingError;
+use tracktwin_files::FilesError;
 
 /// A scene that cannot be, or a recording that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -68,6 +68,6 @@ pub enum TruthError {
         position_m: f64,
     },
     /// The recording cannot be written.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
+    #[error("{0}")]
+    Files(#[from] FilesError),
 }

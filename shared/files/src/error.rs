@@ -76,9 +76,11 @@ impl FilesError {
         move |source| Self::System { path, action, source }
     }
 
-    /// Whether whoever named the file can mend it; all else is the machine's.
+    /// Whether whoever named the file can mend it, as with any file that is to be read; all else is
+    /// the machine's.
     pub fn is_wrong_input(&self) -> bool {
         match self {
+            Self::System { action: "read", .. } => true,
             Self::System { source, .. } => matches!(
                 source.kind(),
                 ErrorKind::NotFound

@@ -11,11 +11,13 @@ mod name;
 mod output;
 mod ownership;
 mod partial;
+mod read;
 mod single;
 
 pub use error::FilesError;
 pub use inside::inside;
 pub use name::{FileName, NameError, Names};
-pub use output::Output;
+pub use output::{Output, make_folder};
 pub use ownership::{Kind, check, is_own};
+pub use read::{read, read_text};
 pub use single::{replace, replace_secret};

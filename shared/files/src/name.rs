@@ -88,6 +88,12 @@ impl FileName {
         folder.join(&self.0)
     }
 
+    /// The same name with an ending, which is the program's own.
+    #[must_use]
+    pub fn with_ending(&self, ending: &'static str) -> Self {
+        Self(format!("{}.{ending}", self.0))
+    }
+
     /// The same name with the first digits of a hash before its ending.
     #[must_use]
     pub(crate) fn marked(&self, hash: &str) -> Self {

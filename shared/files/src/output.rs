@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Output {
     folder: PathBuf,
-    is_new: bool,
+    /// Folders that were made for it, the innermost first.
+    made: Vec<PathBuf>,
     kind: Kind,
     force: bool,
     staging: Option<Staging>,
@@ -33,19 +34,29 @@ impl Output {
     /// # Errors
     /// [`FilesError::System`] when the folder can't be made or written to.
     pub fn begin(folder: &Path, kind: Kind, force: bool) -> Result<Self, FilesError> {
-        let is_new = !folder.exists();
-        std::fs::create_dir_all(folder).map_err(FilesError::system(folder, "made"))?;
-        let mut output = Self {
+        let missing =
+            folder.ancestors().take_while(|it| !it.as_os_str().is_empty() && !it.exists());
+        let made = missing.map(Path::to_owned).collect();
+        make_folder(folder)?;
+        let mut output = Self::in_folder(folder, kind, force)?;
+        output.made = made;
+        Ok(output)
+    }
+
+    /// Begins a set of files in a folder that is there.
+    ///
+    /// # Errors
+    /// [`FilesError::System`] when it is not, or can't be written to.
+    pub fn in_folder(folder: &Path, kind: Kind, force: bool) -> Result<Self, FilesError> {
+        Ok(Self {
             folder: folder.to_owned(),
-            is_new,
+            made: Vec::new(),
             kind,
             force,
-            staging: None,
+            staging: Some(Staging::new(folder)?),
             names: Vec::new(),
             manifest: None,
-        };
-        output.staging = Some(Staging::new(folder)?);
-        Ok(output)
+        })
     }
 
     /// Where to write the file that will be called `name`.
@@ -54,6 +65,20 @@ impl Output {
             self.names.push(name.clone());
         }
         self.staged(name)
+    }
+
+    /// Adds a file that `write` writes to the path that it is given.
+    ///
+    /// # Errors
+    /// [`FilesError::System`] with what `write` says.
+    pub fn fill<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
+        &mut self,
+        name: &FileName,
+        write: impl FnOnce(&Path) -> Result<(), E>,
+    ) -> Result<(), FilesError> {
+        let path = self.stage(name);
+        let place = name.within(&self.folder);
+        write(&path).map_err(|error| FilesError::written(&place)(std::io::Error::other(error)))
     }
 
     /// Adds a file.
@@ -104,6 +129,18 @@ impl Output {
         Ok(marked)
     }
 
+    /// Makes sure that [`Output::commit`] has nothing in its way.
+    ///
+    /// # Errors
+    /// As [`Output::commit`].
+    pub fn check(&self) -> Result<(), FilesError> {
+        let list = List::of(&self.folder);
+        for name in &self.names {
+            self.replaced(&list, name, &hash(&self.staged(name))?)?;
+        }
+        Ok(())
+    }
+
     /// Gives all files their names.
     ///
     /// # Errors
@@ -134,7 +171,7 @@ impl Output {
             }
         }
         self.place(list, moved)?;
-        self.is_new = false;
+        self.made.clear();
         Ok(())
     }
 
@@ -229,11 +266,19 @@ impl Output {
 impl Drop for Output {
     fn drop(&mut self) {
         self.staging = None;
-        if self.is_new {
-            // A folder that was made for what did not come; one that others use stays.
-            let _ = std::fs::remove_dir(&self.folder);
+        for folder in &self.made {
+            // Made for what did not come; one that others use meanwhile stays.
+            let _ = std::fs::remove_dir(folder);
         }
     }
+}
+
+/// Makes a folder and those above it.
+///
+/// # Errors
+/// [`FilesError::System`] names the folder.
+pub fn make_folder(folder: &Path) -> Result<(), FilesError> {
+    std::fs::create_dir_all(folder).map_err(FilesError::system(folder, "made"))
 }
 
 /// Makes a file's content last over a power cut.

@@ -1,5 +1,6 @@
 //! The table of parameters that may differ from case to case or from sleeper to sleeper.
 
+use crate::{Preset, Quantity};
 use serde::{Deserialize, Serialize};
 
 /// A row of the catalogue, without its documentation.
@@ -87,6 +88,14 @@ impl Parameter {
     /// Lowest and highest value on V-Track (paper, Table D1).
     pub const fn range(self) -> [f64; 2] {
         self.row().range
+    }
+
+    /// What can be of it on any track: a thousandth of what V-Track has to a thousand times what the
+    /// real-scale track has.
+    pub fn quantity(self) -> Quantity {
+        let [low, high] = self.range();
+        let real = self.enlarged(high, Preset::RealScale.length_ratio());
+        Quantity::new(self.label(), self.unit(), [1e-3 * low, 1e3 * real], [low, real])
     }
 
     /// What a `value` on V-Track becomes on a track whose lengths are `ratio` times V-Track's

@@ -3,12 +3,13 @@
 use super::files::csv_file::CsvFile;
 use super::files::parquet_file::ParquetFile;
 use super::{OrInput, Stop};
-use crate::commands::files::make_folder;
+use crate::commands::files::{Force, check};
 use crate::commands::library_url::LibraryUrl;
 use crate::commands::say;
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
+use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Cell, Library, Table};
 
 /// Rows held at a time, and in one group of a Parquet file: 30 MB of results.
@@ -28,6 +29,8 @@ pub(in crate::commands) struct Arguments {
     /// A folder for all tables, or a file for the training set.
     #[arg(long, value_name = "DIR|FILE")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// The files' format [default: what the file's name ends in, else parquet].
     #[arg(long, value_enum)]
     format: Option<Format>,
@@ -56,41 +59,56 @@ impl Format {
 }
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
-    let out = &arguments.out;
-    let library = arguments.library.open().await?;
+    let Arguments { library, out, force, format } = arguments;
     let named = Format::of(out).filter(|_| !out.is_dir());
-    let format = arguments.format.or(named).unwrap_or(Format::Parquet);
-    if named.is_some() {
-        let rows = export(&library, Table::ENTRIES, out, format).await?;
-        say(&format!("{}: {rows} rows, one a case and speed", out.display()));
-        return Ok(());
-    }
-    if let (Some(extension), false) = (out.extension(), out.is_dir()) {
+    let format = format.or(named).unwrap_or(Format::Parquet);
+    if let (None, Some(extension), false) = (named, out.extension(), out.is_dir()) {
         let extension = extension.display();
         return Err(anyhow!("--out {}: {extension} is neither parquet nor csv", out.display()))
             .or_input();
     }
-    make_folder(out).or_input()?;
-    for table in Table::ALL {
-        let path = out.join(format!("{}.{}", table.name, format.extension()));
-        let rows = export(&library, table, &path, format).await?;
-        say(&format!("{}: {rows} rows", path.display()));
+    let (folder, tables) = match named {
+        Some(_) => {
+            let (folder, name) = FileName::of_path(out)?;
+            (folder, vec![(Table::ENTRIES, name)])
+        }
+        None => (out.clone(), tables(format)?),
+    };
+    let names: Vec<&str> = tables.iter().map(|(_, name)| name.as_str()).collect();
+    check(&folder, Kind::Export, *force, &names)?;
+    let library = library.open().await?;
+    let mut output = Output::begin(&folder, Kind::Export, force.force)?;
+    let mut said = Vec::new();
+    for &(table, ref name) in &tables {
+        let rows = export(&library, table, name, &mut output, format).await?;
+        let path = name.within(&folder);
+        let each = if named.is_some() { ", one a case and speed" } else { "" };
+        said.push(format!("{}: {rows} rows{each}", path.display()));
     }
+    output.commit()?;
+    said.iter().for_each(|line| say(line));
     Ok(())
 }
 
-/// Writes a table beside the file and renames, so that no reader meets half of it.
+/// All tables, each with its file's name.
+fn tables(format: Format) -> Result<Vec<(&'static Table, FileName)>, Stop> {
+    let named = |table: &'static Table| {
+        Ok((table, FileName::new(table.name)?.with_ending(format.extension())))
+    };
+    Table::ALL.into_iter().map(named).collect()
+}
+
+/// Writes a table to a file of the output.
 async fn export(
     library: &Library,
     table: &'static Table,
-    path: &Path,
+    name: &FileName,
+    output: &mut Output,
     format: Format,
 ) -> Result<usize, Stop> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let partial = PathBuf::from(partial);
-    let at = || format!("{}: it cannot be written", path.display());
-    let mut file = Sink::create(&partial, table, format).with_context(at).or_input()?;
+    let at = || format!("{name}: it cannot be written");
+    let path = output.stage(name);
+    let mut file = Sink::create(&path, table, format).with_context(at)?;
     let mut count = 0;
     let take = async |rows: Vec<Vec<Cell>>| {
         count += rows.len();
@@ -98,7 +116,6 @@ async fn export(
     };
     library.read_table(table, ROWS_A_GROUP, take).await?;
     file.end().with_context(at)?;
-    std::fs::rename(&partial, path).with_context(at)?;
     Ok(count)
 }
 

@@ -7,6 +7,7 @@ use crate::commands::say;
 use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use tracktwin_files::inside;
 use tracktwin_library::{Cell, Library, LibraryError, Table};
 
 /// What `library import` is told.
@@ -20,9 +21,11 @@ pub(in crate::commands) struct Arguments {
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let folder = &arguments.folder;
-    let file = |table: &Table| folder.join(format!("{}.parquet", table.name));
+    let file = |table: &Table| inside(folder, &format!("{}.parquet", table.name));
     // Before anything is written.
-    if let Some(missing) = Table::ALL.iter().find(|table| !file(table).is_file()) {
+    let files = Table::ALL.iter().map(|table| file(table)).collect::<Result<Vec<_>, _>>()?;
+    let missing = Table::ALL.iter().zip(&files).find(|(_, file)| !file.is_file());
+    if let Some((missing, _)) = missing {
         return Err(anyhow!(
             "{}: there is no {}.parquet in it; `tracktwin library export --out FOLDER` writes all tables",
             folder.display(),
@@ -31,8 +34,8 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
         .or_input();
     }
     let library = arguments.library.open_or_create().await?;
-    for table in Table::ALL {
-        let (read, added) = import(&library, table, &file(table)).await?;
+    for (table, file) in Table::ALL.into_iter().zip(&files) {
+        let (read, added) = import(&library, table, file).await?;
         say(&format!("{}: {added} of {read} rows added", table.name));
     }
     library.settle().await?;

@@ -3,8 +3,9 @@
 mod room;
 mod sample;
 
-use super::files::make_folder;
+use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
+use super::numbers::{cores, count};
 use super::progress::Progress;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, continuity, evaluate, note, say, train};
@@ -16,6 +17,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use tracktwin_evaluation::check_recording;
 use tracktwin_library::{Library, Status};
+use tracktwin_parameters::quantity::CASES;
 use tracktwin_signal::recording::Recording;
 
 /// Folder of the models in the folder for all.
@@ -27,7 +29,7 @@ pub(super) struct Arguments {
     /// Campaign file (TOML) [default: a small campaign over the paper's Table D1].
     campaign: Option<PathBuf>,
     /// How many cases, instead of the campaign's own number; at least 200, unless --no-train is given.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count::<u32>(CASES))]
     cases: Option<u32>,
     /// Library to fill: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`; one that holds part of the
     /// campaign is gone on with [default: sqlite:OUT/library.sqlite].
@@ -36,6 +38,8 @@ pub(super) struct Arguments {
     /// Folder for models and report.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Simulate only.
     #[arg(long)]
     no_train: bool,
@@ -43,7 +47,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", conflicts_with = "no_train")]
     recording: Option<PathBuf>,
     /// Cores to simulate on [default: all].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = cores)]
     cores: Option<NonZeroUsize>,
     /// Print the built-in campaign file and do nothing: a start for one's own.
     #[arg(long)]
@@ -71,12 +75,17 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         lack.map_err(|lack| anyhow!("{lack}, or `--no-train` to simulate only")).or_input()?;
     }
     let out = &arguments.out;
-    make_folder(out).or_input()?;
     if trains {
-        make_folder(&out.join(MODELS)).or_input()?;
+        train::check_files(&out.join(MODELS), arguments.force)?;
+        sample::check_files(&out.join("sample"), arguments.force)?;
+        evaluate::check_files(out, arguments.force)?;
+    }
+    make_folder(out)?;
+    if trains {
+        make_folder(&out.join(MODELS))?;
     }
     let recording = match given {
-        None if trains => sample_for(&campaign, out)?,
+        None if trains => sample_for(&campaign, out, arguments.force)?,
         given => given,
     };
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
@@ -101,19 +110,19 @@ async fn chain(
     }
     let out = &arguments.out;
     let record = library.campaign(&campaign.id()).await?;
-    let models = train::train(library, &record, 0, &out.join(MODELS)).await?;
+    let models = train::train(library, &record, 0, &out.join(MODELS), arguments.force).await?;
     let Some(recording) = recording else {
         let models = out.join(MODELS);
         return Ok(format!("models: {}; `tracktwin evaluate` takes a recording", models.display()));
     };
-    evaluate::evaluate(&recording, library, models, out).await?;
+    evaluate::evaluate(&recording, library, models, out, arguments.force).await?;
     Ok(format!("report: {}", out.join("report.html").display()))
 }
 
 /// The bundled recording, if models of the campaign can evaluate it; else it is said at once that nothing
 /// will be evaluated.
-fn sample_for(campaign: &Campaign, out: &Path) -> Result<Option<Recording>, Stop> {
-    let recording = sample::open(&out.join("sample"))?;
+fn sample_for(campaign: &Campaign, out: &Path, force: Force) -> Result<Option<Recording>, Stop> {
+    let recording = sample::open(&out.join("sample"), force)?;
     match check(&recording, campaign) {
         Ok(()) => Ok(Some(recording)),
         Err(other) => {

@@ -4,8 +4,9 @@
 //! `coordinator/sample/README.md`.
 
 use super::super::Stop;
-use anyhow::Context;
+use super::super::files::{Force, check};
 use std::path::Path;
+use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_signal::recording::Recording;
 
 /// The files of the sample's folder.
@@ -16,12 +17,19 @@ const FILES: [(&str, &[u8]); 4] = [
     ("pass-13kmh-1.parquet", include_bytes!("../../../sample/pass-13kmh-1.parquet")),
 ];
 
+/// Makes sure that the sample may be written.
+pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
+    check(folder, Kind::SimulatedRecording, force, &FILES.map(|(name, _)| name))
+}
+
 /// Writes the sample to `folder`, so that a user can look at it, and opens it.
-pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
-    let unwritable = || format!("{}: the sample cannot be written", folder.display());
-    std::fs::create_dir_all(folder).with_context(unwritable)?;
-    for (name, bytes) in FILES {
-        std::fs::write(folder.join(name), bytes).with_context(unwritable)?;
+pub(super) fn open(folder: &Path, force: Force) -> Result<Recording, Stop> {
+    let mut output = Output::begin(folder, Kind::SimulatedRecording, force.force)?;
+    let [manifest, passes @ ..] = FILES;
+    for (name, bytes) in passes {
+        output.add(&FileName::new(name)?, bytes)?;
     }
+    output.add_manifest(&FileName::new(manifest.0)?, manifest.1)?;
+    output.commit()?;
     Ok(Recording::open(folder)?)
 }

@@ -1,5 +1,6 @@
 //! Extensions on the command line: `--extend` and `--extension`.
 
+use super::super::files::read_text;
 use super::super::{OrInput, Stop};
 use anyhow::{Context, anyhow};
 use clap::Args;
@@ -40,9 +41,7 @@ impl Extensions {
         let mut instances = Vec::new();
         for path in &self.files {
             let shown = path.display();
-            let text = std::fs::read_to_string(path)
-                .with_context(|| format!("--extension: {shown} cannot be read"))
-                .or_input()?;
+            let text = read_text(path).context("--extension").or_input()?;
             let file: File = toml::from_str(&text)
                 .map_err(|error| anyhow!("--extension: {shown}: {}", error.message()))
                 .or_input()?;
@@ -51,6 +50,9 @@ impl Extensions {
         for text in &self.extend {
             let instance = text.parse().map_err(|error| anyhow!("--extend {text}: {error}"));
             instances.push(instance.or_input()?);
+        }
+        for instance in &instances {
+            instance.check_numbers().or_input()?;
         }
         Ok(instances)
     }

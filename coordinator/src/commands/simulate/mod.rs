@@ -1,10 +1,13 @@
 //! `tracktwin simulate`: passes over one track, written as a recording.
 
+mod cost;
 mod extensions;
 mod sensor;
 mod setting;
 mod track;
 
+use super::files::{Force, check};
+use super::numbers::{count, number};
 use super::progress::Progress;
 use super::{OrInput, Stop};
 use anyhow::anyhow;
@@ -15,6 +18,8 @@ pub(super) use setting::Setting;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 use track::SimulatedTrack;
+use tracktwin_files::{FileName, Kind, Output};
+use tracktwin_parameters::quantity::{ELEMENTS, PASSES, SPANS, SPEED, TIME_STEP};
 use tracktwin_parameters::{Preset, unit};
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::extension::Class;
@@ -27,17 +32,22 @@ const END_SPANS: usize = 6;
 /// Spans that the wheel runs before anything is recorded.
 const RUN_IN_SPANS: usize = 3;
 
+/// What was put in, beside the recording.
+const TRUTH: &str = "truth.json";
+
 /// What `simulate` is told.
 #[derive(Args)]
 pub(super) struct Arguments {
     /// Folder to write the recording to; what was put in is written beside it as `truth.json`.
     #[arg(long, value_name = "DIR", required_unless_present = "extend")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     /// Speed in km/h; may stand several times [default: the preset's three].
-    #[arg(long = "speed", value_name = "KMH")]
+    #[arg(long = "speed", value_name = "KMH", value_parser = number(SPEED))]
     speeds_km_h: Vec<f64>,
     /// Sleeper spans of the track; recorded is what lies six or more from either end.
-    #[arg(long, default_value_t = 25)]
+    #[arg(long, default_value_t = 25, value_parser = count::<usize>(SPANS))]
     spans: usize,
     /// Seed of the surface and of the noise.
     #[arg(long, default_value_t = 1)]
@@ -50,7 +60,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Track::VTrack)]
     preset: Track,
     /// Passes at each speed.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 1, value_parser = count::<u32>(PASSES))]
     passes: u32,
     /// Share of the surface's power that differs from pass to pass, 0 to 1.
     #[arg(long, default_value_t = 0.0, value_name = "SHARE", value_parser = share)]
@@ -60,13 +70,13 @@ pub(super) struct Arguments {
     #[command(flatten)]
     extensions: Extensions,
     /// Rail elements a span.
-    #[arg(long, default_value_t = 8)]
+    #[arg(long, default_value_t = 8, value_parser = count::<usize>(ELEMENTS))]
     rail_elements: usize,
     /// Elements of a half sleeper.
-    #[arg(long, default_value_t = 8)]
+    #[arg(long, default_value_t = 8, value_parser = count::<usize>(ELEMENTS))]
     sleeper_elements: usize,
     /// Time step in s, at the same time the sample interval.
-    #[arg(long, default_value_t = 1e-5, value_name = "S")]
+    #[arg(long, default_value_t = 1e-5, value_name = "S", value_parser = number(TIME_STEP))]
     time_step: f64,
     /// Leave out the local flexibility of the loaded element, as the paper does.
     #[arg(long)]
@@ -99,9 +109,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let Some(out) = &arguments.out else {
         return Err(anyhow!("--out: say in which folder the recording goes")).or_input();
     };
-    arguments.sensor.check()?;
+    check(out, Kind::SimulatedRecording, arguments.force, &["recording.json", TRUTH])?;
     let track = SimulatedTrack::new(arguments)?;
     let drives = drives(arguments, &track);
+    cost::check(arguments, &track, &drives).or_input()?;
     let recording = Recording {
         name: out.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         sample_rate_hz: sample_rate_hz(arguments.time_step),
@@ -111,8 +122,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
         nominal: track.nominal(),
         spacing_m: track.design().sleeper.spacing_m,
     };
-    recording.write(out)?;
-    std::fs::write(out.join("truth.json"), track.truth_json(&drives))?;
+    let mut output = Output::begin(out, Kind::SimulatedRecording, arguments.force.force)?;
+    output.add(&FileName::new(TRUTH)?, track.truth_json(&drives).as_bytes())?;
+    recording.add_to(&mut output)?;
+    output.commit()?;
     super::say(&format!("recording: {}", out.display()));
     Ok(())
 }

@@ -1,12 +1,14 @@
 //! The measuring chain of a simulated recording: extensions of the chain, noise, steps, odometer.
 
-use super::super::{OrInput, Stop};
+use super::super::Stop;
+use super::super::numbers::number;
 use anyhow::anyhow;
 use clap::Args;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use std::f64::consts::TAU;
+use tracktwin_parameters::quantity::{SENSOR, WANDER};
 use tracktwin_parameters::unit;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Pass;
@@ -17,40 +19,21 @@ use tracktwin_track::time::PassRecord;
 /// Wavelengths of the odometer's wander in m.
 const WANDER_M: [f64; 4] = [0.6, 1.1, 2.3, 4.7];
 
-/// Largest wander of the odometer in m: with it, positions still grow.
-const WANDER_MAX_M: f64 = 0.05;
-
 /// How what was felt is recorded.
 #[derive(Args)]
 pub(super) struct Sensor {
     /// Standard deviation of the sensor's white noise in m/s2.
-    #[arg(long, default_value_t = 0.0, value_name = "M_S2")]
+    #[arg(long, default_value_t = 0.0, value_name = "M_S2", value_parser = number(SENSOR))]
     noise: f64,
     /// Steps in which accelerations are recorded, in m/s2; 0 for none.
-    #[arg(long, default_value_t = 0.0, value_name = "M_S2")]
+    #[arg(long, default_value_t = 0.0, value_name = "M_S2", value_parser = number(SENSOR))]
     resolution: f64,
     /// By how much the odometer wanders at most, in m.
-    #[arg(long, default_value_t = 0.0, value_name = "M")]
+    #[arg(long, default_value_t = 0.0, value_name = "M", value_parser = number(WANDER))]
     odometer: f64,
 }
 
 impl Sensor {
-    /// That noise, steps and wander are what such things can be.
-    pub(super) fn check(&self) -> Result<(), Stop> {
-        let limits = [
-            ("--noise", self.noise, f64::INFINITY),
-            ("--resolution", self.resolution, f64::INFINITY),
-            ("--odometer", self.odometer, WANDER_MAX_M),
-        ];
-        for (flag, value, most) in limits {
-            if !(value.is_finite() && 0.0 <= value && value <= most) {
-                let range = if most.is_finite() { format!("0 to {most}") } else { "0 up".into() };
-                return Err(anyhow!("{flag}: {value} must be a number from {range}")).or_input();
-            }
-        }
-        Ok(())
-    }
-
     /// What is recorded of a pass from `from_m` on; `seed` fixes noise and wander.
     pub(super) fn measured(
         &self,
@@ -113,14 +96,14 @@ mod tests {
 
     #[test]
     fn the_odometer_wanders_by_no_more_than_it_may_and_never_goes_back() {
-        let sensor = Sensor { noise: 0.0, resolution: 0.0, odometer: WANDER_MAX_M };
+        let sensor = Sensor { noise: 0.0, resolution: 0.0, odometer: WANDER.range[1] };
         for seed in 0..20 {
             let truth: Vec<f64> = (0..3000).map(|index| f64::from(index) * 1e-3).collect();
             let mut told = truth.clone();
             sensor.wander(&mut told, &mut ChaCha8Rng::seed_from_u64(seed));
             assert!(told.is_sorted_by(|a, b| a < b));
             let most = told.iter().zip(&truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(most <= WANDER_MAX_M && most > 0.1 * WANDER_MAX_M, "{most}");
+            assert!(most <= WANDER.range[1] && most > 0.1 * WANDER.range[1], "{most}");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 use std::str::FromStr;
-use tracktwin_parameters::{Parameter, ParameterSet};
+use tracktwin_parameters::{Parameter, ParameterSet, QuantityError};
 
 /// A parameter's value, and where it holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,8 +20,8 @@ pub(in crate::commands) enum SettingError {
     Form,
     #[error("{0}")]
     Parameter(String),
-    #[error("`{0}` is not a positive number")]
-    Value(String),
+    #[error(transparent)]
+    Value(#[from] QuantityError),
     #[error("`{0}` names no sleepers; write SN12 or SN12-SN15")]
     Sleepers(String),
     #[error("the irregularity belongs to the whole surface, not to single sleepers")]
@@ -38,10 +38,7 @@ impl FromStr for Setting {
             None => (target, None),
         };
         let parameter = Parameter::try_from(name.to_owned()).map_err(SettingError::Parameter)?;
-        let value = match value.parse::<f64>() {
-            Ok(number) if number.is_finite() && number > 0.0 => number,
-            _ => return Err(SettingError::Value(value.to_owned())),
-        };
+        let value = parameter.quantity().parse(value)?;
         let sleepers = place.map(range).transpose()?;
         if sleepers.is_some() && parameter == Parameter::IrregularityLevel {
             return Err(SettingError::Local);
@@ -93,7 +90,8 @@ mod tests {
         assert!(refused("railpad_stiffness_N_m").contains("NAME=VALUE"));
         assert!(refused("pad=1").contains("railpad_stiffness_N_m"));
         assert!(refused("railpad_stiffness_N_m=soft").contains("`soft`"));
-        assert!(refused("railpad_stiffness_N_m=-1").contains("positive"));
+        assert!(refused("railpad_stiffness_N_m=-1").contains("1e4 to"));
+        assert!(refused("railpad_stiffness_N_m=150").contains("did you mean"));
         assert!(refused("railpad_stiffness_N_m@SN9-SN3=1").contains("SN9-SN3"));
         assert!(refused("irregularity_level@SN3=1").contains("whole surface"));
     }

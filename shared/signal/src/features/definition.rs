@@ -60,6 +60,9 @@ impl Default for FeatureDefinition {
     }
 }
 
+/// Instants of a margin: memory goes by their number, and by that of the bins.
+const INSTANTS_MAX: f64 = 1e5;
+
 /// Part of a voice by which a point may lie outside a range: one that is meant to lie on the
 /// border is not lost to rounding.
 const ROUNDING: f64 = 1e-9;
@@ -142,11 +145,11 @@ impl FeatureDefinition {
             // Below 5 the wavelet is no longer analytic to 1e-6; above 50 a voice is a Fourier line.
             ("wavelet_centre_rad", self.wavelet_centre_rad, 5.0, 50.0),
             ("voices_per_octave", f64::from(self.voices_per_octave), 4.0, 256.0),
-            ("reference_rate_hz", rate, 1.0, 1e9),
+            ("reference_rate_hz", rate, 1e3, 1e7),
             ("lowest_hz", self.lowest_hz, rate * 1e-6, rate * 0.4),
             ("highest_hz", self.highest_hz, self.lowest_hz, rate * 0.4),
             ("instant_rate_hz", self.instant_rate_hz, self.highest_hz, rate),
-            ("margin_s", self.margin_s, 0.0, 10.0),
+            ("margin_s", self.margin_s, 0.0, 10.0_f64.min(INSTANTS_MAX / self.instant_rate_hz)),
             ("floor_m2_s4", self.floor_m2_s4, 1e-300, 1e300),
         ];
         for (name, value, low, high) in ranges {

@@ -1,7 +1,7 @@
 //! The three columns of a pass, whatever kind of file they come from.
 
 use super::error::{Fault, RecordingError};
-use super::{csv_file, parquet_file};
+use super::{csv_file, limits, parquet_file};
 use std::path::Path;
 
 /// Names of the columns of a pass, in the order they are written.
@@ -23,6 +23,7 @@ impl Columns {
         if !path.is_file() {
             return Err(RecordingError::new(path, "file", Fault::NoSuchFile));
         }
+        limits::file(path)?;
         let extension = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
         let columns = match extension.to_ascii_lowercase().as_str() {
             "parquet" => parquet_file::read(path, &NAMES)?,

@@ -1,6 +1,7 @@
 //! What may be wrong with a recording: file, field, what, and how to mend it, on one line.
 
 use std::path::Path;
+use tracktwin_parameters::QuantityError;
 
 /// A recording that cannot be used, in one line: `FILE: FIELD: what; how to mend`.
 #[derive(Debug, thiserror::Error)]
@@ -32,10 +33,24 @@ pub enum Fault {
         /// The words of the operating system or of the decoder.
         reason: String,
     },
-    /// The file cannot be created or filled.
-    #[error("cannot be written ({reason}); check the folder and the space left")]
-    Unwritable {
-        /// The words of the operating system or of the encoder.
+    /// A number can't be what it is given for.
+    #[error("{0}")]
+    OutOfRange(QuantityError),
+    /// A file has more numbers than are held in memory.
+    #[error(
+        "has {:.1} GB of numbers, and {:.1} GB are the most that is held at once; split it into passes",
+        1e-9 * *bytes as f64, 1e-9 * *most as f64
+    )]
+    TooLarge {
+        /// Bytes of its numbers.
+        bytes: u64,
+        /// The most.
+        most: u64,
+    },
+    /// A pass's file lies outside the recording's folder.
+    #[error("{reason}")]
+    OtherFolder {
+        /// What is wrong with the name.
         reason: String,
     },
     /// `recording.json` is not JSON.

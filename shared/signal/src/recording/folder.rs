@@ -3,11 +3,12 @@
 use super::columns::{Columns, NAMES};
 use super::error::{Fault, RecordingError};
 use super::manifest::{FILE_NAME, Manifest, PassEntry};
-use super::{check, parquet_file};
+use super::{check, limits, parquet_file};
 use crate::Signal;
 use serde_json::{Map, Value};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tracktwin_files::{FileName, FilesError, Kind, Names, Output, inside};
 
 /// Least part of a sleeper's window that a pass must cover to say something about the sleeper.
 ///
@@ -67,11 +68,13 @@ impl Recording {
         }
         let manifest_path = folder.join(FILE_NAME);
         let manifest = Manifest::read(&manifest_path)?;
+        limits::manifest(&manifest_path, &manifest)?;
         let spacing_m = spacing(&manifest_path, &manifest)?;
         let mut passes = Vec::with_capacity(manifest.passes.len());
         for (index, entry) in manifest.passes.iter().enumerate() {
-            let pass = read_pass(folder, &manifest_path, index, entry, manifest.sample_rate_hz)?;
-            check::length(&folder.join(&entry.file), &pass.position_m, spacing_m)?;
+            let path = pass_path(folder, &manifest_path, index, entry)?;
+            let pass = read_pass(&path, &manifest_path, index, entry, manifest.sample_rate_hz)?;
+            check::length(&path, &pass.position_m, spacing_m)?;
             passes.push(pass);
         }
         let recording = Self {
@@ -89,24 +92,29 @@ impl Recording {
 
     /// Writes the recording as a folder: `recording.json` and one Parquet file a pass.
     ///
-    /// Accelerations are stored in single precision, times count from zero.
+    /// Accelerations are stored in single precision, times count from zero. The folder has the whole
+    /// recording or none; another recording that is there stays, unless it was computed too.
     ///
     /// # Errors
-    /// [`Fault::Unwritable`] names the file and the reason.
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), RecordingError> {
-        let folder = path.as_ref();
-        let unwritable = |file: &Path, reason: String| {
-            RecordingError::new(file, "file", Fault::Unwritable { reason })
-        };
-        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error.to_string()))?;
-        let files = self.file_names();
-        for (pass, file) in self.passes.iter().zip(&files) {
-            let path = folder.join(file);
-            write_pass(&path, pass).map_err(|error| unwritable(&path, error.to_string()))?;
+    /// [`FilesError`] names the file that can't be written, or that stands in the way.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FilesError> {
+        let mut output = Output::begin(path.as_ref(), Kind::SimulatedRecording, false)?;
+        self.add_to(&mut output)?;
+        output.commit()
+    }
+
+    /// Adds the files of the recording's folder to others.
+    ///
+    /// # Errors
+    /// [`FilesError`] names the file that can't be written.
+    pub fn add_to(&self, output: &mut Output) -> Result<(), FilesError> {
+        let mut files = Vec::with_capacity(self.passes.len());
+        for (pass, name) in self.passes.iter().zip(self.file_names()) {
+            output.fill(&name, |path| write_pass(path, pass))?;
+            files.push(output.settle(&name)?.to_string());
         }
-        let path = folder.join(FILE_NAME);
-        std::fs::write(&path, self.manifest(files).to_json())
-            .map_err(|error| unwritable(&path, error.to_string()))
+        let text = self.manifest(files).to_json();
+        output.add_manifest(&FileName::new(FILE_NAME)?, text.as_bytes())
     }
 
     /// The samples of pass `pass` while the wheel was within half a spacing of sleeper `sleeper`
@@ -178,14 +186,16 @@ impl Recording {
     }
 
     /// Names such as `pass-07kmh-2.parquet`: speed and number among the passes at that speed.
-    fn file_names(&self) -> Vec<String> {
+    fn file_names(&self) -> Vec<FileName> {
         let tenths = |pass: &Pass| (10.0 * pass.speed_km_h).round();
-        let name = |(index, pass): (usize, &Pass)| {
+        let mut names = Names::default();
+        let mut name = |(index, pass): (usize, &Pass)| {
             let earlier = self.passes[..index].iter();
             let number = earlier.filter(|other| tenths(other) == tenths(pass)).count() + 1;
-            format!("pass-{:02}kmh-{number}.parquet", tenths(pass) / 10.0)
+            let name = names.make(&format!("pass-{:02}kmh-{number}", tenths(pass) / 10.0));
+            name.with_ending("parquet")
         };
-        self.passes.iter().enumerate().map(name).collect()
+        self.passes.iter().enumerate().map(&mut name).collect()
     }
 
     fn manifest(&self, files: Vec<String>) -> Manifest {
@@ -202,19 +212,31 @@ impl Recording {
     }
 }
 
-fn read_pass(
+/// Where a pass lies: in the recording's folder, and nowhere else.
+fn pass_path(
     folder: &Path,
+    manifest: &Path,
+    index: usize,
+    entry: &PassEntry,
+) -> Result<PathBuf, RecordingError> {
+    inside(folder, &entry.file).map_err(|error| {
+        let fault = Fault::OtherFolder { reason: error.to_string() };
+        RecordingError::new(manifest, format!("passes[{index}].file"), fault)
+    })
+}
+
+fn read_pass(
+    path: &Path,
     manifest: &Path,
     index: usize,
     entry: &PassEntry,
     sample_rate_hz: f64,
 ) -> Result<Pass, RecordingError> {
-    let path = folder.join(&entry.file);
-    let columns = Columns::read(&path)?;
-    check::times(manifest, &path, &columns, sample_rate_hz)?;
-    check::positions(&path, &columns.position_m)?;
+    let columns = Columns::read(path)?;
+    check::times(manifest, path, &columns, sample_rate_hz)?;
+    check::positions(path, &columns.position_m)?;
     let field = format!("passes[{index}].speed_km_h");
-    check::speed(manifest, &field, &path, &columns, entry.speed_km_h)?;
+    check::speed(manifest, &field, path, &columns, entry.speed_km_h)?;
     let signal = Signal::new(sample_rate_hz, columns.acceleration_m_s2)
         .expect("columns are finite and the rate is positive");
     let (file, speed_km_h) = (entry.file.clone(), entry.speed_km_h);

@@ -5,6 +5,7 @@ use super::folder::Sleeper;
 use serde_json::{Map, Value, json};
 use std::collections::HashSet;
 use std::path::Path;
+use tracktwin_files::FilesError;
 
 /// The name of the file inside a recording's folder.
 pub(super) const FILE_NAME: &str = "recording.json";
@@ -29,10 +30,11 @@ impl Manifest {
     /// Reads and checks the file at `path`.
     pub(super) fn read(path: &Path) -> Result<Self, RecordingError> {
         let fail = |fault| RecordingError::new(path, "file", fault);
-        let text = std::fs::read_to_string(path).map_err(|error| match error.kind() {
-            std::io::ErrorKind::NotFound => fail(Fault::NoSuchFile),
-            _ => fail(Fault::Unreadable { reason: error.to_string() }),
-        })?;
+        if !path.is_file() {
+            return Err(fail(Fault::NoSuchFile));
+        }
+        let unreadable = |error: FilesError| fail(Fault::Unreadable { reason: error.to_string() });
+        let text = tracktwin_files::read_text(path).map_err(unreadable)?;
         let root: Value = serde_json::from_str(&text)
             .map_err(|error| fail(Fault::NotJson { reason: error.to_string() }))?;
         Self::parse(&Fields { path, place: String::new(), value: &root })

@@ -9,6 +9,7 @@ mod csv_file;
 mod error;
 mod folder;
 pub mod import;
+mod limits;
 mod manifest;
 mod parquet_file;
 #[cfg(test)]

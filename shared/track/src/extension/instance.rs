@@ -4,7 +4,7 @@ use super::{Extension, Kind, PlaceKind};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::{QuantityError, TrackDesign};
 
 /// An extension by the name of its kind, where it is, and what its parameters are.
 ///
@@ -66,6 +66,16 @@ pub enum InstanceError {
         /// What it must be.
         form: &'static str,
     },
+    /// A value is of another size than such physics can have.
+    #[error("{physics}: {parameter}: {source}")]
+    Number {
+        /// Name of the kind.
+        physics: String,
+        /// Name of the parameter.
+        parameter: &'static str,
+        /// Why not.
+        source: QuantityError,
+    },
     /// The place is missing, of another kind or not on the track.
     #[error(
         "{physics}: its place must be {form}, on the track of {length_m} m and {sleepers} sleepers"
@@ -125,6 +135,23 @@ impl ExtensionInstance {
     pub fn kind(&self) -> Result<&'static Kind, InstanceError> {
         Kind::from_name(&self.physics)
             .ok_or_else(|| InstanceError::Unknown { physics: self.physics.clone() })
+    }
+
+    /// That its numbers are of a size that such physics can have.
+    ///
+    /// # Errors
+    /// [`InstanceError::Number`] names the parameter that is not.
+    pub fn check_numbers(&self) -> Result<(), InstanceError> {
+        for (name, &value) in &self.parameters {
+            // One that is not known is refused where it is built.
+            let Some(parameter) = self.kind()?.parameter(name) else { continue };
+            parameter.quantity().check(value).map_err(|source| InstanceError::Number {
+                physics: self.physics.clone(),
+                parameter: parameter.name,
+                source,
+            })?;
+        }
+        Ok(())
     }
 
     /// Makes the extension for a track of this design and so many spans.

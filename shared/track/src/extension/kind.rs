@@ -3,6 +3,13 @@
 use super::instance::Inputs;
 use super::{Extension, InstanceError};
 use std::sync::Arc;
+use tracktwin_parameters::Quantity;
+
+/// How many times larger or smaller than expected a parameter may be.
+const SIZE: f64 = 1e3;
+
+/// Largest seed: whole numbers up to it have a place among the floating-point numbers.
+const SEED_MAX: f64 = 9_007_199_254_740_992.0;
 
 /// A row of the registry.
 #[derive(Debug)]
@@ -163,6 +170,25 @@ impl KindParameter {
             bound: Bound::Positive,
             slack: 1.0,
         }
+    }
+
+    /// What it can be: up to a thousand times, and down to a thousandth, of what is to be expected.
+    pub fn quantity(&self) -> Quantity {
+        let ends = [self.v_track, self.real_scale].concat();
+        let sizes = ends.iter().map(|end| end.abs()).filter(|size| *size > 0.0);
+        let most = sizes.clone().fold(0.0, f64::max).max(self.default.unwrap_or(0.0).abs());
+        let least = sizes.fold(most, f64::min);
+        // A seed: nothing is to be expected of it.
+        let most = if self.v_track == [0.0, 0.0] { SEED_MAX } else { SIZE * most };
+        let low = match self.bound {
+            Bound::Any => -most,
+            Bound::NotNegative | Bound::Share => 0.0,
+            Bound::Positive => least / SIZE,
+        };
+        let high = if self.bound == Bound::Share { most.min(1.0) } else { most };
+        let usual =
+            [ends.iter().copied().fold(high, f64::min), ends.iter().copied().fold(low, f64::max)];
+        Quantity::new(self.meaning, self.unit, [low, high], usual)
     }
 
     /// With its ranges on V-Track and at real scale, and a typical value on V-Track.

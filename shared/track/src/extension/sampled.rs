@@ -113,7 +113,9 @@ impl SampledExtension {
             }
         }
         let built = |end: f64| -> Result<Arc<dyn Extension>, InstanceError> {
-            self.instance(&mut || end).build(design, spans)
+            let instance = self.instance(&mut || end);
+            instance.check_numbers()?;
+            instance.build(design, spans)
         };
         built(0.0).and_then(|_| built(1.0)).map(|_| ())
     }

@@ -1,6 +1,8 @@
 //! What the columns of a foreign table mean: names, units, and what the file doesn't say.
 
 use serde::Deserialize;
+use tracktwin_parameters::QuantityError;
+use tracktwin_parameters::quantity::{PLACE, SAMPLE_RATE, SPACING, SPEED, WHEEL_RADIUS};
 
 /// Unit of an acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -130,6 +132,39 @@ pub struct Layout {
     pub sleeper_m: Option<f64>,
     /// Radius of the wheel in m, where it is known.
     pub wheel_radius_m: Option<f64>,
+}
+
+/// An entry of a layout that can't be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{entry}: {source}")]
+pub struct LayoutError {
+    /// The entry.
+    pub entry: &'static str,
+    /// What is wrong.
+    pub source: QuantityError,
+}
+
+impl Layout {
+    /// That its numbers can be what they are given for.
+    ///
+    /// # Errors
+    /// [`LayoutError`] names the first that can't.
+    pub fn check(&self) -> Result<(), LayoutError> {
+        let given = [
+            ("sample_rate_Hz", self.sample_rate_hz, SAMPLE_RATE),
+            ("speed_km_h", self.speed_km_h, SPEED),
+            ("spacing_m", Some(self.spacing_m), SPACING),
+            ("sleeper_m", self.sleeper_m, PLACE),
+            ("wheel_radius_m", self.wheel_radius_m, WHEEL_RADIUS),
+        ];
+        for (entry, value, of) in given {
+            value
+                .map(|value| of.check(value))
+                .transpose()
+                .map_err(|source| LayoutError { entry, source })?;
+        }
+        Ok(())
+    }
 }
 
 impl Default for Layout {

@@ -12,6 +12,6 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use layout::{AccelerationUnit, Layout, PositionUnit, SpeedUnit, TimeUnit};
+pub use layout::{AccelerationUnit, Layout, LayoutError, PositionUnit, SpeedUnit, TimeUnit};
 pub use pass::{Imported, import};
 pub use table::{Column, Table};

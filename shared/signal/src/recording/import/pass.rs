@@ -6,6 +6,8 @@ use super::{AccelerationUnit, Layout, Table};
 use crate::Signal;
 use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
+use tracktwin_parameters::QuantityError;
+use tracktwin_parameters::quantity::SLEEPERS;
 
 /// Relative difference of time steps from their mean above which a file was not sampled evenly.
 const UNEVEN: f64 = 0.5;
@@ -41,9 +43,9 @@ pub fn import(files: &[PathBuf], layout: &Layout) -> Result<Vec<Imported>, Recor
         let expected = format!("the column of acceleration (the file has {names})");
         return Err(missing("acceleration", &expected));
     }
-    if !(layout.spacing_m.is_finite() && layout.spacing_m > 0.0) {
-        return Err(missing("spacing_m", "a positive distance of the sleepers in m"));
-    }
+    layout.check().map_err(|error| {
+        RecordingError::new(first, error.entry, Fault::OutOfRange(error.source))
+    })?;
     layout.acceleration.iter().map(|column| recording(&tables, column, layout)).collect()
 }
 
@@ -53,6 +55,7 @@ fn names(table: &Table) -> String {
 }
 
 fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported, RecordingError> {
+    let first = tables.first().map_or(Path::new("files"), |table| table.path.as_path());
     let mut passes: Vec<Pass> = Vec::with_capacity(tables.len());
     let mut notes = Vec::new();
     for table in tables {
@@ -69,7 +72,8 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
         passes.push(pass);
     }
     let rate = passes.first().map_or(0.0, |pass| pass.signal.sample_rate_hz());
-    let sleepers = sleepers(&passes, layout);
+    let sleepers = sleepers(&passes, layout)
+        .map_err(|error| RecordingError::new(first, "spacing_m", Fault::OutOfRange(error)))?;
     if sleepers.is_empty() {
         notes.push("no place of a sleeper is known: the recording has none".to_owned());
     }
@@ -100,18 +104,20 @@ fn nominal(layout: &Layout) -> Map<String, serde_json::Value> {
 }
 
 /// Sleepers at even distances from the one whose place is known, over all passes.
-fn sleepers(passes: &[Pass], layout: &Layout) -> Vec<Sleeper> {
-    let Some(known) = layout.sleeper_m else { return Vec::new() };
+fn sleepers(passes: &[Pass], layout: &Layout) -> Result<Vec<Sleeper>, QuantityError> {
+    let Some(known) = layout.sleeper_m else { return Ok(Vec::new()) };
     let firsts = passes.iter().map(|pass| pass.position_m[0]);
     let lasts = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
     let number = |x: f64| (x - known) / layout.spacing_m;
     let from = number(firsts.fold(f64::INFINITY, f64::min)).ceil() as i64;
     let to = number(lasts.fold(f64::NEG_INFINITY, f64::max)).floor() as i64;
+    // No more than may be.
+    SLEEPERS.check((to - from + 1).max(0) as f64)?;
     let sleeper = |(index, number): (usize, i64)| Sleeper {
         id: format!("SN{}", index + 1),
         x_m: known + number as f64 * layout.spacing_m,
     };
-    (from..=to).enumerate().map(sleeper).collect()
+    Ok((from..=to).enumerate().map(sleeper).collect())
 }
 
 fn pass(

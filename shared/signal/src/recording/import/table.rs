@@ -1,7 +1,7 @@
 //! Named columns of numbers, whatever kind of file they come from.
 
 use super::super::error::{Fault, RecordingError};
-use super::super::parquet_file;
+use super::super::{limits, parquet_file};
 use super::{csv_table, matlab, numpy};
 use std::path::{Path, PathBuf};
 
@@ -34,6 +34,7 @@ impl Table {
         if !path.is_file() {
             return Err(RecordingError::new(path, "file", Fault::NoSuchFile));
         }
+        limits::file(path)?;
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
         let columns = match ending.to_ascii_lowercase().as_str() {
             "csv" | "txt" | "dat" | "tsv" => csv_table::read(path)?,

@@ -1,0 +1,44 @@
+//! The folder of a trial, before anything is written into it.
+
+use super::{SCORES, SEALS, SUMMARY, TABLES, TERMS, Trial, TrialError};
+use std::path::Path;
+use tracktwin_files::{FilesError, Kind, check, make_folder};
+
+/// Folders inside it.
+const PARTS: [&str; 3] = ["recordings", "sealed", "diagnoses"];
+
+/// Makes sure that a folder holds a trial or nothing of its names: in one without a trial, files
+/// where the trial's own will be are somebody else's.
+///
+/// # Errors
+/// [`FilesError`] names the first that stands in the way.
+pub fn check_folder(folder: &Path, force: bool) -> Result<(), FilesError> {
+    check(folder, Kind::Trial, force, &[TABLES, SCORES, SUMMARY])?;
+    if force || folder.join(TERMS).exists() {
+        return Ok(());
+    }
+    let mut paths = PARTS.iter().chain(&[SEALS]).map(|name| folder.join(name));
+    match paths.find(|path| is_taken(path)) {
+        Some(path) => Err(FilesError::Foreign { path }),
+        None => Ok(()),
+    }
+}
+
+impl Trial {
+    /// Makes the folder.
+    pub(super) fn make_folder(&self) -> Result<(), TrialError> {
+        check_folder(&self.folder, self.force)?;
+        for part in PARTS {
+            make_folder(&self.folder.join(part))?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether a path is a file, or a folder with something in it.
+fn is_taken(path: &Path) -> bool {
+    match path.read_dir() {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(_) => path.symlink_metadata().is_ok(),
+    }
+}

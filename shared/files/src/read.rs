@@ -1,0 +1,54 @@
+//! Small files read whole: what describes, configures or names, not what was measured.
+
+use crate::FilesError;
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read as _};
+use std::path::Path;
+
+/// Bytes that such a file has at most; a pipe or device may go on for ever.
+const BYTES_MAX: u64 = 64 << 20;
+
+/// What a file holds, of at most 64 MiB.
+///
+/// # Errors
+/// [`FilesError::System`] when it can't be read or is larger.
+pub fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
+    let read = || {
+        let mut bytes = Vec::new();
+        File::open(path)?.take(BYTES_MAX + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > BYTES_MAX {
+            let large = format!("it is larger than {} MiB; is it another file?", BYTES_MAX >> 20);
+            return Err(Error::new(ErrorKind::InvalidInput, large));
+        }
+        Ok(bytes)
+    };
+    read().map_err(FilesError::system(path, "read"))
+}
+
+/// As [`read`], for text.
+///
+/// # Errors
+/// As [`read`], and when it is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, FilesError> {
+    String::from_utf8(read(path)?).map_err(|error| {
+        let error = Error::new(ErrorKind::InvalidInput, format!("it is no text ({error})"));
+        FilesError::system(path, "read")(error)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_end_is_not_read_for_ever() {
+        let endless = read(Path::new("/dev/zero")).unwrap_err();
+        assert!(endless.is_wrong_input() && endless.to_string().contains("larger than 64 MiB"));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("text");
+        std::fs::write(&path, [0xff, 0xfe]).unwrap();
+        assert!(read_text(&path).unwrap_err().to_string().contains("no text"));
+        std::fs::write(&path, "text").unwrap();
+        assert_eq!(read_text(&path).unwrap(), "text");
+    }
+}
