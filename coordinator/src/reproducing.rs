@@ -251,7 +251,13 @@ fn recorded(record: time::PassRecord, speed_km_h: f64) -> Result<Pass, Reproduci
     let position_m =
         (0..record.acceleration_m_s2.len()).map(|index| record.position_m(index)).collect();
     let signal = Signal::new(1.0 / record.time_step_s, record.acceleration_m_s2)?;
-    Ok(Pass { file: format!("{speed_km_h} km/h"), speed_km_h, signal, position_m })
+    Ok(Pass {
+        file: format!("{speed_km_h} km/h"),
+        speed_km_h,
+        signal,
+        position_m,
+        contact_loss_share: None,
+    })
 }
 
 #[cfg(test)]

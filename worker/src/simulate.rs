@@ -91,8 +91,10 @@ impl Simulation {
             let records = time::passes(&models, &self.pass(speed_km_h), &surfaces)
                 .map_err(|source| CaseError::Pass { speed_km_h, source })?;
             for ((passes, record), model) in passes.iter_mut().zip(records).zip(&models) {
+                let kept = self.samples(&record, speed_km_h)[0].start;
+                let contact_loss_share = Some(record.contact_loss_share(kept));
                 let features = self.features(&measured(record, model), speed_km_h)?;
-                passes.push(PassFeatures { speed_km_h, features, contact_loss_share: None });
+                passes.push(PassFeatures { speed_km_h, features, contact_loss_share });
             }
         }
         Ok(passes.into_iter().map(Outcome::Finished).collect())
@@ -201,6 +203,19 @@ mod tests {
         assert_eq!(together, alone);
         assert!(matches!(&together[0], Outcome::Finished(passes) if passes.len() == 1));
         assert_ne!(together[0], together[1]);
+    }
+
+    #[test]
+    fn a_case_tells_for_how_long_its_wheel_was_in_the_air() {
+        let share = |level: f64| {
+            let parameters = ParameterSet::nominal().with(Parameter::IrregularityLevel, level);
+            let outcomes = simulation().simulate(&[Case { parameters, ..case(1) }]);
+            let Outcome::Finished(passes) = &outcomes[0] else { panic!("{outcomes:?}") };
+            passes[0].contact_loss_share.unwrap()
+        };
+        assert_eq!(share(1.0), 0.0);
+        let flying = share(3000.0);
+        assert!(0.05 < flying && flying < 0.95, "{flying}");
     }
 
     #[test]

@@ -54,6 +54,7 @@ pub(crate) fn recording(level: f64, speeds_km_h: &[f64]) -> Recording {
             speed_km_h,
             signal: noise(seed, samples, level, 0.5),
             position_m: (0..samples).map(|index| index as f64 * step_m).collect(),
+            contact_loss_share: None,
         }
     };
     let sleeper = |index: u32| Sleeper { id: format!("SN{index}"), x_m: f64::from(index) * 0.125 };

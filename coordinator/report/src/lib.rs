@@ -25,5 +25,6 @@ pub use farm::{Farm, FarmCampaign, FarmWorker, duration};
 pub use farm_page::{farm_page, farm_view};
 pub use inspection_page::{Inspected, InspectedCurve, Inspection, inspection_page};
 pub use models_page::{Tested, models_page};
+pub use number::percent;
 pub use receptance::{ReceptanceCurve, receptance_chart};
 pub use reproduction_page::reproduction_page;

@@ -38,6 +38,13 @@ pub(crate) fn significant(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// A share, 0 to 1, in percent with two significant digits.
+pub fn percent(share: f64) -> String {
+    let value = 100.0 * share;
+    let decimals = decimals(value, 2);
+    format!("{value:.decimals$} %")
+}
+
 /// Decimals that show `digits` significant digits of `value`.
 fn decimals(value: f64, digits: i32) -> usize {
     if value == 0.0 || !value.is_finite() {
@@ -58,5 +65,7 @@ mod tests {
         assert_eq!(Shown::of(Parameter::IrregularityLevel).unit, "10⁻⁴ m² rad/m");
         assert_eq!(significant(0.012_345), "0.0123");
         assert_eq!(significant(0.0), "0");
+        let shares = [0.0, 4.3e-5, 0.0214, 0.45, 1.0].map(percent);
+        assert_eq!(shares, ["0 %", "0.0043 %", "2.1 %", "45 %", "100 %"]);
     }
 }

@@ -76,7 +76,13 @@ fn one_pass(
         measure(&scene.chain, &scene.left_out, number, &driven, scene.recorded_m, &mut random);
     let signal = Signal::new(measured.sample_rate_hz, measured.acceleration_m_s2)
         .expect("a pass whose forces are finite is");
-    Ok(Pass { file: String::new(), speed_km_h, signal, position_m: measured.position_m })
+    Ok(Pass {
+        file: String::new(),
+        speed_km_h,
+        signal,
+        position_m: measured.position_m,
+        contact_loss_share: None,
+    })
 }
 
 /// An irregularity of a scene: 0 for the one that all passes share.

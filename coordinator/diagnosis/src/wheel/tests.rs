@@ -120,7 +120,7 @@ fn long_pass(amplitude: f64) -> Pass {
         position_m.push(position);
     }
     let signal = Signal::new(RATE_HZ, samples).unwrap();
-    Pass { file: String::new(), speed_km_h: 67.0, signal, position_m }
+    Pass { file: String::new(), speed_km_h: 67.0, signal, position_m, contact_loss_share: None }
 }
 
 #[test]

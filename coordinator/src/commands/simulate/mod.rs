@@ -21,6 +21,7 @@ use track::SimulatedTrack;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_parameters::quantity::{ELEMENTS, PASSES, SPANS, SPEED, TIME_STEP};
 use tracktwin_parameters::{Preset, unit};
+use tracktwin_report::percent;
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::extension::Class;
 use tracktwin_track::model::{Roughness, Surface};
@@ -126,8 +127,25 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     output.add(&FileName::new(TRUTH)?, track.truth_json(&drives).as_bytes())?;
     recording.add_to(&mut output)?;
     output.commit()?;
+    super::say(&contact_sentence(&recording.passes));
     super::say(&format!("recording: {}", out.display()));
     Ok(())
+}
+
+/// For how long the wheel was in the air, of all passes the one that was longest.
+fn contact_sentence(passes: &[Pass]) -> String {
+    let lost = passes.iter().filter(|pass| pass.contact_loss_share > Some(0.0));
+    let share = |pass: &&Pass| pass.contact_loss_share.unwrap_or(0.0);
+    let count = lost.clone().count();
+    match lost.max_by(|a, b| share(a).total_cmp(&share(b))) {
+        None => "the wheel keeps contact with the rail in every pass".to_owned(),
+        Some(worst) => format!(
+            "the wheel loses contact with the rail in {count} of {} passes, for up to {} of the time (at {} km/h)",
+            passes.len(),
+            percent(share(&worst)),
+            worst.speed_km_h
+        ),
+    }
 }
 
 /// One pass as it is to be driven.

@@ -45,6 +45,9 @@ pub struct Pass {
     pub signal: Signal,
     /// Position of the wheel along the track in m at every sample; does not decrease.
     pub position_m: Vec<f64>,
+    /// Share of the time, 0 to 1, in which the wheel did not touch the rail: known of simulated passes only,
+    /// and read by no test of a recording.
+    pub contact_loss_share: Option<f64>,
 }
 
 /// A sleeper and its place.
@@ -204,7 +207,11 @@ impl Recording {
             sample_rate_hz: self.sample_rate_hz,
             channel: self.channel.clone(),
             passes: passes
-                .map(|(pass, file)| PassEntry { file, speed_km_h: pass.speed_km_h })
+                .map(|(pass, file)| PassEntry {
+                    file,
+                    speed_km_h: pass.speed_km_h,
+                    contact_loss_share: pass.contact_loss_share,
+                })
                 .collect(),
             sleepers: self.sleepers.clone(),
             nominal: self.nominal.clone(),
@@ -239,8 +246,8 @@ fn read_pass(
     check::speed(manifest, &field, path, &columns, entry.speed_km_h)?;
     let signal = Signal::new(sample_rate_hz, columns.acceleration_m_s2)
         .expect("columns are finite and the rate is positive");
-    let (file, speed_km_h) = (entry.file.clone(), entry.speed_km_h);
-    Ok(Pass { file, speed_km_h, signal, position_m: columns.position_m })
+    let PassEntry { file, speed_km_h, contact_loss_share } = entry.clone();
+    Ok(Pass { file, speed_km_h, signal, position_m: columns.position_m, contact_loss_share })
 }
 
 fn write_pass(path: &Path, pass: &Pass) -> Result<(), parquet::errors::ParquetError> {

@@ -21,9 +21,12 @@ pub(super) struct Manifest {
 }
 
 /// One pass of `recording.json`.
+#[derive(Clone)]
 pub(super) struct PassEntry {
     pub file: String,
     pub speed_km_h: f64,
+    /// Of a simulated pass, the share of the time without contact between wheel and rail.
+    pub contact_loss_share: Option<f64>,
 }
 
 impl Manifest {
@@ -62,11 +65,7 @@ impl Manifest {
 
     /// The text of the file.
     pub(super) fn to_json(&self) -> String {
-        let passes: Vec<_> = self
-            .passes
-            .iter()
-            .map(|pass| json!({"file": pass.file, "speed_km_h": pass.speed_km_h}))
-            .collect();
+        let passes: Vec<_> = self.passes.iter().map(PassEntry::to_json).collect();
         let sleepers: Vec<_> = self
             .sleepers
             .iter()
@@ -87,7 +86,17 @@ impl Manifest {
 impl PassEntry {
     fn parse(fields: &Fields<'_>) -> Result<Self, RecordingError> {
         let file = fields.text("file", "the name of the pass's file")?.to_owned();
-        Ok(Self { file, speed_km_h: fields.positive("speed_km_h", "the nominal speed in km/h")? })
+        let speed_km_h = fields.positive("speed_km_h", "the nominal speed in km/h")?;
+        let contact_loss_share = fields.get("contact_loss_share").and_then(Value::as_f64);
+        Ok(Self { file, speed_km_h, contact_loss_share })
+    }
+
+    fn to_json(&self) -> Value {
+        let mut entry = json!({"file": self.file, "speed_km_h": self.speed_km_h});
+        if let Some(share) = self.contact_loss_share {
+            entry["contact_loss_share"] = json!(share);
+        }
+        entry
     }
 }
 

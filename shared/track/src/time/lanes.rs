@@ -220,6 +220,20 @@ mod tests {
         assert_equal_to_plain(&Mesh::uniform(6, 4, 4), &pass(), 3000.0);
     }
 
+    #[test]
+    fn the_lanes_count_the_time_without_contact_as_the_plain_solver_does() {
+        let (models, _) = cases(2, &Mesh::uniform(6, 4, 4));
+        let surfaces = [3.0, 3000.0].map(|level| Surface::rough(1, level, 1.0));
+        let fast = passes(&models, &pass(), &surfaces).unwrap();
+        assert_eq!(fast[0].contact_loss_share(0), 0.0);
+        let share = fast[1].contact_loss_share(0);
+        assert!(0.05 < share && share < 0.95, "{share}");
+        let plain = time::pass(&models[1], &pass(), &surfaces[1]).unwrap();
+        // Rounding may move the sample in which contact ends.
+        let samples = plain.contact_force_n.len() as f64;
+        assert!((plain.contact_loss_share(0) - share).abs() * samples < 3.0, "{share}");
+    }
+
     /// Something between sleepers, the ground and the rail.
     #[derive(Clone, Copy, Debug)]
     enum Extra {

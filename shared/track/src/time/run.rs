@@ -42,6 +42,14 @@ impl PassRecord {
     pub fn position_m(&self, index: usize) -> f64 {
         self.start_m + index as f64 * self.speed_m_s * self.time_step_s
     }
+
+    /// Share of the samples from `first` on, 0 to 1, at which the wheel does not touch the rail: the contact
+    /// force is zero. 0 where there are no samples.
+    pub fn contact_loss_share(&self, first: usize) -> f64 {
+        let forces = self.contact_force_n.get(first..).unwrap_or_default();
+        let lost = forces.iter().filter(|&&force_n| force_n <= 0.0).count();
+        lost as f64 / forces.len().max(1) as f64
+    }
 }
 
 /// Why a pass has no result.

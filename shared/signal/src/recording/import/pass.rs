@@ -152,7 +152,7 @@ fn pass(
         let fault = Fault::Unreadable { reason: error.to_string() };
         RecordingError::new(&table.path, column, fault)
     })?;
-    Ok(Pass { file, speed_km_h, signal, position_m })
+    Ok(Pass { file, speed_km_h, signal, position_m, contact_loss_share: None })
 }
 
 /// The stated sample rate, or that of the column of times, in Hz.
