@@ -6,7 +6,7 @@
 use crate::null_models;
 use anyhow::Context;
 use tracktwin_diagnosis::{
-    Candidate, Diagnosis, Evidence, FirstLook, Search, Stage, Subject, SubjectError,
+    Candidate, Diagnosis, Evidence, FirstLook, Search, Stage, Subject, SubjectError, check_track,
     first_calibration, first_look, passes_alone, search,
 };
 use tracktwin_library::Library;
@@ -67,6 +67,7 @@ pub async fn diagnose(
 ) -> Result<Diagnosed, DiagnosingError> {
     let Setting { design, library, without, shuffle } = setting;
     let allowed = |physics: &str| !without.iter().any(|other| other == physics);
+    check_track(recording, design)?;
     watch("first look", 0.0);
     let mut look = first_look(recording);
     let mut subject = match Subject::new(recording, design) {

@@ -268,3 +268,43 @@ fn a_recording_that_is_not_json_is_refused() {
 fn a_good_recording_is_followed_by_the_library_s_refusal() {
     refused_recording(|_| {}, &["nowhere.sqlite", "no such file"]);
 }
+
+/// `diagnose` of a small recording whose `nominal` has been given this.
+fn refused_diagnosis(nominal: &str, words: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("recording");
+    fs::create_dir(&recording).unwrap();
+    let manifest = format!(
+        r#"{{"format": "aba-recording/1", "sample_rate_Hz": 10000,
+        "passes": [{{"file": "pass.csv", "speed_km_h": 13.0}}],
+        "sleepers": [{{"id": "SN1", "x_m": 0.25}}, {{"id": "SN2", "x_m": 0.375}}],
+        "nominal": {nominal}}}"#
+    );
+    fs::write(recording.join("recording.json"), manifest).unwrap();
+    fs::write(recording.join("pass.csv"), pass_csv(1500)).unwrap();
+    let [recording, out] =
+        [recording, folder.path().join("out")].map(|it| it.display().to_string());
+    assert_refused(&run(PROGRAM, &["diagnose", &recording, "--out", &out]), words);
+    assert_eq!(contents(folder.path()), ["recording"]);
+}
+
+#[test]
+fn a_diagnosis_of_another_track_or_vehicle_is_refused_with_both_numbers() {
+    refused_diagnosis(r#"{"sleeper": {"spacing_m": 0.6}}"#, &["0.6 m", "0.125 m", "V-Track"]);
+    refused_diagnosis(r#"{"wheel": {"mass_kg": 600}}"#, &["mass_kg", "600 kg", "44 kg"]);
+    refused_diagnosis(r#"{"wheel": {"load_N": 5000}}"#, &["load_N", "5000 N", "4500 N"]);
+    refused_diagnosis(r#"{"railhead_radius_m": 0.3}"#, &["railhead_radius_m", "0.3 m", "0.06 m"]);
+    refused_diagnosis(r#"{"rail": {"area_m2": 0.00767}}"#, &["area_m2", "0.00767", "0.000865"]);
+}
+
+#[test]
+fn what_a_diagnosis_found_on_v_track_extends_no_campaign_of_another_track() {
+    let folder = tempfile::tempdir().unwrap();
+    let [campaign, diagnosis] =
+        ["large.toml", "diagnosis.json"].map(|name| folder.path().join(name).display().to_string());
+    fs::write(&campaign, "name = \"c\"\nseed = 1\ncases = 8\npreset = \"real-scale\"\n").unwrap();
+    fs::write(&diagnosis, "{}").unwrap();
+    let answer = run(PROGRAM, &["extend", &campaign, "--from", &diagnosis]);
+    assert_refused(&answer, &["large.toml", "0.625 m", "0.125 m", "V-Track"]);
+    assert_eq!(contents(folder.path()), ["diagnosis.json", "large.toml"]);
+}

@@ -55,4 +55,4 @@ pub use search::{Fitted, Round, Search, Stage, first_calibration, search};
 pub use section::Section;
 pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra};
-pub use subject::{Subject, SubjectError};
+pub use subject::{Subject, SubjectError, check_track};

@@ -8,7 +8,7 @@ use crate::section::Section;
 use crate::spectra::{Spectra, SpeedSpectra};
 use nalgebra::{DMatrix, DVector};
 use tracktwin_parameters::TrackDesign;
-use tracktwin_signal::recording::Recording;
+use tracktwin_signal::recording::{OtherTrack, Recording, compare_designs};
 
 /// Bands compared in Hz, as far as the sample rate lets them: below, a window holds hardly a
 /// wavelet; above, hardly any irregularity.
@@ -26,9 +26,42 @@ const SLEEPERS_MIN: usize = 6;
 /// Part of a spacing that a pass must cover beyond a sleeper's window, where low bands reach.
 const MARGIN_SPANS: f64 = 0.6;
 
+/// Greatest difference of two neighbouring sleepers' distance from the spacing, as a share of it: the
+/// model's sleepers are evenly spaced.
+const UNEVEN: f64 = 0.1;
+
 /// Why a recording cannot be diagnosed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SubjectError {
+    /// The track that it would be compared with is not V-Track.
+    #[error(
+        "the models are of another track than V-Track ({} {}, V-Track's {}); diagnoses compare with \
+         V-Track only, whose stiffness, damping, bands and kinds of physics they know; leave out \
+         --models for a recording of V-Track", .0.quantity, .0.found(), .0.known()
+    )]
+    OtherDesign(OtherTrack),
+    /// It states another track or vehicle.
+    #[error(
+        "recording.json: {} {}, V-Track's {}; diagnoses compare with V-Track only", .0.quantity,
+        .0.found(), .0.known()
+    )]
+    OtherTrack(OtherTrack),
+    /// Its sleepers are not evenly spaced.
+    #[error(
+        "recording.json: sleepers: {} and {} lie {distance_m:.3} m apart, the model's {spacing_m} m; list \
+         every sleeper, or keep the stretch where they are evenly spaced", .between[0], .between[1]
+    )]
+    Uneven {
+        /// The two sleepers.
+        between: [String; 2],
+        /// Their distance in m.
+        distance_m: f64,
+        /// The model's in m.
+        spacing_m: f64,
+    },
+    /// Levels without a unit.
+    #[error("recording.json: nominal.gain_known: is false; a model predicts levels in m/s2")]
+    GainUnknown,
     /// No sleepers.
     #[error(
         "sleepers: their places are not known; give recording.json theirs, or import with --sleeper"
@@ -74,12 +107,45 @@ pub struct Subject {
     pub heard_m: Vec<[f64; 2]>,
 }
 
+impl SubjectError {
+    /// Whether the recording or the models are of a track that no diagnosis knows.
+    pub const fn is_of_the_track(&self) -> bool {
+        matches!(self, Self::OtherDesign(_) | Self::OtherTrack(_) | Self::Uneven { .. })
+    }
+}
+
+/// Whether a recording can be compared with a track of this design, which must be V-Track: typical values,
+/// ranges and bands are V-Track's.
+///
+/// A recording whose sleepers are not known is compared with no track.
+///
+/// # Errors
+/// [`SubjectError::OtherDesign`], [`SubjectError::OtherTrack`] and [`SubjectError::Uneven`].
+pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), SubjectError> {
+    compare_designs(design, &TrackDesign::v_track()).map_err(SubjectError::OtherDesign)?;
+    if recording.sleepers.is_empty() {
+        return Ok(());
+    }
+    recording.check_track(design).map_err(SubjectError::OtherTrack)?;
+    let spacing_m = design.sleeper.spacing_m;
+    let uneven = recording.sleepers.windows(2).find_map(|pair| {
+        let distance_m = pair[1].x_m - pair[0].x_m;
+        let is_even = (distance_m / spacing_m - 1.0).abs() <= UNEVEN;
+        (!is_even).then(|| ([0, 1].map(|end| pair[end].id.clone()), distance_m))
+    });
+    match uneven {
+        Some((between, distance_m)) => Err(SubjectError::Uneven { between, distance_m, spacing_m }),
+        None => Ok(()),
+    }
+}
+
 impl Subject {
     /// Takes from a recording what is compared.
     ///
     /// # Errors
     /// [`SubjectError`] says what is missing.
     pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, SubjectError> {
+        check_track(recording, design)?;
         let highest_hz = BANDS_HZ[1].min(SAMPLE_RATE_SHARE * recording.sample_rate_hz);
         let bands = Bands::new(BANDS_HZ[0], highest_hz.max(BANDS_HZ[0]));
         if bands.count() < BANDS_MIN {
@@ -87,6 +153,9 @@ impl Subject {
         }
         if recording.sleepers.is_empty() {
             return Err(SubjectError::NoSleepers);
+        }
+        if !recording.gain_known() {
+            return Err(SubjectError::GainUnknown);
         }
         let sleepers = covered(recording);
         if sleepers.len() < SLEEPERS_MIN {

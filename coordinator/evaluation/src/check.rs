@@ -5,9 +5,6 @@ use crate::windows::speed_index;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 
-/// Relative difference up to which two tracks are alike.
-const ALIKE: f64 = 0.02;
-
 /// Compares what a recording says of its track, vehicle, sensor and speeds with what the models
 /// were trained on.
 ///
@@ -24,28 +21,7 @@ pub fn check_recording(
     if !recording.gain_known() {
         return Err(Error::GainUnknown);
     }
-    let known = design.sleeper.spacing_m;
-    // To a tenth of a millimetre, as a message can show it.
-    let distance_m = recording.median_distance_m().map(|distance| (1e4 * distance).round() / 1e4);
-    let stated = |part, name| recording.nominal_value(part, name);
-    let quantities = [
-        ("nominal.sleeper.spacing_m is", Some(recording.spacing_m), known, "m"),
-        ("the sleepers of the recording lie", distance_m, known, "m"),
-        ("nominal.rail.area_m2 is", stated("rail", "area_m2"), design.rail.area_m2, "m2"),
-        (
-            "nominal.rail.second_moment_m4 is",
-            stated("rail", "second_moment_m4"),
-            design.rail.second_moment_m4,
-            "m4",
-        ),
-        ("nominal.wheel.mass_kg is", stated("wheel", "mass_kg"), design.wheel.mass_kg, "kg"),
-    ];
-    for (quantity, found, known, unit) in quantities {
-        let Some(found) = found.filter(|found| (found / known - 1.0).abs() > ALIKE) else {
-            continue;
-        };
-        return Err(Error::OtherTrack { quantity, found, known, unit });
-    }
+    recording.check_track(design)?;
     for pass in &recording.passes {
         speed_index(recording, pass.speed_km_h, speeds_km_h)?;
     }

@@ -1,6 +1,7 @@
 //! Why a recording cannot be evaluated.
 
 use tracktwin_signal::FeatureError;
+use tracktwin_signal::recording::OtherTrack;
 
 /// What goes wrong between a recording and its evaluation.
 #[derive(Debug, thiserror::Error)]
@@ -33,18 +34,9 @@ pub enum Error {
     GainUnknown,
     /// The recording is of another track or vehicle.
     #[error(
-        "{quantity} {found} {unit}, the models are of {known} {unit}; train models of such a track"
+        "{} {}, the models are of {}; train models of such a track", .0.quantity, .0.found(), .0.known()
     )]
-    OtherTrack {
-        /// What differs, with its verb.
-        quantity: &'static str,
-        /// The recording's value.
-        found: f64,
-        /// The campaign's.
-        known: f64,
-        /// Their unit.
-        unit: &'static str,
-    },
+    OtherTrack(#[from] OtherTrack),
     /// There is no model for these features.
     #[error("there is no {feature} model for {} km/h; train it", join(speeds_km_h))]
     NoModel {

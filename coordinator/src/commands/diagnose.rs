@@ -11,7 +11,7 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use tracktwin_diagnosis::Verdict;
+use tracktwin_diagnosis::{Verdict, check_track};
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Library, without_password};
 use tracktwin_parameters::TrackDesign;
@@ -67,6 +67,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None => None,
     };
     let design = design(models, library.as_ref()).await?;
+    check_track(&recording, &design).or_input()?;
     make_folder(&out)?;
     let shown = Shown::default();
     let setting =

@@ -9,6 +9,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Diagnosis, Estimate, FORMAT, Hypothesis};
 use tracktwin_files::Kind as FileKind;
+use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::recording::compare_designs;
 use tracktwin_track::extension::{Kind, KindParameter, PlaceKind};
 
 /// Share of the cases that have the extension: models must hold without it as well.
@@ -42,6 +44,7 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { campaign: path, from, out, force } = arguments;
     let text = read_text(&path).or_input()?;
     let campaign = Campaign::parse(&text, &path.display().to_string(), None).or_input()?;
+    check_design(&path, &campaign).or_input()?;
     let diagnosis = diagnosis(&from).or_input()?;
     let accepted: Vec<_> = diagnosis
         .hypotheses
@@ -70,6 +73,21 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
         accepted.iter().map(|(hypothesis, _)| hypothesis.physics.as_str()).collect();
     say(&format!("{}: half of the cases have {}", out.display(), names.join(" and ")));
     Ok(())
+}
+
+/// Whether the campaign is of the track that diagnoses are of: V-Track.
+fn check_design(path: &Path, campaign: &Campaign) -> anyhow::Result<()> {
+    let design = &campaign.definition.experiment.design;
+    compare_designs(design, &TrackDesign::v_track()).map_err(|other| {
+        anyhow!(
+            "{}: preset: the campaign is of another track than V-Track ({} {}, V-Track's {}); what a \
+             diagnosis found is of V-Track",
+            path.display(),
+            other.quantity,
+            other.found(),
+            other.known()
+        )
+    })
 }
 
 fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {

@@ -6,8 +6,11 @@ use super::progress::Progress;
 use super::{OrInput, Stop, say};
 use crate::evaluating::Evaluator;
 use crate::trial::{Trial, TrialError, check_folder};
+use anyhow::anyhow;
 use clap::Args;
 use std::path::PathBuf;
+use tracktwin_parameters::Preset;
+use tracktwin_signal::recording::compare_designs;
 use tracktwin_surrogate::Trained;
 
 /// What `trial` is told.
@@ -71,7 +74,11 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     make_folder(&out)?;
     let library = open_or_create(&url).await?;
     let paper = match models {
-        Some(models) => Some(Evaluator::new(models, &library).await.or_input()?),
+        Some(models) => {
+            let evaluator = Evaluator::new(models, &library).await.or_input()?;
+            check_models(&evaluator).or_input()?;
+            Some(evaluator)
+        }
         None => None,
     };
     let node = tracktwin_worker::agent::unique_name();
@@ -103,6 +110,19 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     say(&format!("tables: {}", trial.folder.join("trial.md").display()));
     let missed = summary.rows.iter().any(|row| row.reached == Some(false));
     if missed { Err(Stop::Negative) } else { Ok(()) }
+}
+
+/// Whether models are of the track that is recorded: V-Track.
+fn check_models(evaluator: &Evaluator) -> anyhow::Result<()> {
+    compare_designs(evaluator.design(), &Preset::VTrack.design()).map_err(|other| {
+        anyhow!(
+            "--models: their track is another than the trial's, which is V-Track ({} {}, V-Track's {}); \
+             train models of V-Track",
+            other.quantity,
+            other.found(),
+            other.known()
+        )
+    })
 }
 
 fn stop(error: TrialError) -> Stop {

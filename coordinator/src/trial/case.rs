@@ -7,6 +7,7 @@ use anyhow::Context;
 use rustix::time::{ClockId, clock_gettime};
 use std::path::PathBuf;
 use tracktwin_diagnosis::{Diagnosis, Verdict};
+use tracktwin_evaluation::check_recording;
 use tracktwin_files::replace;
 use tracktwin_library::{DiagnosisRecord, Question};
 use tracktwin_parameters::Preset;
@@ -106,8 +107,10 @@ impl Trial {
         recording: &Recording,
     ) -> Result<(), TrialError> {
         let Some(evaluator) = &self.paper else { return Ok(()) };
-        let evaluation =
-            evaluator.evaluate(recording).map_err(|source| TrialError::Paper { number, source })?;
+        let speeds = &evaluator.set().speeds_km_h;
+        let evaluation = check_recording(recording, evaluator.design(), speeds)
+            .and_then(|()| evaluator.evaluate(recording))
+            .map_err(|source| TrialError::Paper { number, source })?;
         let paper = Paper::of(&self.opened(number)?.scene, &evaluation);
         self.keep(number, Question::Paper, &paper, None).await
     }

@@ -5,7 +5,7 @@ use super::{Arguments, Drive, END_SPANS, Setting};
 use anyhow::anyhow;
 use serde_json::{Map, Value, json};
 use tracktwin_parameters::{Parameter, ParameterSet, Preset, TrackDesign};
-use tracktwin_signal::recording::Sleeper;
+use tracktwin_signal::recording::{self, Sleeper};
 use tracktwin_track::extension::{ExtensionInstance, Kind};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
@@ -82,27 +82,7 @@ impl SimulatedTrack {
 
     /// What a recording says of the track, in the recording format's words.
     pub(super) fn nominal(&self) -> Map<String, Value> {
-        let TrackDesign { rail, sleeper, railhead_radius_m, wheel, .. } = &self.design;
-        let nominal = json!({
-            "rail": {
-                "area_m2": rail.area_m2, "second_moment_m4": rail.second_moment_m4,
-                "youngs_Pa": rail.youngs_modulus_pa, "density_kg_m3": rail.density_kg_m3,
-                "poisson": rail.poisson, "shear_coefficient": rail.shear_coefficient,
-            },
-            "sleeper": {
-                "spacing_m": sleeper.spacing_m, "half_length_m": sleeper.half_length_m,
-                "area_m2": sleeper.section.area_m2,
-                "density_kg_m3": sleeper.section.density_kg_m3,
-            },
-            "railhead_radius_m": railhead_radius_m,
-            "wheel": {
-                "mass_kg": wheel.mass_kg, "load_N": wheel.load_n, "radius_m": wheel.radius_m,
-            },
-        });
-        match nominal {
-            Value::Object(fields) => fields,
-            _ => Map::new(),
-        }
+        recording::nominal(&self.design)
     }
 
     /// What was put in: the parameters of every sleeper, the physics beyond the paper, and with

@@ -1,7 +1,7 @@
 //! Recordings of axle-box acceleration: folders of `recording.json` and one file a pass.
 //!
-//! Owns reading, checking, importing and writing of recordings, and which samples of a pass belong to which
-//! sleeper. What is computed from the samples is left to the transforms and features.
+//! Owns reading, checking, importing and writing of recordings, which samples of a pass belong to which
+//! sleeper, and whether a recording is of a track of a certain design. What is computed from the samples is left to the transforms and features.
 
 mod check;
 mod columns;
@@ -14,6 +14,8 @@ mod manifest;
 mod parquet_file;
 #[cfg(test)]
 mod tests;
+mod track;
 
 pub use error::{Fault, RecordingError};
 pub use folder::{Pass, Recording, Sleeper};
+pub use track::{OtherTrack, compare_designs, nominal};

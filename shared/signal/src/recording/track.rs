@@ -1,0 +1,221 @@
+//! What a recording states of track and vehicle, and whether a design has it.
+
+use super::Recording;
+use serde_json::{Map, Value, json};
+use tracktwin_parameters::TrackDesign;
+
+/// Relative difference up to which two tracks are alike.
+const ALIKE: f64 = 0.02;
+
+/// A quantity that `nominal` of `recording.json` may state.
+struct Quantity {
+    /// The object it stands in; none where it stands in `nominal` itself.
+    part: Option<&'static str>,
+    name: &'static str,
+    unit: &'static str,
+    of: fn(&TrackDesign) -> f64,
+}
+
+impl Quantity {
+    const fn new(
+        part: Option<&'static str>,
+        name: &'static str,
+        unit: &'static str,
+        of: fn(&TrackDesign) -> f64,
+    ) -> Self {
+        Self { part, name, unit, of }
+    }
+
+    /// Its place in `recording.json`.
+    fn path(&self) -> String {
+        match self.part {
+            Some(part) => format!("nominal.{part}.{}", self.name),
+            None => format!("nominal.{}", self.name),
+        }
+    }
+
+    fn stated(&self, recording: &Recording) -> Option<f64> {
+        match self.part {
+            Some(part) => recording.nominal_value(part, self.name),
+            None => recording.nominal.get(self.name)?.as_f64(),
+        }
+    }
+}
+
+const RAIL: Option<&str> = Some("rail");
+const SLEEPER: Option<&str> = Some("sleeper");
+const WHEEL: Option<&str> = Some("wheel");
+
+/// All quantities, in the order in which they are compared.
+const QUANTITIES: [Quantity; 14] = [
+    Quantity::new(SLEEPER, "spacing_m", "m", |it| it.sleeper.spacing_m),
+    Quantity::new(RAIL, "area_m2", "m2", |it| it.rail.area_m2),
+    Quantity::new(RAIL, "second_moment_m4", "m4", |it| it.rail.second_moment_m4),
+    Quantity::new(RAIL, "youngs_Pa", "Pa", |it| it.rail.youngs_modulus_pa),
+    Quantity::new(RAIL, "density_kg_m3", "kg/m3", |it| it.rail.density_kg_m3),
+    Quantity::new(RAIL, "poisson", "", |it| it.rail.poisson),
+    Quantity::new(RAIL, "shear_coefficient", "", |it| it.rail.shear_coefficient),
+    Quantity::new(SLEEPER, "half_length_m", "m", |it| it.sleeper.half_length_m),
+    Quantity::new(SLEEPER, "area_m2", "m2", |it| it.sleeper.section.area_m2),
+    Quantity::new(SLEEPER, "density_kg_m3", "kg/m3", |it| it.sleeper.section.density_kg_m3),
+    Quantity::new(None, "railhead_radius_m", "m", |it| it.railhead_radius_m),
+    Quantity::new(WHEEL, "mass_kg", "kg", |it| it.wheel.mass_kg),
+    Quantity::new(WHEEL, "load_N", "N", |it| it.wheel.load_n),
+    Quantity::new(WHEEL, "radius_m", "m", |it| it.wheel.radius_m),
+];
+
+/// A quantity in which two tracks differ by more than 2 %.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{quantity} {}, not {}", with_unit(*found, unit), with_unit(*known, unit))]
+pub struct OtherTrack {
+    /// What differs, with its verb: `nominal.wheel.mass_kg is`.
+    pub quantity: String,
+    /// Its value on the one track.
+    pub found: f64,
+    /// Its value on the track that is known.
+    pub known: f64,
+    /// Unit of both; empty for a plain number.
+    pub unit: &'static str,
+}
+
+impl OtherTrack {
+    /// The value found, with its unit.
+    pub fn found(&self) -> String {
+        with_unit(self.found, self.unit)
+    }
+
+    /// The value known, with its unit.
+    pub fn known(&self) -> String {
+        with_unit(self.known, self.unit)
+    }
+
+    fn new(quantity: String, found: f64, known: f64, unit: &'static str) -> Result<(), Self> {
+        // What is not a number is not alike either.
+        if (found / known - 1.0).abs() <= ALIKE {
+            return Ok(());
+        }
+        Err(Self { quantity, found, known, unit })
+    }
+}
+
+fn with_unit(value: f64, unit: &str) -> String {
+    format!("{value} {unit}").trim_end().to_owned()
+}
+
+impl Recording {
+    /// Compares what the recording states of its track and vehicle with a design, and the distances
+    /// of its sleepers. What it does not state is not compared.
+    ///
+    /// # Errors
+    /// [`OtherTrack`] with the first quantity that differs by more than 2 %.
+    pub fn check_track(&self, design: &TrackDesign) -> Result<(), OtherTrack> {
+        let spacing_m = design.sleeper.spacing_m;
+        let quantity = "nominal.sleeper.spacing_m is".to_owned();
+        OtherTrack::new(quantity, self.spacing_m, spacing_m, "m")?;
+        if let Some(distance_m) = self.median_distance_m() {
+            // To a tenth of a millimetre, as a message can show it.
+            let distance_m = (1e4 * distance_m).round() / 1e4;
+            let quantity = "the sleepers of the recording lie".to_owned();
+            OtherTrack::new(quantity, distance_m, spacing_m, "m")?;
+        }
+        for quantity in &QUANTITIES {
+            if let Some(found) = quantity.stated(self) {
+                let known = (quantity.of)(design);
+                OtherTrack::new(format!("{} is", quantity.path()), found, known, quantity.unit)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Compares two designs in all that recordings state.
+///
+/// # Errors
+/// [`OtherTrack`] with the first quantity in which `found` differs from `known` by more than 2 %.
+pub fn compare_designs(found: &TrackDesign, known: &TrackDesign) -> Result<(), OtherTrack> {
+    QUANTITIES.iter().try_for_each(|quantity| {
+        let [found, known] = [found, known].map(|design| (quantity.of)(design));
+        OtherTrack::new(format!("{} is", quantity.path()), found, known, quantity.unit)
+    })
+}
+
+/// What a recording on a track of this design states, as `nominal` of `recording.json`.
+pub fn nominal(design: &TrackDesign) -> Map<String, Value> {
+    let mut nominal = json!({});
+    for quantity in &QUANTITIES {
+        let value = json!((quantity.of)(design));
+        match quantity.part {
+            Some(part) => nominal[part][quantity.name] = value,
+            None => nominal[quantity.name] = value,
+        }
+    }
+    match nominal {
+        Value::Object(fields) => fields,
+        _ => Map::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Sleeper;
+
+    fn recording() -> Recording {
+        let sleeper =
+            |place: u32| Sleeper { id: format!("SN{place}"), x_m: 0.125 * f64::from(place) };
+        Recording {
+            name: "rig".to_owned(),
+            sample_rate_hz: 1e4,
+            channel: String::new(),
+            passes: Vec::new(),
+            sleepers: (0..5).map(sleeper).collect(),
+            nominal: nominal(&TrackDesign::v_track()),
+            spacing_m: 0.125,
+        }
+    }
+
+    #[test]
+    fn every_quantity_that_a_recording_states_is_compared() {
+        let v_track = TrackDesign::v_track();
+        assert_eq!(recording().check_track(&v_track), Ok(()));
+        for quantity in &QUANTITIES {
+            for (factor, is_alike) in [(1.019, true), (0.981, true), (1.021, false), (0.979, false)]
+            {
+                let mut recording = recording();
+                let known = (quantity.of)(&v_track);
+                let part = quantity.part.map(|part| recording.nominal.get_mut(part));
+                let fields = match part {
+                    Some(part) => part.and_then(Value::as_object_mut).unwrap(),
+                    None => &mut recording.nominal,
+                };
+                fields.insert(quantity.name.to_owned(), json!(factor * known));
+                let found = recording.check_track(&v_track);
+                assert_eq!(found.is_ok(), is_alike, "{} × {factor}: {found:?}", quantity.path());
+                if let Err(other) = found {
+                    assert_eq!(other.quantity, format!("{} is", quantity.path()));
+                    assert_eq!((other.found, other.known), (factor * known, known));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_recording_does_not_state_is_not_compared() {
+        let silent = Recording { nominal: Map::new(), ..recording() };
+        assert_eq!(silent.check_track(&TrackDesign::v_track()), Ok(()));
+        let enlarged = silent.check_track(&TrackDesign::v_track().enlarged(5.0)).unwrap_err();
+        assert_eq!(enlarged.to_string(), "nominal.sleeper.spacing_m is 0.125 m, not 0.625 m");
+        let mut far = recording();
+        far.sleepers.iter_mut().for_each(|sleeper| sleeper.x_m *= 1.12);
+        let far = far.check_track(&TrackDesign::v_track()).unwrap_err().to_string();
+        assert_eq!(far, "the sleepers of the recording lie 0.14 m, not 0.125 m");
+    }
+
+    #[test]
+    fn designs_of_two_scales_differ() {
+        let v_track = TrackDesign::v_track();
+        assert_eq!(compare_designs(&v_track, &v_track), Ok(()));
+        let other = compare_designs(&v_track.enlarged(5.0), &v_track).unwrap_err();
+        assert_eq!((other.found, other.known), (0.625, 0.125));
+    }
+}
