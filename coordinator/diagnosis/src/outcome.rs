@@ -1,6 +1,7 @@
 //! The diagnosis as files and pages have it (`tracktwin-diagnosis/1`).
 
 use crate::behaviour::Element;
+use crate::chain::LossOfContact;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -59,6 +60,9 @@ pub struct Diagnosis {
     pub track: Vec<SleeperValues>,
     /// Measured and predicted levels.
     pub levels: Levels,
+    /// Where the wheel loses contact with the rail; what was fitted there does not hold.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub loss_of_contact: Option<LossOfContact>,
     /// What to keep in mind, in sentences.
     pub notes: Vec<String>,
 }
@@ -184,6 +188,9 @@ pub struct SleeperValues {
     pub ballast_stiffness: BeforeAfter<Estimate>,
     /// Irregularity level.
     pub irregularity_level: BeforeAfter<Estimate>,
+    /// What to keep in mind: `loss_of_contact` where the wheel is in the air.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub flags: Vec<String>,
 }
 
 /// Levels in dB re 1 (m/s2)2: `[speed][sleeper][band]`.

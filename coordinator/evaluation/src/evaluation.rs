@@ -143,6 +143,8 @@ pub enum Flag {
     MissingSpeed,
     /// A mean lies at an end of what the library's tracks have: the track may lie beyond.
     AtEdgeOfRange,
+    /// The wheel is in the air in the sleeper's window: what was recorded there is hardly the track's.
+    LossOfContact,
 }
 
 /// A sleeper without estimates.
@@ -164,6 +166,7 @@ impl Flag {
             Self::ShortMargin => "short margin",
             Self::MissingSpeed => "missing speed",
             Self::AtEdgeOfRange => "at edge of range",
+            Self::LossOfContact => "loss of contact",
         }
     }
 
@@ -174,6 +177,7 @@ impl Flag {
             Self::ShortMargin => "short_margin",
             Self::MissingSpeed => "missing_speed",
             Self::AtEdgeOfRange => "at_edge_of_range",
+            Self::LossOfContact => "loss_of_contact",
         }
     }
 }

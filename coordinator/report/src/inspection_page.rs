@@ -38,6 +38,8 @@ pub struct Inspection {
     pub passes: Vec<Vec<String>>,
     /// Findings.
     pub found: Vec<Inspected>,
+    /// Where the wheel loses contact with the rail, in a sentence.
+    pub loss_of_contact: Option<String>,
     /// What makes passes unusable.
     pub troubles: Vec<String>,
     /// What the recording can be used for, and for what not.
@@ -79,7 +81,10 @@ pub fn inspection_page(inspection: &Inspection) -> String {
 
 fn found(inspection: &Inspection) -> Markup {
     html! {
-        @if inspection.found.is_empty() && inspection.troubles.is_empty() {
+        @if let Some(lost) = &inspection.loss_of_contact {
+            p { strong { code { "loss_of_contact" } } ": " (lost) }
+        }
+        @if inspection.found.is_empty() && inspection.troubles.is_empty() && inspection.loss_of_contact.is_none() {
             p { "Nothing that a faultless chain, a round wheel and a rail without defects wouldn't show (2 % false alarms)." }
         }
         @for trouble in &inspection.troubles { p { strong { "Not usable: " } (trouble) } }
@@ -152,6 +157,7 @@ mod tests {
                 p_value: 1e-9,
                 evidence: "loud".to_owned(),
             }],
+            loss_of_contact: Some("the wheel loses contact".to_owned()),
             troubles: vec![],
             uses: vec!["nothing".to_owned()],
             spectra: vec![curve("one.csv")],
@@ -159,6 +165,7 @@ mod tests {
             unit: "m/s²".to_owned(),
         });
         assert!(page.contains("a &lt; b") && page.contains("<code>squat</code>"));
+        assert!(page.contains("<code>loss_of_contact</code></strong>: the wheel loses contact"));
         assert_eq!(page.matches("<svg xmlns").count(), 2);
         assert!(!page.contains("http://") || !page.contains("src=\"http"));
     }

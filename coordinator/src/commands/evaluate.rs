@@ -8,8 +8,8 @@ use crate::provenance;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tracktwin_diagnosis::chain;
-use tracktwin_evaluation::{Evaluation, check_recording};
+use tracktwin_diagnosis::chain::{self, LossOfContact};
+use tracktwin_evaluation::{Evaluation, Flag, check_recording};
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_library::{Library, without_password};
 use tracktwin_signal::recording::Recording;
@@ -80,6 +80,9 @@ pub(super) async fn evaluate(
     make_folder(folder)?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
     evaluation.notes = notes;
+    if let Some(lost) = chain::loss_of_contact(&recording) {
+        flag(&mut evaluation, &lost, recording.passes.len());
+    }
     let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
     let command = std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>();
     let page = tracktwin_report::evaluation_page(
@@ -97,6 +100,16 @@ pub(super) async fn evaluate(
         tracing::warn!("the library does not keep this evaluation: {error:?}");
     }
     Ok(evaluation)
+}
+
+/// Says where the wheel is in the air, and flags the sleepers there.
+fn flag(evaluation: &mut Evaluation, lost: &LossOfContact, passes: usize) {
+    for sleeper in evaluation.sleepers.iter_mut().filter(|it| lost.sleepers.contains(&it.id)) {
+        sleeper.flags.push(Flag::LossOfContact);
+    }
+    let line = format!("loss_of_contact: {}", lost.sentence(passes));
+    note(&line);
+    evaluation.notes.push(line);
 }
 
 /// The recording without the passes that tell nothing of the track, and a note for what is wrong with

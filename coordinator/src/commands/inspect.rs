@@ -6,6 +6,7 @@ use clap::Args;
 use std::path::PathBuf;
 use tracktwin_diagnosis::{FirstLook, Place, first_look, tells_waves};
 use tracktwin_files::Kind;
+use tracktwin_parameters::TrackDesign;
 use tracktwin_report::{Inspected, InspectedCurve, Inspection, inspection_page};
 use tracktwin_signal::SAMPLES_A_PERIOD;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -63,6 +64,9 @@ fn print(inspection: &Inspection) {
     for trouble in &inspection.troubles {
         say(&format!("not usable: {trouble}"));
     }
+    if let Some(lost) = &inspection.loss_of_contact {
+        say(&format!("loss_of_contact: {lost}"));
+    }
     for found in &inspection.found {
         say(&format!(
             "{} ({}; by chance {:.0e}): {}",
@@ -101,6 +105,7 @@ fn json(recording: &Recording, look: &FirstLook, inspection: &Inspection) -> ser
         "speeds_km_h": recording.speeds_km_h(),
         "sleepers": recording.sleepers.len(),
         "findings": look.findings.iter().map(finding).collect::<Vec<_>>(),
+        "loss_of_contact": look.loss_of_contact,
         "not_usable": inspection.troubles,
         "uses": inspection.uses,
     })
@@ -119,10 +124,18 @@ fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
             speeds.join(", "),
             recording.sample_rate_hz,
             counted(recording.sleepers.len(), "sleeper", "sleepers"),
-            counted(look.findings.len(), "finding", "findings")
+            counted(
+                look.findings.len() + usize::from(look.loss_of_contact.is_some()),
+                "finding",
+                "findings"
+            )
         ),
         passes: passes(recording, look),
         found: look.findings.iter().map(found).collect(),
+        loss_of_contact: look
+            .loss_of_contact
+            .as_ref()
+            .map(|lost| lost.sentence(recording.passes.len())),
         troubles: look.troubles.iter().map(ToString::to_string).collect(),
         uses: uses(recording, look),
         spectra: curves(recording, |pass| spectrum(&pass.signal)),
@@ -193,6 +206,14 @@ fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
     }
     if look.offsets.is_empty() {
         uses.push("no speed has two passes: what repeats can't be told from noise".to_owned());
+    }
+    if let Err(other) = recording.check_track(&TrackDesign::v_track()) {
+        uses.push(format!(
+            "not of V-Track ({} {}, V-Track's {}): `diagnose` compares with V-Track only; `evaluate` takes models of any track",
+            other.quantity,
+            other.found(),
+            other.known()
+        ));
     }
     if uses.is_empty() && look.troubles.is_empty() {
         uses.push("fit for `evaluate` and `diagnose` with models of its speeds".to_owned());

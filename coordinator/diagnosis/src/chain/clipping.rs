@@ -1,11 +1,17 @@
 //! Crests that all stop at one height.
 
+use super::contact::{airborne, is_at_flight_level};
+use super::plateau::Plateaus;
 use super::still::Still;
 use crate::along::{ln_binomial_tail, of_best};
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Thickness of the layer below the greatest value, as a share of it.
 const LAYER: f64 = 0.01;
+
+/// Least level of flat crests, as a share of the greatest value: beyond a recorder's limit there is its noise
+/// alone.
+const TOP: f64 = 0.95;
 
 /// A pass whose crests are cut off.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,12 +32,22 @@ pub struct Clipping {
 ///
 /// Heights of crests become rarer with height: of those in two layers of equal thickness below the
 /// greatest, no more than half are in the upper one, but for chance. And no crest is even for longer
-/// than the recorder's steps make it.
+/// than the recorder's steps make it. A side on which the wheel is in the air, or as good as, is no
+/// recorder's: see [`super::loss_of_contact`].
 pub fn clipping(recording: &Recording, alpha: f64) -> Vec<Clipping> {
+    let flying = airborne(recording);
+    let is_recorder_s = |pass: usize, sign: f64, level: f64| {
+        let flies = flying[pass].as_ref().is_some_and(|found| found.sign * sign > 0.0);
+        !flies && !(sign > 0.0 && is_at_flight_level(recording, level))
+    };
     let passes = recording.passes.iter().enumerate();
-    let sides = passes.flat_map(|(index, pass)| [1.0, -1.0].map(|sign| side(index, pass, sign)));
-    // Two sides, two tests.
-    let tries = 4 * recording.passes.len();
+    let sides = passes.flat_map(|(index, pass)| {
+        let both = [1.0, -1.0].map(|sign| (sign, side(index, pass, sign)));
+        let kept = both.into_iter().filter(|(sign, it)| is_recorder_s(index, *sign, it.level_m_s2));
+        kept.map(|(_, side)| side).collect::<Vec<_>>()
+    });
+    // Two sides, three tests.
+    let tries = 6 * recording.passes.len();
     let cut = sides.map(|side| Clipping { ln_p: of_best(side.ln_p, tries), ..side });
     let mut all: Vec<Clipping> = cut.filter(|side| side.ln_p <= alpha.ln()).collect();
     // One entry a pass: the side that is cut more surely.
@@ -43,13 +59,12 @@ pub fn clipping(recording: &Recording, alpha: f64) -> Vec<Clipping> {
 fn side(index: usize, pass: &Pass, sign: f64) -> Clipping {
     let samples = pass.signal.samples();
     let mean = samples.iter().sum::<f64>() / samples.len() as f64;
-    let value = |index: usize| sign * (samples[index] - mean);
-    let greatest = (0..samples.len()).map(value).fold(0.0, f64::max);
+    let values: Vec<f64> = samples.iter().map(|sample| sign * (sample - mean)).collect();
+    let greatest = values.iter().copied().fold(0.0, f64::max);
     let [upper, lower] = [1.0 - LAYER, 1.0 - 2.0 * LAYER].map(|share| share * greatest);
     let (mut high, mut next, mut within) = (0, 0, 0);
     let mut crest = f64::MIN;
-    for index in 0..samples.len() {
-        let value = value(index);
+    for &value in &values {
         within += usize::from(value > upper);
         // A crest is what lies between two descents below both layers.
         if value > lower {
@@ -68,8 +83,16 @@ fn side(index: usize, pass: &Pass, sign: f64) -> Clipping {
         level_m_s2: sign * greatest + mean,
         crests: high,
         share: within as f64 / samples.len() as f64,
-        ln_p: ln_binomial_tail(high, high + next, 0.5).min(ln_even(samples, sign)),
+        ln_p: ln_binomial_tail(high, high + next, 0.5)
+            .min(ln_even(samples, sign))
+            .min(ln_flat(&values, greatest)),
     }
+}
+
+/// `ln P` of flat crests at the top of all values; certain without any.
+fn ln_flat(values: &[f64], greatest: f64) -> f64 {
+    let found = Plateaus::at_top(values).filter(|found| found.level >= TOP * greatest);
+    found.map_or(0.0, |found| found.ln_p().min(0.0))
 }
 
 /// `ln P` of an even crest as long as the longest at the greatest value; certain without one.

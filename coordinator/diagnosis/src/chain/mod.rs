@@ -5,9 +5,11 @@
 //! resonance of the sensor's mounting needs the track's model and is left to it.
 
 mod clipping;
+mod contact;
 mod gain;
 mod hum;
 mod offset;
+mod plateau;
 mod scale;
 mod still;
 mod stranger;
@@ -15,6 +17,7 @@ mod trouble;
 mod usable;
 
 pub use clipping::{Clipping, clipping};
+pub use contact::{LossOfContact, PassLoss, loss_of_contact};
 pub use gain::{Gain, gains};
 pub use hum::{Hum, hum};
 pub use offset::{Offset, Offsets, offsets};
@@ -35,5 +38,7 @@ pub fn noise_floors(recording: &Recording) -> Vec<Option<f64>> {
     recording.passes.iter().map(floor).collect()
 }
 
+#[cfg(test)]
+mod contact_tests;
 #[cfg(test)]
 mod tests;

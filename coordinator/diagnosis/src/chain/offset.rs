@@ -8,9 +8,11 @@ use rustfft::num_complex::Complex64;
 use std::f64::consts::LN_2;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Band in Hz and shortest wave in m of what is compared: the surface's own sound.
-const LOW_HZ: f64 = 500.0;
-const SHORTEST_M: f64 = 1.2e-3;
+/// Lowest frequency of what is compared, the surface's own sound, times the sleeper spacing, in m/s: 500 Hz
+/// on V-Track. A track's frequencies go with the inverse of its lengths.
+const LOW_M_S: f64 = 62.5;
+/// Shortest wave compared, as a share of the sleeper spacing: 1.2 mm on V-Track.
+const SHORTEST: f64 = 9.6e-3;
 /// Greatest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
 /// Points on the shortest wave.
@@ -19,10 +21,12 @@ const POINTS: f64 = 4.0;
 const REACH_SPACINGS: f64 = 0.5;
 /// Logarithm of the probability of a correlation by chance below which a stretch is matched.
 const MATCHED: f64 = -9.0;
-/// Difference in m of two odometers that is usual: each wanders by three millimetres.
-const USUAL_M: f64 = 6e-3;
-/// Standard deviation in m of that limit: an offset is called an error some way beyond it.
-const USUAL_DEVIATION_M: f64 = 1e-3;
+/// Difference of two odometers that is usual, as a share of the sleeper spacing: each wanders by three
+/// millimetres on V-Track.
+const USUAL: f64 = 0.048;
+/// Standard deviation of that limit, as a share of the spacing: an offset is called an error some way beyond
+/// it.
+const USUAL_DEVIATION: f64 = 8e-3;
 
 /// Where two passes' odometers differ.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,9 +50,18 @@ pub struct Offsets {
     pub stretches: usize,
     /// Median correlation over all stretches.
     pub correlation: f64,
+    /// Lowest frequency compared in Hz.
+    pub low_hz: f64,
+    /// Distance of the sleepers in m.
+    spacing_m: f64,
 }
 
 impl Offsets {
+    /// Difference in m of two odometers that is usual.
+    pub fn usual_m(&self) -> f64 {
+        USUAL * self.spacing_m
+    }
+
     /// Straight line through the offsets: value in m in the middle, slope in m/m.
     pub fn line(&self) -> (f64, f64) {
         let count = self.matched.len().max(1) as f64;
@@ -69,7 +82,7 @@ impl Offsets {
     /// Probability of offsets as great between usual odometers, in logarithm: the normal tail
     /// beyond the usual limit.
     pub fn ln_p(&self) -> f64 {
-        ln_normal_bound((self.greatest_m() - USUAL_M) / USUAL_DEVIATION_M)
+        ln_normal_bound((self.greatest_m() - self.usual_m()) / (USUAL_DEVIATION * self.spacing_m))
     }
 }
 
@@ -85,8 +98,9 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     let from = first.position_m[0].max(second.position_m[0]);
     let last = |pass: &Pass| pass.position_m[pass.position_m.len() - 1];
     let to = last(first).min(last(second));
-    let high = (speed_m_s(first) / SHORTEST_M).min(HIGH_SHARE * recording.sample_rate_hz);
-    let low = LOW_HZ.min(0.25 * high);
+    let shortest_m = SHORTEST * recording.spacing_m;
+    let high = (speed_m_s(first) / shortest_m).min(HIGH_SHARE * recording.sample_rate_hz);
+    let low = (LOW_M_S / recording.spacing_m).min(0.25 * high);
     let step = speed_m_s(first) / high / POINTS;
     let points = ((to - from) / step) as usize;
     let values = |pass: &Pass| -> Option<Vec<Complex64>> {
@@ -99,7 +113,14 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     let reach = (REACH_SPACINGS * recording.spacing_m / step) as usize;
     // Independent values of a stretch: bandwidth times duration.
     let freedom = (high - low) * length as f64 * step / speed_m_s(first);
-    let mut all = Offsets { passes, matched: Vec::new(), stretches: 0, correlation: 0.0 };
+    let mut all = Offsets {
+        passes,
+        matched: Vec::new(),
+        stretches: 0,
+        correlation: 0.0,
+        low_hz: low,
+        spacing_m: recording.spacing_m,
+    };
     let mut correlations = Vec::new();
     let mut start = reach;
     while start + length + reach <= points.min(a.len()).min(b.len()) {

@@ -3,8 +3,8 @@
 use crate::along::{by_speed, ln_normal_bound, speed_m_s};
 use tracktwin_signal::recording::Recording;
 
-/// How far in m an odometer usually wanders over a pass.
-const WANDER_M: f64 = 3e-3;
+/// How far an odometer usually wanders over a pass, as a share of the sleeper spacing: 3 mm on V-Track.
+const WANDER: f64 = 0.024;
 /// Difference of odometer and stated speed that is usual: drives are calibrated to that.
 const USUAL: f64 = 3e-3;
 /// Deviations within which the speeds must agree on the factor: rounded speeds don't.
@@ -35,7 +35,7 @@ pub fn scale(recording: &Recording) -> Option<Scale> {
         positions[positions.len() - 1] - positions[0]
     };
     let shortest = (0..passes.len()).map(length).fold(f64::INFINITY, f64::min);
-    let deviation = WANDER_M / shortest;
+    let deviation = WANDER * recording.spacing_m / shortest;
     let of_pass = |&index: &usize| 3.6 * speed_m_s(&passes[index]) / passes[index].speed_km_h - 1.0;
     let of_speed = |group: &Vec<usize>| group.iter().map(of_pass).sum::<f64>() / group.len() as f64;
     let each: Vec<f64> = groups.iter().map(of_speed).collect();

@@ -1,5 +1,6 @@
 //! Passes that say nothing about the track, and why.
 
+use super::contact::{Airborne, airborne};
 use super::offset::Offsets;
 use super::still::Still;
 use super::stranger::companies;
@@ -13,14 +14,16 @@ const STILL_S: f64 = 2e-3;
 const STILL_LN_P: f64 = -20.0;
 /// Share of samples at the limit above which a pass is saturated.
 const SATURATED: f64 = 0.02;
+/// Share of the time off the rail above which a pass says nothing of the track.
+const AIRBORNE: f64 = 0.5;
 /// Correlation of two passes at one speed below which they have no track in common.
 const UNLIKE: f64 = 0.3;
 /// Coherence of passes at two speeds below which they have no surface in common.
 const STRANGE: f64 = 0.1;
-/// Times the density of its noise floor above which a pass is heard, and up to what frequency in Hz
-/// it must be: lower there is no track to hear, only a vehicle.
+/// Times the density of its noise floor above which a pass is heard, and up to what frequency times the
+/// sleeper spacing in m/s it must be, 80 Hz on V-Track: lower there is no track to hear, only a vehicle.
 const HEARD: f64 = 4.0;
-const HEARD_HZ: f64 = 80.0;
+const HEARD_M_S: f64 = 10.0;
 /// Sleeper spacings that a pass must cover to be compared with itself elsewhere.
 const SPANS_MIN: f64 = 4.0;
 
@@ -53,6 +56,13 @@ pub enum Trouble {
         /// Their share.
         share: f64,
     },
+    /// The wheel is in the air for most of the time: there is hardly a track in it.
+    Airborne {
+        /// Index of the pass.
+        pass: usize,
+        /// Share of the time in the air.
+        share: f64,
+    },
     /// Two passes over the same track at one speed have nothing in common: noise, another track, or
     /// positions that are off by more than half a sleeper spacing.
     Unlike {
@@ -60,6 +70,8 @@ pub enum Trouble {
         passes: [usize; 2],
         /// Their median correlation.
         correlation: f64,
+        /// Lowest frequency compared in Hz.
+        low_hz: f64,
     },
     /// The passes at one speed share no surface with those at any other: noise, another track, or
     /// positions that are off by more than a sleeper spacing.
@@ -101,9 +113,15 @@ impl fmt::Display for Trouble {
                 pass + 1,
                 1e2 * share
             ),
-            Self::Unlike { passes: [first, second], correlation } => write!(
+            Self::Airborne { pass, share } => write!(
                 f,
-                "passes {} and {}, at one speed: their correlation above 500 Hz is {correlation:.2}; noise, another track, or positions off by more than half a sleeper spacing",
+                "pass {}: the wheel is off the rail for {:.0} % of the time; check load and unsprung mass, and record slower or on a smoother rail",
+                pass + 1,
+                1e2 * share
+            ),
+            Self::Unlike { passes: [first, second], correlation, low_hz } => write!(
+                f,
+                "passes {} and {}, at one speed: their correlation above {low_hz:.0} Hz is {correlation:.2}; noise, another track, or positions off by more than half a sleeper spacing",
                 first + 1,
                 second + 1
             ),
@@ -130,11 +148,14 @@ pub fn troubles(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
 /// What each pass suffers from by itself.
 pub(super) fn of_passes(recording: &Recording) -> Vec<Trouble> {
     let passes = recording.passes.iter().enumerate();
-    let mut all: Vec<Trouble> =
-        passes.flat_map(|(index, pass)| of_pass(index, pass, recording.spacing_m)).collect();
+    let flying = airborne(recording);
+    let mut all: Vec<Trouble> = passes
+        .flat_map(|(index, pass)| of_pass(index, pass, recording.spacing_m, flying[index].as_ref()))
+        .collect();
     let speeds = by_speed(&recording.passes);
     let alone = speeds.iter().filter(|passes| passes.len() == 1).map(|passes| passes[0]);
-    let noise = alone.filter(|&pass| is_noise(&recording.passes[pass]));
+    let heard_hz = HEARD_M_S / recording.spacing_m;
+    let noise = alone.filter(|&pass| is_noise(&recording.passes[pass], heard_hz));
     all.extend(noise.map(|pass| Trouble::Noise { pass }));
     all
 }
@@ -148,7 +169,11 @@ pub(super) fn between_passes(recording: &Recording, offsets: &[Offsets]) -> Vec<
     let mut all: Vec<Trouble> = offsets
         .iter()
         .filter(unlike)
-        .map(|offsets| Trouble::Unlike { passes: offsets.passes, correlation: offsets.correlation })
+        .map(|offsets| Trouble::Unlike {
+            passes: offsets.passes,
+            correlation: offsets.correlation,
+            low_hz: offsets.low_hz,
+        })
         .collect();
     let companies = companies(recording);
     let strangers = companies.iter().filter(|company| company.coherence < STRANGE);
@@ -159,7 +184,7 @@ pub(super) fn between_passes(recording: &Recording, offsets: &[Offsets]) -> Vec<
     all
 }
 
-fn of_pass(index: usize, pass: &Pass, spacing_m: f64) -> Vec<Trouble> {
+fn of_pass(index: usize, pass: &Pass, spacing_m: f64, flying: Option<&Airborne>) -> Vec<Trouble> {
     let samples = pass.signal.samples();
     let length_m = pass.position_m[samples.len() - 1] - pass.position_m[0];
     let mut all = Vec::new();
@@ -170,7 +195,11 @@ fn of_pass(index: usize, pass: &Pass, spacing_m: f64) -> Vec<Trouble> {
         all.push(Trouble::Dead { pass: index });
         return all;
     }
-    let share = share_at_limits(samples);
+    if let Some(share) = flying.map(Airborne::share).filter(|share| *share > AIRBORNE) {
+        all.push(Trouble::Airborne { pass: index, share });
+        return all;
+    }
+    let share = share_at_limits(samples, flying.map(|found| found.sign));
     if share > SATURATED {
         all.push(Trouble::Saturated { pass: index, share });
         return all;
@@ -181,14 +210,20 @@ fn of_pass(index: usize, pass: &Pass, spacing_m: f64) -> Vec<Trouble> {
 
 /// Whether nothing stands out of the noise floor. Of a pass that another repeats, that other tells
 /// better.
-fn is_noise(pass: &Pass) -> bool {
+fn is_noise(pass: &Pass, heard_hz: f64) -> bool {
     let background = Background::of(&pass.signal);
-    background.is_some_and(|background| background.audible_hz(HEARD) < HEARD_HZ)
+    background.is_some_and(|background| background.audible_hz(HEARD) < heard_hz)
 }
 
-/// Share of samples that have exactly the greatest or the least value.
-fn share_at_limits(samples: &[f64]) -> f64 {
-    let ends = samples.iter().fold([f64::MAX, f64::MIN], |e, s| [e[0].min(*s), e[1].max(*s)]);
+/// Share of samples that have exactly the greatest or the least value; a side on which the wheel is in the
+/// air has no limit.
+fn share_at_limits(samples: &[f64], airborne_sign: Option<f64>) -> f64 {
+    let mut ends = samples.iter().fold([f64::MAX, f64::MIN], |e, s| [e[0].min(*s), e[1].max(*s)]);
+    match airborne_sign {
+        Some(sign) if sign > 0.0 => ends[1] = f64::NAN,
+        Some(_) => ends[0] = f64::NAN,
+        None => {}
+    }
     samples.iter().filter(|sample| ends.contains(sample)).count() as f64 / samples.len() as f64
 }
 

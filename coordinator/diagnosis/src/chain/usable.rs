@@ -46,6 +46,7 @@ fn about(trouble: &Trouble, recording: &Recording) -> Vec<usize> {
         | Trouble::Dead { pass }
         | Trouble::Noise { pass }
         | Trouble::Saturated { pass, .. }
+        | Trouble::Airborne { pass, .. }
         | Trouble::Short { pass, .. } => vec![pass],
         Trouble::Unlike { passes, .. } => passes.to_vec(),
         Trouble::Stranger { speed_km_h, .. } => {

@@ -1,7 +1,7 @@
 //! What the passes tell by themselves where no model of the track can be compared with them.
 
 use super::finding::{probability, seen};
-use super::notes::{one_speed, shown};
+use super::notes::{lost, one_speed, shown};
 use super::{ONE_PASS_MAX, ONE_SPEED_MAX, verdict};
 use crate::finding::{Finding, Place};
 use crate::first_look::FirstLook;
@@ -48,6 +48,7 @@ pub fn passes_alone(
         notes.push("The unit of the signal is not known: amplitudes are relative.".to_owned());
     }
     notes.extend(look.troubles.iter().map(ToString::to_string));
+    notes.extend(lost(look, recording));
     notes.extend(look.findings.iter().map(shown));
     Some(Diagnosis {
         format: FORMAT.to_owned(),
@@ -61,6 +62,7 @@ pub fn passes_alone(
         bias_removed: BTreeMap::new(),
         track: Vec::new(),
         levels: Levels::default(),
+        loss_of_contact: look.loss_of_contact.clone(),
         notes,
     })
 }

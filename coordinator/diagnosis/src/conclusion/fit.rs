@@ -118,6 +118,14 @@ impl Evidence<'_> {
         ])
     }
 
+    /// What to keep in mind about a sleeper's estimates.
+    fn flags(&self, sleeper: usize) -> Vec<String> {
+        let id = self.id(sleeper);
+        let lost = self.look.loss_of_contact.as_ref();
+        let flies = lost.is_some_and(|lost| lost.sleepers.contains(&id));
+        flies.then(|| "loss_of_contact".to_owned()).into_iter().collect()
+    }
+
     pub(super) fn track(&self) -> Vec<SleeperValues> {
         let unknowns = &self.subject.forward.unknowns;
         let (before, after) = (&self.search.baseline, &self.search.last);
@@ -140,6 +148,7 @@ impl Evidence<'_> {
                 railpad_stiffness: both(unknowns.railpad().start + sleeper),
                 ballast_stiffness: both(unknowns.ballast().start + sleeper),
                 irregularity_level: both(unknowns.level().start + sleeper),
+                flags: self.flags(sleeper),
             })
             .collect()
     }

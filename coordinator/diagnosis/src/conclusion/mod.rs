@@ -70,8 +70,8 @@ impl Evidence<'_> {
         let bias_removed = self.bias_removed(&hypotheses);
         let sleepers = self.subject.forward.section.sleepers;
         let nothing_left_out = self.nothing(&hypotheses).min(most);
-        let sentence =
-            sentence(verdict, &hypotheses, nothing_left_out, sleepers, &fit, &bias_removed);
+        let said = sentence(verdict, &hypotheses, nothing_left_out, sleepers, &fit, &bias_removed);
+        let sentence = said + &airborne(self.look);
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
             recording: self.recording.name.clone(),
@@ -84,6 +84,7 @@ impl Evidence<'_> {
             bias_removed,
             track: self.track(),
             levels,
+            loss_of_contact: self.look.loss_of_contact.clone(),
             notes: self.notes(),
         })
     }
@@ -168,6 +169,15 @@ fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
         Some(kind) if kind.measuring_chain => Verdict::MeasurementChain,
         Some(_) => Verdict::LeftOutPhysics,
     }
+}
+
+/// That the wheel is in the air somewhere, which no fit knows.
+fn airborne(look: &FirstLook) -> String {
+    let Some(lost) = &look.loss_of_contact else { return String::new() };
+    let [from_m, to_m] = lost.reach_m();
+    format!(
+        " The wheel loses contact with the rail from {from_m:.2} to {to_m:.2} m, where no linear fit holds."
+    )
 }
 
 fn names(kind: &Kind) -> Vec<String> {

@@ -2,7 +2,9 @@
 
 use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
 use crate::finding::Finding;
+use crate::first_look::FirstLook;
 use crate::port_scan::PortPlace;
+use tracktwin_signal::recording::Recording;
 
 /// Ratio of two speeds that tells structure from geometry well.
 const SPEED_RATIO: f64 = 1.35;
@@ -20,6 +22,7 @@ impl Evidence<'_> {
                 100.0 * ONE_PASS_MAX
             ));
         }
+        notes.extend(lost(self.look, self.recording));
         notes.extend(self.apart().or_else(|| self.remainder()));
         notes.extend(self.look.findings.iter().map(shown));
         notes
@@ -58,6 +61,15 @@ impl Evidence<'_> {
         );
         (!round.accepted).then_some(left)
     }
+}
+
+/// Where the wheel is in the air.
+pub(super) fn lost(look: &FirstLook, recording: &Recording) -> Option<String> {
+    let lost = look.loss_of_contact.as_ref()?;
+    Some(format!(
+        "loss_of_contact: {}: what was fitted near there says little.",
+        lost.sentence(recording.passes.len())
+    ))
 }
 
 /// A finding as a sentence.

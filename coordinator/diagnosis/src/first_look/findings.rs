@@ -84,10 +84,11 @@ pub(super) fn offset_finding(pair: &Offsets) -> Finding {
         place: Place::Everywhere,
         parameters: BTreeMap::from([("offset_m", (offset, 1e-3)), ("scale", (scale, 1e-3))]),
         evidence: format!(
-            "the odometers of passes {} and {} differ by up to {greatest_mm:.1} mm over the same surface ({offset_mm:+.1} mm in the middle, {:+.2} %); 6 mm are usual",
+            "the odometers of passes {} and {} differ by up to {greatest_mm:.1} mm over the same surface ({offset_mm:+.1} mm in the middle, {:+.2} %); {:.0} mm are usual",
             pair.passes[0] + 1,
             pair.passes[1] + 1,
-            1e2 * scale
+            1e2 * scale,
+            1e3 * pair.usual_m()
         ),
     }
 }

@@ -8,7 +8,7 @@ use self::findings::{
     clipping_finding, comb_finding, corrugation_finding, flat_finding, gain_finding, hum_finding,
     impact_finding, offset_finding, order_finding, scale_finding,
 };
-use crate::chain::{Gain, Offsets, Trouble};
+use crate::chain::{Gain, LossOfContact, Offsets, Trouble};
 use crate::finding::Finding;
 use crate::wheel::{Comb, Flat, Order};
 use crate::{chain, impact, wheel};
@@ -33,6 +33,9 @@ pub struct FirstLook {
     pub nameless: Vec<Finding>,
     /// The wheel's flat with the places of its blows, if it has one.
     pub flat: Option<Flat>,
+    /// Where the wheel loses contact with the rail, if it does: neither chain nor physics of the track, but
+    /// no linear model holds there.
+    pub loss_of_contact: Option<LossOfContact>,
     /// Passes that can't be used, and why.
     pub troubles: Vec<Trouble>,
     /// Noise floor of each pass in (m/s2)2/Hz.
@@ -103,6 +106,7 @@ pub fn first_look(recording: &Recording) -> FirstLook {
         findings,
         nameless: Vec::new(),
         flat,
+        loss_of_contact: chain::loss_of_contact(recording),
         troubles: chain::troubles(recording, &offsets),
         noise_floors: chain::noise_floors(recording),
         gains,

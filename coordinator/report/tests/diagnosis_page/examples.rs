@@ -67,6 +67,7 @@ fn track(biased: impl Fn(usize) -> f64) -> Vec<SleeperValues> {
             railpad_stiffness: both(1.5e8 * wave, 0.05, biased(index)),
             ballast_stiffness: both(1.2e7 / wave, 0.04, biased(index).sqrt()),
             irregularity_level: both(3.0, 0.06, biased(index).powf(0.8)),
+            flags: Vec::new(),
         }
     };
     (0..SLEEPERS).map(sleeper).collect()
@@ -122,6 +123,7 @@ pub(crate) fn consistent() -> Diagnosis {
         bias_removed: BTreeMap::new(),
         track: track(|_| 1.0),
         levels: levels(|_| 0.0),
+        loss_of_contact: None,
         notes: vec!["Below 150 Hz a level scatters by 4 dB: what acts only there may stay unseen.".to_owned()],
     }
 }
@@ -177,6 +179,7 @@ pub(crate) fn left_out() -> Diagnosis {
         ]),
         track: track(|index| if (13..15).contains(&index) { 0.56 } else { 1.0 }),
         levels: levels(joint),
+        loss_of_contact: None,
         notes: vec!["The dip's length is hardly known apart from its depth.".to_owned()],
         ..consistent()
     }

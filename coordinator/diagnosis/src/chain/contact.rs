@@ -1,0 +1,278 @@
+//! A wheel in the air: its acceleration stays at the load over the unsprung mass, for nothing else pushes it.
+//!
+//! A recorder at its limit makes plateaus too. It does so on both sides, or at any level, and nothing it
+//! records lies beyond; a wheel in the air makes them on one side only, at one level, and lands with blows
+//! that reach further the other way.
+
+use super::plateau::Plateaus;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use tracktwin_signal::recording::{Pass, Recording};
+
+/// Relative difference of a level from the load over the unsprung mass up to which it is the same: what is
+/// stated of load, mass and gain is known to a few per cent.
+const NEAR: f64 = 0.03;
+/// Greatest factor between the two where load, mass or gain are not as stated.
+const OFF_MAX: f64 = 2.0;
+/// Times the level that the recording reaches on the other side, if the level is not its recorder's limit.
+const BEYOND: f64 = 1.05;
+/// Flat crests in a pass from which a level is known that nothing is stated about.
+const CRESTS_MIN: usize = 2;
+/// Share of equal neighbours in a plateau from which a recorder holds the value.
+const HELD: f64 = 0.8;
+/// Parts of a pass in which its noise is looked for.
+const PARTS: usize = 16;
+/// Least noise, as a share of the level, from which that can be told.
+const NOISE_MIN: f64 = 1e-4;
+/// Sleeper spacings up to which two flights are one stretch.
+const APART: f64 = 1.0;
+
+/// Loss of contact between wheel and rail.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LossOfContact {
+    /// Acceleration in m/s2 of the wheel in the air, positive as the recording has it.
+    pub level_m_s2: f64,
+    /// Load over unsprung mass in m/s2, where the recording states both.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub expected_m_s2: Option<f64>,
+    /// Speeds at which contact is lost in km/h, ascending.
+    pub speeds_km_h: Vec<f64>,
+    /// Stretches of the track in m, over all passes.
+    pub x_m: Vec<[f64; 2]>,
+    /// The sleepers in whose windows the wheel is in the air.
+    pub sleepers: Vec<String>,
+    /// The passes in which contact is lost.
+    pub passes: Vec<PassLoss>,
+}
+
+/// Loss of contact in one pass.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PassLoss {
+    /// Number of the pass in the recording, from 1.
+    pub pass: usize,
+    /// Its speed in km/h.
+    pub speed_km_h: f64,
+    /// Share of its time in the air, 0 to 1.
+    pub share: f64,
+    /// Longest time in the air at once in s.
+    pub longest_s: f64,
+    /// From where to where in m the wheel is in the air.
+    pub x_m: Vec<[f64; 2]>,
+}
+
+impl LossOfContact {
+    /// The pass that is in the air for the greatest part of its time.
+    pub fn worst(&self) -> Option<&PassLoss> {
+        self.passes.iter().max_by(|a, b| a.share.total_cmp(&b.share))
+    }
+
+    /// Longest time in the air at once in s.
+    pub fn longest_s(&self) -> f64 {
+        self.passes.iter().map(|pass| pass.longest_s).fold(0.0, f64::max)
+    }
+
+    /// What a reader has to know of it, where so many passes were recorded.
+    pub fn sentence(&self, recorded: usize) -> String {
+        let speeds: Vec<String> = self.speeds_km_h.iter().map(|it| format!("{it:.1}")).collect();
+        let [from_m, to_m] = self.reach_m();
+        let share = self.worst().map_or(0.0, |pass| 1e2 * pass.share);
+        format!(
+            "the wheel loses contact with the rail in {} of {recorded} passes (at {} km/h), from {from_m:.3} to {to_m:.3} m{}, for up to {:.1} ms at a time and {share:.1} % of the time; its acceleration then stays at {:.1} m/s2{}. No linear model of the track holds there",
+            self.passes.len(),
+            speeds.join(", "),
+            self.near(),
+            1e3 * self.longest_s(),
+            self.level_m_s2,
+            self.compared(),
+        )
+    }
+
+    /// From the first place to the last in m where the wheel is in the air.
+    pub fn reach_m(&self) -> [f64; 2] {
+        self.x_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[first, last], [from, to]| {
+            [first.min(*from), last.max(*to)]
+        })
+    }
+
+    fn near(&self) -> String {
+        match &self.sleepers[..] {
+            [] => String::new(),
+            [only] => format!(", near {only}"),
+            [first, .., last] => format!(", near {first} to {last}"),
+        }
+    }
+
+    /// The level beside what load and mass say.
+    fn compared(&self) -> String {
+        let Some(expected) = self.expected_m_s2 else { return String::new() };
+        let off = self.level_m_s2.abs() / expected - 1.0;
+        let known = format!(", where load over unsprung mass is {expected:.1} m/s2");
+        if off.abs() > NEAR {
+            let percent = 1e2 * off;
+            return known + &format!(" as stated: load, mass or gain are off by {percent:+.0} %");
+        }
+        if self.level_m_s2 < 0.0 { known + ", upwards: the sensor's sign is turned" } else { known }
+    }
+}
+
+/// Where a recording's wheel loses contact with the rail; none where it does not.
+pub fn loss_of_contact(recording: &Recording) -> Option<LossOfContact> {
+    let airborne = airborne(recording);
+    let lost = airborne.iter().enumerate().filter_map(|(pass, it)| Some((pass, it.as_ref()?)));
+    let sign = lost.clone().next()?.1.sign;
+    let passes: Vec<PassLoss> =
+        lost.clone().map(|(pass, found)| pass_loss(recording, pass, found)).collect();
+    let levels: Vec<f64> = lost.map(|(_, found)| found.plateaus.level).collect();
+    let mut speeds_km_h: Vec<f64> = passes.iter().map(|pass| pass.speed_km_h).collect();
+    speeds_km_h.sort_by(f64::total_cmp);
+    speeds_km_h.dedup();
+    let half_m = 0.5 * recording.spacing_m;
+    let flies_over = |x_m: f64| {
+        let mut flights = passes.iter().flat_map(|pass| &pass.x_m);
+        flights.any(|[from, to]| from - half_m <= x_m && x_m <= to + half_m)
+    };
+    let sleepers = recording.sleepers.iter().filter(|sleeper| flies_over(sleeper.x_m));
+    Some(LossOfContact {
+        level_m_s2: sign * levels.iter().sum::<f64>() / levels.len() as f64,
+        expected_m_s2: expected_m_s2(recording),
+        speeds_km_h,
+        x_m: stretches(&passes, APART * recording.spacing_m),
+        sleepers: sleepers.map(|sleeper| sleeper.id.clone()).collect(),
+        passes,
+    })
+}
+
+/// Load over unsprung mass in m/s2; none where the recording does not state them or has no unit.
+fn expected_m_s2(recording: &Recording) -> Option<f64> {
+    let [load_n, mass_kg] =
+        ["load_N", "mass_kg"].map(|name| recording.nominal_value("wheel", name));
+    let level = load_n? / mass_kg?;
+    (recording.gain_known() && level.is_finite() && level > 0.0).then_some(level)
+}
+
+/// Whether a wheel in the air has this acceleration in m/s2, by what the recording states: no limit can be
+/// told from it.
+pub(super) fn is_at_flight_level(recording: &Recording, level_m_s2: f64) -> bool {
+    expected_m_s2(recording).is_some_and(|level| (level_m_s2 / level - 1.0).abs() <= NEAR)
+}
+
+/// A pass whose wheel is in the air.
+#[derive(Debug)]
+pub(super) struct Airborne {
+    /// Side of the plateaus: 1 for positive accelerations.
+    pub(super) sign: f64,
+    plateaus: Plateaus,
+    samples: usize,
+}
+
+impl Airborne {
+    /// Share of the pass's time in the air, 0 to 1.
+    pub(super) fn share(&self) -> f64 {
+        self.plateaus.samples as f64 / self.samples as f64
+    }
+}
+
+/// What shows of each pass that its wheel is in the air.
+pub(super) fn airborne(recording: &Recording) -> Vec<Option<Airborne>> {
+    let (expected, ends) = (expected_m_s2(recording), ends(recording));
+    recording.passes.iter().map(|pass| of_pass(pass, expected, ends)).collect()
+}
+
+fn of_pass(pass: &Pass, expected: Option<f64>, [least, greatest]: [f64; 2]) -> Option<Airborne> {
+    let (upright, samples) = (side(pass, 1.0), pass.signal.len());
+    let is_limit = |plateaus: &Plateaus, reach: f64| reach < BEYOND * plateaus.level;
+    let near = |plateaus: &Plateaus| {
+        expected.is_some_and(|level| (plateaus.level / level - 1.0).abs() <= NEAR)
+    };
+    let known = |values: &[f64]| {
+        let found = Plateaus::at(values, expected?);
+        (!found.crests.is_empty() && near(&found)).then_some(found)
+    };
+    if let Some(plateaus) = known(&upright) {
+        return Some(Airborne { sign: 1.0, plateaus, samples });
+    }
+    // Nothing is stated of the level, or not the truth: shape has to tell.
+    let unknown = Plateaus::at_top(&upright).filter(|found| {
+        let may_be = |level: f64| (1.0 / OFF_MAX..=OFF_MAX).contains(&(found.level / level));
+        found.crests.len() >= CRESTS_MIN
+            && expected.is_none_or(may_be)
+            && !is_limit(found, -least)
+            && !is_held(pass, &found.crests)
+    });
+    if let Some(plateaus) = unknown {
+        return Some(Airborne { sign: 1.0, plateaus, samples });
+    }
+    // A sensor mounted upside down.
+    let plateaus = known(&side(pass, -1.0)).filter(|found| !is_limit(found, greatest))?;
+    Some(Airborne { sign: -1.0, plateaus, samples })
+}
+
+/// A pass's accelerations about their mean, with a sign.
+fn side(pass: &Pass, sign: f64) -> Vec<f64> {
+    let samples = pass.signal.samples();
+    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+    samples.iter().map(|sample| sign * (sample - mean)).collect()
+}
+
+/// The least and the greatest acceleration of all passes, each about its mean: one recorder has them all.
+fn ends(recording: &Recording) -> [f64; 2] {
+    recording.passes.iter().fold([0.0, 0.0], |[least, greatest], pass| {
+        let values = side(pass, 1.0);
+        let of = |fold: fn(f64, f64) -> f64, from: f64| values.iter().copied().fold(from, fold);
+        [of(f64::min, least), of(f64::max, greatest)]
+    })
+}
+
+/// Whether a recorder holds a value there: neighbouring samples are equal, though the pass has noise.
+fn is_held(pass: &Pass, crests: &[Range<usize>]) -> bool {
+    let samples = pass.signal.samples();
+    let inside = crests.iter().flat_map(|crest| samples[crest.clone()].windows(2));
+    let (mut equal, mut pairs) = (0_u32, 0_u32);
+    for pair in inside {
+        equal += u32::from(pair[0] == pair[1]);
+        pairs += 1;
+    }
+    let level = crests.first().map_or(0.0, |crest| samples[crest.start].abs());
+    f64::from(equal) >= HELD * f64::from(pairs) && noise(samples) > NOISE_MIN * level
+}
+
+/// Standard deviation of a pass's noise, from fourth differences where it is quietest: they hardly hear what
+/// is slower.
+fn noise(samples: &[f64]) -> f64 {
+    let of_part = |part: &[f64]| {
+        let fourth = |w: &[f64]| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
+        let square: f64 = part.windows(5).map(|window| fourth(window).powi(2)).sum();
+        // The squares of the factors add up to 70.
+        (square / 70.0 / part.len() as f64).sqrt()
+    };
+    let length = (samples.len() / PARTS).max(5);
+    samples.chunks_exact(length).map(of_part).fold(f64::INFINITY, f64::min)
+}
+
+fn pass_loss(recording: &Recording, index: usize, found: &Airborne) -> PassLoss {
+    let pass = &recording.passes[index];
+    let x_m = |crest: &Range<usize>| [pass.position_m[crest.start], pass.position_m[crest.end - 1]];
+    let crests = &found.plateaus.crests;
+    let longest = crests.iter().map(Range::len).max().unwrap_or(0);
+    PassLoss {
+        pass: index + 1,
+        speed_km_h: pass.speed_km_h,
+        share: found.share(),
+        longest_s: longest as f64 / pass.signal.sample_rate_hz(),
+        x_m: crests.iter().map(x_m).collect(),
+    }
+}
+
+/// Stretches of all flights, those less than `apart_m` from each other as one.
+fn stretches(passes: &[PassLoss], apart_m: f64) -> Vec<[f64; 2]> {
+    let mut flights: Vec<[f64; 2]> = passes.iter().flat_map(|pass| pass.x_m.clone()).collect();
+    flights.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut joined: Vec<[f64; 2]> = Vec::new();
+    for [from, to] in flights {
+        match joined.last_mut() {
+            Some(last) if from - last[1] <= apart_m => last[1] = last[1].max(to),
+            _ => joined.push([from, to]),
+        }
+    }
+    joined
+}
