@@ -243,6 +243,7 @@ impl<'a> Section<'a> {
             sleepers: (1..=1 + SECTION_SPANS).map(sleeper).collect(),
             nominal: serde_json::Map::new(),
             spacing_m: self.spacing_m(),
+            doubts: Vec::new(),
         }
     }
 }

@@ -9,6 +9,7 @@ use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use tracktwin_number::significant;
 
 /// Share of what a free dynamic stiffness explains from which something behaves like an element.
 const ALIKE: f64 = 0.5;
@@ -152,7 +153,7 @@ impl Element {
         let value = |name: &str| parameters.get(name).map(|parameter| parameter.mean);
         let quantity = |name: &str, unit: &str, scale: f64, thing: &str| {
             let value = value(name)? / scale;
-            let size = significant(value.abs());
+            let size = significant(value.abs(), 2);
             Some(if value >= 0.0 {
                 format!("acts like {thing} of {size} {unit}")
             } else {
@@ -165,18 +166,13 @@ impl Element {
             Self::Mass => quantity("mass_kg", "kg", 1.0, "a mass"),
             Self::MassOnSpring => {
                 let mass = quantity("mass_kg", "kg", 1.0, "a mass")?;
-                Some(format!("{mass} on a spring, at {} Hz", significant(value("frequency_Hz")?)))
+                Some(format!(
+                    "{mass} on a spring, at {} Hz",
+                    significant(value("frequency_Hz")?, 2)
+                ))
             }
         }
     }
-}
-
-/// A value above zero with two digits that mean something.
-fn significant(value: f64) -> String {
-    let digits = 1.0 - value.log10().floor();
-    let step = 10_f64.powf(-digits);
-    let shown = digits.clamp(0.0, 9.0) as usize;
-    format!("{:.shown$}", (value / step).round() * step)
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Why a recording cannot be evaluated.
 
+use tracktwin_number::rounded;
 use tracktwin_signal::FeatureError;
 use tracktwin_signal::recording::OtherTrack;
 
@@ -8,7 +9,8 @@ use tracktwin_signal::recording::OtherTrack;
 pub enum Error {
     /// The passes have a speed for which there is no model.
     #[error(
-        "the recording {recording} has passes at {speed_km_h} km/h; the models know {} km/h (within 2 %)",
+        "the recording {recording} has passes at {} km/h; the models know {} km/h (within 2 %)",
+        rounded(*speed_km_h, 4),
         join(known)
     )]
     UnknownSpeed {
@@ -67,5 +69,5 @@ pub enum Error {
 }
 
 fn join(speeds: &[f64]) -> String {
-    speeds.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    speeds.iter().map(|speed| rounded(*speed, 4)).collect::<Vec<_>>().join(", ")
 }

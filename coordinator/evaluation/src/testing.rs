@@ -66,6 +66,7 @@ pub(crate) fn recording(level: f64, speeds_km_h: &[f64]) -> Recording {
         sleepers: (0..7).map(sleeper).collect(),
         nominal: serde_json::Map::new(),
         spacing_m: 0.125,
+        doubts: Vec::new(),
     }
 }
 

@@ -7,6 +7,7 @@ use crate::spectrum_picture::{chosen, spectrum_chart};
 use crate::track_picture::track_charts;
 use maud::{Markup, html};
 use tracktwin_evaluation::{Estimate, Evaluation, Flag, SleeperEvaluation};
+use tracktwin_number::rounded;
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::Recording;
@@ -44,7 +45,7 @@ pub fn evaluation_page(
 /// What a reader in a hurry needs, in one sentence.
 fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
     let speeds: Vec<String> =
-        evaluation.provenance.speeds_km_h.iter().map(ToString::to_string).collect();
+        evaluation.provenance.speeds_km_h.iter().map(|speed| rounded(*speed, 4)).collect();
     let ranges: Vec<String> = evaluation
         .parameters()
         .into_iter()

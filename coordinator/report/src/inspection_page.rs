@@ -42,6 +42,8 @@ pub struct Inspection {
     pub loss_of_contact: Option<String>,
     /// What makes passes unusable.
     pub troubles: Vec<String>,
+    /// What was mended while it was read, or is doubtful.
+    pub doubts: Vec<String>,
     /// What the recording can be used for, and for what not.
     pub uses: Vec<String>,
     /// Power spectral density in dB by frequency in Hz, a curve a pass.
@@ -73,6 +75,10 @@ pub fn inspection_page(inspection: &Inspection) -> String {
         div.scroll { (table(&inspection.passes)) }
         h2 { "What the passes tell by themselves" }
         (found(inspection))
+        @if !inspection.doubts.is_empty() {
+            h2 { "What was mended, or is doubtful" }
+            ul { @for text in &inspection.doubts { li { (text) } } }
+        }
         h2 { "What it can be used for" }
         ul { @for text in &inspection.uses { li { (text) } } }
     };
@@ -94,7 +100,7 @@ fn found(inspection: &Inspection) -> Markup {
                 @for one in &inspection.found {
                     tr {
                         td { code { (one.physics) } } td.words { (one.place) }
-                        td { (format!("{:.0e}", one.p_value)) }
+                        td { (tracktwin_number::chance(one.p_value)) }
                         td.words style="white-space:normal" { (one.evidence) }
                     }
                 }
@@ -154,11 +160,12 @@ mod tests {
             found: vec![Inspected {
                 physics: "squat".to_owned(),
                 place: "1.7 m".to_owned(),
-                p_value: 1e-9,
+                p_value: 0.0,
                 evidence: "loud".to_owned(),
             }],
             loss_of_contact: Some("the wheel loses contact".to_owned()),
             troubles: vec![],
+            doubts: vec!["positions in steps".to_owned()],
             uses: vec!["nothing".to_owned()],
             spectra: vec![curve("one.csv")],
             levels: vec![curve("one.csv")],
@@ -166,6 +173,7 @@ mod tests {
         });
         assert!(page.contains("a &lt; b") && page.contains("<code>squat</code>"));
         assert!(page.contains("<code>loss_of_contact</code></strong>: the wheel loses contact"));
+        assert!(page.contains("<td>below 1e-12</td>") && page.contains("positions in steps"));
         assert_eq!(page.matches("<svg xmlns").count(), 2);
         assert!(!page.contains("http://") || !page.contains("src=\"http"));
     }

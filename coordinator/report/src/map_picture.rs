@@ -5,6 +5,7 @@ use crate::chart::Chart;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use std::ops::Range;
+use tracktwin_number::rounded;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, TimeFrequencyMap};
 
@@ -62,7 +63,7 @@ impl<'a> Stretch<'a> {
         let positions = self.positions();
         let x = Axis::linear("position in m", positions[0], positions[positions.len() - 1]);
         let pass = &self.recording.passes[self.pass];
-        let title = format!("{title}, {} km/h ({})", pass.speed_km_h, pass.file);
+        let title = format!("{title}, {} km/h ({})", rounded(pass.speed_km_h, 4), pass.file);
         Chart::new(&title, [SIZE[0], height], x, y)
     }
 

@@ -1,4 +1,4 @@
-//! Numbers as a person reads them: three significant digits, units with prefixes.
+//! Estimates of parameters as a person reads them: units with prefixes, digits as they are known.
 
 use tracktwin_evaluation::Estimate;
 use tracktwin_parameters::Parameter;
@@ -27,30 +27,19 @@ impl Shown {
     /// Mean and standard deviation as `148 ± 12`.
     pub(crate) fn estimate(&self, estimate: Estimate) -> String {
         let (mean, sd) = (estimate.mean / self.divisor, estimate.sd / self.divisor);
-        let decimals = decimals(mean, 3);
+        let decimals = tracktwin_number::decimals(mean, 3);
         format!("{mean:.decimals$} ± {sd:.decimals$}")
     }
 }
 
 /// The number with three significant digits.
 pub(crate) fn significant(value: f64) -> String {
-    let decimals = decimals(value, 3);
-    format!("{value:.decimals$}")
+    tracktwin_number::significant(value, 3)
 }
 
 /// A share, 0 to 1, in percent with two significant digits.
 pub fn percent(share: f64) -> String {
-    let value = 100.0 * share;
-    let decimals = decimals(value, 2);
-    format!("{value:.decimals$} %")
-}
-
-/// Decimals that show `digits` significant digits of `value`.
-fn decimals(value: f64, digits: i32) -> usize {
-    if value == 0.0 || !value.is_finite() {
-        return 0;
-    }
-    (digits - 1 - value.abs().log10().floor() as i32).max(0) as usize
+    format!("{} %", tracktwin_number::significant(100.0 * share, 2))
 }
 
 #[cfg(test)]

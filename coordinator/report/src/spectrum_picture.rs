@@ -3,6 +3,7 @@
 use crate::axis::Axis;
 use crate::chart::Chart;
 use tracktwin_evaluation::{Measured, SleeperEvaluation};
+use tracktwin_number::rounded;
 
 const SIZE: [f64; 2] = [560.0, 300.0];
 
@@ -32,7 +33,7 @@ pub(crate) fn spectrum_chart(
     };
     let all = measured.matches.iter().chain([&measured.log_power]).flatten();
     let y = Axis::around("LWPS in dB re 1 (m/s²)²", all.map(|value| decibel * value));
-    let title = format!("{} at {} km/h", sleeper.id, measured.speed_km_h);
+    let title = format!("{} at {} km/h", sleeper.id, rounded(measured.speed_km_h, 4));
     let x = Axis::logarithmic("frequency in Hz", low, high);
     let mut chart = Chart::new(&title, SIZE, x, y);
     for matched in &measured.matches {

@@ -45,6 +45,7 @@ fn recording() -> Recording {
         sleepers,
         nominal: serde_json::Map::new(),
         spacing_m: 0.125,
+        doubts: Vec::new(),
     }
 }
 

@@ -3,7 +3,7 @@
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::Progress;
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, note, say};
 use crate::diagnosing::{DiagnosingError, Setting, diagnose};
 use crate::{provenance, training};
 use anyhow::Context;
@@ -60,6 +60,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, models, library, out, force, without } = arguments;
     let recording = Recording::open(&recording).or_input()?;
     check(&out, Kind::Results, force, &["report.html", "diagnosis.json"])?;
+    recording.doubts.iter().for_each(|doubt| note(doubt));
     let library = match library {
         // Models belong to a library that is there already.
         Some(url) if models.is_some() => Some(open_whole(&url).await?),
@@ -74,7 +75,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         Setting { design: &design, library: library.as_ref(), without: &without, shuffle: None };
     let diagnosed = diagnose(&recording, setting, &|stage, share| shown.at(stage, share)).await;
     shown.end();
-    let diagnosis = diagnosed.map_err(stop)?.diagnosis;
+    let mut diagnosis = diagnosed.map_err(stop)?.diagnosis;
+    diagnosis.notes.splice(..0, recording.doubts.iter().cloned());
     let json = serde_json::to_string_pretty(&diagnosis).context("a diagnosis is plain JSON")?;
     let page = tracktwin_report::diagnosis_page(&diagnosis, &origin);
     let mut output = Output::begin(&out, Kind::Results, force.force)?;

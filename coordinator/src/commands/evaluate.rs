@@ -74,7 +74,8 @@ pub(super) async fn evaluate(
     force: Force,
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
-    let (recording, notes) = usable(recording)?;
+    let (recording, left_out) = usable(recording)?;
+    let notes = [recording.doubts.clone(), left_out].concat();
     notes.iter().for_each(|line| note(line));
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     make_folder(folder)?;

@@ -10,7 +10,7 @@ use std::str::FromStr;
 use tracktwin_files::{Kind, Names, Output};
 use tracktwin_parameters::quantity::{PLACE, SAMPLE_RATE, SPACING, SPEED, WHEEL_RADIUS};
 use tracktwin_signal::recording::import::{
-    AccelerationUnit, Imported, Layout, PositionUnit, import,
+    AccelerationUnit, Imported, Layout, PositionUnit, SpeedUnit, TimeUnit, import,
 };
 
 /// What `import` is told.
@@ -40,7 +40,8 @@ pub(super) struct Arguments {
     /// or speed=NAME.
     #[arg(long = "column", value_name = "QUANTITY=NAME")]
     columns: Vec<Meaning>,
-    /// Unit of the accelerations, m/s2 if nothing is said; with `unknown` levels mean something within the recording only.
+    /// Unit of the accelerations, m/s2 if neither this nor the file says one; with `unknown` levels
+    /// mean something within the recording only.
     #[arg(long, value_enum)]
     unit: Option<Unit>,
     /// Accelerations are positive upwards.
@@ -49,6 +50,12 @@ pub(super) struct Arguments {
     /// Unit of the column of positions: m, km or mm.
     #[arg(long, value_enum)]
     position_unit: Option<LengthUnit>,
+    /// Unit of the column of times.
+    #[arg(long, value_enum)]
+    time_unit: Option<DurationUnit>,
+    /// Unit of the column of speeds.
+    #[arg(long, value_enum)]
+    speed_unit: Option<VelocityUnit>,
     /// Samples per second, where no column of times says it.
     #[arg(long, value_name = "HZ", value_parser = number(SAMPLE_RATE))]
     sample_rate: Option<f64>,
@@ -87,6 +94,30 @@ enum LengthUnit {
     Km,
     /// Millimetres.
     Mm,
+}
+
+/// Units of time on the command line.
+#[derive(Clone, Copy, ValueEnum)]
+enum DurationUnit {
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// Nanoseconds.
+    Ns,
+}
+
+/// Units of speed on the command line.
+#[derive(Clone, Copy, ValueEnum)]
+enum VelocityUnit {
+    /// Kilometres per hour.
+    #[value(name = "km/h")]
+    KilometrePerHour,
+    /// Metres per second.
+    #[value(name = "m/s")]
+    MetrePerSecond,
 }
 
 /// Quantity and column.
@@ -130,9 +161,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let imported = import(&arguments.files, &layout).or_input()?;
     let folders = folders(&arguments.out, &imported);
     let force = arguments.force.force;
-    if arguments.unit.is_none() && arguments.layout.is_none() {
-        say("unit: taken as m/s2 (say --unit g or --unit unknown)");
-    }
     // All are written before the first gets its name.
     let mut outputs = Vec::with_capacity(imported.len());
     for (one, folder) in imported.iter().zip(&folders) {
@@ -175,18 +203,32 @@ fn layout(arguments: &Arguments) -> Result<Layout, anyhow::Error> {
         }
     }
     if let Some(unit) = arguments.unit {
-        layout.acceleration_unit = match unit {
+        layout.acceleration_unit = Some(match unit {
             Unit::MetrePerSecondSquared => AccelerationUnit::MetrePerSecondSquared,
             Unit::G => AccelerationUnit::G,
             Unit::Unknown => AccelerationUnit::Unknown,
-        };
+        });
     }
     if let Some(unit) = arguments.position_unit {
-        layout.position_unit = match unit {
+        layout.position_unit = Some(match unit {
             LengthUnit::M => PositionUnit::Metre,
             LengthUnit::Km => PositionUnit::Kilometre,
             LengthUnit::Mm => PositionUnit::Millimetre,
-        };
+        });
+    }
+    if let Some(unit) = arguments.time_unit {
+        layout.time_unit = Some(match unit {
+            DurationUnit::S => TimeUnit::Second,
+            DurationUnit::Ms => TimeUnit::Millisecond,
+            DurationUnit::Us => TimeUnit::Microsecond,
+            DurationUnit::Ns => TimeUnit::Nanosecond,
+        });
+    }
+    if let Some(unit) = arguments.speed_unit {
+        layout.speed_unit = Some(match unit {
+            VelocityUnit::KilometrePerHour => SpeedUnit::KilometrePerHour,
+            VelocityUnit::MetrePerSecond => SpeedUnit::MetrePerSecond,
+        });
     }
     layout.upwards |= arguments.upwards;
     layout.spacing_m = arguments.spacing.unwrap_or(layout.spacing_m);

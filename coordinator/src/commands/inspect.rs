@@ -6,6 +6,7 @@ use clap::Args;
 use std::path::PathBuf;
 use tracktwin_diagnosis::{FirstLook, Place, first_look, tells_waves};
 use tracktwin_files::Kind;
+use tracktwin_number::{chance, rounded, significant};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_report::{Inspected, InspectedCurve, Inspection, inspection_page};
 use tracktwin_signal::SAMPLES_A_PERIOD;
@@ -69,11 +70,14 @@ fn print(inspection: &Inspection) {
     }
     for found in &inspection.found {
         say(&format!(
-            "{} ({}; by chance {:.0e}): {}",
-            found.physics, found.place, found.p_value, found.evidence
+            "{} ({}; by chance {}): {}",
+            found.physics,
+            found.place,
+            chance(found.p_value),
+            found.evidence
         ));
     }
-    for text in &inspection.uses {
+    for text in inspection.doubts.iter().chain(&inspection.uses) {
         say(text);
     }
 }
@@ -107,13 +111,14 @@ fn json(recording: &Recording, look: &FirstLook, inspection: &Inspection) -> ser
         "findings": look.findings.iter().map(finding).collect::<Vec<_>>(),
         "loss_of_contact": look.loss_of_contact,
         "not_usable": inspection.troubles,
+        "doubts": inspection.doubts,
         "uses": inspection.uses,
     })
 }
 
 fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
     let speeds: Vec<String> =
-        recording.speeds_km_h().iter().map(|speed| format!("{speed:.1}")).collect();
+        recording.speeds_km_h().iter().map(|speed| rounded(*speed, 3)).collect();
     let unit = if recording.gain_known() { "m/s²" } else { "unit" };
     let seconds: f64 = recording.passes.iter().map(|pass| pass.signal.duration_s()).sum();
     Inspection {
@@ -122,7 +127,7 @@ fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
             "{} at {} km/h, {seconds:.1} s at {} Hz in all, {}, {}.",
             counted(recording.passes.len(), "pass", "passes"),
             speeds.join(", "),
-            recording.sample_rate_hz,
+            rounded(recording.sample_rate_hz, 8),
             counted(recording.sleepers.len(), "sleeper", "sleepers"),
             counted(
                 look.findings.len() + usize::from(look.loss_of_contact.is_some()),
@@ -137,6 +142,7 @@ fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
             .as_ref()
             .map(|lost| lost.sentence(recording.passes.len())),
         troubles: look.troubles.iter().map(ToString::to_string).collect(),
+        doubts: recording.doubts.clone(),
         uses: uses(recording, look),
         spectra: curves(recording, |pass| spectrum(&pass.signal)),
         levels: curves(recording, levels),
@@ -167,7 +173,7 @@ fn passes(recording: &Recording, look: &FirstLook) -> Vec<Vec<String>> {
         // White noise of this density up to half the sample rate.
         let noise = look.noise_floors[index].map_or_else(
             || "–".to_owned(),
-            |d| format!("{:.3}", (d * 0.5 * recording.sample_rate_hz).sqrt()),
+            |d| significant((d * 0.5 * recording.sample_rate_hz).sqrt(), 2),
         );
         let gain = look.gains.iter().find(|gain| gain.pass == index);
         rows.push(vec![
@@ -176,8 +182,8 @@ fn passes(recording: &Recording, look: &FirstLook) -> Vec<Vec<String>> {
             format!("{:.3}", pass.position_m[0]),
             format!("{:.3}", pass.position_m[samples.len() - 1]),
             format!("{:.2}", pass.signal.duration_s()),
-            format!("{:.3}", (square / samples.len() as f64).sqrt()),
-            format!("{peak:.2}"),
+            significant((square / samples.len() as f64).sqrt(), 3),
+            significant(peak, 3),
             noise,
             gain.map_or_else(|| "–".to_owned(), |gain| format!("{:+.2}", gain.gain_db.0)),
         ]);
@@ -193,7 +199,8 @@ fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
     }
     if rate < FEATURES_HZ {
         uses.push(format!(
-            "sampled at {rate} Hz it says nothing above {:.0} Hz; features up to 4000 Hz need {FEATURES_HZ:.0} Hz",
+            "sampled at {} Hz it says nothing above {:.0} Hz; features up to 4000 Hz need {FEATURES_HZ:.0} Hz",
+            rounded(rate, 8),
             rate / SAMPLES_A_PERIOD
         ));
     }
@@ -215,7 +222,7 @@ fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
             other.known()
         ));
     }
-    if uses.is_empty() && look.troubles.is_empty() {
+    if uses.is_empty() && look.troubles.is_empty() && recording.doubts.is_empty() {
         uses.push("fit for `evaluate` and `diagnose` with models of its speeds".to_owned());
     }
     uses

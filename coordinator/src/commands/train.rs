@@ -121,7 +121,8 @@ fn table(trained: &Trained) -> String {
 
 /// What people call a group: `13 km/h GF`, `7+10+13 km/h GF`.
 fn name(key: &GroupKey) -> String {
-    let speeds: Vec<_> = key.speeds_km_h.iter().map(ToString::to_string).collect();
+    let speeds: Vec<_> =
+        key.speeds_km_h.iter().map(|speed| tracktwin_number::rounded(*speed, 4)).collect();
     format!("{} km/h {}", speeds.join("+"), key.feature)
 }
 

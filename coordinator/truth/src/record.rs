@@ -50,6 +50,7 @@ fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
         sleepers: sleepers(scene),
         nominal: nominal(),
         spacing_m: SPACING_M,
+        doubts: Vec::new(),
     })
 }
 

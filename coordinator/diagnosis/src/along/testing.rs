@@ -71,6 +71,7 @@ impl Rolled<'_> {
             sleepers: (1..24).map(sleeper).collect(),
             nominal: serde_json::Map::new(),
             spacing_m: 0.125,
+            doubts: Vec::new(),
         }
     }
 }

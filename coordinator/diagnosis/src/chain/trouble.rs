@@ -6,6 +6,7 @@ use super::still::Still;
 use super::stranger::companies;
 use crate::along::{Background, by_speed};
 use std::fmt;
+use tracktwin_number::rounded;
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Longest stretch in s without a change that a sensor at work shows.
@@ -127,7 +128,8 @@ impl fmt::Display for Trouble {
             ),
             Self::Stranger { speed_km_h, coherence } => write!(
                 f,
-                "the passes at {speed_km_h} km/h: their coherence with those at other speeds, in waves of a tenth of a sleeper spacing to one, is {coherence:.2}; noise, another track, or positions off by more than a sleeper spacing"
+                "the passes at {} km/h: their coherence with those at other speeds, in waves of a tenth of a sleeper spacing to one, is {coherence:.2}; noise, another track, or positions off by more than a sleeper spacing",
+                rounded(*speed_km_h, 4)
             ),
             Self::Short { pass, length_m } => write!(
                 f,

@@ -59,7 +59,7 @@ pub(super) fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -
         look_alikes: names(kind),
         would_separate: kind.would_separate.to_owned(),
         detectability: 0.0,
-        log_evidence: -finding.p_value.max(1e-300).ln(),
+        log_evidence: -finding.p_value.ln(),
     }
 }
 

@@ -4,6 +4,7 @@ use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
 use crate::finding::Finding;
 use crate::first_look::FirstLook;
 use crate::port_scan::PortPlace;
+use tracktwin_number::chance;
 use tracktwin_signal::recording::Recording;
 
 /// Ratio of two speeds that tells structure from geometry well.
@@ -48,16 +49,16 @@ impl Evidence<'_> {
         }
         if round.port_strays {
             return Some(format!(
-                "Something is left{place} that chance does not explain (p = {:.1e}), but no two speeds \
+                "Something is left{place} that chance does not explain (probability {}), but no two speeds \
                  hear it there: what stays where it is, all of them pass.",
-                round.p_value
+                chance(round.p_value)
             ));
         }
         let rest = if self.search.accepted.is_empty() { "Something" } else { "A remainder" };
         let left = format!(
-            "{rest} is left{place} that chance does not explain (p = {:.1e}); it may be the model's \
+            "{rest} is left{place} that chance does not explain (probability {}); it may be the model's \
              own error, for nothing in the catalogue predicts the held-out speeds better.",
-            round.p_value
+            chance(round.p_value)
         );
         (!round.accepted).then_some(left)
     }

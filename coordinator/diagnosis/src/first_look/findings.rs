@@ -6,6 +6,7 @@ use crate::finding::{Finding, Place};
 use crate::impact::{Corrugation, Form, Impact};
 use crate::wheel::{Comb, Flat, Order};
 use std::collections::BTreeMap;
+use tracktwin_number::{self as number, ratio, rounded};
 use tracktwin_signal::recording::Pass;
 
 /// Lead of one form over the other, in nats, below which an impact may be either.
@@ -20,16 +21,16 @@ pub(super) fn clipping_finding(
     let limit = passes.iter().map(|pass| pass.level_m_s2.abs()).fold(f64::MAX, f64::min);
     Some(Finding {
         physics: "clipping",
-        p_value: worst.ln_p.exp(),
+        p_value: number::probability(worst.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([("limit_m_s2", (limit, 0.01 * limit))]),
         evidence: format!(
-            "{} of {} passes are cut off: in pass {}, {} crests end within 1 % of {:.3} {unit} ({:.2} % of the samples)",
+            "{} of {} passes are cut off: in pass {}, {} crests end within 1 % of {} {unit} ({:.2} % of the samples)",
             passes.len(),
             recorded,
             worst.pass + 1,
             worst.crests,
-            worst.level_m_s2,
+            rounded(worst.level_m_s2, 3),
             1e2 * worst.share
         ),
     })
@@ -39,19 +40,19 @@ pub(super) fn hum_finding(lines: &[Hum], unit: &str) -> Option<Finding> {
     let first = lines.first()?;
     let names: Vec<String> = lines
         .iter()
-        .map(|l| format!("{:.1} Hz ({:.3} {unit})", l.frequency_hz, l.amplitude_m_s2.0))
+        .map(|l| format!("{:.1} Hz ({} {unit})", l.frequency_hz, rounded(l.amplitude_m_s2.0, 2)))
         .collect();
     Some(Finding {
         physics: "electrical_hum",
-        p_value: first.ln_p.exp(),
+        p_value: number::probability(first.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([
             ("frequency_Hz", (first.frequency_hz, 0.1)),
             ("amplitude_m_s2", first.amplitude_m_s2),
         ]),
         evidence: format!(
-            "lines at frequencies of the mains, {:.0} times above their neighbours: {}",
-            first.ratio,
+            "lines at frequencies of the mains, {} times above their neighbours: {}",
+            ratio(first.ratio),
             names.join(", ")
         ),
     })
@@ -63,7 +64,7 @@ pub(super) fn gain_finding(gain: &Gain) -> Finding {
     let which = if gain.passes > 2 { "" } else { " (or the other one is off; a third would tell)" };
     Finding {
         physics: "gain_error",
-        p_value: gain.ln_p.exp(),
+        p_value: number::probability(gain.ln_p),
         place: Place::Everywhere,
         // A decibel is a factor of e^0.115 in amplitude.
         parameters: BTreeMap::from([("factor", (factor, 0.115 * deviation * factor))]),
@@ -80,7 +81,7 @@ pub(super) fn offset_finding(pair: &Offsets) -> Finding {
     let (offset_mm, greatest_mm) = (1e3 * offset, 1e3 * pair.greatest_m());
     Finding {
         physics: "position_error",
-        p_value: pair.ln_p().exp(),
+        p_value: number::probability(pair.ln_p()),
         place: Place::Everywhere,
         parameters: BTreeMap::from([("offset_m", (offset, 1e-3)), ("scale", (scale, 1e-3))]),
         evidence: format!(
@@ -97,7 +98,7 @@ pub(super) fn scale_finding(scale: &Scale) -> Finding {
     let (factor, deviation) = scale.scale;
     Finding {
         physics: "position_error",
-        p_value: scale.ln_p.exp(),
+        p_value: number::probability(scale.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([("scale", scale.scale)]),
         evidence: format!(
@@ -118,12 +119,12 @@ pub(super) fn flat_finding(flat: &Flat) -> Finding {
     }
     Finding {
         physics: "wheel_flat",
-        p_value: flat.ln_p.exp(),
+        p_value: number::probability(flat.ln_p),
         place: Place::Everywhere,
         parameters,
         evidence: format!(
-            "one blow a turn in every pass, {turn:.4} m (sd {deviation:.4}) apart and {:.0} times louder than what is around them",
-            flat.power_ratio
+            "one blow a turn in every pass, {turn:.4} m (sd {deviation:.4}) apart and {} times louder than what is around them",
+            ratio(flat.power_ratio)
         ),
     }
 }
@@ -133,17 +134,17 @@ pub(super) fn order_finding(orders: &[Order]) -> Option<Finding> {
     let names: Vec<String> = orders.iter().map(|order| order.number.to_string()).collect();
     Some(Finding {
         physics: "wheel_out_of_round",
-        p_value: first.ln_p.exp(),
+        p_value: number::probability(first.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([
             ("order", (first.number as f64, 0.0)),
             ("amplitude_m", first.amplitude_m),
         ]),
         evidence: format!(
-            "lines at whole waves to a turn of the wheel: order {}; order {} is {:.0} times above what lies between orders",
+            "lines at whole waves to a turn of the wheel: order {}; order {} is {} times above what lies between orders",
             names.join(", "),
             first.number,
-            first.ratio
+            ratio(first.ratio)
         ),
     })
 }
@@ -153,7 +154,7 @@ pub(super) fn comb_finding(comb: &Comb) -> Finding {
     let held_out = &comb.held_out;
     Finding {
         physics: "wheel_out_of_round",
-        p_value: comb.ln_p.exp(),
+        p_value: number::probability(comb.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([("circumference_m", comb.circumference_m)]),
         evidence: format!(
@@ -205,13 +206,13 @@ pub(super) fn impact_finding(impact: &Impact, passes: &[Pass]) -> Finding {
     let reach = 3.0 * deviation.max(3e-3);
     Finding {
         physics,
-        p_value: impact.ln_p.exp(),
+        p_value: number::probability(impact.ln_p),
         place: Place::Stretch { from_m: x - reach, to_m: x + reach },
         parameters,
         evidence: format!(
-            "at {x:.4} m (sd {deviation:.4}) {} is {:.0} times louder than around it{form}",
+            "at {x:.4} m (sd {deviation:.4}) {} is {} times louder than around it{form}",
             who(passes),
-            impact.power_ratio
+            ratio(impact.power_ratio)
         ),
     }
 }
@@ -220,16 +221,16 @@ pub(super) fn corrugation_finding(waves: &Corrugation) -> Finding {
     let [from_m, to_m] = waves.stretch_m;
     Finding {
         physics: "corrugation",
-        p_value: waves.ln_p.exp(),
+        p_value: number::probability(waves.ln_p),
         place: Place::Stretch { from_m, to_m },
         parameters: BTreeMap::from([
             ("wavelength_m", waves.wavelength_m),
             ("amplitude_m", waves.amplitude_m),
         ]),
         evidence: format!(
-            "waves of {:.2} mm from {from_m:.2} to {to_m:.2} m, {:.0} times above the surface's own at every speed",
+            "waves of {:.2} mm from {from_m:.2} to {to_m:.2} m, {} times above the surface's own at every speed",
             1e3 * waves.wavelength_m.0,
-            waves.ratio
+            ratio(waves.ratio)
         ),
     }
 }

@@ -6,6 +6,7 @@ use super::round::{FALSE_ALARM, Setting};
 use super::{Round, Search};
 use crate::along::median;
 use crate::calibration::{CalibrationError, Problem};
+use tracktwin_number::probability;
 
 impl Search {
     /// Compares what was found with a track of its own for each speed, and takes it back if that is
@@ -46,7 +47,7 @@ impl Search {
 
     /// Probability of such a difference if all speeds passed the same track.
     pub fn apart_p_value(&self) -> f64 {
-        (-self.apart.max(0.0) / TEMPERATURE).exp()
+        probability(-self.apart.max(0.0) / TEMPERATURE)
     }
 
     /// Whether the speeds did surely not pass the same track.

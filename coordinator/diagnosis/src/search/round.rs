@@ -16,6 +16,7 @@ use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use tracktwin_number::floored;
 
 /// Probability of a false alarm on a recording without anything left out.
 pub(super) const FALSE_ALARM: f64 = 0.05;
@@ -173,7 +174,7 @@ impl<'a> Setting<'a> {
             })
         });
         // The better of two tests.
-        let p_value = (2.0 * p_value.min(port_p_value)).min(1.0);
+        let p_value = floored(2.0 * p_value.min(port_p_value));
         Round { p_value, port, port_p_value, ..Round::default() }
     }
 }

@@ -146,7 +146,7 @@ fn the_wheel_of_a_real_recording_is_found_on_both_sides() {
         acceleration: vec!["acc_left".to_owned(), "acc_right".to_owned()],
         time: Some("t_s".to_owned()),
         speed: Some("speed_kmh".to_owned()),
-        acceleration_unit: AccelerationUnit::Unknown,
+        acceleration_unit: Some(AccelerationUnit::Unknown),
         ..Layout::default()
     };
     for imported in import(&[file], &layout).unwrap() {

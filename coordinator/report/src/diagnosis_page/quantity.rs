@@ -75,7 +75,7 @@ impl Unit {
 /// Two values in one unit, with the decimals that show three digits of the second.
 pub(super) fn rounded_pair(unit: &Unit, si: [f64; 2]) -> [String; 2] {
     let values = si.map(|value| unit.value(value));
-    let decimals = decimals_for(values[1], 3);
+    let decimals = tracktwin_number::decimals(values[1], 3);
     values.map(|value| unit.after(&rounded(value, decimals)))
 }
 
@@ -100,24 +100,17 @@ pub(super) fn interval(parameter: &str, estimate: Estimate, positive: bool) -> S
 /// more than three digits of the mean.
 fn decimals(unit: &Unit, estimate: Estimate) -> usize {
     let (mean, sd) = (unit.value(estimate.mean), unit.value(estimate.sd));
-    let of_mean = decimals_for(mean, 3);
+    let of_mean = tracktwin_number::decimals(mean, 3);
     if !(sd.is_finite() && sd > 0.0) {
         return of_mean;
     }
     let leading = sd / 10f64.powf(sd.log10().floor());
-    of_mean.min(decimals_for(sd, if leading < 2.0 { 2 } else { 1 }))
+    of_mean.min(tracktwin_number::decimals(sd, if leading < 2.0 { 2 } else { 1 }))
 }
 
 /// The number with so many significant digits, without a power of ten.
-pub(super) fn digits(value: f64, count: i32) -> String {
-    rounded(value, decimals_for(value, count))
-}
-
-fn decimals_for(value: f64, count: i32) -> usize {
-    if value == 0.0 || !value.is_finite() {
-        return 0;
-    }
-    (count - 1 - value.abs().log10().floor() as i32).clamp(0, 9) as usize
+pub(super) fn digits(value: f64, count: usize) -> String {
+    rounded(value, tracktwin_number::decimals(value, count))
 }
 
 /// With a minus sign that is one, and none before zero.

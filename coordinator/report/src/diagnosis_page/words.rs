@@ -1,6 +1,5 @@
 //! Names of physics, sleepers and places as a reader says them.
 
-use super::quantity::digits;
 use tracktwin_diagnosis::{Diagnosis, Hypothesis, Location};
 use tracktwin_track::extension::Kind;
 
@@ -103,14 +102,17 @@ pub(super) fn stretch([from, to]: [f64; 2]) -> String {
     }
 }
 
-/// Speeds in km/h, to the tenth.
+/// Speeds in km/h, with three digits.
 pub(super) fn speeds(speeds_km_h: &[f64]) -> String {
-    let tenths = |speed: &f64| ((speed * 10.0).round() / 10.0).to_string();
-    let texts: Vec<String> = speeds_km_h.iter().map(tenths).collect();
+    let rounded = |speed: &f64| tracktwin_number::rounded(*speed, 3);
+    let texts: Vec<String> = speeds_km_h.iter().map(rounded).collect();
     format!("{} km/h", list(&texts))
 }
 
+/// The least probability that a page tells: a few hundred null simulations know no smaller one.
+const CHANCE_LEAST: f64 = 1e-3;
+
 /// How probable something is by chance, to follow "probability".
 pub(super) fn chance(p_value: f64) -> String {
-    if p_value < 1e-3 { "below 0.001".to_owned() } else { digits(p_value, 2) }
+    tracktwin_number::chance_down_to(p_value, CHANCE_LEAST)
 }

@@ -122,6 +122,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
         sleepers: track.sleepers_recorded(),
         nominal: track.nominal(),
         spacing_m: track.design().sleeper.spacing_m,
+        doubts: Vec::new(),
     };
     let mut output = Output::begin(out, Kind::SimulatedRecording, arguments.force.force)?;
     output.add(&FileName::new(TRUTH)?, track.truth_json(&drives).as_bytes())?;

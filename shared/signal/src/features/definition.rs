@@ -3,6 +3,7 @@
 use super::ThirdOctave;
 use crate::wavelet::Morlet;
 use serde::{Deserialize, Serialize};
+use tracktwin_number::rounded;
 
 /// Everything that decides the value of a feature.
 ///
@@ -87,7 +88,11 @@ pub enum DefinitionError {
         high: f64,
     },
     /// No bin lies between the lowest and the highest frequency.
-    #[error("no bin lies between {lowest_hz} and {highest_hz} Hz")]
+    #[error(
+        "no bin lies between {} and {} Hz",
+        rounded(*lowest_hz, 5),
+        rounded(*highest_hz, 5)
+    )]
     NoBins {
         /// Lowest frequency in Hz.
         lowest_hz: f64,

@@ -13,6 +13,7 @@ use std::{
     ops::Range,
     sync::{Arc, Mutex, PoisonError},
 };
+use tracktwin_number::rounded;
 
 /// Sample rate that the highest frequency needs, in units of it: two by Nyquist, and room for the
 /// upper half of the highest band and an anti-aliasing filter.
@@ -59,7 +60,11 @@ pub enum FeatureError {
         samples: usize,
     },
     /// The signal does not hold the definition's frequencies.
-    #[error("a sample rate of {sample_rate_hz} Hz is too low; at least {needed_hz} Hz is needed")]
+    #[error(
+        "a sample rate of {} Hz is too low; at least {} Hz is needed",
+        rounded(*sample_rate_hz, 8),
+        rounded(*needed_hz, 4)
+    )]
     SampleRate {
         /// Sample rate of the signal in Hz.
         sample_rate_hz: f64,

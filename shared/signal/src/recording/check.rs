@@ -1,6 +1,8 @@
 //! Do a pass's times, positions, rate and speed agree with one another?
 
+use super::clock::Pace;
 use super::columns::Columns;
+use super::copies;
 use super::error::{Fault, RecordingError};
 use std::path::Path;
 
@@ -8,7 +10,7 @@ use std::path::Path;
 ///
 /// Clocks of recorders are off by parts in a hundred thousand; a wrong rate is off by much more.
 const RATE_TOLERANCE: f64 = 1e-3;
-/// Deviation of a single time step, in sample intervals, that rounded times may show.
+/// Relative difference of a declared step from the median one below which it is the one expected.
 const STEP_TOLERANCE: f64 = 0.5;
 /// Relative difference allowed between nominal speed and mean speed of a pass.
 ///
@@ -23,43 +25,43 @@ pub(super) fn times(
     path: &Path,
     columns: &Columns,
     declared: f64,
-) -> Result<(), RecordingError> {
-    let times = &columns.time_s;
-    let duration = times[times.len() - 1] - times[0];
-    let observed = (times.len() - 1) as f64 / duration;
-    let even = uneven_step(times, duration / (times.len() - 1) as f64, 1.0 / declared);
-    if let Some(fault) = even {
-        return Err(RecordingError::new(path, "time_s", fault));
-    }
-    if (observed / declared - 1.0).abs() > RATE_TOLERANCE {
+) -> Result<Pace, RecordingError> {
+    let pace = Pace::of(&columns.time_s)
+        .map_err(|fault| RecordingError::new(path, "time_s", known_rate(fault, declared)))?;
+    let observed = pace.rate_hz;
+    if (observed / declared - 1.0).abs() > RATE_TOLERANCE.max(pace.uncertainty) {
         let fault = Fault::WrongSampleRate { declared, observed, file: file_name(path) };
         return Err(RecordingError::new(manifest, "sample_rate_Hz", fault));
     }
+    Ok(pace)
+}
+
+/// The step that is expected is what the declared rate says, unless that is wrong too.
+fn known_rate(fault: Fault, declared: f64) -> Fault {
+    match fault {
+        Fault::UnevenTime { row, step, expected }
+            if (1.0 / declared / expected - 1.0).abs() < STEP_TOLERANCE =>
+        {
+            Fault::UnevenTime { row, step, expected: 1.0 / declared }
+        }
+        other => other,
+    }
+}
+
+/// No pass is a copy of another one.
+pub(super) fn copies<'a>(
+    passes: impl Iterator<Item = (&'a Path, &'a [f64])>,
+) -> Result<(), RecordingError> {
+    let passes: Vec<(&Path, &[f64])> = passes.collect();
+    for (index, (path, samples)) in passes.iter().enumerate() {
+        for (other, earlier) in &passes[..index] {
+            if let Some(factor) = copies::factor(earlier, samples) {
+                let fault = Fault::Copy { of: file_name(other), factor };
+                return Err(RecordingError::new(path, "acceleration", fault));
+            }
+        }
+    }
     Ok(())
-}
-
-fn uneven_step(times: &[f64], mean: f64, declared: f64) -> Option<Fault> {
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let index = steps.len() / 2;
-    // The median step is what a gap cannot move; the mean is what rounding cannot move.
-    let median = *steps.clone().select_nth_unstable_by(index, f64::total_cmp).1;
-    let expected = if (mean / median - 1.0).abs() < STEP_TOLERANCE { mean } else { median };
-    let odd = |step: f64| !(step > 0.0 && (step - expected).abs() <= STEP_TOLERANCE * expected);
-    let row = steps.iter().position(|&step| odd(step))?;
-    // What the declared rate says, unless that is wrong too.
-    let expected =
-        if (declared / median - 1.0).abs() < STEP_TOLERANCE { declared } else { expected };
-    Some(Fault::UnevenTime { row: row + 2, step: steps.swap_remove(row), expected })
-}
-
-/// The position does not decrease.
-pub(super) fn positions(path: &Path, positions: &[f64]) -> Result<(), RecordingError> {
-    let Some(index) = positions.windows(2).position(|pair| pair[1] < pair[0]) else {
-        return Ok(());
-    };
-    let (before, after) = (positions[index], positions[index + 1]);
-    let fault = Fault::RunsBack { row: index + 2, before, after };
-    Err(RecordingError::new(path, "position_m", fault))
 }
 
 /// The declared speed (the `field` of `manifest`) is that of the positions.
@@ -67,11 +69,12 @@ pub(super) fn speed(
     manifest: &Path,
     field: &str,
     path: &Path,
-    columns: &Columns,
+    position_m: &[f64],
+    pace: Pace,
     declared: f64,
 ) -> Result<(), RecordingError> {
-    let span = |values: &[f64]| values[values.len() - 1] - values[0];
-    let observed = span(&columns.position_m) / span(&columns.time_s) / KM_PER_H;
+    let last = position_m.len() - 1;
+    let observed = (position_m[last] - position_m[0]) / last as f64 * pace.rate_hz / KM_PER_H;
     if (observed / declared - 1.0).abs() <= SPEED_TOLERANCE {
         return Ok(());
     }

@@ -25,9 +25,17 @@ pub(super) fn read<const N: usize>(
     }
     let mut places = [0; N];
     for (place, name) in places.iter_mut().zip(names) {
-        *place = present.iter().position(|column| column == name).ok_or_else(|| {
-            RecordingError::new(path, *name, Fault::NoColumn { present: present.clone() })
-        })?;
+        let fault = |fault| RecordingError::new(path, *name, fault);
+        let found: Vec<usize> =
+            (0..present.len()).filter(|&index| present[index] == *name).collect();
+        *place = match found[..] {
+            [index] => index,
+            [] => return Err(fault(Fault::NoColumn { present })),
+            _ => {
+                let places = found.iter().map(|index| index + 1).collect();
+                return Err(fault(Fault::ColumnTwice { places }));
+            }
+        };
     }
     let mut columns = [const { Vec::new() }; N];
     let mut record = csv::StringRecord::new();

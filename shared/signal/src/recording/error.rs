@@ -1,6 +1,7 @@
 //! What may be wrong with a recording: file, field, what, and how to mend it, on one line.
 
 use std::path::Path;
+use tracktwin_number::{rounded, significant};
 use tracktwin_parameters::QuantityError;
 
 /// A recording that cannot be used, in one line: `FILE: FIELD: what; how to mend`.
@@ -101,6 +102,60 @@ pub enum Fault {
         "its name ends in none of .csv .txt .tsv .dat .parquet .npy .npz .mat; convert it to one of these"
     )]
     UnknownTable,
+    /// The file is of a known kind that is not read.
+    #[error("is {kind}, which is not read here; {mend}")]
+    Foreign {
+        /// What it is.
+        kind: &'static str,
+        /// How it becomes something that is read.
+        mend: &'static str,
+    },
+    /// A text table holds bytes that no text has.
+    #[error("is no text (byte {byte} is {value:#04x}); export it from its program as CSV")]
+    NoText {
+        /// The place of the first such byte, counted from 1.
+        byte: usize,
+        /// The byte.
+        value: u8,
+    },
+    /// A line has another number of fields than the others.
+    #[error(
+        "line {line} has {fields} field{} where {expected} belong; complete or delete it, begin lines that are no rows with #, and separate decimal commas by another sign",
+        if *fields == 1 { "" } else { "s" }
+    )]
+    Fields {
+        /// The line of the file, counted from 1.
+        line: u64,
+        /// How many fields it has.
+        fields: usize,
+        /// How many the others have.
+        expected: usize,
+    },
+    /// The rows have a field more than the head has names, and the first one is no row name.
+    #[error(
+        "the head has {names} names, the rows have {} fields, and the first of them counts no rows; name every column",
+        names + 1
+    )]
+    ShortHead {
+        /// How many names there are.
+        names: usize,
+    },
+    /// Two columns bear one name.
+    #[error("columns {} are all called so; give each its own name", list(places))]
+    ColumnTwice {
+        /// Where they stand, counted from 1.
+        places: Vec<usize>,
+    },
+    /// The name or the file says a unit that is not known for such a column.
+    #[error("its unit is \"{unit}\", which is none of {known}; {mend}")]
+    UnknownUnit {
+        /// What the file says.
+        unit: String,
+        /// The units that are known.
+        known: String,
+        /// How to say which it is.
+        mend: &'static str,
+    },
     /// A column that is needed is absent.
     #[error("there is no such column; name it so (the file has {})", present.join(", "))]
     NoColumn {
@@ -114,12 +169,35 @@ pub enum Fault {
         kind: String,
     },
     /// A value is not a finite number; rows count from 1, the first row of data.
-    #[error("row {row} is {value}; drop or mend that stretch")]
+    #[error("row {row} is {value}; write a plain number there, or drop that stretch")]
     NotFinite {
         /// The row, counted from 1.
         row: usize,
         /// The value, as written.
         value: String,
+    },
+    /// A value stands for one that was not measured.
+    #[error(
+        "row {row} is {value}, far from all others: it stands for a missing value; drop that stretch"
+    )]
+    Missing {
+        /// The row, counted from 1.
+        row: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A column of speeds that goes to and fro between two values.
+    #[error(
+        "goes {changes} times to and fro between {} and {}: pulses of a tachometer, not speeds; add up the pulses times the distance of one and give that as position",
+        rounded(*low, 3), rounded(*high, 3)
+    )]
+    Pulses {
+        /// How often it changes from one to the other.
+        changes: usize,
+        /// The lower value.
+        low: f64,
+        /// The upper value.
+        high: f64,
     },
     /// The file has no rows, or a single one.
     #[error("has {rows} row{}; a pass needs at least two", if *rows == 1 { "" } else { "s" })]
@@ -137,7 +215,8 @@ pub enum Fault {
     },
     /// The sample rate disagrees with the times.
     #[error(
-        "is {declared} Hz but `time_s` of {file} advances at {observed:.6} Hz; correct one of them"
+        "is {} Hz but `time_s` of {file} advances at {} Hz; correct one of them",
+        rounded(*declared, 9), rounded(*observed, 7)
     )]
     WrongSampleRate {
         /// The declared rate in Hz.
@@ -149,7 +228,9 @@ pub enum Fault {
     },
     /// A step in time differs from the sample interval.
     #[error(
-        "steps by {step:.3e} s to row {row} where {expected:.3e} s is expected; resample evenly or split the pass there"
+        "steps by {} s to row {row} where {} s is expected; drop repeated rows, split the pass at a gap, or leave the times out and state the sample rate",
+        rounded(*step, 3),
+        rounded(*expected, 3)
     )]
     UnevenTime {
         /// The row, counted from 1, that the step leads to.
@@ -161,7 +242,8 @@ pub enum Fault {
     },
     /// The position decreases.
     #[error(
-        "runs back from {before} m to {after} m at row {row}; positions must not decrease (turn a backward pass round)"
+        "runs back from {} m to {} m at row {row}; smooth it, or leave it out and give the speed",
+        rounded(*before, 9), rounded(*after, 9)
     )]
     RunsBack {
         /// The row, counted from 1, where it does.
@@ -171,9 +253,101 @@ pub enum Fault {
         /// The position in m of that row.
         after: f64,
     },
+    /// The position decreases from begin to end.
+    #[error(
+        "decreases along the travel, from {} m to {} m; give it, and the places of the sleepers, the other sign",
+        rounded(*from_m, 9), rounded(*to_m, 9)
+    )]
+    Decreases {
+        /// The first position in m.
+        from_m: f64,
+        /// The last one in m.
+        to_m: f64,
+    },
+    /// Some files run one way along the positions and some the other.
+    #[error(
+        "runs towards smaller positions and other files towards greater ones; import each direction by itself"
+    )]
+    Directions,
+    /// The position begins anew.
+    #[error(
+        "begins anew at row {row}, from {} m to {} m; split the pass there",
+        rounded(*before, 9), rounded(*after, 9)
+    )]
+    Restarts {
+        /// The row, counted from 1, where it does.
+        row: usize,
+        /// The position in m one row earlier.
+        before: f64,
+        /// The position in m of that row.
+        after: f64,
+    },
+    /// The position jumps ahead.
+    #[error(
+        "jumps from {} m to {} m at row {row}; split the pass there",
+        rounded(*before, 9), rounded(*after, 9)
+    )]
+    Jumps {
+        /// The row, counted from 1, where it does.
+        row: usize,
+        /// The position in m one row earlier.
+        before: f64,
+        /// The position in m of that row.
+        after: f64,
+    },
+    /// The wheel stands.
+    #[error("stands still {}; keep only where the wheel rolls", standing(*from_s, *to_s))]
+    StandsStill {
+        /// From when on, in s from the first row.
+        from_s: f64,
+        /// Until when in s; to the end if there is none.
+        to_s: Option<f64>,
+    },
+    /// The position changes too rarely to be straightened.
+    #[error(
+        "changes only {steps} time{}, by {} m each; record positions finer, or leave them out and give the speed",
+        if *steps == 1 { "" } else { "s" }, significant(*step_m, 2)
+    )]
+    FewSteps {
+        /// How often it changes.
+        steps: usize,
+        /// The median change in m.
+        step_m: f64,
+    },
+    /// Steps of the position are too long to tell one sleeper from the next.
+    #[error(
+        "advances in steps of {} m; to tell sleepers apart they must not exceed {} m: record positions finer, or give the speed and the place of a sleeper",
+        significant(*step_m, 2), significant(*needed_m, 2)
+    )]
+    CoarsePosition {
+        /// The median step in m.
+        step_m: f64,
+        /// The longest that would do, in m.
+        needed_m: f64,
+    },
+    /// Two passes are one.
+    #[error(
+        "is a copy of {of}{}; a copy repeats nothing: remove one",
+        if (*factor - 1.0).abs() < 1e-6 { String::new() } else { format!(", times {}", significant(*factor, 4)) }
+    )]
+    Copy {
+        /// The other pass's file.
+        of: String,
+        /// What its samples are multiplied by.
+        factor: f64,
+    },
+    /// Two statements about one thing disagree.
+    #[error("{says}, but {but}; correct one of them, or leave one out")]
+    Contradiction {
+        /// One of them.
+        says: String,
+        /// The other one.
+        but: String,
+    },
     /// The nominal speed disagrees with position and time.
     #[error(
-        "is {declared} km/h but `position_m` of {file} advances at {observed:.3} km/h; correct one of them"
+        "is {} km/h but `position_m` of {file} advances at {} km/h; correct one of them",
+        rounded(*declared, 5), rounded(*observed, 4)
     )]
     WrongSpeed {
         /// The declared speed in km/h.
@@ -185,14 +359,35 @@ pub enum Fault {
     },
     /// The positions advance at a speed that no train has.
     #[error(
-        "advance at {observed:.1} km/h, which no pass does; check their unit, and turn a backward pass round"
+        "advances at {} km/h in {unit}, which no pass does; {mend}",
+        rounded(*observed, 3)
     )]
     Impossible {
         /// The mean speed in km/h that the positions say.
         observed: f64,
+        /// The unit that they were taken for.
+        unit: &'static str,
+        /// What to do.
+        mend: String,
+    },
+    /// The times advance at a rate at which no acceleration is recorded.
+    #[error(
+        "advances at {} Hz in {unit}, at which no acceleration is recorded; {mend}",
+        rounded(*observed, 3)
+    )]
+    ImpossibleRate {
+        /// The rate in Hz that the times say.
+        observed: f64,
+        /// The unit that they were taken for.
+        unit: &'static str,
+        /// What to do.
+        mend: String,
     },
     /// The pass is shorter than a sleeper's window.
-    #[error("covers {length_m:.4} m; one sleeper's window needs {spacing_m} m, record more")]
+    #[error(
+        "covers {} m; one sleeper's window needs {} m, record more",
+        significant(*length_m, 3), rounded(*spacing_m, 6)
+    )]
     TooShort {
         /// The distance covered in m.
         length_m: f64,
@@ -201,7 +396,8 @@ pub enum Fault {
     },
     /// No sleeper has its window inside any pass.
     #[error(
-        "none lies inside a pass (passes cover {from_m} to {to_m} m); give them on the scale of `position_m`"
+        "none lies inside a pass (passes cover {} to {} m); give them on the scale of `position_m`",
+        rounded(*from_m, 9), rounded(*to_m, 9)
     )]
     NoSleeperInside {
         /// Where the passes begin, in m.
@@ -209,4 +405,21 @@ pub enum Fault {
         /// Where they end, in m.
         to_m: f64,
     },
+}
+
+/// "2 and 4", "2, 4 and 5".
+fn list(places: &[usize]) -> String {
+    let texts: Vec<String> = places.iter().map(usize::to_string).collect();
+    match texts.as_slice() {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => texts.concat(),
+    }
+}
+
+/// When a wheel stands.
+fn standing(from_s: f64, to_s: Option<f64>) -> String {
+    to_s.map_or_else(
+        || "all the time".to_owned(),
+        |to_s| format!("from {from_s:.1} s to {to_s:.1} s"),
+    )
 }

@@ -3,12 +3,14 @@
 use super::columns::{Columns, NAMES};
 use super::error::{Fault, RecordingError};
 use super::manifest::{FILE_NAME, Manifest, PassEntry};
-use super::{check, limits, parquet_file};
+use super::odometer::Odometer;
+use super::{check, limits, parquet_file, quiet};
 use crate::Signal;
 use serde_json::{Map, Value};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use tracktwin_files::{FileName, FilesError, Kind, Names, Output, inside};
+use tracktwin_number::significant;
 
 /// Least part of a sleeper's window that a pass must cover to say something about the sleeper.
 ///
@@ -32,6 +34,8 @@ pub struct Recording {
     pub nominal: Map<String, Value>,
     /// Distance of the sleepers in m: the length of a sleeper's window.
     pub spacing_m: f64,
+    /// What was mended while the recording was read, or is doubtful in it: a sentence each.
+    pub doubts: Vec<String>,
 }
 
 /// One run of the wheel along the track.
@@ -74,13 +78,17 @@ impl Recording {
         limits::manifest(&manifest_path, &manifest)?;
         let spacing_m = spacing(&manifest_path, &manifest)?;
         let mut passes = Vec::with_capacity(manifest.passes.len());
-        for (index, entry) in manifest.passes.iter().enumerate() {
-            let path = pass_path(folder, &manifest_path, index, entry)?;
-            let pass = read_pass(&path, &manifest_path, index, entry, manifest.sample_rate_hz)?;
-            check::length(&path, &pass.position_m, spacing_m)?;
+        let mut doubts = Vec::new();
+        for index in 0..manifest.passes.len() {
+            let path = pass_path(folder, &manifest_path, index, &manifest.passes[index])?;
+            let (pass, step_m) = read_pass(&path, &manifest_path, index, &manifest, spacing_m)?;
+            doubts.extend(step_m.map(|step_m| straightened(&pass.file, step_m)));
             passes.push(pass);
         }
-        let recording = Self {
+        let paths: Vec<PathBuf> = passes.iter().map(|pass| folder.join(&pass.file)).collect();
+        let samples = passes.iter().map(|pass| pass.signal.samples());
+        check::copies(paths.iter().map(PathBuf::as_path).zip(samples))?;
+        let mut recording = Self {
             name: name_of(folder),
             sample_rate_hz: manifest.sample_rate_hz,
             channel: manifest.channel,
@@ -88,8 +96,13 @@ impl Recording {
             sleepers: manifest.sleepers,
             nominal: manifest.nominal,
             spacing_m,
+            doubts,
         };
         recording.check_sleepers(&manifest_path)?;
+        let gain_known = recording.gain_known();
+        let quiet = recording.passes.iter().filter_map(|pass| quiet::doubt(pass, gain_known));
+        let quiet: Vec<String> = quiet.collect();
+        recording.doubts.extend(quiet);
         Ok(recording)
     }
 
@@ -232,22 +245,39 @@ fn pass_path(
     })
 }
 
+/// A pass, and the length in m of the steps that its positions came in.
 fn read_pass(
     path: &Path,
-    manifest: &Path,
+    manifest_path: &Path,
     index: usize,
-    entry: &PassEntry,
-    sample_rate_hz: f64,
-) -> Result<Pass, RecordingError> {
+    manifest: &Manifest,
+    spacing_m: f64,
+) -> Result<(Pass, Option<f64>), RecordingError> {
+    let (entry, sample_rate_hz) = (&manifest.passes[index], manifest.sample_rate_hz);
     let columns = Columns::read(path)?;
-    check::times(manifest, path, &columns, sample_rate_hz)?;
-    check::positions(path, &columns.position_m)?;
+    let pace = check::times(manifest_path, path, &columns, sample_rate_hz)?;
+    let of_position = |fault| RecordingError::new(path, "position_m", fault);
+    let odometer =
+        Odometer::straightened(columns.position_m, sample_rate_hz).map_err(of_position)?;
+    if !manifest.sleepers.is_empty() {
+        odometer.tells_sleepers(spacing_m).map_err(of_position)?;
+    }
     let field = format!("passes[{index}].speed_km_h");
-    check::speed(manifest, &field, path, &columns, entry.speed_km_h)?;
+    let Odometer { position_m, step_m } = odometer;
+    check::speed(manifest_path, &field, path, &position_m, pace, entry.speed_km_h)?;
+    check::length(path, &position_m, spacing_m)?;
     let signal = Signal::new(sample_rate_hz, columns.acceleration_m_s2)
         .expect("columns are finite and the rate is positive");
     let PassEntry { file, speed_km_h, contact_loss_share } = entry.clone();
-    Ok(Pass { file, speed_km_h, signal, position_m: columns.position_m, contact_loss_share })
+    Ok((Pass { file, speed_km_h, signal, position_m, contact_loss_share }, step_m))
+}
+
+/// What was done to positions in steps.
+pub(super) fn straightened(file: &str, step_m: f64) -> String {
+    let step = significant(step_m, 2);
+    format!(
+        "{file}: the positions advance in steps of {step} m; between them the speed was taken as constant, and the zero of the positions is known to one step"
+    )
 }
 
 fn write_pass(path: &Path, pass: &Pass) -> Result<(), parquet::errors::ParquetError> {

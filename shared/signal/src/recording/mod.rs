@@ -4,14 +4,18 @@
 //! sleeper, and whether a recording is of a track of a certain design. What is computed from the samples is left to the transforms and features.
 
 mod check;
+mod clock;
 mod columns;
+mod copies;
 mod csv_file;
 mod error;
 mod folder;
 pub mod import;
 mod limits;
 mod manifest;
+mod odometer;
 mod parquet_file;
+mod quiet;
 #[cfg(test)]
 mod tests;
 mod track;

@@ -1,15 +1,20 @@
 //! Columns of numbers in Parquet files; knows nothing of what they mean.
 
 use super::error::{Fault, RecordingError};
-use super::import::Column;
-use parquet::basic::{Compression, Encoding, Repetition, Type as PhysicalType, ZstdLevel};
+use super::import::{Column, Oddity};
+use parquet::basic::{
+    Compression, ConvertedType, Encoding, LogicalType, Repetition, TimeUnit, Type as PhysicalType,
+    ZstdLevel,
+};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{DataType, DoubleType, FloatType};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::FileMetaData;
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
-use parquet::schema::types::Type;
+use parquet::schema::types::{ColumnDescriptor, Type};
+use std::collections::HashMap;
 use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
@@ -19,80 +24,181 @@ pub(super) fn read<const N: usize>(
     path: &Path,
     names: &[&str; N],
 ) -> Result<[Vec<f64>; N], RecordingError> {
-    let unreadable = |reason: String| Fault::Unreadable { reason };
-    let file = File::open(path)
-        .map_err(|error| RecordingError::new(path, "file", unreadable(error.to_string())))?;
-    let reader = SerializedFileReader::new(file)
-        .map_err(|error| RecordingError::new(path, "file", unreadable(error.to_string())))?;
-    let schema = reader.metadata().file_metadata().schema_descr();
-    let present: Vec<String> =
-        schema.columns().iter().map(|column| column.path().string()).collect();
+    let all = read_all(path)?;
     let mut columns = [const { Vec::new() }; N];
     for (column, name) in columns.iter_mut().zip(names) {
-        let place = present.iter().position(|candidate| candidate == name).ok_or_else(|| {
-            RecordingError::new(path, *name, Fault::NoColumn { present: present.clone() })
-        })?;
-        *column = column_values(&reader, place)
-            .map_err(|error| RecordingError::new(path, *name, unreadable(error.to_string())))?
-            .ok_or_else(|| {
-                let kind = format!("{} values", schema.column(place).physical_type());
-                RecordingError::new(path, *name, Fault::NotNumeric { kind })
-            })?;
+        let fault = |fault| RecordingError::new(path, *name, fault);
+        let named = || all.iter().enumerate().filter(|(_, column)| column.name == *name);
+        let places: Vec<usize> = named().map(|(index, _)| index + 1).collect();
+        let Some((_, found)) = named().next() else {
+            let present = all.iter().map(|column| column.name.clone()).collect();
+            return Err(fault(Fault::NoColumn { present }));
+        };
+        if places.len() > 1 {
+            return Err(fault(Fault::ColumnTwice { places }));
+        }
+        if let Some(Oddity::Kind(kind)) = &found.oddity {
+            return Err(fault(Fault::NotNumeric { kind: kind.clone() }));
+        }
+        column.clone_from(&found.values);
     }
     Ok(columns)
 }
 
-/// Reads all columns that hold numbers.
+/// Reads all columns; those that hold no numbers say what they hold.
+///
+/// Times, timestamps and durations become seconds; timestamps count from the first.
 pub(super) fn read_all(path: &Path) -> Result<Vec<Column>, RecordingError> {
     let unreadable = |error: ParquetError| {
         RecordingError::new(path, "file", Fault::Unreadable { reason: error.to_string() })
     };
     let file = File::open(path).map_err(|error| unreadable(error.into()))?;
     let reader = SerializedFileReader::new(file).map_err(unreadable)?;
-    let schema = reader.metadata().file_metadata().schema_descr();
+    let metadata = reader.metadata().file_metadata();
+    let durations = durations(metadata);
     let mut columns = Vec::new();
-    for (place, column) in schema.columns().iter().enumerate() {
-        if let Some(values) = column_values(&reader, place).map_err(unreadable)? {
-            columns.push(Column { name: column.path().string(), values, oddity: None });
-        }
+    for (place, column) in metadata.schema_descr().columns().iter().enumerate() {
+        let name = column.path().string();
+        let kind = Kind::of(column, durations.get(&name).copied());
+        let unit = matches!(kind, Kind::Time(_)).then(|| "s".to_owned());
+        let mut values = Vec::new();
+        let oddity = match kind {
+            Kind::Other(kind) => Some(Oddity::Kind(kind)),
+            kind => {
+                values = column_values(&reader, place, column, &kind).map_err(unreadable)?;
+                None
+            }
+        };
+        columns.push(Column { name, values, oddity, unit });
     }
     Ok(columns)
 }
 
-/// All values of the column at `place`, or none if they are not numbers.
+/// What the values of a column are.
+#[derive(Clone, Debug, PartialEq)]
+enum Kind {
+    /// Numbers as they stand.
+    Plain,
+    /// Whole numbers without a sign.
+    Unsigned,
+    /// Numbers of half precision.
+    Half,
+    /// Whole numbers of so much each.
+    Scaled(f64),
+    /// Times in whole numbers of so many seconds.
+    Time(f64),
+    /// No numbers.
+    Other(String),
+}
+
+impl Kind {
+    fn of(column: &ColumnDescriptor, duration_s: Option<f64>) -> Self {
+        if column.max_rep_level() > 0 {
+            return Self::Other("a list in every row".to_owned());
+        }
+        match column.logical_type_ref() {
+            Some(LogicalType::Timestamp(kind)) => return Self::Time(seconds(&kind.unit)),
+            Some(LogicalType::Time(kind)) => return Self::Time(seconds(&kind.unit)),
+            Some(LogicalType::Date) => return Self::Other("dates".to_owned()),
+            Some(LogicalType::Float16) => return Self::Half,
+            Some(LogicalType::Integer(kind)) if !kind.is_signed => return Self::Unsigned,
+            _ => {}
+        }
+        match (column.converted_type(), column.physical_type()) {
+            (ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIME_MILLIS, _) => Self::Time(1e-3),
+            (ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS, _) => Self::Time(1e-6),
+            (ConvertedType::UINT_32 | ConvertedType::UINT_64, _) => Self::Unsigned,
+            (ConvertedType::DECIMAL, PhysicalType::INT32 | PhysicalType::INT64) => {
+                Self::Scaled(10f64.powi(-column.type_scale()))
+            }
+            (_, PhysicalType::INT64) => duration_s.map_or(Self::Plain, Self::Time),
+            (_, PhysicalType::DOUBLE | PhysicalType::FLOAT | PhysicalType::INT32) => Self::Plain,
+            (_, PhysicalType::BOOLEAN) => Self::Other("true and false values".to_owned()),
+            (ConvertedType::DECIMAL, _) => Self::Other("long decimal numbers".to_owned()),
+            (_, PhysicalType::INT96) => Self::Other("timestamps of an old kind (INT96)".to_owned()),
+            (_, PhysicalType::BYTE_ARRAY) => Self::Other("texts".to_owned()),
+            (_, PhysicalType::FIXED_LEN_BYTE_ARRAY) => Self::Other("bytes".to_owned()),
+        }
+    }
+
+    fn of_int(&self, value: i64, unsigned: u64, first: &mut Option<i64>) -> f64 {
+        match self {
+            Self::Unsigned => unsigned as f64,
+            Self::Scaled(factor) => value as f64 * factor,
+            // A time since 1970 in nanoseconds has more digits than a double.
+            Self::Time(seconds) => value.wrapping_sub(*first.get_or_insert(value)) as f64 * seconds,
+            _ => value as f64,
+        }
+    }
+}
+
+const fn seconds(unit: &TimeUnit) -> f64 {
+    match unit {
+        TimeUnit::MILLIS => 1e-3,
+        TimeUnit::MICROS => 1e-6,
+        TimeUnit::NANOS => 1e-9,
+    }
+}
+
+/// Seconds of one of a column that pandas stores as durations, for which Parquet has no type.
+fn durations(metadata: &FileMetaData) -> HashMap<String, f64> {
+    let entries = metadata.key_value_metadata().into_iter().flatten();
+    let pandas = entries
+        .filter(|entry| entry.key == "pandas")
+        .find_map(|entry| serde_json::from_str::<serde_json::Value>(entry.value.as_deref()?).ok());
+    let columns = pandas.as_ref().and_then(|pandas| pandas.get("columns")?.as_array());
+    let duration = |column: &serde_json::Value| {
+        let name = column.get("field_name").or_else(|| column.get("name"))?.as_str()?;
+        let seconds = match column.get("numpy_type")?.as_str()? {
+            "timedelta64[s]" => 1.0,
+            "timedelta64[ms]" => 1e-3,
+            "timedelta64[us]" => 1e-6,
+            "timedelta64[ns]" => 1e-9,
+            _ => return None,
+        };
+        Some((name.to_owned(), seconds))
+    };
+    columns.into_iter().flatten().filter_map(duration).collect()
+}
+
+/// All values of the column at `place`.
 fn column_values(
     reader: &SerializedFileReader<File>,
     place: usize,
-) -> Result<Option<Vec<f64>>, ParquetError> {
+    column: &ColumnDescriptor,
+    kind: &Kind,
+) -> Result<Vec<f64>, ParquetError> {
     let mut values = Vec::new();
+    let mut first = None;
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group)?;
         let rows = usize::try_from(group.metadata().num_rows()).unwrap_or_default();
+        let into = (rows, column.max_def_level(), &mut values);
         match group.get_column_reader(place)? {
-            ColumnReader::DoubleColumnReader(column) => {
-                append(column, rows, |value| value, &mut values)?;
+            ColumnReader::DoubleColumnReader(reader) => append(reader, into, |value| value)?,
+            ColumnReader::FloatColumnReader(reader) => append(reader, into, f64::from)?,
+            ColumnReader::Int32ColumnReader(reader) => append(reader, into, |value| {
+                kind.of_int(value.into(), value.cast_unsigned().into(), &mut first)
+            })?,
+            ColumnReader::Int64ColumnReader(reader) => {
+                append(reader, into, |value| kind.of_int(value, value.cast_unsigned(), &mut first))?
             }
-            ColumnReader::FloatColumnReader(column) => {
-                append(column, rows, f64::from, &mut values)?;
-            }
-            ColumnReader::Int32ColumnReader(column) => {
-                append(column, rows, f64::from, &mut values)?;
-            }
-            ColumnReader::Int64ColumnReader(column) => {
-                append(column, rows, |value| value as f64, &mut values)?;
-            }
-            _ => return Ok(None),
+            ColumnReader::FixedLenByteArrayColumnReader(reader) => append(reader, into, |value| {
+                let bytes = value.data().try_into().unwrap_or([0; 2]);
+                half::f16::from_le_bytes(bytes).into()
+            })?,
+            _ => return Err(ParquetError::General("holds no numbers".to_owned())),
         }
     }
-    Ok(Some(values))
+    Ok(values)
 }
 
-/// Appends the `rows` values of one row group's column.
+/// Appends the values of one row group's column: its rows, the level of a value that is there, and
+/// where they go.
 fn append<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
-    rows: usize,
-    number: impl Fn(T::T) -> f64,
-    into: &mut Vec<f64>,
+    (rows, there, into): (usize, i16, &mut Vec<f64>),
+    number: impl FnMut(T::T) -> f64,
 ) -> Result<(), ParquetError> {
     let (mut values, mut levels) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
     while levels.len().max(values.len()) < rows {
@@ -106,9 +212,8 @@ fn append<T: DataType>(
     if levels.is_empty() {
         into.extend(present);
     } else {
-        let defined = levels.iter().copied().max().unwrap_or_default().max(1);
         into.extend(levels.iter().map(|&level| {
-            if level == defined { present.next().unwrap_or(f64::NAN) } else { f64::NAN }
+            if level == there { present.next().unwrap_or(f64::NAN) } else { f64::NAN }
         }));
     }
     Ok(())

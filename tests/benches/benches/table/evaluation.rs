@@ -124,5 +124,6 @@ fn recording() -> Recording {
         sleepers: (0..SLEEPERS).map(|i| Sleeper { id: format!("S{i}"), x_m: place(i) }).collect(),
         nominal: serde_json::Map::new(),
         spacing_m: SPACING_M,
+        doubts: Vec::new(),
     }
 }

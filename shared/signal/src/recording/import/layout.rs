@@ -1,105 +1,16 @@
 //! What the columns of a foreign table mean: names, units, and what the file doesn't say.
 
+use super::unit::{AccelerationUnit, PositionUnit, SpeedUnit, TimeUnit};
 use serde::Deserialize;
 use tracktwin_parameters::QuantityError;
 use tracktwin_parameters::quantity::{PLACE, SAMPLE_RATE, SPACING, SPEED, WHEEL_RADIUS};
 
-/// Unit of an acceleration.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum AccelerationUnit {
-    /// Metres per second squared.
-    #[default]
-    #[serde(rename = "m/s2")]
-    MetrePerSecondSquared,
-    /// Standard gravity.
-    #[serde(rename = "g")]
-    G,
-    /// Not known: levels mean something within the recording only.
-    #[serde(rename = "unknown")]
-    Unknown,
-}
-
-/// Unit of a time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum TimeUnit {
-    /// Seconds.
-    #[default]
-    #[serde(rename = "s")]
-    Second,
-    /// Milliseconds.
-    #[serde(rename = "ms")]
-    Millisecond,
-}
-
-/// Unit of a position.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum PositionUnit {
-    /// Metres.
-    #[default]
-    #[serde(rename = "m")]
-    Metre,
-    /// Kilometres.
-    #[serde(rename = "km")]
-    Kilometre,
-    /// Millimetres.
-    #[serde(rename = "mm")]
-    Millimetre,
-}
-
-/// Unit of a speed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum SpeedUnit {
-    /// Kilometres per hour.
-    #[default]
-    #[serde(rename = "km/h")]
-    KilometrePerHour,
-    /// Metres per second.
-    #[serde(rename = "m/s")]
-    MetrePerSecond,
-}
-
-impl AccelerationUnit {
-    /// One of it in m/s2; one where it isn't known.
-    pub(super) const fn in_si(self) -> f64 {
-        match self {
-            Self::MetrePerSecondSquared | Self::Unknown => 1.0,
-            Self::G => 9.806_65,
-        }
-    }
-}
-
-impl TimeUnit {
-    pub(super) const fn in_si(self) -> f64 {
-        match self {
-            Self::Second => 1.0,
-            Self::Millisecond => 1e-3,
-        }
-    }
-}
-
-impl PositionUnit {
-    pub(super) const fn in_si(self) -> f64 {
-        match self {
-            Self::Metre => 1.0,
-            Self::Kilometre => 1e3,
-            Self::Millimetre => 1e-3,
-        }
-    }
-}
-
-impl SpeedUnit {
-    pub(super) const fn in_si(self) -> f64 {
-        match self {
-            Self::KilometrePerHour => 1.0 / 3.6,
-            Self::MetrePerSecond => 1.0,
-        }
-    }
-}
-
 /// What the columns of the files mean, as a TOML file or flags say it.
 ///
 /// The place of the wheel comes from `position`, else from the sum of `speed` (a column), else from
-/// `speed_km_h` at constant speed. The sample rate comes from `sample_rate_hz`, else from `time`.
+/// `speed_km_h` at constant speed. The sample rate comes from `sample_rate_hz`, else from `time`. What
+/// is said twice must agree. Units that are not said here are what the file or the columns' names say,
+/// else m/s2, s, m and km/h.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Layout {
@@ -112,13 +23,13 @@ pub struct Layout {
     /// Column of the speed.
     pub speed: Option<String>,
     /// Unit of the accelerations.
-    pub acceleration_unit: AccelerationUnit,
+    pub acceleration_unit: Option<AccelerationUnit>,
     /// Unit of the time.
-    pub time_unit: TimeUnit,
+    pub time_unit: Option<TimeUnit>,
     /// Unit of the position.
-    pub position_unit: PositionUnit,
+    pub position_unit: Option<PositionUnit>,
     /// Unit of the speed column.
-    pub speed_unit: SpeedUnit,
+    pub speed_unit: Option<SpeedUnit>,
     /// Accelerations are positive upwards: their sign is turned.
     pub upwards: bool,
     /// Samples per second in Hz.
@@ -174,10 +85,10 @@ impl Default for Layout {
             time: None,
             position: None,
             speed: None,
-            acceleration_unit: AccelerationUnit::default(),
-            time_unit: TimeUnit::default(),
-            position_unit: PositionUnit::default(),
-            speed_unit: SpeedUnit::default(),
+            acceleration_unit: None,
+            time_unit: None,
+            position_unit: None,
+            speed_unit: None,
             upwards: false,
             sample_rate_hz: None,
             speed_km_h: None,

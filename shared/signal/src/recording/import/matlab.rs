@@ -1,24 +1,43 @@
 //! Numeric arrays of MATLAB files of version 5 to 7.
 
 use super::super::error::{Fault, RecordingError};
-use super::table::{Column, matrix};
+use super::mat_listing::{Variable, list};
+use super::table::{Column, matrix, other};
 use matfile::{Array, MatFile, NumericData};
-use std::fs::File;
 use std::path::Path;
 
-/// The columns of all real numeric arrays, named as the arrays.
+/// The columns of all arrays, named as these; what is not real numbers is named too.
 pub(super) fn read(path: &Path) -> Result<Vec<Column>, RecordingError> {
     let unreadable =
         |reason: String| RecordingError::new(path, "file", Fault::Unreadable { reason });
-    let file = File::open(path).map_err(|error| unreadable(error.to_string()))?;
-    let file = MatFile::parse(file).map_err(|error| {
-        unreadable(format!("{error}; files of version 7.3 must be saved anew with `save -v7`"))
+    let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
+    let variables = list(&bytes);
+    let opaque = variables.iter().find(|variable| variable.is_opaque());
+    let file = MatFile::parse(bytes.as_slice()).map_err(|error| match opaque {
+        Some(variable) => RecordingError::new(
+            path,
+            variable.name.as_str(),
+            Fault::NotNumeric { kind: variable.kind().unwrap_or_default() },
+        ),
+        None => unreadable(format!(
+            "{error}; files of version 4 or 7.3 must be saved anew with `save -v7`"
+        )),
     })?;
-    Ok(file.arrays().iter().flat_map(columns).collect())
+    let odd = |name: &str| variables.iter().find(|v| v.name == name).and_then(Variable::kind);
+    let mut columns: Vec<Column> = file
+        .arrays()
+        .iter()
+        .filter(|array| odd(array.name()).is_none())
+        .flat_map(columns)
+        .collect();
+    columns.extend(variables.iter().filter_map(|v| Some(other(&v.name, v.kind()?))));
+    Ok(columns)
 }
 
 fn columns(array: &Array) -> Vec<Column> {
-    let [rows, width] = array.size()[..] else { return Vec::new() };
+    let [rows, width] = array.size()[..] else {
+        return vec![other(array.name(), "an array of more than two dimensions")];
+    };
     let values = numbers(array.data());
     // Stored column by column.
     matrix(array.name(), rows, width, |row, column| values[column * rows + row])

@@ -4,14 +4,27 @@
 //! to a recording. What a recording must satisfy is checked where it is opened.
 
 mod csv_table;
+mod doubt;
+mod foreign;
 mod layout;
+mod mat_listing;
 mod matlab;
 mod numpy;
+#[cfg(test)]
+mod odd_files;
+#[cfg(test)]
+mod odd_kinds;
 mod pass;
+mod places;
+mod rate;
+mod raw;
 mod table;
 #[cfg(test)]
 mod tests;
+mod text;
+mod unit;
 
-pub use layout::{AccelerationUnit, Layout, LayoutError, PositionUnit, SpeedUnit, TimeUnit};
+pub use layout::{Layout, LayoutError};
 pub use pass::{Imported, import};
-pub use table::{Column, Table};
+pub use table::{Column, Oddity, Table};
+pub use unit::{AccelerationUnit, PositionUnit, SpeedUnit, TimeUnit};

@@ -1,11 +1,11 @@
 //! NumPy arrays: single ones, columns of a matrix, and archives of several.
 
 use super::super::error::{Fault, RecordingError};
-use super::table::{Column, matrix};
+use super::table::{Column, matrix, other};
 use npyz::npz::array_name_from_file_name;
 use npyz::{DType, NpyFile, Order};
 use std::fs::File;
-use std::io::{BufReader, Error, ErrorKind, Read};
+use std::io::{BufReader, Error, Read};
 use std::path::Path;
 use zip::ZipArchive;
 
@@ -25,12 +25,7 @@ pub(super) fn read_archive(path: &Path) -> Result<Vec<Column>, RecordingError> {
             let Some(name) = array_name_from_file_name(&entry.name()?).map(str::to_owned) else {
                 continue;
             };
-            // Texts and objects are no columns.
-            match columns(NpyFile::new(entry)?, &name) {
-                Ok(columns) => all.extend(columns),
-                Err(error) if error.kind() == ErrorKind::Unsupported => {}
-                Err(error) => return Err(error),
-            }
+            all.extend(columns(NpyFile::new(entry)?, &name)?);
         }
         Ok(all)
     };
@@ -42,18 +37,22 @@ fn unreadable(path: &Path, error: &Error) -> RecordingError {
 }
 
 fn columns<R: Read>(array: NpyFile<R>, name: &str) -> Result<Vec<Column>, Error> {
+    if let DType::Record(fields) = array.dtype() {
+        let kind = "a field of records: save it as an array of its own";
+        return Ok(fields.iter().map(|field| other(&field.name, kind)).collect());
+    }
     let shape: Vec<usize> = array.shape().iter().map(|&size| size as usize).collect();
     let order = array.order();
     let (rows, width) = match shape[..] {
         [] => (1, 1),
         [rows] => (rows, 1),
         [rows, width] => (rows, width),
-        _ => {
-            let text = format!("{name} has {} dimensions; give one or two", shape.len());
-            return Err(Error::new(ErrorKind::Unsupported, text));
-        }
+        _ => return Ok(vec![other(name, "an array of more than two dimensions")]),
     };
-    let values = numbers(array, name)?;
+    let values = match numbers(array)? {
+        Ok(values) => values,
+        Err(kind) => return Ok(vec![other(name, kind)]),
+    };
     let value = |row: usize, column: usize| match order {
         Order::C => values[row * width + column],
         Order::Fortran => values[column * rows + row],
@@ -61,24 +60,43 @@ fn columns<R: Read>(array: NpyFile<R>, name: &str) -> Result<Vec<Column>, Error>
     Ok(matrix(name, rows, width, value))
 }
 
-fn numbers<R: Read>(array: NpyFile<R>, name: &str) -> Result<Vec<f64>, Error> {
-    let kind = array.dtype();
-    let DType::Plain(text) = &kind else {
-        let text = format!("{name} has fields; save each as an array of its own");
-        return Err(Error::new(ErrorKind::Unsupported, text));
+/// The values as numbers, or what they are instead.
+fn numbers<R: Read>(array: NpyFile<R>) -> Result<Result<Vec<f64>, String>, Error> {
+    fn all<T: Copy>(values: Vec<T>, number: impl Fn(T) -> f64) -> Vec<f64> {
+        values.into_iter().map(number).collect()
+    }
+    let DType::Plain(text) = array.dtype() else {
+        return Ok(Err("arrays in arrays".to_owned()));
     };
     // `<f8`, `>i2` ...: kind and size are the last characters.
     let text = text.to_string();
-    match text.trim_start_matches(['<', '>', '|', '=']) {
-        "f8" => array.into_vec(),
-        "f4" => Ok(array.into_vec::<f32>()?.into_iter().map(f64::from).collect()),
-        "i8" => Ok(array.into_vec::<i64>()?.into_iter().map(|value| value as f64).collect()),
-        "i4" => Ok(array.into_vec::<i32>()?.into_iter().map(f64::from).collect()),
-        "i2" => Ok(array.into_vec::<i16>()?.into_iter().map(f64::from).collect()),
-        "u2" => Ok(array.into_vec::<u16>()?.into_iter().map(f64::from).collect()),
-        other => {
-            let text = format!("{name} holds {other} values; save it as floating-point numbers");
-            Err(Error::new(ErrorKind::Unsupported, text))
+    let kind = text.trim_start_matches(['<', '>', '|', '=']);
+    Ok(Ok(match kind {
+        "f8" => array.into_vec()?,
+        "f4" => all(array.into_vec::<f32>()?, f64::from),
+        "f2" => all(array.into_vec::<half::f16>()?, f64::from),
+        "i8" => all(array.into_vec::<i64>()?, |value| value as f64),
+        "i4" => all(array.into_vec::<i32>()?, f64::from),
+        "i2" => all(array.into_vec::<i16>()?, f64::from),
+        "i1" => all(array.into_vec::<i8>()?, f64::from),
+        "u8" => all(array.into_vec::<u64>()?, |value| value as f64),
+        "u4" => all(array.into_vec::<u32>()?, f64::from),
+        "u2" => all(array.into_vec::<u16>()?, f64::from),
+        "u1" => all(array.into_vec::<u8>()?, f64::from),
+        _ => return Ok(Err(other_kind(kind))),
+    }))
+}
+
+/// What values are that are no real numbers.
+fn other_kind(kind: &str) -> String {
+    match kind.chars().next() {
+        Some('c') => "complex numbers: save the real part or the magnitude".to_owned(),
+        Some('b') => "true and false values".to_owned(),
+        Some('O') => "objects of Python: save them with `astype(float)`".to_owned(),
+        Some('U' | 'S' | 'a') => "texts".to_owned(),
+        Some('m' | 'M') => {
+            format!("{kind} values: save times in seconds, such as `t / numpy.timedelta64(1, 's')`")
         }
+        _ => format!("{kind} values"),
     }
 }

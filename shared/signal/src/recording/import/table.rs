@@ -2,8 +2,18 @@
 
 use super::super::error::{Fault, RecordingError};
 use super::super::{limits, parquet_file};
-use super::{csv_table, matlab, numpy};
+use super::unit::bare_name;
+use super::{csv_table, foreign, matlab, numpy};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
+
+/// Bytes by whose beginning a kind of file is known.
+const BEGIN_BYTES: u64 = 64;
+/// Numbers that loggers write for what was not measured.
+const MISSING: [f64; 8] = [999.0, 999.25, 9999.0, 99_999.0, 999_999.0, 9_999_999.0, 1e30, 1e35];
+/// Times the span of all other values by which such a number is away from them.
+const FAR: f64 = 3.0;
 
 /// A column of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -12,8 +22,39 @@ pub struct Column {
     pub name: String,
     /// Its values; not-a-number where the file has something else.
     pub values: Vec<f64>,
-    /// The first value that is no number, with its row counted from 1.
-    pub oddity: Option<(usize, String)>,
+    /// What in it is no number.
+    pub oddity: Option<Oddity>,
+    /// Its unit, where the file says it beside the name.
+    pub unit: Option<String>,
+}
+
+/// What keeps a column from being numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Oddity {
+    /// The first value that is no number.
+    Value {
+        /// Its row, counted from 1.
+        row: usize,
+        /// Its text.
+        text: String,
+    },
+    /// The whole column holds something else, such as complex numbers.
+    Kind(String),
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Content {
+    /// Its columns, in the file's order.
+    pub columns: Vec<Column>,
+    /// What was assumed on reading it, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl From<Vec<Column>> for Content {
+    fn from(columns: Vec<Column>) -> Self {
+        Self { columns, notes: Vec::new() }
+    }
 }
 
 /// A file's columns.
@@ -23,55 +64,107 @@ pub struct Table {
     pub path: PathBuf,
     /// Its columns, in the file's order.
     pub columns: Vec<Column>,
+    /// What was assumed on reading it, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl Table {
     /// Reads a `.csv`, `.txt`, `.parquet`, `.npy`, `.npz` or `.mat` file.
     ///
     /// # Errors
-    /// [`Fault::NoSuchFile`], [`Fault::UnknownTable`] or [`Fault::Unreadable`].
+    /// [`Fault::NoSuchFile`], [`Fault::Foreign`], [`Fault::UnknownTable`] or what is wrong inside.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
+        let fail = |fault| RecordingError::new(path, "file", fault);
         if !path.is_file() {
-            return Err(RecordingError::new(path, "file", Fault::NoSuchFile));
+            return Err(fail(Fault::NoSuchFile));
         }
         limits::file(path)?;
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        let columns = match ending.to_ascii_lowercase().as_str() {
+        let ending = ending.to_ascii_lowercase();
+        if let Some(fault) = foreign::fault(&begin(path)?, &ending, ending == "npz") {
+            return Err(fail(fault));
+        }
+        let content = match ending.as_str() {
             "csv" | "txt" | "dat" | "tsv" => csv_table::read(path)?,
-            "parquet" => parquet_file::read_all(path)?,
-            "npy" => numpy::read_array(path)?,
-            "npz" => numpy::read_archive(path)?,
-            "mat" => matlab::read(path)?,
-            _ => return Err(RecordingError::new(path, "file", Fault::UnknownTable)),
+            "parquet" => parquet_file::read_all(path)?.into(),
+            "npy" => numpy::read_array(path)?.into(),
+            "npz" => numpy::read_archive(path)?.into(),
+            "mat" => matlab::read(path)?.into(),
+            _ => return Err(fail(Fault::UnknownTable)),
         };
-        Ok(Self { path: path.to_owned(), columns })
+        if content.columns.is_empty() {
+            return Err(fail(Fault::Empty { rows: 0 }));
+        }
+        Ok(Self { path: path.to_owned(), columns: content.columns, notes: content.notes })
     }
 
-    /// The column of that name: all finite, at least two values.
+    /// The column of that name, or of that name before its unit: all finite, at least two values.
     ///
     /// # Errors
-    /// [`Fault::NoColumn`] with the names there are, [`Fault::NotFinite`] with the row, or
-    /// [`Fault::Empty`].
-    pub fn column(&self, name: &str) -> Result<&[f64], RecordingError> {
+    /// [`Fault::NoColumn`] with the names there are, [`Fault::ColumnTwice`], [`Fault::NotNumeric`],
+    /// [`Fault::NotFinite`] or [`Fault::Missing`] with the row, or [`Fault::Empty`].
+    pub(super) fn column(&self, name: &str) -> Result<&Column, RecordingError> {
         let fault = |fault| RecordingError::new(&self.path, name, fault);
-        let column = self.columns.iter().find(|column| column.name == name).ok_or_else(|| {
-            let present = self.columns.iter().map(|column| column.name.clone()).collect();
-            fault(Fault::NoColumn { present })
-        })?;
-        if let Some((row, value)) = &column.oddity {
-            return Err(fault(Fault::NotFinite { row: *row, value: format!("\"{value}\"") }));
-        }
-        if column.values.len() < 2 {
-            return Err(fault(Fault::Empty { rows: column.values.len() }));
-        }
-        match column.values.iter().position(|value| !value.is_finite()) {
-            Some(row) => {
-                let value = column.values[row].to_string();
-                Err(fault(Fault::NotFinite { row: row + 1, value }))
+        let column = self.find(name).map_err(fault)?;
+        check(column).map_or(Ok(column), |found| Err(fault(found)))
+    }
+
+    fn find(&self, name: &str) -> Result<&Column, Fault> {
+        let places = |is_it: &dyn Fn(&str) -> bool| -> Vec<usize> {
+            let named = self.columns.iter().enumerate().filter(|(_, column)| is_it(&column.name));
+            named.map(|(index, _)| index).collect()
+        };
+        let exact = places(&|other| other == name);
+        let found =
+            if exact.is_empty() { places(&|other| bare_name(other) == name) } else { exact };
+        match found[..] {
+            [index] => Ok(&self.columns[index]),
+            [] => {
+                let present = self.columns.iter().map(|column| column.name.clone()).collect();
+                Err(Fault::NoColumn { present })
             }
-            None => Ok(&column.values),
+            _ => Err(Fault::ColumnTwice { places: found.iter().map(|index| index + 1).collect() }),
         }
     }
+}
+
+/// What is wrong with the values of a column.
+fn check(column: &Column) -> Option<Fault> {
+    match &column.oddity {
+        Some(Oddity::Kind(kind)) => return Some(Fault::NotNumeric { kind: kind.clone() }),
+        Some(Oddity::Value { row, text }) => {
+            return Some(Fault::NotFinite { row: *row, value: format!("\"{text}\"") });
+        }
+        None => {}
+    }
+    if column.values.len() < 2 {
+        return Some(Fault::Empty { rows: column.values.len() });
+    }
+    let odd = column.values.iter().position(|value| !value.is_finite());
+    odd.map(|index| Fault::NotFinite { row: index + 1, value: column.values[index].to_string() })
+        .or_else(|| missing(&column.values))
+}
+
+/// A number that stands for none, if it lies far from all others.
+fn missing(values: &[f64]) -> Option<Fault> {
+    let is_sign = |value: &f64| MISSING.iter().any(|sign| (value.abs() / sign - 1.0).abs() < 1e-6);
+    let row = values.iter().position(is_sign)?;
+    let others = values.iter().filter(|value| !is_sign(value));
+    let ends = others.fold([f64::INFINITY, f64::NEG_INFINITY], |e, &v| [e[0].min(v), e[1].max(v)]);
+    let span = ends[1] - ends[0];
+    let value = values[row];
+    let away = if value > 0.0 { value - ends[1] } else { ends[0] - value };
+    (away > FAR * span && span >= 0.0).then_some(Fault::Missing { row: row + 1, value })
+}
+
+/// The first bytes of a file.
+fn begin(path: &Path) -> Result<Vec<u8>, RecordingError> {
+    let mut bytes = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(BEGIN_BYTES).read_to_end(&mut bytes));
+    read.map_err(|error| {
+        RecordingError::new(path, "file", Fault::Unreadable { reason: error.to_string() })
+    })?;
+    Ok(bytes)
 }
 
 /// Columns of a matrix by their numbers, or the single one under the name itself.
@@ -90,7 +183,13 @@ pub(super) fn matrix(
     let column = |index: usize| Column {
         name: if width == 1 { name.to_owned() } else { format!("{name}-{}", index + 1) },
         values: (0..length).map(|row| at(row, index)).collect(),
-        oddity: None,
+        ..Column::default()
     };
     (0..width).map(column).collect()
+}
+
+/// A column that holds something else than real numbers.
+pub(super) fn other(name: &str, kind: impl Into<String>) -> Column {
+    let oddity = Some(Oddity::Kind(kind.into()));
+    Column { name: name.to_owned(), oddity, ..Column::default() }
 }

@@ -182,20 +182,24 @@ fn an_imported_recording_opens_again() {
 fn units_signs_and_places_come_out_in_si() {
     let folder = folder();
     let path = csv(folder.path(), "t,acc\n", ",", false);
-    let g = Layout { acceleration_unit: AccelerationUnit::G, upwards: true, ..layout() };
+    let g = Layout { acceleration_unit: Some(AccelerationUnit::G), upwards: true, ..layout() };
     let (found, expected) = (samples(&path, &g), expected());
     assert!(found.iter().zip(&expected).all(|(a, b)| (a + 9.80665 * b).abs() < 1e-12));
     // A column of times read as millimetres: 0.2 mm in 0.2 s.
-    let places_in =
-        |unit| Layout { position: Some("t".to_owned()), position_unit: unit, ..layout() };
-    let slow = places_in(PositionUnit::Millimetre);
-    let recording = import(std::slice::from_ref(&path), &slow).unwrap().remove(0).recording;
+    let places_in = |unit| Layout {
+        position: Some("t".to_owned()),
+        position_unit: Some(unit),
+        spacing_m: 1e-4,
+        ..layout()
+    };
+    let layout = Layout { speed_km_h: None, ..places_in(PositionUnit::Millimetre) };
+    let recording = import(std::slice::from_ref(&path), &layout).unwrap().remove(0).recording;
     let places = &recording.passes[0].position_m;
     assert!((places[ROWS - 1] - 1e-3 * (ROWS - 1) as f64 / RATE_HZ).abs() < 1e-9);
     assert!((recording.passes[0].speed_km_h - 0.0036).abs() < 1e-9);
     // As kilometres it is 3600 km/h.
-    let refusal = import(&[path], &places_in(PositionUnit::Kilometre)).unwrap_err().to_string();
-    assert!(refusal.contains("3600.0 km/h, which no pass does"), "{refusal}");
+    let text = complaint(&path, &places_in(PositionUnit::Kilometre));
+    assert!(text.contains("advances at 3600 km/h in km, which no pass does; in m it is"), "{text}");
 }
 
 #[test]
@@ -229,10 +233,10 @@ fn what_is_no_number_is_named_by_its_row() {
     let path = folder.path().join("pass.csv");
     fs::write(&path, "t,acc,remark\n0,1,start\n1,n/a,\n2,3,end\n").unwrap();
     let text = complaint(&path, &layout());
-    assert!(text.starts_with("pass.csv: acc: row 2 is \"n/a\"; drop or mend"), "{text}");
-    fs::write(folder.path().join("pass.xlsx"), "").unwrap();
-    let text = complaint(&folder.path().join("pass.xlsx"), &layout());
-    assert!(text.starts_with("pass.xlsx: file: its name ends in none of .csv"), "{text}");
+    assert!(text.starts_with("pass.csv: acc: row 2 is \"n/a\"; write a plain number"), "{text}");
+    fs::write(folder.path().join("pass.odd"), "").unwrap();
+    let text = complaint(&folder.path().join("pass.odd"), &layout());
+    assert!(text.starts_with("pass.odd: file: its name ends in none of .csv"), "{text}");
     fs::write(folder.path().join("pass.mat"), "MATLAB 7.3 ...").unwrap();
     let text = complaint(&folder.path().join("pass.mat"), &layout());
     assert!(text.contains("-v7"), "{text}");

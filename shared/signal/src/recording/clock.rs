@@ -1,0 +1,162 @@
+//! The pace of a column of times: even, in coarse steps, with jitter, or with gaps.
+
+use super::error::Fault;
+
+/// Deviation of a single time step, in sample intervals, that rounded times may show.
+const STEP_TOLERANCE: f64 = 0.5;
+/// Sample intervals by which a stamp may be off where its clock trembles.
+const JITTER_MAX: f64 = 1.0;
+/// Sample intervals from which on steps of the clock are coarse: a repeated row makes steps of one.
+const COARSE_MIN: f64 = 1.1;
+/// Relative accuracy of a rate from times that advance evenly.
+const ACCURACY: f64 = 1e-6;
+
+/// How the samples of a pass follow each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pace {
+    /// Samples per second in Hz.
+    pub rate_hz: f64,
+    /// Relative uncertainty of that rate.
+    pub uncertainty: f64,
+    /// What the stamps are off from even times.
+    pub stamps: Stamps,
+}
+
+/// How far stamps of time can be trusted one by one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Stamps {
+    /// As even as rounding allows.
+    Even,
+    /// The clock advances in steps of so many seconds, longer than a sample interval.
+    Coarse(f64),
+    /// Off by up to so many seconds, but never by more than a sample interval.
+    Jitter(f64),
+}
+
+impl Pace {
+    /// The pace of `times` in s, of which there are two at least.
+    ///
+    /// # Errors
+    /// [`Fault::UnevenTime`] where samples are missing, repeated or out of order.
+    pub(super) fn of(times: &[f64]) -> Result<Self, Fault> {
+        let last = times.len() - 1;
+        let mean = (times[last] - times[0]) / last as f64;
+        let Some(fault) = uneven_step(times, mean) else {
+            let rate_hz = 1.0 / mean;
+            return Ok(Self { rate_hz, uncertainty: ACCURACY, stamps: Stamps::Even });
+        };
+        coarse(times, mean).or_else(|| jitter(times, mean)).ok_or(fault)
+    }
+
+    /// The rate with as few digits as its uncertainty allows, in Hz: clocks have round rates.
+    pub(super) fn round_rate_hz(&self) -> f64 {
+        let with = |digits: usize| {
+            let text = format!("{:.*e}", digits, self.rate_hz);
+            text.parse::<f64>().unwrap_or(self.rate_hz)
+        };
+        let fits = |rate: &f64| (rate / self.rate_hz - 1.0).abs() <= self.uncertainty;
+        (0..8).map(with).find(fits).unwrap_or(self.rate_hz)
+    }
+}
+
+/// Times that stand still and then advance by whole steps of a clock.
+fn coarse(times: &[f64], mean: f64) -> Option<Pace> {
+    let changes: Vec<usize> = (1..times.len()).filter(|&i| times[i] != times[i - 1]).collect();
+    let steps = || changes.iter().map(|&i| times[i] - times[i - 1]);
+    let step_s = steps().fold(f64::INFINITY, f64::min);
+    if changes.len() < 3 || step_s <= 0.0 || step_s < COARSE_MIN * mean {
+        return None;
+    }
+    let (first, last) = (changes[0], changes[changes.len() - 1]);
+    let interval = (times[last] - times[first]) / (last - first) as f64;
+    let whole = |step: f64| (step / step_s - (step / step_s).round()).abs() < 0.1;
+    let off = farthest(times, first, interval);
+    if !(steps().all(whole) && off <= step_s + interval) {
+        return None;
+    }
+    let uncertainty = 1.0 / (last - first) as f64;
+    Some(Pace { rate_hz: 1.0 / interval, uncertainty, stamps: Stamps::Coarse(step_s) })
+}
+
+/// Stamps that tremble about even times.
+fn jitter(times: &[f64], mean: f64) -> Option<Pace> {
+    let off = farthest(times, 0, mean);
+    let advances = times.windows(2).all(|pair| pair[1] > pair[0]);
+    let uncertainty = 2.0 * off / (mean * (times.len() - 1) as f64);
+    (advances && off <= JITTER_MAX * mean).then_some(Pace {
+        rate_hz: 1.0 / mean,
+        uncertainty: uncertainty.max(ACCURACY),
+        stamps: Stamps::Jitter(off),
+    })
+}
+
+/// The greatest distance in s from times that are even from row `first` on.
+fn farthest(times: &[f64], first: usize, interval: f64) -> f64 {
+    let off = |(row, time): (usize, &f64)| {
+        (time - times[first] - (row as f64 - first as f64) * interval).abs()
+    };
+    times.iter().enumerate().map(off).fold(0.0, f64::max)
+}
+
+/// The first step that differs from the others by more than rounding.
+fn uneven_step(times: &[f64], mean: f64) -> Option<Fault> {
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let index = steps.len() / 2;
+    // The median step is what a gap cannot move; the mean is what rounding cannot move.
+    let median = *steps.clone().select_nth_unstable_by(index, f64::total_cmp).1;
+    let expected = if (mean / median - 1.0).abs() < STEP_TOLERANCE { mean } else { median };
+    let odd = |step: f64| !(step > 0.0 && (step - expected).abs() <= STEP_TOLERANCE * expected);
+    let row = steps.iter().position(|&step| odd(step))?;
+    Some(Fault::UnevenTime { row: row + 2, step: steps.swap_remove(row), expected })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 25_600.0;
+
+    fn times(stamp: impl Fn(f64) -> f64) -> Vec<f64> {
+        (0..40_000).map(|row| stamp(f64::from(row) / RATE_HZ)).collect()
+    }
+
+    #[test]
+    fn even_times_from_any_instant_have_their_rate() {
+        for begin in [0.0, 3.7, 1.7e9] {
+            let pace = Pace::of(&times(|time| begin + time)).unwrap();
+            assert_eq!((pace.stamps, pace.round_rate_hz()), (Stamps::Even, RATE_HZ), "{begin}");
+        }
+    }
+
+    #[test]
+    fn a_clock_in_coarse_steps_has_the_rate_of_its_samples() {
+        for step in [1e-3, 1e-2, 5e-5] {
+            let rounded = times(|time| (time / step).round() * step);
+            let pace = Pace::of(&rounded).unwrap();
+            let Stamps::Coarse(found) = pace.stamps else { panic!("{step}: {pace:?}") };
+            assert!((found / step - 1.0).abs() < 1e-6, "{found} for {step}");
+            assert_eq!(pace.round_rate_hz(), RATE_HZ, "{pace:?}");
+        }
+    }
+
+    #[test]
+    fn stamps_that_tremble_by_less_than_a_sample_are_even_underneath() {
+        let tremble = |time: f64| time + 0.45 / RATE_HZ * (1e5 * time).sin();
+        let pace = Pace::of(&times(tremble)).unwrap();
+        assert!(matches!(pace.stamps, Stamps::Jitter(_)), "{pace:?}");
+        assert!((pace.round_rate_hz() / RATE_HZ - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn gaps_repeated_rows_and_rows_out_of_order_are_none_of_these() {
+        let rounded = || times(|time| (time * 1e3).round() / 1e3);
+        let mut cases = vec![times(|time| time), times(|time| time), times(|time| time), rounded()];
+        cases[0].insert(700, 700.0 / RATE_HZ);
+        cases[1].swap(700, 720);
+        cases[2].drain(700..720);
+        cases[3].drain(700..900);
+        for (index, times) in cases.iter().enumerate() {
+            assert!(matches!(Pace::of(times), Err(Fault::UnevenTime { .. })), "case {index}");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The sample rate of a file, from what was stated and from its times.
+
+use super::super::clock::{Pace, Stamps};
+use super::super::error::{Fault, RecordingError};
+use super::table::Column;
+use super::unit::{TimeUnit, Unit, bare_name, of_column};
+use super::{Layout, Table};
+use tracktwin_number::{rounded, significant};
+
+/// Relative difference of two statements of one rate that is no contradiction.
+const ALIKE: f64 = 1e-3;
+/// Relative difference from a column that only seems to hold times.
+const NEAR: f64 = 0.02;
+/// Rates in Hz within which accelerations of an axle box are recorded.
+const PLAUSIBLE_HZ: [f64; 2] = [50.0, 1e7];
+/// Names of columns that hold times, in lower case.
+const TIMES: [&str; 8] = ["t", "time", "zeit", "t_s", "time_s", "t_ms", "time_ms", "timestamp"];
+
+/// Samples per second in Hz: as stated, else as the column of times says; these must agree.
+pub(super) fn of(
+    table: &Table,
+    layout: &Layout,
+    notes: &mut Vec<String>,
+) -> Result<f64, RecordingError> {
+    match (&layout.time, layout.sample_rate_hz) {
+        (None, None) => {
+            let fault = Fault::NoField { expected: "it, or the column of times".to_owned() };
+            Err(RecordingError::new(&table.path, "sample_rate_Hz", fault))
+        }
+        (None, Some(stated)) => {
+            notes.extend(doubt(table, stated));
+            Ok(stated)
+        }
+        (Some(name), stated) => {
+            let pace = pace(table, name, layout.time_unit, notes)?;
+            let Some(stated) = stated else { return Ok(pace.round_rate_hz()) };
+            if (pace.rate_hz / stated - 1.0).abs() <= ALIKE.max(pace.uncertainty) {
+                return Ok(stated);
+            }
+            let fault = Fault::Contradiction {
+                says: format!("is {} Hz", rounded(stated, 8)),
+                but: format!("column {name} advances at {} Hz", rounded(pace.rate_hz, 6)),
+            };
+            Err(RecordingError::new(&table.path, "sample_rate_Hz", fault))
+        }
+    }
+}
+
+/// How the column of times advances.
+fn pace(
+    table: &Table,
+    name: &str,
+    told: Option<TimeUnit>,
+    notes: &mut Vec<String>,
+) -> Result<Pace, RecordingError> {
+    let column = table.column(name)?;
+    let fault = |fault| RecordingError::new(&table.path, name, fault);
+    let unit = of_column(column, told, notes).map_err(fault)?;
+    let pace = in_unit(column, unit).map_err(fault)?;
+    let observed = pace.rate_hz;
+    let is_sure = told.is_some() || column.unit.is_some();
+    if !is_sure && !(PLAUSIBLE_HZ[0]..=PLAUSIBLE_HZ[1]).contains(&observed) {
+        let mend = other_unit(observed * unit.in_si());
+        return Err(fault(Fault::ImpossibleRate { observed, unit: unit.name(), mend }));
+    }
+    let (interval, shown) = (1.0 / observed, |seconds: f64| significant(1e3 * seconds, 2));
+    match pace.stamps {
+        Stamps::Even => {}
+        Stamps::Coarse(step_s) => notes.push(format!(
+            "column {name} advances in steps of {} ms, a sample takes {} ms: the samples were taken as evenly spaced",
+            shown(step_s),
+            shown(interval)
+        )),
+        Stamps::Jitter(off_s) => notes.push(format!(
+            "column {name} trembles by up to {} ms, a sample takes {} ms: the samples were taken as evenly spaced",
+            shown(off_s),
+            shown(interval)
+        )),
+    }
+    Ok(pace)
+}
+
+fn in_unit(column: &Column, unit: TimeUnit) -> Result<Pace, Fault> {
+    let begin = column.values[0];
+    // From the first on: a time since 1970 leaves no digits for the steps.
+    let times: Vec<f64> = column.values.iter().map(|time| unit.in_si() * (time - begin)).collect();
+    Pace::of(&times)
+}
+
+/// The unit in which the times would make sense; `per_unit` is how many samples one has.
+fn other_unit(per_unit: f64) -> String {
+    let rates = TimeUnit::ALL.iter().map(|(unit, _)| (unit.name(), per_unit / unit.in_si()));
+    let range = PLAUSIBLE_HZ[0]..=PLAUSIBLE_HZ[1];
+    let fits: Vec<String> = rates
+        .filter(|(_, rate)| range.contains(rate))
+        .map(|(unit, rate)| format!("in {unit} it is {} Hz", rounded(rate, 4)))
+        .collect();
+    if fits.is_empty() {
+        "give another column, or the sample rate".to_owned()
+    } else {
+        format!("{}: {}", fits.join(", "), TimeUnit::MEND)
+    }
+}
+
+/// A column that looks like times and says another rate than the one stated.
+fn doubt(table: &Table, stated: f64) -> Option<String> {
+    let is_time = |column: &&Column| {
+        TIMES.contains(&bare_name(&column.name).to_ascii_lowercase().as_str())
+            && column.oddity.is_none()
+            && column.values.len() > 2
+            && column.values.iter().all(|time| time.is_finite())
+    };
+    let column = table.columns.iter().find(is_time)?;
+    let rate = |unit: TimeUnit| Some(in_unit(column, unit).ok()?.rate_hz);
+    let rates: Vec<f64> = TimeUnit::ALL.iter().filter_map(|(unit, _)| rate(*unit)).collect();
+    let agrees = rates.iter().any(|rate| (rate / stated - 1.0).abs() < NEAR);
+    let first = rates.first().filter(|_| !agrees)?;
+    Some(format!(
+        "doubt: column {} advances at {} Hz, if it holds times in s, and the stated rate is {} Hz: say --column \"time={}\" if that is so",
+        column.name,
+        rounded(*first, 4),
+        rounded(stated, 8),
+        column.name
+    ))
+}

@@ -1,0 +1,268 @@
+//! Units of columns: what a user says, what a file says, and what they are in SI.
+
+use super::super::error::Fault;
+use super::table::Column;
+use serde::Deserialize;
+
+/// A unit of some quantity.
+pub(super) trait Unit: Copy + PartialEq + Default + 'static {
+    /// All of them with their spellings, in lower case and without blanks; the first one is shown.
+    const ALL: &'static [(Self, &'static [&'static str])];
+    /// How a user says which unit it is.
+    const MEND: &'static str;
+
+    /// One of it in SI units.
+    fn in_si(self) -> f64;
+
+    /// As it is written.
+    fn name(self) -> &'static str {
+        let of = Self::ALL.iter().find(|(unit, _)| *unit == self);
+        of.and_then(|(_, spellings)| spellings.first()).copied().unwrap_or("an unknown unit")
+    }
+}
+
+/// Unit of an acceleration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum AccelerationUnit {
+    /// Metres per second squared.
+    #[default]
+    #[serde(rename = "m/s2")]
+    MetrePerSecondSquared,
+    /// Standard gravity.
+    #[serde(rename = "g")]
+    G,
+    /// Not known: levels mean something within the recording only.
+    #[serde(rename = "unknown")]
+    Unknown,
+}
+
+/// Unit of a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum TimeUnit {
+    /// Seconds.
+    #[default]
+    #[serde(rename = "s")]
+    Second,
+    /// Milliseconds.
+    #[serde(rename = "ms")]
+    Millisecond,
+    /// Microseconds.
+    #[serde(rename = "us")]
+    Microsecond,
+    /// Nanoseconds.
+    #[serde(rename = "ns")]
+    Nanosecond,
+}
+
+/// Unit of a position.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum PositionUnit {
+    /// Metres.
+    #[default]
+    #[serde(rename = "m")]
+    Metre,
+    /// Kilometres.
+    #[serde(rename = "km")]
+    Kilometre,
+    /// Millimetres.
+    #[serde(rename = "mm")]
+    Millimetre,
+}
+
+/// Unit of a speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum SpeedUnit {
+    /// Kilometres per hour.
+    #[default]
+    #[serde(rename = "km/h")]
+    KilometrePerHour,
+    /// Metres per second.
+    #[serde(rename = "m/s")]
+    MetrePerSecond,
+}
+
+impl Unit for AccelerationUnit {
+    const ALL: &'static [(Self, &'static [&'static str])] = &[
+        (Self::MetrePerSecondSquared, &["m/s2", "ms-2", "m/s/s", "mps2", "ms2"]),
+        (Self::G, &["g", "gn", "g0"]),
+        (Self::Unknown, &["unknown"]),
+    ];
+    const MEND: &'static str = "say --unit m/s2, g or unknown";
+
+    fn in_si(self) -> f64 {
+        match self {
+            Self::MetrePerSecondSquared | Self::Unknown => 1.0,
+            Self::G => 9.806_65,
+        }
+    }
+}
+
+impl Unit for TimeUnit {
+    const ALL: &'static [(Self, &'static [&'static str])] = &[
+        (Self::Second, &["s", "sec", "seconds"]),
+        (Self::Millisecond, &["ms", "msec"]),
+        (Self::Microsecond, &["us", "\u{b5}s", "\u{3bc}s"]),
+        (Self::Nanosecond, &["ns"]),
+    ];
+    const MEND: &'static str = "say --time-unit s, ms, us or ns";
+
+    fn in_si(self) -> f64 {
+        match self {
+            Self::Second => 1.0,
+            Self::Millisecond => 1e-3,
+            Self::Microsecond => 1e-6,
+            Self::Nanosecond => 1e-9,
+        }
+    }
+}
+
+impl Unit for PositionUnit {
+    const ALL: &'static [(Self, &'static [&'static str])] =
+        &[(Self::Metre, &["m"]), (Self::Kilometre, &["km"]), (Self::Millimetre, &["mm"])];
+    const MEND: &'static str = "say --position-unit m, km or mm";
+
+    fn in_si(self) -> f64 {
+        match self {
+            Self::Metre => 1.0,
+            Self::Kilometre => 1e3,
+            Self::Millimetre => 1e-3,
+        }
+    }
+}
+
+impl Unit for SpeedUnit {
+    const ALL: &'static [(Self, &'static [&'static str])] = &[
+        (Self::KilometrePerHour, &["km/h", "kmh", "kmph", "kph"]),
+        (Self::MetrePerSecond, &["m/s", "mps", "ms-1"]),
+    ];
+    const MEND: &'static str = "say --speed-unit km/h or m/s";
+
+    fn in_si(self) -> f64 {
+        match self {
+            Self::KilometrePerHour => 1.0 / 3.6,
+            Self::MetrePerSecond => 1.0,
+        }
+    }
+}
+
+/// The unit of a column: as told, else as the file or the column's name says, else the default.
+///
+/// What is worth saying of it goes into `notes`.
+///
+/// # Errors
+/// [`Fault::UnknownUnit`] where the file says one that is not known and nothing is told.
+pub(super) fn of_column<U: Unit>(
+    column: &Column,
+    told: Option<U>,
+    notes: &mut Vec<String>,
+) -> Result<U, Fault> {
+    let name = &column.name;
+    let stated = column.unit.as_deref().or_else(|| in_brackets(name).map(|(_, unit)| unit));
+    let known = stated.map_or_else(|| at_end::<U>(name), named::<U>);
+    match (told, known, stated) {
+        (Some(told), Some(known), _) if told != known => {
+            notes.push(format!(
+                "doubt: {name} is taken in {}, as told, and its name or file says {}",
+                told.name(),
+                known.name()
+            ));
+            Ok(told)
+        }
+        (Some(told), ..) => Ok(told),
+        (None, Some(known), _) => {
+            notes.push(format!("{name} is taken in {}, as its name or file says", known.name()));
+            Ok(known)
+        }
+        (None, None, Some(unit)) => {
+            let names: Vec<&str> = U::ALL.iter().map(|(unit, _)| unit.name()).collect();
+            let known = names.join(", ");
+            Err(Fault::UnknownUnit { unit: unit.to_owned(), known, mend: U::MEND })
+        }
+        (None, None, None) => {
+            let unit = U::default();
+            notes.push(format!(
+                "{name} is taken in {}; if that is wrong, {}",
+                unit.name(),
+                U::MEND
+            ));
+            Ok(unit)
+        }
+    }
+}
+
+/// The name without a unit in brackets behind it.
+pub(super) fn bare_name(name: &str) -> &str {
+    in_brackets(name).map_or(name, |(bare, _)| bare)
+}
+
+/// "acc \[g\]" and "acc (g)" as "acc" and "g".
+fn in_brackets(name: &str) -> Option<(&str, &str)> {
+    let (name, unit) = [('[', ']'), ('(', ')')]
+        .into_iter()
+        .find_map(|(opens, closes)| name.trim_end().strip_suffix(closes)?.rsplit_once(opens))?;
+    Some((name.trim(), unit.trim())).filter(|(name, unit)| !name.is_empty() && !unit.is_empty())
+}
+
+/// The unit that a name ends in: `speed_kmh`, `acc_m_s2`, `km`.
+fn at_end<U: Unit>(name: &str) -> Option<U> {
+    let parts: Vec<&str> = name.split(['_', ' ', ',']).filter(|part| !part.is_empty()).collect();
+    // Longest first: m_s2 ends in s2, and m_s in s.
+    let longest = parts.len().min(3);
+    (1..=longest).rev().find_map(|count| named(&parts[parts.len() - count..].join("/")))
+}
+
+fn named<U: Unit>(text: &str) -> Option<U> {
+    let sign = |c: char| match c {
+        '\u{b2}' => Some('2'),
+        '\u{2212}' => Some('-'),
+        '^' | '*' | '\u{b7}' | '.' => None,
+        c if c.is_whitespace() => None,
+        c => Some(c.to_ascii_lowercase()),
+    };
+    let text: String = text.chars().filter_map(sign).collect();
+    let is_it = |(_, spellings): &&(U, &[&str])| spellings.contains(&text.as_str());
+    U::ALL.iter().find(is_it).map(|(unit, _)| *unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit<U: Unit>(name: &str, told: Option<U>) -> (Result<U, Fault>, Vec<String>) {
+        let mut notes = Vec::new();
+        let column = Column { name: name.to_owned(), ..Column::default() };
+        (of_column(&column, told, &mut notes), notes)
+    }
+
+    #[test]
+    fn names_that_say_their_unit_are_believed_and_told() {
+        for (name, expected) in [
+            ("acc [g]", AccelerationUnit::G),
+            ("a (m/s\u{b2})", AccelerationUnit::MetrePerSecondSquared),
+            ("a [m s^-2]", AccelerationUnit::MetrePerSecondSquared),
+            ("acc_g", AccelerationUnit::G),
+            ("acceleration_m_s2", AccelerationUnit::MetrePerSecondSquared),
+        ] {
+            let (found, notes) = unit::<AccelerationUnit>(name, None);
+            assert_eq!((found.unwrap(), notes.len()), (expected, 1), "{name}");
+        }
+        assert_eq!(unit::<PositionUnit>("km", None).0.unwrap(), PositionUnit::Kilometre);
+        assert_eq!(unit::<SpeedUnit>("v_m_s", None).0.unwrap(), SpeedUnit::MetrePerSecond);
+        assert_eq!(unit::<TimeUnit>("t [\u{b5}s]", None).0.unwrap(), TimeUnit::Microsecond);
+        let (found, notes) = unit::<AccelerationUnit>("acc_left", None);
+        assert_eq!(found.unwrap(), AccelerationUnit::MetrePerSecondSquared);
+        assert!(notes[0].contains("taken in m/s2; if that is wrong, say --unit"), "{notes:?}");
+    }
+
+    #[test]
+    fn a_unit_told_against_the_name_is_doubted_and_an_unknown_one_refused() {
+        let told = AccelerationUnit::MetrePerSecondSquared;
+        let (found, notes) = unit("acc [g]", Some(told));
+        assert_eq!(found.unwrap(), told);
+        assert!(notes[0].starts_with("doubt: acc [g] is taken in m/s2, as told"), "{notes:?}");
+        let (found, _) = unit::<AccelerationUnit>("acc [mV]", None);
+        let text = found.unwrap_err().to_string();
+        assert!(text.contains("\"mV\", which is none of m/s2, g, unknown; say --unit"), "{text}");
+        assert!(unit("acc [mV]", Some(AccelerationUnit::Unknown)).0.is_ok());
+    }
+}

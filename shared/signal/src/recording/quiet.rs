@@ -1,0 +1,76 @@
+//! Is there anything in a pass's signal that a rolling wheel makes?
+
+use super::Pass;
+use tracktwin_number::{rounded, significant};
+
+/// Acceleration in m/s2, as a root mean square, for every km/h, below which no axle box of a rolling
+/// wheel lies: ground rail and round wheels give a hundred times as much.
+const QUIET: f64 = 5e-3;
+/// Steps of the recorder below which a signal is mostly rounding.
+const STEPS_MIN: f64 = 2.0;
+/// Samples that are looked at for the recorder's steps.
+const LOOKED_AT: usize = 20_000;
+
+/// What makes it doubtful that the wheel rolled, or that the sensor was on.
+pub(super) fn doubt(pass: &Pass, gain_known: bool) -> Option<String> {
+    let (samples, speed) = (pass.signal.samples(), pass.speed_km_h);
+    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+    let square = samples.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    let rms = (square / samples.len() as f64).sqrt();
+    let file = &pass.file;
+    if gain_known && rms < QUIET * speed {
+        let (rms, speed) = (significant(rms, 2), rounded(speed, 3));
+        return Some(format!(
+            "doubt: {file}: {rms} m/s2 rms is nearly no signal for {speed} km/h: did the train stand, was the sensor off, is it another unit or channel?"
+        ));
+    }
+    let step = step(samples)?;
+    (rms < STEPS_MIN * step).then(|| {
+        format!(
+            "doubt: {file}: the signal is only {} steps of its resolution loud: nearly no signal; record with more gain, or with the train rolling",
+            significant(rms / step, 2)
+        )
+    })
+}
+
+/// The recorder's step: the least difference of two values, if all are whole numbers of it.
+fn step(samples: &[f64]) -> Option<f64> {
+    let mut values = samples[..samples.len().min(LOOKED_AT)].to_vec();
+    values.sort_by(f64::total_cmp);
+    let apart = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let greatest = values.last()?.abs().max(values.first()?.abs());
+    // Single precision makes values differ that were alike.
+    let real = |difference: &f64| *difference > 1e-6 * greatest;
+    let step = apart().filter(real).fold(f64::INFINITY, f64::min);
+    let whole = |ratio: f64| (ratio - ratio.round()).abs() < 0.02 * ratio.max(1.0);
+    (step.is_finite() && apart().filter(real).all(|difference| whole(difference / step)))
+        .then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Signal;
+
+    fn pass(rms: f64, step: f64) -> Pass {
+        let value = |i: u32| rms * std::f64::consts::SQRT_2 * (0.7 * f64::from(i)).sin();
+        let rounded = |v: f64| if step > 0.0 { (v / step).round() * step } else { v };
+        let samples: Vec<f64> = (0..4000).map(|i| rounded(value(i))).collect();
+        let position_m = (0..4000).map(|i| 0.01 * f64::from(i)).collect();
+        let signal = Signal::new(2000.0, samples).unwrap();
+        Pass { file: "a.csv".to_owned(), speed_km_h: 67.0, signal, position_m }
+    }
+
+    #[test]
+    fn a_standing_train_is_doubted_and_a_rolling_one_is_not() {
+        assert!(doubt(&pass(0.026, 0.0), true).unwrap().contains("0.026 m/s2 rms"));
+        assert_eq!(doubt(&pass(0.026, 0.0), false), None);
+        assert_eq!(doubt(&pass(5.0, 0.0), true), None);
+    }
+
+    #[test]
+    fn a_signal_of_a_few_steps_is_doubted_in_any_unit() {
+        assert!(doubt(&pass(0.015, 0.01), false).unwrap().contains("steps of its resolution"));
+        assert_eq!(doubt(&pass(0.5, 0.01), false), None);
+    }
+}
