@@ -107,8 +107,8 @@ pub async fn add_cases(
     mut goes_on: impl FnMut(u32) -> bool,
 ) -> Result<(), FarmError> {
     let id = campaign.id();
-    // Cases are stored in order, so the ones that are there are the first.
-    let mut stored = library.status(&id).await?.total();
+    // Cases are stored in order, so the ones that are there are the first; behind a gap they stay as they are.
+    let mut stored = library.cases_in_order(&id).await?;
     while goes_on(stored) && stored < campaign.cases {
         let end = campaign.cases.min(stored.saturating_add(CASES_AT_A_TIME));
         library.insert_cases(&id, &cases(campaign, stored..end)?).await?;

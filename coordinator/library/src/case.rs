@@ -60,6 +60,27 @@ impl Library {
         Ok(())
     }
 
+    /// How many cases a campaign has from its first on, up to the first that is not there: all, unless a
+    /// malformed library has lost some.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read.
+    pub async fn cases_in_order(&self, campaign: &str) -> Result<u32, LibraryError> {
+        let total = self.status(campaign).await?.total();
+        let last = "select max(sobol_index) as last from campaign_case where campaign_id = $1";
+        let last = self.readers().row(sql(last).bind(campaign)).await?;
+        let last: Option<i64> = last.map_or(Ok(None), |row| row.get("last"))?;
+        if last.is_none_or(|last| last + 1 == i64::from(total)) {
+            return Ok(total);
+        }
+        let before_gap = "select count(*) as cases from (
+                select sobol_index, row_number() over (order by sobol_index) - 1 as place
+                from campaign_case where campaign_id = $1) as placed
+            where sobol_index = place";
+        let row = self.readers().row(sql(before_gap).bind(campaign)).await?;
+        row.map_or(Ok(0), |row| row.get_u32("cases"))
+    }
+
     /// The counts of a campaign's first `cases` cases.
     ///
     /// # Errors

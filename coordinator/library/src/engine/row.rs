@@ -52,11 +52,17 @@ impl Row {
 
     /// A series of numbers.
     pub(crate) fn doubles(&self, column: &str) -> Result<Vec<f64>, LibraryError> {
-        let bytes: &[u8] = match self {
+        let missing = || LibraryError::Damaged { what: format!("{column} is missing") };
+        self.doubles_if_there(column)?.ok_or_else(missing)
+    }
+
+    /// A series of numbers that may be missing.
+    pub(crate) fn doubles_if_there(&self, column: &str) -> Result<Option<Vec<f64>>, LibraryError> {
+        let bytes: Option<&[u8]> = match self {
             Self::Sqlite(row) => sqlx::Row::try_get(row, column)?,
             Self::Postgres(row) => sqlx::Row::try_get(row, &*folded(column))?,
         };
-        Ok(series(bytes))
+        Ok(bytes.map(series))
     }
 }
 

@@ -81,9 +81,11 @@ fn complete(case: StoredCase, speeds: usize) -> Result<LibraryEntry, LibraryErro
 }
 
 pub(crate) fn features_of(row: &Row) -> Result<Features, LibraryError> {
-    let levels = LEVEL_COLUMNS.iter().map(|&column| row.get(column));
-    let band_levels_db = levels.collect::<Result<_, _>>()?;
-    Ok(Features { log_power: row.doubles("log_power")?, band_levels_db })
+    Ok(Features { log_power: row.doubles("log_power")?, band_levels_db: levels_of(row)? })
+}
+
+fn levels_of(row: &Row) -> Result<Vec<f64>, LibraryError> {
+    LEVEL_COLUMNS.iter().map(|&column| row.get(column)).collect()
 }
 
 /// Binds what both databases keep of a report: campaign, worker, version, model, experiment and time.

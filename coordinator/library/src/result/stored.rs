@@ -1,12 +1,13 @@
 //! What is stored of a case, put together again from its passes, beside the checksum it came with.
 
-use super::{LibraryEntry, features_of};
+use super::{LibraryEntry, levels_of};
 use crate::case::case_of;
 use crate::engine::{Row, Statement, sql};
 use crate::{Library, LibraryError};
 use tokio_stream::StreamExt;
 use tracktwin_parameters::Case;
 use tracktwin_protocol::{PassFeatures, checksum_of_passes};
+use tracktwin_signal::Features;
 
 /// A case with results, as it is stored.
 pub(crate) struct StoredCase {
@@ -67,9 +68,11 @@ impl StoredCase {
 }
 
 fn pass_of(row: &Row) -> Result<PassFeatures, LibraryError> {
+    // A series that a server has lost is one of no numbers, so that its case does not have its checksum.
+    let log_power = row.doubles_if_there("log_power")?.unwrap_or_default();
     Ok(PassFeatures {
         speed_km_h: row.get("speed_km_h")?,
-        features: features_of(row)?,
+        features: Features { log_power, band_levels_db: levels_of(row)? },
         contact_loss_share: row.get("contact_loss_share")?,
     })
 }

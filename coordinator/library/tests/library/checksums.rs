@@ -2,7 +2,7 @@
 
 use crate::data::{copy, sql};
 use crate::support::{
-    CAMPAIGN, Home, features, finished, lease, on_both_databases, passes, report, reported,
+    CAMPAIGN, Home, case, features, finished, lease, on_both_databases, passes, report, reported,
 };
 use tracktwin_library::{Cell, ContactLoss, Library, LibraryError, Retry, Status, Table, Verdict};
 use tracktwin_protocol::Outcome;
@@ -224,6 +224,17 @@ on_both_databases! {
         copy(&library, &there).await;
         let verified = there.verify(|| ()).await.unwrap();
         assert_eq!((verified.attested, verified.unattested), (1, 2));
+    }
+
+    async fn cases_that_were_lost_are_filled_in_again(home: &Home) {
+        let library = home.library(6).await;
+        assert_eq!(library.cases_in_order(CAMPAIGN).await.unwrap(), 6);
+        sql(home, "delete from campaign_case where sobol_index in (2, 4)").await;
+        assert_eq!(library.cases_in_order(CAMPAIGN).await.unwrap(), 2);
+        library.insert_cases(CAMPAIGN, &(2..6).map(case).collect::<Vec<_>>()).await.unwrap();
+        assert_eq!(library.cases_in_order(CAMPAIGN).await.unwrap(), 6);
+        let findings = library.verify(|| ()).await.unwrap().findings;
+        assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
     }
 
     async fn cases_whose_wheel_was_in_the_air_are_counted(home: &Home) {

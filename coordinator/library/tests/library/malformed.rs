@@ -4,6 +4,7 @@ use crate::checksums::salvage;
 use crate::support::{CAMPAIGN, Home, features, finished, lease, report};
 use std::fs;
 use std::path::{Path, PathBuf};
+use test_postgres::{Server, Settings};
 use tracktwin_library::{Library, LibraryError};
 
 const CASES: u32 = 300;
@@ -237,6 +238,48 @@ async fn what_the_schema_lacks_is_found() {
         };
         assert!(findings.iter().any(|it| it.what.contains(what)), "{damage}: {findings:?}");
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_a_server_loses_of_its_pages_is_found_and_the_rest_is_saved() {
+    let Some(server) = Server::start(Settings::default()) else { return };
+    for (table, filling, least) in [
+        ("case_series", 0x5a, CASES / 2),
+        ("case_series", 0, CASES / 2),
+        ("case_result", 0x5a, CASES / 2),
+        ("campaign_case", 0x5a, CASES / 4),
+        ("frequency_bin", 0x5a, CASES),
+    ] {
+        let url = server.database();
+        let library = Library::open_or_create(&url).await.unwrap();
+        crate::support::fill(&library, CAMPAIGN, CASES).await;
+        let leased = lease(&library, "w", CASES, 0).await;
+        report(&library, "w", leased.iter().map(finished).collect()).await;
+        library.close().await;
+        let Some(file) = file_of(&url, table).await else { continue };
+        server.stop();
+        let mut bytes = fs::read(&file).unwrap();
+        bytes[..8192].fill(filling);
+        fs::write(&file, bytes).unwrap();
+        server.start_again();
+        assert!(is_found(&url).await, "{table} {filling:x}");
+        let saved = saved(&url).await.unwrap();
+        assert!((least..=CASES).contains(&saved), "{table} {filling:x}: {saved}");
+        assert!(saved < CASES || table == "frequency_bin", "{table} {filling:x}: {saved}");
+    }
+}
+
+/// The file of a server's table, once all of it is there; none where the table has no page.
+async fn file_of(url: &str, table: &str) -> Option<PathBuf> {
+    use sqlx::Connection as _;
+    let mut connection = sqlx::PgConnection::connect(url).await.unwrap();
+    sqlx::raw_sql("checkpoint").execute(&mut connection).await.unwrap();
+    let ask = "select current_setting('data_directory') || '/' || pg_relation_filepath($1)";
+    let path: String =
+        sqlx::query_scalar(ask).bind(table).fetch_one(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+    let path = PathBuf::from(path);
+    fs::metadata(&path).is_ok_and(|file| file.len() >= 8192).then_some(path)
 }
 
 /// Adds a case to a library, and an attempt of it.
