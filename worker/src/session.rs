@@ -137,15 +137,11 @@ impl Session {
                             return Ok(Some(lease));
                         }
                         Err(error) => {
-                            damaged += 1;
-                            tracing::warn!(
-                                "a lease arrived damaged, {damaged} of {DAMAGED_MAX} times: {error}"
-                            );
                             self.release(&campaign, held).await;
-                            if damaged == DAMAGED_MAX {
+                            let what = format!("a lease arrived damaged ({error})");
+                            if !goes_again(&mut damaged, &what).await {
                                 return Err(error.into());
                             }
-                            tokio::time::sleep(AGAIN_AFTER * damaged).await;
                         }
                     }
                 }
@@ -182,14 +178,12 @@ impl Session {
                 .await;
             match answer {
                 Err(AgentError::Unknown) => self.register(seen, &self.give_up).await?,
-                Err(AgentError::NotUnderstood { reason }) if damaged + 1 < DAMAGED_MAX => {
-                    damaged += 1;
-                    tracing::warn!(
-                        "results were not understood, {damaged} of {DAMAGED_MAX} times: {reason}"
-                    );
-                    tokio::time::sleep(AGAIN_AFTER * damaged).await;
-                }
                 Err(error) => {
+                    if let AgentError::NotUnderstood { reason } = &error
+                        && goes_again(&mut damaged, reason).await
+                    {
+                        continue;
+                    }
                     step.fail(&error.to_string());
                     return Err(error);
                 }
@@ -204,16 +198,11 @@ impl Session {
                     if request.cases.is_empty() {
                         break;
                     }
-                    damaged += 1;
-                    let count = request.cases.len();
-                    tracing::warn!(
-                        "{count} results arrived damaged, {damaged} of {DAMAGED_MAX} times"
-                    );
-                    if damaged == DAMAGED_MAX {
-                        step.fail("results arrived damaged");
+                    let what = format!("{} results arrived damaged", request.cases.len());
+                    if !goes_again(&mut damaged, &what).await {
+                        step.fail(&what);
                         break;
                     }
-                    tokio::time::sleep(AGAIN_AFTER * damaged).await;
                 }
             }
         }
@@ -308,6 +297,17 @@ impl Session {
         }
         self.last_work.lock().expect("nobody panics while holding it").elapsed()
     }
+}
+
+/// Waits until something is said or asked again that arrived damaged; not when that was so too often.
+async fn goes_again(damaged: &mut u32, what: &str) -> bool {
+    *damaged += 1;
+    tracing::warn!("{what}: {damaged} of {DAMAGED_MAX} times");
+    if *damaged >= DAMAGED_MAX {
+        return false;
+    }
+    tokio::time::sleep(AGAIN_AFTER * *damaged).await;
+    true
 }
 
 /// Whether a case need not be sent again.

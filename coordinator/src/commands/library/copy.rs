@@ -6,6 +6,7 @@ use crate::commands::progress::Progress;
 use crate::commands::say;
 use anyhow::anyhow;
 use clap::Args;
+use std::error::Error;
 use tracktwin_library::{Cell, Library, LibraryError, Lost, Table};
 
 /// Rows held at a time: 4 MB of results.
@@ -93,7 +94,10 @@ fn unread(table: &Table, lost: &Lost) -> String {
 
 fn unwritten(table: &Table, refused: &[LibraryError]) -> Option<String> {
     let first = refused.first()?;
-    let reason = format!("{:#}", anyhow!(first.to_string()));
+    let reason = match first.source() {
+        Some(source) => format!("{first}: {source}"),
+        None => first.to_string(),
+    };
     Some(format!(
         "{} rows of {} that are not whole; the first: {reason}",
         refused.len(),
