@@ -18,6 +18,7 @@
 
 pub mod campaign;
 pub mod commands;
+mod contact;
 pub mod dashboard;
 pub mod diagnosing;
 pub mod dispatch;

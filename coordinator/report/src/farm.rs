@@ -38,6 +38,10 @@ pub struct FarmCampaign {
     pub per_second: f64,
     /// Why cases were given up, and how many so.
     pub causes: Vec<(String, u32)>,
+    /// Cases whose wheel lost contact with the rail.
+    pub contact_lost: u32,
+    /// The largest share of a pass's time without contact, 0 to 1.
+    pub contact_loss_share_max: f64,
     /// Frequencies of the spectra in Hz.
     pub frequencies_hz: Vec<f64>,
     /// ln LWPS of the newest cases at the fastest speed, with what each is called.

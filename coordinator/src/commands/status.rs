@@ -2,12 +2,14 @@
 
 use super::library_url::LibraryUrl;
 use super::{Stop, answer};
+use crate::contact::contact_sentence;
 use crate::dashboard::{Detail, farm};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::IsTerminal;
 use std::time::Duration;
+use tracktwin_library::ContactLoss;
 use tracktwin_report::{Farm, FarmCampaign, FarmWorker, duration};
 
 /// Characters of a progress bar.
@@ -95,6 +97,13 @@ fn campaign_text(text: &mut String, campaign: &FarmCampaign) {
         100.0 * share,
         campaign.left(),
     );
+    if campaign.contact_lost > 0 {
+        let lost = ContactLoss {
+            cases: campaign.contact_lost,
+            largest_share: campaign.contact_loss_share_max,
+        };
+        let _ = writeln!(text, "{}", contact_sentence(lost, *finished));
+    }
     for (cause, count) in campaign.causes.iter().take(CAUSES) {
         let _ = writeln!(text, "  {count} given up: {cause}");
     }
@@ -134,7 +143,8 @@ fn as_json(farm: &Farm) -> Value {
         json!({
             "campaign": it.id, "state": it.state, "done": it.is_done(), "priority": it.priority, "cases": it.cases(),
             "finished": it.finished, "leased": it.leased, "waiting": it.waiting,
-            "failed": it.failed, "cases_per_s": it.per_second, "remaining_s": it.eta_s(),
+            "failed": it.failed, "contact_lost": it.contact_lost,
+            "contact_loss_share_max": it.contact_loss_share_max, "cases_per_s": it.per_second, "remaining_s": it.eta_s(),
             "causes": causes.collect::<Vec<_>>(),
         })
     };
@@ -166,6 +176,8 @@ mod tests {
             failed: 1,
             per_second: 10.0,
             causes: vec![("the sleeper floats".to_owned(), 1)],
+            contact_lost: 3,
+            contact_loss_share_max: 0.02,
             ..FarmCampaign::default()
         };
         let worker = FarmWorker { id: "node-1".to_owned(), cores: 8, ..FarmWorker::default() };
@@ -176,6 +188,7 @@ mod tests {
             "10.0 cases/s",
             "5 s left",
             "1 given up: the sleeper floats",
+            "3 of 49 cases lost contact between wheel and rail (at most 2.0 % of the time)",
             "workers: 25 in the last minute, 25 in the last hour",
             "and 5 more",
         ] {

@@ -1,7 +1,7 @@
 //! From the library to what is shown of it.
 
 use time::OffsetDateTime;
-use tracktwin_library::{CampaignOverview, Library, LibraryError, WorkerRecord};
+use tracktwin_library::{CampaignOverview, ContactLoss, Library, LibraryError, WorkerRecord};
 use tracktwin_report::{Farm, FarmCampaign, FarmWorker};
 use tracktwin_worker::Experiment;
 
@@ -37,7 +37,8 @@ pub async fn farm(library: &Library, detail: Detail) -> Result<Farm, LibraryErro
     overview.sort_by_key(|campaign| std::cmp::Reverse(campaign.priority));
     let mut campaigns = Vec::with_capacity(overview.len());
     for overview in overview {
-        let counted = counted(&overview);
+        let lost = library.contact_loss(&overview.id).await?;
+        let counted = counted(&overview, lost);
         campaigns.push(match detail {
             Detail::Counts => counted,
             Detail::Pictures => pictured(library, counted).await?,
@@ -50,7 +51,7 @@ pub async fn farm(library: &Library, detail: Detail) -> Result<Farm, LibraryErro
     Ok(Farm { library: library.name(), at, campaigns, workers, may_control: false })
 }
 
-fn counted(overview: &CampaignOverview) -> FarmCampaign {
+fn counted(overview: &CampaignOverview, lost: ContactLoss) -> FarmCampaign {
     let CampaignOverview { status, causes, .. } = overview;
     FarmCampaign {
         id: overview.id.clone(),
@@ -61,6 +62,8 @@ fn counted(overview: &CampaignOverview) -> FarmCampaign {
         finished: status.finished,
         failed: status.failed,
         per_second: overview.per_second,
+        contact_lost: lost.cases,
+        contact_loss_share_max: lost.largest_share,
         causes: causes.iter().map(|it| (it.error.clone(), it.cases)).collect(),
         ..FarmCampaign::default()
     }

@@ -1,8 +1,9 @@
 //! `tracktwin library status`: how many cases stand where.
 
 use super::{Stop, Which, answer, open};
+use crate::contact::contact_sentence;
 use serde::Serialize;
-use tracktwin_library::{CampaignRecord, Library};
+use tracktwin_library::{CampaignRecord, ContactLoss, Library};
 
 /// How many given-up cases are explained.
 const FAILURES_SHOWN: u32 = 5;
@@ -16,6 +17,8 @@ struct Counts {
     leased: u32,
     failed: u32,
     speeds_km_h: Vec<f64>,
+    contact_lost: u32,
+    contact_loss_share_max: f64,
     failures: Vec<Failure>,
 }
 
@@ -45,12 +48,16 @@ impl Counts {
         let failures = self.failures.iter().map(|Failure { sobol_index, error }| {
             format!("\n  case {sobol_index} was given up: {error}")
         });
-        counts + &failures.collect::<String>()
+        let lost =
+            ContactLoss { cases: self.contact_lost, largest_share: self.contact_loss_share_max };
+        let contact = format!("\n  {}", contact_sentence(lost, *finished));
+        counts + &contact + &failures.collect::<String>()
     }
 }
 
 async fn counts(library: &Library, campaign: CampaignRecord) -> Result<Counts, Stop> {
     let status = library.status(&campaign.id).await?;
+    let lost = library.contact_loss(&campaign.id).await?;
     let failures = library.failures(&campaign.id, FAILURES_SHOWN).await?;
     let failures = failures.into_iter().map(|case| Failure {
         sobol_index: case.case.index,
@@ -63,6 +70,8 @@ async fn counts(library: &Library, campaign: CampaignRecord) -> Result<Counts, S
         leased: status.leased,
         failed: status.failed,
         speeds_km_h: campaign.speeds_km_h,
+        contact_lost: lost.cases,
+        contact_loss_share_max: lost.largest_share,
         failures: failures.collect(),
         campaign: campaign.id,
     })

@@ -10,6 +10,7 @@ use super::progress::Progress;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, continuity, evaluate, note, say, train};
 use crate::campaign::{Campaign, DEFAULT};
+use crate::contact::contact_sentence;
 use crate::farm::{self, Task};
 use anyhow::anyhow;
 use clap::Args;
@@ -177,6 +178,7 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
         let left = status.total() - status.done();
         return Err(anyhow!("interrupted with {left} cases left; the same command goes on").into());
     }
+    note(&contact_sentence(library.contact_loss(&id).await?, status.finished));
     if status.failed > 0 {
         note(&format!(
             "{} cases were given up; `tracktwin library status` says why; going on without them",
