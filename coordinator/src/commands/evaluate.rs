@@ -17,6 +17,10 @@ use tracktwin_surrogate::Trained;
 
 /// What `evaluate` is told.
 #[derive(Args)]
+#[command(
+    after_help = "Exit codes: 0 done, 1 done and most sleepers lie outside what the library knows (their estimates \
+are not valid; the last lines say which range to widen), 2 wrong input, 3 failure."
+)]
 pub(super) struct Arguments {
     /// The recording: a folder with `recording.json` and a file a pass.
     recording: PathBuf,
@@ -44,7 +48,14 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let evaluation = evaluate(&recording, &library, models, &out, force).await?;
     let sleepers = evaluation.sleepers.len();
     say(&format!("{sleepers} sleepers evaluated; report: {}", out.join("report.html").display()));
-    Ok(())
+    conclude(&evaluation)
+}
+
+/// Says what lies outside the library; if that is most of the track, the answer is negative.
+pub(super) fn conclude(evaluation: &Evaluation) -> Result<(), Stop> {
+    let outside = &evaluation.outside_library;
+    outside.sentences().iter().for_each(|sentence| say(sentence));
+    if outside.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
 
 /// The recording in a folder, if there is something in it to evaluate.
@@ -80,7 +91,7 @@ pub(super) async fn evaluate(
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     make_folder(folder)?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
-    evaluation.notes = notes;
+    evaluation.notes.splice(0..0, notes);
     if let Some(lost) = chain::loss_of_contact(&recording) {
         flag(&mut evaluation, &lost, recording.passes.len());
     }

@@ -16,7 +16,7 @@ use anyhow::anyhow;
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use tracktwin_evaluation::check_recording;
+use tracktwin_evaluation::{Evaluation, check_recording};
 use tracktwin_library::{Library, Status};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_signal::recording::Recording;
@@ -94,8 +94,9 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let said = chain(&library, &campaign, recording, &arguments).await;
     // What the library holds is then in one file, fit to be copied.
     library.close().await;
-    say(&said?);
-    Ok(())
+    let (line, evaluation) = said?;
+    say(&line);
+    evaluation.map_or(Ok(()), |evaluation| evaluate::conclude(&evaluation))
 }
 
 /// Simulates, trains and evaluates; says what was made of it.
@@ -104,20 +105,21 @@ async fn chain(
     campaign: &Campaign,
     recording: Option<Recording>,
     arguments: &Arguments,
-) -> Result<String, Stop> {
+) -> Result<(String, Option<Evaluation>), Stop> {
     simulate(library, campaign, arguments.cores.unwrap_or_else(all_cores)).await?;
     if arguments.no_train {
-        return Ok(format!("library: {}", library.name()));
+        return Ok((format!("library: {}", library.name()), None));
     }
     let out = &arguments.out;
     let record = library.campaign(&campaign.id()).await?;
     let models = train::train(library, &record, 0, &out.join(MODELS), arguments.force).await?;
     let Some(recording) = recording else {
         let models = out.join(MODELS);
-        return Ok(format!("models: {}; `tracktwin evaluate` takes a recording", models.display()));
+        let line = format!("models: {}; `tracktwin evaluate` takes a recording", models.display());
+        return Ok((line, None));
     };
-    evaluate::evaluate(&recording, library, models, out, arguments.force).await?;
-    Ok(format!("report: {}", out.join("report.html").display()))
+    let evaluation = evaluate::evaluate(&recording, library, models, out, arguments.force).await?;
+    Ok((format!("report: {}", out.join("report.html").display()), Some(evaluation)))
 }
 
 /// The bundled recording, if models of the campaign can evaluate it; else it is said at once that nothing
