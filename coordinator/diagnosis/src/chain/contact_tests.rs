@@ -63,7 +63,7 @@ fn simulated(dip_m: f64, level: f64) -> Recording {
 }
 
 static DEEP: LazyLock<Recording> = LazyLock::new(|| simulated(1e-3, 3.0));
-static SHALLOW: LazyLock<Recording> = LazyLock::new(|| simulated(5e-4, 3.0));
+static SHALLOW: LazyLock<Recording> = LazyLock::new(|| simulated(7e-4, 3.0));
 static ROUGH: LazyLock<Recording> = LazyLock::new(|| simulated(0.0, 100.0));
 
 /// The recording by a chain: its samples through `chain`, with the noise before or after.

@@ -17,6 +17,7 @@ mod trouble;
 mod usable;
 
 pub use clipping::{Clipping, clipping};
+pub(crate) use contact::expected_m_s2;
 pub use contact::{LossOfContact, PassLoss, loss_of_contact};
 pub use gain::{Gain, gains};
 pub use hum::{Hum, hum};

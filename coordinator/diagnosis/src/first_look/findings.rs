@@ -16,7 +16,15 @@ pub(super) fn clipping_finding(
     passes: &[Clipping],
     recorded: usize,
     unit: &str,
+    is_flight_known: bool,
 ) -> Option<Finding> {
+    // On the side towards the rail alone, a wheel in the air may do the same.
+    let may_fly = !is_flight_known && passes.iter().all(|pass| pass.level_m_s2 > 0.0);
+    let or = if may_fly {
+        "; or the wheel was in the air there: give nominal.wheel.load_N and mass_kg to tell"
+    } else {
+        ""
+    };
     let worst = passes.iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
     let limit = passes.iter().map(|pass| pass.level_m_s2.abs()).fold(f64::MAX, f64::min);
     Some(Finding {
@@ -25,7 +33,7 @@ pub(super) fn clipping_finding(
         place: Place::Everywhere,
         parameters: BTreeMap::from([("limit_m_s2", (limit, 0.01 * limit))]),
         evidence: format!(
-            "{} of {} passes are cut off: in pass {}, {} crests end within 1 % of {} {unit} ({:.2} % of the samples)",
+            "{} of {} passes are cut off: in pass {}, {} crests end within 1 % of {} {unit} ({:.2} % of the samples){or}",
             passes.len(),
             recorded,
             worst.pass + 1,

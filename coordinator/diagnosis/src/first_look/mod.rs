@@ -87,8 +87,9 @@ pub fn first_look(recording: &Recording) -> FirstLook {
     let (flat, on_surface) = surface(recording);
     let turn_m = flat.as_ref().map(|flat| flat.circumference_m.0);
     let clipping = chain::clipping(recording, EACH_TEST);
-    let mut findings: Vec<Finding> =
-        clipping_finding(&clipping, recording.passes.len(), unit).into_iter().collect();
+    let is_flight_known = chain::expected_m_s2(recording).is_some();
+    let cut = clipping_finding(&clipping, recording.passes.len(), unit, is_flight_known);
+    let mut findings: Vec<Finding> = cut.into_iter().collect();
     findings.extend(hum_finding(&chain::hum(recording, turn_m, EACH_TEST), unit));
     findings.extend(gains.iter().filter(|gain| gain.is_error(EACH_TEST)).map(gain_finding));
     let scale = chain::scale(recording).filter(|scale| scale.ln_p <= EACH_TEST.ln());
