@@ -89,7 +89,7 @@ fn compare(path: &str, own: &Value, other: &Value, paths: &mut Vec<String>) {
     paths.push(if is_short(own) && is_short(other) {
         format!("{path} ({own}, was {other})")
     } else {
-        format!("{path} ")
+        path.to_owned()
     });
 }
 
