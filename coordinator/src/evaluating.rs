@@ -1,12 +1,13 @@
 //! From models and their library to what evaluates recordings.
 
 use crate::training::{self, TrainingError};
-use tracktwin_evaluation::{Error, Evaluation, Twin};
+use tracktwin_evaluation::{Domains, Error, Evaluation, Twin};
 use tracktwin_library::{Library, LibraryError};
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::{ParameterSet, TrackDesign};
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureError};
 use tracktwin_surrogate::{Trained, TrainingSet};
+use tracktwin_worker::Experiment;
 
 /// Surrogates and model selector of one library, ready for any number of recordings.
 pub struct Evaluator {
@@ -14,7 +15,9 @@ pub struct Evaluator {
     pub extractor: Extractor,
     models: Trained,
     set: TrainingSet,
-    design: TrackDesign,
+    domains: Domains,
+    experiment: Experiment,
+    fixed: ParameterSet,
 }
 
 /// Why models can't evaluate.
@@ -42,7 +45,8 @@ impl Evaluator {
         let set = training::set(library, &campaign).await?;
         let experiment = training::experiment(&campaign)?;
         let extractor = Extractor::new(&experiment.features)?;
-        Ok(Self { extractor, models, set, design: experiment.design })
+        let fixed = training::fixed(&campaign)?;
+        Ok(Self { extractor, models, set, domains: Domains::default(), experiment, fixed })
     }
 
     /// The models.
@@ -57,7 +61,17 @@ impl Evaluator {
 
     /// The track of the models' campaign.
     pub const fn design(&self) -> &TrackDesign {
-        &self.design
+        &self.experiment.design
+    }
+
+    /// What the library's cases were simulated with.
+    pub const fn experiment(&self) -> &Experiment {
+        &self.experiment
+    }
+
+    /// The values of the parameters that the campaign does not vary.
+    pub const fn fixed(&self) -> &ParameterSet {
+        &self.fixed
     }
 
     /// What models and selector say of a recording.
@@ -65,7 +79,12 @@ impl Evaluator {
     /// # Errors
     /// Those of [`tracktwin_evaluation::evaluate`].
     pub fn evaluate(&self, recording: &Recording) -> Result<Evaluation, Error> {
-        let twin = Twin { extractor: &self.extractor, models: &self.models, library: &self.set };
+        let twin = Twin {
+            extractor: &self.extractor,
+            models: &self.models,
+            library: &self.set,
+            domains: &self.domains,
+        };
         tracktwin_evaluation::evaluate(recording, &twin)
     }
 }

@@ -8,6 +8,7 @@
 //! - [`trial`]: blind trials of the diagnosis, in a folder.
 //! - [`training`]: from a library to a training set.
 //! - [`diagnosing`]: from a recording to its diagnosis, stage by stage.
+//! - [`coverage`]: how often estimates hold and refusals are right, on simulated tracks.
 //! - [`evaluating`]: from models and their library to what evaluates recordings.
 //! - [`null_models`]: simulations of a track with nothing left out, kept in the library.
 //! - [`reproducing`]: from a library and models to the paper's figures.
@@ -18,6 +19,7 @@
 
 pub mod campaign;
 pub mod commands;
+pub mod coverage;
 pub mod dashboard;
 pub mod diagnosing;
 pub mod dispatch;

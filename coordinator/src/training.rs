@@ -1,7 +1,7 @@
 //! From a library to what surrogates are trained on.
 
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, ParameterSet};
 use tracktwin_report::Tested;
 use tracktwin_signal::{FeatureDefinition, FeatureSet};
 use tracktwin_surrogate::{FeatureColumns, ModelGroup, Split, TrainOptions, Trained, TrainingSet};
@@ -27,6 +27,14 @@ pub enum TrainingError {
         campaign: String,
         /// What is wrong with it.
         source: ExperimentError,
+    },
+    /// The campaign's definition isn't understood by this version.
+    #[error("campaign {campaign}: its definition is not understood: {source}")]
+    Definition {
+        /// The campaign.
+        campaign: String,
+        /// What is wrong with it.
+        source: serde_json::Error,
     },
 }
 
@@ -126,6 +134,20 @@ pub fn tested_by(
 /// [`TrainingError::Experiment`].
 pub fn feature_definition(campaign: &CampaignRecord) -> Result<FeatureDefinition, TrainingError> {
     Ok(experiment(campaign)?.features)
+}
+
+/// The values of the parameters that a campaign does not vary.
+///
+/// # Errors
+/// [`TrainingError::Definition`].
+pub fn fixed(campaign: &CampaignRecord) -> Result<ParameterSet, TrainingError> {
+    #[derive(serde::Deserialize)]
+    struct Definition {
+        fixed: [f64; Parameter::COUNT],
+    }
+    serde_json::from_str::<Definition>(&campaign.definition_json)
+        .map(|definition| ParameterSet::new(definition.fixed))
+        .map_err(|source| TrainingError::Definition { campaign: campaign.id.clone(), source })
 }
 
 /// What a campaign's cases are simulated with.

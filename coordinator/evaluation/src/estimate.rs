@@ -5,7 +5,7 @@ use crate::evaluation::{
     Unevaluated,
 };
 use crate::matches::Matcher;
-use crate::{Error, SleeperFeatures, features};
+use crate::{Domains, Error, OutsideLibrary, SleeperFeatures, Unevenness, features, outside};
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
@@ -30,6 +30,8 @@ pub struct Twin<'a> {
     pub models: &'a Trained,
     /// The library they were trained on, searched by the model selector.
     pub library: &'a TrainingSet,
+    /// What that library knows.
+    pub domains: &'a Domains,
 }
 
 /// The parameters of the track at every sleeper that a pass covers.
@@ -51,13 +53,20 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
     if seen.is_empty() {
         return Err(Error::NothingToEvaluate { recording: recording.name.clone() });
     }
-    let estimates = estimates(&seen, twin.models)?;
+    let mut estimates = estimates(&seen, twin.models)?;
+    let verdicts = outside::judge(&seen, twin.library, twin.domains)?;
+    let outside_library = OutsideLibrary::of(&verdicts, twin.library);
+    let told = estimates.iter().zip(&verdicts).filter(|(_, verdict)| !verdict.outside);
+    let unevenness = Unevenness::of(told.map(|(estimates, _)| estimates));
+    let even: Vec<_> = estimates.iter_mut().map(|of| unevenness.widen(of)).collect();
     let mut matcher = Matcher::new(twin.library);
-    let sleepers = seen
+    let mut sleepers = seen
         .into_iter()
-        .zip(estimates)
+        .zip(estimates.into_iter().zip(even))
         .map(|(sleeper, estimates)| evaluated(recording, twin, &mut matcher, sleeper, estimates))
         .collect::<Result<Vec<_>, _>>()?;
+    let outside = sleepers.iter_mut().zip(&verdicts).filter(|(_, verdict)| verdict.outside);
+    outside.for_each(|(sleeper, _)| sleeper.flags.push(Flag::OutsideLibrary));
     Ok(Evaluation {
         format: FORMAT,
         recording: recording.name.clone(),
@@ -65,7 +74,9 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
         provenance: provenance(twin, &sleepers),
         sleepers,
         unevaluated: unseen.iter().map(|sleeper| unevaluated(recording, sleeper)).collect(),
-        notes: Vec::new(),
+        notes: outside_library.sentences(),
+        outside_library,
+        unevenness,
         frequencies_hz: twin.models.frequencies_hz().to_vec(),
     })
 }
@@ -143,7 +154,7 @@ fn evaluated(
     twin: &Twin<'_>,
     matcher: &mut Matcher<'_>,
     sleeper: SleeperFeatures,
-    estimates: Estimates,
+    (estimates, sd_if_even): (Estimates, BTreeMap<Parameter, f64>),
 ) -> Result<SleeperEvaluation, Error> {
     let selector = matcher.select(&sleeper.speeds)?;
     let place = &recording.sleepers[sleeper.sleeper];
@@ -165,6 +176,7 @@ fn evaluated(
         id: place.id.clone(),
         x_m: place.x_m,
         estimates,
+        sd_if_even,
         selector,
         flags,
         measured,
@@ -237,12 +249,15 @@ fn known(twin: &Twin<'_>, speeds_km_h: &[f64]) -> BTreeMap<Parameter, Known> {
 mod tests {
     use super::*;
     use crate::testing;
+    use tracktwin_surrogate::Side;
 
     #[test]
     fn the_level_of_an_unseen_recording_lies_within_three_standard_deviations() {
         let (extractor, library) = (testing::extractor(), testing::library());
         let models = testing::models(&library);
-        let twin = Twin { extractor: &extractor, models: &models, library: &library };
+        let domains = Domains::default();
+        let twin =
+            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
         for speeds in [&[10.0, 13.0][..], &[10.0]] {
             for truth in [2.0, 4.0] {
                 let recording = testing::recording(truth, speeds);
@@ -262,7 +277,9 @@ mod tests {
     fn a_mean_at_an_end_of_the_library_s_range_is_flagged() {
         let (extractor, library) = (testing::extractor(), testing::library());
         let models = testing::models(&library);
-        let twin = Twin { extractor: &extractor, models: &models, library: &library };
+        let domains = Domains::default();
+        let twin =
+            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
         let flagged = |level: f64| {
             let evaluation = evaluate(&testing::recording(level, &[10.0, 13.0]), &twin).unwrap();
             evaluation.sleepers[3].flags.contains(&Flag::AtEdgeOfRange)
@@ -272,10 +289,42 @@ mod tests {
     }
 
     #[test]
+    fn a_level_that_the_library_lacks_is_called_outside_with_the_range_to_widen() {
+        let (extractor, library) = (testing::extractor(), testing::library());
+        let models = testing::models(&library);
+        let domains = Domains::default();
+        let twin =
+            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
+        let evaluated =
+            |level: f64| evaluate(&testing::recording(level, &[10.0, 13.0]), &twin).unwrap();
+        let inside = evaluated(3.0);
+        assert_eq!(inside.outside_library, OutsideLibrary::default());
+        assert!(inside.sleepers.iter().all(SleeperEvaluation::is_valid));
+        // Levels of the library are 1 to 5.
+        for (level, side) in [(0.3, Side::Low), (20.0, Side::High)] {
+            let evaluation = evaluated(level);
+            let outside = &evaluation.outside_library;
+            assert!(outside.is_most() && outside.widen[0] == Parameter::IrregularityLevel);
+            assert_eq!(outside.ends[0].side, side);
+            let json: serde_json::Value = serde_json::from_str(&evaluation.to_json()).unwrap();
+            assert_eq!(json["outside_library"]["share"], outside.share);
+            assert_eq!(json["outside_library"]["widen"][0], "irregularity_level");
+            let flags = json["sleepers"][3]["flags"].as_array().unwrap();
+            assert!(flags.contains(&"outside_library".into()), "{flags:?}");
+            assert!(
+                evaluation.notes.iter().any(|note| note.contains("widen `irregularity_level`"))
+            );
+            assert!(evaluation.to_csv().lines().nth(4).unwrap().contains(",true,"));
+        }
+    }
+
+    #[test]
     fn json_and_csv_hold_every_sleeper_under_the_agreed_names() {
         let (extractor, library) = (testing::extractor(), testing::library());
         let models = testing::models(&library);
-        let twin = Twin { extractor: &extractor, models: &models, library: &library };
+        let domains = Domains::default();
+        let twin =
+            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
         let evaluation = evaluate(&testing::recording(3.0, &[10.0, 13.0]), &twin).unwrap();
         let folder = tempfile::tempdir().unwrap();
         evaluation.write(folder.path()).unwrap();
@@ -302,7 +351,9 @@ mod tests {
         let library = testing::library();
         let models = testing::models(&library);
         let other = Extractor::new(&tracktwin_signal::FeatureDefinition::default()).unwrap();
-        let twin = Twin { extractor: &other, models: &models, library: &library };
+        let domains = Domains::default();
+        let twin =
+            Twin { extractor: &other, models: &models, library: &library, domains: &domains };
         let result = evaluate(&testing::recording(3.0, &[10.0]), &twin);
         assert!(matches!(result, Err(Error::OtherFeatures { .. })));
     }

@@ -1,5 +1,6 @@
 //! What an evaluation says: the record that files and pages are made of.
 
+use crate::{OutsideLibrary, Unevenness};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
@@ -34,6 +35,10 @@ pub struct Evaluation {
     pub sleepers: Vec<SleeperEvaluation>,
     /// The sleepers that no pass covers.
     pub unevaluated: Vec<Unevaluated>,
+    /// What of the recording lies outside what the library knows.
+    pub outside_library: OutsideLibrary,
+    /// How much sleepers are taken to differ.
+    pub unevenness: Unevenness,
     /// What was left out of the recording, and why.
     pub notes: Vec<String>,
     /// Frequencies of the bins in Hz, ascending; for pictures.
@@ -96,6 +101,8 @@ pub struct SleeperEvaluation {
     /// Mean and standard deviation by Gaussian processes.
     #[serde(flatten)]
     pub estimates: Estimates,
+    /// Standard deviations as they would be if all sleepers were alike.
+    pub sd_if_even: BTreeMap<Parameter, f64>,
     /// The model selector's answer.
     pub selector: Selected,
     /// What to keep in mind about it.
@@ -143,6 +150,8 @@ pub enum Flag {
     MissingSpeed,
     /// A mean lies at an end of what the library's tracks have: the track may lie beyond.
     AtEdgeOfRange,
+    /// The features are such as no track of the library has: the estimates are not valid.
+    OutsideLibrary,
 }
 
 /// A sleeper without estimates.
@@ -156,6 +165,13 @@ pub struct Unevaluated {
     pub reason: &'static str,
 }
 
+impl SleeperEvaluation {
+    /// Whether the estimates, the selector's too, mean anything.
+    pub fn is_valid(&self) -> bool {
+        !self.flags.contains(&Flag::OutsideLibrary)
+    }
+}
+
 impl Flag {
     /// A few words for a person.
     pub const fn label(self) -> &'static str {
@@ -164,6 +180,7 @@ impl Flag {
             Self::ShortMargin => "short margin",
             Self::MissingSpeed => "missing speed",
             Self::AtEdgeOfRange => "at edge of range",
+            Self::OutsideLibrary => "outside library: not valid",
         }
     }
 
@@ -174,6 +191,7 @@ impl Flag {
             Self::ShortMargin => "short_margin",
             Self::MissingSpeed => "missing_speed",
             Self::AtEdgeOfRange => "at_edge_of_range",
+            Self::OutsideLibrary => "outside_library",
         }
     }
 }

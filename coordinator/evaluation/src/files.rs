@@ -53,7 +53,7 @@ fn head(parameters: &[Parameter]) -> Vec<String> {
             head.extend(["mean", "sd"].map(|what| format!("{way}{parameter}_{what}")));
         }
     }
-    head.extend(["selector_mape_best", "flags"].map(str::to_owned));
+    head.extend(["selector_mape_best", "outside_library", "flags"].map(str::to_owned));
     head
 }
 
@@ -67,6 +67,7 @@ fn row(sleeper: &SleeperEvaluation, parameters: &[Parameter]) -> Vec<String> {
         }
     }
     row.push(sleeper.selector.mape.first().map(ToString::to_string).unwrap_or_default());
+    row.push((!sleeper.is_valid()).to_string());
     row.push(sleeper.flags.iter().map(|flag| flag.name()).collect::<Vec<_>>().join(";"));
     row
 }

@@ -10,8 +10,10 @@ mod estimate;
 mod evaluation;
 mod files;
 mod matches;
+mod outside;
 #[cfg(test)]
 mod testing;
+mod unevenness;
 mod windows;
 
 pub use check::check_recording;
@@ -22,4 +24,6 @@ pub use evaluation::{
     SleeperEvaluation, Unevaluated,
 };
 pub use matches::MATCHES;
+pub use outside::{BeyondEnd, Domains, OutsideLibrary};
+pub use unevenness::Unevenness;
 pub use windows::{SleeperFeatures, SpeedFeatures, features};

@@ -25,20 +25,38 @@ pub fn evaluation_page(
     command: &str,
 ) -> String {
     let body = html! {
-        @for note in &evaluation.notes { p { (note) } }
+        (banner(evaluation))
+        @for note in notes(evaluation) { p { (note) } }
+        p { (evaluation.unevenness.sentence()) }
         h2 { "Along the track" }
-        (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a band of two standard deviations inside the library's range, and the average over the ten library entries that match best. Not told: on the library's test half the models are hardly better than a constant answer."))
+        (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a band of two standard deviations inside the library's range, and the average over the ten library entries that match best. Hollow dots: not valid, the library has no such track. Not told: on the library's test half the models are hardly better than a constant answer."))
         h2 { "What was measured" }
         (figure(&maps(evaluation, recording, extractor), "Five sleeper bays in the middle of the recording (paper, Fig. 2); dashed lines are sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet transform (CWT), sharpened in frequency."))
         h2 { "Measured and matched spectra" }
-        (figure(&spectra(evaluation), "Local wavelet power spectra (LWPS) of some sleepers, mean over the passes of one speed, and those of the library entries nearest to them (paper, Fig. 11)."))
+        (figure(&spectra(evaluation), "Local wavelet power spectra (LWPS) of some sleepers, mean over the passes of one speed, and those of the library entries nearest to them (paper, Fig. 11). The nearest entry of a library that has no such track can lie as near as any: at a sleeper marked \"not valid\" a small distance says nothing."))
         h2 { "Estimates" }
-        p.note { "Mean ± one standard deviation. Match: how far the best library entry is off on average, in dB and as mean absolute percentage error of the logarithm (paper, eq. 10)." }
+        p.note { "Mean ± one standard deviation. Rows in italics are not valid, nor are their matches. Match: how far the best library entry is off on average, in dB and as mean absolute percentage error of the logarithm (paper, eq. 10)." }
         div.scroll { (table(evaluation)) }
         h2 { "Provenance" }
         (provenance(evaluation, command))
     };
     page(&format!("Track under {}", evaluation.recording), &summary(evaluation, recording), &body)
+}
+
+/// The notes that the banner does not say already.
+fn notes(evaluation: &Evaluation) -> impl Iterator<Item = &String> {
+    let said = evaluation.outside_library.sentences();
+    evaluation.notes.iter().filter(move |note| !said.contains(note))
+}
+
+/// Which estimates are not valid, and which library to make instead.
+fn banner(evaluation: &Evaluation) -> Markup {
+    let sentences = evaluation.outside_library.sentences();
+    html! {
+        @if !sentences.is_empty() {
+            div.banner role="alert" { @for sentence in &sentences { p { (sentence) } } }
+        }
+    }
 }
 
 /// What a reader in a hurry needs, in one sentence.
@@ -70,8 +88,9 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
         1 => "; 1 has a mean at an end of what the models know".to_owned(),
         count => format!("; {count} have a mean at an end of what the models know"),
     };
+    let ranges = if ranges.is_empty() { "no valid estimate".to_owned() } else { ranges.join(", ") };
     format!(
-        "{} sleepers evaluated from {} at {} km/h: {}{remark}{edge}.",
+        "{} sleepers evaluated from {} at {} km/h: {ranges}{remark}{edge}.",
         evaluation.sleepers.len(),
         if recording.passes.len() == 1 {
             "one pass".to_owned()
@@ -79,7 +98,6 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
             format!("{} passes", recording.passes.len())
         },
         speeds.join(", "),
-        ranges.join(", ")
     )
 }
 
@@ -91,8 +109,9 @@ fn is_whole(sleeper: &SleeperEvaluation) -> bool {
 /// Lowest to highest mean of a parameter over the sleepers that were heard as a whole, or over all if
 /// none was.
 fn range(evaluation: &Evaluation, parameter: Parameter) -> Option<String> {
-    let none = !evaluation.sleepers.iter().any(is_whole);
-    let told = evaluation.sleepers.iter().filter(|sleeper| none || is_whole(sleeper));
+    let valid = || evaluation.sleepers.iter().filter(|sleeper| sleeper.is_valid());
+    let none = !valid().any(is_whole);
+    let told = valid().filter(|sleeper| none || is_whole(sleeper));
     let mut means: Vec<f64> =
         told.filter_map(|sleeper| Some(sleeper.estimates.get(&parameter)?.mean)).collect();
     means.sort_by(f64::total_cmp);
@@ -153,7 +172,7 @@ fn table(evaluation: &Evaluation) -> Markup {
             } }
             tbody {
                 @for sleeper in &evaluation.sleepers {
-                    tr {
+                    tr.invalid[!sleeper.is_valid()] {
                         td { (sleeper.id) } td { (format!("{:.3}", sleeper.x_m)) }
                         @for &parameter in &parameters { td { (cell(parameter, sleeper.estimates.get(&parameter))) } }
                         td { @if let Some(best) = match_db(sleeper) { (significant(best)) } }

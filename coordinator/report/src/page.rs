@@ -16,6 +16,7 @@ pub(crate) const CHART_STYLE: &str = "
 .line.a{stroke:var(--a)}.line.b{stroke:var(--b)}.line.c{stroke:var(--c)}.line.d{stroke:var(--d)}.line.e{stroke:var(--e)}.line.f{stroke:var(--f)}.line.ink{stroke:var(--ink)}
 .band.a,.dot.a,.bar.a,.key.a{fill:var(--a)}.band.b,.dot.b,.bar.b,.key.b{fill:var(--b)}.band.c,.dot.c,.bar.c,.key.c{fill:var(--c)}
 .dot.d,.bar.d,.key.d{fill:var(--d)}.dot.e,.bar.e,.key.e{fill:var(--e)}.dot.f,.bar.f,.key.f{fill:var(--f)}.key.ink{fill:var(--ink)}.dot.pale{opacity:.35}
+.dot.hollow{fill:var(--paper);stroke:var(--dim)}.key.hollow{fill:var(--paper);stroke:var(--dim)}
 ";
 
 const PAGE_STYLE: &str = "
@@ -27,6 +28,7 @@ table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.88re
 th{vertical-align:bottom;font-weight:600;white-space:normal}th small{white-space:nowrap}th small{display:block;font-weight:400;color:var(--dim)}td:first-child,th:first-child,.words{text-align:left}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.15rem 1.2rem;font-size:.9rem}dt{color:var(--dim)}dd{margin:0;overflow-wrap:anywhere}
 code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.85rem}pre{overflow-x:auto;border:1px solid var(--faint);padding:.6rem}
+tr.invalid{color:var(--dim);font-style:italic}.banner{border:2px solid var(--b);padding:.6rem .9rem;max-width:60rem}.banner p{margin:.2rem 0}
 @media print{body{max-width:none;padding:0;font-size:11pt}figure,tr{break-inside:avoid}}
 ";
 

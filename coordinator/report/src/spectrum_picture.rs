@@ -32,7 +32,8 @@ pub(crate) fn spectrum_chart(
     };
     let all = measured.matches.iter().chain([&measured.log_power]).flatten();
     let y = Axis::around("LWPS in dB re 1 (m/s²)²", all.map(|value| decibel * value));
-    let title = format!("{} at {} km/h", sleeper.id, measured.speed_km_h);
+    let valid = if sleeper.is_valid() { "" } else { " (not valid)" };
+    let title = format!("{} at {} km/h{valid}", sleeper.id, measured.speed_km_h);
     let x = Axis::logarithmic("frequency in Hz", low, high);
     let mut chart = Chart::new(&title, SIZE, x, y);
     for matched in &measured.matches {
@@ -40,6 +41,6 @@ pub(crate) fn spectrum_chart(
     }
     chart.line("a", points(&measured.log_power));
     chart.explain("a", "measured");
-    chart.explain("b", &format!("{} best matches", measured.matches.len()));
+    chart.explain("b", &format!("{} nearest entries", measured.matches.len()));
     chart.into_svg()
 }

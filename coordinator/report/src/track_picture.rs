@@ -26,10 +26,11 @@ pub(crate) fn track_charts(evaluation: &Evaluation) -> Vec<String> {
 
 fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
     let shown = Shown::of(parameter);
-    let estimates = |pick: fn(&SleeperEvaluation) -> &Estimates| -> Vec<(f64, f64, f64)> {
+    let estimates = |pick: fn(&SleeperEvaluation) -> &Estimates| -> Vec<Place> {
         let value = |sleeper: &SleeperEvaluation| {
             let estimate = pick(sleeper).get(&parameter)?;
-            Some((sleeper.x_m, estimate.mean / shown.divisor, 2.0 * estimate.sd / shown.divisor))
+            let (mean, two_sd) = (estimate.mean / shown.divisor, 2.0 * estimate.sd / shown.divisor);
+            Some(Place { x_m: sleeper.x_m, mean, two_sd, valid: sleeper.is_valid() })
         };
         evaluation.sleepers.iter().filter_map(value).collect()
     };
@@ -37,12 +38,8 @@ fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
     let range = known.range.map(|end| end / shown.divisor);
     let process = estimates(|sleeper| &sleeper.estimates);
     let selector = estimates(|sleeper| &sleeper.selector.estimates);
-    // The models know nothing beyond the library's range.
-    let within = |value: f64| value.clamp(range[0], range[1]);
-    let band: Vec<_> =
-        process.iter().map(|&(x, mean, two)| (x, within(mean - two), within(mean + two))).collect();
     let label = format!("{} in {}", parameter.symbol(), shown.unit);
-    let x = Axis::around("position in m", process.iter().map(|point| point.0));
+    let x = Axis::around("position in m", process.iter().map(|place| place.x_m));
     let y = Axis::around(&label, range);
     let mut label = parameter.label().to_owned();
     label[..1].make_ascii_uppercase();
@@ -50,13 +47,46 @@ fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
         label += " (not told)";
     }
     let mut chart = Chart::new(&label, SIZE, x, y);
-    chart.band("a", &band);
-    let means = |of: &[(f64, f64, f64)]| of.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>();
-    chart.line("thin b", means(&selector));
-    chart.dots("b", 2.6, &means(&selector));
-    chart.line("a", means(&process));
-    chart.dots("a", 2.6, &means(&process));
+    draw(&mut chart, &process, &selector, range);
     chart.explain("a", "GP ± 2 sd");
     chart.explain("b", "selector");
+    if process.iter().any(|place| !place.valid) {
+        chart.explain("hollow", "not valid");
+    }
     chart.into_svg()
+}
+
+/// An estimate of one parameter at a sleeper, in the chart's unit.
+struct Place {
+    x_m: f64,
+    mean: f64,
+    two_sd: f64,
+    valid: bool,
+}
+
+/// Lines and bands through neighbours whose estimates are valid; hollow dots for the others.
+fn draw(chart: &mut Chart, process: &[Place], selector: &[Place], range: [f64; 2]) {
+    // The models know nothing beyond the library's range.
+    let within = |value: f64| value.clamp(range[0], range[1]);
+    let stretches = |of: &[Place]| -> Vec<Vec<(f64, f64, f64)>> {
+        let alike = of.chunk_by(|a, b| a.valid == b.valid).filter(|stretch| stretch[0].valid);
+        alike.map(|it| it.iter().map(|p| (p.x_m, p.mean, p.two_sd)).collect()).collect()
+    };
+    let points = |of: &[(f64, f64, f64)]| of.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>();
+    for stretch in stretches(process) {
+        let band: Vec<_> = stretch
+            .iter()
+            .map(|&(x, mean, two)| (x, within(mean - two), within(mean + two)))
+            .collect();
+        chart.band("a", &band);
+    }
+    for (class, line, of) in [("b", "thin b", selector), ("a", "a", process)] {
+        for stretch in stretches(of) {
+            chart.line(line, points(&stretch));
+            chart.dots(class, 2.6, &points(&stretch));
+        }
+        let invalid: Vec<_> =
+            of.iter().filter(|place| !place.valid).map(|place| (place.x_m, place.mean)).collect();
+        chart.dots("hollow", 2.6, &invalid);
+    }
 }

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use std::f64::consts::{LN_10, PI, TAU};
 use std::path::Path;
 use tracktwin_evaluation::{
-    Estimate, Estimates, Evaluation, FORMAT, Flag, Known, Measured, Provenance, Selected,
-    SleeperEvaluation,
+    BeyondEnd, Estimate, Estimates, Evaluation, FORMAT, Flag, Known, Measured, OutsideLibrary,
+    Provenance, Selected, SleeperEvaluation, Unevenness,
 };
 use tracktwin_parameters::Parameter;
 use tracktwin_report::{ReceptanceCurve, evaluation_page, models_page, receptance_chart};
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_signal::{Extractor, FeatureDefinition, Signal};
-use tracktwin_surrogate::{FeatureColumns, TrainOptions, Trained, TrainingSet, train};
+use tracktwin_surrogate::{FeatureColumns, Side, TrainOptions, Trained, TrainingSet, train};
 
 const RATE_HZ: f64 = 20_000.0;
 
@@ -74,6 +74,7 @@ fn evaluation(recording: &Recording, extractor: &Extractor) -> Evaluation {
             id,
             x_m,
             estimates: estimates(x_m, 0.0),
+            sd_if_even: estimates(x_m, 0.0).iter().map(|(&of, it)| (of, it.sd)).collect(),
             selector: Selected {
                 estimates: estimates(x_m, 0.7),
                 entries: (0..10).collect(),
@@ -100,6 +101,8 @@ fn evaluation(recording: &Recording, extractor: &Extractor) -> Evaluation {
         },
         sleepers: (0..recording.sleepers.len()).map(sleeper).collect(),
         unevaluated: Vec::new(),
+        outside_library: OutsideLibrary::default(),
+        unevenness: Unevenness { scatter: 0.05, least: 0.05, learned_from: None },
         notes: vec!["left out: pass 2".to_owned()],
         frequencies_hz: extractor.definition().frequencies_hz(),
     }
@@ -178,6 +181,42 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
     evaluation.sleepers.iter_mut().for_each(|sleeper| sleeper.flags = vec![Flag::MissingSpeed]);
     let page = evaluation_page(&evaluation, &recording, &extractor, "");
     assert!(!page.contains("km/h: ;") && page.contains("all are flagged"));
+}
+
+#[test]
+fn estimates_outside_the_library_are_drawn_and_said_as_not_valid() {
+    let recording = recording();
+    let extractor = Extractor::new(&FeatureDefinition::default()).expect("the usual features");
+    let mut evaluation = evaluation(&recording, &extractor);
+    let all = evaluation.sleepers.len();
+    let plain = evaluation_page(&evaluation, &recording, &extractor, "");
+    assert!(!plain.contains("class=\"banner\"") && !plain.contains("dot hollow"));
+    let end = BeyondEnd {
+        parameter: Parameter::BallastStiffness,
+        side: Side::Low,
+        value: 4e6,
+        sleepers: all,
+    };
+    evaluation.outside_library = OutsideLibrary {
+        share: 1.0,
+        widen: vec![Parameter::BallastStiffness],
+        ends: vec![end],
+        unexplained: 0,
+    };
+    evaluation.notes.extend(evaluation.outside_library.sentences());
+    let flag = |sleeper: &mut SleeperEvaluation| sleeper.flags.push(Flag::OutsideLibrary);
+    evaluation.sleepers.iter_mut().for_each(flag);
+    let page = evaluation_page(&evaluation, &recording, &extractor, "");
+    keep("evaluation-outside.html", &page);
+    assert!(page.contains("class=\"banner\"") && page.contains("not valid"));
+    // Said once, though the notes hold it too.
+    assert_eq!(page.matches("widen `ballast_stiffness_N_m`").count(), 1);
+    // Processes and selector, six parameters; no line or band is left.
+    assert_eq!(page.matches("class=\"dot hollow\"").count(), 2 * 6 * all);
+    assert_eq!(page.matches("class=\"band a\"").count(), 0);
+    assert_eq!(page.matches("<tr class=\"invalid\">").count(), all);
+    let ranges = page.matches("ballast stiffness 1").count();
+    assert_eq!(ranges, 0, "the summary tells no range that is not valid");
 }
 
 #[test]

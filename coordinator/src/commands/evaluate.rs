@@ -16,6 +16,10 @@ use tracktwin_surrogate::Trained;
 
 /// What `evaluate` is told.
 #[derive(Args)]
+#[command(
+    after_help = "Exit codes: 0 done, 1 done and most sleepers lie outside what the library knows (their estimates \
+are not valid; the last lines say which range to widen), 2 wrong input, 3 failure."
+)]
 pub(super) struct Arguments {
     /// The recording: a folder with `recording.json` and a file a pass.
     recording: PathBuf,
@@ -46,7 +50,14 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let evaluation = evaluate(&recording, &library, models, &out).await?;
     let sleepers = evaluation.sleepers.len();
     say(&format!("{sleepers} sleepers evaluated; report: {}", out.join("report.html").display()));
-    Ok(())
+    conclude(&evaluation)
+}
+
+/// Says what lies outside the library; if that is most of the track, the answer is negative.
+pub(super) fn conclude(evaluation: &Evaluation) -> Result<(), Stop> {
+    let outside = &evaluation.outside_library;
+    outside.sentences().iter().for_each(|sentence| say(sentence));
+    if outside.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
 
 /// Evaluates a recording with models of this library; writes files and report to `folder`.
@@ -60,7 +71,7 @@ pub(super) async fn evaluate(
     let (recording, notes) = usable(recording)?;
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
-    evaluation.notes = notes;
+    evaluation.notes.splice(0..0, notes);
     make_folder(folder).or_input()?;
     evaluation.write(folder)?;
     let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));

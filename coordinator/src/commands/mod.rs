@@ -3,6 +3,7 @@
 mod campaign;
 mod certs;
 mod coordinator;
+mod coverage;
 mod diagnose;
 mod evaluate;
 mod extend;
@@ -62,6 +63,8 @@ enum Command {
     Train(train::Arguments),
     /// Tell the track's parameters under a recording, sleeper by sleeper.
     Evaluate(evaluate::Arguments),
+    /// Tell how often estimates hold and refusals are right, on simulated tracks nobody has seen.
+    Coverage(coverage::Arguments),
     /// Find where a recording and the simulation differ, and what physics was left out.
     Diagnose(diagnose::Arguments),
     /// Write a campaign that has the physics a diagnosis found in its parameter space.
@@ -135,6 +138,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Extend(arguments) => extend::run(arguments),
         Command::Trial(arguments) => asynchronously(trial::run(arguments)),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
+        Command::Coverage(arguments) => asynchronously(coverage::run(arguments)),
         Command::Reproduce(arguments) => asynchronously(reproduce::run(arguments)),
         Command::Import(arguments) => import::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),

@@ -8,6 +8,7 @@
 mod cholesky;
 mod coarse;
 mod distance;
+mod domain;
 mod error;
 mod exponential;
 mod features;
@@ -17,6 +18,7 @@ mod group;
 mod input_map;
 mod kernel;
 mod ladder;
+mod polynomial;
 mod selector;
 mod spread;
 mod store;
@@ -26,6 +28,7 @@ mod validate;
 mod whitening;
 
 pub use distance::{distances, distances_within};
+pub use domain::{Beyond, Domain, Judgement, Side};
 pub use error::Error;
 pub use features::FeatureColumns;
 pub use fit::{Fit, MeanFunction, fit};

@@ -8,15 +8,8 @@
 
 use crate::Error;
 use crate::cholesky::Cholesky;
+use crate::polynomial::Polynomial;
 use faer::{Mat, MatRef, Side};
-
-/// Highest total degree of the polynomial that stands for the expected features.
-const DEGREE_MAX: usize = 3;
-/// Entries per polynomial coefficient below which the degree is lowered.
-const ENTRIES_PER_COEFFICIENT: usize = 8;
-/// A parameter whose range spans more than this ratio enters by its logarithm: what stiffness and
-/// level do to a spectrum saturates or multiplies.
-const LOGARITHMIC_FROM: f64 = 4.0;
 
 /// Directions (d x m, m at most `components`), the most telling first, along which the scatter of
 /// the centred `features` (n x d) at fixed `parameters` (n x p) has variance one.
@@ -35,7 +28,8 @@ pub(crate) fn directions(
     shrinkage: f64,
 ) -> Result<Mat<f64>, Error> {
     let (n, d) = (features.nrows(), features.ncols());
-    let basis = polynomial(parameters);
+    let polynomial = Polynomial::of(parameters);
+    let basis = polynomial.basis(polynomial.unit(parameters).as_ref());
     let normal = Cholesky::new(basis.transpose() * &basis)?;
     let expected = &basis * normal.solve((basis.transpose() * features).as_ref());
     let residual = features - &expected;
@@ -52,59 +46,9 @@ pub(crate) fn directions(
     Ok(factor.other_half_solve(leading))
 }
 
-/// All monomials up to the degree that the number of entries allows, in parameters mapped to
-/// [-1, 1] (n x coefficients).
-fn polynomial(parameters: MatRef<'_, f64>) -> Mat<f64> {
-    let n = parameters.nrows();
-    let axes: Vec<Vec<f64>> = parameters
-        .col_iter()
-        .map(|column| unit_axis(&column.iter().copied().collect::<Vec<_>>()))
-        .collect();
-    let exponents = (1..=DEGREE_MAX)
-        .rev()
-        .map(|degree| monomials(axes.len(), degree))
-        .find(|m| m.len() * ENTRIES_PER_COEFFICIENT <= n)
-        .unwrap_or_else(|| monomials(axes.len(), 1));
-    Mat::from_fn(n, exponents.len(), |i, j| {
-        exponents[j].iter().map(|&axis| axes[axis][i]).product()
-    })
-}
-
-fn unit_axis(values: &[f64]) -> Vec<f64> {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let logarithmic = low > 0.0 && high / low > LOGARITHMIC_FROM;
-    let scale = |v: f64| if logarithmic { v.ln() } else { v };
-    let (low, high) = (scale(low), scale(high));
-    values.iter().map(|&v| 2.0 * (scale(v) - low) / (high - low) - 1.0).collect()
-}
-
-/// Monomials of total degree 0 to `degree`, each as the sorted list of its factors.
-fn monomials(axes: usize, degree: usize) -> Vec<Vec<usize>> {
-    let mut all = vec![Vec::new()];
-    let mut last = all.clone();
-    for _ in 0..degree {
-        last = last
-            .iter()
-            .flat_map(|m: &Vec<usize>| {
-                let from = m.last().copied().unwrap_or(0);
-                (from..axes).map(move |axis| [m.as_slice(), &[axis]].concat())
-            })
-            .collect();
-        all.extend_from_slice(&last);
-    }
-    all
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn six_parameters_have_84_monomials_up_to_cubes() {
-        assert_eq!(monomials(6, 3).len(), 84);
-        assert_eq!(monomials(2, 2), [vec![], vec![0], vec![1], vec![0, 0], vec![0, 1], vec![1, 1]]);
-    }
 
     #[test]
     fn the_first_direction_finds_the_parameter_under_correlated_noise() {

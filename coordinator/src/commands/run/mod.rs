@@ -13,7 +13,7 @@ use anyhow::anyhow;
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use tracktwin_evaluation::check_recording;
+use tracktwin_evaluation::{Evaluation, check_recording};
 use tracktwin_library::{Library, Status};
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::ENTRIES_MIN;
@@ -76,8 +76,9 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let said = chain(&library, &campaign, given, &arguments).await;
     // What the library holds is then in one file, fit to be copied.
     library.close().await;
-    say(&said?);
-    Ok(())
+    let (line, evaluation) = said?;
+    say(&line);
+    evaluation.map_or(Ok(()), |evaluation| evaluate::conclude(&evaluation))
 }
 
 /// Simulates, trains and evaluates; says what was made of it.
@@ -86,10 +87,10 @@ async fn chain(
     campaign: &Campaign,
     recording: Option<Recording>,
     arguments: &Arguments,
-) -> Result<String, Stop> {
+) -> Result<(String, Option<Evaluation>), Stop> {
     simulate(library, campaign, arguments.cores.unwrap_or_else(all_cores)).await?;
     if arguments.no_train {
-        return Ok(format!("library: {}", library.name()));
+        return Ok((format!("library: {}", library.name()), None));
     }
     let out = &arguments.out;
     let record = library.campaign(&campaign.id()).await?;
@@ -101,10 +102,11 @@ async fn chain(
     if let Err(other) = check(&recording, campaign) {
         note(&format!("the sample recording is of another kind: {other}"));
         let models = out.join("models");
-        return Ok(format!("models: {}; `tracktwin evaluate` takes a recording", models.display()));
+        let line = format!("models: {}; `tracktwin evaluate` takes a recording", models.display());
+        return Ok((line, None));
     }
-    evaluate::evaluate(&recording, library, models, out).await?;
-    Ok(format!("report: {}", out.join("report.html").display()))
+    let evaluation = evaluate::evaluate(&recording, library, models, out).await?;
+    Ok((format!("report: {}", out.join("report.html").display()), Some(evaluation)))
 }
 
 /// Whether models of the campaign can evaluate the recording.

@@ -1,0 +1,254 @@
+//! Which sleepers' features lie outside what the library knows.
+//!
+//! A track beyond the library is beyond it at many sleepers, and the mean over them tells more than
+//! each. So running windows of one, three, seven and all sleepers are judged, and a sleeper is
+//! outside if any window that holds it is.
+
+use crate::{Error, Flag, SleeperFeatures};
+use serde::Serialize;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, Mutex, PoisonError};
+use tracktwin_parameters::Parameter;
+use tracktwin_surrogate::{Beyond, Domain, Judgement, Side, TrainingSet};
+
+/// Share of the library's own tracks in which some sleeper may be called outside.
+const FALSE_RATE: f64 = 0.01;
+/// Sleepers in a running window; the whole track is judged beside.
+const SIZES: [usize; 3] = [1, 3, 7];
+/// Share of the sleepers outside that an end must explain to be named.
+const NAMED_FROM: f64 = 0.2;
+
+/// What of a recording lies outside the library.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct OutsideLibrary {
+    /// Share of the evaluated sleepers, 0 to 1.
+    pub share: f64,
+    /// Parameters whose range must be wider, the one that explains most first.
+    pub widen: Vec<Parameter>,
+    /// The ends that the track lies beyond.
+    pub ends: Vec<BeyondEnd>,
+    /// Sleepers outside that no range explains.
+    pub unexplained: usize,
+}
+
+/// An end of a range that sleepers lie beyond.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BeyondEnd {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Which end.
+    pub side: Side,
+    /// The library's value there, in the parameter's unit.
+    pub value: f64,
+    /// How many sleepers.
+    pub sleepers: usize,
+}
+
+/// What one library knows at each set of speeds that was asked for.
+#[derive(Default)]
+pub struct Domains(Mutex<HashMap<Vec<usize>, Arc<Domain>>>);
+
+impl Domains {
+    /// What the library knows at these speeds; worked out when first asked for.
+    fn of(&self, library: &TrainingSet, speeds: &[usize]) -> Result<Arc<Domain>, Error> {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(domain) = known.get(speeds) {
+            return Ok(Arc::clone(domain));
+        }
+        let domain = Arc::new(Domain::of(library, speeds)?);
+        known.insert(speeds.to_vec(), Arc::clone(&domain));
+        Ok(domain)
+    }
+}
+
+/// Whether a sleeper is outside, and beyond what.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Verdict {
+    pub(crate) outside: bool,
+    beyond: Option<Beyond>,
+    /// Sleepers in the window that said so.
+    window: usize,
+}
+
+impl Verdict {
+    /// Takes a window's judgement; larger windows know better what a track is beyond.
+    fn take(&mut self, judgement: &Judgement, window: usize) {
+        if !judgement.is_outside() {
+            return;
+        }
+        self.outside = true;
+        if judgement.beyond.is_some() && window >= self.window {
+            self.beyond = judgement.beyond;
+            self.window = window;
+        }
+    }
+}
+
+/// A verdict on every sleeper, in their order.
+///
+/// Sleepers whose windows are not complete are judged by the whole track only.
+///
+/// # Errors
+/// What [`Domain`] reports.
+pub(crate) fn judge(
+    sleepers: &[SleeperFeatures],
+    library: &TrainingSet,
+    domains: &Domains,
+) -> Result<Vec<Verdict>, Error> {
+    let mut by_speeds: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
+    for (index, sleeper) in sleepers.iter().enumerate() {
+        let key = sleeper.speeds.iter().map(|known| known.speed).collect();
+        by_speeds.entry(key).or_default().push(index);
+    }
+    let mut verdicts = vec![Verdict::default(); sleepers.len()];
+    let groups = by_speeds.len();
+    for (speeds, members) in by_speeds {
+        let domain = domains.of(library, &speeds)?;
+        judge_alike(sleepers, &members, &domain, groups, &mut verdicts)?;
+    }
+    Ok(verdicts)
+}
+
+/// Judges the sleepers that have the same speeds.
+fn judge_alike(
+    sleepers: &[SleeperFeatures],
+    members: &[usize],
+    domain: &Domain,
+    groups: usize,
+    verdicts: &mut [Verdict],
+) -> Result<(), Error> {
+    let whole: Vec<usize> =
+        members.iter().copied().filter(|&index| is_whole(&sleepers[index])).collect();
+    let coordinates = whole
+        .iter()
+        .map(|&index| {
+            let speeds = &sleepers[index].speeds;
+            let observed: Vec<f64> =
+                speeds.iter().flat_map(|known| known.log_power.iter().copied()).collect();
+            domain.coordinates(&observed)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut sizes: Vec<usize> =
+        SIZES.into_iter().filter(|&size| size < whole.len()).chain([whole.len()]).collect();
+    sizes.retain(|&size| size > 0);
+    for &size in &sizes {
+        let windows = whole.len() + 1 - size;
+        let probability = FALSE_RATE / (groups * sizes.len() * windows) as f64;
+        for first in 0..windows {
+            let mean = mean(&coordinates[first..first + size]);
+            let judgement = domain.judge(&mean, size, probability)?;
+            let all = size == whole.len();
+            let held = if all { members } else { &whole[first..first + size] };
+            held.iter().for_each(|&index| verdicts[index].take(&judgement, size));
+        }
+    }
+    Ok(())
+}
+
+fn is_whole(sleeper: &SleeperFeatures) -> bool {
+    !sleeper.flags.iter().any(|flag| matches!(flag, Flag::IncompleteWindow | Flag::ShortMargin))
+}
+
+fn mean(rows: &[Vec<f64>]) -> Vec<f64> {
+    let mut mean = vec![0.0; rows[0].len()];
+    let share = 1.0 / rows.len() as f64;
+    for row in rows {
+        mean.iter_mut().zip(row).for_each(|(sum, value)| *sum += share * value);
+    }
+    mean
+}
+
+impl OutsideLibrary {
+    /// The verdicts on a recording, taken together.
+    pub(crate) fn of(verdicts: &[Verdict], library: &TrainingSet) -> Self {
+        let outside: Vec<&Verdict> = verdicts.iter().filter(|verdict| verdict.outside).collect();
+        let mut counts: BTreeMap<Beyond, usize> = BTreeMap::new();
+        for beyond in outside.iter().filter_map(|verdict| verdict.beyond) {
+            *counts.entry(beyond).or_default() += 1;
+        }
+        let least = (NAMED_FROM * outside.len() as f64).ceil() as usize;
+        let mut ends: Vec<BeyondEnd> = counts
+            .into_iter()
+            .filter(|&(_, sleepers)| sleepers >= least)
+            .map(|(Beyond { parameter, side }, sleepers)| {
+                let value = end_of_range(library, parameter, side);
+                BeyondEnd { parameter, side, value, sleepers }
+            })
+            .collect();
+        ends.sort_by_key(|end| std::cmp::Reverse(end.sleepers));
+        let mut widen: Vec<Parameter> = Vec::new();
+        for end in &ends {
+            if !widen.contains(&end.parameter) {
+                widen.push(end.parameter);
+            }
+        }
+        let unexplained = outside.iter().filter(|verdict| verdict.beyond.is_none()).count();
+        let share = outside.len() as f64 / verdicts.len().max(1) as f64;
+        Self { share, widen, ends, unexplained }
+    }
+
+    /// Whether most sleepers are outside: the recording as a whole has no answer.
+    pub fn is_most(&self) -> bool {
+        self.share > 0.5
+    }
+
+    /// What is outside and which library to make, a sentence each; none if nothing is outside.
+    pub fn sentences(&self) -> Vec<String> {
+        if self.share <= 0.0 {
+            return Vec::new();
+        }
+        let mut sentences = vec![format!(
+            "{:.0} % of the sleepers have features that no track of the library has: their estimates are not valid.",
+            (100.0 * self.share).ceil()
+        )];
+        sentences.extend(self.ends.iter().map(BeyondEnd::sentence));
+        if self.unexplained > 0 {
+            sentences.push(format!(
+"{} {} outside in a way that a step beyond one end does not explain: a parameter lies far beyond its range, or physics, vehicle or surface differ; compare the ranges in the campaign with what is known of the track, and see `tracktwin diagnose`.",
+                self.unexplained,
+                if self.unexplained == 1 { "sleeper is" } else { "sleepers are" }
+            ));
+        }
+        sentences
+    }
+}
+
+impl BeyondEnd {
+    /// The end in words, and what to do.
+    fn sentence(&self) -> String {
+        let Self { parameter, side, value, sleepers } = self;
+        let than = match side {
+            Side::Low => "lower than",
+            Side::High => "higher than",
+        };
+        let whose =
+            if *sleepers == 1 { "1 sleeper".to_owned() } else { format!("{sleepers} sleepers") };
+        format!(
+            "{} at {whose} is {than} the library's {} {}: widen `{parameter}` in the campaign, then simulate and train again.",
+            parameter.label(),
+            rounded(*value),
+            parameter.unit()
+        )
+    }
+}
+
+/// The value with three significant digits.
+fn rounded(value: f64) -> String {
+    let text = format!("{value:.2e}");
+    match text.parse::<f64>() {
+        Ok(number) if (1e-3..1e5).contains(&number.abs()) => number.to_string(),
+        Ok(number) => format!("{number:e}"),
+        Err(_) => text,
+    }
+}
+
+fn end_of_range(library: &TrainingSet, parameter: Parameter, side: Side) -> f64 {
+    let column = library.varied.iter().position(|&varied| varied == parameter);
+    column.map_or(f64::NAN, |column| {
+        let [low, high] = library.range(column);
+        match side {
+            Side::Low => low,
+            Side::High => high,
+        }
+    })
+}

@@ -1,0 +1,168 @@
+//! `tracktwin coverage`: how often estimates hold and refusals are right.
+
+use super::evaluate::stop;
+use super::library_url::LibraryUrl;
+use super::progress::Progress;
+use super::simulate::Setting;
+use super::{OrInput, Stop, say};
+use crate::coverage::{Counts, Coverage, Kind, Row};
+use crate::evaluating::Evaluator;
+use anyhow::anyhow;
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use tracktwin_parameters::Parameter;
+use tracktwin_surrogate::{Side, Trained};
+
+/// Most tracks inside the ranges that may have a sleeper called outside.
+const FALSE_MOST: f64 = 0.02;
+/// Fewest tracks 30 % beyond an end that must be called outside.
+const FOUND_LEAST: f64 = 0.95;
+
+/// What `coverage` is told.
+#[derive(Args)]
+#[command(
+    after_help = "Simulates tracks with all parameters inside the library's ranges (even ones, and ones whose \
+railpads and ballast differ by 5, 15 and 30 % from sleeper to sleeper) and tracks with one parameter 30 % beyond \
+an end, evaluates them, and prints two tables: how many are called outside, and how many true values the 90 % \
+intervals hold, in brackets with the standard deviations of an even track.\n\nExit codes: 0 done, 1 more than 2 % of \
+the even tracks inside are called outside, 2 wrong input, 3 failure."
+)]
+pub(super) struct Arguments {
+    /// Folder of the models, as `train` or `run` wrote it.
+    #[arg(long, value_name = "DIR")]
+    models: PathBuf,
+    #[command(flatten)]
+    library: LibraryUrl,
+    /// Tracks beyond each end of a range; twice as many inside.
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    tracks: u32,
+    /// Sleepers of a track.
+    #[arg(long, value_name = "N", default_value_t = 14, value_parser = clap::value_parser!(u32).range(1..=200))]
+    sleepers: u32,
+    /// Decides parameters and surfaces.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// A track more, with this value and all others in the middle of their ranges; may stand several
+    /// times: `ballast_stiffness_N_m=6e7`.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    settings: Vec<Setting>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    let settings = settings(&arguments.settings)?;
+    let models = Trained::load(&arguments.models).or_input()?;
+    let library = arguments.library.open().await?;
+    let evaluator = Evaluator::new(models, &library).await.map_err(stop)?;
+    library.close().await;
+    let Arguments { tracks, sleepers, seed, json, .. } = arguments;
+    let counts = Counts { tracks: tracks as usize, sleepers: sleepers as usize, seed };
+    let rows = tokio::task::spawn_blocking(move || rows(&evaluator, settings, counts)).await??;
+    if json {
+        say(&serde_json::to_string_pretty(&rows)?);
+    } else {
+        say(&tables(&rows));
+    }
+    let even =
+        rows.iter().find(|row| matches!(row.kind, Kind::Inside { scatter } if scatter <= 0.0));
+    if even.is_some_and(|row| row.any_outside > FALSE_MOST) { Err(Stop::Negative) } else { Ok(()) }
+}
+
+fn settings(given: &[Setting]) -> Result<Vec<(Parameter, f64)>, Stop> {
+    let setting = |setting: &Setting| match setting.sleepers {
+        None => Ok((setting.parameter, setting.value)),
+        Some(_) => Err(anyhow!("--set: a whole track has the value; leave out the sleepers")),
+    };
+    given.iter().map(setting).collect::<Result<_, _>>().or_input()
+}
+
+fn rows(
+    evaluator: &Evaluator,
+    settings: Vec<(Parameter, f64)>,
+    counts: Counts,
+) -> anyhow::Result<Vec<Row>> {
+    let coverage = Coverage {
+        evaluator,
+        experiment: evaluator.experiment(),
+        fixed: *evaluator.fixed(),
+        settings,
+        counts,
+    };
+    let bar = Mutex::new(None::<Progress>);
+    let rows = coverage.rows(&|done, total| {
+        if let Ok(mut bar) = bar.lock() {
+            let begin = || Progress::begin("tracks", 0, total as u64);
+            bar.get_or_insert_with(begin).at(done as u64, "");
+        }
+    })?;
+    bar.into_inner().ok().flatten().into_iter().for_each(Progress::end);
+    Ok(rows)
+}
+
+/// How many tracks are called outside, then how much the intervals hold.
+fn tables(rows: &[Row]) -> String {
+    let width = rows.iter().map(|row| name(row.kind).len()).max().unwrap_or(0);
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let mut lines = vec![format!(
+        "{:width$}  tracks  any sleeper outside  most outside  named to widen first",
+        "Called outside the library"
+    )];
+    for row in rows {
+        let named: Vec<_> =
+            row.widen.iter().map(|(of, share)| format!("{of} {}", percent(*share))).collect();
+        lines.push(format!(
+            "{:width$}  {:>6}  {:>19}  {:>12}  {}",
+            name(row.kind),
+            row.tracks,
+            percent(row.any_outside),
+            percent(row.most_outside),
+            named.join(", ")
+        ));
+    }
+    let columns = rows.first().map(|row| row.estimates.keys().copied().collect::<Vec<_>>());
+    let columns = columns.unwrap_or_default();
+    let heads = columns.iter().map(|parameter| format!("{:>16}", parameter.symbol()));
+    lines.push(String::new());
+    lines.push(format!(
+        "{:width$}{}  assumed scatter",
+        "Inside the 90 % interval",
+        heads.collect::<String>()
+    ));
+    for row in rows.iter().filter(|row| matches!(row.kind, Kind::Inside { .. })) {
+        let cells = columns.iter().map(|parameter| {
+            let of = row.estimates[parameter];
+            format!(
+                "{:>16}",
+                format!("{} ({})", percent(of.holds_90), percent(of.holds_90_if_even))
+            )
+        });
+        let cells = cells.collect::<String>();
+        lines.push(format!("{:width$}{cells}  {}", name(row.kind), percent(row.assumed_scatter)));
+    }
+    lines.extend(shortfalls(rows));
+    lines.join("\n")
+}
+
+/// Ends beyond which too few tracks are called outside.
+fn shortfalls(rows: &[Row]) -> impl Iterator<Item = String> + '_ {
+    let missed = rows
+        .iter()
+        .filter(|row| matches!(row.kind, Kind::Beyond { .. }) && row.any_outside < FOUND_LEAST);
+    missed.map(|row| {
+        format!("{}: fewer than {:.0} % are called outside", name(row.kind), 100.0 * FOUND_LEAST)
+    })
+}
+
+/// What a row's tracks are.
+fn name(kind: Kind) -> String {
+    match kind {
+        Kind::Inside { scatter } if scatter <= 0.0 => "inside, even".to_owned(),
+        Kind::Inside { scatter } => format!("inside, {:.0} % scatter", 100.0 * scatter),
+        Kind::Beyond { parameter, side: Side::Low } => format!("{parameter} 30 % below"),
+        Kind::Beyond { parameter, side: Side::High } => format!("{parameter} 30 % above"),
+        Kind::Set { parameter, value } => format!("{parameter} = {value:e}"),
+    }
+}

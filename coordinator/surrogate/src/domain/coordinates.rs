@@ -1,0 +1,180 @@
+//! Coordinates of a window's features in which the scatter of the surface is one and independent.
+
+use super::discrepancy::discrepancy;
+use crate::cholesky::Cholesky;
+use crate::polynomial::Polynomial;
+use crate::{Error, TrainingSet};
+use faer::{Mat, MatRef, Side};
+
+/// Bins that are averaged into a band, the finest first.
+const BAND_BINS: [usize; 5] = [4, 8, 16, 32, 64];
+/// Entries per band value below which bands are made wider.
+const ENTRIES_PER_BAND: usize = 4;
+/// Added to every band's scatter, as a share of the mean over the bands.
+const SHRINKAGE: f64 = 0.02;
+
+/// From features to coordinates, and the coordinates expected of parameters.
+///
+/// Bands of ln-power are regressed on the parameters. In units of the regression's residuals the
+/// first directions carry what the parameters do, as in Fisher's discriminant analysis; in all
+/// others the expectation is zero. The coordinates are then turned so that the discrepancy between
+/// simulators is independent too.
+pub(super) struct Coordinates {
+    speeds: usize,
+    bins: usize,
+    band_bins: usize,
+    offset: Vec<f64>,
+    /// Band values x d.
+    projection: Mat<f64>,
+    /// Variances of what two simulators of one track differ by, d values.
+    pub(super) discrepancy: Vec<f64>,
+    pub(super) polynomial: Polynomial,
+    /// Coefficients x d.
+    coefficients: Mat<f64>,
+    /// `(B' B)⁻¹` of the regression, coefficients x coefficients.
+    inverse_normal: Mat<f64>,
+}
+
+/// What is expected of parameters, and how sure that is.
+pub(super) struct Expected {
+    /// d values.
+    pub(super) mean: Vec<f64>,
+    /// Its variance in every coordinate: the regression's leverage there.
+    pub(super) variance: f64,
+    /// Derivatives by the mapped parameters, p x d.
+    pub(super) slopes: Mat<f64>,
+}
+
+impl Coordinates {
+    /// The coordinates that chosen entries of a library define.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] when entries are too few or a parameter is constant;
+    /// [`Error::NoEigenvalues`].
+    pub(super) fn of(
+        set: &TrainingSet,
+        speeds: &[usize],
+        entries: &[usize],
+    ) -> Result<Self, Error> {
+        let bins = set.frequencies_hz.len();
+        let band_bins = band_bins(set, speeds.len());
+        let features = set.features(entries, speeds, &(0..bins));
+        let bands = bands(features.as_ref(), bins, band_bins);
+        let offset: Vec<f64> =
+            bands.col_iter().map(|c| c.iter().sum::<f64>() / entries.len() as f64).collect();
+        let centred = Mat::from_fn(bands.nrows(), bands.ncols(), |i, j| bands[(i, j)] - offset[j]);
+        let parameters = set.values(entries);
+        let polynomial = Polynomial::of(parameters.as_ref());
+        let basis = polynomial.basis(polynomial.unit(parameters.as_ref()).as_ref());
+        let normal = Cholesky::new(basis.transpose() * &basis)?;
+        let inverse_normal = normal.solve(Mat::identity(basis.ncols(), basis.ncols()).as_ref());
+        let coefficients = normal.solve((basis.transpose() * &centred).as_ref());
+        let expected = &basis * &coefficients;
+        let whitening = whitening(&centred, &expected, basis.ncols())?;
+        let between = discrepancy(&band_frequencies(&set.frequencies_hz, band_bins), speeds.len());
+        let between = whitening.projection.transpose() * between * &whitening.projection;
+        let size = between.nrows();
+        let eigen =
+            between.self_adjoint_eigen(Side::Lower).map_err(|_| Error::NoEigenvalues { size })?;
+        let turned = eigen.U().to_owned();
+        let leading = whitening.leading;
+        let told = coefficients * whitening.projection.subcols(0, leading);
+        Ok(Self {
+            speeds: speeds.len(),
+            bins,
+            band_bins,
+            offset,
+            projection: &whitening.projection * &turned,
+            discrepancy: eigen.S().column_vector().iter().map(|value| value.max(0.0)).collect(),
+            polynomial,
+            coefficients: told * turned.subrows(0, leading),
+            inverse_normal,
+        })
+    }
+
+    /// Coordinates (t x d) of features (t x speeds bins).
+    pub(super) fn apply(&self, features: MatRef<'_, f64>) -> Mat<f64> {
+        let bands = bands(features, self.bins, self.band_bins);
+        Mat::from_fn(bands.nrows(), bands.ncols(), |i, j| bands[(i, j)] - self.offset[j])
+            * &self.projection
+    }
+
+    /// How many numbers the features of a window are.
+    pub(super) fn features(&self) -> usize {
+        self.speeds * self.bins
+    }
+
+    /// What is expected at mapped parameters; beyond their ranges it goes on in a straight line.
+    pub(super) fn expected(&self, unit: &[f64]) -> Expected {
+        let inside: Vec<f64> = unit.iter().map(|value| value.clamp(-1.0, 1.0)).collect();
+        let row = MatRef::from_row_major_slice(&inside, 1, inside.len());
+        let basis = self.polynomial.basis(row);
+        let slopes = self.polynomial.slopes(&inside) * &self.coefficients;
+        let beyond = Mat::from_fn(1, unit.len(), |_, j| unit[j] - inside[j]);
+        let mean = &basis * &self.coefficients + beyond * &slopes;
+        let leverage = &basis * &self.inverse_normal * basis.transpose();
+        let mean = mean.row(0).iter().copied().collect();
+        Expected { mean, variance: leverage[(0, 0)], slopes }
+    }
+}
+
+/// The narrowest bands that half of the library's entries can tell the scatter of.
+fn band_bins(set: &TrainingSet, speeds: usize) -> usize {
+    let values = |band: usize| speeds * set.frequencies_hz.len().div_ceil(band);
+    BAND_BINS
+        .into_iter()
+        .find(|&band| 2 * ENTRIES_PER_BAND * values(band) <= set.entries())
+        .unwrap_or(BAND_BINS[BAND_BINS.len() - 1])
+}
+
+/// Directions of unit scatter, those that parameters move most first.
+struct Whitening {
+    projection: Mat<f64>,
+    /// How many are moved by more than chance.
+    leading: usize,
+}
+
+fn whitening(
+    centred: &Mat<f64>,
+    expected: &Mat<f64>,
+    coefficients: usize,
+) -> Result<Whitening, Error> {
+    let (n, d) = (centred.nrows(), centred.ncols());
+    let residual = centred - expected;
+    let freedom = n.saturating_sub(coefficients).max(1) as f64;
+    let mut scatter = residual.transpose() * &residual * faer::Scale(1.0 / freedom);
+    let mean = (0..d).map(|i| scatter[(i, i)]).sum::<f64>() / d as f64;
+    (0..d).for_each(|i| scatter[(i, i)] += SHRINKAGE * mean);
+    let factor = Cholesky::new(scatter)?;
+    let moved = expected.transpose() * expected * faer::Scale(1.0 / n as f64);
+    let moved = factor.half_solve(factor.half_solve(moved).transpose().to_owned());
+    let eigen =
+        moved.self_adjoint_eigen(Side::Lower).map_err(|_| Error::NoEigenvalues { size: d })?;
+    let descending = Mat::from_fn(d, d, |i, j| eigen.U()[(i, d - 1 - j)]);
+    // What a regression on nothing but noise would have at most (Marchenko & Pastur 1967).
+    let chance =
+        coefficients as f64 / n as f64 * (1.0 + (d as f64 / coefficients as f64).sqrt()).powi(2);
+    let leading = eigen.S().column_vector().iter().filter(|&&value| value > chance).count();
+    let projection = factor.other_half_solve(descending);
+    Ok(Whitening { projection, leading: leading.max(1) })
+}
+
+/// Means over neighbouring bins, the speeds side by side; the last band may be narrower.
+fn bands(features: MatRef<'_, f64>, bins: usize, band_bins: usize) -> Mat<f64> {
+    let per_speed = bins.div_ceil(band_bins);
+    let speeds = features.ncols() / bins;
+    Mat::from_fn(features.nrows(), speeds * per_speed, |i, j| {
+        let (speed, band) = (j / per_speed, j % per_speed);
+        let range = band * band_bins..((band + 1) * band_bins).min(bins);
+        let width = range.len() as f64;
+        range.map(|bin| features[(i, speed * bins + bin)]).sum::<f64>() / width
+    })
+}
+
+/// Geometric middle of every band in Hz.
+fn band_frequencies(frequencies_hz: &[f64], band_bins: usize) -> Vec<f64> {
+    let middle = |band: &[f64]| {
+        (band.iter().map(|frequency| frequency.ln()).sum::<f64>() / band.len() as f64).exp()
+    };
+    frequencies_hz.chunks(band_bins).map(middle).collect()
+}

@@ -1,0 +1,142 @@
+//! The parameters, within bounds, whose expected coordinates are nearest to those observed.
+
+use super::coordinates::{Coordinates, Expected};
+use crate::Error;
+use crate::cholesky::Cholesky;
+use faer::Mat;
+
+/// Steps after which a search ends.
+const STEPS_MAX: usize = 25;
+/// A step that gains less ends the search, in units of chi-square.
+const GAIN_MIN: f64 = 1e-3;
+/// Damping at the beginning, and its least value.
+const DAMPING: [f64; 2] = [1e-3, 1e-7];
+/// Damping beyond which no step helps.
+const DAMPING_MAX: f64 = 1e6;
+
+/// Bounds of the mapped parameters.
+#[derive(Clone, Debug)]
+pub(super) struct Bounds {
+    pub(super) low: Vec<f64>,
+    pub(super) high: Vec<f64>,
+}
+
+/// The best point inside bounds.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    /// Mapped parameters.
+    pub(super) unit: Vec<f64>,
+    /// Weighted sum of squares that is left.
+    pub(super) chi_square: f64,
+}
+
+impl Bounds {
+    /// The library's own ranges.
+    pub(super) fn library(parameters: usize) -> Self {
+        Self { low: vec![-1.0; parameters], high: vec![1.0; parameters] }
+    }
+
+    fn clamp(&self, unit: &[f64]) -> Vec<f64> {
+        let bounds = self.low.iter().zip(&self.high);
+        unit.iter().zip(bounds).map(|(value, (low, high))| value.clamp(*low, *high)).collect()
+    }
+
+    /// Whether a step from `unit` along `axis` would leave the bounds at once.
+    fn holds_back(&self, unit: f64, step: f64, axis: usize) -> bool {
+        (unit <= self.low[axis] && step < 0.0) || (unit >= self.high[axis] && step > 0.0)
+    }
+}
+
+/// What is to be fitted: observed coordinates and the precision of each.
+pub(super) struct Problem<'a> {
+    pub(super) coordinates: &'a Coordinates,
+    pub(super) observed: &'a [f64],
+    pub(super) precision: Vec<f64>,
+}
+
+impl Problem<'_> {
+    /// Levenberg's and Marquardt's descent from `start`; parameters at a bound that would leave it
+    /// are held.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] when numbers are not finite.
+    pub(super) fn solve(&self, bounds: &Bounds, start: &[f64]) -> Result<Fit, Error> {
+        let mut unit = bounds.clamp(start);
+        let mut expected = self.coordinates.expected(&unit);
+        let mut chi_square = self.chi_square(&expected);
+        let mut damping = DAMPING[0];
+        for _ in 0..STEPS_MAX {
+            let (slope, curvature) = self.descent(&expected);
+            let mut gain = None;
+            while damping < DAMPING_MAX && gain.is_none() {
+                let step = step(&unit, &slope, &curvature, damping, bounds)?;
+                let tried = bounds.clamp(&sum(&unit, &step));
+                let at_tried = self.coordinates.expected(&tried);
+                let left = self.chi_square(&at_tried);
+                if left < chi_square {
+                    gain = Some(chi_square - left);
+                    (unit, expected, chi_square) = (tried, at_tried, left);
+                    damping = (0.1 * damping).max(DAMPING[1]);
+                } else {
+                    damping *= 10.0;
+                }
+            }
+            if gain.is_none_or(|gain| gain < GAIN_MIN) {
+                break;
+            }
+        }
+        Ok(Fit { unit, chi_square })
+    }
+
+    fn chi_square(&self, expected: &Expected) -> f64 {
+        let pairs = self.observed.iter().zip(&expected.mean).zip(&self.precision);
+        pairs.map(|((observed, mean), precision)| precision * (observed - mean).powi(2)).sum()
+    }
+
+    /// Half the negative slope of chi-square, and half its curvature without second derivatives.
+    fn descent(&self, expected: &Expected) -> (Vec<f64>, Mat<f64>) {
+        let Expected { mean, slopes, .. } = expected;
+        let (p, d) = (slopes.nrows(), slopes.ncols());
+        let weighted = Mat::from_fn(p, d, |axis, k| slopes[(axis, k)] * self.precision[k]);
+        let residual = |k: usize| self.observed[k] - mean[k];
+        let slope =
+            (0..p).map(|axis| (0..d).map(|k| weighted[(axis, k)] * residual(k)).sum()).collect();
+        (slope, &weighted * slopes.transpose())
+    }
+}
+
+/// The damped step; what a bound holds back stays.
+fn step(
+    unit: &[f64],
+    slope: &[f64],
+    curvature: &Mat<f64>,
+    damping: f64,
+    bounds: &Bounds,
+) -> Result<Vec<f64>, Error> {
+    let p = unit.len();
+    let largest = (0..p).map(|axis| curvature[(axis, axis)]).fold(0.0, f64::max);
+    let mut free: Vec<usize> =
+        (0..p).filter(|&axis| !bounds.holds_back(unit[axis], slope[axis], axis)).collect();
+    loop {
+        let mut out = vec![0.0; p];
+        if free.is_empty() {
+            return Ok(out);
+        }
+        let damped = Mat::from_fn(free.len(), free.len(), |i, j| {
+            let value = curvature[(free[i], free[j])];
+            if i == j { value * (1.0 + damping) + damping * 1e-3 * largest } else { value }
+        });
+        let right = Mat::from_fn(free.len(), 1, |i, _| slope[free[i]]);
+        let solved = Cholesky::new(damped)?.solve(right.as_ref());
+        free.iter().enumerate().for_each(|(i, &axis)| out[axis] = solved[(i, 0)]);
+        let before = free.len();
+        free.retain(|&axis| !bounds.holds_back(unit[axis], out[axis], axis));
+        if free.len() == before {
+            return Ok(out);
+        }
+    }
+}
+
+fn sum(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + b).collect()
+}

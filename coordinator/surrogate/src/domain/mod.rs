@@ -1,0 +1,271 @@
+//! Where the library can speak: whether features are such as one of its tracks can have.
+//!
+//! A forward emulator is made of the library itself: the expected features are a polynomial in the
+//! parameters, the scatter of one window is what the polynomial leaves. Observed features are
+//! fitted inside the library's ranges, and two questions are asked of the best fit. Is what it
+//! leaves larger than what the library's own cases leave? And does it become much smaller when one
+//! parameter may go beyond one end of its range?
+
+mod coordinates;
+mod discrepancy;
+mod fit;
+mod null;
+
+use crate::{Error, TrainingSet};
+use coordinates::Coordinates;
+use faer::{Mat, MatRef};
+use fit::{Bounds, Fit, Problem};
+use null::Null;
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
+use tracktwin_parameters::Parameter;
+
+/// Library entries from which a fit starts.
+const STARTS: usize = 3;
+/// Entries nearer to an end than this, from -1 to 1, are where a search beyond it may start.
+const NEAR_END: f64 = 0.6;
+/// How far a parameter may go beyond an end, as a share of half its range.
+const REACH: f64 = 2.0;
+/// Share of the misfit that an end may leave and still be named.
+const LEFT_MOST: f64 = 0.5;
+/// How far beyond an end a search starts.
+const FIRST_STEP: f64 = 0.2;
+/// Nearer to an end than this share of half the range, a fit pushes against it.
+const AT_END: f64 = 0.02;
+/// Share by which a single window's limit of the gain is raised: its scatter has longer tails than
+/// a normal distribution.
+const TAILS: f64 = 0.5;
+
+/// An end of a parameter's range in the library.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// The lowest value.
+    Low,
+    /// The highest value.
+    High,
+}
+
+/// What is beyond the library.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Beyond {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// The end of its range that features lie beyond.
+    pub side: Side,
+}
+
+/// Whether features are such as one of the library's tracks can have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// Chi-square of the best fit inside the library over what it may be; more than 1 is outside.
+    pub misfit: f64,
+    /// The end that the features lie beyond, if one explains them better by more than chance.
+    pub beyond: Option<Beyond>,
+}
+
+impl Judgement {
+    /// Whether the library does not know such features.
+    pub fn is_outside(&self) -> bool {
+        self.misfit > 1.0 || self.beyond.is_some()
+    }
+}
+
+/// The features that a library's tracks can have at certain speeds.
+pub struct Domain {
+    coordinates: Coordinates,
+    null: Null,
+    varied: Vec<Parameter>,
+    /// Coordinates of the entries, n x d.
+    entries: Mat<f64>,
+    /// Their mapped parameters, n x p.
+    unit: Mat<f64>,
+    /// Limits of chi-square that were asked for, by windows and bits of the probability.
+    limits: Mutex<HashMap<(usize, u64), f64>>,
+}
+
+impl Domain {
+    /// What the library's tracks can have at these `speeds` (places in the set's list).
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] when entries are too few; [`Error::NoEigenvalues`].
+    pub fn of(set: &TrainingSet, speeds: &[usize]) -> Result<Self, Error> {
+        let all: Vec<usize> = (0..set.entries()).collect();
+        let coordinates = Coordinates::of(set, speeds, &all)?;
+        let features = set.features(&all, speeds, &(0..set.frequencies_hz.len()));
+        Ok(Self {
+            null: Null::of(set, speeds)?,
+            varied: set.varied.clone(),
+            entries: coordinates.apply(features.as_ref()),
+            unit: coordinates.polynomial.unit(set.values(&all).as_ref()),
+            coordinates,
+            limits: Mutex::default(),
+        })
+    }
+
+    /// Coordinates of a window's ln-powers, the speeds side by side.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when there are more or fewer bins.
+    pub fn coordinates(&self, log_power: &[f64]) -> Result<Vec<f64>, Error> {
+        let (expected, found) = (self.coordinates.features(), log_power.len());
+        if expected != found {
+            return Err(Error::Shape { what: "observed bins", expected, found });
+        }
+        let row = MatRef::from_row_major_slice(log_power, 1, found);
+        Ok(self.coordinates.apply(row).row(0).iter().copied().collect())
+    }
+
+    /// Judges the mean coordinates of so many `windows` of a track, such that one of the library
+    /// is called outside with about that `probability`.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] when coordinates are not finite.
+    pub fn judge(
+        &self,
+        mean: &[f64],
+        windows: usize,
+        probability: f64,
+    ) -> Result<Judgement, Error> {
+        let limit = self.limit(windows, 0.5 * probability);
+        let bounds = Bounds::library(self.varied.len());
+        let (problem, best) = self.inside(mean, windows, &bounds)?;
+        let misfit = best.chi_square / limit;
+        // Few tracks of a library lie at an end, so that ends share no probability.
+        let needed = gain_needed(probability, windows);
+        let further = self.push(&problem, &bounds, &best, misfit > 1.0)?;
+        // An end that leaves most of what is too much is no explanation.
+        let left = limit + LEFT_MOST * (best.chi_square - limit).max(0.0);
+        let explains =
+            |fit: &Fit| best.chi_square - fit.chi_square > needed && fit.chi_square < left;
+        let beyond = further
+            .filter(|(_, fit)| explains(fit))
+            .map(|((axis, side), _)| Beyond { parameter: self.varied[axis], side });
+        Ok(Judgement { misfit, beyond })
+    }
+
+    fn limit(&self, windows: usize, probability: f64) -> f64 {
+        let mut limits = self.limits.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = (windows, probability.to_bits());
+        *limits.entry(key).or_insert_with(|| self.null.limit(windows, probability))
+    }
+
+    /// The best fit inside the library, and the problem with the precision that holds there.
+    fn inside<'a>(
+        &'a self,
+        mean: &'a [f64],
+        windows: usize,
+        bounds: &Bounds,
+    ) -> Result<(Problem<'a>, Fit), Error> {
+        let coefficients = self.coordinates.polynomial.coefficients();
+        let typical = coefficients as f64 / self.entries.nrows() as f64;
+        let problem = self.problem(mean, windows, typical);
+        let mut best: Option<Fit> = None;
+        for start in self.nearest(mean, STARTS, |_| true) {
+            let fit = problem.solve(bounds, &start)?;
+            if best.as_ref().is_none_or(|best| fit.chi_square < best.chi_square) {
+                best = Some(fit);
+            }
+        }
+        let at = best.map_or_else(|| vec![0.0; self.varied.len()], |fit| fit.unit);
+        let problem = self.problem(mean, windows, self.coordinates.expected(&at).variance);
+        let fit = problem.solve(bounds, &at)?;
+        Ok((problem, fit))
+    }
+
+    fn problem<'a>(&'a self, observed: &'a [f64], windows: usize, emulator: f64) -> Problem<'a> {
+        let scatter = 1.0 / windows as f64 + emulator;
+        let precision =
+            self.coordinates.discrepancy.iter().map(|between| 1.0 / (scatter + between)).collect();
+        Problem { coordinates: &self.coordinates, observed, precision }
+    }
+
+    /// Mapped parameters of the `count` entries, of those that count, whose coordinates are nearest.
+    fn nearest(
+        &self,
+        observed: &[f64],
+        count: usize,
+        counts: impl Fn(usize) -> bool,
+    ) -> Vec<Vec<f64>> {
+        let weight: Vec<f64> =
+            self.coordinates.discrepancy.iter().map(|between| 1.0 / (1.0 + between)).collect();
+        let mut near: Vec<(f64, usize)> = (0..self.entries.nrows())
+            .filter(|&entry| counts(entry))
+            .map(|entry| {
+                let row = self.entries.row(entry);
+                let terms = row.iter().zip(observed).zip(&weight);
+                (terms.map(|((a, b), weight)| weight * (a - b).powi(2)).sum(), entry)
+            })
+            .collect();
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        near.truncate(count);
+        near.iter().map(|&(_, entry)| self.unit.row(entry).iter().copied().collect()).collect()
+    }
+
+    /// The end behind which chi-square falls most, with the fit there; of the ends that the best
+    /// fit lies at, or of all where features fit nowhere inside.
+    fn push(
+        &self,
+        problem: &Problem<'_>,
+        bounds: &Bounds,
+        best: &Fit,
+        nowhere: bool,
+    ) -> Result<Option<((usize, Side), Fit)>, Error> {
+        let mut found: Option<((usize, Side), Fit)> = None;
+        for axis in 0..self.varied.len() {
+            for side in [Side::Low, Side::High] {
+                if !nowhere && towards(side, best.unit[axis]) < 1.0 - AT_END {
+                    continue;
+                }
+                let mut starts = vec![best.unit.clone()];
+                if nowhere {
+                    let near = |entry| towards(side, self.unit[(entry, axis)]) > NEAR_END;
+                    starts.extend(self.nearest(problem.observed, 1, near));
+                }
+                for start in starts {
+                    let (further, start) = beyond(bounds, &start, axis, side);
+                    let fit = problem.solve(&further, &start)?;
+                    if found.as_ref().is_none_or(|(_, least)| fit.chi_square < least.chi_square) {
+                        found = Some(((axis, side), fit));
+                    }
+                }
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// A mapped parameter, counted towards an end.
+fn towards(side: Side, unit: f64) -> f64 {
+    match side {
+        Side::Low => -unit,
+        Side::High => unit,
+    }
+}
+
+/// Bounds that hold one parameter beyond an end, and where to start there.
+fn beyond(bounds: &Bounds, unit: &[f64], axis: usize, side: Side) -> (Bounds, Vec<f64>) {
+    let (mut further, mut start) = (bounds.clone(), unit.to_vec());
+    match side {
+        Side::Low => {
+            (further.low[axis], further.high[axis]) = (-1.0 - REACH, -1.0);
+            start[axis] = -1.0 - FIRST_STEP;
+        }
+        Side::High => {
+            (further.low[axis], further.high[axis]) = (1.0, 1.0 + REACH);
+            start[axis] = 1.0 + FIRST_STEP;
+        }
+    }
+    (further, start)
+}
+
+/// What chi-square must fall by when an end is opened, so that a track at that end is called
+/// beyond it with this `probability`: half of a chi-square distribution of one degree of freedom
+/// lies at zero, as the parameter may go only one way.
+fn gain_needed(probability: f64, windows: usize) -> f64 {
+    let one = ChiSquared::new(1.0).expect("one degree of freedom");
+    let tails = 1.0 + TAILS / (windows as f64).sqrt();
+    tails * one.inverse_cdf(1.0 - 2.0 * probability)
+}
