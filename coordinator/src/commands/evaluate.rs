@@ -1,6 +1,6 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
-use super::files::{Force, check};
+use super::files::{Force, check, make_folder};
 use super::library_url::LibraryUrl;
 use super::{OrInput, Stop, note, say};
 use crate::evaluating::{Evaluator, EvaluatorError};

@@ -93,6 +93,7 @@ pub(super) fn record(
                 speed_km_h,
                 signal: Signal::new(recording.sample_rate_hz, samples)?,
                 position_m: (first..count).map(position).collect(),
+                contact_loss_share: None,
             });
         }
     }
@@ -137,5 +138,6 @@ fn empty(experiment: &Experiment, place: &Place) -> Recording {
         sleepers: place.numbers.clone().map(sleeper).collect(),
         nominal: Map::new(),
         spacing_m,
+        doubts: Vec::new(),
     }
 }
