@@ -59,6 +59,7 @@ fn simulated(dip_m: f64, level: f64) -> Recording {
         sleepers: (5..15).map(sleeper).collect(),
         nominal: nominal(&design),
         spacing_m: SPACING_M,
+        doubts: Vec::new(),
     }
 }
 

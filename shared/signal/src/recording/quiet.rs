@@ -58,7 +58,13 @@ mod tests {
         let samples: Vec<f64> = (0..4000).map(|i| rounded(value(i))).collect();
         let position_m = (0..4000).map(|i| 0.01 * f64::from(i)).collect();
         let signal = Signal::new(2000.0, samples).unwrap();
-        Pass { file: "a.csv".to_owned(), speed_km_h: 67.0, signal, position_m }
+        Pass {
+            file: "a.csv".to_owned(),
+            speed_km_h: 67.0,
+            signal,
+            position_m,
+            contact_loss_share: None,
+        }
     }
 
     #[test]

@@ -171,6 +171,7 @@ mod tests {
             sleepers: (0..5).map(sleeper).collect(),
             nominal: nominal(&TrackDesign::v_track()),
             spacing_m: 0.125,
+            doubts: Vec::new(),
         }
     }
 
