@@ -130,21 +130,31 @@ fn a_trial_s_seals_that_cannot_be_read_are_left_as_they_are() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("trial");
     fs::create_dir(&out).unwrap();
+    let trial = || run(PROGRAM, &["trial", "--cases", "1", "--out", &out.display().to_string()]);
+    let assert_stopped = |code: i32, file: &str| {
+        let answer = trial();
+        assert_eq!(answer.code, Some(code), "{}", answer.err);
+        assert!(answer.err.contains(file), "{}", answer.err);
+    };
     let seals = out.join("seals.sha256");
     let unreadable = b"\xff\xfe is no text";
+    // Without a trial beside them they are somebody else's.
     fs::write(&seals, unreadable).unwrap();
-    let trial = || run(PROGRAM, &["trial", "--cases", "1", "--out", &out.display().to_string()]);
-    let answer = trial();
-    assert_eq!(answer.code, Some(3), "{}", answer.err);
-    assert!(answer.err.contains("seals.sha256"), "{}", answer.err);
+    assert_stopped(2, "seals.sha256");
+    assert_eq!(fs::read(&seals).unwrap(), unreadable);
+    // A trial begins, and finds something else in the place of its seals.
+    fs::remove_file(&seals).unwrap();
+    fs::create_dir(&seals).unwrap();
+    assert_stopped(3, "seals.sha256");
+    fs::remove_dir(&seals).unwrap();
+    fs::write(&seals, unreadable).unwrap();
+    assert_stopped(3, "seals.sha256");
     assert_eq!(fs::read(&seals).unwrap(), unreadable);
     // Neither is a trial begun where it can't be told which one is there.
     fs::remove_file(&seals).unwrap();
     fs::remove_file(out.join("trial.json")).unwrap();
     fs::create_dir(out.join("trial.json")).unwrap();
-    let answer = trial();
-    assert_eq!(answer.code, Some(3), "{}", answer.err);
-    assert!(answer.err.contains("trial.json"), "{}", answer.err);
+    assert_stopped(3, "trial.json");
 }
 
 #[test]
@@ -281,7 +291,7 @@ fn refused_diagnosis(nominal: &str, words: &[&str]) {
         "nominal": {nominal}}}"#
     );
     fs::write(recording.join("recording.json"), manifest).unwrap();
-    fs::write(recording.join("pass.csv"), pass_csv(1500)).unwrap();
+    fs::write(recording.join("pass.csv"), pass_csv(2000)).unwrap();
     let [recording, out] =
         [recording, folder.path().join("out")].map(|it| it.display().to_string());
     assert_refused(&run(PROGRAM, &["diagnose", &recording, "--out", &out]), words);

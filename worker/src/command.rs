@@ -96,7 +96,7 @@ struct Arguments {
 
 fn cores(text: &str) -> Result<NonZeroUsize, QuantityError> {
     let cores = usize::try_from(CORES.parse_count(text)?).ok().and_then(NonZeroUsize::new);
-    cores.ok_or(QuantityError::Range { value: 0.0, of: CORES })
+    cores.ok_or(QuantityError::Range { value: 0.0, of: Box::new(CORES) })
 }
 
 fn seconds(text: &str) -> Result<u64, QuantityError> {

@@ -16,7 +16,8 @@ pub(super) fn count<T: TryFrom<u64>>(
 ) -> impl Fn(&str) -> Result<T, QuantityError> + Clone + Send + Sync + 'static {
     move |text| {
         let count = of.parse_count(text)?;
-        T::try_from(count).map_err(|_| QuantityError::Range { value: count as f64, of })
+        T::try_from(count)
+            .map_err(|_| QuantityError::Range { value: count as f64, of: Box::new(of) })
     }
 }
 
@@ -24,5 +25,5 @@ pub(super) fn count<T: TryFrom<u64>>(
 pub(super) fn cores(text: &str) -> Result<NonZeroUsize, QuantityError> {
     let of = tracktwin_parameters::quantity::CORES;
     let cores = usize::try_from(of.parse_count(text)?).ok().and_then(NonZeroUsize::new);
-    cores.ok_or(QuantityError::Range { value: 0.0, of })
+    cores.ok_or(QuantityError::Range { value: 0.0, of: Box::new(of) })
 }

@@ -65,10 +65,8 @@ impl Polynomial {
             let power = monomial.iter().filter(|&&factor| factor == axis).count();
             let others = monomial.iter().filter(|&&factor| factor != axis);
             let rest: f64 = others.map(|&factor| unit[factor]).product();
-            match power {
-                0 => 0.0,
-                _ => power as f64 * unit[axis].powi(power as i32 - 1) * rest,
-            }
+            let Some(lower) = power.checked_sub(1) else { return 0.0 };
+            power as f64 * (0..lower).map(|_| unit[axis]).product::<f64>() * rest
         })
     }
 }

@@ -160,6 +160,7 @@ mod tests {
             .collect();
         names.sort();
         let expected = [
+            ".tracktwin.json",
             "pass-10kmh-1.parquet",
             "pass-13kmh-1.parquet",
             "pass-13kmh-2.parquet",

@@ -12,7 +12,7 @@ pub const PROBABILITY_LEAST: f64 = 1e-12;
 pub const RATIO_GREATEST: f64 = 1000.0;
 
 /// Decimals that a number has at most.
-const DECIMALS_MAX: i32 = 9;
+const DECIMALS_MAX: i64 = 9;
 /// Sizes outside which a number is written with a power of ten.
 const SIZE_MAX: f64 = 1e7;
 const SIZE_MIN: f64 = 1e-5;
@@ -90,8 +90,12 @@ pub fn significant(value: f64, digits: usize) -> String {
 pub fn decimals(value: f64, digits: usize) -> usize {
     // Rounding first: 9.97 with two digits is 10, not 10.0.
     let text = format!("{value:.*e}", digits.max(1) - 1);
-    let power: i32 = text.split_once('e').and_then(|(_, p)| p.parse().ok()).unwrap_or(0);
-    if value == 0.0 { 0 } else { (digits as i32 - 1 - power).clamp(0, DECIMALS_MAX) as usize }
+    let power: i64 = text.split_once('e').and_then(|(_, p)| p.parse().ok()).unwrap_or(0);
+    if value == 0.0 {
+        0
+    } else {
+        (i64::try_from(digits).unwrap_or(DECIMALS_MAX) - 1 - power).clamp(0, DECIMALS_MAX) as usize
+    }
 }
 
 #[cfg(test)]

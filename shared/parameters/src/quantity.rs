@@ -26,7 +26,7 @@ pub enum QuantityError {
         /// The beginning of the text.
         text: String,
         /// What it is given for.
-        of: Quantity,
+        of: Box<Quantity>,
     },
     /// The number lies outside what can be.
     #[error("{} is no {}{}", with_unit(*value, of.unit), of.described(), of.guess(*value))]
@@ -34,7 +34,7 @@ pub enum QuantityError {
         /// The number.
         value: f64,
         /// What it is given for.
-        of: Quantity,
+        of: Box<Quantity>,
     },
 }
 
@@ -66,7 +66,7 @@ impl Quantity {
         if (low..=high).contains(&value) {
             return Ok(value);
         }
-        Err(QuantityError::Range { value, of: self })
+        Err(QuantityError::Range { value, of: Box::new(self) })
     }
 
     /// The value that a text gives.
@@ -76,7 +76,7 @@ impl Quantity {
     pub fn parse(self, text: &str) -> Result<f64, QuantityError> {
         let shown = || text.chars().take(SHOWN).collect();
         let value = text.trim().parse();
-        let value = value.map_err(|_| QuantityError::Text { text: shown(), of: self })?;
+        let value = value.map_err(|_| QuantityError::Text { text: shown(), of: Box::new(self) })?;
         self.check(value)
     }
 
@@ -89,7 +89,7 @@ impl Quantity {
         let is_whole = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
         if !is_whole && digits.parse::<i128>().is_err() {
             let text = text.chars().take(SHOWN).collect();
-            return Err(QuantityError::Text { text, of: self });
+            return Err(QuantityError::Text { text, of: Box::new(self) });
         }
         // Beyond 64 bits it is out of range all the more.
         Ok(self.parse(digits)? as u64)

@@ -31,7 +31,9 @@ pub fn checksum_of_passes(index: u32, parameter_hash: &str, passes: &[PassFeatur
     };
     let length = passes.iter().map(of_pass).sum();
     let mut bytes = begun(index, parameter_hash, passes.len(), length);
-    passes.iter().for_each(|it| pass(&mut bytes, it));
+    for it in passes {
+        pass(&mut bytes, it);
+    }
     hash(&bytes)
 }
 
@@ -51,7 +53,7 @@ fn hash(bytes: &[u8]) -> String {
 }
 
 fn pass(bytes: &mut Vec<u8>, pass: &PassFeatures) {
-    bytes.extend(big_endian(&pass.speed_km_h));
+    bytes.extend(big_endian(pass.speed_km_h));
     numbers(bytes, pass.contact_loss_share.as_slice());
     numbers(bytes, &pass.features.band_levels_db);
     numbers(bytes, &pass.features.log_power);
@@ -60,7 +62,7 @@ fn pass(bytes: &mut Vec<u8>, pass: &PassFeatures) {
 /// How many, and each of them: neighbouring lists are kept apart.
 fn numbers(bytes: &mut Vec<u8>, numbers: &[f64]) {
     count(bytes, numbers.len());
-    bytes.extend(numbers.iter().map(big_endian).collect::<Vec<_>>().as_flattened());
+    bytes.extend(numbers.iter().copied().map(big_endian).collect::<Vec<_>>().as_flattened());
 }
 
 fn text(bytes: &mut Vec<u8>, text: &str) {
@@ -73,7 +75,7 @@ fn count(bytes: &mut Vec<u8>, count: usize) {
 }
 
 /// Negative zero is zero, as `SQLite` stores it.
-fn big_endian(number: &f64) -> [u8; 8] {
+fn big_endian(number: f64) -> [u8; 8] {
     (number + 0.0).to_be_bytes()
 }
 

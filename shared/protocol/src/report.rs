@@ -352,7 +352,7 @@ mod tests {
     #[test]
     fn a_report_without_outcome_or_checksum_is_damaged() {
         for change in [(|message| message.outcome = None) as fn(&mut farm::CaseReport), |message| {
-            message.checksum.clear()
+            message.checksum.clear();
         }] {
             let mut message = farm::CaseReport::from(report());
             change(&mut message);

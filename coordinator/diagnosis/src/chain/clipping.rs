@@ -38,7 +38,7 @@ pub fn clipping(recording: &Recording, alpha: f64) -> Vec<Clipping> {
     let flying = airborne(recording);
     let is_recorder_s = |pass: usize, sign: f64, level: f64| {
         let flies = flying[pass].as_ref().is_some_and(|found| found.sign * sign > 0.0);
-        !flies && !(sign > 0.0 && is_at_flight_level(recording, level))
+        !(flies || sign > 0.0 && is_at_flight_level(recording, level))
     };
     let passes = recording.passes.iter().enumerate();
     let sides = passes.flat_map(|(index, pass)| {

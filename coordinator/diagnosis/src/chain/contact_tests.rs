@@ -42,7 +42,8 @@ fn simulated(dip_m: f64, level: f64) -> Recording {
             time_step_s: TIME_STEP_S,
             local_flexibility: true,
         };
-        let records = time::passes(&[model.clone()], &pass, std::slice::from_ref(&surface));
+        let records =
+            time::passes(std::slice::from_ref(&model), &pass, std::slice::from_ref(&surface));
         let record = records.unwrap().remove(0);
         let position_m =
             (0..record.acceleration_m_s2.len()).map(|i| record.position_m(i)).collect();

@@ -22,6 +22,9 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 use tracktwin_parameters::Parameter;
 
+/// An end that the best fit goes beyond, and the fit there.
+type Push = ((usize, Side), Fit);
+
 /// Library entries from which a fit starts.
 const STARTS: usize = 3;
 /// Entries nearer to an end than this, from -1 to 1, are where a search beyond it may start.
@@ -212,8 +215,8 @@ impl Domain {
         bounds: &Bounds,
         best: &Fit,
         nowhere: bool,
-    ) -> Result<Option<((usize, Side), Fit)>, Error> {
-        let mut found: Option<((usize, Side), Fit)> = None;
+    ) -> Result<Option<Push>, Error> {
+        let mut found: Option<Push> = None;
         for axis in 0..self.varied.len() {
             for side in [Side::Low, Side::High] {
                 if !nowhere && towards(side, best.unit[axis]) < 1.0 - AT_END {

@@ -48,20 +48,20 @@ fn known_rate(fault: Fault, declared: f64) -> Fault {
     }
 }
 
-/// No pass is a copy of another one.
+/// The passes that are copies of an earlier one, an error each.
 pub(super) fn copies<'a>(
     passes: impl Iterator<Item = (&'a Path, &'a [f64])>,
-) -> Result<(), RecordingError> {
+) -> Vec<RecordingError> {
     let passes: Vec<(&Path, &[f64])> = passes.collect();
-    for (index, (path, samples)) in passes.iter().enumerate() {
-        for (other, earlier) in &passes[..index] {
-            if let Some(factor) = copies::factor(earlier, samples) {
-                let fault = Fault::Copy { of: file_name(other), factor };
-                return Err(RecordingError::new(path, "acceleration", fault));
-            }
-        }
-    }
-    Ok(())
+    let earlier = |index: usize| {
+        let (path, samples) = passes[index];
+        passes[..index].iter().find_map(|(other, earlier)| {
+            let factor = copies::factor(earlier, samples)?;
+            let fault = Fault::Copy { of: file_name(other), factor };
+            Some(RecordingError::new(path, "acceleration", fault))
+        })
+    };
+    (0..passes.len()).filter_map(earlier).collect()
 }
 
 /// The declared speed (the `field` of `manifest`) is that of the positions.

@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn gaps_repeated_rows_and_rows_out_of_order_are_none_of_these() {
         let rounded = || times(|time| (time * 1e3).round() / 1e3);
-        let mut cases = vec![times(|time| time), times(|time| time), times(|time| time), rounded()];
+        let mut cases = [times(|time| time), times(|time| time), times(|time| time), rounded()];
         cases[0].insert(700, 700.0 / RATE_HZ);
         cases[1].swap(700, 720);
         cases[2].drain(700..720);

@@ -13,12 +13,12 @@ pub struct RecordingError {
     /// The field, column or row of that file.
     pub field: String,
     /// What is wrong with it.
-    pub fault: Fault,
+    pub fault: Box<Fault>,
 }
 
 impl RecordingError {
     pub(super) fn new(file: &Path, field: impl Into<String>, fault: Fault) -> Self {
-        Self { file: file.display().to_string(), field: field.into(), fault }
+        Self { file: file.display().to_string(), field: field.into(), fault: Box::new(fault) }
     }
 }
 

@@ -87,7 +87,9 @@ impl Recording {
         }
         let paths: Vec<PathBuf> = passes.iter().map(|pass| folder.join(&pass.file)).collect();
         let samples = passes.iter().map(|pass| pass.signal.samples());
-        check::copies(paths.iter().map(PathBuf::as_path).zip(samples))?;
+        // Simulated passes without noise repeat to the bit, so a copy is no fault of the folder.
+        let copies = check::copies(paths.iter().map(PathBuf::as_path).zip(samples));
+        doubts.extend(copies.iter().map(|copy| format!("doubt: {copy}")));
         let mut recording = Self {
             name: name_of(folder),
             sample_rate_hz: manifest.sample_rate_hz,

@@ -97,8 +97,8 @@ impl Kind {
             return Self::Other("a list in every row".to_owned());
         }
         match column.logical_type_ref() {
-            Some(LogicalType::Timestamp(kind)) => return Self::Time(seconds(&kind.unit)),
-            Some(LogicalType::Time(kind)) => return Self::Time(seconds(&kind.unit)),
+            Some(LogicalType::Timestamp(kind)) => return Self::Time(seconds(kind.unit)),
+            Some(LogicalType::Time(kind)) => return Self::Time(seconds(kind.unit)),
             Some(LogicalType::Date) => return Self::Other("dates".to_owned()),
             Some(LogicalType::Float16) => return Self::Half,
             Some(LogicalType::Integer(kind)) if !kind.is_signed => return Self::Unsigned,
@@ -132,7 +132,7 @@ impl Kind {
     }
 }
 
-const fn seconds(unit: &TimeUnit) -> f64 {
+const fn seconds(unit: TimeUnit) -> f64 {
     match unit {
         TimeUnit::MILLIS => 1e-3,
         TimeUnit::MICROS => 1e-6,
@@ -181,7 +181,8 @@ fn column_values(
                 kind.of_int(value.into(), value.cast_unsigned().into(), &mut first)
             })?,
             ColumnReader::Int64ColumnReader(reader) => {
-                append(reader, into, |value| kind.of_int(value, value.cast_unsigned(), &mut first))?
+                let number = |value: i64| kind.of_int(value, value.cast_unsigned(), &mut first);
+                append(reader, into, number)?;
             }
             ColumnReader::FixedLenByteArrayColumnReader(reader) => append(reader, into, |value| {
                 let bytes = value.data().try_into().unwrap_or([0; 2]);

@@ -119,7 +119,7 @@ impl Reader {
             fields.iter().enumerate().all(|(index, field)| *field == index.to_string())
         };
         let is_counted = fields.len() > 1 && fields[0].is_empty() && counts(&fields[1..]);
-        let named = is_counted || fields.iter().all(|field| is_name(&field));
+        let named = is_counted || fields.iter().all(is_name);
         let mut reader = Self {
             separator,
             names: None,

@@ -1,7 +1,7 @@
 //! Names and kinds of the variables in a MATLAB file of version 5, which `matfile` passes over where
 //! they are no numbers.
 //!
-//! Source: The MathWorks, *MAT-File Format*, R2020b, chapter 1.
+//! Source: The `MathWorks`, *MAT-File Format*, R2020b, chapter 1.
 
 use flate2::read::ZlibDecoder;
 use std::io::Read;

@@ -103,7 +103,8 @@ fn alike(raw: &[Raw]) -> Result<(), RecordingError> {
             return Err(RecordingError::new(&other.path, "sample_rate_Hz", fault));
         }
     }
-    check::copies(raw.iter().map(|raw| (raw.path.as_path(), raw.samples.as_slice())))
+    let samples = raw.iter().map(|raw| (raw.path.as_path(), raw.samples.as_slice()));
+    check::copies(samples).into_iter().next().map_or(Ok(()), Err)
 }
 
 /// Whether all files run towards smaller positions.

@@ -185,19 +185,23 @@ fn units_signs_and_places_come_out_in_si() {
     let g = Layout { acceleration_unit: Some(AccelerationUnit::G), upwards: true, ..layout() };
     let (found, expected) = (samples(&path, &g), expected());
     assert!(found.iter().zip(&expected).all(|(a, b)| (a + 9.80665 * b).abs() < 1e-12));
-    // A column of times read as millimetres: 0.2 mm in 0.2 s.
     let places_in = |unit| Layout {
         position: Some("t".to_owned()),
         position_unit: Some(unit),
-        spacing_m: 1e-4,
+        spacing_m: 0.05,
         ..layout()
     };
+    // 10 m/s in millimetres.
+    let millimetres = folder.path().join("millimetres.csv");
+    let row = |row: usize| format!("{},{}\n", 1e4 * row as f64 / RATE_HZ, value(row));
+    let rows: String = (0..ROWS).map(row).collect();
+    std::fs::write(&millimetres, format!("t,acc\n{rows}")).unwrap();
     let layout = Layout { speed_km_h: None, ..places_in(PositionUnit::Millimetre) };
-    let recording = import(std::slice::from_ref(&path), &layout).unwrap().remove(0).recording;
+    let recording = import(&[millimetres], &layout).unwrap().remove(0).recording;
     let places = &recording.passes[0].position_m;
-    assert!((places[ROWS - 1] - 1e-3 * (ROWS - 1) as f64 / RATE_HZ).abs() < 1e-9);
-    assert!((recording.passes[0].speed_km_h - 0.0036).abs() < 1e-9);
-    // As kilometres it is 3600 km/h.
+    assert!((places[ROWS - 1] - 10.0 * (ROWS - 1) as f64 / RATE_HZ).abs() < 1e-9);
+    assert!((recording.passes[0].speed_km_h - 36.0).abs() < 1e-9);
+    // A column of times read as kilometres: 3600 km/h.
     let text = complaint(&path, &places_in(PositionUnit::Kilometre));
     assert!(text.contains("advances at 3600 km/h in km, which no pass does; in m it is"), "{text}");
 }

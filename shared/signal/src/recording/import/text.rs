@@ -29,6 +29,9 @@ pub(super) fn decode(bytes: &[u8]) -> Result<String, Fault> {
     })
 }
 
+/// Makes a unit of UTF-16 from two bytes.
+type Unit = fn([u8; 2]) -> u16;
+
 /// The text where the bytes are UTF-16: every other one is nought, or a mark says so.
 fn utf_16(bytes: &[u8]) -> Option<String> {
     let looked_at = &bytes[..bytes.len().min(LOOKED_AT)];
@@ -36,7 +39,7 @@ fn utf_16(bytes: &[u8]) -> Option<String> {
         let every_other = looked_at.iter().skip(odd).step_by(2);
         2 * every_other.filter(|byte| **byte == 0).count() > looked_at.len() / 2
     };
-    let (bytes, unit): (&[u8], fn([u8; 2]) -> u16) = match bytes {
+    let (bytes, unit): (&[u8], Unit) = match bytes {
         [0xff, 0xfe, rest @ ..] => (rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => (rest, u16::from_be_bytes),
         _ if noughts(1) && !noughts(0) => (bytes, u16::from_le_bytes),
