@@ -46,7 +46,9 @@ fn text(path: &Path) -> String {
 /// A table of two seconds at 2 kHz with a column of times and columns of accelerations.
 fn table(columns: &[&str]) -> String {
     let mut table = "t_s".to_owned();
-    columns.iter().for_each(|column| write!(table, ",\"{column}\"").unwrap());
+    for column in columns {
+        write!(table, ",\"{column}\"").unwrap();
+    }
     let mut state = 1_u32;
     for row in 0..4000 {
         write!(table, "\n{}", f64::from(row) / 2000.0).unwrap();

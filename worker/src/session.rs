@@ -214,7 +214,7 @@ impl Session {
     /// Counts what was taken, and warns of what was refused.
     fn count(&self, answer: &farm::ReportResponse, failed: &[u32]) {
         let refused = |it: &&farm::Receipt| it.verdict() == farm::Verdict::Refused;
-        let settled = answer.receipts.iter().filter(|it| is_settled(it));
+        let settled = answer.receipts.iter().filter(|it| is_settled(**it));
         let (refused, taken): (Vec<&farm::Receipt>, Vec<_>) = settled.partition(refused);
         if !refused.is_empty() {
             tracing::warn!("{} results refused: not cases of this coordinator", refused.len());
@@ -311,13 +311,13 @@ async fn goes_again(damaged: &mut u32, what: &str) -> bool {
 }
 
 /// Whether a case need not be sent again.
-fn is_settled(receipt: &farm::Receipt) -> bool {
+fn is_settled(receipt: farm::Receipt) -> bool {
     !matches!(receipt.verdict(), farm::Verdict::Unspecified | farm::Verdict::Damaged)
 }
 
 /// Leaves the cases that are to be sent again: a case whose index was damaged has no receipt at all.
 fn keep_unsettled(cases: &mut Vec<farm::CaseReport>, answer: &farm::ReportResponse) {
     let settled: HashSet<u32> =
-        answer.receipts.iter().filter(|it| is_settled(it)).map(|it| it.sobol_index).collect();
+        answer.receipts.iter().filter(|it| is_settled(**it)).map(|it| it.sobol_index).collect();
     cases.retain(|case| !settled.contains(&case.sobol_index));
 }

@@ -57,7 +57,7 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
     let verdicts = outside::judge(&seen, twin.library, twin.domains)?;
     let outside_library = OutsideLibrary::of(&verdicts, twin.library);
     let told = estimates.iter().zip(&verdicts).filter(|(_, verdict)| !verdict.outside);
-    let unevenness = Unevenness::of(told.map(|(estimates, _)| estimates));
+    let unevenness = Unevenness::of(&told.map(|(estimates, _)| estimates).collect::<Vec<_>>());
     let even: Vec<_> = estimates.iter_mut().map(|of| unevenness.widen(of)).collect();
     let mut matcher = Matcher::new(twin.library);
     let mut sleepers = seen

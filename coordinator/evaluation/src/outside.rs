@@ -139,7 +139,9 @@ fn judge_alike(
             let judgement = domain.judge(&mean, size, probability)?;
             let all = size == whole.len();
             let held = if all { members } else { &whole[first..first + size] };
-            held.iter().for_each(|&index| verdicts[index].take(&judgement, size));
+            for &index in held {
+                verdicts[index].take(&judgement, size);
+            }
         }
     }
     Ok(())

@@ -42,12 +42,12 @@ impl Unevenness {
     /// What the `told` sleepers' estimates say, with the standard deviations of an even track.
     ///
     /// The parameter with the smallest standard deviations is asked: it tells most.
-    pub(crate) fn of<'a>(told: impl Iterator<Item = &'a Estimates> + Clone) -> Self {
+    pub(crate) fn of(told: &[&Estimates]) -> Self {
         let learned = OWN
             .into_iter()
             .filter_map(|parameter| {
                 let estimates: Vec<Estimate> =
-                    told.clone().filter_map(|of| of.get(&parameter)).copied().collect();
+                    told.iter().filter_map(|of| of.get(&parameter)).copied().collect();
                 (estimates.len() >= SLEEPERS_MIN).then(|| (parameter, variances(&estimates)))
             })
             .min_by(|(_, a), (_, b)| a.expected.total_cmp(&b.expected));
@@ -112,16 +112,20 @@ mod tests {
         (0..40).map(|n| [(Parameter::BallastStiffness, estimate(mean(n)))].into()).collect()
     }
 
+    fn told(estimates: &[Estimates]) -> Vec<&Estimates> {
+        estimates.iter().collect()
+    }
+
     #[test]
     fn means_that_vary_no_more_than_their_sd_tell_of_the_least_scatter() {
-        let even = Unevenness::of(along(0.02).iter());
+        let even = Unevenness::of(&told(&along(0.02)));
         assert_eq!(even, Unevenness { scatter: LEAST, least: LEAST, learned_from: None });
-        assert_eq!(Unevenness::of(along(0.3)[..4].iter()).scatter, LEAST);
+        assert_eq!(Unevenness::of(&told(&along(0.3)[..4])).scatter, LEAST);
     }
 
     #[test]
     fn means_that_vary_more_tell_of_more_scatter() {
-        let uneven = Unevenness::of(along(0.12).iter());
+        let uneven = Unevenness::of(&told(&along(0.12)));
         let expected = 0.12f64.powi(2) - OWN_SHARE * 0.04f64.powi(2);
         let expected = (LEAST.powi(2) + expected / SEEN.powi(2)).sqrt();
         // The cosine's mean square over forty sleepers is a half within 2 %.

@@ -296,10 +296,10 @@ impl LibraryError {
 
     /// Whether the same may succeed later, when somebody has mended the machine.
     pub const fn is_temporary(&self) -> bool {
-        match self {
-            Self::Unavailable { .. } | Self::DiskFull | Self::FileGone { .. } | Self::Busy => true,
-            _ => false,
-        }
+        matches!(
+            self,
+            Self::Unavailable { .. } | Self::DiskFull | Self::FileGone { .. } | Self::Busy
+        )
     }
 
     /// Whether what was read is to blame, not the way to it.

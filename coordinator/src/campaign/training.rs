@@ -64,10 +64,8 @@ mod tests {
             lack(&DEFAULT.replace("cases = 800", "cases = 199")),
             Some(Lack::Cases { cases: 199 })
         );
-        let held: String = Parameter::ALL
-            .iter()
-            .map(|&it| format!("{} = {:e}\n", it.name(), ParameterSet::nominal()[it]))
-            .collect();
+        let line = |&it: &Parameter| format!("{} = {:e}\n", it.name(), ParameterSet::nominal()[it]);
+        let held = Parameter::ALL.iter().map(line).collect::<Vec<_>>().concat();
         let held = format!("{DEFAULT}\n[parameters]\n{held}");
         assert_eq!(lack(&held), Some(Lack::Axes));
     }

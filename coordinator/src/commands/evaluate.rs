@@ -87,7 +87,9 @@ pub(super) async fn evaluate(
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
     let (recording, left_out) = usable(recording)?;
     let notes = [recording.doubts.clone(), left_out].concat();
-    notes.iter().for_each(|line| note(line));
+    for line in &notes {
+        note(line);
+    }
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     make_folder(folder)?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;

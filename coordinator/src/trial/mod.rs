@@ -45,6 +45,7 @@ const WAIT: Duration = Duration::from_secs(2);
 const PATIENCE: Duration = Duration::from_mins(10);
 
 /// A trial, as one node takes part in it.
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub struct Trial {
     /// Decides what is hidden.
     pub seed: u64,

@@ -31,7 +31,7 @@ fn library() -> TrainingSet {
     let cases: Vec<(f64, f64)> = (0..ENTRIES).map(case).collect();
     let log_power = cases.iter().enumerate().flat_map(|(n, &(k, a))| features(k, a, n));
     TrainingSet {
-        frequencies_hz: (0..BINS).map(|bin| 100.0 * 1.1f64.powi(bin as i32)).collect(),
+        frequencies_hz: (0..BINS).map(|bin| 100.0 * 1.1f64.powf(bin as f64)).collect(),
         speeds_km_h: vec![10.0],
         log_power: vec![log_power.collect()],
         varied: vec![Parameter::BallastStiffness, Parameter::IrregularityLevel],

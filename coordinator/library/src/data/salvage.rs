@@ -93,7 +93,8 @@ impl Library {
     ) -> Result<u64, E> {
         let mut lost = 0;
         for start in (0..=max).step_by(TOGETHER as usize) {
-            let mut ranges: Vec<Range<i64>> = vec![start..start + TOGETHER];
+            let whole: Range<i64> = start..start + TOGETHER;
+            let mut ranges = vec![whole];
             while let Some(range) = ranges.pop() {
                 let mut found = Vec::new();
                 let keep = async |rows: Vec<Vec<Cell>>| {

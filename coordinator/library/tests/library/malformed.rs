@@ -189,7 +189,7 @@ async fn no_flipped_bit_of_a_result_goes_unnoticed() {
     let (mut found, mut harmless) = (0, 0);
     for turn in 0..250 {
         // Spread over the file by the golden ratio.
-        let bit = (turn as f64 * 0.618_033_988_75).fract() * bits as f64;
+        let bit = (f64::from(turn) * 0.618_033_988_75).fract() * bits as f64;
         let bit = bit as usize;
         let (_, url) = sound.with(|bytes| bytes[bit / 8] ^= 1 << (bit % 8));
         if is_found(&url).await {

@@ -86,7 +86,9 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
         said.push(format!("{}: {rows} rows{each}", path.display()));
     }
     output.commit()?;
-    said.iter().for_each(|line| say(line));
+    for line in &said {
+        say(line);
+    }
     Ok(())
 }
 
