@@ -2,6 +2,8 @@
 
 use super::*;
 use crate::along::testing::noise;
+use crate::finding::Place;
+use crate::first_look::first_look;
 use serde_json::json;
 use std::sync::LazyLock;
 use tracktwin_parameters::{ParameterSet, TrackDesign};
@@ -125,6 +127,13 @@ fn a_wheel_in_the_air_is_found_at_every_speed_and_is_no_clipped_recorder() {
     assert!(found.sleepers.contains(&"SN9".to_owned()), "{:?}", found.sleepers);
     assert!(!found.sleepers.contains(&"SN6".to_owned()), "{:?}", found.sleepers);
     assert!((3e-3..10e-3).contains(&found.longest_s()), "{}", found.longest_s());
+}
+
+#[test]
+fn a_landing_is_no_finding_of_its_own() {
+    let places: Vec<Place> = first_look(&DEEP).findings.into_iter().map(|it| it.place).collect();
+    let [Place::Stretch { from_m, to_m }] = places[..] else { panic!("{places:?}") };
+    assert!(from_m < JOINT_M + 0.01 && to_m > JOINT_M - 0.01, "{places:?}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use self::findings::{
     impact_finding, offset_finding, order_finding, scale_finding,
 };
 use crate::chain::{Gain, LossOfContact, Offsets, Trouble};
-use crate::finding::Finding;
+use crate::finding::{Finding, Place};
 use crate::wheel::{Comb, Flat, Order};
 use crate::{chain, impact, wheel};
 use tracktwin_signal::recording::Recording;
@@ -103,17 +103,30 @@ pub fn first_look(recording: &Recording) -> FirstLook {
         findings.extend(apart.map(offset_finding));
     }
     findings.extend(on_surface);
+    let loss_of_contact = chain::loss_of_contact(recording);
+    if let Some(lost) = &loss_of_contact {
+        findings.retain(|finding| !is_landing(finding, lost));
+    }
     FirstLook {
         findings,
         nameless: Vec::new(),
         flat,
-        loss_of_contact: chain::loss_of_contact(recording),
+        loss_of_contact,
         troubles: chain::troubles(recording, &offsets),
         noise_floors: chain::noise_floors(recording),
         gains,
         offsets,
         comb,
     }
+}
+
+/// Whether a finding lies where the wheel is in the air or lands: the blow is the landing's.
+///
+/// What throws the wheel up lies before the stretch without contact.
+fn is_landing(finding: &Finding, lost: &LossOfContact) -> bool {
+    let Place::Stretch { from_m, to_m } = finding.place else { return false };
+    let middle_m = 0.5 * (from_m + to_m);
+    lost.x_m.iter().any(|&[from_m, to_m]| from_m < middle_m && middle_m <= to_m)
 }
 
 /// The comb of a wheel whose circumference the recording doesn't state.
