@@ -2,8 +2,6 @@
 
 use faer::{Mat, MatRef};
 
-/// Highest total degree.
-const DEGREE_MAX: usize = 3;
 /// Entries per polynomial coefficient below which the degree is lowered.
 const ENTRIES_PER_COEFFICIENT: usize = 8;
 /// A parameter whose range spans more than this ratio enters by its logarithm: what stiffness and
@@ -27,11 +25,12 @@ struct UnitAxis {
 }
 
 impl Polynomial {
-    /// The polynomial of the highest degree that these `parameters` (n x p) can tell.
-    pub(crate) fn of(parameters: MatRef<'_, f64>) -> Self {
+    /// The polynomial of the highest total degree, at most `degree_max`, that these `parameters` (n x p)
+    /// can tell.
+    pub(crate) fn of(parameters: MatRef<'_, f64>, degree_max: usize) -> Self {
         let axes: Vec<_> =
             parameters.col_iter().map(|column| UnitAxis::of(column.iter().copied())).collect();
-        let monomials = (1..=DEGREE_MAX)
+        let monomials = (1..=degree_max)
             .rev()
             .map(|degree| monomials(axes.len(), degree))
             .find(|m| m.len() * ENTRIES_PER_COEFFICIENT <= parameters.nrows())
@@ -118,7 +117,7 @@ mod tests {
     #[test]
     fn slopes_are_those_of_small_steps() {
         let parameters = Mat::from_fn(200, 2, |i, j| 1.0 + ((i * (7 + 4 * j)) % 40) as f64);
-        let polynomial = Polynomial::of(parameters.as_ref());
+        let polynomial = Polynomial::of(parameters.as_ref(), 3);
         let value = |at: [f64; 2]| polynomial.basis(Mat::from_fn(1, 2, |_, j| at[j]).as_ref());
         let (at, step) = ([0.3, -0.7], 1e-5);
         let slopes = polynomial.slopes(&at);

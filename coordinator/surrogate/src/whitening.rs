@@ -11,6 +11,9 @@ use crate::cholesky::Cholesky;
 use crate::polynomial::Polynomial;
 use faer::{Mat, MatRef, Side};
 
+/// Highest total degree of the polynomial in the parameters.
+const DEGREE_MAX: usize = 3;
+
 /// Directions (d x m, m at most `components`), the most telling first, along which the scatter of
 /// the centred `features` (n x d) at fixed `parameters` (n x p) has variance one.
 ///
@@ -28,7 +31,7 @@ pub(crate) fn directions(
     shrinkage: f64,
 ) -> Result<Mat<f64>, Error> {
     let (n, d) = (features.nrows(), features.ncols());
-    let polynomial = Polynomial::of(parameters);
+    let polynomial = Polynomial::of(parameters, DEGREE_MAX);
     let basis = polynomial.basis(polynomial.unit(parameters).as_ref());
     let normal = Cholesky::new(basis.transpose() * &basis)?;
     let expected = &basis * normal.solve((basis.transpose() * features).as_ref());

@@ -1,11 +1,14 @@
 //! Coordinates of a window's features in which the scatter of the surface is one and independent.
 
 use super::discrepancy::discrepancy;
+use super::lack_of_fit::lack_of_fit;
 use crate::cholesky::Cholesky;
 use crate::polynomial::Polynomial;
 use crate::{Error, TrainingSet};
 use faer::{Mat, MatRef, Side};
 
+/// Highest total degree of the polynomial in the parameters.
+const DEGREE_MAX: usize = 5;
 /// Bins that are averaged into a band, the finest first.
 const BAND_BINS: [usize; 5] = [4, 8, 16, 32, 64];
 /// Entries per band value below which bands are made wider.
@@ -26,7 +29,8 @@ pub(super) struct Coordinates {
     offset: Vec<f64>,
     /// Band values x d.
     projection: Mat<f64>,
-    /// Variances of what two simulators of one track differ by, d values.
+    /// Variances of what all windows of a track may be off by: what two simulators of one track differ
+    /// by, and what the polynomial can't follow; d values.
     pub(super) discrepancy: Vec<f64>,
     pub(super) polynomial: Polynomial,
     /// Coefficients x d.
@@ -64,7 +68,7 @@ impl Coordinates {
             bands.col_iter().map(|c| c.iter().sum::<f64>() / entries.len() as f64).collect();
         let centred = Mat::from_fn(bands.nrows(), bands.ncols(), |i, j| bands[(i, j)] - offset[j]);
         let parameters = set.values(entries);
-        let polynomial = Polynomial::of(parameters.as_ref());
+        let polynomial = Polynomial::of(parameters.as_ref(), DEGREE_MAX);
         let basis = polynomial.basis(polynomial.unit(parameters.as_ref()).as_ref());
         let normal = Cholesky::new(basis.transpose() * &basis)?;
         let inverse_normal = normal.solve(Mat::identity(basis.ncols(), basis.ncols()).as_ref());
@@ -79,15 +83,21 @@ impl Coordinates {
         let turned = eigen.U().to_owned();
         let leading = whitening.leading;
         let told = coefficients * whitening.projection.subcols(0, leading);
+        let projection = &whitening.projection * &turned;
+        let coefficients = told * turned.subrows(0, leading);
+        let residuals = centred * &projection - &basis * &coefficients;
+        let unit = polynomial.unit(parameters.as_ref());
+        let lack_of_fit = lack_of_fit(&residuals, &unit, basis.ncols());
+        let simulators = eigen.S().column_vector().iter().map(|value| value.max(0.0));
         Ok(Self {
             speeds: speeds.len(),
             bins,
             band_bins,
             offset,
-            projection: &whitening.projection * &turned,
-            discrepancy: eigen.S().column_vector().iter().map(|value| value.max(0.0)).collect(),
+            projection,
+            discrepancy: simulators.zip(lack_of_fit).map(|(a, b)| a + b).collect(),
             polynomial,
-            coefficients: told * turned.subrows(0, leading),
+            coefficients,
             inverse_normal,
         })
     }

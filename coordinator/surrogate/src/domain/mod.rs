@@ -9,6 +9,7 @@
 mod coordinates;
 mod discrepancy;
 mod fit;
+mod lack_of_fit;
 mod null;
 
 use crate::{Error, TrainingSet};
