@@ -7,7 +7,7 @@
 
 #![expect(clippy::print_stdout, reason = "an example shows its numbers")]
 
-use tracktwin::training;
+use tracktwin::pipeline;
 use tracktwin_library::Library;
 use tracktwin_surrogate::{TrainOptions, train};
 
@@ -17,8 +17,8 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let library = Library::open(&url).await?;
     let campaigns = library.campaigns().await?;
     let campaign = campaigns.first().ok_or("the library holds no campaign")?;
-    let set = training::set(&library, campaign).await?;
-    let usual = training::options(&set);
+    let set = pipeline::train::set(&library, campaign).await?;
+    let usual = pipeline::train::options(&set);
     let whole = usual.features[..1].to_vec();
     println!(
         "Test MASE in %: {}",

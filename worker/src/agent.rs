@@ -3,11 +3,10 @@
 use crate::core::{Core, Prepared};
 use crate::counters::Counters;
 use crate::credentials::{Credentials, CredentialsError};
+use crate::health;
 use crate::holdings::Holdings;
 use crate::outbox::{outbox, send};
 use crate::session::Session;
-use crate::simulate::Prepare;
-use crate::{ExperimentError, health, prepare_simulation};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,6 +14,8 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::transport::{Channel, Endpoint};
+use tracktwin_experiment::Prepare;
+use tracktwin_experiment::{ExperimentError, prepare_simulation};
 use tracktwin_protocol::BadMessage;
 
 /// Cases simulated side by side on one core: the lanes of the track model's fast solver.

@@ -4,11 +4,11 @@ use crate::agent::{AgentError, GROUP};
 use crate::counters::Counters;
 use crate::outbox::{Finished, Outbox};
 use crate::session::Session;
-use crate::simulate::{Prepare, Simulate};
-use crate::{Case, Experiment, Outcome};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use tracktwin_experiment::{Case, Experiment, Outcome};
+use tracktwin_experiment::{Prepare, Simulate};
 use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase, checksum};
 use tracktwin_traces::{Step, Value};
 

@@ -8,7 +8,8 @@ use crate::agent::AgentError;
 use crate::session::Session;
 use std::sync::Arc;
 use tokio::sync::mpsc;
-use tracktwin_protocol::{CaseLease, CaseReport, MESSAGE_BYTES_MAX, Outcome};
+use tracktwin_experiment::Outcome;
+use tracktwin_protocol::{CaseLease, CaseReport, MESSAGE_BYTES_MAX};
 
 /// Groups that may wait: some 500 cases, or a few megabytes.
 const GROUPS_WAITING: usize = 64;
@@ -94,7 +95,7 @@ pub(crate) async fn send(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tracktwin_protocol::PassFeatures;
+    use tracktwin_experiment::PassFeatures;
     use tracktwin_signal::Features;
 
     fn finished(campaign: &str, cases: usize) -> Finished {

@@ -5,7 +5,6 @@ use crate::coordinators::Coordinators;
 use crate::counters::Counters;
 use crate::holdings::Holdings;
 use crate::outbox::Finished;
-use crate::{CODE_VERSION, MODEL_HASH};
 use std::collections::HashSet;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -13,7 +12,9 @@ use tokio::sync::RwLock;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::Code;
-use tracktwin_protocol::{Lease, Outcome, PROTOCOL_VERSION, Registration, farm, held_to_messages};
+use tracktwin_experiment::Outcome;
+use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
+use tracktwin_protocol::{Lease, PROTOCOL_VERSION, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
 
 /// Cases asked for at a time; the coordinator, who knows how long they take, gives fewer.

@@ -6,7 +6,8 @@ use crate::result::insert_results;
 use crate::tally::Tally;
 use crate::{Ending, Held, Library, LibraryError, Policy, State, audit};
 use std::collections::{HashMap, HashSet};
-use tracktwin_protocol::{CaseReport, Outcome, PassFeatures};
+use tracktwin_experiment::{Outcome, PassFeatures};
+use tracktwin_protocol::CaseReport;
 
 /// What a worker hands in.
 #[derive(Clone, Debug)]

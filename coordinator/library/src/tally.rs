@@ -2,7 +2,7 @@
 
 use crate::engine::{Connection, sql};
 use crate::{LibraryError, Report, Verdict};
-use tracktwin_protocol::Outcome;
+use tracktwin_experiment::Outcome;
 
 /// Length of the intervals in which progress is told, in s.
 pub(crate) const INTERVAL_S: i64 = 10;

@@ -1,11 +1,11 @@
 //! The page of an evaluated recording.
 
 use crate::map_picture::map_charts;
-use crate::number::{Shown, significant};
-use crate::page::{figure, page};
 use crate::spectrum_picture::{chosen, spectrum_chart};
 use crate::track_picture::track_charts;
 use maud::{Markup, html};
+use tracktwin_drawing::{Shown, significant};
+use tracktwin_drawing::{figure, page};
 use tracktwin_evaluation::{Estimate, Evaluation, Flag, SleeperEvaluation};
 use tracktwin_number::rounded;
 use tracktwin_parameters::Parameter;
@@ -160,7 +160,7 @@ fn match_db(sleeper: &SleeperEvaluation) -> Option<f64> {
 fn table(evaluation: &Evaluation) -> Markup {
     let parameters = evaluation.parameters();
     let cell = |parameter: Parameter, estimate: Option<&Estimate>| {
-        estimate.map(|estimate| Shown::of(parameter).estimate(*estimate)).unwrap_or_default()
+        estimate.map(|it| Shown::of(parameter).estimate(it.mean, it.sd)).unwrap_or_default()
     };
     html! {
         table {

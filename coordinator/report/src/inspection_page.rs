@@ -1,9 +1,9 @@
 //! What is in a recording, before any model is asked.
 
-use crate::axis::Axis;
-use crate::chart::Chart;
-use crate::page::{figure, page};
 use maud::{Markup, html};
+use tracktwin_drawing::Axis;
+use tracktwin_drawing::Chart;
+use tracktwin_drawing::{figure, page};
 
 const SIZE: [f64; 2] = [1000.0, 320.0];
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];

@@ -1,10 +1,10 @@
 //! A stretch of signal with its CWT and SSWT maps (paper, Fig. 2).
 
-use crate::axis::Axis;
-use crate::chart::Chart;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use std::ops::Range;
+use tracktwin_drawing::Axis;
+use tracktwin_drawing::Chart;
 use tracktwin_number::rounded;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, TimeFrequencyMap};

@@ -1,17 +1,14 @@
 //! How good the models are (paper, Fig. 14).
 
-use crate::axis::Axis;
-use crate::chart::Chart;
-use crate::number::{Shown, significant};
-use crate::page::{figure, page};
 use maud::{Markup, html};
+use tracktwin_drawing::Axis;
+use tracktwin_drawing::Chart;
+use tracktwin_drawing::{Shown, significant};
+use tracktwin_drawing::{figure, page};
 use tracktwin_parameters::Parameter;
-use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Trained};
+use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Tested, Trained};
 
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
-
-/// True and predicted values of a parameter, in its unit.
-pub type Tested = (Parameter, Vec<(f64, f64)>);
 
 /// The page of a library's models: errors of every model, as pictures and as a table, and
 /// predictions of the best models for cases they weren't trained on.

@@ -1,9 +1,9 @@
 //! Receptances as a picture: magnitude and phase against frequency.
 
-use crate::axis::Axis;
-use crate::chart::Chart;
-use crate::page::stand_alone;
 use num_complex::Complex64;
+use tracktwin_drawing::Axis;
+use tracktwin_drawing::Chart;
+use tracktwin_drawing::stand_alone;
 
 /// Receptance between two places of the track.
 #[derive(Clone, Debug)]

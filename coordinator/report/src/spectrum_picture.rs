@@ -1,7 +1,7 @@
 //! Measured LWPS of a sleeper against the library's best matches (paper, Fig. 11).
 
-use crate::axis::Axis;
-use crate::chart::Chart;
+use tracktwin_drawing::Axis;
+use tracktwin_drawing::Chart;
 use tracktwin_evaluation::{Measured, SleeperEvaluation};
 use tracktwin_number::rounded;
 

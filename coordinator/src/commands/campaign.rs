@@ -6,11 +6,10 @@ use super::numbers::count;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, continuity, note, say};
-use crate::campaign::Campaign;
-use crate::farm;
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
+use tracktwin_farm::campaign::Campaign;
 use tracktwin_library::{CampaignState, Library, Retry, State};
 use tracktwin_parameters::quantity::CASES;
 
@@ -135,7 +134,7 @@ async fn add(
     let id = campaign.id();
     continuity::check(&library, &campaign, note).await?;
     continuity::tell_what_training_lacks(&campaign, note);
-    farm::introduce(&library, &campaign).await?;
+    tracktwin_farm::campaign::insert_campaign(&library, &campaign).await?;
     // Before there is anything to hand out.
     if let Some(priority) = priority {
         library.set_priority(&id, priority).await?;
@@ -160,7 +159,7 @@ async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
     let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
     let (mut stored, total) = (0, campaign.cases);
     let mut progress = None::<Progress>;
-    let added = farm::add_cases(library, campaign, |now| {
+    let added = tracktwin_farm::campaign::add_cases(library, campaign, |now| {
         stored = now;
         let begin = || Progress::begin("adding cases", now.into(), total.into());
         progress.get_or_insert_with(begin).at(now.into(), "");

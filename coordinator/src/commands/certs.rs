@@ -2,10 +2,10 @@
 
 use super::files::Force;
 use super::{OrInput, Stop, say};
-use crate::service::issue;
 use clap::Args;
 use std::path::PathBuf;
 use time::OffsetDateTime;
+use tracktwin_farm::security::issue;
 
 /// What `certs` is told.
 #[derive(Args)]

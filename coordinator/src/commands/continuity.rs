@@ -1,8 +1,9 @@
 //! Whether a campaign goes on with what a library holds, or begins anew beside it.
 
 use super::Stop;
-use crate::campaign::{Campaign, Kinship};
+use crate::pipeline::lack::check_for_training;
 use anyhow::anyhow;
+use tracktwin_farm::campaign::{Campaign, Kinship};
 use tracktwin_library::Library;
 
 /// Refuses a campaign that would begin anew only because its number of cases changed the sequence of its
@@ -31,7 +32,7 @@ pub(super) async fn check(
 
 /// `tell`s what training will lack of a campaign, before it is simulated.
 pub(super) fn tell_what_training_lacks(campaign: &Campaign, tell: impl Fn(&str)) {
-    if let Err(lack) = campaign.check_for_training() {
+    if let Err(lack) = check_for_training(campaign) {
         tell(&format!("the campaign can be simulated, but not trained on: {lack}"));
     }
 }

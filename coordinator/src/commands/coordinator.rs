@@ -5,16 +5,16 @@ use super::library_url::LibraryUrl;
 use super::numbers::count;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, continuity};
-use crate::campaign::Campaign;
-use crate::dispatch::{Settings, Timing};
-use crate::farm;
-use crate::service::{Coordinator, CoordinatorError, Security};
 use anyhow::Context;
 use clap::Args;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::net::TcpListener;
+use tracktwin_farm::campaign::Campaign;
+use tracktwin_farm::coordinator::{Coordinator, CoordinatorError};
+use tracktwin_farm::dispatch::{Settings, Timing};
+use tracktwin_farm::security::Security;
 use tracktwin_library::Library;
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_traces::Export;
@@ -97,7 +97,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     };
     let library = arguments.library.open_or_create().await?;
     // A coordinator that can't serve the library adds nothing to it.
-    let claim = farm::claim(&library).await?;
+    let claim = tracktwin_farm::embedded::claim(&library).await?;
     add(&library, &campaigns).await?;
     let coordinator = Coordinator {
         library: library.clone(),
@@ -130,7 +130,7 @@ async fn add(library: &Library, campaigns: &[Campaign]) -> Result<(), Stop> {
         continuity::tell_what_training_lacks(campaign, tell);
     }
     for campaign in campaigns {
-        farm::prepare(library, campaign).await?;
+        tracktwin_farm::campaign::store_campaign(library, campaign).await?;
     }
     Ok(())
 }

@@ -4,14 +4,16 @@ use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::Progress;
 use super::{OrInput, Stop, note, say};
-use crate::diagnosing::{DiagnosingError, Setting, diagnose};
-use crate::{provenance, training};
+use crate::pipeline;
+use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
+use crate::pipeline::provenance;
 use anyhow::Context;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use tracktwin_diagnosis::{Verdict, check_track};
+use tracktwin_experiment::CODE_VERSION;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Library, without_password};
 use tracktwin_parameters::TrackDesign;
@@ -19,7 +21,6 @@ use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
 use tracktwin_track::extension::KINDS;
-use tracktwin_worker::CODE_VERSION;
 
 /// Steps of a stage's progress bar.
 const STEPS: u64 = 100;
@@ -133,7 +134,7 @@ async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<Tr
         .await
         .context("the models belong to another library; train on this one")
         .or_input()?;
-    Ok(training::experiment(&campaign).or_input()?.design)
+    Ok(pipeline::train::experiment(&campaign).or_input()?.design)
 }
 
 /// A line or bar for the stage that goes on, the last one ended when another begins.

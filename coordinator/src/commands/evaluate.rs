@@ -3,14 +3,14 @@
 use super::files::{Force, check, make_folder};
 use super::library_url::LibraryUrl;
 use super::{OrInput, Stop, note, say};
-use crate::evaluating::{Evaluator, EvaluatorError};
-use crate::provenance;
+use crate::pipeline::evaluate::{Evaluator, EvaluatorError};
+use crate::pipeline::provenance;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tracktwin_diagnosis::chain::{self, LossOfContact};
 use tracktwin_evaluation::{Evaluation, Flag, check_recording};
 use tracktwin_files::{FileName, FilesError, Kind, Output};
+use tracktwin_inspection::chain::{self, LossOfContact};
 use tracktwin_library::{Library, without_password};
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;

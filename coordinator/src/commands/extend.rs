@@ -2,12 +2,12 @@
 
 use super::files::{Force, read, read_text, write_file};
 use super::{OrInput, Stop, say};
-use crate::campaign::Campaign;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Diagnosis, Estimate, FORMAT, Hypothesis};
+use tracktwin_farm::campaign::Campaign;
 use tracktwin_files::Kind as FileKind;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::compare_designs;

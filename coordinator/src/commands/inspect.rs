@@ -4,8 +4,8 @@ use super::files::{Force, check_file, write_file};
 use super::{OrInput, Stop, say};
 use clap::Args;
 use std::path::PathBuf;
-use tracktwin_diagnosis::{FirstLook, Place, first_look, tells_waves};
 use tracktwin_files::Kind;
+use tracktwin_inspection::{FirstLook, Place, first_look, tells_waves};
 use tracktwin_number::{chance, rounded, significant};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_report::{Inspected, InspectedCurve, Inspection, inspection_page};
@@ -83,7 +83,7 @@ fn print(inspection: &Inspection) {
 }
 
 fn json(recording: &Recording, look: &FirstLook, inspection: &Inspection) -> serde_json::Value {
-    let finding = |finding: &tracktwin_diagnosis::Finding| {
+    let finding = |finding: &tracktwin_inspection::Finding| {
         let parameters: serde_json::Map<String, serde_json::Value> = finding
             .parameters
             .iter()
@@ -154,7 +154,7 @@ fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 
-fn found(finding: &tracktwin_diagnosis::Finding) -> Inspected {
+fn found(finding: &tracktwin_inspection::Finding) -> Inspected {
     let place = match finding.place {
         Place::Everywhere => "everywhere".to_owned(),
         Place::Stretch { from_m, to_m } => format!("{from_m:.3} to {to_m:.3} m"),

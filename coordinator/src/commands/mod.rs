@@ -2,6 +2,7 @@
 
 mod campaign;
 mod certs;
+mod contact;
 mod continuity;
 mod coordinator;
 mod coverage;

@@ -5,17 +5,17 @@ use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::{OrInput, Stop, evaluate, say, train};
-use crate::evaluating::Evaluator;
-use crate::reproducing::{self, ReproducingError};
-use crate::training;
+use crate::pipeline;
+use crate::pipeline::evaluate::Evaluator;
+use crate::pipeline::reproduce::ReproducingError;
 use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use tracktwin_experiment::Experiment;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
 use tracktwin_reproduction::{Compared, Figure, Provenance, Reproduction, Verdict};
 use tracktwin_surrogate::{Trained, TrainingSet};
-use tracktwin_worker::Experiment;
 
 /// What `reproduce` is told.
 #[derive(Args)]
@@ -69,8 +69,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let library = arguments.library.open_whole().await?;
     let given = arguments.models.as_deref().map(Trained::load).transpose().or_input()?;
     let campaign = campaign(&library, arguments.campaign.as_deref(), given.as_ref()).await?;
-    let experiment = training::experiment(&campaign).or_input()?;
-    reproducing::check(&experiment, &figures).or_input()?;
+    let experiment = pipeline::train::experiment(&campaign).or_input()?;
+    pipeline::reproduce::check(&experiment, &figures).or_input()?;
     let out = &arguments.out;
     check(out, Kind::Results, arguments.force, &[PAGE, ANSWER])?;
     make_folder(out)?;
@@ -131,7 +131,7 @@ impl Material {
         models: Option<Trained>,
     ) -> Result<Self, Stop> {
         let Some(models) = models else {
-            return Ok(Self::Results(training::set(library, campaign).await?));
+            return Ok(Self::Results(pipeline::train::set(library, campaign).await?));
         };
         let evaluator = Evaluator::new(models, library).await.map_err(evaluate::stop)?;
         evaluator.models().belongs_to(&evaluator.set().library_digest).or_input()?;
@@ -161,8 +161,9 @@ fn compare(
     let set = material.set();
     let mut examples = if figures.iter().any(|figure| figure.is_example()) {
         let mut progress = Progress::begin("examples", 0, experiment.speeds_km_h.len() as u64);
-        let recordings =
-            reproducing::recordings(figures, experiment, &mut |done| progress.at(done as u64, ""))?;
+        let recordings = pipeline::reproduce::recordings(figures, experiment, &mut |done| {
+            progress.at(done as u64, "")
+        })?;
         progress.end();
         recordings
     } else {
@@ -176,12 +177,12 @@ fn compare(
         let seed = evaluator.map_or(SEED, |evaluator| evaluator.models().split_seed());
         let compared = match (examples.remove(&figure), evaluator) {
             (Some(recordings), Some(evaluator)) => {
-                Some(reproducing::from_examples(figure, evaluator, recordings)?)
+                Some(pipeline::reproduce::from_examples(figure, evaluator, recordings)?)
             }
             (None, Some(evaluator)) if figure.needs_models() => {
-                Some(reproducing::test_errors(set, evaluator.models())?)
+                Some(pipeline::reproduce::test_errors(set, evaluator.models())?)
             }
-            _ => reproducing::from_library(figure, experiment, set, seed)?,
+            _ => pipeline::reproduce::from_library(figure, experiment, set, seed)?,
         };
         all.extend(compared);
     }

@@ -2,15 +2,15 @@
 
 use super::library_url::LibraryUrl;
 use super::{Stop, answer};
-use crate::contact::contact_sentence;
-use crate::dashboard::{Detail, farm};
+use crate::commands::contact::contact_sentence;
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::IsTerminal;
 use std::time::Duration;
+use tracktwin_farm::dashboard::{Detail, farm};
+use tracktwin_farm::dashboard::{Farm, FarmCampaign, FarmWorker, duration};
 use tracktwin_library::ContactLoss;
-use tracktwin_report::{Farm, FarmCampaign, FarmWorker, duration};
 
 /// Characters of a progress bar.
 const BAR: usize = 30;

@@ -1,6 +1,6 @@
 //! Why a command ends without being done.
 
-use crate::farm::FarmError;
+use tracktwin_farm::embedded::FarmError;
 use tracktwin_files::FilesError;
 use tracktwin_library::LibraryError;
 

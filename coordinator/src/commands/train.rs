@@ -5,8 +5,9 @@ use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::{OrInput, Stop, say};
-use crate::provenance;
-use crate::training::{self, TrainingError};
+use crate::pipeline;
+use crate::pipeline::provenance;
+use crate::pipeline::train::TrainingError;
 use clap::Args;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -63,8 +64,8 @@ pub(super) async fn train(
     check_files(folder, force)?;
     // Before hours of training.
     make_folder(folder)?;
-    let set = training::set_to_train_on(library, campaign).await.map_err(stop)?;
-    let mut options = training::options(&set);
+    let set = pipeline::train::set_to_train_on(library, campaign).await.map_err(stop)?;
+    let mut options = pipeline::train::options(&set);
     options.seed = seed;
     let (trained, tested) = tokio::task::spawn_blocking(move || {
         let bar = RefCell::new(None::<Progress>);
@@ -74,7 +75,7 @@ pub(super) async fn train(
             bar.at(at.finished as u64, &at.next.map(name).unwrap_or_default());
         })?;
         bar.take().into_iter().for_each(Progress::end);
-        let tested = training::tested(&set, &trained)?;
+        let tested = pipeline::train::tested(&set, &trained)?;
         Ok::<_, tracktwin_surrogate::Error>((trained, tested))
     })
     .await?

@@ -2,7 +2,7 @@
 //!
 //! The bytes that are hashed are described in `docs/checksums.md`, so that any language can do it.
 
-use crate::{Outcome, PassFeatures};
+use tracktwin_experiment::{Outcome, PassFeatures};
 
 /// Says which encoding is hashed; another encoding has another number.
 const CONTEXT: &str = "tracktwin case result 1";

@@ -13,7 +13,7 @@ pub use check::{BadMessage, name};
 pub use checksum::{checksum, checksum_of_passes};
 pub use lease::{CaseLease, Lease, LeasedCase, held_from_messages, held_to_messages};
 pub use register::Registration;
-pub use report::{CaseReport, Outcome, PassFeatures, Shape};
+pub use report::{CaseReport, Shape};
 
 /// Version of the protocol that this program speaks.
 ///

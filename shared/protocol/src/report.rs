@@ -4,34 +4,11 @@ use crate::check::{BadMessage, bounded, duration, finite, name, share};
 use crate::{checksum, farm};
 use farm::case_report::Outcome as OutcomeMessage;
 use prost::bytes::Bytes;
+use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_signal::{Features, ThirdOctave};
 
 /// Longest reason of a failure that is kept, in bytes; the rest is cut off.
 const REASON_BYTES_MAX: usize = 2000;
-
-/// What became of a case.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
-    /// Features, one pass a speed, by ascending speed.
-    Finished(Vec<PassFeatures>),
-    /// It cannot be simulated. That is a result, not an error of the farm.
-    Failed {
-        /// Why.
-        reason: String,
-    },
-}
-
-/// The features of one pass.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PassFeatures {
-    /// Speed in km/h.
-    pub speed_km_h: f64,
-    /// The features.
-    pub features: Features,
-    /// Share of the recorded time, 0 to 1, in which the wheel did not touch the rail; none where the worker
-    /// did not tell it.
-    pub contact_loss_share: Option<f64>,
-}
 
 /// What a worker hands in for one case.
 #[derive(Clone, Debug, PartialEq)]

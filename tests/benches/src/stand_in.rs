@@ -2,9 +2,10 @@
 
 use tempfile::TempDir;
 use tokio::task::JoinSet;
+use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_library::{CampaignRecord, LeaseRequest, Leased, Library, Report, State, Verdict};
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
-use tracktwin_protocol::{CaseReport, Outcome, PassFeatures, checksum};
+use tracktwin_protocol::{CaseReport, checksum};
 use tracktwin_signal::{Features, ThirdOctave};
 
 /// Why a measurement stops.

@@ -3,7 +3,8 @@
 use super::{Cell, Table};
 use crate::LibraryError;
 use crate::result::LEVEL_COLUMNS;
-use tracktwin_protocol::{PassFeatures, checksum_of_passes};
+use tracktwin_experiment::PassFeatures;
+use tracktwin_protocol::checksum_of_passes;
 use tracktwin_signal::Features;
 
 /// The case whose rows are coming; looks at nothing where the table's rows have no checksum.

@@ -4,7 +4,8 @@ use super::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
 use crate::engine::{Connection, Value, sql};
 use crate::report::Report;
-use tracktwin_protocol::{CaseReport, PassFeatures};
+use tracktwin_experiment::PassFeatures;
+use tracktwin_protocol::CaseReport;
 
 /// Cases in one statement: what is read and copied again and again on both sides stays in the cache.
 const CASES_A_STATEMENT: usize = 64;

@@ -4,7 +4,8 @@ use super::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
 use crate::engine::{Connection, sql};
 use crate::report::Report;
-use tracktwin_protocol::{CaseReport, PassFeatures};
+use tracktwin_experiment::PassFeatures;
+use tracktwin_protocol::CaseReport;
 
 /// The columns that are one for a whole report, and then those that are not, without the levels.
 const INSERT: &str = "insert into result (campaign_id, worker, code_version, model_hash,

@@ -16,8 +16,9 @@ pub(crate) use stored::{Attested, Gathering, StoredCase, passes_of};
 use crate::engine::{Connection, Dialect, Row, Statement, iso_utc, sql};
 use crate::report::Report;
 use crate::{Library, LibraryError};
+use tracktwin_experiment::PassFeatures;
 use tracktwin_parameters::Case;
-use tracktwin_protocol::{CaseReport, PassFeatures};
+use tracktwin_protocol::CaseReport;
 use tracktwin_signal::Features;
 
 /// The columns of one-third-octave levels, ascending; 50 to 4000 Hz.

@@ -5,8 +5,9 @@ use crate::case::case_of;
 use crate::engine::{Row, Statement, sql};
 use crate::{Library, LibraryError};
 use tokio_stream::StreamExt;
+use tracktwin_experiment::PassFeatures;
 use tracktwin_parameters::Case;
-use tracktwin_protocol::{PassFeatures, checksum_of_passes};
+use tracktwin_protocol::checksum_of_passes;
 use tracktwin_signal::Features;
 
 /// A case with results, as it is stored.

@@ -4,8 +4,8 @@ use crate::data::{copy, sql};
 use crate::support::{
     CAMPAIGN, Home, case, features, finished, lease, on_both_databases, passes, report, reported,
 };
+use tracktwin_experiment::Outcome;
 use tracktwin_library::{Cell, ContactLoss, Library, LibraryError, Retry, Status, Table, Verdict};
-use tracktwin_protocol::Outcome;
 
 const CASES: u32 = 3;
 

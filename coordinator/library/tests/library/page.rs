@@ -5,11 +5,12 @@ use crate::provenance::{diagnosis, evaluation, training};
 use crate::support::{Home, case, features, message, on_both_databases, passes, reported, request};
 use crate::upgrade::{CAMPAIGN, released};
 use sqlx::{Connection, PgConnection};
+use tracktwin_experiment::Outcome;
 use tracktwin_library::{
     CampaignRecord, Cell, DiagnosisRecord, EvaluationRecord, LeaseRequest, Leased, Library,
     LibraryError, Registration, Report, TrainingRecord,
 };
-use tracktwin_protocol::{CaseReport, Outcome};
+use tracktwin_protocol::CaseReport;
 use tracktwin_signal::Features;
 
 const PAGE: &str = include_str!("../../../../docs/how-to/query-the-library.md");

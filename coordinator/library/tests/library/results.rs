@@ -4,8 +4,9 @@ use crate::support::{
     CAMPAIGN, Home, case, failed, features, finished, lease, on_both_databases, passes, report,
     reported,
 };
+use tracktwin_experiment::Outcome;
 use tracktwin_library::{LibraryEntry, LibraryError, Verdict};
-use tracktwin_protocol::{CaseReport, Outcome};
+use tracktwin_protocol::CaseReport;
 
 on_both_databases! {
     async fn a_second_report_changes_nothing(home: &Home) {

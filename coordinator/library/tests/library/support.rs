@@ -2,11 +2,12 @@
 
 use tempfile::TempDir;
 use test_postgres::Server;
+use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_library::{
     CampaignRecord, Ending, Held, LeaseRequest, Leased, Library, Report, State, Verdict,
 };
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
-use tracktwin_protocol::{CaseReport, Outcome, PassFeatures, checksum};
+use tracktwin_protocol::{CaseReport, checksum};
 use tracktwin_signal::{Features, ThirdOctave};
 
 pub(crate) const CAMPAIGN: &str = "test-000000000000";

@@ -3,11 +3,11 @@
 use super::levels::{Side, all_cells, difference, usual_scatter};
 use super::quantity::digits;
 use super::words::{addition, chance, numbers, sleepers, speeds, stretch};
-use crate::axis::Axis;
-use crate::chart::Chart;
-use crate::page::figure;
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Mismatch};
+use tracktwin_drawing::Axis;
+use tracktwin_drawing::Chart;
+use tracktwin_drawing::figure;
 
 /// Width of a panel where two stand beside each other, and where three do.
 const WIDTHS: [f64; 2] = [546.0, 361.0];

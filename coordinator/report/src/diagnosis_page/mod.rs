@@ -15,9 +15,9 @@ mod quantity;
 mod style;
 mod words;
 
-use crate::page::page_with;
 use maud::{Markup, PreEscaped, html};
 use tracktwin_diagnosis::Diagnosis;
+use tracktwin_drawing::page_with;
 
 /// How a diagnosis came about.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -42,7 +42,7 @@ impl Unit {
     /// The unit for a value of about `size` of the parameter of that name.
     pub(super) fn of(parameter: &str, size: f64) -> Self {
         if let Some(known) = Parameter::from_name(parameter).filter(|p| p.unit().contains("1e-4")) {
-            let shown = crate::number::Shown::of(known);
+            let shown = tracktwin_drawing::Shown::of(known);
             return Self { factor: shown.divisor, name: shown.unit };
         }
         let plain = |name: &str| Self { factor: 1.0, name: name.to_owned() };

@@ -1,7 +1,7 @@
 //! `tracktwin library status`: how many cases stand where.
 
 use super::{Stop, Which, answer, open};
-use crate::contact::contact_sentence;
+use crate::commands::contact::contact_sentence;
 use serde::Serialize;
 use tracktwin_library::{CampaignRecord, ContactLoss, Library};
 

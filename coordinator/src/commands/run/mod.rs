@@ -9,14 +9,15 @@ use super::numbers::{cores, count};
 use super::progress::Progress;
 use super::signals::stop_on_signal;
 use super::{OrInput, Stop, continuity, evaluate, note, say, train};
-use crate::campaign::{Campaign, DEFAULT};
-use crate::contact::contact_sentence;
-use crate::farm::{self, Task};
+use crate::commands::contact::contact_sentence;
+use crate::pipeline::lack::check_for_training;
 use anyhow::anyhow;
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use tracktwin_evaluation::{Evaluation, check_recording};
+use tracktwin_farm::campaign::{Campaign, DEFAULT};
+use tracktwin_farm::embedded::Task;
 use tracktwin_library::{Library, Status};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_signal::recording::Recording;
@@ -72,7 +73,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     let trains = !arguments.no_train;
     if trains {
-        let lack = campaign.check_for_training();
+        let lack = check_for_training(&campaign);
         lack.map_err(|lack| anyhow!("{lack}, or `--no-train` to simulate only")).or_input()?;
     }
     let out = &arguments.out;
@@ -156,25 +157,26 @@ fn all_cores() -> NonZeroUsize {
 async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -> Result<(), Stop> {
     continuity::check(library, campaign, note).await?;
     // Whoever is refused has added nothing.
-    let claim = farm::claim(library).await?;
+    let claim = tracktwin_farm::embedded::claim(library).await?;
     room::check(library, campaign).await?;
-    farm::prepare(library, campaign).await?;
+    tracktwin_farm::campaign::store_campaign(library, campaign).await?;
     let id = campaign.id();
     let shutdown = stop_on_signal("stopping: cases that are begun go back to the library")?;
     let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
     let stopped = shutdown.clone();
     let mut progress = None::<Progress>;
     let task = Task::new(&id, campaign.cases, cores);
-    let status = farm::work(library, &claim, task, shutdown, |status: Status| {
-        let (done, total) = (u64::from(status.done()), u64::from(status.total()));
-        let bar = progress.get_or_insert_with(|| Progress::begin("simulating", done, total));
-        let remark = match status.failed {
-            0 => String::new(),
-            failed => format!("({failed} given up)"),
-        };
-        bar.at(done, &remark);
-    })
-    .await?;
+    let status =
+        tracktwin_farm::embedded::run_claimed(library, &claim, task, shutdown, |status: Status| {
+            let (done, total) = (u64::from(status.done()), u64::from(status.total()));
+            let bar = progress.get_or_insert_with(|| Progress::begin("simulating", done, total));
+            let remark = match status.failed {
+                0 => String::new(),
+                failed => format!("({failed} given up)"),
+            };
+            bar.at(done, &remark);
+        })
+        .await?;
     progress.into_iter().for_each(Progress::end);
     if stopped.is_cancelled() || status.done() < status.total() {
         let left = status.total() - status.done();

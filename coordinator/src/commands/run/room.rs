@@ -2,7 +2,7 @@
 
 use super::super::files::free_bytes;
 use super::super::{Stop, note};
-use crate::campaign::Campaign;
+use tracktwin_farm::campaign::Campaign;
 use tracktwin_library::Library;
 use tracktwin_signal::ThirdOctave;
 

@@ -1,0 +1,421 @@
+//! The campaign file (TOML) and the checked campaign it becomes.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+use tracktwin_experiment::{Experiment, ExperimentError};
+use tracktwin_parameters::quantity::CASES;
+use tracktwin_parameters::{
+    Axis, OWEN_POINTS_MAX, Parameter, ParameterSet, ParameterSpace, Preset, QuantityError, Scale,
+    Sequence, SpaceError,
+};
+use tracktwin_signal::FeatureDefinition;
+use tracktwin_track::extension::SampledExtension;
+
+/// Longest name of a campaign.
+const NAME_CHARACTERS_MAX: usize = 64;
+
+/// The campaign that `tracktwin run` simulates where none is named.
+pub const DEFAULT: &str = include_str!("default.toml");
+
+/// A set of cases: where they are sampled and what is done with each.
+///
+/// Everything but `name` and `cases` decides results and therefore the campaign's identity; so a
+/// campaign may be given more cases later and stays itself.
+#[derive(Clone, Debug, Serialize)]
+pub struct Campaign {
+    /// What people call it.
+    pub name: String,
+    /// How many cases it has.
+    pub cases: u32,
+    /// Whether the sequence of its points follows from that number, for the file names none.
+    #[serde(skip)]
+    pub sequence_by_cases: bool,
+    /// What decides the results.
+    #[serde(flatten)]
+    pub definition: Definition,
+}
+
+/// What makes a campaign itself: equal definitions have equal cases and equal results.
+#[derive(Clone, Debug, Serialize)]
+pub struct Definition {
+    /// Seed of the sample points and of every case's surface.
+    pub seed: u64,
+    /// Sequence that the sample points come from.
+    pub sequence: Sequence,
+    /// The varied parameters and their ranges.
+    pub space: ParameterSpace,
+    /// The values of the parameters that don't vary, in catalogue order.
+    pub fixed: [f64; Parameter::COUNT],
+    /// Whether every case has an irregularity of its own.
+    #[serde(skip_serializing_if = "Surfaces::is_default")]
+    pub surfaces: Surfaces,
+    /// What is simulated and measured in each case.
+    pub experiment: Experiment,
+}
+
+/// Which irregularity the cases run over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Surfaces {
+    /// Every case has its own, as every stretch of a real track has.
+    #[default]
+    PerCase,
+    /// All cases share one, scaled by the level: models learn that surface by heart and are of no
+    /// use for a recording, but this may be how the paper's library was made.
+    Shared,
+}
+
+impl Surfaces {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// Why a campaign file is refused; one line each.
+#[derive(Debug, thiserror::Error)]
+pub enum SpecError {
+    /// The file can't be read.
+    #[error("{0}")]
+    Unreadable(#[from] tracktwin_files::FilesError),
+    /// Not TOML, an unknown key, or a value of the wrong type.
+    #[error("{path}:{line}: {message}")]
+    Malformed {
+        /// The file.
+        path: String,
+        /// The line, from 1.
+        line: usize,
+        /// What the parser said.
+        message: String,
+    },
+    /// A name that terminals, pages and commands can't take.
+    #[error(
+        "{path}: name: {name:?} must begin with a letter or digit and have up to {NAME_CHARACTERS_MAX} \
+         letters, digits, spaces, and . _ - +"
+    )]
+    Name {
+        /// The file.
+        path: String,
+        /// The name.
+        name: String,
+    },
+    /// A range is wrong.
+    #[error("{path}: parameters.{source}")]
+    Space {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        source: SpaceError,
+    },
+    /// The simulation can't be done as described.
+    #[error("{path}: {source}")]
+    Experiment {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        source: ExperimentError,
+    },
+    /// A number can't be what it is given for.
+    #[error("{path}: {key}: {source}")]
+    Number {
+        /// The file.
+        path: String,
+        /// The key.
+        key: String,
+        /// Why not.
+        source: QuantityError,
+    },
+    /// No case at all.
+    #[error("{path}: cases: a campaign needs at least one case")]
+    NoCases {
+        /// The file.
+        path: String,
+    },
+    /// More cases than the sequence has points.
+    #[error(
+        "{path}: cases: the owen_scrambled sequence repeats beyond {OWEN_POINTS_MAX} points and \
+         {cases} are asked for; write `sequence = \"rotated\"`"
+    )]
+    SequenceExhausted {
+        /// The file.
+        path: String,
+        /// The cases asked for.
+        cases: u32,
+    },
+}
+
+/// The campaign file as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: String,
+    seed: u64,
+    cases: u32,
+    #[serde(default)]
+    preset: Preset,
+    sequence: Option<Sequence>,
+    #[serde(default)]
+    surfaces: Surfaces,
+    speeds_km_h: Option<Vec<f64>>,
+    #[serde(default)]
+    parameters: BTreeMap<Parameter, Range>,
+    #[serde(default)]
+    simulation: Simulation,
+    #[serde(default)]
+    features: FeatureDefinition,
+    #[serde(default)]
+    extension: Vec<SampledExtension>,
+}
+
+/// How a parameter is given.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "expected a number, [low, high] or { low, high, scale }")]
+enum Range {
+    Fixed(f64),
+    Between([f64; 2]),
+    Scaled { low: f64, high: f64, scale: Scale },
+}
+
+impl Range {
+    /// The numbers that were given.
+    fn values(self) -> Vec<f64> {
+        match self {
+            Self::Fixed(value) => vec![value],
+            Self::Between(ends) => ends.to_vec(),
+            Self::Scaled { low, high, .. } => vec![low, high],
+        }
+    }
+}
+
+/// The numerical settings that a campaign may change.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Simulation {
+    spans: Option<usize>,
+    rail_elements_per_span: Option<usize>,
+    sleeper_elements: Option<usize>,
+    time_step_s: Option<f64>,
+    run_in_spans: Option<f64>,
+    local_flexibility: Option<bool>,
+}
+
+impl Campaign {
+    /// Reads a campaign file; `cases`, if given, takes the place of the file's own number.
+    ///
+    /// # Errors
+    /// [`SpecError`] says in one line what is wrong, where, and how to mend it.
+    pub fn read(path: &Path, cases: Option<u32>) -> Result<Self, SpecError> {
+        let shown = path.display().to_string();
+        let text = tracktwin_files::read_text(path)?;
+        Self::parse(&text, &shown, cases)
+    }
+
+    /// The campaign that is simulated where none is named.
+    ///
+    /// # Errors
+    /// As [`Campaign::read`], for a number of cases that can't be.
+    pub fn built_in(cases: Option<u32>) -> Result<Self, SpecError> {
+        Self::parse(DEFAULT, "built-in campaign", cases)
+    }
+
+    /// Reads a campaign from text, which errors call `path`.
+    ///
+    /// # Errors
+    /// As [`Campaign::read`], the file's own apart.
+    pub fn parse(text: &str, path: &str, cases: Option<u32>) -> Result<Self, SpecError> {
+        let file: File = toml::from_str(text).map_err(|error| SpecError::Malformed {
+            path: path.to_owned(),
+            line: line_of(text, error.span()),
+            message: error.message().lines().collect::<Vec<_>>().join(" "),
+        })?;
+        file.check(path, cases)
+    }
+
+    /// The name in the library: the given name and the hash of the definition.
+    pub fn id(&self) -> String {
+        format!("{}-{}", self.name, &self.definition_hash()[..12])
+    }
+
+    /// Hash (BLAKE3, hexadecimal) of [`Campaign::definition_json`].
+    pub fn definition_hash(&self) -> String {
+        blake3::hash(self.definition_json().as_bytes()).to_hex().to_string()
+    }
+
+    /// What decides the results, as canonical JSON.
+    pub fn definition_json(&self) -> String {
+        serde_json::to_string(&self.definition).expect("numbers and names become JSON")
+    }
+}
+
+impl File {
+    fn check(self, path: &str, cases: Option<u32>) -> Result<Campaign, SpecError> {
+        let is_name = |c: char| c.is_alphanumeric() || " ._-+".contains(c);
+        let fits = (1..=NAME_CHARACTERS_MAX).contains(&self.name.chars().count());
+        let begins = self.name.starts_with(char::is_alphanumeric);
+        if !fits || !begins || !self.name.chars().all(is_name) {
+            return Err(SpecError::Name { path: path.to_owned(), name: self.name });
+        }
+        let cases = cases.unwrap_or(self.cases);
+        if cases == 0 {
+            return Err(SpecError::NoCases { path: path.to_owned() });
+        }
+        CASES.check(f64::from(cases)).map_err(|source| number(path, "cases", source))?;
+        let sequence = self.sequence.unwrap_or(Sequence::for_cases(cases));
+        if sequence == Sequence::OwenScrambled && cases > OWEN_POINTS_MAX {
+            return Err(SpecError::SequenceExhausted { path: path.to_owned(), cases });
+        }
+        let (space, fixed) = self.sampled(path)?;
+        let experiment = self
+            .experiment()
+            .map_err(|source| SpecError::Experiment { path: path.to_owned(), source })?;
+        let fixed = *fixed.values();
+        let (seed, surfaces) = (self.seed, self.surfaces);
+        let definition = Definition { seed, sequence, space, fixed, surfaces, experiment };
+        let sequence_by_cases = self.sequence.is_none();
+        Ok(Campaign { name: self.name, cases, sequence_by_cases, definition })
+    }
+
+    /// The sampled space, and the values of what isn't sampled.
+    fn sampled(&self, path: &str) -> Result<(ParameterSpace, ParameterSet), SpecError> {
+        let mut axes = Vec::new();
+        let mut fixed = self.preset.nominal();
+        for &parameter in Parameter::ALL {
+            let linear = |low, high| Axis { parameter, low, high, scale: Scale::Linear };
+            match self.parameters.get(&parameter) {
+                None => axes.push(self.preset.axis(parameter)),
+                Some(&Range::Between([low, high])) => axes.push(linear(low, high)),
+                Some(&Range::Scaled { low, high, scale }) => {
+                    axes.push(Axis { parameter, low, high, scale });
+                }
+                Some(&Range::Fixed(value)) => fixed[parameter] = value,
+            }
+            let given = self.parameters.get(&parameter);
+            for value in given.map(|range| range.values()).unwrap_or_default() {
+                let key = format!("parameters.{parameter}");
+                let checked = parameter.quantity().check(value);
+                checked.map_err(|source| number(path, &key, source))?;
+            }
+        }
+        let space = ParameterSpace::new(axes)
+            .map_err(|source| SpecError::Space { path: path.to_owned(), source })?;
+        Ok((space, fixed))
+    }
+
+    fn experiment(&self) -> Result<Experiment, ExperimentError> {
+        let simulation = &self.simulation;
+        let mut experiment = Experiment::new(self.preset.design());
+        experiment.speeds_km_h =
+            self.speeds_km_h.clone().unwrap_or_else(|| self.preset.speeds_km_h());
+        experiment.features = self.features.clone();
+        experiment.extensions.clone_from(&self.extension);
+        replace(&mut experiment.spans, simulation.spans);
+        replace(&mut experiment.rail_elements_per_span, simulation.rail_elements_per_span);
+        replace(&mut experiment.sleeper_elements, simulation.sleeper_elements);
+        replace(&mut experiment.time_step_s, simulation.time_step_s);
+        replace(&mut experiment.run_in_spans, simulation.run_in_spans);
+        replace(&mut experiment.local_flexibility, simulation.local_flexibility);
+        experiment.checked()
+    }
+}
+
+fn number(path: &str, key: &str, source: QuantityError) -> SpecError {
+    SpecError::Number { path: path.to_owned(), key: key.to_owned(), source }
+}
+
+fn replace<T>(setting: &mut T, chosen: Option<T>) {
+    if let Some(value) = chosen {
+        *setting = value;
+    }
+}
+
+/// The line, from 1, at which a span of `text` begins.
+fn line_of(text: &str, span: Option<std::ops::Range<usize>>) -> usize {
+    let start = span.map_or(0, |span| span.start.min(text.len()));
+    text[..start].matches('\n').count() + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(change: impl Fn(&str) -> String) -> String {
+        Campaign::parse(&change(DEFAULT), "c.toml", None).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_built_in_campaign_is_table_d1_at_the_paper_s_speeds() {
+        let campaign = Campaign::built_in(None).unwrap();
+        assert_eq!(campaign.definition.space, Preset::VTrack.space());
+        assert_eq!(campaign.definition.experiment.speeds_km_h, [7.0, 10.0, 13.0]);
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line() {
+        let message = refusal(|text| format!("speeed_km_h = [7]\n{text}"));
+        assert!(message.starts_with("c.toml:1: unknown field `speeed_km_h`"), "{message}");
+        assert!(message.contains("speeds_km_h") && !message.contains('\n'), "{message}");
+    }
+
+    #[test]
+    fn a_name_is_one_that_can_be_shown_and_typed() {
+        for good in ["v-track", "Gleis 2.1", "Übung_1+"] {
+            Campaign::parse(&format!("name = \"{good}\"\nseed = 1\ncases = 1"), "f", None).unwrap();
+        }
+        for wrong in ["", " ", "-rf", "\\u001b[31mred", "a\\nb", "a/b", &"x".repeat(65)] {
+            let text = format!("name = \"{wrong}\"\nseed = 1\ncases = 1");
+            let error = Campaign::parse(&text, "f", None).unwrap_err();
+            assert!(matches!(error, SpecError::Name { .. }), "{wrong}: {error}");
+            assert!(!error.to_string().contains('\u{1b}'), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_reversed_range_is_named() {
+        let message =
+            refusal(|text| format!("{text}\n[parameters]\nballast_stiffness_N_m = [22e6, 4e6]"));
+        assert!(message.starts_with("c.toml: parameters.ballast_stiffness_N_m: "), "{message}");
+    }
+
+    #[test]
+    fn an_unknown_parameter_is_named_with_the_known_ones() {
+        let message = refusal(|text| format!("{text}\n[parameters]\npad_stiffness = [1, 2]"));
+        assert!(message.contains("`pad_stiffness`") && message.contains("railpad_stiffness_N_m"));
+    }
+
+    #[test]
+    fn an_extension_joins_the_experiment_or_is_refused_with_the_reason() {
+        let text = format!(
+            "{DEFAULT}\n[[extension]]\nphysics = \"hanging_sleeper\"\nsleepers = [19]\n\
+             share = 0.5\ngap_m = {{ low = 2e-5, high = 4e-4, scale = \"logarithmic\" }}\n"
+        );
+        let campaign = Campaign::parse(&text, "c.toml", None).unwrap();
+        assert_eq!(campaign.definition.experiment.extensions.len(), 1);
+        assert_ne!(campaign.id(), Campaign::built_in(None).unwrap().id());
+        let missing = text.replace("gap_m", "gap");
+        let message = Campaign::parse(&missing, "c.toml", None).unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "c.toml: extension: hanging_sleeper: has no parameter `gap`; it has gap_m"
+        );
+    }
+
+    #[test]
+    fn more_cases_than_the_sequence_has_points_need_another_sequence() {
+        let many = Some(OWEN_POINTS_MAX + 1);
+        let campaign = Campaign::parse(DEFAULT, "c.toml", many).unwrap();
+        assert_eq!(campaign.definition.sequence, Sequence::Rotated);
+        let text = format!("sequence = \"owen_scrambled\"\n{DEFAULT}");
+        let error = Campaign::parse(&text, "c.toml", many).unwrap_err();
+        assert!(error.to_string().contains("write `sequence = \"rotated\"`"));
+    }
+
+    #[test]
+    fn more_cases_leave_the_identity_as_it_was() {
+        let few = Campaign::built_in(Some(10)).unwrap();
+        let many = Campaign::built_in(Some(1000)).unwrap();
+        assert_eq!(few.id(), many.id());
+        let other = Campaign::parse(&DEFAULT.replace("seed = 1", "seed = 2"), "", None).unwrap();
+        assert_ne!(few.id(), other.id());
+    }
+}

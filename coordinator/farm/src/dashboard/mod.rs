@@ -1,0 +1,15 @@
+//! What people and Prometheus see of a farm: pages and metrics over HTTP.
+//!
+//! Owns routes, the token of those who may press buttons, the way from the library to what is shown,
+//! and how it looks.
+
+mod metrics;
+mod page;
+mod routes;
+mod status;
+mod view;
+
+pub use page::{farm_page, farm_view};
+pub use routes::{Dashboard, serve};
+pub use status::{Farm, FarmCampaign, FarmWorker, duration};
+pub use view::{Detail, farm};

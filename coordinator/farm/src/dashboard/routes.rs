@@ -1,0 +1,217 @@
+//! Addresses, and who may do what at them.
+
+use super::metrics;
+use super::page::{farm_page, farm_view};
+use super::view::{Detail, farm};
+use crate::dispatch::Counts;
+use crate::security::{Guard, Security};
+use axum::extract::{Form, Path, Request, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::{self, Next};
+use axum::response::{Html, IntoResponse, Redirect, Response};
+use axum::routing::{get, post};
+use axum::{Extension, Router};
+use serde::Deserialize;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tracktwin_library::{Library, LibraryError, Retry};
+use tracktwin_worker::Port;
+
+/// The cookie of those who have shown the token.
+const COOKIE: &str = "tracktwin";
+
+/// Nothing is loaded from elsewhere, and nobody may frame the page.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
+                      connect-src 'self'; form-action 'self'; frame-ancestors 'none'";
+
+/// What the pages are made of.
+#[derive(Clone)]
+pub struct Dashboard(Arc<Inner>);
+
+struct Inner {
+    library: Library,
+    counts: Counts,
+    guard: Guard,
+    /// What the cookie must hold: a hash of the token, so that the token itself is not kept.
+    key: Option<String>,
+    /// Whether whoever reaches the farm's ports may do what there is to do.
+    open: bool,
+    /// Whether only this machine can reach the port.
+    loopback: bool,
+}
+
+impl Dashboard {
+    /// Pages about a library. Only who has shown the token may press buttons; without one nobody, where
+    /// workers must show certificates, for no page can ask for those.
+    pub fn new(library: Library, counts: Counts, security: &Security, address: SocketAddr) -> Self {
+        let token = security.token.as_deref();
+        let open = token.is_none() && security.client_ca_pem.is_none();
+        let key =
+            |token: &str| blake3::derive_key("tracktwin dashboard 1", token.trim().as_bytes());
+        let key = token.map(|token| blake3::Hash::from_bytes(key(token)).to_hex().to_string());
+        let (guard, loopback) = (Guard::new(token), address.ip().is_loopback());
+        Self(Arc::new(Inner { library, counts, guard, key, open, loopback }))
+    }
+
+    /// Whether the caller may press buttons: by the cookie, or by the token itself.
+    ///
+    /// Where nothing is demanded, nobody else can reach the port, or the network was said to be trusted.
+    fn admits(&self, headers: &HeaderMap) -> bool {
+        let Some(key) = &self.0.key else { return self.0.open };
+        let authorization = headers.get(header::AUTHORIZATION).map(HeaderValue::as_bytes);
+        let cookies = headers.get_all(header::COOKIE).iter().filter_map(|it| it.to_str().ok());
+        let mut cookies = cookies.flat_map(|it| it.split(';')).map(str::trim);
+        let shown = cookies.find_map(|it| it.strip_prefix(COOKIE)?.strip_prefix('='));
+        // Hashes are compared in constant time.
+        let same = |shown: &str| blake3::hash(shown.as_bytes()) == blake3::hash(key.as_bytes());
+        authorization.is_some_and(|it| self.0.guard.admits(Some(it))) || shown.is_some_and(same)
+    }
+}
+
+/// Serves pages on a port until told to stop.
+pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: CancellationToken) {
+    let routes = Router::new()
+        .route("/", get(page))
+        .route("/view", get(view))
+        .route("/login", post(login))
+        .route("/campaign/{action}", post(control))
+        .route("/metrics", get(numbers))
+        .route("/healthz", get(healthz))
+        .layer(middleware::from_fn_with_state(dashboard.clone(), same_origin))
+        .with_state(dashboard);
+    let served =
+        axum::serve(Port::new(listener), routes).with_graceful_shutdown(stop.cancelled_owned());
+    if let Err(error) = served.await {
+        tracing::error!("the dashboard is no longer served: {error}");
+    }
+}
+
+/// Turns away what another site's page sends, and marks who may press buttons.
+async fn same_origin(
+    State(dashboard): State<Dashboard>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let headers = request.headers();
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    let host = text(header::HOST).unwrap_or_default();
+    // `null`, of a page in a sandbox, is another site as well.
+    let ours = |origin: &HeaderValue| {
+        let origin = origin.to_str().ok().and_then(|it| it.split_once("://"));
+        origin.is_some_and(|(_, origin)| origin == host)
+    };
+    if headers.get(header::ORIGIN).is_some_and(|origin| !ours(origin)) {
+        return (StatusCode::FORBIDDEN, "from another site\n").into_response();
+    }
+    // A name that leads here is somebody else's, unless it says that it is this machine.
+    let local = |host: &str| {
+        let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
+        name == "localhost" || name.trim_matches(['[', ']']).parse::<std::net::IpAddr>().is_ok()
+    };
+    if dashboard.0.loopback && !local(host) {
+        return (StatusCode::FORBIDDEN, "not this machine's name\n").into_response();
+    }
+    let may_control = MayControl(dashboard.admits(headers));
+    request.extensions_mut().insert(may_control);
+    let mut response = next.run(request).await;
+    let policy = HeaderValue::from_static(POLICY);
+    response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, policy);
+    response
+}
+
+/// Whether the caller may press buttons.
+#[derive(Clone, Copy)]
+struct MayControl(bool);
+
+async fn page(
+    State(dashboard): State<Dashboard>,
+    Extension(MayControl(may_control)): Extension<MayControl>,
+) -> Result<Html<String>, Failed> {
+    let mut farm = farm(&dashboard.0.library, Detail::Pictures).await?;
+    farm.may_control = may_control;
+    Ok(Html(farm_page(&farm)))
+}
+
+async fn view(
+    State(dashboard): State<Dashboard>,
+    Extension(MayControl(may_control)): Extension<MayControl>,
+) -> Result<Html<String>, Failed> {
+    let mut farm = farm(&dashboard.0.library, Detail::Pictures).await?;
+    farm.may_control = may_control;
+    Ok(Html(farm_view(&farm).into_string()))
+}
+
+#[derive(Deserialize)]
+struct Login {
+    token: String,
+}
+
+async fn login(State(dashboard): State<Dashboard>, Form(login): Form<Login>) -> Response {
+    let header = format!("Bearer {}", login.token.trim());
+    let key =
+        dashboard.0.key.as_ref().filter(|_| dashboard.0.guard.admits(Some(header.as_bytes())));
+    let Some(key) = key else {
+        tracing::warn!("a wrong token was shown to the dashboard");
+        return (StatusCode::FORBIDDEN, "the token is wrong\n").into_response();
+    };
+    let cookie = format!("{COOKIE}={key}; HttpOnly; SameSite=Strict; Path=/");
+    ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response()
+}
+
+#[derive(Deserialize)]
+struct Chosen {
+    campaign: String,
+}
+
+async fn control(
+    State(dashboard): State<Dashboard>,
+    Extension(MayControl(may_control)): Extension<MayControl>,
+    Path(action): Path<String>,
+    Form(Chosen { campaign }): Form<Chosen>,
+) -> Result<Response, Failed> {
+    if !may_control {
+        return Ok((StatusCode::FORBIDDEN, "show the token first\n").into_response());
+    }
+    let library = &dashboard.0.library;
+    match action.as_str() {
+        "pause" => library.pause(&campaign).await?,
+        "resume" => library.resume(&campaign).await?,
+        "retry" => library.retry(&campaign, Retry::Failed).await.map(drop)?,
+        _ => return Ok((StatusCode::NOT_FOUND, "no such action\n").into_response()),
+    }
+    tracing::info!(campaign, action, "asked for at the dashboard");
+    Ok(Redirect::to("/").into_response())
+}
+
+async fn numbers(State(dashboard): State<Dashboard>) -> Result<String, Failed> {
+    let farm = farm(&dashboard.0.library, Detail::Counts).await?;
+    Ok(metrics::text(&farm, &dashboard.0.counts))
+}
+
+/// Well is a coordinator whose library answers.
+async fn healthz(State(dashboard): State<Dashboard>) -> Result<&'static str, Failed> {
+    dashboard.0.library.overview().await?;
+    Ok("serving\n")
+}
+
+/// The library does not answer.
+struct Failed(LibraryError);
+
+impl From<LibraryError> for Failed {
+    fn from(error: LibraryError) -> Self {
+        Self(error)
+    }
+}
+
+impl IntoResponse for Failed {
+    fn into_response(self) -> Response {
+        let code = if self.0.is_wrong_input() {
+            StatusCode::BAD_REQUEST
+        } else {
+            StatusCode::SERVICE_UNAVAILABLE
+        };
+        (code, format!("{}\n", self.0)).into_response()
+    }
+}

@@ -1,0 +1,250 @@
+//! Has a share of the finished cases simulated again by another worker, and compares.
+//!
+//! An auditor does not know that it is one. Where two workers differ, this machine simulates the
+//! case itself and finds out which of them is wrong.
+
+use super::campaigns::{Campaigns, Served};
+use super::settings::Settings;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::time::Instant;
+use tracktwin_experiment::Outcome;
+use tracktwin_experiment::{Case, Prepare};
+use tracktwin_library::{Audit, AuditFinding, Library, LibraryError};
+use tracktwin_protocol::{CaseLease, CaseReport, LeasedCase};
+use tracktwin_signal::Features;
+
+/// The lease number of audited cases: the library counts real ones from 1.
+pub(crate) const EPOCH: u32 = 0;
+
+/// Largest difference of a one-third-octave level between two workers, in dB.
+///
+/// Sound machines differ by rounding only, where their vector units order sums differently: far
+/// below a hundredth. What the surface's chance leaves uncertain in a level is a third of a dB.
+const TOLERANCE_DB: f64 = 0.05;
+
+/// Cases of one audit lease: one group.
+const CASES: u32 = tracktwin_worker::agent::GROUP as u32;
+
+/// How long an auditor may take, for its leases are not renewed.
+const LEASE: Duration = Duration::from_mins(10);
+
+/// Pause after there was nothing to audit.
+const PAUSE: Duration = Duration::from_secs(2);
+
+/// Audits under way.
+pub(crate) struct Audits {
+    library: Library,
+    share: f64,
+    prepare: Prepare,
+    under_way: Mutex<HashMap<(String, u32), (String, Audit)>>,
+    next: Mutex<Option<Instant>>,
+}
+
+impl Audits {
+    pub(crate) fn new(library: Library, settings: &Settings) -> Self {
+        let Settings { audit_share, prepare, .. } = settings;
+        Self {
+            library,
+            share: *audit_share,
+            prepare: *prepare,
+            under_way: Mutex::default(),
+            next: Mutex::default(),
+        }
+    }
+
+    /// So many cases for a worker to audit at most, if there are any.
+    pub(crate) async fn lease(
+        &self,
+        worker: &str,
+        cases_max: u32,
+        campaigns: &Campaigns,
+    ) -> Result<Option<CaseLease>, LibraryError> {
+        if self.share <= 0.0 || !self.is_time() {
+            return Ok(None);
+        }
+        let cases_max = cases_max.min(CASES);
+        for campaign in self.library.campaigns().await? {
+            // One that this version can't do must not hold up the others.
+            let Ok(served) = campaigns.of(&campaign.id).await else { continue };
+            let lease_ms = i64::try_from(LEASE.as_millis()).unwrap_or(i64::MAX);
+            let sample =
+                self.library.audit_sample(&campaign.id, worker, cases_max, lease_ms).await?;
+            if sample.is_empty() {
+                continue;
+            }
+            let cases = sample.iter().map(|it| LeasedCase { case: it.case.clone(), epoch: EPOCH });
+            let lease = served.lease(cases.collect());
+            for audit in sample {
+                self.put(worker.to_owned(), audit);
+            }
+            *self.next.lock().expect("nobody panics while holding it") = None;
+            return Ok(Some(lease));
+        }
+        Ok(None)
+    }
+
+    /// Takes back what an auditor will not do.
+    pub(crate) async fn release(
+        &self,
+        worker: &str,
+        campaign: &str,
+        indices: Vec<u32>,
+    ) -> Result<(), LibraryError> {
+        for &index in &indices {
+            self.take(worker, campaign, index);
+        }
+        self.library.release_audits(campaign, worker, indices).await
+    }
+
+    fn put(&self, worker: String, audit: Audit) {
+        let key = (audit.campaign.clone(), audit.case.index);
+        self.under_way.lock().expect("nobody panics while holding it").insert(key, (worker, audit));
+    }
+
+    /// What a worker was asked to audit; another's audit stays.
+    fn take(&self, worker: &str, campaign: &str, index: u32) -> Option<Audit> {
+        let mut under_way = self.under_way.lock().expect("nobody panics while holding it");
+        match under_way.entry((campaign.to_owned(), index)) {
+            Entry::Occupied(entry) if entry.get().0 == worker => Some(entry.remove().1),
+            _ => None,
+        }
+    }
+
+    /// Whether there may be something to audit; the next to ask waits for a while.
+    fn is_time(&self) -> bool {
+        let now = Instant::now();
+        let mut next = self.next.lock().expect("nobody panics while holding it");
+        let is_time = next.is_none_or(|next| next <= now);
+        if is_time {
+            *next = Some(now + PAUSE);
+        }
+        is_time
+    }
+
+    /// Takes what an auditor found. Answers whether it was asked, and who was wrong, if somebody.
+    ///
+    /// It is gone through with even if nobody waits for the answer any more.
+    pub(crate) async fn report(
+        self: &Arc<Self>,
+        worker: &str,
+        served: &Arc<Served>,
+        report: CaseReport,
+    ) -> Result<Option<Found>, LibraryError> {
+        let Some(audit) = self.take(worker, &served.record.id, report.index) else {
+            return Ok(None);
+        };
+        let (this, worker, served) = (self.clone(), worker.to_owned(), served.clone());
+        let compare = async move {
+            let found = this.compare(&worker, served, &audit, &report.outcome).await;
+            if found.is_err() {
+                // The auditor reports again.
+                this.put(worker, audit);
+            }
+            found
+        };
+        tokio::spawn(compare).await.expect("comparing does not panic")
+    }
+
+    async fn compare(
+        &self,
+        worker: &str,
+        served: Arc<Served>,
+        audit: &Audit,
+        outcome: &Outcome,
+    ) -> Result<Option<Found>, LibraryError> {
+        let (campaign, index) = (&audit.campaign, audit.case.index);
+        let Some(entry) = self.library.entry(campaign, index).await? else { return Ok(None) };
+        let difference_db = difference(&entry.features, outcome);
+        let agrees = difference_db <= TOLERANCE_DB;
+        let wrong = if agrees {
+            None
+        } else {
+            let judged = self.judge(served, audit.case.clone()).await;
+            judged.map(|judged| {
+                let stored_is_right = difference(&entry.features, &judged) <= TOLERANCE_DB;
+                if stored_is_right { worker } else { audit.worker.as_str() }
+            })
+        };
+        let reason = format!(
+            "case {index} of {campaign} by {} and {worker} differs by {difference_db:.2} dB",
+            audit.worker
+        );
+        let finding = AuditFinding { agrees, difference_db };
+        let blame = wrong.map(|wrong| (wrong, reason.as_str()));
+        let kept = self.library.audited(campaign, index, worker, finding, blame).await?;
+        if agrees || kept.is_none() {
+            return Ok(Some(Found::Agreement));
+        }
+        let Some(wrong) = wrong else {
+            tracing::error!("{reason}; this machine could not simulate it, so nobody is blamed");
+            return Ok(Some(Found::Unjudged));
+        };
+        tracing::error!(worker = wrong, "quarantined: {reason}");
+        Ok(Some(Found::Wrong { worker: wrong.to_owned(), reason }))
+    }
+
+    /// What this machine makes of a case, if it can simulate it.
+    async fn judge(&self, served: Arc<Served>, case: Case) -> Option<Outcome> {
+        let prepare = self.prepare;
+        let simulate = move || {
+            let simulation = prepare(&served.experiment).ok()?;
+            simulation.simulate(&[case]).pop().filter(|it| matches!(it, Outcome::Finished(_)))
+        };
+        tokio::task::spawn_blocking(simulate).await.ok().flatten()
+    }
+}
+
+/// What came of an audit.
+pub(crate) enum Found {
+    /// Both agree, or it is known already.
+    Agreement,
+    /// They differ, and nobody knows who is wrong.
+    Unjudged,
+    /// A worker is wrong, and was put into quarantine.
+    Wrong {
+        /// Which.
+        worker: String,
+        /// What speaks against it.
+        reason: String,
+    },
+}
+
+/// Largest difference of a level between what is stored and what was found, in dB.
+fn difference(stored: &[Features], found: &Outcome) -> f64 {
+    let Outcome::Finished(passes) = found else { return f64::INFINITY };
+    if passes.len() != stored.len() {
+        return f64::INFINITY;
+    }
+    let pairs = stored
+        .iter()
+        .zip(passes)
+        .flat_map(|(stored, pass)| stored.band_levels_db.iter().zip(&pass.features.band_levels_db));
+    pairs.map(|(stored, found)| (stored - found).abs()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_experiment::PassFeatures;
+
+    #[test]
+    fn outcomes_differ_by_their_worst_level() {
+        let features =
+            |levels: [f64; 2]| Features { log_power: vec![0.0], band_levels_db: levels.to_vec() };
+        let pass = |levels| PassFeatures {
+            speed_km_h: 7.0,
+            features: features(levels),
+            contact_loss_share: None,
+        };
+        let stored = [features([1.0, 2.0]), features([3.0, 4.0])];
+        let found = Outcome::Finished(vec![pass([1.0, 2.5]), pass([2.8, 4.0])]);
+        assert!((difference(&stored, &found) - 0.5).abs() < 1e-12);
+        let short = Outcome::Finished(vec![pass([1.0, 2.0])]);
+        assert_eq!(difference(&stored, &short), f64::INFINITY);
+        let failed = Outcome::Failed { reason: "?".to_owned() };
+        assert_eq!(difference(&stored, &failed), f64::INFINITY);
+    }
+}

@@ -1,0 +1,91 @@
+//! The campaigns whose cases are handed out, as messages need them.
+
+use super::Pace;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+use tracktwin_experiment::{Experiment, ExperimentError};
+use tracktwin_library::{CampaignRecord, Library, LibraryError};
+use tracktwin_protocol::Shape;
+
+/// Why a campaign can't be dispatched.
+#[derive(Debug, thiserror::Error)]
+pub enum DispatchError {
+    /// The library can't be read.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
+    /// Its experiment can't be done by this version.
+    #[error("campaign {campaign}: {source}")]
+    Experiment {
+        /// The campaign.
+        campaign: String,
+        /// Why not.
+        source: ExperimentError,
+    },
+}
+
+/// A campaign, and what its messages must look like.
+pub(crate) struct Served {
+    pub(crate) record: CampaignRecord,
+    pub(crate) experiment: Experiment,
+    pub(crate) shape: Shape,
+    pace: Mutex<Pace>,
+}
+
+impl Served {
+    fn new(record: CampaignRecord) -> Result<Self, DispatchError> {
+        let experiment = Experiment::from_json(&record.experiment_json)
+            .map_err(|source| DispatchError::Experiment { campaign: record.id.clone(), source })?;
+        let shape = Shape {
+            bins: experiment.features.frequencies_hz().len(),
+            speeds_km_h: experiment.speeds_km_h.clone(),
+        };
+        Ok(Self { record, experiment, shape, pace: Mutex::default() })
+    }
+
+    /// Takes measured computing times of cases, in s.
+    pub(crate) fn measured(&self, durations_s: impl IntoIterator<Item = f64>) {
+        let mut pace = self.pace.lock().expect("nobody panics while holding it");
+        durations_s.into_iter().for_each(|case_s| pace.measured(case_s));
+    }
+
+    /// Cases of a lease where so many cores are at work.
+    fn cases_per_lease(&self, cores: u32) -> u32 {
+        self.pace.lock().expect("nobody panics while holding it").cases_per_lease(cores)
+    }
+}
+
+/// The campaigns of a library, read when they are first needed: they never change.
+pub(crate) struct Campaigns {
+    library: Library,
+    known: Mutex<HashMap<String, Arc<Served>>>,
+    latest: Mutex<Option<Arc<Served>>>,
+}
+
+impl Campaigns {
+    pub(crate) fn new(library: Library) -> Self {
+        Self { library, known: Mutex::default(), latest: Mutex::default() }
+    }
+
+    /// A campaign of the library.
+    pub(crate) async fn of(&self, id: &str) -> Result<Arc<Served>, DispatchError> {
+        let known = self.known.lock().expect("nobody panics while holding it").get(id).cloned();
+        if let Some(served) = known {
+            return Ok(served);
+        }
+        let served = Arc::new(Served::new(self.library.campaign(id).await?)?);
+        let mut known = self.known.lock().expect("nobody panics while holding it");
+        Ok(known.entry(id.to_owned()).or_insert(served).clone())
+    }
+
+    /// Remembers whose cases were handed out last: the next will most likely be of the same.
+    pub(crate) fn leased(&self, served: &Arc<Served>) {
+        *self.latest.lock().expect("nobody panics while holding it") = Some(served.clone());
+    }
+
+    /// Cases of the next lease, as far as one can know before.
+    pub(crate) fn cases_per_lease(&self, cores: u32) -> u32 {
+        let latest = self.latest.lock().expect("nobody panics while holding it");
+        let unknown = || Pace::default().cases_per_lease(cores);
+        latest.as_ref().map_or_else(unknown, |it| it.cases_per_lease(cores))
+    }
+}

@@ -1,0 +1,54 @@
+//! Between the values of messages and those of the library.
+
+use std::error::Error;
+use tonic::Status;
+use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
+use tracktwin_library::{Held, LibraryError, Verdict};
+use tracktwin_protocol::{BadMessage, PROTOCOL_VERSION, Registration, farm, held_from_messages};
+
+/// Why a worker is of no use here, if so, and what mends it.
+pub(crate) fn unfit(registration: &Registration) -> Option<String> {
+    let Registration { worker, code_version, model_hash, protocol_version, .. } = registration;
+    if *protocol_version != PROTOCOL_VERSION {
+        let mend = if *protocol_version < PROTOCOL_VERSION {
+            "update the worker to the coordinator's version"
+        } else {
+            "install the coordinator's version on the worker, or update the coordinator"
+        };
+        return Some(format!(
+            "worker {worker} (version {code_version}) speaks protocol {protocol_version}, this \
+             coordinator (version {CODE_VERSION}) speaks {PROTOCOL_VERSION}: {mend}"
+        ));
+    }
+    (model_hash != MODEL_HASH).then(|| {
+        format!(
+            "worker {worker} simulates other physics than this coordinator: its model hash is \
+             {model_hash} (version {code_version}), here it is {MODEL_HASH} (version \
+             {CODE_VERSION}); install the coordinator's version"
+        )
+    })
+}
+
+pub(crate) fn held(messages: Vec<farm::HeldCase>) -> Result<Vec<Held>, Status> {
+    let held = held_from_messages(messages).map_err(|error| malformed(&error))?;
+    Ok(held.into_iter().map(|(index, epoch)| Held { index, epoch }).collect())
+}
+
+pub(crate) const fn verdict_message(verdict: Verdict) -> farm::Verdict {
+    match verdict {
+        Verdict::Stored => farm::Verdict::Stored,
+        Verdict::Duplicate => farm::Verdict::Duplicate,
+        Verdict::Late => farm::Verdict::Late,
+        Verdict::Refused => farm::Verdict::Refused,
+    }
+}
+
+pub(crate) fn malformed(error: &BadMessage) -> Status {
+    Status::invalid_argument(error.to_string())
+}
+
+/// The worker asks again; what is wrong with the library is the coordinator's to say.
+pub(crate) fn unavailable(error: &LibraryError) -> Status {
+    tracing::error!(error = error as &dyn Error, "the library does not do what is asked");
+    Status::unavailable(error.to_string())
+}

@@ -1,0 +1,132 @@
+//! Workers' results, into the library.
+
+use super::Dispatch;
+use crate::dispatch::after_attempt;
+use crate::dispatch::audits::{self, Found};
+use crate::dispatch::campaigns::Served;
+use crate::dispatch::messages::{unavailable, verdict_message};
+use crate::dispatch::roster::Standing;
+use std::sync::Arc;
+use tonic::Status;
+use tracktwin_experiment::Outcome;
+use tracktwin_library::{Report, Verdict, WorkerState};
+use tracktwin_protocol::{CaseReport, farm};
+use tracktwin_traces::Step;
+
+impl Dispatch {
+    /// Stores checked reports; those of audits are compared instead, and those that arrived damaged (none)
+    /// stay with their worker.
+    pub(super) async fn take_in(
+        &self,
+        worker: &str,
+        standing: Standing,
+        served: &Arc<Served>,
+        reports: Vec<Option<CaseReport>>,
+        step: &Step,
+    ) -> Result<Vec<farm::Verdict>, Status> {
+        let mut verdicts = vec![farm::Verdict::Damaged; reports.len()];
+        let (mut places, mut ordinary) = (Vec::new(), Vec::new());
+        for (place, report) in reports.into_iter().enumerate() {
+            let Some(report) = report else {
+                tracing::warn!(worker, "a case arrived damaged; its worker is to send it again");
+                self.counts.malformed.inc();
+                continue;
+            };
+            if report.epoch == audits::EPOCH {
+                verdicts[place] = verdict_message(self.audited(worker, served, report).await?);
+            } else {
+                places.push(place);
+                ordinary.push(report);
+            }
+        }
+        if !ordinary.is_empty() {
+            let stored = self.store(worker, standing, served, ordinary, step).await?;
+            self.count(&stored);
+            for (place, verdict) in places.into_iter().zip(stored) {
+                verdicts[place] = verdict_message(verdict);
+            }
+        }
+        Ok(verdicts)
+    }
+
+    async fn store(
+        &self,
+        worker: &str,
+        standing: Standing,
+        served: &Served,
+        reports: Vec<CaseReport>,
+        step: &Step,
+    ) -> Result<Vec<Verdict>, Status> {
+        let ended = |it: &CaseReport| (matches!(it.outcome, Outcome::Failed { .. }), it.duration_s);
+        let ended: Vec<_> = reports.iter().map(ended).collect();
+        let step = Step::after("store", [&step.traceparent()]);
+        let report = Report {
+            campaign: served.record.id.clone(),
+            worker: worker.to_owned(),
+            code_version: standing.code_version,
+            model_hash: standing.model_hash,
+            experiment_hash: served.record.experiment_hash.clone(),
+            speeds_km_h: served.shape.speeds_km_h.clone(),
+            cases: reports,
+            now_unix_ms: self.now_unix_ms(),
+            after_failure: after_attempt,
+            audit_share: self.settings.audit_share,
+        };
+        let verdicts = self.library.report(report).await.map_err(|error| {
+            step.fail(&error.to_string());
+            unavailable(&error)
+        })?;
+        // What is said again counts once.
+        let stored = ended.iter().zip(&verdicts).filter(|(_, it)| matches!(it, Verdict::Stored));
+        let (failed, durations_s): (Vec<bool>, Vec<f64>) = stored.map(|(ended, _)| *ended).unzip();
+        step.count("cases_stored", failed.len());
+        drop(step);
+        served.measured(durations_s);
+        if self.settings.put_aside && self.roster.reported(worker, &failed) {
+            tracing::warn!(worker, "put aside: it fails where other workers don't");
+            self.counts.put_aside.inc();
+        }
+        Ok(verdicts)
+    }
+
+    async fn audited(
+        &self,
+        worker: &str,
+        served: &Arc<Served>,
+        report: CaseReport,
+    ) -> Result<Verdict, Status> {
+        let found = self.audits.report(worker, served, report).await;
+        Ok(match found.map_err(|error| unavailable(&error))? {
+            None => {
+                self.counts.refused.inc();
+                Verdict::Refused
+            }
+            Some(Found::Agreement) => {
+                self.counts.audited.inc();
+                Verdict::Duplicate
+            }
+            Some(Found::Unjudged) => {
+                self.counts.audited.inc();
+                self.counts.differed.inc();
+                Verdict::Duplicate
+            }
+            Some(Found::Wrong { worker, reason }) => {
+                self.counts.audited.inc();
+                self.counts.differed.inc();
+                self.roster.quarantine(&worker, WorkerState::Quarantined, Some(reason));
+                Verdict::Duplicate
+            }
+        })
+    }
+
+    fn count(&self, verdicts: &[Verdict]) {
+        for verdict in verdicts {
+            match verdict {
+                Verdict::Stored => self.counts.stored.inc(),
+                Verdict::Duplicate => self.counts.duplicates.inc(),
+                Verdict::Late => self.counts.late.inc(),
+                Verdict::Refused => self.counts.refused.inc(),
+            };
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! The farm in one process: a coordinator, and workers that talk to it as a cluster's would.
+
+use crate::campaign::StoreError;
+use crate::dispatch::{Counts, Dispatch, DispatchError, Scope, Settings, Timing};
+use crate::security::{Security, random_token};
+use crate::serve::{ServeError, serve};
+use std::net::Ipv4Addr;
+use std::num::NonZeroUsize;
+use std::time::{Duration, Instant};
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tracktwin_experiment::{Prepare, prepare_simulation};
+use tracktwin_library::{Claim, Library, LibraryError, Status};
+use tracktwin_worker::agent::{self, AgentError};
+use tracktwin_worker::{Credentials, Holdings, Token};
+
+/// How often the counts are looked at: often enough for a progress bar.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
+
+/// How long a library that does not answer is waited for; as long as a blind trial waits for one.
+const PATIENCE: Duration = Duration::from_mins(10);
+
+/// Why the farm stops.
+#[derive(Debug, thiserror::Error)]
+pub enum FarmError {
+    /// The library fails or refuses.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
+    /// The campaign can't be dispatched.
+    #[error(transparent)]
+    Dispatch(#[from] DispatchError),
+    /// The campaign can't be stored.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The workers stopped.
+    #[error("the workers stopped: {0}")]
+    Worker(#[from] AgentError),
+    /// The service failed.
+    #[error(transparent)]
+    Service(#[from] ServeError),
+    /// There is no port to be had.
+    #[error("the farm's service has no port")]
+    Port(#[from] std::io::Error),
+}
+
+/// What is to be simulated, and by how many.
+#[derive(Clone, Debug)]
+pub struct Task<'a> {
+    /// The campaign.
+    pub campaign: &'a str,
+    /// Its first cases, so many.
+    pub cases: u32,
+    /// Groups of cases simulated at a time.
+    pub cores: NonZeroUsize,
+    /// How long leases last.
+    pub timing: Timing,
+    /// What simulates: the track model, or a stand-in where the farm is tested.
+    pub prepare: Prepare,
+}
+
+impl<'a> Task<'a> {
+    /// The first `cases` cases of a campaign, by the track model.
+    pub fn new(campaign: &'a str, cases: u32, cores: NonZeroUsize) -> Self {
+        let timing = Timing::default();
+        Self { campaign, cases, cores, timing, prepare: prepare_simulation }
+    }
+}
+
+/// The right to hand out a library's cases, which can be written. Whoever has it may add cases: nobody else
+/// will refuse to hand them out.
+///
+/// # Errors
+/// [`LibraryError::InUse`] when another process works on the library, [`LibraryError::NotWritable`].
+pub async fn claim(library: &Library) -> Result<Claim, FarmError> {
+    let claim = library.claim()?;
+    library.check_writable().await?;
+    Ok(claim)
+}
+
+/// [`claim`] and [`run_claimed`] in one.
+///
+/// # Errors
+/// As both.
+pub async fn run_embedded(
+    library: &Library,
+    task: Task<'_>,
+    shutdown: CancellationToken,
+    progress: impl FnMut(Status),
+) -> Result<Status, FarmError> {
+    let claim = claim(library).await?;
+    run_claimed(library, &claim, task, shutdown, progress).await
+}
+
+/// Simulates what a claimed library lacks, by workers in this process, until every case is finished or
+/// given up, or until `shutdown`. Either way the library can be gone on with; it loses no finished
+/// case however the process ends. A library that does not answer is waited for, as the workers do.
+///
+/// `progress` sees the counts now and then.
+///
+/// # Errors
+/// [`FarmError`].
+pub async fn run_claimed(
+    library: &Library,
+    claim: &Claim,
+    task: Task<'_>,
+    shutdown: CancellationToken,
+    mut progress: impl FnMut(Status),
+) -> Result<Status, FarmError> {
+    let own = agent::Config::new(String::new(), task.cores);
+    let dispatch = dispatch(library, claim, &task, own.holdings.clone()).await?;
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
+    let coordinator = format!("http://{}", listener.local_addr()?);
+
+    let stop_working = shutdown.child_token();
+    let stop_serving = CancellationToken::new();
+    // However this ends, nothing goes on behind its back.
+    let _guards = [stop_working.clone().drop_guard(), stop_serving.clone().drop_guard()];
+    let stop = stop_serving.clone();
+    // Other users of the machine reach the port as well.
+    let token = random_token()?.to_string();
+    let credentials = Credentials {
+        token: Some(Token::new(&token).expect("hexadecimal digits are fit for a token")),
+        ..Credentials::default()
+    };
+    let security = Security { token: Some(token), ..Security::default() };
+    let server = tokio::spawn(async move { serve(listener, dispatch, &security, stop).await });
+    let config = agent::Config {
+        prepare: task.prepare,
+        credentials,
+        coordinators: vec![coordinator],
+        ..own
+    };
+    let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
+
+    let mut outage = Outage::default();
+    let ended = loop {
+        library.takes_writes()?;
+        match library.status_of(task.campaign, task.cases).await {
+            Ok(status) => {
+                outage = Outage::default();
+                progress(status);
+                if status.done() == status.total() {
+                    break None;
+                }
+            }
+            Err(error) => outage.goes_on(error)?,
+        }
+        if shutdown.is_cancelled() {
+            break None;
+        }
+        tokio::select! {
+            () = tokio::time::sleep(LOOK_EVERY) => {}
+            () = shutdown.cancelled() => {}
+            ended = &mut worker => break Some(ended),
+        }
+    };
+    // The worker hands in what it has begun, so it must end before the service.
+    stop_working.cancel();
+    let ended = match ended {
+        Some(ended) => ended,
+        None => worker.await,
+    };
+    stop_serving.cancel();
+    server.await.expect("the service does not panic")?;
+    ended.expect("a worker does not panic: what it computes is caught")?;
+    let status = library.status_of(task.campaign, task.cases).await?;
+    progress(status);
+    Ok(status)
+}
+
+/// A library that does not answer, since when.
+#[derive(Default)]
+struct Outage(Option<Instant>);
+
+impl Outage {
+    /// Whether the library may answer later: what has begun meanwhile is not lost, for the workers keep it.
+    ///
+    /// # Errors
+    /// The library's error where no waiting helps, or after [`PATIENCE`].
+    fn goes_on(&mut self, error: LibraryError) -> Result<(), LibraryError> {
+        if !error.is_temporary() {
+            return Err(error);
+        }
+        let since = *self.0.get_or_insert_with(|| {
+            tracing::warn!("{error}; waiting for it for up to {} minutes", PATIENCE.as_secs() / 60);
+            Instant::now()
+        });
+        if since.elapsed() < PATIENCE { Ok(()) } else { Err(error) }
+    }
+}
+
+/// What hands out a campaign's cases.
+async fn dispatch(
+    library: &Library,
+    claim: &Claim,
+    task: &Task<'_>,
+    own: Holdings,
+) -> Result<Dispatch, FarmError> {
+    if claim.is_exclusive() {
+        // Whoever held these died with the process that served it.
+        library.release_all(task.campaign).await?;
+    }
+    // Who runs a campaign that was paused or cancelled means to go on with it.
+    library.resume(task.campaign).await?;
+    let settings = Settings {
+        timing: task.timing,
+        scope: Some(Scope { campaign: task.campaign.to_owned(), cases: task.cases }),
+        // There is no other machine to turn to.
+        put_aside: false,
+        own: Some(own),
+        ..Settings::default()
+    };
+    let dispatch = Dispatch::new(library.clone(), settings, Counts::default());
+    dispatch.check(task.campaign).await?;
+    Ok(dispatch)
+}

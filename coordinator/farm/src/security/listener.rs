@@ -1,0 +1,159 @@
+//! Lets connections in, or turns them away and says why in the log.
+
+use super::peer::{Peer, Stream};
+use super::settings::HTTP2;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::io::AsyncReadExt;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio_rustls::TlsAcceptor;
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::either::Either;
+
+/// Connections at a time: a few thousand nodes. Each costs a file descriptor and some 100 kB.
+const CONNECTIONS_MAX: usize = 4096;
+
+/// Connections that were let in and wait for the service.
+const WAITING_MAX: usize = 64;
+
+/// How long a caller may take to say what it wants; TLS over a slow line takes a second.
+const GREETING: Duration = Duration::from_secs(10);
+
+/// Pause after the system had no connection for us: descriptors come back within moments.
+const SYSTEM_PAUSE: Duration = Duration::from_millis(100);
+
+/// What every HTTP/2 connection begins with (RFC 9113, 3.4).
+const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+
+/// Why a caller is turned away.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error("said nothing for {} s", GREETING.as_secs())]
+    Silent,
+    #[error("spoke neither gRPC nor anything else that is served here")]
+    Stranger,
+    #[error("TLS: {0}")]
+    Tls(std::io::Error),
+    #[error("TLS without HTTP/2")]
+    NoHttp2,
+    #[error("went away: {0}")]
+    Gone(#[from] std::io::Error),
+}
+
+/// The connections of a port, as they are let in. It ends when the stream is dropped.
+///
+/// Each greets in a task of its own, so that a slow or silent caller holds up nobody.
+pub fn accept(
+    listener: TcpListener,
+    tls: Option<TlsAcceptor>,
+) -> ReceiverStream<std::io::Result<Peer>> {
+    let (peers, waiting) = mpsc::channel(WAITING_MAX);
+    let shares = Arc::new(Semaphore::new(CONNECTIONS_MAX));
+    tokio::spawn(async move {
+        loop {
+            let share = shares.clone().acquire_owned().await;
+            let share = share.expect("nobody closes this semaphore");
+            let (stream, address) = tokio::select! {
+                accepted = listener.accept() => match accepted {
+                    Ok(accepted) => accepted,
+                    Err(error) => {
+                        tracing::warn!("a connection could not be taken: {error}");
+                        tokio::time::sleep(SYSTEM_PAUSE).await;
+                        continue;
+                    }
+                },
+                () = peers.closed() => break,
+            };
+            tokio::spawn(let_in(stream, address, tls.clone(), share, peers.clone()));
+        }
+    });
+    ReceiverStream::new(waiting)
+}
+
+async fn let_in(
+    stream: TcpStream,
+    address: SocketAddr,
+    tls: Option<TlsAcceptor>,
+    share: OwnedSemaphorePermit,
+    peers: mpsc::Sender<std::io::Result<Peer>>,
+) {
+    let greeted = tokio::time::timeout(GREETING, greet(stream, tls)).await;
+    match greeted.unwrap_or(Err(Refusal::Silent)) {
+        // Who would take it may be stopping.
+        Ok(stream) => drop(peers.send(Ok(Peer::new(stream, PREFACE, address, share))).await),
+        Err(refusal) => tracing::warn!(peer = %address, "connection refused: {refusal}"),
+    }
+}
+
+/// Takes the beginning of a connection, up to the end of [`PREFACE`].
+async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>) -> Result<Stream, Refusal> {
+    stream.set_nodelay(true)?;
+    let mut stream = match tls {
+        None => Either::Left(stream),
+        Some(tls) => {
+            let stream = tls.accept(stream).await.map_err(Refusal::Tls)?;
+            if stream.get_ref().1.alpn_protocol() != Some(HTTP2) {
+                return Err(Refusal::NoHttp2);
+            }
+            Either::Right(Box::new(stream))
+        }
+    };
+    let mut begin = [0; PREFACE.len()];
+    let mut length = 0;
+    while length < begin.len() {
+        let more = stream.read(&mut begin[length..]).await?;
+        length += more;
+        if more == 0 || !PREFACE.starts_with(&begin[..length]) {
+            return Err(Refusal::Stranger);
+        }
+    }
+    Ok(stream)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tokio::io::AsyncWriteExt;
+    use tokio_stream::StreamExt;
+
+    /// A port with a caller on it that has said `begin`.
+    async fn called(begin: &[u8]) -> (ReceiverStream<std::io::Result<Peer>>, TcpStream) {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let mut caller = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
+        caller.write_all(begin).await.unwrap();
+        (accept(listener, None), caller)
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_does_not_finish_its_greeting_is_not_waited_for() {
+        let (_peers, mut caller) = called(&PREFACE[..5]).await;
+        assert_eq!(caller.read(&mut [0; 8]).await.unwrap(), 0, "it is turned away");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_connection_lasts_if_a_call_of_it_was_admitted() {
+        for admitted in [false, true] {
+            let (mut peers, mut caller) = called(&[PREFACE, b"more"].concat()).await;
+            let mut peer = peers.next().await.unwrap().unwrap();
+            let mut begin = [0; PREFACE.len() + 4];
+            peer.read_exact(&mut begin).await.unwrap();
+            assert_eq!(begin, *[PREFACE, b"more"].concat());
+            if admitted {
+                tonic::transport::server::Connected::connect_info(&peer).admit();
+            }
+            let minute = tokio::time::sleep(Duration::from_mins(1));
+            let later = async {
+                minute.await;
+                caller.write_all(b"x").await.unwrap();
+                std::future::pending::<()>().await;
+            };
+            let mut one = [0; 1];
+            tokio::select! {
+                read = peer.read_exact(&mut one) => assert_eq!(read.is_ok(), admitted),
+                () = later => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! A worker that computes wrongly is found out, and one that fails is put aside.
+
+use crate::support::{
+    CORES, Coordinator, StandIn, coordinator_with, lease, library, registered, registration,
+    report, stand_in, with_checksum,
+};
+use std::net::Ipv4Addr;
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tracktwin_experiment::{
+    Case, Experiment, ExperimentError, MODEL_HASH, Outcome, Prepare, Simulate,
+};
+use tracktwin_farm::campaign::Campaign;
+use tracktwin_farm::dispatch::Settings;
+use tracktwin_farm::embedded;
+use tracktwin_farm::security::Security;
+use tracktwin_library::WorkerState;
+use tracktwin_protocol::farm::{self as messages, CaseReport, ReportRequest};
+use tracktwin_worker::agent::{self, Config};
+
+/// A machine whose every level is a tenth of a dB too high.
+struct Faulty(StandIn);
+
+impl Simulate for Faulty {
+    fn simulate(&self, cases: &[Case]) -> Vec<Outcome> {
+        let mut outcomes = self.0.simulate(cases);
+        for outcome in &mut outcomes {
+            let Outcome::Finished(passes) = outcome else { continue };
+            let levels = passes.iter_mut().flat_map(|pass| &mut pass.features.band_levels_db);
+            levels.for_each(|level| *level += 0.1);
+        }
+        outcomes
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the signature is that of a preparation")]
+fn faulty(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
+    Ok(Box::new(Faulty(StandIn(experiment.clone()))))
+}
+
+async fn serving(audit_share: f64) -> Coordinator {
+    let settings = Settings { prepare: stand_in, audit_share, ..Settings::default() };
+    coordinator_with(settings, Security::default(), 40).await
+}
+
+async fn work(coordinator: &Coordinator, worker: &str, prepare: Prepare) {
+    let config = Config {
+        prepare,
+        worker: worker.to_owned(),
+        // Longer than the pause after which audits are looked for again.
+        idle_exit: Some(Duration::from_secs(3)),
+        ..Config::new(coordinator.url.clone(), CORES)
+    };
+    let run = agent::run(config, CancellationToken::new());
+    tokio::time::timeout(Duration::from_secs(20), run).await.unwrap().unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn sound_workers_agree() {
+    let coordinator = serving(0.5).await;
+    let id = coordinator.campaign.id();
+    work(&coordinator, "first", stand_in).await;
+    let open = coordinator.library.audits(&id).await.unwrap().open;
+    assert!((5..35).contains(&open), "about half of 40 are to be audited: {open}");
+    work(&coordinator, "second", stand_in).await;
+    let audits = coordinator.library.audits(&id).await.unwrap();
+    assert_eq!((audits.open, audits.agree, audits.differ), (0, open, 0));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_worker_that_differs_is_quarantined_and_its_results_are_flagged_whoever_audits_whom() {
+    for (first, second, wrong) in
+        [(faulty as Prepare, stand_in as Prepare, "first"), (stand_in, faulty, "second")]
+    {
+        let coordinator = serving(0.2).await;
+        work(&coordinator, "first", first).await;
+        work(&coordinator, "second", second).await;
+        let audits = coordinator.library.audits(&coordinator.campaign.id()).await.unwrap();
+        assert!(audits.differ > 0, "{audits:?}");
+        for name in ["first", "second"] {
+            let worker = coordinator.library.worker(name).await.unwrap().unwrap();
+            let expected =
+                if name == wrong { WorkerState::Quarantined } else { WorkerState::Active };
+            assert_eq!(worker.state, expected, "{name}: {:?}", worker.reason);
+        }
+        let mut client = registered(&coordinator, wrong).await;
+        let answer = lease(&mut client, wrong).await;
+        assert!(answer.cases.is_empty() && answer.reason.contains("quarantine"), "{answer:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn where_nobody_can_judge_nobody_is_blamed() {
+    let cannot = |_: &Experiment| Err(ExperimentError::Speeds { speeds: Vec::new() });
+    let settings = Settings { prepare: cannot, audit_share: 0.2, ..Settings::default() };
+    let coordinator = coordinator_with(settings, Security::default(), 40).await;
+    work(&coordinator, "first", stand_in).await;
+    work(&coordinator, "second", faulty).await;
+    let audits = coordinator.library.audits(&coordinator.campaign.id()).await.unwrap();
+    assert!(audits.differ > 0, "{audits:?}");
+    for name in ["first", "second"] {
+        let worker = coordinator.library.worker(name).await.unwrap().unwrap();
+        assert_eq!(worker.state, WorkerState::Active, "{name}: {:?}", worker.reason);
+    }
+}
+
+#[tokio::test]
+async fn what_an_auditor_gives_back_goes_to_the_next_at_once() {
+    let coordinator = serving(1.0).await;
+    let mut client = registered(&coordinator, "first").await;
+    let leased = lease(&mut client, "first").await;
+    client.report(report(&leased, "first")).await.unwrap();
+    // There was nothing to audit when the first one asked; for a while nobody looks again.
+    tokio::time::sleep(Duration::from_millis(2100)).await;
+    for auditor in ["second", "third"] {
+        client.register(registration(auditor, MODEL_HASH)).await.unwrap();
+        let audits = lease(&mut client, auditor).await;
+        assert!(!audits.cases.is_empty() && audits.cases.iter().all(|case| case.epoch == 0));
+        let held = |case: &messages::LeasedCase| messages::HeldCase {
+            sobol_index: case.sobol_index,
+            epoch: case.epoch,
+        };
+        let request = messages::ReleaseRequest {
+            worker: auditor.to_owned(),
+            campaign_id: audits.campaign_id.clone(),
+            cases: audits.cases.iter().map(held).collect(),
+        };
+        client.release(request).await.unwrap();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn audits_that_nobody_can_do_are_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let campaign = Campaign::built_in(Some(8)).unwrap();
+    let library = library(&folder, &campaign).await;
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    let coordinator = tracktwin_farm::coordinator::Coordinator {
+        claim: embedded::claim(&library).await.unwrap(),
+        library: library.clone(),
+        listener,
+        dashboard: None,
+        security: Security::default(),
+        settings: Settings { prepare: stand_in, audit_share: 1.0, ..Settings::default() },
+        exit_when_done: true,
+    };
+    let served = tokio::spawn(coordinator.run(CancellationToken::new()));
+    let stop = CancellationToken::new();
+    let config = Config { prepare: stand_in, ..Config::new(url, CORES) };
+    let worker = tokio::spawn(agent::run(config, stop.clone()));
+    tokio::time::timeout(Duration::from_secs(20), served).await.unwrap().unwrap().unwrap();
+    let audits = library.audits(&campaign.id()).await.unwrap();
+    assert_eq!((audits.open, audits.agree), (8, 0));
+    stop.cancel();
+    worker.await.unwrap().unwrap();
+}
+
+#[tokio::test]
+async fn a_worker_that_fails_where_another_does_not_is_put_aside() {
+    let coordinator = serving(0.0).await;
+    let mut client = registered(&coordinator, "bad").await;
+    client.register(registration("good", MODEL_HASH)).await.unwrap();
+    for _ in 0..2 {
+        let leased = lease(&mut client, "bad").await;
+        let failed = |case: &messages::LeasedCase| {
+            with_checksum(CaseReport {
+                sobol_index: case.sobol_index,
+                epoch: case.epoch,
+                parameter_hash: case.parameter_hash.clone(),
+                duration_s: 0.1,
+                outcome: Some(messages::case_report::Outcome::Failure(messages::Failure {
+                    reason: "out of memory".to_owned(),
+                })),
+                checksum: String::new(),
+            })
+        };
+        let request = ReportRequest {
+            worker: "bad".to_owned(),
+            campaign_id: leased.campaign_id.clone(),
+            experiment_hash: leased.experiment_hash.clone(),
+            cases: leased.cases.iter().map(failed).collect(),
+            traceparent: String::new(),
+        };
+        client.report(request).await.unwrap();
+    }
+    let answer = lease(&mut client, "bad").await;
+    assert!(answer.cases.is_empty() && answer.reason.contains("put aside"), "{answer:?}");
+    assert!(answer.retry_after_s > 10.0);
+    assert_eq!(lease(&mut client, "good").await.cases.len(), 4);
+}

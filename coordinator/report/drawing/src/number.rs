@@ -1,0 +1,59 @@
+//! Estimates of parameters as a person reads them: units with prefixes, digits as they are known.
+
+use tracktwin_parameters::Parameter;
+
+/// How a parameter is shown: divided by `divisor`, in `unit`.
+pub struct Shown {
+    /// What the SI value is divided by.
+    pub divisor: f64,
+    /// The unit, with its prefix.
+    pub unit: String,
+}
+
+impl Shown {
+    /// How this parameter is shown: prefixes follow from the upper end of its range.
+    pub fn of(parameter: Parameter) -> Self {
+        let [_, high] = parameter.range();
+        let (divisor, prefix) = match high {
+            1e6.. => (1e6, "M"),
+            1e3.. => (1e3, "k"),
+            _ => (1.0, ""),
+        };
+        let unit = parameter.unit().replace("1e-4", "10⁻⁴").replace("m2", "m²");
+        Self { divisor, unit: format!("{prefix}{unit}") }
+    }
+
+    /// Mean and standard deviation, in SI units, as `148 ± 12`.
+    pub fn estimate(&self, mean: f64, sd: f64) -> String {
+        let (mean, sd) = (mean / self.divisor, sd / self.divisor);
+        let decimals = tracktwin_number::decimals(mean, 3);
+        format!("{mean:.decimals$} ± {sd:.decimals$}")
+    }
+}
+
+/// The number with three significant digits.
+pub fn significant(value: f64) -> String {
+    tracktwin_number::significant(value, 3)
+}
+
+/// A share, 0 to 1, in percent with two significant digits.
+pub fn percent(share: f64) -> String {
+    format!("{} %", tracktwin_number::significant(100.0 * share, 2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn estimates_have_three_significant_digits_and_a_prefix() {
+        let shown = Shown::of(Parameter::RailpadStiffness);
+        assert_eq!(shown.unit, "MN/m");
+        assert_eq!(shown.estimate(1.4829e8, 1.27e7), "148 ± 13");
+        assert_eq!(Shown::of(Parameter::IrregularityLevel).unit, "10⁻⁴ m² rad/m");
+        assert_eq!(significant(0.012_345), "0.0123");
+        assert_eq!(significant(0.0), "0");
+        let shares = [0.0, 4.3e-5, 0.0214, 0.45, 1.0].map(percent);
+        assert_eq!(shares, ["0 %", "0.0043 %", "2.1 %", "45 %", "100 %"]);
+    }
+}

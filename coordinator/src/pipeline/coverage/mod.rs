@@ -1,0 +1,85 @@
+//! How often estimates hold and refusals are right: unseen tracks are simulated inside the
+//! library's ranges, beyond each of their ends and with sleepers that differ, then evaluated.
+
+mod plan;
+mod score;
+mod track;
+
+pub use plan::{Counts, Kind};
+pub use score::{Compared, Row};
+pub use track::TrackError;
+
+use crate::pipeline::evaluate::Evaluator;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use track::Track;
+use tracktwin_experiment::Experiment;
+use tracktwin_parameters::{Parameter, ParameterSet};
+
+/// Tracks that are simulated side by side.
+const TOGETHER: usize = 8;
+
+/// Why coverage can't be told.
+#[derive(Debug, thiserror::Error)]
+pub enum CoverageError {
+    /// A track can't be simulated.
+    #[error("a simulated track: {0}")]
+    Track(#[from] TrackError),
+    /// A recording can't be evaluated.
+    #[error("a simulated recording: {0}")]
+    Evaluation(#[from] tracktwin_evaluation::Error),
+}
+
+/// What is to be simulated and with what it is evaluated.
+pub struct Coverage<'a> {
+    /// Models and library.
+    pub evaluator: &'a Evaluator,
+    /// What the library's cases were simulated with.
+    pub experiment: &'a Experiment,
+    /// Values of the parameters that do not vary.
+    pub fixed: ParameterSet,
+    /// Tracks with one parameter at a value of the user's.
+    pub settings: Vec<(Parameter, f64)>,
+    /// How much.
+    pub counts: Counts,
+}
+
+impl Coverage<'_> {
+    /// Simulates and evaluates all tracks on all cores; tells how many of how many are done.
+    ///
+    /// # Errors
+    /// [`CoverageError`] of the first track that has one.
+    pub fn rows(
+        &self,
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<Vec<Row>, CoverageError> {
+        let library = self.evaluator.set();
+        let rows = plan::rows(library, &self.fixed, &self.settings, self.counts);
+        let total = rows.iter().map(|(_, tracks)| tracks.len()).sum();
+        let done = AtomicUsize::new(0);
+        rows.into_iter()
+            .map(|(kind, tracks)| {
+                let answers = tracks
+                    .par_chunks(TOGETHER)
+                    .map(|together| {
+                        let answers = self.answers(together)?;
+                        let before = done.fetch_add(together.len(), Ordering::Relaxed);
+                        progress(before + together.len(), total);
+                        Ok(answers)
+                    })
+                    .collect::<Result<Vec<_>, CoverageError>>()?;
+                let answers: Vec<_> =
+                    tracks.iter().cloned().zip(answers.into_iter().flatten()).collect();
+                Ok(score::row(kind, &answers))
+            })
+            .collect()
+    }
+
+    fn answers(
+        &self,
+        tracks: &[Track],
+    ) -> Result<Vec<tracktwin_evaluation::Evaluation>, CoverageError> {
+        let recordings = track::record(self.experiment, tracks)?;
+        recordings.iter().map(|recording| Ok(self.evaluator.evaluate(recording)?)).collect()
+    }
+}

@@ -1,0 +1,126 @@
+//! A recording's way to its diagnosis: first look, baseline, null model, search, conclusion.
+//!
+//! Owns the order of the stages; what each does is the diagnosis crate's, where null simulations
+//! are kept the library's.
+
+use crate::pipeline::null_models;
+use anyhow::Context;
+use tracktwin_diagnosis::{
+    Candidate, Diagnosis, Evidence, Search, Stage, Subject, SubjectError, check_track,
+    first_calibration, passes_alone, search,
+};
+use tracktwin_inspection::{FirstLook, first_look};
+use tracktwin_library::Library;
+use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::recording::Recording;
+
+/// What a diagnosis is made with.
+#[derive(Clone, Copy)]
+pub struct Setting<'a> {
+    /// The track that recordings are compared with.
+    pub design: &'a TrackDesign,
+    /// Keeps the null simulations, if there is one.
+    pub library: Option<&'a Library>,
+    /// Kinds of physics that may not be named.
+    pub without: &'a [String],
+    /// Seed by which sleepers are shuffled, at each speed otherwise: a control in which nothing has
+    /// a place, and the passes don't speak for themselves.
+    pub shuffle: Option<u64>,
+}
+
+/// A diagnosis and what it was concluded from.
+#[derive(Debug)]
+pub struct Diagnosed {
+    /// What is written down.
+    pub diagnosis: Diagnosis,
+    /// The comparison; none where the passes spoke for themselves alone.
+    pub compared: Option<Compared>,
+}
+
+/// A recording's comparison with the model.
+#[derive(Debug)]
+pub struct Compared {
+    /// What was compared.
+    pub subject: Subject,
+    /// What the search found.
+    pub search: Search,
+}
+
+/// Why there is no diagnosis.
+#[derive(Debug, thiserror::Error)]
+pub enum DiagnosingError {
+    /// The recording cannot be diagnosed.
+    #[error(transparent)]
+    Recording(#[from] SubjectError),
+    /// Something broke down on the way.
+    #[error(transparent)]
+    Failure(#[from] anyhow::Error),
+}
+
+/// Diagnoses a recording. `watch` hears what is going on and which share of it is done.
+///
+/// # Errors
+/// [`DiagnosingError::Recording`] says what the recording lacks; all else is a failure.
+pub async fn diagnose(
+    recording: &Recording,
+    setting: Setting<'_>,
+    watch: &(dyn Fn(&'static str, f64) + Sync),
+) -> Result<Diagnosed, DiagnosingError> {
+    let Setting { design, library, without, shuffle } = setting;
+    let allowed = |physics: &str| !without.iter().any(|other| other == physics);
+    check_track(recording, design)?;
+    watch("first look", 0.0);
+    let mut look = first_look(recording);
+    let mut subject = match Subject::new(recording, design) {
+        Ok(subject) => subject,
+        Err(reason) => {
+            look.forget(allowed);
+            let diagnosis = passes_alone(recording, &look, &reason).ok_or(reason)?;
+            return Ok(Diagnosed { diagnosis, compared: None });
+        }
+    };
+    if let Some(trouble) = look.refusal() {
+        return Err(SubjectError::Unusable(trouble.clone()).into());
+    }
+    look.forget(allowed);
+    if let Some(seed) = shuffle {
+        look.ignore();
+        let (speeds, sleepers) = (subject.pass_numbers.len(), subject.forward.section.sleepers);
+        subject.shuffle(&tracktwin_trial::orders(seed, speeds, sleepers));
+    }
+    let suggested = subject.suggested(&look);
+    watch("baseline", 0.0);
+    let start = first_calibration(&subject).context("no baseline fits")?;
+    subject.forward.allow_beyond(&start).context("no baseline fits")?;
+    watch("null model", 0.0);
+    let surfaces = f64::from(null_models::SURFACES);
+    let share = |done| watch("null model", done as f64 / surfaces);
+    let null = null_models::of(&subject, &start, library, share).await?;
+    let mut all = tracktwin_diagnosis::candidates(&subject.forward.section);
+    all.extend(suggested);
+    all.retain(|candidate: &Candidate| allowed(candidate.kind.physics));
+    let progress = |stage, share| watch(name(stage), share);
+    let found = tokio::task::block_in_place(|| search(&subject, &null, start, &all, &progress));
+    let search = found.context("the search for left-out physics broke down")?;
+    let diagnosis = conclude(recording, &subject, &look, &search)?;
+    Ok(Diagnosed { diagnosis, compared: Some(Compared { subject, search }) })
+}
+
+fn conclude(
+    recording: &Recording,
+    subject: &Subject,
+    look: &FirstLook,
+    search: &Search,
+) -> Result<Diagnosis, anyhow::Error> {
+    let evidence = Evidence { recording, subject, look, search };
+    evidence.conclude().context("no conclusion can be drawn")
+}
+
+const fn name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Baseline => "baseline",
+        Stage::Screening => "screening",
+        Stage::Refinement => "refinement",
+        Stage::HeldOut => "held out",
+    }
+}

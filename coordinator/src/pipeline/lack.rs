@@ -1,0 +1,76 @@
+//! What training will need of a campaign's cases, asked before the first of them is simulated.
+
+use tracktwin_farm::campaign::Campaign;
+use tracktwin_surrogate::ENTRIES_MIN;
+
+/// What a campaign lacks to be trained on; one line each, with what mends it.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Lack {
+    /// Too few cases to fit and to test.
+    #[error(
+        "{cases} cases are too few to train on, which takes {ENTRIES_MIN}: give `--cases {ENTRIES_MIN}` or more"
+    )]
+    Cases {
+        /// The cases there are.
+        cases: u32,
+    },
+    /// No parameter varies.
+    #[error(
+        "parameters: each is held at one value, so that there is nothing to learn; give at least one a range, \
+         as in `ballast_stiffness_N_m = [4e6, 22e6]`"
+    )]
+    Axes,
+}
+
+/// Whether models can be trained on a campaign once all its cases are finished.
+///
+/// # Errors
+/// [`Lack`].
+pub fn check_for_training(campaign: &Campaign) -> Result<(), Lack> {
+    if (campaign.cases as usize) < ENTRIES_MIN {
+        return Err(Lack::Cases { cases: campaign.cases });
+    }
+    if campaign.definition.space.axes().is_empty() {
+        return Err(Lack::Axes);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::train::TRAINED;
+    use tracktwin_farm::campaign::DEFAULT;
+    use tracktwin_parameters::{Parameter, ParameterSet};
+
+    fn lack(text: &str) -> Option<Lack> {
+        check_for_training(&Campaign::parse(text, "c.toml", None).unwrap()).err()
+    }
+
+    #[test]
+    fn the_built_in_campaign_can_be_trained_on() {
+        assert_eq!(lack(DEFAULT), None);
+    }
+
+    #[test]
+    fn what_training_would_find_out_late_is_found_out_at_once() {
+        assert_eq!(
+            lack(&DEFAULT.replace("cases = 800", "cases = 199")),
+            Some(Lack::Cases { cases: 199 })
+        );
+        let line = |&it: &Parameter| format!("{} = {:e}\n", it.name(), ParameterSet::nominal()[it]);
+        let held = Parameter::ALL.iter().map(line).collect::<Vec<_>>().concat();
+        let held = format!("{DEFAULT}\n[parameters]\n{held}");
+        assert_eq!(lack(&held), Some(Lack::Axes));
+    }
+
+    #[test]
+    fn every_feature_vector_has_bins_in_the_coarsest_definition_that_is_let_in() {
+        let coarse = format!("{DEFAULT}\n[features]\nvoices_per_octave = 4\n");
+        let campaign = Campaign::parse(&coarse, "c.toml", None).unwrap();
+        let frequencies_hz = campaign.definition.experiment.features.frequencies_hz();
+        assert!(TRAINED.into_iter().all(|set| !set.bins(&frequencies_hz).is_empty()));
+        let coarser = coarse.replace("voices_per_octave = 4", "voices_per_octave = 3");
+        Campaign::parse(&coarser, "c.toml", None).unwrap_err();
+    }
+}

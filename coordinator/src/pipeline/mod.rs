@@ -1,0 +1,14 @@
+//! From a library and a recording to results, stage by stage: what commands call.
+//!
+//! Owns the order of stages and the way between the library, which is asynchronous, and the crates
+//! that compute. What a stage does is its crate's.
+
+pub mod coverage;
+pub mod diagnose;
+pub mod evaluate;
+pub mod lack;
+pub mod null_models;
+pub mod provenance;
+pub mod reproduce;
+pub mod train;
+pub mod trial;

@@ -1,0 +1,73 @@
+//! Null simulations of a recording's track: taken from the library, or made and kept there.
+
+use anyhow::Context;
+use nalgebra::DVector;
+use serde::Serialize;
+use tracktwin_diagnosis::{NullModel, Subject};
+use tracktwin_experiment::MODEL_HASH;
+use tracktwin_library::{Library, StoredArray};
+use tracktwin_parameters::TrackDesign;
+
+/// Random surfaces simulated.
+pub const SURFACES: u32 = 40;
+
+/// Seed of the first.
+const SEED: u64 = 0x6e75_6c6c;
+
+/// All that the numbers follow from.
+#[derive(Serialize)]
+struct Key<'a> {
+    model_hash: &'static str,
+    design: &'a TrackDesign,
+    sleepers: usize,
+    sources: String,
+    speeds_m_s: &'a [f64],
+    bands_hz: &'a [f64],
+    values: &'a [f64],
+    surfaces: u32,
+    seed: u64,
+}
+
+/// The null model of a subject whose baseline came out at `values`; `progress` hears how many
+/// surfaces are done.
+///
+/// # Errors
+/// When the library cannot be read or written, or a simulation breaks down.
+pub async fn of(
+    subject: &Subject,
+    values: &DVector<f64>,
+    library: Option<&Library>,
+    progress: impl Fn(u64) + Sync,
+) -> anyhow::Result<NullModel> {
+    let forward = &subject.forward;
+    let grid = NullModel::grid_values(forward, values);
+    let key = Key {
+        model_hash: MODEL_HASH,
+        design: &forward.section.design,
+        sleepers: forward.section.sleepers,
+        sources: blake3::hash(NullModel::SOURCES.concat().as_bytes()).to_hex().to_string(),
+        speeds_m_s: &forward.speeds_m_s,
+        bands_hz: forward.bands.centres_hz(),
+        values: grid.as_slice(),
+        surfaces: SURFACES,
+        seed: SEED,
+    };
+    let meta_json = serde_json::to_string(&key).context("a key is plain JSON")?;
+    let key = blake3::hash(meta_json.as_bytes()).to_hex().to_string();
+    if let Some(library) = library
+        && let Some(stored) = library.array(&key).await?
+        && let Some(null) = NullModel::from_numbers(forward, &stored.numbers)
+    {
+        return Ok(null);
+    }
+    let simulated = tokio::task::block_in_place(|| {
+        NullModel::simulate(forward, &grid, u64::from(SURFACES), SEED, |done| progress(done as u64))
+    });
+    let null = simulated.context("the null simulations broke down")?;
+    if let Some(library) = library {
+        let numbers = null.differences.concat();
+        let kind = "null-campaign".to_owned();
+        library.store_array(StoredArray { key, kind, meta_json, numbers }).await?;
+    }
+    Ok(null)
+}

@@ -1,0 +1,131 @@
+//! What the passes tell by themselves where no model of the track can be compared with them.
+
+use super::finding::{probability, seen};
+use super::notes::{lost, one_speed, shown};
+use super::{ONE_PASS_MAX, ONE_SPEED_MAX, verdict};
+use crate::outcome::{Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Score, Scores};
+use crate::subject::SubjectError;
+use std::collections::BTreeMap;
+use tracktwin_inspection::FirstLook;
+use tracktwin_inspection::wheel::{Comb, CombBlock};
+use tracktwin_inspection::{Finding, Place};
+use tracktwin_signal::recording::Recording;
+use tracktwin_track::extension::Kind;
+
+/// The diagnosis of a recording that has no track to compare with, for the reason given; none where
+/// the passes show nothing for sure.
+///
+/// Sure is what was tested on blocks that nothing was fitted on, and a fault of the measuring chain;
+/// all else is a possibility.
+pub fn passes_alone(
+    recording: &Recording,
+    look: &FirstLook,
+    reason: &SubjectError,
+) -> Option<Diagnosis> {
+    let mut found: Vec<(&Finding, Hypothesis)> = look
+        .findings
+        .iter()
+        .filter_map(|finding| Some((finding, hypothesis(recording, look, finding)?)))
+        .collect();
+    found.sort_by(|(_, a), (_, b)| {
+        let tested = |it: &Hypothesis| is_comb(&it.physics, look);
+        tested(b).cmp(&tested(a)).then(b.probability.total_cmp(&a.probability))
+    });
+    let (first, best) = found.iter().find(|(_, it)| it.accepted)?;
+    let summary = Kind::from_name(&best.physics)?.summary;
+    let sentence = format!(
+        "The passes alone show {summary} ({}, {:.0} %): {}.",
+        best.physics,
+        100.0 * best.probability,
+        first.evidence
+    );
+    let hypotheses: Vec<Hypothesis> = found.iter().map(|(_, it)| it.clone()).collect();
+    let mut notes = vec![format!("No model of a track was compared with the recording: {reason}.")];
+    if let [speed_km_h] = recording.speeds_km_h()[..] {
+        notes.push(one_speed(speed_km_h));
+    }
+    if !recording.gain_known() {
+        notes.push("The unit of the signal is not known: amplitudes are relative.".to_owned());
+    }
+    notes.extend(look.troubles.iter().map(ToString::to_string));
+    notes.extend(lost(look, recording));
+    notes.extend(look.findings.iter().map(shown));
+    Some(Diagnosis {
+        format: FORMAT.to_owned(),
+        recording: recording.name.clone(),
+        verdict: verdict(&hypotheses),
+        sentence,
+        nothing_left_out: None,
+        mismatches: Vec::new(),
+        hypotheses,
+        fit: fit(recording, look.comb.as_ref().filter(|_| is_comb(&best.physics, look))),
+        bias_removed: BTreeMap::new(),
+        track: Vec::new(),
+        levels: Levels::default(),
+        loss_of_contact: look.loss_of_contact.clone(),
+        notes,
+    })
+}
+
+/// Whether a name stands for the comb of a wheel, which is tested on blocks that were held out.
+fn is_comb(physics: &str, look: &FirstLook) -> bool {
+    physics == "wheel_out_of_round" && look.comb.is_some()
+}
+
+fn hypothesis(recording: &Recording, look: &FirstLook, finding: &Finding) -> Option<Hypothesis> {
+    let kind = Kind::from_name(finding.physics)?;
+    let is_tested = is_comb(finding.physics, look);
+    let most = match (is_tested || kind.measuring_chain, recording.speeds_km_h().len()) {
+        (true, _) => 1.0,
+        (false, 1) => ONE_SPEED_MAX,
+        (false, _) => ONE_PASS_MAX,
+    };
+    let location = match finding.place {
+        Place::Everywhere => None,
+        Place::Stretch { from_m, to_m } => {
+            let half_m = 0.5 * recording.spacing_m;
+            let near = recording.sleepers.iter();
+            let near = near.filter(|it| from_m - half_m <= it.x_m && it.x_m <= to_m + half_m);
+            let sleepers = near.map(|sleeper| sleeper.id.clone()).collect();
+            Some(Location { x_m: [from_m, to_m], sleepers })
+        }
+    };
+    Some(Hypothesis {
+        probability: probability(finding).min(most),
+        accepted: is_tested || kind.measuring_chain,
+        ..seen(finding, kind, location)
+    })
+}
+
+/// What the wheel's orders explain, on all blocks and on those that were held out.
+fn fit(recording: &Recording, comb: Option<&Comb>) -> Fit {
+    let Some(comb) = comb else {
+        let none = Scores { in_sample: Score { score: 0.0 }, held_out: None };
+        let score = "nothing was fitted".to_owned();
+        return Fit { score, before: none, after: none, held_out_gain_nats: BTreeMap::new() };
+    };
+    let blocks = comb.blocks.len() as f64;
+    let mean = |of: fn(&CombBlock) -> f64| Score {
+        score: comb.blocks.iter().map(of).sum::<f64>() / blocks,
+    };
+    let held_out = &comb.held_out;
+    let [from_hz, to_hz] = comb.band_hz;
+    let speed = recording.speeds_km_h().first().copied().unwrap_or_default();
+    let nats = held_out.gain_nats * held_out.blocks as f64;
+    Fit {
+        score: format!(
+            "share of the variance between {from_hz:.0} and {to_hz:.0} Hz that a comb of lines \
+             explains: one between the teeth of the wheel's, then the wheel's own; withheld was \
+             every other block of two seconds"
+        ),
+        before: Scores {
+            in_sample: mean(|block| block.by_chance),
+            held_out: Some(Score { score: held_out.by_chance }),
+        },
+        after: Scores {
+            in_sample: mean(|block| block.explained),
+            held_out: Some(Score { score: held_out.explained }),
+        },
+        held_out_gain_nats: BTreeMap::from([(format!("{speed:.0}"), nats)]),
+    }
+}

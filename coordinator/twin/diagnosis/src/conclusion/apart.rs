@@ -1,0 +1,43 @@
+//! Speeds that do not agree about the track.
+
+use super::{Evidence, FAILED_SHARE};
+use crate::outcome::Hypothesis;
+use std::collections::BTreeMap;
+use tracktwin_inspection::{Finding, Place};
+
+impl Evidence<'_> {
+    /// Nothing is named on a track that the speeds do not agree about: their positions are wrong, if
+    /// no other fault of the measuring chain makes them differ.
+    pub(super) fn add_apart(&self, all: &mut Vec<Hypothesis>) {
+        if !self.search.is_apart() {
+            return;
+        }
+        for known in all.iter_mut() {
+            known.accepted = false;
+            known.probability *= FAILED_SHARE;
+        }
+        let Some(evidence) = self.apart() else { return };
+        let finding = Finding {
+            physics: "position_error",
+            p_value: self.search.apart_p_value(),
+            place: Place::Everywhere,
+            parameters: BTreeMap::new(),
+            evidence,
+        };
+        self.add_finding(&finding, all);
+    }
+
+    /// What a reader should know of it, if it is so. Passes that are cut off differ wherever they were:
+    /// the faster they are, the more is missing.
+    pub(super) fn apart(&self) -> Option<String> {
+        let are_cut = self.look.findings.iter().any(|finding| finding.physics == "clipping");
+        (self.search.is_apart() && !are_cut).then(|| {
+            format!(
+                "The speeds do not agree about the track: one for each explains the recording better \
+                 than one for all, by {:.0} nats. Positions of some pass belong to another place, or to \
+                 the other rail.",
+                self.search.apart
+            )
+        })
+    }
+}

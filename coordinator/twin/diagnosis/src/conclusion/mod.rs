@@ -1,0 +1,185 @@
+//! From a search to the diagnosis that is written down.
+
+mod alone;
+mod apart;
+mod finding;
+mod fit;
+mod nameless;
+mod notes;
+mod place;
+mod round;
+
+pub use self::alone::passes_alone;
+use self::nameless::UNKNOWN;
+use crate::calibration::CalibrationError;
+use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Verdict};
+use crate::search::Search;
+use crate::sentence::sentence;
+use crate::subject::Subject;
+use tracktwin_inspection::FirstLook;
+use tracktwin_inspection::chain::Trouble;
+use tracktwin_signal::recording::Recording;
+use tracktwin_track::extension::Kind;
+
+/// Greatest probability where nothing could be tested on a speed that was not fitted: structure and
+/// geometry look alike at one speed.
+const ONE_SPEED_MAX: f64 = 0.5;
+
+/// Greatest probability where no pass repeats another: how far passes differ had to be assumed.
+const ONE_PASS_MAX: f64 = 0.9;
+
+/// What is left of a name's probability when it does not predict withheld speeds better, or a shape
+/// that it does not have shows.
+const FAILED_SHARE: f64 = 0.1;
+
+/// Hypotheses of less probability are not worth a line.
+const PROBABILITY_MIN: f64 = 0.001;
+
+/// Everything that a conclusion is drawn from.
+pub struct Evidence<'a> {
+    /// The recording.
+    pub recording: &'a Recording,
+    /// What was compared.
+    pub subject: &'a Subject,
+    /// What the passes tell alone.
+    pub look: &'a FirstLook,
+    /// What the model tells.
+    pub search: &'a Search,
+}
+
+impl Evidence<'_> {
+    /// The diagnosis.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a calibrated track makes no model.
+    pub fn conclude(&self) -> Result<Diagnosis, CalibrationError> {
+        let mut hypotheses = self.hypotheses();
+        let most = self.probability_max();
+        for hypothesis in &mut hypotheses {
+            hypothesis.probability = hypothesis.probability.min(most);
+        }
+        hypotheses.sort_by(|a, b| {
+            b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
+        });
+        let verdict = verdict(&hypotheses);
+        if verdict == Verdict::Consistent {
+            hypotheses.clear();
+        }
+        let levels = self.levels()?;
+        let fit = self.fit();
+        let bias_removed = self.bias_removed(&hypotheses);
+        let sleepers = self.subject.forward.section.sleepers;
+        let nothing_left_out = self.nothing(&hypotheses).min(most);
+        let said = sentence(verdict, &hypotheses, nothing_left_out, sleepers, &fit, &bias_removed);
+        let sentence = said + &airborne(self.look);
+        Ok(Diagnosis {
+            format: FORMAT.to_owned(),
+            recording: self.recording.name.clone(),
+            verdict,
+            sentence,
+            nothing_left_out: Some(nothing_left_out),
+            mismatches: self.mismatches(verdict, &levels),
+            hypotheses,
+            fit,
+            bias_removed,
+            track: self.track(),
+            levels,
+            loss_of_contact: self.look.loss_of_contact.clone(),
+            notes: self.notes(),
+        })
+    }
+
+    /// As sure as the recording lets anybody be.
+    fn probability_max(&self) -> f64 {
+        if self.speeds() == 1 {
+            ONE_SPEED_MAX
+        } else if self.repeats() {
+            1.0
+        } else {
+            ONE_PASS_MAX
+        }
+    }
+
+    /// Probability that nothing is left out, beside these hypotheses.
+    fn nothing(&self, hypotheses: &[Hypothesis]) -> f64 {
+        let first = self.search.rounds.first().map_or(1.0, |round| round.probabilities().nothing);
+        let accepted = hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
+        first * accepted.map(|hypothesis| 1.0 - hypothesis.probability).product::<f64>()
+    }
+
+    fn speeds(&self) -> usize {
+        self.subject.forward.speeds_m_s.len()
+    }
+
+    /// Whether some pass repeats another at its speed.
+    fn repeats(&self) -> bool {
+        self.subject.pass_numbers.iter().any(|passes| passes.len() > 1)
+    }
+
+    fn hypotheses(&self) -> Vec<Hypothesis> {
+        let mut all: Vec<Hypothesis> = Vec::new();
+        let rounds = self.search.rounds.iter().filter(|round| round.p_value <= 0.05);
+        for round in rounds {
+            for hypothesis in self.of_round(round) {
+                let known = all.iter_mut().find(|known| self.is_same(known, &hypothesis));
+                match known {
+                    Some(known) if known.accepted => {
+                        known.probability = known.probability.max(hypothesis.probability);
+                    }
+                    Some(known) if known.probability >= hypothesis.probability => {}
+                    Some(known) => *known = hypothesis,
+                    None => all.push(hypothesis),
+                }
+            }
+        }
+        self.add_apart(&mut all);
+        for finding in &self.look.findings {
+            self.add_finding(finding, &mut all);
+        }
+        for finding in &self.look.nameless {
+            self.add_nameless(finding, &mut all);
+        }
+        // What a faulty chain makes of the recording is not unknown physics, and what is left of a
+        // saturated one no physics at all.
+        let is_chain = |known: &Hypothesis| {
+            Kind::from_name(&known.physics).is_some_and(|kind| kind.measuring_chain)
+        };
+        if all.iter().any(|known| known.accepted && is_chain(known)) {
+            let saturated = |trouble: &Trouble| matches!(trouble, Trouble::Saturated { .. });
+            let is_saturated = self.look.troubles.iter().any(saturated);
+            let made_by_chain = |known: &&mut Hypothesis| {
+                !is_chain(known) && (known.physics == UNKNOWN || is_saturated)
+            };
+            for known in all.iter_mut().filter(made_by_chain) {
+                known.accepted = false;
+                known.probability *= FAILED_SHARE;
+            }
+        }
+        all.retain(|hypothesis| hypothesis.accepted || hypothesis.probability >= PROBABILITY_MIN);
+        all
+    }
+}
+
+fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
+    let Some(first) = hypotheses.iter().find(|hypothesis| hypothesis.accepted) else {
+        return Verdict::Consistent;
+    };
+    match Kind::from_name(&first.physics) {
+        None => Verdict::UnknownPhysics,
+        Some(kind) if kind.measuring_chain => Verdict::MeasurementChain,
+        Some(_) => Verdict::LeftOutPhysics,
+    }
+}
+
+/// That the wheel is in the air somewhere, which no fit knows.
+fn airborne(look: &FirstLook) -> String {
+    let Some(lost) = &look.loss_of_contact else { return String::new() };
+    let [from_m, to_m] = lost.reach_m();
+    format!(
+        " The wheel loses contact with the rail from {from_m:.2} to {to_m:.2} m, where no linear fit holds."
+    )
+}
+
+fn names(kind: &Kind) -> Vec<String> {
+    kind.look_alikes.iter().map(|&name| name.to_owned()).collect()
+}

@@ -1,0 +1,89 @@
+//! What a reader should know beside the hypotheses.
+
+use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
+use crate::port_scan::PortPlace;
+use tracktwin_inspection::Finding;
+use tracktwin_inspection::FirstLook;
+use tracktwin_number::chance;
+use tracktwin_signal::recording::Recording;
+
+/// Ratio of two speeds that tells structure from geometry well.
+const SPEED_RATIO: f64 = 1.35;
+
+impl Evidence<'_> {
+    pub(super) fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.look.troubles.iter().map(ToString::to_string).collect();
+        if self.speeds() == 1 {
+            notes.push(one_speed(3.6 * self.subject.forward.speeds_m_s[0]));
+        }
+        if !self.repeats() {
+            notes.push(format!(
+                "One pass a speed: how far passes repeat each other had to be assumed, so that no \
+                 name is more certain than {:.0} %. Add a second pass at each speed.",
+                100.0 * ONE_PASS_MAX
+            ));
+        }
+        notes.extend(lost(self.look, self.recording));
+        notes.extend(self.apart().or_else(|| self.remainder()));
+        notes.extend(self.look.findings.iter().map(shown));
+        notes
+    }
+
+    /// What the last search left without a name.
+    fn remainder(&self) -> Option<String> {
+        let round = self.search.rounds.last().filter(|round| round.p_value <= 0.05)?;
+        let place = round.port.as_ref().map_or(String::new(), |port| match &port.place {
+            PortPlace::Wheel => " at the wheel".to_owned(),
+            PortPlace::Seats(seats) if seats.len() <= 2 => format!(" near {}", self.id(seats[0])),
+            PortPlace::Between([first, second]) => {
+                format!(" between {} and {}", self.id(*first), self.id(*second))
+            }
+            PortPlace::Seats(_) => String::new(),
+        });
+        if let (Some(nats), Some(best)) = (round.remainder, round.fitted.first()) {
+            return Some(format!(
+                "{} explains most of what is left out{place}, but leaves {nats:.0} nats there: it \
+                 looks like it and is something else.",
+                best.candidate.kind.physics
+            ));
+        }
+        if round.port_strays {
+            return Some(format!(
+                "Something is left{place} that chance does not explain (probability {}), but no two speeds \
+                 hear it there: what stays where it is, all of them pass.",
+                chance(round.p_value)
+            ));
+        }
+        let rest = if self.search.accepted.is_empty() { "Something" } else { "A remainder" };
+        let left = format!(
+            "{rest} is left{place} that chance does not explain (probability {}); it may be the model's \
+             own error, for nothing in the catalogue predicts the held-out speeds better.",
+            chance(round.p_value)
+        );
+        (!round.accepted).then_some(left)
+    }
+}
+
+/// Where the wheel is in the air.
+pub(super) fn lost(look: &FirstLook, recording: &Recording) -> Option<String> {
+    let lost = look.loss_of_contact.as_ref()?;
+    Some(format!(
+        "loss_of_contact: {}: what was fitted near there says little.",
+        lost.sentence(recording.passes.len())
+    ))
+}
+
+/// A finding as a sentence.
+pub(super) fn shown(finding: &Finding) -> String {
+    format!("The passes alone show {}: {}.", finding.physics, finding.evidence)
+}
+
+pub(super) fn one_speed(speed_km_h: f64) -> String {
+    format!(
+        "One speed only: nothing could be tested on a speed that was not fitted, so that no name \
+         that needs such a test is more certain than {:.0} %. Add a pass at {:.0} km/h or at {:.0} km/h.",
+        100.0 * ONE_SPEED_MAX,
+        speed_km_h / SPEED_RATIO,
+        speed_km_h * SPEED_RATIO,
+    )
+}

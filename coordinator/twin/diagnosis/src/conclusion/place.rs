@@ -1,0 +1,128 @@
+//! Where something is: in metres, sleepers and frequencies.
+
+use super::Evidence;
+use crate::candidate::Candidate;
+use crate::outcome::{Levels, Location, Mismatch, Verdict};
+use crate::port_scan::PortPlace;
+use nalgebra::DVector;
+use std::ops::Range;
+use tracktwin_inspection::{Finding, Place};
+use tracktwin_track::extension::PlaceKind;
+
+/// Share of a trace's square by which a sleeper belongs to the place of a mismatch.
+const PLACE_SHARE: f64 = 0.1;
+
+/// Error of a place on the recording's scale in sleeper spacings: odometers wander by millimetres.
+const PLACE_ERROR: f64 = 0.04;
+
+impl Evidence<'_> {
+    pub(super) fn location_of(&self, candidate: &Candidate) -> Option<Location> {
+        let section = &self.subject.forward.section;
+        match (candidate.kind.place, candidate.extension.x_m, &candidate.extension.sleepers) {
+            (PlaceKind::Nowhere, _, _) => None,
+            (_, Some([from_m, to_m]), _) => Some(self.location_between(from_m, to_m)),
+            (_, None, Some(sleepers)) => (!sleepers.is_empty()).then(|| self.location(sleepers)),
+            (_, None, None) => Some(self.location(&(0..section.sleepers).collect::<Vec<_>>())),
+        }
+    }
+
+    /// None at the wheel or where it is everywhere.
+    pub(super) fn location_of_port(&self, place: &PortPlace) -> Option<Location> {
+        let everywhere = self.subject.forward.section.sleepers;
+        match place {
+            PortPlace::Seats(seats) if seats.len() < everywhere => Some(self.location(seats)),
+            PortPlace::Between(pair) => Some(self.location(pair)),
+            PortPlace::Seats(_) | PortPlace::Wheel => None,
+        }
+    }
+
+    /// From the first of some sleepers, of which there is one at least, to the last.
+    pub(super) fn location(&self, sleepers: &[usize]) -> Location {
+        let section = &self.subject.forward.section;
+        let [first, last] = [sleepers[0], sleepers[sleepers.len() - 1]];
+        Location {
+            x_m: [section.x_m(first), section.x_m(last)],
+            sleepers: sleepers.iter().map(|&sleeper| self.id(sleeper)).collect(),
+        }
+    }
+
+    /// A stretch with the sleepers whose half bays it touches.
+    pub(super) fn location_between(&self, from_m: f64, to_m: f64) -> Location {
+        let section = &self.subject.forward.section;
+        let half_m = (0.5 + PLACE_ERROR) * section.design.sleeper.spacing_m;
+        let near = |sleeper: &usize| {
+            let x_m = section.x_m(*sleeper);
+            from_m - half_m <= x_m && x_m <= to_m + half_m
+        };
+        let sleepers = (0..section.sleepers).filter(near).map(|sleeper| self.id(sleeper));
+        Location { x_m: [from_m, to_m], sleepers: sleepers.collect() }
+    }
+
+    pub(super) fn location_of_finding(&self, finding: &Finding) -> Option<Location> {
+        match finding.place {
+            Place::Everywhere => None,
+            Place::Stretch { from_m, to_m } => Some(self.location_between(from_m, to_m)),
+        }
+    }
+
+    pub(super) fn id(&self, sleeper: usize) -> String {
+        self.recording.sleepers[self.subject.first_sleeper + sleeper].id.clone()
+    }
+
+    pub(super) fn mismatches(&self, verdict: Verdict, levels: &Levels) -> Vec<Mismatch> {
+        if verdict == Verdict::Consistent {
+            return Vec::new();
+        }
+        let rounds = self.search.rounds.iter().filter(|round| round.p_value <= 0.05);
+        let found = rounds.filter_map(|round| {
+            let named = round.fitted.first().map(|fitted| &fitted.change);
+            let unknown = round.port.as_ref().map(|port| &port.change);
+            let change = if round.accepted { named } else { unknown.or(named) }?;
+            Some(self.mismatch(change, round.p_value, levels))
+        });
+        found.take(self.search.accepted.len().max(1)).collect()
+    }
+
+    /// Sleepers and bands where a whitened change of the prediction is greatest.
+    fn mismatch(&self, change: &DVector<f64>, p_value: f64, levels: &Levels) -> Mismatch {
+        let forward = &self.subject.forward;
+        let square = |row: usize| change[row].powi(2);
+        let (mut by_sleeper, mut by_band) =
+            (vec![0.0; forward.section.sleepers], vec![0.0; forward.bands.count()]);
+        for row in 0..forward.count() {
+            let (sleeper, _, band) = forward.place(row);
+            by_sleeper[sleeper] += square(row);
+            by_band[band] += square(row);
+        }
+        let sleepers = loud(&by_sleeper);
+        let bands = loud(&by_band);
+        let mut sum = (0.0, 0.0);
+        for (measured, before) in levels.measured_db.iter().zip(&levels.before_db) {
+            for sleeper in sleepers.clone() {
+                for band in bands.clone() {
+                    sum.0 += (measured[sleeper][band] - before[sleeper][band]).powi(2);
+                    sum.1 += 1.0;
+                }
+            }
+        }
+        let Location { x_m, sleepers } = self.location(&sleepers.collect::<Vec<_>>());
+        let centres = forward.bands.centres_hz();
+        Mismatch {
+            x_m,
+            sleepers,
+            frequency_hz: [centres[bands.start], centres[bands.end - 1]],
+            speeds_km_h: levels.speeds_km_h.clone(),
+            level_db: f64::sqrt(sum.0 / sum.1),
+            p_value,
+        }
+    }
+}
+
+/// The stretch of entries that hold a good share of the sum.
+fn loud(squares: &[f64]) -> Range<usize> {
+    let highest = squares.iter().copied().fold(0.0, f64::max);
+    let part = |square: &f64| *square >= PLACE_SHARE * highest;
+    let first = squares.iter().position(part).unwrap_or(0);
+    let last = squares.iter().rposition(part).unwrap_or(squares.len() - 1);
+    first..last + 1
+}

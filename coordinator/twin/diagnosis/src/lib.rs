@@ -1,0 +1,49 @@
+//! Where simulation and recording differ, what physics was left out, and what including it gains.
+//!
+//! Owns baseline, null model, detection, names and their acceptance. Pure: recordings and null
+//! simulations come in as values, a diagnosis goes out. The catalogue of physics is the track
+//! model's; pages and files are left to others.
+
+mod bands;
+mod baseline;
+mod behaviour;
+mod calibration;
+mod candidate;
+mod conclusion;
+mod forward;
+mod held_out;
+mod null_model;
+mod observation;
+mod outcome;
+mod port_scan;
+mod profile;
+mod screen;
+mod search;
+mod section;
+mod sentence;
+mod signature;
+mod spectra;
+mod subject;
+mod suggestion;
+mod transfer;
+
+pub use bands::Bands;
+pub use baseline::Unknowns;
+pub use behaviour::{Behaviour, Element};
+pub use calibration::{Calibration, CalibrationError, Problem};
+pub use candidate::{Candidate, candidates};
+pub use conclusion::{Evidence, passes_alone};
+pub use forward::{Forward, Linearised};
+pub use null_model::{NullError, NullModel};
+pub use observation::Observation;
+pub use outcome::{
+    BeforeAfter, Diagnosis, Estimate, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score,
+    Scores, SleeperValues, Verdict,
+};
+pub use port_scan::{Port, PortPlace, PortScan};
+pub use screen::{Template, templates};
+pub use search::{Fitted, Round, Search, Stage, first_calibration, search};
+pub use section::Section;
+pub use signature::signature;
+pub use spectra::{Spectra, SpeedSpectra};
+pub use subject::{Subject, SubjectError, check_track};

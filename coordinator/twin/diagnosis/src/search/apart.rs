@@ -1,0 +1,66 @@
+//! Whether all speeds passed the same track.
+
+use super::chance::squares;
+use super::probability::TEMPERATURE;
+use super::round::{FALSE_ALARM, Setting};
+use super::{Round, Search};
+use crate::calibration::{CalibrationError, Problem};
+use tracktwin_inspection::median;
+use tracktwin_number::probability;
+
+impl Search {
+    /// Compares what was found with a track of its own for each speed, and takes it back if that is
+    /// surely better: what stays where it is, all speeds pass.
+    pub(super) fn compare_apart(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
+        let forward = &setting.subject.forward;
+        if forward.speeds_m_s.len() < 2 {
+            return Ok(());
+        }
+        let start = &self.baseline.values;
+        let each = setting.at_each_speed(|observation| {
+            let alone =
+                Problem { forward, observation, candidates: &[] }.calibrate(start.clone())?;
+            let deviation = observation.log_deviation() - observation.held_out_log_deviation();
+            Ok((alone, deviation))
+        })?;
+        let alone: f64 = each.iter().map(|(alone, deviation)| alone.log_evidence - deviation).sum();
+        // What is left without a name explains as well.
+        let left = self.rounds.last().filter(|last| !last.accepted).map_or(0.0, Round::most);
+        let together = self.last.log_evidence - self.observation.log_deviation() + left;
+        let sleepers = forward.section.sleepers;
+        let mut gains = squares(&self.last.residual, sleepers);
+        for (alone, _) in &each {
+            let left = squares(&alone.residual, sleepers);
+            gains.iter_mut().zip(left).for_each(|(gain, left)| *gain -= left);
+        }
+        // What is wrong at one place is wrong with the track there, not with where the passes were.
+        let all: f64 = gains.iter().sum();
+        self.apart = alone - together + 0.5 * (sleepers as f64 * median(gains) - all);
+        if self.is_apart() {
+            self.accepted.clear();
+            self.last = self.baseline.clone();
+            self.rounds.truncate(1);
+            self.rounds.iter_mut().for_each(|round| round.accepted = false);
+        }
+        Ok(())
+    }
+
+    /// Probability of such a difference if all speeds passed the same track.
+    pub fn apart_p_value(&self) -> f64 {
+        probability(-self.apart.max(0.0) / TEMPERATURE)
+    }
+
+    /// Whether the speeds did surely not pass the same track.
+    pub fn is_apart(&self) -> bool {
+        self.apart_p_value() <= FALSE_ALARM
+    }
+}
+
+impl Round {
+    /// The greatest log evidence in nats of all that was tried, none at least.
+    fn most(&self) -> f64 {
+        let named = self.fitted.first().map(|fitted| fitted.log_evidence);
+        let unknown = self.port.as_ref().map(|port| port.log_evidence);
+        named.into_iter().chain(unknown).fold(0.0, f64::max)
+    }
+}

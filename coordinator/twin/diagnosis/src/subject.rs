@@ -1,0 +1,244 @@
+//! A recording made ready for diagnosis, or the reason why it can't be.
+
+use crate::bands::Bands;
+use crate::forward::Forward;
+use crate::null_model::NullModel;
+use crate::section::Section;
+use crate::spectra::{Spectra, SpeedSpectra};
+use nalgebra::{DMatrix, DVector};
+use tracktwin_inspection::chain::Trouble;
+use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::recording::{OtherTrack, Recording, compare_designs};
+
+/// Bands compared in Hz, as far as the sample rate lets them: below, a window holds hardly a
+/// wavelet; above, hardly any irregularity.
+const BANDS_HZ: [f64; 2] = [80.0, 5100.0];
+
+/// Highest band as a part of the sample rate.
+const SAMPLE_RATE_SHARE: f64 = 0.35;
+
+/// Least number of bands from which physics can be told.
+const BANDS_MIN: usize = 12;
+
+/// Least number of neighbouring sleepers that all passes cover.
+const SLEEPERS_MIN: usize = 6;
+
+/// Part of a spacing that a pass must cover beyond a sleeper's window, where low bands reach.
+const MARGIN_SPANS: f64 = 0.6;
+
+/// Greatest difference of two neighbouring sleepers' distance from the spacing, as a share of it: the
+/// model's sleepers are evenly spaced.
+const UNEVEN: f64 = 0.1;
+
+/// Why a recording cannot be diagnosed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SubjectError {
+    /// The track that it would be compared with is not V-Track.
+    #[error(
+        "the models are of another track than V-Track ({} {}, V-Track's {}); diagnoses compare with \
+         V-Track only, whose stiffness, damping, bands and kinds of physics they know; leave out \
+         --models for a recording of V-Track", .0.quantity, .0.found(), .0.known()
+    )]
+    OtherDesign(OtherTrack),
+    /// It states another track or vehicle.
+    #[error(
+        "recording.json: {} {}, V-Track's {}; diagnoses compare with V-Track only", .0.quantity,
+        .0.found(), .0.known()
+    )]
+    OtherTrack(OtherTrack),
+    /// Its sleepers are not evenly spaced.
+    #[error(
+        "recording.json: sleepers: {} and {} lie {distance_m:.3} m apart, the model's {spacing_m} m; list \
+         every sleeper, or keep the stretch where they are evenly spaced", .between[0], .between[1]
+    )]
+    Uneven {
+        /// The two sleepers.
+        between: [String; 2],
+        /// Their distance in m.
+        distance_m: f64,
+        /// The model's in m.
+        spacing_m: f64,
+    },
+    /// Levels without a unit.
+    #[error("recording.json: nominal.gain_known: is false; a model predicts levels in m/s2")]
+    GainUnknown,
+    /// No sleepers.
+    #[error(
+        "sleepers: their places are not known; give recording.json theirs, or import with --sleeper"
+    )]
+    NoSleepers,
+    /// Too few sleepers.
+    #[error(
+        "passes: only {sleepers} neighbouring sleepers lie inside every pass with a margin of \
+         {margin_m:.2} m; a diagnosis needs {SLEEPERS_MIN} or more: record a longer stretch"
+    )]
+    TooShort {
+        /// Sleepers inside every pass.
+        sleepers: usize,
+        /// Margin in m.
+        margin_m: f64,
+    },
+    /// Too low a sample rate.
+    #[error(
+        "sample_rate_Hz: {0} is too low: nothing above {high:.0} Hz can be compared with a model \
+         of this track", high = SAMPLE_RATE_SHARE * .0
+    )]
+    SampleRate(f64),
+    /// Passes without a track in them.
+    #[error("passes: nothing can be said of the track from {0}")]
+    Unusable(Trouble),
+}
+
+/// A recording in the terms of the forward model.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// Predicts it.
+    pub forward: Forward,
+    /// Its log powers in the order of [`Forward`], means over the passes of a speed.
+    pub log_power: DVector<f64>,
+    /// Variance of these means by what passes of one speed do not share, a value a speed and band.
+    pub pass_variance: DVector<f64>,
+    /// Number in the recording of the first sleeper compared.
+    pub first_sleeper: usize,
+    /// Numbers in the recording of the passes at each speed.
+    pub pass_numbers: Vec<Vec<usize>>,
+    /// Where the passes alone show the rail's own shape, from and to in m; nowhere until
+    /// [`Subject::suggested`].
+    pub heard_m: Vec<[f64; 2]>,
+}
+
+impl SubjectError {
+    /// Whether the recording or the models are of a track that no diagnosis knows.
+    pub const fn is_of_the_track(&self) -> bool {
+        matches!(self, Self::OtherDesign(_) | Self::OtherTrack(_) | Self::Uneven { .. })
+    }
+}
+
+/// Whether a recording can be compared with a track of this design, which must be V-Track: typical values,
+/// ranges and bands are V-Track's.
+///
+/// A recording whose sleepers are not known is compared with no track.
+///
+/// # Errors
+/// [`SubjectError::OtherDesign`], [`SubjectError::OtherTrack`] and [`SubjectError::Uneven`].
+pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), SubjectError> {
+    compare_designs(design, &TrackDesign::v_track()).map_err(SubjectError::OtherDesign)?;
+    if recording.sleepers.is_empty() {
+        return Ok(());
+    }
+    recording.check_track(design).map_err(SubjectError::OtherTrack)?;
+    let spacing_m = design.sleeper.spacing_m;
+    let uneven = recording.sleepers.windows(2).find_map(|pair| {
+        let distance_m = pair[1].x_m - pair[0].x_m;
+        let is_even = (distance_m / spacing_m - 1.0).abs() <= UNEVEN;
+        (!is_even).then(|| ([0, 1].map(|end| pair[end].id.clone()), distance_m))
+    });
+    match uneven {
+        Some((between, distance_m)) => Err(SubjectError::Uneven { between, distance_m, spacing_m }),
+        None => Ok(()),
+    }
+}
+
+impl Subject {
+    /// Takes from a recording what is compared.
+    ///
+    /// # Errors
+    /// [`SubjectError`] says what is missing.
+    pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, SubjectError> {
+        check_track(recording, design)?;
+        let highest_hz = BANDS_HZ[1].min(SAMPLE_RATE_SHARE * recording.sample_rate_hz);
+        let bands = Bands::new(BANDS_HZ[0], highest_hz.max(BANDS_HZ[0]));
+        if bands.count() < BANDS_MIN {
+            return Err(SubjectError::SampleRate(recording.sample_rate_hz));
+        }
+        if recording.sleepers.is_empty() {
+            return Err(SubjectError::NoSleepers);
+        }
+        if !recording.gain_known() {
+            return Err(SubjectError::GainUnknown);
+        }
+        let sleepers = covered(recording);
+        if sleepers.len() < SLEEPERS_MIN {
+            let margin_m = MARGIN_SPANS * recording.spacing_m;
+            return Err(SubjectError::TooShort { sleepers: sleepers.len(), margin_m });
+        }
+        let spectra = Spectra::new(recording, &bands);
+        let first_x_m = recording.sleepers[sleepers.start].x_m;
+        let section = Section::new(design.clone(), sleepers.len(), first_x_m);
+        let speeds: Vec<f64> = spectra.speeds.iter().map(|speed| speed.speed_km_h).collect();
+        let noise = spectra.speeds.iter().map(|speed| speed.noise_density).collect();
+        let forward = Forward::new(section, bands, &speeds, noise);
+        let log_power = log_power(&forward, &spectra, sleepers.start);
+        let pass_variance = pass_variance(&forward, &spectra);
+        let pass_numbers = spectra.speeds.iter().map(|speed| speed.passes.clone()).collect();
+        let first_sleeper = sleepers.start;
+        let heard_m = Vec::new();
+        Ok(Self { forward, log_power, pass_variance, first_sleeper, pass_numbers, heard_m })
+    }
+
+    /// The same powers at other sleepers: those of each speed in an order of its own, `[speed][sleeper]`,
+    /// so that speeds have no place in common. A control: what is somewhere can't be found.
+    pub fn shuffle(&mut self, orders: &[Vec<usize>]) {
+        let (bands, per_sleeper) = (self.forward.bands.count(), self.forward.per_sleeper());
+        let measured = self.log_power.clone();
+        for (speed, order) in orders.iter().enumerate() {
+            for (sleeper, &from) in order.iter().enumerate() {
+                let row = |sleeper: usize| sleeper * per_sleeper + speed * bands;
+                let moved = measured.rows(row(from), bands);
+                self.log_power.rows_mut(row(sleeper), bands).copy_from(&moved);
+            }
+        }
+    }
+
+    /// Covariance of any one sleeper's log powers: the null model's, and what the passes do not share.
+    pub fn covariance(&self, null: &NullModel) -> DMatrix<f64> {
+        null.covariance(self.forward.bands.count(), &self.pass_variance)
+    }
+}
+
+/// The longest run of neighbouring sleepers that every pass covers with a margin.
+fn covered(recording: &Recording) -> std::ops::Range<usize> {
+    let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
+    let inside = |x_m: f64| {
+        recording.passes.iter().all(|pass| {
+            let (first, last) = (pass.position_m[0], pass.position_m[pass.position_m.len() - 1]);
+            first <= x_m - reach_m && x_m + reach_m <= last
+        })
+    };
+    let mut longest = 0..0;
+    let mut start = 0;
+    for (number, sleeper) in recording.sleepers.iter().enumerate() {
+        if !inside(sleeper.x_m) {
+            start = number + 1;
+        } else if number + 1 - start > longest.len() {
+            longest = start..number + 1;
+        }
+    }
+    longest
+}
+
+fn log_power(forward: &Forward, spectra: &Spectra, first: usize) -> DVector<f64> {
+    let mut all = DVector::zeros(forward.count());
+    for sleeper in 0..forward.section.sleepers {
+        for (number, speed) in spectra.speeds.iter().enumerate() {
+            let Some(mean) = speed.mean(first + sleeper) else { continue };
+            let row = sleeper * forward.per_sleeper() + number * forward.bands.count();
+            all.rows_mut(row, mean.len()).copy_from_slice(&mean);
+        }
+    }
+    all
+}
+
+/// A single pass at a speed scatters as passes of the other speeds do, or as a twentieth of the
+/// surface's power.
+fn pass_variance(forward: &Forward, spectra: &Spectra) -> DVector<f64> {
+    let bands = forward.bands.count();
+    let known: Vec<_> = spectra.speeds.iter().map(SpeedSpectra::pass_variance).collect();
+    let typical = known.iter().flatten().next().cloned().unwrap_or(vec![0.01; bands]);
+    let of_speed = |(variance, speed): (&Option<Vec<f64>>, &SpeedSpectra)| {
+        let count = speed.passes.len() as f64;
+        let variance = variance.as_ref().unwrap_or(&typical);
+        variance.iter().map(|value| value / count).collect::<Vec<_>>()
+    };
+    DVector::from_vec(known.iter().zip(&spectra.speeds).flat_map(of_speed).collect())
+}

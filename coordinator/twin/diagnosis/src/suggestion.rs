@@ -1,0 +1,61 @@
+//! What the passes alone suggest, as candidates for the model.
+
+use crate::candidate::{Candidate, parameter};
+use crate::subject::Subject;
+use tracktwin_inspection::FirstLook;
+use tracktwin_inspection::{Finding, Place};
+use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter};
+
+impl Subject {
+    /// Tells the model where the wheel begins its turns, if its blows say so, and where the rail's shape
+    /// was heard; makes candidates of what a first look found.
+    pub fn suggested(&mut self, look: &FirstLook) -> Vec<Candidate> {
+        let section = &self.forward.section;
+        let turn_start_m = |pass: &usize| {
+            let blows = look.flat.as_ref().and_then(|flat| flat.blows_m.get(*pass));
+            blows.and_then(|blows| blows.first()).map_or(0.0, |&x_m| section.model_x_m(x_m))
+        };
+        let starts = |passes: &Vec<usize>| passes.iter().map(turn_start_m).collect();
+        self.forward.wheel_starts_m = self.pass_numbers.iter().map(starts).collect();
+        self.heard_m = look.findings.iter().chain(&look.nameless).filter_map(heard_m).collect();
+        look.findings.iter().filter_map(candidate).collect()
+    }
+}
+
+/// Where a finding heard the rail's shape.
+fn heard_m(finding: &Finding) -> Option<[f64; 2]> {
+    match finding.place {
+        Place::Stretch { from_m, to_m } => Some([from_m, to_m]),
+        Place::Everywhere => None,
+    }
+}
+
+/// The candidate that a finding speaks for; none where a model of the track has nothing to say.
+fn candidate(finding: &Finding) -> Option<Candidate> {
+    let kind = Kind::from_name(finding.physics)?;
+    let new = ExtensionInstance::new(finding.physics);
+    let free: &[&str] = match finding.physics {
+        "wheel_flat" => &["length_m"],
+        "corrugation" => &["wavelength_m", "amplitude_m"],
+        "squat" => &["depth_m", "length_m"],
+        "rail_joint" => &["dip_m", "length_m", "bending_factor"],
+        "wheel_out_of_round" => &["amplitude_m"],
+        _ => return None,
+    };
+    let extension = match (finding.physics, &finding.place) {
+        ("corrugation", &Place::Stretch { from_m, to_m }) => new.at([from_m, to_m]),
+        (_, &Place::Stretch { from_m, to_m }) => new.at([0.5 * (from_m + to_m); 2]),
+        (_, Place::Everywhere) => new,
+    };
+    let extension = match finding.parameters.get("order") {
+        Some(&(order, _)) => extension.with("order", order),
+        None => extension,
+    };
+    let free: Vec<&KindParameter> = free.iter().map(|name| parameter(kind, name)).collect();
+    let found = |parameter: &&KindParameter| {
+        let found = finding.parameters.get(parameter.name);
+        found.map_or(parameter.typical, |&(mean, _)| mean)
+    };
+    let trial = free.iter().map(found).collect();
+    Some(Candidate { kind, extension, free, trials: vec![trial] })
+}

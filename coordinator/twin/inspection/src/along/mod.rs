@@ -1,0 +1,20 @@
+//! A pass as a function of the place: background, whitened power, lines, tail probabilities.
+//!
+//! Owns what the tests of wheel, impacts and measuring chain have in common; what is concluded is
+//! left to them.
+
+mod background;
+mod energy;
+mod line;
+mod tail;
+#[cfg(test)]
+pub(crate) mod testing;
+
+pub use background::median;
+pub(crate) use background::{Background, hann, whitened};
+pub use energy::tells_waves;
+pub(crate) use energy::{Energy, by_speed, speed_m_s};
+pub(crate) use line::{Line, Ruler, Spectrum, amplitude, on_even_places};
+pub(crate) use tail::{
+    combined, ln_binomial_tail, ln_gamma_tail, ln_normal_bound, ln_student_tail, of_best,
+};

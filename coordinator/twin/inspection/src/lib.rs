@@ -1,0 +1,16 @@
+//! What the passes of a recording tell without a model of the track.
+//!
+//! Owns impacts, waves and the wheel's turns, faults of the measuring chain, and the first look that
+//! puts them together. Pure: a recording goes in, findings come out. What a model of the track explains
+//! is the diagnosis's.
+
+mod along;
+pub mod chain;
+mod finding;
+mod first_look;
+pub mod impact;
+pub mod wheel;
+
+pub use along::{median, tells_waves};
+pub use finding::{Finding, Place};
+pub use first_look::{FALSE_ALARMS, FirstLook, first_look};

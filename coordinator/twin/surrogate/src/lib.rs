@@ -1,0 +1,44 @@
+//! Surrogates of the track model: from a feature vector back to the track's parameters.
+//!
+//! Owns Gaussian processes with the exponential kernel, how their inputs are scaled and their
+//! hyper-parameters found, the model selector, the error measures, and the files models live in.
+//! Leaves to others what a bin's power is (signal), where the training cases come from (library)
+//! and how windows of a recording are combined (evaluation).
+
+mod cholesky;
+mod coarse;
+mod distance;
+mod domain;
+mod error;
+mod exponential;
+mod features;
+mod fit;
+mod gaussian_process;
+mod group;
+mod input_map;
+mod kernel;
+mod ladder;
+mod polynomial;
+mod selector;
+mod spread;
+mod store;
+mod train;
+mod training_set;
+mod validate;
+mod whitening;
+
+pub use distance::{distances, distances_within};
+pub use domain::{Beyond, Domain, Judgement, Side};
+pub use error::Error;
+pub use features::FeatureColumns;
+pub use fit::{Fit, MeanFunction, fit};
+pub use gaussian_process::{Factor, Weights};
+pub use group::{GroupKey, ModelGroup, ParameterModel, Prediction, Score, Tested};
+pub use input_map::{InputMap, InputScaling};
+pub use kernel::{Hyperparameters, correlation};
+pub use selector::{Neighbour, Selection, Selector, mape};
+pub use spread::Spread;
+pub use store::{FORMAT, Trained};
+pub use train::{ENTRIES_MIN, Progress, TrainOptions, train};
+pub use training_set::{Split, TrainingSet};
+pub use validate::{Folds, coverage, folds, mase};

@@ -1,0 +1,335 @@
+//! One diagnosis against its truth.
+
+use crate::draw::{Class, Plan};
+use crate::paper::Paper;
+use serde::{Deserialize, Serialize};
+use tracktwin_diagnosis::{Diagnosis, Hypothesis, Verdict};
+use tracktwin_parameters::{Axis, Parameter, Preset};
+use tracktwin_reference_simulator::{Hidden, Scene};
+
+/// Spacing of the sleepers in m.
+const SPACING_M: f64 = 0.125;
+
+/// Longest effect in spacings that has a place to be found.
+const LOCAL_SPACINGS: f64 = 3.0;
+
+/// Probability that the set of answers must hold together.
+const SET: f64 = 0.9;
+
+/// A cell beyond so many deviations of the nulls is seen by anybody who looks.
+const CELL_DEVIATIONS: f64 = 3.5;
+
+/// What became of a case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// Number of the case.
+    pub number: u32,
+    /// What kind of case it is.
+    pub class: Class,
+    /// What the diagnosis said.
+    pub verdict: Verdict,
+    /// Names that it accepted.
+    pub accepted: Vec<String>,
+    /// What became of each hidden effect.
+    pub hidden: Vec<Named>,
+    /// Each probability that was given, and whether it was so.
+    pub probabilities: Vec<(f64, bool)>,
+    /// Gain on the speeds held out in nats; none where nothing was accepted.
+    pub held_out_gain_nats: Option<f64>,
+    /// Errors of the stiffnesses next to the effect; none where nothing was hidden.
+    pub bias: Option<Bias>,
+    /// Whether the re-tuned baseline looks well: parameters inside Table D1.
+    pub parameters_inside: bool,
+    /// Whether no cell of the re-tuned baseline is far beyond chance.
+    pub cells_inside: bool,
+    /// CPU time of the diagnosis in s.
+    pub cpu_s: f64,
+    /// What was said without the hidden kind in the catalogue; none if nobody asked.
+    pub knocked_out: Option<KnockedOut>,
+    /// What was said with its sleepers shuffled; none if nobody asked.
+    #[serde(default)]
+    pub shuffled: Option<Verdict>,
+    /// What the paper's own pipeline says of it; none if nobody asked.
+    #[serde(default)]
+    pub paper: Option<Paper>,
+}
+
+/// What is said of an effect when the catalogue does not have it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KnockedOut {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Whether it was "unknown", as it should be.
+    pub unknown: bool,
+    /// How well the effect was placed; none where it has no place.
+    pub place: Option<Placed>,
+}
+
+/// What became of a hidden effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Named {
+    /// What it is.
+    pub physics: String,
+    /// Length of its trace over the scatter of nulls after re-tuning; none for what the model has
+    /// no part for.
+    pub detectability: Option<f64>,
+    /// Whether it is the first name.
+    pub first: bool,
+    /// Whether it is in the set of names that hold 90 % together.
+    pub in_set: bool,
+    /// Whether it was accepted, at any rank.
+    pub accepted: bool,
+    /// How well it was placed; none where it has no place.
+    pub place: Option<Placed>,
+}
+
+/// How well a local effect was placed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Placed {
+    /// Distance in sleeper spacings to the nearest accepted place; none where none was said.
+    pub error_spacings: Option<f64>,
+}
+
+impl Placed {
+    /// Whether it is right to within a sleeper.
+    pub fn within_a_sleeper(self) -> bool {
+        self.error_spacings.is_some_and(|error| error <= 1.0)
+    }
+}
+
+/// Mean absolute error of the logarithms of railpad and ballast stiffness.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bias {
+    /// By the re-tuned baseline.
+    pub before: f64,
+    /// With what was named.
+    pub after: f64,
+}
+
+impl Score {
+    /// Whether it can be asked what is said without the hidden kind: one effect, found and named.
+    pub fn can_be_knocked_out(&self) -> bool {
+        self.class == Class::Single && self.hidden.iter().all(|named| named.accepted)
+    }
+
+    /// Whether it can be asked what is said with shuffled sleepers: one effect with a place, found.
+    pub fn can_be_shuffled(&self) -> bool {
+        self.class == Class::Single
+            && self.verdict != Verdict::Consistent
+            && self.hidden.iter().all(|named| named.place.is_some())
+    }
+
+    /// Whether nobody could have said it better: hidden effects are the accepted names, faults of
+    /// the chain are not called physics, and where nothing is hidden nothing is said.
+    pub fn is_right(&self) -> bool {
+        match self.class {
+            Class::Control => self.verdict == Verdict::Consistent,
+            Class::Artefact => {
+                matches!(self.verdict, Verdict::Consistent | Verdict::MeasurementChain)
+            }
+            Class::Single | Class::Double | Class::Unknown => {
+                self.accepted.len() == self.hidden.len()
+                    && self.hidden.iter().all(|named| named.accepted)
+            }
+        }
+    }
+}
+
+/// Scores a diagnosis. `detectability` has a value for each hidden effect.
+pub fn score(
+    plan: &Plan,
+    diagnosis: &Diagnosis,
+    detectability: &[Option<f64>],
+    cpu_s: f64,
+) -> Score {
+    let accepted: Vec<&Hypothesis> = diagnosis.hypotheses.iter().filter(|h| h.accepted).collect();
+    let left_out = &plan.scene.left_out;
+    let named = left_out.iter().zip(detectability);
+    let gains = diagnosis.fit.held_out_gain_nats.values();
+    Score {
+        number: plan.number,
+        class: plan.class,
+        verdict: diagnosis.verdict,
+        accepted: accepted.iter().map(|hypothesis| hypothesis.physics.clone()).collect(),
+        hidden: named.map(|(hidden, &d)| becomes(hidden, d, diagnosis, &accepted)).collect(),
+        probabilities: probabilities(plan.class, left_out, diagnosis),
+        held_out_gain_nats: (gains.len() > 0).then(|| gains.sum()),
+        bias: bias(&plan.scene, diagnosis),
+        parameters_inside: parameters_inside(diagnosis),
+        cells_inside: cells_inside(diagnosis),
+        cpu_s,
+        knocked_out: None,
+        shuffled: None,
+        paper: None,
+    }
+}
+
+/// How well a diagnosis places the first hidden effect that has a place.
+pub fn placed(scene: &Scene, diagnosis: &Diagnosis) -> Option<Placed> {
+    let place = scene.left_out.iter().find_map(local)?;
+    let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
+    Some(Placed { error_spacings: nearest(place, accepted) })
+}
+
+/// Distance in sleeper spacings from the middle of a place to the nearest of these.
+fn nearest<'h>(
+    place: [f64; 2],
+    hypotheses: impl IntoIterator<Item = &'h Hypothesis>,
+) -> Option<f64> {
+    let middle = |[from_m, to_m]: [f64; 2]| 0.5 * (from_m + to_m);
+    let error = |hypothesis: &Hypothesis| {
+        let said = hypothesis.location.as_ref()?.x_m;
+        Some((middle(said) - middle(place)).abs() / SPACING_M)
+    };
+    hypotheses.into_iter().filter_map(error).min_by(f64::total_cmp)
+}
+
+fn becomes(
+    hidden: &Hidden,
+    detectability: Option<f64>,
+    diagnosis: &Diagnosis,
+    accepted: &[&Hypothesis],
+) -> Named {
+    let is_it = |hypothesis: &Hypothesis| is_it(hidden, &hypothesis.physics);
+    let place = local(hidden)
+        .map(|place| Placed { error_spacings: nearest(place, accepted.iter().copied()) });
+    Named {
+        physics: hidden.physics().to_owned(),
+        detectability,
+        first: accepted.first().is_some_and(|first| is_it(first)),
+        in_set: set(&diagnosis.hypotheses).iter().any(is_it),
+        accepted: accepted.iter().any(|hypothesis| is_it(hypothesis)),
+        place,
+    }
+}
+
+/// Whether a name is right; for what the catalogue lacks it is "unknown".
+fn is_it(hidden: &Hidden, physics: &str) -> bool {
+    let right = if hidden.in_catalogue() { hidden.physics() } else { "unknown_physics" };
+    physics == right
+}
+
+/// Whether a hypothesis has an effect's place, within a sleeper; where either is everywhere, it has.
+fn is_placed(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
+    let (Some([from_m, to_m]), Some(location)) = (hidden.place(), &hypothesis.location) else {
+        return true;
+    };
+    from_m - 1.01 * SPACING_M <= location.x_m[1] && location.x_m[0] <= to_m + 1.01 * SPACING_M
+}
+
+/// The place of an effect that has one.
+fn local(hidden: &Hidden) -> Option<[f64; 2]> {
+    hidden.place().filter(|[from_m, to_m]| to_m - from_m <= LOCAL_SPACINGS * SPACING_M)
+}
+
+/// The most probable names that hold 90 % of all probability together.
+fn set(hypotheses: &[Hypothesis]) -> &[Hypothesis] {
+    let all: f64 = hypotheses.iter().map(|hypothesis| hypothesis.probability).sum();
+    let mut held = 0.0;
+    let enough = hypotheses.iter().position(|hypothesis| {
+        held += hypothesis.probability;
+        held >= SET * all
+    });
+    &hypotheses[..enough.map_or(hypotheses.len(), |last| last + 1)]
+}
+
+/// Every probability given, with whether it was so; that of nothing where nothing is said.
+fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Vec<(f64, bool)> {
+    let is_there = |hypothesis: &Hypothesis| {
+        let is_so =
+            |hidden: &Hidden| is_it(hidden, &hypothesis.physics) && is_placed(hidden, hypothesis);
+        left_out.iter().any(is_so)
+    };
+    let given = diagnosis.hypotheses.iter();
+    let mut all: Vec<_> =
+        given.map(|hypothesis| (hypothesis.probability, is_there(hypothesis))).collect();
+    if diagnosis.verdict == Verdict::Consistent {
+        all.push((diagnosis.nothing_left_out.unwrap_or(1.0), class == Class::Control));
+    }
+    all
+}
+
+/// Whether a place is next to physics that is hidden; all places are if it is everywhere, or none is
+/// hidden.
+pub(crate) fn near(scene: &Scene, x_m: f64) -> bool {
+    let mut physical = scene.left_out.iter().filter(|hidden| !hidden.is_artefact()).peekable();
+    let is_near = |hidden: &Hidden| {
+        hidden.place().is_none_or(|[from_m, to_m]| {
+            from_m - 1.01 * SPACING_M <= x_m && x_m <= to_m + 1.01 * SPACING_M
+        })
+    };
+    physical.peek().is_none() || physical.any(is_near)
+}
+
+/// Errors at the sleepers next to all that is hidden; everywhere if it is everywhere.
+fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
+    if scene.left_out.iter().all(Hidden::is_artefact) {
+        return None;
+    }
+    let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
+    for sleeper in diagnosis.track.iter().filter(|sleeper| near(scene, sleeper.x_m)) {
+        let number = (sleeper.x_m / SPACING_M).round() as usize;
+        let Some(truth) = number.checked_sub(1).and_then(|n| scene.sleepers.get(n)) else {
+            continue;
+        };
+        let error = |value: f64, truth: f64| (value / truth).ln().abs();
+        let (railpad, ballast) = (&sleeper.railpad_stiffness, &sleeper.ballast_stiffness);
+        before += error(railpad.before.mean, truth.railpad_stiffness_n_m)
+            + error(ballast.before.mean, truth.ballast_stiffness_n_m);
+        after += error(railpad.after.mean, truth.railpad_stiffness_n_m)
+            + error(ballast.after.mean, truth.ballast_stiffness_n_m);
+        count += 2.0;
+    }
+    (count > 0.0).then(|| Bias { before: before / count, after: after / count })
+}
+
+/// Whether what the baseline says of every sleeper lies inside Table D1 of the paper.
+fn parameters_inside(diagnosis: &Diagnosis) -> bool {
+    let inside = |parameter: Parameter, value: f64| {
+        let Axis { low, high, .. } = Preset::VTrack.axis(parameter);
+        (low..=high).contains(&value)
+    };
+    diagnosis.track.iter().all(|sleeper| {
+        inside(Parameter::RailpadStiffness, sleeper.railpad_stiffness.before.mean)
+            && inside(Parameter::BallastStiffness, sleeper.ballast_stiffness.before.mean)
+    })
+}
+
+fn cells_inside(diagnosis: &Diagnosis) -> bool {
+    let levels = &diagnosis.levels;
+    let speeds = levels.measured_db.iter().zip(&levels.before_db).zip(&levels.scatter_db);
+    speeds.into_iter().all(|((measured, before), scatter)| {
+        measured.iter().zip(before).all(|(measured, before)| {
+            let cells = measured.iter().zip(before).zip(scatter);
+            cells.into_iter().all(|((m, b), sd)| (m - b).abs() <= CELL_DEVIATIONS * sd)
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+    use tracktwin_diagnosis::Location;
+
+    #[test]
+    fn a_right_name_at_a_wrong_place_is_wrong() {
+        let hidden = Hidden::Squat { x_m: [2.5, 2.5], depth_m: 2e-5, length_m: 6e-3 };
+        let squat_at = |x_m: Option<f64>| Hypothesis {
+            physics: "squat".to_owned(),
+            probability: 0.5,
+            accepted: false,
+            location: x_m.map(|x_m| Location { x_m: [x_m, x_m], sleepers: Vec::new() }),
+            port: None,
+            behaviour: None,
+            parameters: BTreeMap::new(),
+            look_alikes: Vec::new(),
+            would_separate: String::new(),
+            detectability: 0.0,
+            log_evidence: 0.0,
+        };
+        let places = [Some(2.5), Some(2.6), Some(2.7), Some(1.0), None];
+        let placed = places.map(|x_m| is_placed(&hidden, &squat_at(x_m)));
+        assert_eq!(placed, [true, true, false, false, true]);
+    }
+}

@@ -1,0 +1,74 @@
+//! How visible a hidden effect was: its trace over the scatter of nulls, after re-tuning.
+//!
+//! Opens the truth, so it comes after the diagnosis was written down.
+
+use nalgebra::DVector;
+use tracktwin_diagnosis::{CalibrationError, Search, Subject, signature};
+use tracktwin_reference_simulator::{Hidden, Scene};
+use tracktwin_signal::recording::Recording;
+use tracktwin_track::extension::ExtensionInstance;
+
+/// `d'` of a hidden effect; none for what the forward model does not have.
+///
+/// # Errors
+/// [`CalibrationError`] when the true values make no track.
+pub fn detectability(
+    recording: &Recording,
+    subject: &Subject,
+    search: &Search,
+    scene: &Scene,
+    hidden: &Hidden,
+) -> Result<Option<f64>, CalibrationError> {
+    let Some(extension) = in_recording(recording, subject, hidden) else { return Ok(None) };
+    let values = values(recording, subject, scene);
+    let length = signature(subject, &search.observation, &values, extension)?;
+    Ok((length > 0.0).then_some(length))
+}
+
+/// The effect in terms of the recording: compared sleepers count from 0.
+fn in_recording(
+    recording: &Recording,
+    subject: &Subject,
+    hidden: &Hidden,
+) -> Option<ExtensionInstance> {
+    let in_model = matches!(hidden, Hidden::SensorMountResonance { .. }) || !hidden.is_artefact();
+    if !hidden.in_catalogue() || !in_model {
+        return None;
+    }
+    let json = serde_json::to_value(hidden).ok()?;
+    let mut extension: ExtensionInstance = serde_json::from_value(json).ok()?;
+    let compared: Vec<Option<usize>> =
+        (0..subject.forward.section.sleepers).map(|s| number(recording, subject, s)).collect();
+    if let Some(sleepers) = &mut extension.sleepers {
+        let place = |number: &usize| compared.iter().position(|other| *other == Some(*number));
+        *sleepers = sleepers.iter().filter_map(place).collect();
+        if sleepers.is_empty() {
+            return None;
+        }
+    }
+    Some(extension)
+}
+
+/// Number in the scene of a compared sleeper: its name holds it.
+pub(crate) fn number(recording: &Recording, subject: &Subject, sleeper: usize) -> Option<usize> {
+    recording.sleepers[subject.first_sleeper + sleeper].id.strip_prefix("SN")?.parse().ok()
+}
+
+/// The unknowns as they truly are.
+fn values(recording: &Recording, subject: &Subject, scene: &Scene) -> DVector<f64> {
+    let unknowns = &subject.forward.unknowns;
+    let mut values = unknowns.typical();
+    for sleeper in 0..subject.forward.section.sleepers {
+        let truth = number(recording, subject, sleeper).and_then(|n| scene.sleepers.get(n));
+        let Some(truth) = truth else { continue };
+        values[unknowns.ballast().start + sleeper] = truth.ballast_stiffness_n_m.ln();
+        values[unknowns.railpad().start + sleeper] = truth.railpad_stiffness_n_m.ln();
+        values[unknowns.level().start + sleeper] = scene.irregularity_level.ln();
+    }
+    let bending: f64 = scene.sleepers.iter().map(|sleeper| sleeper.sleeper_ei_n_m2).sum();
+    let global = unknowns.global().start;
+    values[global] = (bending / scene.sleepers.len() as f64).ln();
+    values[global + 1] = scene.railpad_damping_n_s_m.ln();
+    values[global + 2] = scene.ballast_damping_n_s_m.ln();
+    values
+}

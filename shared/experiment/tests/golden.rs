@@ -1,0 +1,77 @@
+//! The version of the physics: features of some cases, as they were when it was last raised.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use tracktwin_experiment::{Case, Experiment, Outcome, Simulate, Simulation};
+use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
+
+/// Every so many bins are kept.
+const BINS_APART: usize = 8;
+/// Processors sum in another order: features differ by less than this, in neper. Results of workers that
+/// differ by as little are one result.
+const ALIKE_NEPER: f64 = 1e-9;
+/// Set to write the file anew.
+const WRITE: &str = "TRACKTWIN_WRITE_GOLDEN";
+
+type Golden = BTreeMap<String, Vec<f64>>;
+
+fn v_track() -> Experiment {
+    Experiment::new(TrackDesign::v_track())
+}
+
+fn with_extension(json: &str) -> Experiment {
+    Experiment { extensions: vec![serde_json::from_str(json).unwrap()], ..v_track() }
+}
+
+fn features(experiment: Experiment, parameters: ParameterSet) -> Vec<f64> {
+    let experiment = experiment.checked().unwrap();
+    let case = Case { index: 0, parameters, surface_seed: 7 };
+    let outcomes = Simulation::new(&experiment).unwrap().simulate(&[case]);
+    let Outcome::Finished(passes) = &outcomes[0] else { panic!("{:?}", outcomes[0]) };
+    let bins = passes.iter().flat_map(|pass| pass.features.log_power.iter().step_by(BINS_APART));
+    bins.copied().collect()
+}
+
+fn golden() -> Golden {
+    let nominal = ParameterSet::nominal();
+    let soft = nominal
+        .with(Parameter::RailpadStiffness, Parameter::RailpadStiffness.range()[0])
+        .with(Parameter::BallastStiffness, Parameter::BallastStiffness.range()[0])
+        .with(Parameter::IrregularityLevel, Parameter::IrregularityLevel.range()[1]);
+    let joint = r#"{"physics": "rail_joint", "x_m": [2.5, 2.5], "dip_m": 4e-5}"#;
+    let gap = r#"{"physics": "hanging_sleeper", "sleepers": [20], "gap_m": 1e-4}"#;
+    let real_scale = Experiment {
+        speeds_km_h: vec![50.0],
+        ..Experiment::new(TrackDesign::v_track().enlarged(5.0))
+    };
+    [
+        ("nominal", features(v_track(), nominal)),
+        ("soft track, high level", features(v_track(), soft)),
+        ("rail joint", features(with_extension(joint), nominal)),
+        ("hanging sleeper", features(with_extension(gap), nominal)),
+        ("five times as large", features(real_scale, nominal)),
+    ]
+    .map(|(name, features)| (name.to_owned(), features))
+    .into()
+}
+
+#[test]
+fn features_are_those_of_the_version_of_the_physics() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden.json");
+    let now = golden();
+    if std::env::var_os(WRITE).is_some() {
+        let text = serde_json::to_string_pretty(&now).unwrap() + "\n";
+        std::fs::write(&path, text).unwrap();
+    }
+    let kept: Golden = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    assert!(kept.keys().eq(now.keys()), "other cases; set {WRITE}=1 and run the test again");
+    for (name, features) in &now {
+        let pairs = features.iter().zip(&kept[name]);
+        let most = pairs.map(|(now, kept)| (now - kept).abs()).fold(0.0, f64::max);
+        assert!(
+            most < ALIKE_NEPER && features.len() == kept[name].len(),
+            "{name}: features differ by {most:e} neper from those in golden.json. If the physics was meant to \
+             change, raise its version: set {WRITE}=1, run this test, and commit golden.json"
+        );
+    }
+}
