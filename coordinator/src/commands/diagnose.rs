@@ -103,7 +103,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 fn stop(error: DiagnosingError) -> Stop {
     match error {
         DiagnosingError::Recording(error) => Stop::Input(error.into()),
-        DiagnosingError::Failure(error) => Stop::Failure(error),
+        failed => Stop::from(failed),
     }
 }
 

@@ -3,11 +3,10 @@
 //! Owns the order of the stages; what each does is the diagnosis crate's, where null simulations
 //! are kept the library's.
 
-use crate::pipeline::null_models;
-use anyhow::Context;
+use crate::pipeline::null_models::{self, NullModelError};
 use tracktwin_diagnosis::{
-    Candidate, Diagnosis, Evidence, Search, Stage, Subject, SubjectError, check_track,
-    first_calibration, passes_alone, search,
+    CalibrationError, Candidate, Diagnosis, Evidence, Search, Stage, Subject, SubjectError,
+    check_track, first_calibration, passes_alone, search,
 };
 use tracktwin_inspection::{FirstLook, first_look};
 use tracktwin_library::Library;
@@ -23,10 +22,13 @@ pub struct Setting<'a> {
     pub library: Option<&'a Library>,
     /// Kinds of physics that may not be named.
     pub without: &'a [String],
-    /// Seed by which sleepers are shuffled, at each speed otherwise: a control in which nothing has
-    /// a place, and the passes don't speak for themselves.
-    pub shuffle: Option<u64>,
+    /// Gives an order of the sleepers for each speed, `[speed][sleeper]`, from the numbers of speeds and
+    /// sleepers: a control in which nothing has a place, and the passes don't speak for themselves.
+    pub shuffle: Option<&'a Orders<'a>>,
 }
+
+/// From numbers of speeds and sleepers to an order of the sleepers for each speed.
+pub type Orders<'a> = dyn Fn(usize, usize) -> Vec<Vec<usize>> + Send + Sync + 'a;
 
 /// A diagnosis and what it was concluded from.
 #[derive(Debug)]
@@ -52,9 +54,18 @@ pub enum DiagnosingError {
     /// The recording cannot be diagnosed.
     #[error(transparent)]
     Recording(#[from] SubjectError),
-    /// Something broke down on the way.
+    /// The model of the track cannot be fitted without anything left out.
+    #[error("no baseline fits: {0}")]
+    Baseline(#[source] CalibrationError),
+    /// The null simulations are not to be had.
     #[error(transparent)]
-    Failure(#[from] anyhow::Error),
+    NullModel(#[from] NullModelError),
+    /// The search broke down.
+    #[error("the search for left-out physics broke down: {0}")]
+    Search(#[source] CalibrationError),
+    /// What the search found comes to no conclusion.
+    #[error("no conclusion can be drawn: {0}")]
+    Conclusion(#[source] CalibrationError),
 }
 
 /// Diagnoses a recording. `watch` hears what is going on and which share of it is done.
@@ -83,15 +94,16 @@ pub async fn diagnose(
         return Err(SubjectError::Unusable(trouble.clone()).into());
     }
     look.forget(allowed);
-    if let Some(seed) = shuffle {
+    if let Some(orders) = shuffle {
         look.ignore();
         let (speeds, sleepers) = (subject.pass_numbers.len(), subject.forward.section.sleepers);
-        subject.shuffle(&tracktwin_trial::orders(seed, speeds, sleepers));
+        subject.shuffle(&orders(speeds, sleepers));
     }
     let suggested = subject.suggested(&look);
     watch("baseline", 0.0);
-    let start = first_calibration(&subject).context("no baseline fits")?;
-    subject.forward.allow_beyond(&start).context("no baseline fits")?;
+    let start = first_calibration(&subject).map_err(DiagnosingError::Baseline)?;
+    let beyond = subject.forward.allow_beyond(&start).map_err(CalibrationError::from);
+    beyond.map_err(DiagnosingError::Baseline)?;
     watch("null model", 0.0);
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
@@ -101,7 +113,7 @@ pub async fn diagnose(
     all.retain(|candidate: &Candidate| allowed(candidate.kind.physics));
     let progress = |stage, share| watch(name(stage), share);
     let found = tokio::task::block_in_place(|| search(&subject, &null, start, &all, &progress));
-    let search = found.context("the search for left-out physics broke down")?;
+    let search = found.map_err(DiagnosingError::Search)?;
     let diagnosis = conclude(recording, &subject, &look, &search)?;
     Ok(Diagnosed { diagnosis, compared: Some(Compared { subject, search }) })
 }
@@ -111,9 +123,9 @@ fn conclude(
     subject: &Subject,
     look: &FirstLook,
     search: &Search,
-) -> Result<Diagnosis, anyhow::Error> {
+) -> Result<Diagnosis, DiagnosingError> {
     let evidence = Evidence { recording, subject, look, search };
-    evidence.conclude().context("no conclusion can be drawn")
+    evidence.conclude().map_err(DiagnosingError::Conclusion)
 }
 
 const fn name(stage: Stage) -> &'static str {

@@ -1,11 +1,10 @@
 //! Null simulations of a recording's track: taken from the library, or made and kept there.
 
-use anyhow::Context;
 use nalgebra::DVector;
 use serde::Serialize;
-use tracktwin_diagnosis::{NullModel, Subject};
+use tracktwin_diagnosis::{NullError, NullModel, Subject};
 use tracktwin_experiment::MODEL_HASH;
-use tracktwin_library::{Library, StoredArray};
+use tracktwin_library::{Library, LibraryError, StoredArray};
 use tracktwin_parameters::TrackDesign;
 
 /// Random surfaces simulated.
@@ -13,6 +12,17 @@ pub const SURFACES: u32 = 40;
 
 /// Seed of the first.
 const SEED: u64 = 0x6e75_6c6c;
+
+/// Why there is no null model.
+#[derive(Debug, thiserror::Error)]
+pub enum NullModelError {
+    /// The library cannot be read or written.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
+    /// A simulation breaks down.
+    #[error("the null simulations broke down: {0}")]
+    Simulation(#[from] NullError),
+}
 
 /// All that the numbers follow from.
 #[derive(Serialize)]
@@ -32,13 +42,13 @@ struct Key<'a> {
 /// surfaces are done.
 ///
 /// # Errors
-/// When the library cannot be read or written, or a simulation breaks down.
+/// [`NullModelError`].
 pub async fn of(
     subject: &Subject,
     values: &DVector<f64>,
     library: Option<&Library>,
     progress: impl Fn(u64) + Sync,
-) -> anyhow::Result<NullModel> {
+) -> Result<NullModel, NullModelError> {
     let forward = &subject.forward;
     let grid = NullModel::grid_values(forward, values);
     let key = Key {
@@ -52,7 +62,7 @@ pub async fn of(
         surfaces: SURFACES,
         seed: SEED,
     };
-    let meta_json = serde_json::to_string(&key).context("a key is plain JSON")?;
+    let meta_json = serde_json::to_string(&key).expect("a key is plain JSON");
     let key = blake3::hash(meta_json.as_bytes()).to_hex().to_string();
     if let Some(library) = library
         && let Some(stored) = library.array(&key).await?
@@ -63,7 +73,7 @@ pub async fn of(
     let simulated = tokio::task::block_in_place(|| {
         NullModel::simulate(forward, &grid, u64::from(SURFACES), SEED, |done| progress(done as u64))
     });
-    let null = simulated.context("the null simulations broke down")?;
+    let null = simulated?;
     if let Some(library) = library {
         let numbers = null.differences.concat();
         let kind = "null-campaign".to_owned();

@@ -4,7 +4,6 @@ use super::{SEALS, Trial, TrialError, file, sealed, text};
 use crate::pipeline;
 use crate::pipeline::diagnose::{Compared, Diagnosed, Setting};
 use crate::pipeline::provenance;
-use anyhow::Context;
 use rustix::time::{ClockId, clock_gettime};
 use std::path::PathBuf;
 use tracktwin_diagnosis::{Diagnosis, Verdict};
@@ -95,7 +94,8 @@ impl Trial {
         recording: &Recording,
         setting: Setting<'_>,
     ) -> Result<(), TrialError> {
-        let setting = Setting { shuffle: Some(self.seed), ..setting };
+        let orders = |speeds, sleepers| tracktwin_trial::orders(self.seed, speeds, sleepers);
+        let setting = Setting { shuffle: Some(&orders), ..setting };
         let (diagnosis, _) = diagnose(number, recording, setting).await?;
         let record = self.written(number, "-shuffled", &diagnosis)?;
         self.keep(number, Question::Shuffled, &diagnosis.verdict, Some(record)).await
@@ -179,11 +179,9 @@ async fn diagnose(
     setting: Setting<'_>,
 ) -> Result<(Diagnosis, Compared), TrialError> {
     let diagnosed = pipeline::diagnose::diagnose(recording, setting, &|_, _| ()).await;
-    let compared = diagnosed.and_then(|Diagnosed { diagnosis, compared }| {
-        let compared = compared.context("the recording has no track to compare with")?;
-        Ok((diagnosis, compared))
-    });
-    compared.map_err(|source| TrialError::Diagnosis { number, source })
+    let Diagnosed { diagnosis, compared } =
+        diagnosed.map_err(|source| TrialError::Diagnosis { number, source })?;
+    Ok((diagnosis, compared.ok_or(TrialError::NoTrack { number })?))
 }
 
 /// CPU time of this process so far in s.

@@ -14,6 +14,7 @@ pub use folder::check_folder;
 
 use crate::pipeline::diagnose::DiagnosingError;
 use crate::pipeline::evaluate::Evaluator;
+use crate::pipeline::null_models::NullModelError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -123,6 +124,12 @@ pub enum TrialError {
         /// Why.
         source: DiagnosingError,
     },
+    /// A recording has no track to compare with.
+    #[error("case {number}: the recording has no track to compare with")]
+    NoTrack {
+        /// Number of the case.
+        number: u32,
+    },
     /// The paper's pipeline can't be asked.
     #[error("case {number}: {source}")]
     Paper {
@@ -160,10 +167,10 @@ impl TrialError {
     fn is_temporary(&self) -> bool {
         match self {
             Self::Library(error) => error.is_temporary(),
-            Self::Diagnosis { source: DiagnosingError::Failure(failure), .. } => failure
-                .chain()
-                .filter_map(|cause| cause.downcast_ref::<LibraryError>())
-                .any(LibraryError::is_temporary),
+            Self::Diagnosis {
+                source: DiagnosingError::NullModel(NullModelError::Library(error)),
+                ..
+            } => error.is_temporary(),
             _ => false,
         }
     }

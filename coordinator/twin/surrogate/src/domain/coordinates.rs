@@ -8,7 +8,7 @@ use crate::{Error, TrainingSet};
 use faer::{Mat, MatRef, Side};
 
 /// Highest total degree of the polynomial in the parameters.
-const DEGREE_MAX: usize = 5;
+const DEGREE_MAX: usize = 4;
 /// Bins that are averaged into a band, the finest first.
 const BAND_BINS: [usize; 5] = [4, 8, 16, 32, 64];
 /// Entries per band value below which bands are made wider.

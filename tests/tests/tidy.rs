@@ -1,0 +1,210 @@
+//! Rules of the house that a compiler does not hold: which crate may use which, and how large things get.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Crates with those that they must not reach, directly or through others.
+const BORDERS: &[(&str, &[&str])] = &[
+    (
+        "tracktwin-farm",
+        &[
+            "tracktwin-surrogate",
+            "tracktwin-evaluation",
+            "tracktwin-inspection",
+            "tracktwin-diagnosis",
+            "tracktwin-report",
+            "tracktwin-trial",
+            "tracktwin-reproduction",
+            "tracktwin-reference-simulator",
+        ],
+    ),
+    ("tracktwin-worker", &["tracktwin-library", "tracktwin-farm", "sqlx"]),
+    ("tracktwin-library", &["tracktwin-farm", "tracktwin-worker", "tracktwin-surrogate"]),
+    ("tracktwin-surrogate", OUTSIDE_THE_TWIN),
+    ("tracktwin-evaluation", OUTSIDE_THE_TWIN),
+    ("tracktwin-inspection", OUTSIDE_THE_TWIN),
+    ("tracktwin-inspection", &["tracktwin-diagnosis", "tracktwin-surrogate"]),
+    ("tracktwin-diagnosis", OUTSIDE_THE_TWIN),
+    // What tests the twin may not be the twin.
+    (
+        "tracktwin-reference-simulator",
+        &["tracktwin-track", "tracktwin-diagnosis", "tracktwin-worker"],
+    ),
+    (
+        "tracktwin-report",
+        &["tracktwin-library", "tracktwin-farm", "tracktwin-worker", "tonic", "sqlx"],
+    ),
+    ("tracktwin-drawing", &["tracktwin-signal", "tracktwin-track", "tracktwin-evaluation"]),
+    ("tracktwin-track", &["tracktwin-signal", "tracktwin-experiment", "tokio"]),
+    ("tracktwin-experiment", &["tracktwin-protocol", "tokio", "tonic"]),
+];
+
+/// The twin knows no library, no network and nobody who examines it.
+const OUTSIDE_THE_TWIN: &[&str] = &[
+    "tracktwin-library",
+    "tracktwin-farm",
+    "tracktwin-worker",
+    "tracktwin-protocol",
+    "tracktwin-report",
+    "tracktwin-trial",
+    "tracktwin-reference-simulator",
+    "tokio",
+];
+
+/// Libraries that only these crates use.
+const KEPT_TO: &[(&str, &[&str])] = &[
+    ("sqlx", &["tracktwin-library"]),
+    ("tonic", &["tracktwin-protocol", "tracktwin-worker", "tracktwin-farm"]),
+    ("axum", &["tracktwin-worker", "tracktwin-farm"]),
+    ("anyhow", &["tracktwin", "tracktwin-worker"]),
+    ("clap", &["tracktwin", "tracktwin-worker"]),
+];
+
+/// Files in which `anyhow` stands: commands.
+const ANYHOW_IN: &[&str] = &["coordinator/src/commands/", "worker/src/command.rs"];
+
+/// Lines of a source file; an enum of errors can't be cut.
+const FILE_LINES_MAX: usize = 400;
+const ERRORS_LINES_MAX: usize = 450;
+/// Characters of a line in a page of the documentation, tables and code aside.
+const PAGE_LINE_MAX: usize = 130;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Files with this extension below a folder, built ones aside.
+fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() {
+                if name != "target" && !name.starts_with('.') {
+                    folders.push(path);
+                }
+            } else if path.extension().is_some_and(|it| it == extension) {
+                found.push(path);
+            }
+        }
+    }
+    found
+}
+
+/// What each crate of the workspace uses directly, in what is built for users.
+fn uses() -> BTreeMap<String, BTreeSet<String>> {
+    let manifests = files(&root(), "toml").into_iter().filter(|it| it.ends_with("Cargo.toml"));
+    let mut uses = BTreeMap::new();
+    for manifest in manifests {
+        let manifest: toml::Table = fs::read_to_string(manifest).unwrap().parse().unwrap();
+        let Some(name) = manifest.get("package").and_then(|it| it["name"].as_str()) else {
+            continue;
+        };
+        let dependencies = manifest.get("dependencies").and_then(|it| it.as_table());
+        let names = dependencies.into_iter().flat_map(|it| it.keys().cloned()).collect();
+        uses.insert(name.to_owned(), names);
+    }
+    uses
+}
+
+/// Everything that a crate reaches.
+fn reached<'a>(name: &'a str, uses: &'a BTreeMap<String, BTreeSet<String>>) -> BTreeSet<&'a str> {
+    let mut reached = BTreeSet::new();
+    let mut open = vec![name];
+    while let Some(name) = open.pop() {
+        for used in uses.get(name).into_iter().flatten() {
+            if reached.insert(used.as_str()) {
+                open.push(used);
+            }
+        }
+    }
+    reached
+}
+
+#[test]
+fn no_crate_reaches_over_its_border() {
+    let uses = uses();
+    for (name, forbidden) in BORDERS {
+        assert!(uses.contains_key(*name), "{name} is no crate");
+        let reached = reached(name, &uses);
+        let over: Vec<_> = forbidden.iter().filter(|it| reached.contains(**it)).collect();
+        assert!(over.is_empty(), "{name} reaches {over:?}");
+    }
+}
+
+#[test]
+fn databases_networks_and_arguments_stay_where_they_belong() {
+    let uses = uses();
+    let examinations = |name: &str| name.contains("test") || name == "tracktwin-benches";
+    for (library, allowed) in KEPT_TO {
+        let users = uses.iter().filter(|(_, used)| used.contains(*library)).map(|(name, _)| name);
+        for user in users.filter(|user| !examinations(user)) {
+            assert!(allowed.contains(&user.as_str()), "{user} uses {library}");
+        }
+    }
+}
+
+#[test]
+fn anyhow_is_for_commands() {
+    let root = root();
+    for file in files(&root, "rs") {
+        let place = file.strip_prefix(&root).unwrap().to_string_lossy().into_owned();
+        let text = fs::read_to_string(&file).unwrap();
+        let tells = text.lines().any(|it| it.contains("anyhow::") && !it.contains("\"anyhow"));
+        let allowed = ANYHOW_IN.iter().any(|folder| place.starts_with(folder));
+        assert!(!tells || allowed || place.ends_with("tidy.rs"), "{place} uses anyhow");
+    }
+}
+
+#[test]
+fn files_stay_short() {
+    let root = root();
+    for file in files(&root, "rs") {
+        let lines = fs::read_to_string(&file).unwrap().lines().count();
+        let most = if file.ends_with("error.rs") { ERRORS_LINES_MAX } else { FILE_LINES_MAX };
+        assert!(lines <= most, "{}: {lines} lines", file.display());
+    }
+}
+
+#[test]
+fn lines_of_pages_stay_short() {
+    let root = root();
+    let mut pages = files(&root.join("docs"), "md");
+    pages.push(root.join("README.md"));
+    for page in pages {
+        let mut code = false;
+        for (number, line) in (1..).zip(fs::read_to_string(&page).unwrap().lines()) {
+            let line = line.trim_start();
+            code ^= line.starts_with("```");
+            let prose = !code && !line.starts_with('|');
+            let long = prose && line.chars().count() > PAGE_LINE_MAX;
+            assert!(!long, "{}:{number}: longer than {PAGE_LINE_MAX}", page.display());
+        }
+    }
+}
+
+/// Paths of this repository that a page names in code spans or links.
+fn named_paths(text: &str) -> Vec<&str> {
+    let spans = text.split('`').skip(1).step_by(2);
+    let inside = ["coordinator/", "shared/", "worker/", "tests/", "docs/", "migrations/", "proto/"];
+    spans
+        .filter(|span| inside.iter().any(|folder| span.starts_with(folder)))
+        .filter(|span| !span.contains([' ', '*', '{', '<', '$', '…']))
+        .collect()
+}
+
+#[test]
+fn paths_that_pages_name_are_there() {
+    let root = root();
+    let mut count = 0;
+    for page in files(&root.join("docs"), "md") {
+        for path in named_paths(&fs::read_to_string(&page).unwrap()) {
+            assert!(root.join(path).exists(), "{}: {path}", page.display());
+            count += 1;
+        }
+    }
+    assert!(count > 40, "only {count} paths were found");
+}
