@@ -2,7 +2,7 @@
 
 use crate::outcome::{BeforeAfter, Fit, Hypothesis, Verdict};
 use std::collections::BTreeMap;
-use tracktwin_track::extension::Kind;
+use tracktwin_track::extension::{Kind, PlaceKind};
 
 /// Logarithm of a parameter's bias that is worth a word.
 const BIAS_MIN: f64 = 0.1;
@@ -80,7 +80,7 @@ fn place(hypothesis: &Hypothesis, sleepers: usize) -> String {
             let middle_m = 0.5 * (location.x_m[0] + location.x_m[1]);
             format!("at {}, {middle_m:.2} m: ", location.sleepers.join(" and "))
         }
-        Some(location) if hypothesis.physics == "corrugation" => {
+        Some(location) if is_stretch(&hypothesis.physics) => {
             format!("from {:.2} to {:.2} m: ", location.x_m[0], location.x_m[1])
         }
         Some(location) if location.sleepers.len() < sleepers => {
@@ -89,6 +89,11 @@ fn place(hypothesis: &Hypothesis, sleepers: usize) -> String {
         _ if hypothesis.port.as_deref() == Some("rail_seat") => "at all sleepers: ".to_owned(),
         _ => String::new(),
     }
+}
+
+/// Whether a kind has a stretch of the rail as its place.
+fn is_stretch(physics: &str) -> bool {
+    Kind::from_name(physics).is_some_and(|kind| kind.place == PlaceKind::Stretch)
 }
 
 fn gained(fit: &Fit) -> String {

@@ -4,7 +4,7 @@ use crate::candidate::{Candidate, parameter};
 use crate::subject::Subject;
 use tracktwin_inspection::FirstLook;
 use tracktwin_inspection::{Finding, Place};
-use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter};
+use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter, PlaceKind};
 
 impl Subject {
     /// Tells the model where the wheel begins its turns, if its blows say so, and where the rail's shape
@@ -33,25 +33,23 @@ fn heard_m(finding: &Finding) -> Option<[f64; 2]> {
 /// The candidate that a finding speaks for; none where a model of the track has nothing to say.
 fn candidate(finding: &Finding) -> Option<Candidate> {
     let kind = Kind::from_name(finding.physics)?;
+    if kind.screening.suggested.is_empty() {
+        return None;
+    }
     let new = ExtensionInstance::new(finding.physics);
-    let free: &[&str] = match finding.physics {
-        "wheel_flat" => &["length_m"],
-        "corrugation" => &["wavelength_m", "amplitude_m"],
-        "squat" => &["depth_m", "length_m"],
-        "rail_joint" => &["dip_m", "length_m", "bending_factor"],
-        "wheel_out_of_round" => &["amplitude_m"],
-        _ => return None,
-    };
-    let extension = match (finding.physics, &finding.place) {
-        ("corrugation", &Place::Stretch { from_m, to_m }) => new.at([from_m, to_m]),
-        (_, &Place::Stretch { from_m, to_m }) => new.at([0.5 * (from_m + to_m); 2]),
-        (_, Place::Everywhere) => new,
+    let extension = match finding.place {
+        Place::Stretch { from_m, to_m } if kind.place == PlaceKind::Stretch => {
+            new.at([from_m, to_m])
+        }
+        Place::Stretch { from_m, to_m } => new.at([0.5 * (from_m + to_m); 2]),
+        Place::Everywhere => new,
     };
     let extension = match finding.parameters.get("order") {
         Some(&(order, _)) => extension.with("order", order),
         None => extension,
     };
-    let free: Vec<&KindParameter> = free.iter().map(|name| parameter(kind, name)).collect();
+    let suggested = kind.screening.suggested.iter();
+    let free: Vec<&KindParameter> = suggested.map(|name| parameter(kind, name)).collect();
     let found = |parameter: &&KindParameter| {
         let found = finding.parameters.get(parameter.name);
         found.map_or(parameter.typical, |&(mean, _)| mean)

@@ -1,6 +1,6 @@
 //! A sensor or converter at the end of its range.
 
-use super::{Class, Extension, Kind, KindParameter, Measured, PlaceKind};
+use super::{Class, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
@@ -13,6 +13,7 @@ pub(super) const KIND: Kind = Kind {
         .ranges([5.0, 500.0], [50.0, 5000.0], 50.0)],
     look_alikes: &["gain_error"],
     would_separate: "a sensor of larger range",
+    screening: Screening::not_tried("the samples of a pass show it without a model of the track"),
     build: |inputs| Ok(Arc::new(Clipping { limit_m_s2: inputs.value("limit_m_s2") })),
 };
 

@@ -1,6 +1,6 @@
 //! The contact patch, which averages the irregularity over its length.
 
-use super::{Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Class, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::FRAC_PI_4;
 use std::sync::Arc;
 
@@ -14,6 +14,9 @@ pub(super) const KIND: Kind = Kind {
         .ranges([5e-4, 2e-3], [4e-3, 7e-3], 1.2e-3)],
     look_alikes: &["roughness_spectrum"],
     would_separate: "a measurement of the railhead's roughness, or a second wheel load",
+    screening: Screening::not_tried(
+        "the baseline fits the spectrum of the surface, and a patch changes nothing else",
+    ),
     build: |inputs| {
         Ok(Arc::new(ContactPatchFilter { half_length_m: inputs.value("half_length_m") }))
     },

@@ -1,6 +1,6 @@
 //! Corrugation: waves of one length on the railhead.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -28,6 +28,7 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["roughness_spectrum", "wheel_out_of_round"],
     would_separate: "passes at another speed: the peak stays at one wavelength",
+    screening: Screening::tried(&[]).suggested(&["wavelength_m", "amplitude_m"]),
     build: |inputs| {
         let middle = TAU / inputs.value("wavelength_m");
         let width = inputs.value("bandwidth") * middle;

@@ -1,6 +1,6 @@
 //! The mains in the signal.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, Measured, PlaceKind};
+use super::{Bound, Class, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -26,6 +26,7 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["wheel_out_of_round"],
     would_separate: "a recording at standstill",
+    screening: Screening::not_tried("the spectrum of a pass shows it without a model of the track"),
     build: |inputs| {
         Ok(Arc::new(ElectricalHum {
             omega: TAU * inputs.value("frequency_Hz"),

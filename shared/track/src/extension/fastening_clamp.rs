@@ -1,6 +1,8 @@
 //! Clamps that hold the rail at some sleepers.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{
+    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+};
 use crate::element::SpringDamper;
 use crate::model::{Assembly, Port};
 use std::sync::Arc;
@@ -23,6 +25,11 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["support_variation"],
     would_separate: "25 or more spans: the clamps come back every few sleepers",
+    screening: Screening::tried(&[Family::new(
+        Places::Patterns,
+        &["vertical_N_per_m", "rotational_N_m_per_rad"],
+        Trials::Grid(&[&[3e7, 1.5e8], &[3e4, 3e5]]),
+    )]),
     build: |inputs| {
         Ok(Arc::new(FasteningClamp {
             sleepers: inputs.sleepers(),

@@ -1,6 +1,8 @@
 //! An axle box on a spring of its own.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{
+    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+};
 use crate::model::{ContactOscillator, Vehicle};
 use std::sync::Arc;
 
@@ -21,6 +23,19 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["rail_cross_section", "sensor_mount_resonance"],
     would_separate: "a tap test on wheel and axle box, or a second sensor",
+    screening: Screening::tried(&[Family::new(
+        Places::Everywhere,
+        &["mass_kg", "stiffness_N_per_m", "damping_N_s_per_m"],
+        // Resonances a tenth apart, for they are sharp.
+        Trials::Grid(&[
+            &[2.0, 6.0, 15.0],
+            &[
+                5e7, 6.2e7, 7.6e7, 9.4e7, 1.2e8, 1.4e8, 1.8e8, 2.2e8, 2.7e8, 3.3e8, 4.1e8, 5e8,
+                6.2e8, 7.6e8, 9.4e8,
+            ],
+            &[2e3],
+        ]),
+    )]),
     build: |inputs| {
         let total = inputs.design.wheel.mass_kg;
         let box_kg = inputs.value("mass_kg");

@@ -1,6 +1,6 @@
 //! Railpads that are stiffer the faster they are loaded.
 
-use super::{Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials};
 use crate::element::SpringDamper;
 use crate::model::Assembly;
 use std::sync::Arc;
@@ -22,6 +22,11 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["rail_cross_section", "load_dependent_railpad"],
     would_separate: "a hundred spans, or recordings at two temperatures",
+    screening: Screening::tried(&[Family::new(
+        Places::Everywhere,
+        &["stiffness_ratio", "relaxation_time_s"],
+        Trials::Grid(&[&[0.5, 1.5, 3.0], &[3e-5, 1e-4, 3e-4, 1e-3]]),
+    )]),
     build: |inputs| {
         Ok(Arc::new(FrequencyDependentRailpad {
             sleepers: inputs.sleepers(),

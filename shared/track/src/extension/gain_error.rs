@@ -1,6 +1,6 @@
 //! A sensor or amplifier of wrong gain.
 
-use super::{Class, Extension, Kind, KindParameter, Measured, PlaceKind};
+use super::{Class, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
 use rustfft::num_complex::Complex64;
 use std::sync::Arc;
 
@@ -17,6 +17,9 @@ pub(super) const KIND: Kind = Kind {
     )],
     look_alikes: &["roughness_spectrum"],
     would_separate: "a calibration of the sensor, or a measurement of the railhead's roughness",
+    screening: Screening::not_tried(
+        "passes show it by what they have in common, without a model of the track",
+    ),
     build: |inputs| Ok(Arc::new(GainError { factor: inputs.value("factor") })),
 };
 

@@ -1,6 +1,8 @@
 //! Sleepers that hang on the rail over a void.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{
+    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+};
 use crate::element::SpringDamper;
 use crate::model::{Assembly, ForceLaw, Law, Reaction, Support};
 use std::sync::Arc;
@@ -16,6 +18,11 @@ pub(super) const KIND: Kind = Kind {
         .bound(Bound::NotNegative)],
     look_alikes: &["support_variation", "rail_joint"],
     would_separate: "passes with another wheel load: a void closes, soft ballast does not",
+    screening: Screening::tried(&[
+        // Gaps that close while the wheel is above the sleeper, or near it; and one that no load closes.
+        Family::new(Places::SleepersAndPairs, &["gap_m"], Trials::Grid(&[&[1e-4, 1.6e-4]])),
+        Family::new(Places::SleepersAndPairs, &[], Trials::Grid(&[])).held(&[("gap_m", 4e-4)]),
+    ]),
     build: |inputs| {
         let gap_m = inputs.value("gap_m");
         Ok(Arc::new(HangingSleeper { sleepers: inputs.sleepers(), gap_m }))

@@ -1,7 +1,7 @@
 //! What a kind of extension is: name, class, place, parameters, how to build it.
 
 use super::instance::Inputs;
-use super::{Extension, InstanceError};
+use super::{Extension, InstanceError, Screening};
 use std::sync::Arc;
 use tracktwin_parameters::Quantity;
 
@@ -30,6 +30,8 @@ pub struct Kind {
     pub look_alikes: &'static [&'static str],
     /// What would tell it from them.
     pub would_separate: &'static str,
+    /// How a recording is searched for it.
+    pub screening: Screening,
     /// Makes it, once the registry has checked what it is made of.
     pub(super) build: fn(&Inputs<'_>) -> Result<Arc<dyn Extension>, InstanceError>,
 }

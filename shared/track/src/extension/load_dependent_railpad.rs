@@ -1,6 +1,6 @@
 //! Railpads that are stiffer the more load they carry.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
 use crate::element::SpringDamper;
 use crate::model::{Assembly, ForceLaw, Law, Reaction};
 use std::sync::Arc;
@@ -24,6 +24,9 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["support_variation", "frequency_dependent_railpad"],
     would_separate: "passes with a second wheel load, over 25 spans or more",
+    screening: Screening::not_tried(
+        "passes under one load show one stiffness: two loads would tell",
+    ),
     build: |inputs| {
         Ok(Arc::new(LoadDependentRailpad {
             sleepers: inputs.sleepers(),

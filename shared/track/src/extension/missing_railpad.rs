@@ -1,6 +1,6 @@
 //! Railpads that are missing or worn out.
 
-use super::{Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials};
 use crate::model::{Assembly, Support};
 use std::sync::Arc;
 
@@ -16,6 +16,11 @@ pub(super) const KIND: Kind = Kind {
         .slack(0.4)],
     look_alikes: &["support_variation", "load_dependent_railpad"],
     would_separate: "a second speed, or a hammer test of the sleeper",
+    screening: Screening::tried(&[Family::new(
+        Places::Sleepers,
+        &["stiffness_N_per_m"],
+        Trials::Grid(&[&[5e6, 1.5e7]]),
+    )]),
     build: |inputs| {
         let stiffness_n_m = inputs.value("stiffness_N_per_m");
         Ok(Arc::new(MissingRailpad { sleepers: inputs.sleepers(), stiffness_n_m }))

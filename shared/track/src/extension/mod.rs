@@ -9,6 +9,7 @@ mod kind;
 mod measured;
 mod registry;
 mod sampled;
+mod screening;
 mod text;
 
 mod clipping;
@@ -40,8 +41,9 @@ mod wheel_out_of_round;
 pub use instance::{ExtensionInstance, InstanceError};
 pub use kind::{Bound, Class, Kind, KindParameter, PlaceKind};
 pub use measured::Measured;
-pub use registry::KINDS;
+pub use registry::*;
 pub use sampled::{SampledExtension, SampledValue};
+pub use screening::{Family, Places, Screening, Trials};
 pub use text::InstanceTextError;
 
 use crate::model::{Assembly, Vehicle};

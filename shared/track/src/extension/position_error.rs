@@ -1,6 +1,6 @@
 //! An odometer that is off.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, Measured, PlaceKind};
+use super::{Bound, Class, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
@@ -21,6 +21,9 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["support_variation"],
     would_separate: "a marker on the track that every pass must see at its place",
+    screening: Screening::not_tried(
+        "passes show it by what they have in common, without a model of the track",
+    ),
     build: |inputs| {
         if inputs.value("scale") <= -1.0 {
             return Err(inputs.refuse("scale", "more than -1: positions must grow"));

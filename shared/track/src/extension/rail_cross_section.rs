@@ -1,6 +1,8 @@
 //! Deformation of the rail's cross-section under the wheel.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{
+    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+};
 use crate::model::{ContactOscillator, Vehicle};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -26,6 +28,11 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["flexible_axle_box", "sensor_mount_resonance"],
     would_separate: "features up to 8 kHz, or a hammer test on the railhead",
+    screening: Screening::tried(&[Family::new(
+        Places::Everywhere,
+        &["frequency_Hz", "stiffness_N_per_m"],
+        Trials::Grid(&[&[6e3, 8e3, 1.1e4], &[5e8, 1e9, 2e9]]),
+    )]),
     build: |inputs| {
         Ok(Arc::new(RailCrossSection {
             resonance_rad_s: TAU * inputs.value("frequency_Hz"),

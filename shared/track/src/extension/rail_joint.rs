@@ -1,6 +1,8 @@
 //! A joint of the rail: a dip of its surface, a loss of its bending stiffness, or both.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{
+    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+};
 use crate::model::Assembly;
 use std::sync::Arc;
 
@@ -27,6 +29,17 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["squat", "support_variation", "hanging_sleeper"],
     would_separate: "a slower pass: the dip's part moves with the speed, the bending's does not",
+    screening: Screening::tried(&[Family::new(
+        Places::Points,
+        &["bending_factor", "dip_m", "length_m"],
+        Trials::List(&[
+            &[0.15, 0.0, 2e-2],
+            &[0.4, 0.0, 2e-2],
+            &[1.0, 6e-5, 2e-2],
+            &[0.3, 6e-5, 2e-2],
+        ]),
+    )])
+    .suggested(&["dip_m", "length_m", "bending_factor"]),
     build: |inputs| {
         let (centre_m, length_m) = (inputs.point_m(), inputs.value("bending_length_m"));
         Ok(Arc::new(RailJoint {

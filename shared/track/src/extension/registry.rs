@@ -29,10 +29,34 @@ pub static KINDS: &[Kind] = &[
     super::electrical_hum::KIND,
 ];
 
+// Kinds that the passes of a recording show by themselves: who looks for one names it here.
+/// Clipping.
+pub static CLIPPING: &Kind = &super::clipping::KIND;
+/// Position error.
+pub static POSITION_ERROR: &Kind = &super::position_error::KIND;
+/// Gain error.
+pub static GAIN_ERROR: &Kind = &super::gain_error::KIND;
+/// Electrical hum.
+pub static ELECTRICAL_HUM: &Kind = &super::electrical_hum::KIND;
+/// Wheel flat.
+pub static WHEEL_FLAT: &Kind = &super::wheel_flat::KIND;
+/// Wheel out of round.
+pub static WHEEL_OUT_OF_ROUND: &Kind = &super::wheel_out_of_round::KIND;
+/// Corrugation.
+pub static CORRUGATION: &Kind = &super::corrugation::KIND;
+/// Squat.
+pub static SQUAT: &Kind = &super::squat::KIND;
+/// Rail joint.
+pub static RAIL_JOINT: &Kind = &super::rail_joint::KIND;
+/// Second wheel.
+pub static SECOND_WHEEL: &Kind = &super::second_wheel::KIND;
+/// Sensor mount resonance.
+pub static SENSOR_MOUNT_RESONANCE: &Kind = &super::sensor_mount_resonance::KIND;
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extension::{Bound, ExtensionInstance, PlaceKind};
+    use crate::extension::{Bound, ExtensionInstance, PlaceKind, Screening};
     use crate::model::{Mesh, Support, TrackModel};
     use std::collections::HashSet;
     use tracktwin_parameters::{ParameterSet, TrackDesign};
@@ -71,6 +95,24 @@ mod tests {
         for kind in KINDS {
             for other in kind.look_alikes {
                 assert!(names.contains(other) && other != &kind.physics, "{}", kind.physics);
+            }
+        }
+    }
+
+    #[test]
+    fn every_kind_is_searched_for_or_says_why_not() {
+        for kind in KINDS {
+            let Screening { families, suggested, not_tried } = &kind.screening;
+            let is_searched = !families.is_empty() || !suggested.is_empty();
+            assert!(is_searched != not_tried.is_some_and(|it| !it.is_empty()), "{}", kind.physics);
+            let has = |name: &&str| kind.parameter(name).is_some();
+            assert!(suggested.iter().all(has), "{}", kind.physics);
+            for family in *families {
+                assert!(family.free.iter().all(has), "{}", kind.physics);
+                assert!(family.held.iter().all(|(name, _)| has(name)), "{}", kind.physics);
+                for trial in family.trials.values() {
+                    assert_eq!(trial.len(), family.free.len(), "{}", kind.physics);
+                }
             }
         }
     }

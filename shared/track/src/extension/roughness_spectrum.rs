@@ -1,6 +1,6 @@
 //! A spectrum of the irregularity other than eq. B.6.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -35,6 +35,7 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["contact_patch_filter", "corrugation"],
     would_separate: "a measurement of the railhead's roughness, or a second wheel load",
+    screening: Screening::not_tried("the baseline fits the spectrum of the surface itself"),
     build: |inputs| {
         Ok(Arc::new(RoughnessSpectrum {
             level_db: inputs.value("level_dB"),

@@ -1,8 +1,22 @@
 //! A second wheel on the same rail.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{
+    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+};
 use crate::model::Vehicle;
 use std::sync::Arc;
+
+/// Distances that are tried, in m: the rail's waves at 1 kHz are 15 steps long. As far as the track is
+/// modelled beyond what is compared.
+const DISTANCES_M: [f64; 46] = {
+    let mut distances_m = [0.0; 46];
+    let mut step = 0;
+    while step < distances_m.len() {
+        distances_m[step] = 0.2 + 0.04 * step as f64;
+        step += 1;
+    }
+    distances_m
+};
 
 pub(super) const KIND: Kind = Kind {
     physics: "second_wheel",
@@ -15,6 +29,11 @@ pub(super) const KIND: Kind = Kind {
         .bound(Bound::Any)],
     look_alikes: &["support_variation", "rail_cross_section"],
     would_separate: "a run with the second wheel lifted or at another distance",
+    screening: Screening::tried(&[Family::new(
+        Places::Everywhere,
+        &["distance_m"],
+        Trials::Grid(&[&DISTANCES_M]),
+    )]),
     build: |inputs| {
         if inputs.value("distance_m") == 0.0 {
             return Err(inputs.refuse("distance_m", "other than zero"));

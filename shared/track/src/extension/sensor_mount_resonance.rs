@@ -1,6 +1,8 @@
 //! A sensor whose mounting resonates.
 
-use super::{Class, Extension, Kind, KindParameter, Measured, PlaceKind};
+use super::{
+    Class, Extension, Family, Kind, KindParameter, Measured, PlaceKind, Places, Screening, Trials,
+};
 use rustfft::num_complex::Complex64;
 use std::sync::Arc;
 
@@ -23,6 +25,17 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["rail_cross_section", "flexible_axle_box"],
     would_separate: "another sensor, another mounting, or the other axes of the same sensor",
+    screening: Screening::tried(&[Family::new(
+        Places::Everywhere,
+        &["frequency_Hz", "damping_ratio"],
+        Trials::Grid(&[
+            &[
+                1.2e3, 1.4e3, 1.7e3, 2e3, 2.3e3, 2.6e3, 2.9e3, 3.2e3, 3.6e3, 4e3, 4.5e3, 5e3, 6e3,
+                7e3, 9e3,
+            ],
+            &[0.02, 0.05, 0.15],
+        ]),
+    )]),
     build: |inputs| {
         Ok(Arc::new(SensorMountResonance {
             frequency_hz: inputs.value("frequency_Hz"),

@@ -1,6 +1,6 @@
 //! Bolts that hold the sleepers' ends down on the substructure.
 
-use super::{Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials};
 use crate::element::SpringDamper;
 use crate::model::Assembly;
 use std::sync::Arc;
@@ -15,6 +15,14 @@ pub(super) const KIND: Kind = Kind {
         .ranges([5e6, 5e7], [2.5e7, 2.5e8], 3e7)],
     look_alikes: &["support_variation", "subgrade_layer"],
     would_separate: "a second speed, or a hammer test of the sleeper's end",
+    screening: Screening::tried(&[
+        Family::new(Places::SleepersAndPairs, &["stiffness_N_per_m"], Trials::Grid(&[&[1e7, 3e7]])),
+        Family::new(
+            Places::Everywhere,
+            &["stiffness_N_per_m"],
+            Trials::Grid(&[&[5e6, 1e7, 2e7, 4e7]]),
+        ),
+    ]),
     build: |inputs| {
         let (sleepers, stiffness) = (inputs.sleepers(), inputs.value("stiffness_N_per_m"));
         Ok(Arc::new(SleeperBolt { sleepers, stiffness }))

@@ -1,6 +1,6 @@
 //! A squat: a short hollow of the railhead.
 
-use super::{Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -24,6 +24,12 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["rail_joint"],
     would_separate: "a look at the railhead, or passes of both directions over the place",
+    screening: Screening::tried(&[Family::new(
+        Places::Points,
+        &["depth_m", "length_m"],
+        Trials::List(&[&[2e-5, 3e-3], &[2e-5, 6e-3], &[2e-5, 1e-2]]),
+    )])
+    .suggested(&["depth_m", "length_m"]),
     build: |inputs| {
         Ok(Arc::new(Squat {
             centre_m: inputs.point_m(),

@@ -1,6 +1,8 @@
 //! A layer below the ballast that moves.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{
+    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+};
 use crate::element::SpringDamper;
 use crate::model::Assembly;
 use std::sync::Arc;
@@ -26,6 +28,18 @@ pub(super) const KIND: Kind =
         ],
         look_alikes: &["support_variation", "hanging_sleeper"],
         would_separate: "a hammer test of a sleeper between 100 and 500 Hz",
+        screening: Screening::tried(&[
+            Family::new(
+                Places::Sleepers,
+                &["mass_kg", "stiffness_N_per_m", "damping_N_s_per_m"],
+                Trials::Grid(&[&[0.5, 2.0], &[1.5e7, 5e7], &[1e3]]),
+            ),
+            Family::new(
+                Places::Everywhere,
+                &["mass_kg", "stiffness_N_per_m", "damping_N_s_per_m"],
+                Trials::Grid(&[&[0.5, 1.5, 4.0], &[1.5e7, 3e7, 6e7, 1e8], &[5e2, 2e3]]),
+            ),
+        ]),
         build: |inputs| {
             Ok(Arc::new(SubgradeLayer {
                 sleepers: inputs.sleepers(),

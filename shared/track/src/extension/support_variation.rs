@@ -1,6 +1,6 @@
 //! Railpads and ballast that differ from sleeper to sleeper.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
 use crate::model::{Assembly, Support};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -29,6 +29,7 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["hanging_sleeper", "missing_railpad"],
     would_separate: "nothing needs to: it is what the baseline's own values at each sleeper are",
+    screening: Screening::not_tried("the baseline fits every support by itself"),
     build: |inputs| {
         Ok(Arc::new(SupportVariation {
             sleepers: inputs.sleepers(),

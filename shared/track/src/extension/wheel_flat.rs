@@ -1,6 +1,6 @@
 //! A flat of the wheel's tread.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -23,6 +23,7 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["wheel_out_of_round", "squat"],
     would_separate: "more laps: the flat's places walk along the track, a squat's stay",
+    screening: Screening::tried(&[]).suggested(&["length_m"]),
     build: |inputs| {
         let (length_m, radius_m) = (inputs.value("length_m"), inputs.design.wheel.radius_m);
         Ok(Arc::new(WheelFlat {

@@ -1,6 +1,6 @@
 //! A wheel that is not round.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind};
+use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -28,6 +28,7 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["corrugation", "roughness_spectrum"],
     would_separate: "more laps: the wheel's waves lie elsewhere on the track in every lap",
+    screening: Screening::tried(&[]).suggested(&["amplitude_m"]),
     build: |inputs| {
         if inputs.value("order").fract() != 0.0 {
             return Err(inputs.refuse("order", "a whole number of waves a turn"));

@@ -1,4 +1,3 @@
-
 use super::*;
 
 fn refusal(change: impl Fn(&str) -> String) -> String {

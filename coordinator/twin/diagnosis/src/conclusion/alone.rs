@@ -10,7 +10,7 @@ use tracktwin_inspection::FirstLook;
 use tracktwin_inspection::wheel::{Comb, CombBlock};
 use tracktwin_inspection::{Finding, Place};
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::extension::Kind;
+use tracktwin_track::extension::{Kind, WHEEL_OUT_OF_ROUND};
 
 /// The diagnosis of a recording that has no track to compare with, for the reason given; none where
 /// the passes show nothing for sure.
@@ -69,7 +69,7 @@ pub fn passes_alone(
 
 /// Whether a name stands for the comb of a wheel, which is tested on blocks that were held out.
 fn is_comb(physics: &str, look: &FirstLook) -> bool {
-    physics == "wheel_out_of_round" && look.comb.is_some()
+    physics == WHEEL_OUT_OF_ROUND.physics && look.comb.is_some()
 }
 
 fn hypothesis(recording: &Recording, look: &FirstLook, finding: &Finding) -> Option<Hypothesis> {

@@ -4,6 +4,7 @@ use super::{Evidence, FAILED_SHARE};
 use crate::outcome::Hypothesis;
 use std::collections::BTreeMap;
 use tracktwin_inspection::{Finding, Place};
+use tracktwin_track::extension::{CLIPPING, POSITION_ERROR};
 
 impl Evidence<'_> {
     /// Nothing is named on a track that the speeds do not agree about: their positions are wrong, if
@@ -18,7 +19,7 @@ impl Evidence<'_> {
         }
         let Some(evidence) = self.apart() else { return };
         let finding = Finding {
-            physics: "position_error",
+            physics: POSITION_ERROR.physics,
             p_value: self.search.apart_p_value(),
             place: Place::Everywhere,
             parameters: BTreeMap::new(),
@@ -30,7 +31,7 @@ impl Evidence<'_> {
     /// What a reader should know of it, if it is so. Passes that are cut off differ wherever they were:
     /// the faster they are, the more is missing.
     pub(super) fn apart(&self) -> Option<String> {
-        let are_cut = self.look.findings.iter().any(|finding| finding.physics == "clipping");
+        let are_cut = self.look.findings.iter().any(|finding| finding.physics == CLIPPING.physics);
         (self.search.is_apart() && !are_cut).then(|| {
             format!(
                 "The speeds do not agree about the track: one for each explains the recording better \

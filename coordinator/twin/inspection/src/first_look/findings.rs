@@ -8,6 +8,10 @@ use crate::wheel::{Comb, Flat, Order};
 use std::collections::BTreeMap;
 use tracktwin_number::{self as number, ratio, rounded};
 use tracktwin_signal::recording::Pass;
+use tracktwin_track::extension::{
+    CLIPPING, CORRUGATION, ELECTRICAL_HUM, GAIN_ERROR, POSITION_ERROR, RAIL_JOINT, SQUAT,
+    WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
+};
 
 /// Lead of one form over the other, in nats, below which an impact may be either.
 const FORM_LEAD: f64 = 3.0;
@@ -28,7 +32,7 @@ pub(super) fn clipping_finding(
     let worst = passes.iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
     let limit = passes.iter().map(|pass| pass.level_m_s2.abs()).fold(f64::MAX, f64::min);
     Some(Finding {
-        physics: "clipping",
+        physics: CLIPPING.physics,
         p_value: number::probability(worst.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([("limit_m_s2", (limit, 0.01 * limit))]),
@@ -51,7 +55,7 @@ pub(super) fn hum_finding(lines: &[Hum], unit: &str) -> Option<Finding> {
         .map(|l| format!("{:.1} Hz ({} {unit})", l.frequency_hz, rounded(l.amplitude_m_s2.0, 2)))
         .collect();
     Some(Finding {
-        physics: "electrical_hum",
+        physics: ELECTRICAL_HUM.physics,
         p_value: number::probability(first.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([
@@ -71,7 +75,7 @@ pub(super) fn gain_finding(gain: &Gain) -> Finding {
     let factor = 10f64.powf(level / 20.0);
     let which = if gain.passes > 2 { "" } else { " (or the other one is off; a third would tell)" };
     Finding {
-        physics: "gain_error",
+        physics: GAIN_ERROR.physics,
         p_value: number::probability(gain.ln_p),
         place: Place::Everywhere,
         // A decibel is a factor of e^0.115 in amplitude.
@@ -88,7 +92,7 @@ pub(super) fn offset_finding(pair: &Offsets) -> Finding {
     let (offset, scale) = pair.line();
     let (offset_mm, greatest_mm) = (1e3 * offset, 1e3 * pair.greatest_m());
     Finding {
-        physics: "position_error",
+        physics: POSITION_ERROR.physics,
         p_value: number::probability(pair.ln_p()),
         place: Place::Everywhere,
         parameters: BTreeMap::from([("offset_m", (offset, 1e-3)), ("scale", (scale, 1e-3))]),
@@ -105,7 +109,7 @@ pub(super) fn offset_finding(pair: &Offsets) -> Finding {
 pub(super) fn scale_finding(scale: &Scale) -> Finding {
     let (factor, deviation) = scale.scale;
     Finding {
-        physics: "position_error",
+        physics: POSITION_ERROR.physics,
         p_value: number::probability(scale.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([("scale", scale.scale)]),
@@ -126,7 +130,7 @@ pub(super) fn flat_finding(flat: &Flat) -> Finding {
         parameters.insert("depth_m", shape.depth_m);
     }
     Finding {
-        physics: "wheel_flat",
+        physics: WHEEL_FLAT.physics,
         p_value: number::probability(flat.ln_p),
         place: Place::Everywhere,
         parameters,
@@ -141,7 +145,7 @@ pub(super) fn order_finding(orders: &[Order]) -> Option<Finding> {
     let first = orders.iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
     let names: Vec<String> = orders.iter().map(|order| order.number.to_string()).collect();
     Some(Finding {
-        physics: "wheel_out_of_round",
+        physics: WHEEL_OUT_OF_ROUND.physics,
         p_value: number::probability(first.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([
@@ -161,7 +165,7 @@ pub(super) fn comb_finding(comb: &Comb) -> Finding {
     let (turn, deviation) = comb.circumference_m;
     let held_out = &comb.held_out;
     Finding {
-        physics: "wheel_out_of_round",
+        physics: WHEEL_OUT_OF_ROUND.physics,
         p_value: number::probability(comb.ln_p),
         place: Place::Everywhere,
         parameters: BTreeMap::from([("circumference_m", comb.circumference_m)]),
@@ -191,8 +195,8 @@ fn who(passes: &[Pass]) -> &'static str {
 pub(super) fn impact_finding(impact: &Impact, passes: &[Pass]) -> Finding {
     let (x, deviation) = impact.x_m;
     let physics = match &impact.shape {
-        Some(shape) if shape.form == Form::Hollow => "squat",
-        _ => "rail_joint",
+        Some(shape) if shape.form == Form::Hollow => SQUAT.physics,
+        _ => RAIL_JOINT.physics,
     };
     let mut parameters = BTreeMap::new();
     let mut form = String::new();
@@ -228,7 +232,7 @@ pub(super) fn impact_finding(impact: &Impact, passes: &[Pass]) -> Finding {
 pub(super) fn corrugation_finding(waves: &Corrugation) -> Finding {
     let [from_m, to_m] = waves.stretch_m;
     Finding {
-        physics: "corrugation",
+        physics: CORRUGATION.physics,
         p_value: number::probability(waves.ln_p),
         place: Place::Stretch { from_m, to_m },
         parameters: BTreeMap::from([

@@ -13,6 +13,7 @@ use crate::finding::{Finding, Place};
 use crate::wheel::{Comb, Flat, Order};
 use crate::{chain, impact, wheel};
 use tracktwin_signal::recording::Recording;
+use tracktwin_track::extension::POSITION_ERROR;
 
 /// Probability of a false alarm on a recording without defects, all tests together.
 pub const FALSE_ALARMS: f64 = 0.02;
@@ -68,7 +69,8 @@ impl FirstLook {
             |trouble: &&Trouble| matches!(trouble, Trouble::Dead { .. } | Trouble::Noise { .. });
         let unlike = |trouble: &&Trouble| matches!(trouble, Trouble::Unlike { .. });
         let stranger = |trouble: &&Trouble| matches!(trouble, Trouble::Stranger { .. });
-        let is_misplaced = self.findings.iter().any(|found| found.physics == "position_error");
+        let is_misplaced =
+            self.findings.iter().any(|found| found.physics == POSITION_ERROR.physics);
         let is_noise = self.troubles.iter().filter(unlike).count() == self.offsets.len();
         let troubles = || self.troubles.iter();
         let noise = troubles().find(unlike).filter(|_| is_noise);
