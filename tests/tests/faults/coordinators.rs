@@ -13,6 +13,10 @@ fn coordinator_is_killed(farm: &Farm, times: u32) {
         let coordinator = farm.coordinator(0);
         // Moments spread over start, work and commit by the golden ratio.
         std::thread::sleep(Duration::from_millis(150 + u64::from(kill) * 618 % 700));
+        if kill + 1 == times && acknowledged.is_empty() {
+            // On a busy machine no coordinator has lived long enough yet.
+            farm.reach(1);
+        }
         coordinator.kill();
         acknowledged.extend(farm.results());
     }

@@ -87,7 +87,14 @@ impl Coordinates {
         let coefficients = told * turned.subrows(0, leading);
         let residuals = centred * &projection - &basis * &coefficients;
         let unit = polynomial.unit(parameters.as_ref());
-        let lack_of_fit = lack_of_fit(&residuals, &unit, basis.ncols());
+        let weighted = &basis * &inverse_normal;
+        let leverage = |i: usize, j: usize| weighted.row(i) * basis.row(j).transpose();
+        let fitted: Vec<f64> = turned
+            .subrows(0, leading)
+            .col_iter()
+            .map(|column| column.iter().map(|part| part * part).sum())
+            .collect();
+        let lack_of_fit = lack_of_fit(&residuals, &unit, leverage, &fitted);
         let simulators = eigen.S().column_vector().iter().map(|value| value.max(0.0));
         Ok(Self {
             speeds: speeds.len(),
