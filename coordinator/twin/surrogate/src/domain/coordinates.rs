@@ -8,7 +8,7 @@ use crate::{Error, TrainingSet};
 use faer::{Mat, MatRef, Side};
 
 /// Highest total degree of the polynomial in the parameters.
-const DEGREE_MAX: usize = 4;
+const DEGREE_MAX: usize = 3;
 /// Bins that are averaged into a band, the finest first.
 const BAND_BINS: [usize; 5] = [4, 8, 16, 32, 64];
 /// Entries per band value below which bands are made wider.
@@ -87,14 +87,7 @@ impl Coordinates {
         let coefficients = told * turned.subrows(0, leading);
         let residuals = centred * &projection - &basis * &coefficients;
         let unit = polynomial.unit(parameters.as_ref());
-        let weighted = &basis * &inverse_normal;
-        let leverage = |i: usize, j: usize| weighted.row(i) * basis.row(j).transpose();
-        let fitted: Vec<f64> = turned
-            .subrows(0, leading)
-            .col_iter()
-            .map(|column| column.iter().map(|part| part * part).sum())
-            .collect();
-        let lack_of_fit = lack_of_fit(&residuals, &unit, leverage, &fitted);
+        let lack_of_fit = lack_of_fit(&residuals, &unit, basis.ncols());
         let simulators = eigen.S().column_vector().iter().map(|value| value.max(0.0));
         Ok(Self {
             speeds: speeds.len(),

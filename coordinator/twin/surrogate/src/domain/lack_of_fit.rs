@@ -11,30 +11,22 @@ const NEIGHBOURS: usize = 2;
 /// of scatter one) of entries with these mapped parameters (`unit`, n x p).
 ///
 /// The scatter of two entries is independent, but what the polynomial can't follow is nearly the same
-/// for neighbours in the parameters: the mean product of their residuals is its variance. Fitting the
-/// same entries has made their residuals alike by less, by the `leverage` of one on the other, in the
-/// share of each coordinate that was `fitted` (d values, 0 to 1).
-pub(super) fn lack_of_fit(
-    residuals: &Mat<f64>,
-    unit: &Mat<f64>,
-    leverage: impl Fn(usize, usize) -> f64,
-    fitted: &[f64],
-) -> Vec<f64> {
+/// for neighbours in the parameters: the mean product of their residuals is its variance. Fitting
+/// `coefficients` numbers to the same entries has taken their share of it away.
+pub(super) fn lack_of_fit(residuals: &Mat<f64>, unit: &Mat<f64>, coefficients: usize) -> Vec<f64> {
     let (n, d) = (residuals.nrows(), residuals.ncols());
     let step = n.div_ceil(PROBES_MAX).max(1);
     let mut sums = vec![0.0; d];
-    let (mut pairs, mut taken) = (0.0, 0.0);
+    let mut pairs = 0.0;
     for probe in (0..n).step_by(step) {
         for other in neighbours(unit, probe) {
             pairs += 1.0;
-            taken += leverage(probe, other);
             let products = (0..d).map(|k| residuals[(probe, k)] * residuals[(other, k)]);
             sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
         }
     }
-    let alike =
-        |(sum, share): (&f64, &f64)| ((sum + share * taken) / f64::max(pairs, 1.0)).max(0.0);
-    sums.iter().zip(fitted).map(alike).collect()
+    let fitted = coefficients as f64 / n as f64;
+    sums.iter().map(|sum| (sum / f64::max(pairs, 1.0) + fitted).max(0.0)).collect()
 }
 
 /// The entries whose parameters are nearest to those of `probe`.
@@ -74,9 +66,7 @@ mod tests {
             let scatter = (random.next_u64() as f64 / u64::MAX as f64 - 0.5) * 12.0_f64.sqrt();
             scatter + if k == 0 { missed(i) } else { 0.0 }
         });
-        let [shared, none] = lack_of_fit(&residuals, &unit, |_, _| 0.0, &[0.0; 2])[..] else {
-            panic!("two columns")
-        };
+        let [shared, none] = lack_of_fit(&residuals, &unit, 0)[..] else { panic!("two columns") };
         assert!((shared - 0.125).abs() < 0.04, "{shared}");
         assert!(none < 0.04, "{none}");
     }
