@@ -1,5 +1,7 @@
 //! Rules of the house that a compiler does not hold: which crate may use which, and how large things get.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};

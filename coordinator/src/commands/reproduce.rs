@@ -162,7 +162,7 @@ fn compare(
     let mut examples = if figures.iter().any(|figure| figure.is_example()) {
         let mut progress = Progress::begin("examples", 0, experiment.speeds_km_h.len() as u64);
         let recordings = pipeline::reproduce::recordings(figures, experiment, &mut |done| {
-            progress.at(done as u64, "")
+            progress.at(done as u64, "");
         })?;
         progress.end();
         recordings

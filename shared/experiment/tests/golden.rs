@@ -1,5 +1,7 @@
 //! The version of the physics: features of some cases, as they were when it was last raised.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::collections::BTreeMap;
 use std::path::Path;
 use tracktwin_experiment::{Case, Experiment, Outcome, Simulate, Simulation};

@@ -26,6 +26,7 @@ impl Axis {
     }
 
     /// The same axis with a tick at every multiple of `step`.
+    #[must_use]
     pub fn every(self, step: f64) -> Self {
         Self { step: Some(step), ..self }
     }

@@ -1,7 +1,5 @@
 //! The version of null models: differences of a small one, as they were when it was last raised.
 
-#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
-
 use std::path::Path;
 use tracktwin_diagnosis::{Bands, Forward, NullModel, Section};
 use tracktwin_parameters::TrackDesign;
