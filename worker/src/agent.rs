@@ -14,8 +14,7 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::transport::{Channel, Endpoint};
-use tracktwin_experiment::Prepare;
-use tracktwin_experiment::{ExperimentError, prepare_simulation};
+use tracktwin_experiment::{ExperimentError, Prepare, prepare_simulation};
 use tracktwin_protocol::BadMessage;
 
 /// Cases simulated side by side on one core: the lanes of the track model's fast solver.

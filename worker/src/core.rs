@@ -7,8 +7,7 @@ use crate::session::Session;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use tracktwin_experiment::{Case, Experiment, Outcome};
-use tracktwin_experiment::{Prepare, Simulate};
+use tracktwin_experiment::{Case, Experiment, Outcome, Prepare, Simulate};
 use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase, checksum};
 use tracktwin_traces::{Step, Value};
 

@@ -12,8 +12,7 @@ use tokio::sync::RwLock;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::Code;
-use tracktwin_experiment::Outcome;
-use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
+use tracktwin_experiment::{CODE_VERSION, MODEL_HASH, Outcome};
 use tracktwin_protocol::{Lease, PROTOCOL_VERSION, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
 

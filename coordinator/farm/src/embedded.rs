@@ -1,6 +1,5 @@
 //! The farm in one process: a coordinator, and workers that talk to it as a cluster's would.
 
-use crate::campaign::StoreError;
 use crate::dispatch::{Counts, Dispatch, DispatchError, Scope, Settings, Timing};
 use crate::security::{Security, random_token};
 use crate::serve::{ServeError, serve};
@@ -29,9 +28,6 @@ pub enum FarmError {
     /// The campaign can't be dispatched.
     #[error(transparent)]
     Dispatch(#[from] DispatchError),
-    /// The campaign can't be stored.
-    #[error(transparent)]
-    Store(#[from] StoreError),
     /// The workers stopped.
     #[error("the workers stopped: {0}")]
     Worker(#[from] AgentError),

@@ -1,9 +1,7 @@
 //! What is in a recording, before any model is asked.
 
 use maud::{Markup, html};
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
-use tracktwin_drawing::{figure, page};
+use tracktwin_drawing::{Axis, Chart, figure, page};
 
 const SIZE: [f64; 2] = [1000.0, 320.0];
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];

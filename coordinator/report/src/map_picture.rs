@@ -3,8 +3,7 @@
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use std::ops::Range;
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
+use tracktwin_drawing::{Axis, Chart};
 use tracktwin_number::rounded;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, TimeFrequencyMap};

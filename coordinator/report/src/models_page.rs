@@ -1,10 +1,7 @@
 //! How good the models are (paper, Fig. 14).
 
 use maud::{Markup, html};
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
-use tracktwin_drawing::{Shown, significant};
-use tracktwin_drawing::{figure, page};
+use tracktwin_drawing::{Axis, Chart, Shown, figure, page, significant};
 use tracktwin_parameters::Parameter;
 use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Tested, Trained};
 

@@ -1,9 +1,7 @@
 //! Receptances as a picture: magnitude and phase against frequency.
 
 use num_complex::Complex64;
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
-use tracktwin_drawing::stand_alone;
+use tracktwin_drawing::{Axis, Chart, stand_alone};
 
 /// Receptance between two places of the track.
 #[derive(Clone, Debug)]

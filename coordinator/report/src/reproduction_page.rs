@@ -1,9 +1,7 @@
 //! The paper's results beside this program's.
 
 use maud::{Markup, html};
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
-use tracktwin_drawing::{figure, page};
+use tracktwin_drawing::{Axis, Chart, figure, page};
 use tracktwin_reproduction::{Compared, Curve, Picture, Reproduction, Scale, Style, Verdict};
 
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];

@@ -1,7 +1,6 @@
 //! Measured LWPS of a sleeper against the library's best matches (paper, Fig. 11).
 
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
+use tracktwin_drawing::{Axis, Chart};
 use tracktwin_evaluation::{Measured, SleeperEvaluation};
 use tracktwin_number::rounded;
 

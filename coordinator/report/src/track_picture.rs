@@ -1,8 +1,6 @@
 //! Parameters along the track with their uncertainty (paper, Fig. 20).
 
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
-use tracktwin_drawing::Shown;
+use tracktwin_drawing::{Axis, Chart, Shown};
 use tracktwin_evaluation::{Estimates, Evaluation, SleeperEvaluation};
 use tracktwin_parameters::Parameter;
 

@@ -103,7 +103,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 fn stop(error: DiagnosingError) -> Stop {
     match error {
         DiagnosingError::Recording(error) => Stop::Input(error.into()),
-        failed => Stop::from(failed),
+        failed => Stop::Failure(failed.into()),
     }
 }
 

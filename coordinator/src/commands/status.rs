@@ -8,8 +8,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::IsTerminal;
 use std::time::Duration;
-use tracktwin_farm::dashboard::{Detail, farm};
-use tracktwin_farm::dashboard::{Farm, FarmCampaign, FarmWorker, duration};
+use tracktwin_farm::dashboard::{Detail, Farm, FarmCampaign, FarmWorker, duration, farm};
 use tracktwin_library::ContactLoss;
 
 /// Characters of a progress bar.

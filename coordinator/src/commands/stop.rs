@@ -1,5 +1,6 @@
 //! Why a command ends without being done.
 
+use tracktwin_farm::campaign::StoreError;
 use tracktwin_farm::embedded::FarmError;
 use tracktwin_files::FilesError;
 use tracktwin_library::LibraryError;
@@ -29,15 +30,22 @@ impl<E: Into<anyhow::Error>> From<E> for Stop {
 
 /// What libraries and files say of whose fault an error is.
 fn is_wrong_input(error: &anyhow::Error) -> Option<bool> {
-    let library = match error.downcast_ref::<FarmError>() {
-        Some(FarmError::Library(library)) => Some(library),
-        _ => error.downcast_ref::<LibraryError>(),
-    };
-    if let Some(library) = library {
+    if let Some(library) = library_error(error) {
         return Some(library.is_wrong_input());
     }
     let file = error.chain().find_map(|cause| cause.downcast_ref::<FilesError>());
     file.map(FilesError::is_wrong_input)
+}
+
+/// What a library says, whoever passes it on.
+fn library_error(error: &anyhow::Error) -> Option<&LibraryError> {
+    if let Some(FarmError::Library(library)) = error.downcast_ref() {
+        return Some(library);
+    }
+    if let Some(StoreError::Library(library)) = error.downcast_ref() {
+        return Some(library);
+    }
+    error.downcast_ref()
 }
 
 /// Blames an error on what the user gave, unless it says that the machine is to blame.
@@ -59,5 +67,24 @@ impl<T, E: Into<anyhow::Error>> OrInput<T> for Result<T, E> {
                 _ => Stop::Input(error),
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_library_s_word_on_whose_fault_it_is_survives_those_who_pass_it_on() {
+        let wrong = || LibraryError::SeedTooLarge { seed: u64::MAX };
+        assert!(wrong().is_wrong_input());
+        let stops: [Stop; 3] = [
+            wrong().into(),
+            FarmError::Library(wrong()).into(),
+            StoreError::Library(wrong()).into(),
+        ];
+        assert!(stops.iter().all(|stop| matches!(stop, Stop::Input(_))), "{stops:?}");
+        let full = StoreError::Library(LibraryError::DiskFull);
+        assert!(matches!(Stop::from(full), Stop::Failure(_)));
     }
 }

@@ -9,7 +9,6 @@ mod routes;
 mod status;
 mod view;
 
-pub use page::{farm_page, farm_view};
 pub use routes::{Dashboard, serve};
 pub use status::{Farm, FarmCampaign, FarmWorker, duration};
 pub use view::{Detail, farm};

@@ -29,7 +29,7 @@ document.querySelector('footer').style.opacity=1}catch{document.querySelector('f
 ";
 
 /// The whole page.
-pub fn farm_page(farm: &Farm) -> String {
+pub(super) fn farm_page(farm: &Farm) -> String {
     let head = html! { style { (PreEscaped(STYLE)) } };
     // Outside of what changes, or typing would be lost.
     let end = html! {
@@ -40,7 +40,7 @@ pub fn farm_page(farm: &Farm) -> String {
 }
 
 /// The middle of the page, which changes.
-pub fn farm_view(farm: &Farm) -> Markup {
+pub(super) fn farm_view(farm: &Farm) -> Markup {
     html! {
         p.note { "library " code { (farm.library) } ", " (farm.at) }
         @if farm.campaigns.is_empty() {

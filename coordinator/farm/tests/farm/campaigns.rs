@@ -3,8 +3,7 @@
 use crate::support::{CORES, Coordinator, coordinator_with, lease, registered, stand_in};
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
-use tracktwin_farm::campaign;
-use tracktwin_farm::campaign::Campaign;
+use tracktwin_farm::campaign::{self, Campaign};
 use tracktwin_farm::dispatch::Settings;
 use tracktwin_farm::security::Security;
 use tracktwin_worker::agent::{self, Config};

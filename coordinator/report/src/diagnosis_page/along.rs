@@ -4,10 +4,7 @@ use super::quantity::{Unit, rounded_pair, signed};
 use super::words::{accepted, addition, is_chain, numbers, physics};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{BeforeAfter, Diagnosis, Estimate, SleeperValues};
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
-use tracktwin_drawing::Shown;
-use tracktwin_drawing::figure;
+use tracktwin_drawing::{Axis, Chart, Shown, figure};
 use tracktwin_parameters::Parameter;
 
 const SIZE: [f64; 2] = [1104.0, 240.0];

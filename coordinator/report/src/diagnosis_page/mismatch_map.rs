@@ -5,9 +5,7 @@ use super::quantity::digits;
 use super::words::{addition, chance, numbers, sleepers, speeds, stretch};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Mismatch};
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
-use tracktwin_drawing::figure;
+use tracktwin_drawing::{Axis, Chart, figure};
 
 /// Width of a panel where two stand beside each other, and where three do.
 const WIDTHS: [f64; 2] = [546.0, 361.0];

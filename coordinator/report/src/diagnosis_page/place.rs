@@ -4,9 +4,7 @@ use super::levels::{Side, measured, predicted, scatter, strangeness};
 use super::words::{accepted, addition, numbers, sleepers, speeds};
 use maud::{Markup, PreEscaped, html};
 use tracktwin_diagnosis::{Diagnosis, Levels, Location};
-use tracktwin_drawing::Axis;
-use tracktwin_drawing::Chart;
-use tracktwin_drawing::figure;
+use tracktwin_drawing::{Axis, Chart, figure};
 
 const SIZE: [f64; 2] = [361.0, 280.0];
 

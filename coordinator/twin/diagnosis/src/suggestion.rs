@@ -2,8 +2,7 @@
 
 use crate::candidate::{Candidate, parameter};
 use crate::subject::Subject;
-use tracktwin_inspection::FirstLook;
-use tracktwin_inspection::{Finding, Place};
+use tracktwin_inspection::{Finding, FirstLook, Place};
 use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter, PlaceKind};
 
 impl Subject {

@@ -41,7 +41,10 @@ mod wheel_out_of_round;
 pub use instance::{ExtensionInstance, InstanceError};
 pub use kind::{Bound, Class, Kind, KindParameter, PlaceKind};
 pub use measured::Measured;
-pub use registry::*;
+pub use registry::{
+    CLIPPING, CORRUGATION, ELECTRICAL_HUM, GAIN_ERROR, KINDS, POSITION_ERROR, RAIL_JOINT, SQUAT,
+    WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
+};
 pub use sampled::{SampledExtension, SampledValue};
 pub use screening::{Family, Places, Screening, Trials};
 pub use text::InstanceTextError;

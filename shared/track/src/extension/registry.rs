@@ -48,10 +48,6 @@ pub static CORRUGATION: &Kind = &super::corrugation::KIND;
 pub static SQUAT: &Kind = &super::squat::KIND;
 /// Rail joint.
 pub static RAIL_JOINT: &Kind = &super::rail_joint::KIND;
-/// Second wheel.
-pub static SECOND_WHEEL: &Kind = &super::second_wheel::KIND;
-/// Sensor mount resonance.
-pub static SENSOR_MOUNT_RESONANCE: &Kind = &super::sensor_mount_resonance::KIND;
 
 #[cfg(test)]
 mod tests {

@@ -1,3 +1,5 @@
+//! Campaign files that are understood, and those that are refused.
+
 use super::*;
 
 fn refusal(change: impl Fn(&str) -> String) -> String {

@@ -2,8 +2,7 @@
 
 use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
 use crate::port_scan::PortPlace;
-use tracktwin_inspection::Finding;
-use tracktwin_inspection::FirstLook;
+use tracktwin_inspection::{Finding, FirstLook};
 use tracktwin_number::chance;
 use tracktwin_signal::recording::Recording;
 

@@ -12,7 +12,8 @@ const NEIGHBOURS: usize = 2;
 ///
 /// The scatter of two entries is independent, but what the polynomial can't follow is nearly the same
 /// for neighbours in the parameters: the mean product of their residuals is its variance. Fitting
-/// `coefficients` numbers to the same entries has taken their share of it away.
+/// `coefficients` numbers to the same entries has taken some of it away; as much as their share of the
+/// entries is given back in every coordinate, which is more than enough where nothing was fitted.
 pub(super) fn lack_of_fit(residuals: &Mat<f64>, unit: &Mat<f64>, coefficients: usize) -> Vec<f64> {
     let (n, d) = (residuals.nrows(), residuals.ncols());
     let step = n.div_ceil(PROBES_MAX).max(1);
