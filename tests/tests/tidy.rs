@@ -28,6 +28,8 @@ const BORDERS: &[(&str, &[&str])] = &[
     ("tracktwin-inspection", OUTSIDE_THE_TWIN),
     ("tracktwin-inspection", &["tracktwin-diagnosis", "tracktwin-surrogate"]),
     ("tracktwin-diagnosis", OUTSIDE_THE_TWIN),
+    ("tracktwin-diagnosis", &["tracktwin-inversion", "tracktwin-surrogate"]),
+    ("tracktwin-inversion", OUTSIDE_THE_TWIN),
     // What tests the twin may not be the twin.
     (
         "tracktwin-reference-simulator",

@@ -1,11 +1,13 @@
 //! The page of an evaluated recording.
 
+use crate::inversion_page;
 use crate::map_picture::map_charts;
 use crate::spectrum_picture::{chosen, spectrum_chart};
 use crate::track_picture::track_charts;
 use maud::{Markup, html};
 use tracktwin_drawing::{Shown, figure, page, significant};
 use tracktwin_evaluation::{Estimate, Evaluation, Flag, SleeperEvaluation};
+use tracktwin_inversion::Inversion;
 use tracktwin_number::rounded;
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
@@ -16,10 +18,12 @@ const SLEEPERS_SHOWN: usize = 4;
 
 /// The report of an evaluation: one sentence, pictures, estimates, provenance.
 ///
-/// `recording` and `extractor` are those of the evaluation; of them come signal and maps. `command`
-/// is the command line that repeats it.
+/// `inversion` is the same recording's evaluation by the physics, if there is one. `recording` and
+/// `extractor` are those of the evaluation; of them come signal and maps. `command` is the command
+/// line that repeats it.
 pub fn evaluation_page(
     evaluation: &Evaluation,
+    inversion: Option<&Inversion>,
     recording: &Recording,
     extractor: &Extractor,
     command: &str,
@@ -30,6 +34,7 @@ pub fn evaluation_page(
         p { (evaluation.unevenness.sentence()) }
         h2 { "Along the track" }
         (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a band of two standard deviations inside the library's range, and the average over the ten library entries that match best. Hollow dots: not valid, the library has no such track. Not told: on the library's test half the models are hardly better than a constant answer."))
+        @if let Some(inversion) = inversion { (inversion_page::section(inversion, evaluation)) }
         h2 { "What was measured" }
         (figure(&maps(evaluation, recording, extractor), "Five sleeper bays in the middle of the recording (paper, Fig. 2); dashed lines are sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet transform (CWT), sharpened in frequency."))
         h2 { "Measured and matched spectra" }
@@ -123,10 +128,19 @@ fn range(evaluation: &Evaluation, parameter: Parameter) -> Option<String> {
 
 fn maps(evaluation: &Evaluation, recording: &Recording, extractor: &Extractor) -> Vec<String> {
     let middle = evaluation.sleepers.get(evaluation.sleepers.len() / 2);
+    maps_at(middle.map(|sleeper| sleeper.x_m), recording, extractor)
+}
+
+/// Signal and maps around a place in m in the fastest pass.
+pub(crate) fn maps_at(
+    x_m: Option<f64>,
+    recording: &Recording,
+    extractor: &Extractor,
+) -> Vec<String> {
     let fastest = (0..recording.passes.len())
         .max_by(|&a, &b| recording.passes[a].speed_km_h.total_cmp(&recording.passes[b].speed_km_h));
-    match (middle, fastest) {
-        (Some(sleeper), Some(pass)) => map_charts(recording, extractor, pass, sleeper.x_m),
+    match (x_m, fastest) {
+        (Some(x_m), Some(pass)) => map_charts(recording, extractor, pass, x_m),
         _ => Vec::new(),
     }
 }

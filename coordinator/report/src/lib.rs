@@ -6,6 +6,7 @@
 mod diagnosis_page;
 mod evaluation_page;
 mod inspection_page;
+mod inversion_page;
 mod map_picture;
 mod models_page;
 mod receptance;
@@ -16,6 +17,7 @@ mod track_picture;
 pub use diagnosis_page::{Origin, diagnosis_page};
 pub use evaluation_page::evaluation_page;
 pub use inspection_page::{Inspected, InspectedCurve, Inspection, inspection_page};
+pub use inversion_page::inversion_page;
 pub use models_page::models_page;
 pub use receptance::{ReceptanceCurve, receptance_chart};
 pub use reproduction_page::reproduction_page;

@@ -2,7 +2,7 @@
 
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
-use super::progress::Progress;
+use super::progress::Stages;
 use super::{OrInput, Stop, note, say};
 use crate::pipeline;
 use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
@@ -11,7 +11,6 @@ use anyhow::Context;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
-use std::sync::Mutex;
 use tracktwin_diagnosis::{Verdict, check_track};
 use tracktwin_experiment::CODE_VERSION;
 use tracktwin_files::{FileName, Kind, Output};
@@ -21,9 +20,6 @@ use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
 use tracktwin_track::extension::KINDS;
-
-/// Steps of a stage's progress bar.
-const STEPS: u64 = 100;
 
 /// What `diagnose` is told.
 #[derive(Args)]
@@ -71,7 +67,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let design = design(models, library.as_ref()).await?;
     check_track(&recording, &design).or_input()?;
     make_folder(&out)?;
-    let shown = Shown::default();
+    let shown = Stages::default();
     let setting =
         Setting { design: &design, library: library.as_ref(), without: &without, shuffle: None };
     let diagnosed = diagnose(&recording, setting, &|stage, share| shown.at(stage, share)).await;
@@ -135,30 +131,4 @@ async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<Tr
         .context("the models belong to another library; train on this one")
         .or_input()?;
     Ok(pipeline::train::experiment(&campaign).or_input()?.design)
-}
-
-/// A line or bar for the stage that goes on, the last one ended when another begins.
-#[derive(Default)]
-struct Shown(Mutex<Option<(&'static str, Progress)>>);
-
-impl Shown {
-    fn at(&self, stage: &'static str, share: f64) {
-        let mut shown = self.0.lock().expect("nobody panics while holding it");
-        if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
-            if let Some((_, progress)) = shown.take() {
-                progress.end();
-            }
-            *shown = Some((stage, Progress::begin(stage, 0, STEPS)));
-        }
-        if let Some((_, progress)) = shown.as_mut() {
-            progress.at((share * STEPS as f64) as u64, "");
-        }
-    }
-
-    fn end(self) {
-        let shown = self.0.into_inner().expect("nobody panics while holding it");
-        if let Some((_, progress)) = shown {
-            progress.end();
-        }
-    }
 }

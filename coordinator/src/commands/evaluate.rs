@@ -1,35 +1,56 @@
 //! `tracktwin evaluate`: the track's parameters under a recording.
 
 use super::files::{Force, check, make_folder};
-use super::library_url::LibraryUrl;
+use super::library_url::open_whole;
+use super::progress::Stages;
 use super::{OrInput, Stop, note, say};
 use crate::pipeline::evaluate::{Evaluator, EvaluatorError};
-use crate::pipeline::provenance;
+use crate::pipeline::invert::InvertingError;
+use crate::pipeline::{self, provenance};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use tracktwin_evaluation::{Evaluation, Flag, check_recording};
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_inspection::chain::{self, LossOfContact};
+use tracktwin_inversion::Inversion;
 use tracktwin_library::{Library, without_password};
+use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
+use tracktwin_signal::{Extractor, FeatureDefinition};
 use tracktwin_surrogate::Trained;
+
+/// How parameters are told from a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Method {
+    /// Gaussian processes trained on a library, and its nearest entries; needs --models.
+    Gp,
+    /// The track model fitted to all passes and speeds at once, each sleeper with its own stiffness.
+    Inversion,
+}
 
 /// What `evaluate` is told.
 #[derive(Args)]
 #[command(
-    after_help = "Exit codes: 0 done, 1 done and most sleepers lie outside what the library knows (their estimates \
-are not valid; the last lines say which range to widen), 2 wrong input, 3 failure."
+    after_help = "Without --models the recording is evaluated by inversion, which needs no library and takes any speed. \
+With --models the Gaussian processes evaluate it and the page shows the inversion beside them; --method takes one of \
+the two alone.\n\nExit codes: 0 done, 1 done and the estimates of most sleepers are not valid (the last lines say \
+why), 2 wrong input, 3 failure."
 )]
 pub(super) struct Arguments {
     /// The recording: a folder with `recording.json` and a file a pass.
     recording: PathBuf,
+    /// One method alone [default: inversion; with --models both].
+    #[arg(long, value_enum)]
+    method: Option<Method>,
     /// Folder of the models, as `train` or `run` wrote it.
-    #[arg(long, value_name = "DIR")]
-    models: PathBuf,
-    #[command(flatten)]
-    library: LibraryUrl,
-    /// Folder for evaluation.json, evaluation.csv and report.html.
+    #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"))]
+    models: Option<PathBuf>,
+    /// The library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
+    #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
+    library: Option<String>,
+    /// Folder for evaluation.json, evaluation.csv and report.html; with both methods also inversion.json
+    /// and inversion.csv.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -37,18 +58,68 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { recording, models, library, out, force } = arguments;
+    let Arguments { recording, method, models, library, out, force } = arguments;
     // The recording first: it is what most often needs mending, and quickest to check.
     let recording = open(&recording)?;
     check_files(&out, force)?;
-    let library = library.open_whole().await?;
+    let (Some(models), Some(library)) =
+        (models.filter(|_| method != Some(Method::Inversion)), library)
+    else {
+        return by_inversion(&recording, &out, force).await;
+    };
+    let library = open_whole(&library).await?;
     let models = Trained::load(&models)
         .with_context(|| format!("{}: no models; `tracktwin train` makes them", models.display()))
         .or_input()?;
-    let evaluation = evaluate(&recording, &library, models, &out, force).await?;
+    let beside = method.is_none();
+    let evaluation = evaluate(&recording, &library, models, &out, force, beside).await?;
     let sleepers = evaluation.sleepers.len();
     say(&format!("{sleepers} sleepers evaluated; report: {}", out.join("report.html").display()));
     conclude(&evaluation)
+}
+
+/// Evaluates a recording by the physics alone.
+async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Result<(), Stop> {
+    let (recording, left_out) = usable(recording)?;
+    let notes = [recording.doubts.clone(), left_out].concat();
+    notes.iter().for_each(|line| note(line));
+    make_folder(folder)?;
+    let mut inversion =
+        invert(&recording, &TrackDesign::v_track(), None).await.map_err(|error| match error {
+            InvertingError::Recording(error) => Stop::Input(error.into()),
+            failed => Stop::Failure(failed.into()),
+        })?;
+    let said = inversion.notes.clone();
+    inversion.notes.splice(0..0, notes);
+    let extractor = Extractor::new(&FeatureDefinition::default()).context("the usual features")?;
+    let page = tracktwin_report::inversion_page(&inversion, &recording, &extractor, &command());
+    let mut output = Output::begin(folder, Kind::Results, force.force)?;
+    output.add(&FileName::new("report.html")?, page.as_bytes())?;
+    inversion.add_to(&mut output, "evaluation")?;
+    output.commit()?;
+    let (sleepers, report) = (inversion.sleepers.len(), folder.join("report.html"));
+    say(&format!("{sleepers} sleepers evaluated by inversion; report: {}", report.display()));
+    said.iter().for_each(|sentence| say(sentence));
+    if inversion.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
+}
+
+/// The inversion of a recording, with its progress.
+async fn invert(
+    recording: &Recording,
+    design: &TrackDesign,
+    library: Option<&Library>,
+) -> Result<Inversion, InvertingError> {
+    let stages = Stages::default();
+    let watch = |stage, share| stages.at(stage, share);
+    let inverted = pipeline::invert::invert(recording, design, library, &watch).await;
+    stages.end();
+    inverted
+}
+
+/// The command line that repeats what is done, without passwords.
+fn command() -> String {
+    let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
+    std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
 /// Says what lies outside the library; if that is most of the track, the answer is negative.
@@ -73,16 +144,20 @@ pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
 
 /// Makes sure that an evaluation may be written into a folder.
 pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
-    check(folder, Kind::Results, force, &["report.html", "evaluation.csv", "evaluation.json"])
+    let names =
+        ["report.html", "evaluation.csv", "evaluation.json", "inversion.csv", "inversion.json"];
+    check(folder, Kind::Results, force, &names)
 }
 
-/// Evaluates a recording with models of this library; writes files and report to `folder`.
+/// Evaluates a recording with models of this library, and by the physics `beside`; writes files and
+/// report to `folder`.
 pub(super) async fn evaluate(
     recording: &Recording,
     library: &Library,
     models: Trained,
     folder: &Path,
     force: Force,
+    beside: bool,
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
     let (recording, left_out) = usable(recording)?;
@@ -97,17 +172,32 @@ pub(super) async fn evaluate(
     if let Some(lost) = chain::loss_of_contact(&recording) {
         flag(&mut evaluation, &lost, recording.passes.len());
     }
-    let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
-    let command = std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>();
+    let inversion = if beside {
+        match invert(&recording, evaluator.design(), Some(library)).await {
+            Ok(inversion) => Some(inversion),
+            Err(error) => {
+                let line = format!("not evaluated by inversion: {error}");
+                note(&line);
+                evaluation.notes.push(line);
+                None
+            }
+        }
+    } else {
+        None
+    };
     let page = tracktwin_report::evaluation_page(
         &evaluation,
+        inversion.as_ref(),
         &recording,
         &evaluator.extractor,
-        &command.join(" "),
+        &command(),
     );
     let mut output = Output::begin(folder, Kind::Results, force.force)?;
     output.add(&FileName::new("report.html")?, page.as_bytes())?;
     evaluation.add_to(&mut output)?;
+    if let Some(inversion) = &inversion {
+        inversion.add_to(&mut output, "inversion")?;
+    }
     output.commit()?;
     if let Err(error) = library.record_evaluation(provenance::evaluation(&evaluation)).await {
         // The answer stands in the folder; somebody who may only read the library has it all the same.

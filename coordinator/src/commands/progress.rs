@@ -3,10 +3,14 @@
 use super::note;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// Steps of the bar of a stage of which shares are told.
+const STEPS: u64 = 100;
 
 /// The progress of one stage of a command, on standard error.
 pub(super) struct Progress {
@@ -65,5 +69,33 @@ impl Progress {
             }
         };
         note(&format!("{}: {done} of {total}, {left} left {remark}", self.stage));
+    }
+}
+
+/// A line or bar for the stage that goes on, the last one ended when another begins.
+#[derive(Default)]
+pub(super) struct Stages(Mutex<Option<(&'static str, Progress)>>);
+
+impl Stages {
+    /// Shows which share of a stage is done.
+    pub(super) fn at(&self, stage: &'static str, share: f64) {
+        let mut shown = self.0.lock().expect("nobody panics while holding it");
+        if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
+            if let Some((_, progress)) = shown.take() {
+                progress.end();
+            }
+            *shown = Some((stage, Progress::begin(stage, 0, STEPS)));
+        }
+        if let Some((_, progress)) = shown.as_mut() {
+            progress.at((share * STEPS as f64) as u64, "");
+        }
+    }
+
+    /// Ends the stage that goes on.
+    pub(super) fn end(self) {
+        let shown = self.0.into_inner().expect("nobody panics while holding it");
+        if let Some((_, progress)) = shown {
+            progress.end();
+        }
     }
 }

@@ -6,6 +6,7 @@
 pub mod coverage;
 pub mod diagnose;
 pub mod evaluate;
+pub mod invert;
 pub mod lack;
 pub mod null_models;
 pub mod provenance;

@@ -119,7 +119,8 @@ async fn chain(
         let line = format!("models: {}; `tracktwin evaluate` takes a recording", models.display());
         return Ok((line, None));
     };
-    let evaluation = evaluate::evaluate(&recording, library, models, out, arguments.force).await?;
+    let evaluation =
+        evaluate::evaluate(&recording, library, models, out, arguments.force, true).await?;
     Ok((format!("report: {}", out.join("report.html").display()), Some(evaluation)))
 }
 

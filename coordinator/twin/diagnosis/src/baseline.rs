@@ -18,6 +18,30 @@ pub struct Unknowns {
     knots: Vec<f64>,
     /// Logarithms of the frequencies in Hz at which the sensor's response is free.
     response_knots: Vec<f64>,
+    /// How ballast stiffness, railpad stiffness and level vary along the track.
+    pub variation: [Variation; 3],
+    /// Sleepers that differ from their neighbours by more than `variation` says.
+    pub exceptions: Vec<Exception>,
+}
+
+/// How the logarithm of a quantity varies along the track, about its mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variation {
+    /// Standard deviation of the smooth part.
+    pub smooth: f64,
+    /// Length of the smooth part's Gaussian correlation, in sleepers.
+    pub length: f64,
+    /// Standard deviation of the part that is independent from sleeper to sleeper.
+    pub independent: f64,
+}
+
+/// A sleeper of which one quantity lies far from its neighbours'.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Exception {
+    /// Place of the quantity in [`Unknowns::variation`].
+    pub field: usize,
+    /// Number of the sleeper among those compared.
+    pub sleeper: usize,
 }
 
 /// Distance of knots in the logarithm of the wave number or of the frequency.
@@ -27,12 +51,14 @@ const KNOT_DISTANCE: f64 = 0.35;
 mod prior {
     /// Mean over all sleepers of ballast, railpad and level.
     pub(super) const MEAN: [f64; 3] = [0.7, 0.9, 1.2];
-    /// What varies smoothly along the track (section 4.2 of the mismatch design).
-    pub(super) const SMOOTH: [f64; 3] = [0.35, 0.35, 0.15];
-    /// What varies from sleeper to sleeper.
-    pub(super) const ALONE: [f64; 3] = [0.15, 0.2, 0.2];
-    /// Length of smooth variation in sleepers.
-    pub(super) const LENGTH: f64 = 3.0;
+    /// Variation along the track where it is not learned from the recording.
+    pub(super) const VARIATION: [super::Variation; 3] = [
+        super::Variation { smooth: 0.35, length: 3.0, independent: 0.15 },
+        super::Variation { smooth: 0.35, length: 3.0, independent: 0.2 },
+        super::Variation { smooth: 0.15, length: 3.0, independent: 0.2 },
+    ];
+    /// Deviation of an exception from its neighbours.
+    pub(super) const EXCEPTION: f64 = 1.0;
     /// Bending stiffness of all sleepers, railpad and ballast damping.
     pub(super) const GLOBAL: [f64; 3] = [0.3, 0.4, 0.6];
     /// Spectrum of the surface about eq. B.6, and its length in `ln kappa`.
@@ -77,7 +103,8 @@ impl Unknowns {
         frequencies_hz: Range<f64>,
     ) -> Self {
         let (knots, response_knots) = (knots(wave_numbers), knots(frequencies_hz));
-        Self { sleepers: section.sleepers, speeds, knots, response_knots }
+        let (variation, exceptions) = (prior::VARIATION, Vec::new());
+        Self { sleepers: section.sleepers, speeds, knots, response_knots, variation, exceptions }
     }
 
     /// How many unknowns there are.
@@ -161,14 +188,29 @@ impl Unknowns {
         values
     }
 
+    /// Standard deviation of each unknown's prior, without exceptions.
+    pub fn prior_deviations(&self) -> DVector<f64> {
+        self.covariance().diagonal().map(f64::sqrt)
+    }
+
     /// Inverse of the prior covariance.
     pub fn precision(&self) -> DMatrix<f64> {
+        let mut covariance = self.covariance();
+        for &Exception { field, sleeper } in &self.exceptions {
+            let index = field * self.sleepers + sleeper;
+            covariance[(index, index)] += prior::EXCEPTION.powi(2);
+        }
+        Cholesky::new(covariance).expect("a prior with a white part is positive definite").inverse()
+    }
+
+    /// Prior covariance of all unknowns, without exceptions.
+    fn covariance(&self) -> DMatrix<f64> {
         let mut covariance = DMatrix::zeros(self.count(), self.count());
         for (field, range) in [self.ballast(), self.railpad(), self.level()].into_iter().enumerate()
         {
             for (i, row) in (0..).zip(range.clone()) {
                 for (j, column) in (0..).zip(range.clone()) {
-                    covariance[(row, column)] = along(field, i, j);
+                    covariance[(row, column)] = self.along(field, i, j);
                 }
             }
         }
@@ -194,7 +236,7 @@ impl Unknowns {
         for index in self.ends() {
             covariance[(index, index)] = 1.0 / ENDS_SPANS.len() as f64;
         }
-        Cholesky::new(covariance).expect("a prior with a white part is positive definite").inverse()
+        covariance
     }
 
     /// The sleepers beyond vary as those compared do: a difference from the first or last one is what
@@ -205,7 +247,8 @@ impl Unknowns {
         for &(row, Outer { sleeper, is_railpad, .. }) in &outer {
             let field = usize::from(is_railpad);
             let end = sleeper.clamp(0, last);
-            let with = |other: isize| along(field, sleeper, other) - along(field, end, other);
+            let with =
+                |other: isize| self.along(field, sleeper, other) - self.along(field, end, other);
             let compared = if is_railpad { self.railpad() } else { self.ballast() };
             for (other, column) in (0..).zip(compared) {
                 covariance[(row, column)] = with(other);
@@ -244,14 +287,15 @@ impl Unknowns {
     pub fn response_shares(&self, frequency_hz: f64) -> [(usize, f64); 2] {
         shares(&self.response_knots, frequency_hz, self.response().start)
     }
-}
 
-/// Prior covariance of one of ballast, railpad and level between two sleepers.
-fn along(field: usize, i: isize, j: isize) -> f64 {
-    let distance = (i - j) as f64 / prior::LENGTH;
-    let smooth = prior::SMOOTH[field].powi(2) * (-0.5 * distance.powi(2)).exp();
-    let alone = if i == j { prior::ALONE[field].powi(2) } else { 0.0 };
-    prior::MEAN[field].powi(2) + smooth + alone
+    /// Prior covariance of one of ballast, railpad and level between two sleepers.
+    fn along(&self, field: usize, i: isize, j: isize) -> f64 {
+        let Variation { smooth, length, independent } = self.variation[field];
+        let distance = (i - j) as f64 / length;
+        let together = smooth.powi(2) * (-0.5 * distance.powi(2)).exp();
+        let own = if i == j { independent.powi(2) } else { 0.0 };
+        prior::MEAN[field].powi(2) + together + own
+    }
 }
 
 /// Knots that cover a range, in logarithms.

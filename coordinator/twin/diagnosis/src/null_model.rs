@@ -138,6 +138,12 @@ impl NullModel {
         sum / count
     }
 
+    /// The offset of so many sleepers, one after the other.
+    pub fn offset_of(&self, sleepers: usize) -> DVector<f64> {
+        let offset = self.offset();
+        DVector::from_fn(sleepers * self.per_sleeper, |row, _| offset[row % self.per_sleeper])
+    }
+
     /// Covariance of a sleeper's log powers about the offset, drawn towards its diagonal, with what
     /// the passes do not share and the prediction's own error.
     ///

@@ -15,6 +15,8 @@ pub struct Observation {
     fitted: usize,
     /// Inverse Cholesky factor of a sleeper's covariance, in that order.
     whitening: DMatrix<f64>,
+    /// What each sleeper's whitened values are multiplied by.
+    weights: Vec<f64>,
 }
 
 impl Observation {
@@ -32,7 +34,15 @@ impl Observation {
         let ordered = DMatrix::from_fn(size, size, |i, j| covariance[(order[i], order[j])]);
         let factor = nalgebra::Cholesky::new(ordered)?;
         let whitening = factor.l().solve_lower_triangular(&DMatrix::identity(size, size))?;
-        Some(Self { log_power, order, fitted, whitening })
+        let weights = vec![1.0; log_power.len() / size];
+        Some(Self { log_power, order, fitted, whitening, weights })
+    }
+
+    /// The same with a covariance at each sleeper that is larger by its own factor.
+    #[must_use]
+    pub fn with_factors(mut self, factors: &[f64]) -> Self {
+        self.weights = factors.iter().map(|factor| factor.sqrt().recip()).collect();
+        self
     }
 
     /// Measured less predicted log powers.
@@ -55,9 +65,10 @@ impl Observation {
     pub fn whiten_matrix(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let size = self.order.len();
         let mut whitened = DMatrix::zeros(matrix.nrows(), matrix.ncols());
-        for first in (0..matrix.nrows()).step_by(size) {
+        for (sleeper, weight) in self.weights.iter().enumerate() {
+            let first = sleeper * size;
             let rows: Vec<usize> = self.order.iter().map(|row| first + row).collect();
-            let part = &self.whitening * matrix.select_rows(&rows);
+            let part = &self.whitening * matrix.select_rows(&rows) * *weight;
             whitened.rows_mut(first, size).copy_from(&part);
         }
         whitened

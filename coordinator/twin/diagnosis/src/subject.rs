@@ -6,6 +6,7 @@ use crate::null_model::NullModel;
 use crate::section::Section;
 use crate::spectra::{Spectra, SpeedSpectra};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 use tracktwin_inspection::chain::Trouble;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::{OtherTrack, Recording, compare_designs};
@@ -139,12 +140,15 @@ pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Su
     }
 }
 
-impl Subject {
-    /// Takes from a recording what is compared.
-    ///
-    /// # Errors
-    /// [`SubjectError`] says what is missing.
-    pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, SubjectError> {
+/// What a recording has in bands, and the sleepers that can be compared.
+struct Measured {
+    bands: Bands,
+    spectra: Spectra,
+    sleepers: Range<usize>,
+}
+
+impl Measured {
+    fn of(recording: &Recording, design: &TrackDesign) -> Result<Self, SubjectError> {
         check_track(recording, design)?;
         let highest_hz = BANDS_HZ[1].min(SAMPLE_RATE_SHARE * recording.sample_rate_hz);
         let bands = Bands::new(BANDS_HZ[0], highest_hz.max(BANDS_HZ[0]));
@@ -163,17 +167,54 @@ impl Subject {
             return Err(SubjectError::TooShort { sleepers: sleepers.len(), margin_m });
         }
         let spectra = Spectra::new(recording, &bands);
+        Ok(Self { bands, spectra, sleepers })
+    }
+
+    /// Some of the sleepers.
+    fn subject(
+        &self,
+        recording: &Recording,
+        design: &TrackDesign,
+        sleepers: Range<usize>,
+    ) -> Subject {
+        let Self { bands, spectra, .. } = self;
         let first_x_m = recording.sleepers[sleepers.start].x_m;
         let section = Section::new(design.clone(), sleepers.len(), first_x_m);
         let speeds: Vec<f64> = spectra.speeds.iter().map(|speed| speed.speed_km_h).collect();
         let noise = spectra.speeds.iter().map(|speed| speed.noise_density).collect();
-        let forward = Forward::new(section, bands, &speeds, noise);
-        let log_power = log_power(&forward, &spectra, sleepers.start);
-        let pass_variance = pass_variance(&forward, &spectra);
+        let forward = Forward::new(section, bands.clone(), &speeds, noise);
+        let log_power = log_power(&forward, spectra, sleepers.start);
+        let pass_variance = pass_variance(&forward, spectra);
         let pass_numbers = spectra.speeds.iter().map(|speed| speed.passes.clone()).collect();
-        let first_sleeper = sleepers.start;
-        let heard_m = Vec::new();
-        Ok(Self { forward, log_power, pass_variance, first_sleeper, pass_numbers, heard_m })
+        let (first_sleeper, heard_m) = (sleepers.start, Vec::new());
+        Subject { forward, log_power, pass_variance, first_sleeper, pass_numbers, heard_m }
+    }
+}
+
+impl Subject {
+    /// Takes from a recording what is compared.
+    ///
+    /// # Errors
+    /// [`SubjectError`] says what is missing.
+    pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, SubjectError> {
+        let measured = Measured::of(recording, design)?;
+        Ok(measured.subject(recording, design, measured.sleepers.clone()))
+    }
+
+    /// The same in sections of at most `length` sleepers, each of which shares at least `overlap` with
+    /// the next: a long track need not be fitted as a whole.
+    ///
+    /// # Errors
+    /// As [`Subject::new`].
+    pub fn sections(
+        recording: &Recording,
+        design: &TrackDesign,
+        length: usize,
+        overlap: usize,
+    ) -> Result<Vec<Self>, SubjectError> {
+        let measured = Measured::of(recording, design)?;
+        let ranges = overlapping(measured.sleepers.clone(), length, overlap);
+        Ok(ranges.into_iter().map(|range| measured.subject(recording, design, range)).collect())
     }
 
     /// The same powers at other sleepers: those of each speed in an order of its own, `[speed][sleeper]`,
@@ -190,6 +231,12 @@ impl Subject {
         }
     }
 
+    /// The log powers less the null model's offset: what the forward model predicts where nothing is
+    /// left out.
+    pub fn expected_log_power(&self, null: &NullModel) -> DVector<f64> {
+        &self.log_power - null.offset_of(self.forward.section.sleepers)
+    }
+
     /// Covariance of any one sleeper's log powers: the null model's, and what the passes do not share.
     pub fn covariance(&self, null: &NullModel) -> DMatrix<f64> {
         null.covariance(self.forward.bands.count(), &self.pass_variance)
@@ -197,7 +244,7 @@ impl Subject {
 }
 
 /// The longest run of neighbouring sleepers that every pass covers with a margin.
-fn covered(recording: &Recording) -> std::ops::Range<usize> {
+fn covered(recording: &Recording) -> Range<usize> {
     let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
     let inside = |x_m: f64| {
         recording.passes.iter().all(|pass| {
@@ -215,6 +262,15 @@ fn covered(recording: &Recording) -> std::ops::Range<usize> {
         }
     }
     longest
+}
+
+/// Ranges of at most `length` that cover a range; each shares at least `overlap` with the next.
+fn overlapping(whole: Range<usize>, length: usize, overlap: usize) -> Vec<Range<usize>> {
+    let rest = whole.len().saturating_sub(length);
+    let steps = rest.div_ceil(length - overlap);
+    let length = length.min(whole.len());
+    let first = |step: usize| whole.start + if steps == 0 { 0 } else { step * rest / steps };
+    (0..=steps).map(|step| first(step)..first(step) + length).collect()
 }
 
 fn log_power(forward: &Forward, spectra: &Spectra, first: usize) -> DVector<f64> {
@@ -241,4 +297,21 @@ fn pass_variance(forward: &Forward, spectra: &Spectra) -> DVector<f64> {
         variance.iter().map(|value| value / count).collect::<Vec<_>>()
     };
     DVector::from_vec(known.iter().zip(&spectra.speeds).flat_map(of_speed).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::overlapping;
+
+    #[test]
+    fn sections_cover_a_track_and_overlap() {
+        assert_eq!(overlapping(3..23, 24, 6), [3..23]);
+        assert_eq!(overlapping(3..27, 24, 6), [3..27]);
+        assert_eq!(overlapping(0..40, 24, 6), [0..24, 16..40]);
+        let many = overlapping(5..106, 24, 6);
+        assert_eq!((many[0].start, many[many.len() - 1].end), (5, 106));
+        for pair in many.windows(2) {
+            assert!(pair[0].end - pair[1].start >= 6, "{pair:?}");
+        }
+    }
 }

@@ -150,6 +150,8 @@ pub enum Flag {
     MissingSpeed,
     /// A mean lies at an end of what the library's tracks have: the track may lie beyond.
     AtEdgeOfRange,
+    /// It differs from its neighbours by more than the track varies elsewhere.
+    UnlikeNeighbours,
     /// The wheel is in the air in the sleeper's window: what was recorded there is hardly the track's.
     LossOfContact,
     /// The features are such as no track of the library has: the estimates are not valid.
@@ -182,6 +184,7 @@ impl Flag {
             Self::ShortMargin => "short margin",
             Self::MissingSpeed => "missing speed",
             Self::AtEdgeOfRange => "at edge of range",
+            Self::UnlikeNeighbours => "unlike its neighbours",
             Self::LossOfContact => "loss of contact",
             Self::OutsideLibrary => "outside library: not valid",
         }
@@ -194,6 +197,7 @@ impl Flag {
             Self::ShortMargin => "short_margin",
             Self::MissingSpeed => "missing_speed",
             Self::AtEdgeOfRange => "at_edge_of_range",
+            Self::UnlikeNeighbours => "unlike_neighbours",
             Self::LossOfContact => "loss_of_contact",
             Self::OutsideLibrary => "outside_library",
         }

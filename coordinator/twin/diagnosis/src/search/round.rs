@@ -45,17 +45,14 @@ pub(super) struct Setting<'a> {
 
 impl<'a> Setting<'a> {
     pub(super) fn new(subject: &'a Subject, null: &NullModel) -> Self {
-        let offset = null.offset();
-        let repeated: Vec<f64> =
-            (0..subject.forward.section.sleepers).flat_map(|_| offset.iter().copied()).collect();
-        let offset = DVector::from_vec(repeated);
+        let offset = null.offset_of(subject.forward.section.sleepers);
         let nulls = null
             .differences
             .iter()
             .map(|difference| DVector::from_column_slice(difference) - &offset)
             .collect();
-        let covariance = subject.covariance(null);
-        Self { subject, log_power: &subject.log_power - offset, covariance, nulls }
+        let (log_power, covariance) = (subject.expected_log_power(null), subject.covariance(null));
+        Self { subject, log_power, covariance, nulls }
     }
 
     pub(super) fn observe(

@@ -1,0 +1,246 @@
+//! The page of a recording evaluated by the physics, and the same beside a library's models.
+
+use crate::evaluation_page::maps_at;
+use maud::{Markup, html};
+use tracktwin_drawing::{Axis, Chart, Shown, figure, page, significant};
+use tracktwin_evaluation::{Estimate, Estimates, Evaluation};
+use tracktwin_inversion::{Inversion, Sleeper, beside};
+use tracktwin_number::rounded;
+use tracktwin_parameters::Parameter;
+use tracktwin_signal::Extractor;
+use tracktwin_signal::recording::Recording;
+
+const SIZE: [f64; 2] = [1104.0, 240.0];
+
+/// Sleepers whose names fit under the charts.
+const NAMES: usize = 20;
+
+/// What differs from sleeper to sleeper.
+const ALONG: [Parameter; 3] =
+    [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::IrregularityLevel];
+
+/// What the sleepers of a section have in common.
+const COMMON: [Parameter; 3] =
+    [Parameter::SleeperBendingStiffness, Parameter::RailpadDamping, Parameter::BallastDamping];
+
+/// The report of an evaluation by the physics: one sentence, pictures, estimates, provenance.
+///
+/// `extractor` makes the maps of the signal; `command` is the command line that repeats the evaluation.
+pub fn inversion_page(
+    inversion: &Inversion,
+    recording: &Recording,
+    extractor: &Extractor,
+    command: &str,
+) -> String {
+    let middle = inversion.sleepers.get(inversion.sleepers.len() / 2).map(|it| it.x_m);
+    let body = html! {
+        (banner(inversion))
+        h2 { "Along the track" }
+        (figure(&charts(inversion, None), "Posterior mean of every sleeper's own value with a band of two standard deviations. Hollow dots: not valid, the track model does not explain what was measured there."))
+        (common(inversion))
+        (variation(inversion))
+        h2 { "What was measured" }
+        (figure(&maps_at(middle, recording, extractor), "Five sleeper bays in the middle of the recording (paper, Fig. 2); dashed lines are sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet transform (CWT), sharpened in frequency."))
+        h2 { "Estimates" }
+        p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the residual over its expectation, about one where the track model holds." }
+        div.scroll { (table(inversion)) }
+        h2 { "Provenance" }
+        (provenance(inversion, command))
+    };
+    page(&format!("Track under {}", inversion.recording), &summary(inversion, recording), &body)
+}
+
+/// The section of an evaluation's page that shows the inversion beside the Gaussian processes.
+pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
+    html! {
+        h2 { "Each sleeper for itself" }
+        p { "Inversion fits the track model to all passes and speeds at once, each sleeper with a stiffness of its own, without the library." }
+        @for compared in beside(inversion, models) { p { (capital(&compared.sentence())) } }
+        @for note in &inversion.notes { p { (note) } }
+        (figure(&charts(inversion, Some(models)), "Bold: inversion. Dashed grey: Gaussian processes of the library. Bands are two standard deviations."))
+        (common(inversion))
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn banner(inversion: &Inversion) -> Markup {
+    html! {
+        @if inversion.outside_library.share > 0.0 {
+            div.banner role="alert" { @for note in &inversion.notes { p { (note) } } }
+        } @else {
+            @for note in &inversion.notes { p { (note) } }
+        }
+    }
+}
+
+/// What a reader in a hurry needs, in one sentence.
+fn summary(inversion: &Inversion, recording: &Recording) -> String {
+    let speeds: Vec<String> =
+        inversion.provenance.speeds_km_h.iter().map(|speed| rounded(*speed, 3)).collect();
+    let ranges: Vec<String> = ALONG.iter().filter_map(|&of| range(inversion, of)).collect();
+    let ranges = if ranges.is_empty() { "no valid estimate".to_owned() } else { ranges.join(", ") };
+    let passes = recording.passes.len();
+    format!(
+        "{} sleepers evaluated by inversion from {passes} {} at {} km/h: {ranges}.",
+        inversion.sleepers.len(),
+        if passes == 1 { "pass" } else { "passes" },
+        speeds.join(", "),
+    )
+}
+
+fn range(inversion: &Inversion, parameter: Parameter) -> Option<String> {
+    let valid = inversion.sleepers.iter().filter(|sleeper| sleeper.is_valid());
+    let mut means: Vec<f64> = valid.map(|sleeper| sleeper.estimates[&parameter].mean).collect();
+    means.sort_by(f64::total_cmp);
+    let shown = Shown::of(parameter);
+    let text = |value: f64| significant(value / shown.divisor);
+    let (low, high) = (text(*means.first()?), text(*means.last()?));
+    Some(format!("{} {low} to {high} {}", parameter.label(), shown.unit))
+}
+
+/// A mean with two standard deviations at a place, in the chart's unit.
+struct Point {
+    x_m: f64,
+    mean: f64,
+    two_sd: f64,
+}
+
+/// A chart a parameter; with the Gaussian processes' estimates behind where there are some.
+fn charts(inversion: &Inversion, models: Option<&Evaluation>) -> Vec<String> {
+    ALONG.into_iter().map(|parameter| chart(inversion, models, parameter)).collect()
+}
+
+fn chart(inversion: &Inversion, models: Option<&Evaluation>, parameter: Parameter) -> String {
+    let shown = Shown::of(parameter);
+    let point = |x_m: f64, estimates: &Estimates| {
+        let Estimate { mean, sd } = *estimates.get(&parameter)?;
+        Some(Point { x_m, mean: mean / shown.divisor, two_sd: 2.0 * sd / shown.divisor })
+    };
+    let own = |valid: bool| -> Vec<Point> {
+        let sleepers = inversion.sleepers.iter().filter(|sleeper| sleeper.is_valid() == valid);
+        sleepers.filter_map(|sleeper| point(sleeper.x_m, &sleeper.estimates)).collect()
+    };
+    let (valid, invalid) = (own(true), own(false));
+    let behind: Vec<Point> = models
+        .iter()
+        .flat_map(|models| &models.sleepers)
+        .filter(|sleeper| sleeper.is_valid())
+        .filter_map(|sleeper| point(sleeper.x_m, &sleeper.estimates))
+        .collect();
+    let drawn = || valid.iter().chain(&behind);
+    let ends = drawn().flat_map(|p| [p.mean - p.two_sd, p.mean + p.two_sd]);
+    let ends = ends.chain(invalid.iter().map(|p| p.mean)).map(|end| end.max(0.0));
+    let y = Axis::around(&format!("in {}", shown.unit), ends);
+    let x = Axis::around("sleeper", inversion.sleepers.iter().map(|sleeper| sleeper.x_m));
+    let mut chart = Chart::new(&capital(parameter.label()), SIZE, x, y);
+    if !behind.is_empty() {
+        curve(&mut chart, "was", &behind);
+        chart.explain("was", "Gaussian processes");
+        chart.explain("a", "inversion");
+    }
+    curve(&mut chart, "a", &valid);
+    if !invalid.is_empty() {
+        chart.dots("hollow", 2.6, &invalid.iter().map(|p| (p.x_m, p.mean)).collect::<Vec<_>>());
+        chart.explain("hollow", "not valid");
+    }
+    let step = inversion.sleepers.len().div_ceil(NAMES).max(1);
+    let names = inversion.sleepers.iter().step_by(step);
+    chart.name_x(names.map(|sleeper| (sleeper.x_m, sleeper.id.clone())).collect());
+    chart.into_svg()
+}
+
+fn curve(chart: &mut Chart, class: &str, points: &[Point]) {
+    let band: Vec<_> =
+        points.iter().map(|p| (p.x_m, p.mean - p.two_sd, p.mean + p.two_sd)).collect();
+    let means: Vec<_> = points.iter().map(|p| (p.x_m, p.mean)).collect();
+    chart.band(class, &band);
+    chart.line(class, means.iter().copied());
+    if class != "was" {
+        chart.dots(class, 2.6, &means);
+    }
+}
+
+/// What all sleepers have in common.
+fn common(inversion: &Inversion) -> Markup {
+    let Some(sleeper) = inversion.sleepers.get(inversion.sleepers.len() / 2) else {
+        return Markup::default();
+    };
+    let text = |parameter: Parameter| {
+        let shown = Shown::of(parameter);
+        let Estimate { mean, sd } = sleeper.estimates[&parameter];
+        format!("{} {} {}", parameter.label(), shown.estimate(mean, sd), shown.unit)
+    };
+    let all: Vec<String> = COMMON.iter().map(|&parameter| text(parameter)).collect();
+    html! { p { "Common to the sleepers in the middle: " (all.join(", ")) "." } }
+}
+
+/// How much sleepers differ, as the recording tells.
+fn variation(inversion: &Inversion) -> Markup {
+    let text = |parameter: Parameter| {
+        let along = inversion.provenance.variation.get(&parameter)?;
+        let scatter = 100.0 * along.smooth.hypot(along.independent);
+        Some(format!("{} by {} %", parameter.label(), significant(scatter)))
+    };
+    let all: Vec<String> = ALONG.iter().filter_map(|&parameter| text(parameter)).collect();
+    html! { @if !all.is_empty() {
+        p { "The recording tells that sleepers differ along the track (one standard deviation): " (all.join(", ")) "." }
+    } }
+}
+
+fn table(inversion: &Inversion) -> Markup {
+    let parameters = inversion.parameters();
+    html! {
+        table {
+            thead { tr {
+                th { "sleeper" } th { "position" small { "m" } }
+                @for &parameter in &parameters {
+                    th { (parameter.label()) small { (parameter.symbol()) " in " (Shown::of(parameter).unit) } }
+                }
+                th { "misfit" } th.words { "flags" }
+            } }
+            tbody {
+                @for sleeper in &inversion.sleepers { (row(sleeper)) }
+                @for sleeper in &inversion.unevaluated {
+                    tr { td { (sleeper.id) } td { (format!("{:.3}", sleeper.x_m)) } td.words colspan=(parameters.len() + 2) { (sleeper.reason) } }
+                }
+            }
+        }
+    }
+}
+
+fn row(sleeper: &Sleeper) -> Markup {
+    let flags: Vec<_> = sleeper.flags.iter().map(|flag| flag.label()).collect();
+    html! {
+        tr.invalid[!sleeper.is_valid()] {
+            td { (sleeper.id) } td { (format!("{:.3}", sleeper.x_m)) }
+            @for (&parameter, estimate) in &sleeper.estimates {
+                td { (Shown::of(parameter).estimate(estimate.mean, estimate.sd)) }
+            }
+            td { (significant(sleeper.misfit)) }
+            td.words { (flags.join(", ")) }
+        }
+    }
+}
+
+fn provenance(inversion: &Inversion, command: &str) -> Markup {
+    let prior = inversion.provenance.prior.iter().map(|(&parameter, prior)| {
+        let shown = Shown::of(parameter);
+        let [low, high] = [-1.0, 1.0].map(|way| prior.median * (way * prior.log_sd).exp());
+        let [low, high] = [low, high].map(|value| significant(value / shown.divisor));
+        format!("{} {low} to {high} {}", parameter.label(), shown.unit)
+    });
+    html! {
+        dl {
+            dt { "recording" } dd { (inversion.recording) }
+            dt { "method" } dd { "inversion of the frequency-domain track model: Gaussian posterior of the logarithms" }
+            dt { "prior" } dd { "log-normal, one standard deviation about the median: " (prior.collect::<Vec<_>>().join(", ")) }
+            dt { "program" } dd { "tracktwin " (inversion.provenance.code_version) }
+        }
+        p { "To reproduce:" }
+        pre { (command) }
+    }
+}

@@ -1,0 +1,84 @@
+//! From a recording to its evaluation by the physics: sections, null model, fits.
+
+use crate::pipeline::null_models::{self, NullModelError};
+use nalgebra::DVector;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use tracktwin_diagnosis::{CalibrationError, NullModel, Subject, SubjectError, first_calibration};
+use tracktwin_evaluation::Flag;
+use tracktwin_inspection::chain;
+use tracktwin_inversion::{Fitted, Inversion, fit, sections};
+use tracktwin_library::Library;
+use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::recording::Recording;
+
+/// Why a recording can't be evaluated by the physics.
+#[derive(Debug, thiserror::Error)]
+pub enum InvertingError {
+    /// The recording cannot be compared with the track model.
+    #[error(transparent)]
+    Recording(#[from] SubjectError),
+    /// No track fits.
+    #[error("no track fits the recording: {0}")]
+    Fit(#[from] CalibrationError),
+    /// The null simulations are not to be had.
+    #[error(transparent)]
+    NullModel(#[from] NullModelError),
+}
+
+/// Evaluates a recording by the physics; `library` keeps the null simulations. `watch` is told what is
+/// going on and which share of it is done.
+///
+/// # Errors
+/// [`InvertingError::Recording`] says what the recording lacks; all else is a failure.
+pub async fn invert(
+    recording: &Recording,
+    design: &TrackDesign,
+    library: Option<&Library>,
+    watch: &(dyn Fn(&'static str, f64) + Sync),
+) -> Result<Inversion, InvertingError> {
+    watch("spectra", 0.0);
+    let subjects = tokio::task::block_in_place(|| sections(recording, design))?;
+    let started = tokio::task::block_in_place(|| start(subjects, watch))?;
+    let (subject, values) = &started[started.len() / 2];
+    watch("null model", 0.0);
+    let surfaces = f64::from(null_models::SURFACES);
+    let share = |done| watch("null model", done as f64 / surfaces);
+    let null = null_models::of(subject, values, library, share).await?;
+    let fitted = tokio::task::block_in_place(|| fit_all(started, &null, watch))?;
+    let mut inversion = Inversion::of(recording, &fitted);
+    if let Some(lost) = chain::loss_of_contact(recording) {
+        let there = inversion.sleepers.iter_mut().filter(|it| lost.sleepers.contains(&it.id));
+        there.for_each(|sleeper| sleeper.flags.push(Flag::LossOfContact));
+    }
+    Ok(inversion)
+}
+
+/// A first fit of every section, and what lies beyond it.
+fn start(
+    subjects: Vec<Subject>,
+    watch: &(dyn Fn(&'static str, f64) + Sync),
+) -> Result<Vec<(Subject, DVector<f64>)>, CalibrationError> {
+    let (done, all) = (AtomicUsize::new(0), subjects.len() as f64);
+    let one = |mut subject: Subject| {
+        let values = first_calibration(&subject)?;
+        subject.forward.allow_beyond(&values)?;
+        watch("first fit", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
+        Ok((subject, values))
+    };
+    subjects.into_par_iter().map(one).collect()
+}
+
+fn fit_all(
+    started: Vec<(Subject, DVector<f64>)>,
+    null: &NullModel,
+    watch: &(dyn Fn(&'static str, f64) + Sync),
+) -> Result<Vec<(Subject, Fitted)>, CalibrationError> {
+    let (done, all) = (AtomicUsize::new(0), started.len() as f64);
+    let one = |(subject, values): (Subject, DVector<f64>)| {
+        let fitted = fit(&subject, null, values)?;
+        watch("fit", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
+        Ok((subject, fitted))
+    };
+    started.into_par_iter().map(one).collect()
+}

@@ -1,0 +1,100 @@
+//! Sections that were fitted, put together to one track.
+
+use crate::fit::Fitted;
+use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
+use std::collections::BTreeMap;
+use tracktwin_diagnosis::{Subject, Unknowns};
+use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
+use tracktwin_parameters::Parameter;
+use tracktwin_signal::recording::Recording;
+
+/// Mean square of a sleeper's residual over its expectation above which the model does not hold.
+const MISFIT_MAX: f64 = 2.0;
+
+/// What differs from sleeper to sleeper, in the order of [`Unknowns::variation`].
+const FIELDS: [Parameter; 3] =
+    [Parameter::BallastStiffness, Parameter::RailpadStiffness, Parameter::IrregularityLevel];
+
+/// What is common to a section, in the order of [`Unknowns::global`].
+const COMMON: [Parameter; 3] =
+    [Parameter::SleeperBendingStiffness, Parameter::RailpadDamping, Parameter::BallastDamping];
+
+impl Inversion {
+    /// The track of a recording from its sections, which lie in order. Of a sleeper in several
+    /// sections the one speaks in which it lies farthest from an end.
+    pub fn of(recording: &Recording, sections: &[(Subject, Fitted)]) -> Self {
+        let covered = |(subject, _): &(Subject, Fitted)| {
+            subject.first_sleeper..subject.first_sleeper + subject.forward.section.sleepers
+        };
+        let mut sleepers = Vec::new();
+        let mut unevaluated = Vec::new();
+        for (number, place) in recording.sleepers.iter().enumerate() {
+            let inside = |section: &&(Subject, Fitted)| covered(section).contains(&number);
+            let from_end = |section: &&(Subject, Fitted)| {
+                let range = covered(section);
+                (number - range.start).min(range.end - 1 - number)
+            };
+            let Some((subject, fitted)) = sections.iter().filter(inside).max_by_key(from_end)
+            else {
+                let reason = "not every pass covers its window with a margin";
+                unevaluated.push(Unevaluated { id: place.id.clone(), x_m: place.x_m, reason });
+                continue;
+            };
+            sleepers.push(fitted.sleeper(number - subject.first_sleeper, &place.id, place.x_m));
+        }
+        Self::new(recording.name.clone(), provenance(sections), sleepers, unevaluated)
+    }
+}
+
+impl Fitted {
+    fn sleeper(&self, index: usize, id: &str, x_m: f64) -> Sleeper {
+        let fields = fields(&self.unknowns).map(|first| first + index);
+        let common = self.unknowns.global();
+        let places = FIELDS.into_iter().zip(fields).chain(COMMON.into_iter().zip(common));
+        let estimates: Estimates =
+            places.map(|(of, at)| (of, log_normal(self.values[at], self.deviations[at]))).collect();
+        let misfit = self.misfit[index];
+        let mut flags = Vec::new();
+        if self.unknowns.exceptions.iter().any(|exception| exception.sleeper == index) {
+            flags.push(Flag::UnlikeNeighbours);
+        }
+        if misfit > MISFIT_MAX {
+            flags.push(Flag::OutsideLibrary);
+        }
+        Sleeper { id: id.to_owned(), x_m, estimates, misfit, flags }
+    }
+}
+
+/// Where the values of each of [`FIELDS`] begin.
+fn fields(unknowns: &Unknowns) -> [usize; 3] {
+    [unknowns.ballast().start, unknowns.railpad().start, unknowns.level().start]
+}
+
+fn provenance(sections: &[(Subject, Fitted)]) -> Provenance {
+    let middle = sections.get(sections.len() / 2);
+    let speeds = middle.map_or(&[][..], |(subject, _)| &subject.forward.speeds_m_s);
+    let passes = middle.map_or(&[][..], |(subject, _)| &subject.pass_numbers);
+    let mut prior = BTreeMap::new();
+    let mut variation = BTreeMap::new();
+    if let Some((_, fitted)) = middle {
+        let unknowns = &fitted.unknowns;
+        let typical = unknowns.typical();
+        let spread = unknowns.prior_deviations();
+        let places = FIELDS
+            .into_iter()
+            .zip(fields(unknowns))
+            .chain(COMMON.into_iter().zip(unknowns.global()));
+        for (of, at) in places {
+            prior.insert(of, Prior { median: typical[at].exp(), log_sd: spread[at] });
+        }
+        let along = FIELDS.into_iter().zip(unknowns.variation);
+        variation.extend(along.map(|(of, variation)| (of, Along::from(variation))));
+    }
+    Provenance {
+        code_version: env!("CARGO_PKG_VERSION"),
+        speeds_km_h: speeds.iter().map(|speed| 3.6 * speed).collect(),
+        passes: passes.iter().map(Vec::len).collect(),
+        prior,
+        variation,
+    }
+}

@@ -1,0 +1,67 @@
+//! An evaluation by the physics beside one by a library's models: where they contradict each other.
+
+use crate::record::Inversion;
+use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
+use tracktwin_parameters::Parameter;
+
+/// Standard deviations of their difference from which two estimates contradict each other: by chance
+/// one in 370 does.
+const BEYOND_CHANCE: f64 = 3.0;
+
+/// What is compared: what differs from sleeper to sleeper.
+const COMPARED: [Parameter; 3] =
+    [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::IrregularityLevel];
+
+/// How two evaluations of one parameter agree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beside {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Sleepers that both evaluate validly.
+    pub sleepers: usize,
+    /// Those at which they contradict each other beyond chance.
+    pub contradict: Vec<String>,
+}
+
+/// Compares both at every sleeper that both evaluate.
+pub fn beside(inversion: &Inversion, models: &Evaluation) -> Vec<Beside> {
+    let valid = |id: &str| -> Option<&SleeperEvaluation> {
+        models.sleepers.iter().find(|it| it.id == id && it.is_valid())
+    };
+    let known = models.parameters();
+    let of = |parameter: Parameter| {
+        let mut beside = Beside { parameter, sleepers: 0, contradict: Vec::new() };
+        for sleeper in inversion.sleepers.iter().filter(|sleeper| sleeper.is_valid()) {
+            let one = sleeper.estimates.get(&parameter);
+            let other = valid(&sleeper.id).and_then(|other| other.estimates.get(&parameter));
+            let (Some(one), Some(other)) = (one, other) else { continue };
+            beside.sleepers += 1;
+            if (one.mean - other.mean).abs() > BEYOND_CHANCE * one.sd.hypot(other.sd) {
+                beside.contradict.push(sleeper.id.clone());
+            }
+        }
+        beside
+    };
+    COMPARED.into_iter().filter(|parameter| known.contains(parameter)).map(of).collect()
+}
+
+impl Beside {
+    /// Whether they contradict each other at more sleepers than chance allows.
+    pub fn contradicts(&self) -> bool {
+        self.contradict.len() > 1 + self.sleepers / 50
+    }
+
+    /// The comparison in a sentence.
+    pub fn sentence(&self) -> String {
+        let label = self.parameter.label();
+        let (count, all) = (self.contradict.len(), self.sleepers);
+        if !self.contradicts() {
+            return format!("{label}: both methods agree within their uncertainty.");
+        }
+        format!(
+            "{label}: the methods contradict each other at {count} of {all} sleepers. Trust the \
+             inversion there: it fits each sleeper for itself, while the Gaussian processes learned \
+             from even tracks and average over neighbours."
+        )
+    }
+}
