@@ -27,7 +27,7 @@ const KNOT_DISTANCE: f64 = 0.35;
 mod prior {
     /// Mean over all sleepers of ballast, railpad and level.
     pub(super) const MEAN: [f64; 3] = [0.7, 0.9, 1.2];
-    /// What varies smoothly along the track (section 4.2 of the mismatch design).
+    /// What varies smoothly along the track (docs/diagnosis.md, eq. 6).
     pub(super) const SMOOTH: [f64; 3] = [0.35, 0.35, 0.15];
     /// What varies from sleeper to sleeper.
     pub(super) const ALONE: [f64; 3] = [0.15, 0.2, 0.2];
