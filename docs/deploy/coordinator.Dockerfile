@@ -2,10 +2,10 @@
 FROM rust:1.95-slim-bookworm AS build
 RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
-# Line tables would be four fifths of the program.
+# Without line tables, which would be four fifths of the program.
 ENV CARGO_PROFILE_RELEASE_STRIP=debuginfo
 COPY . .
-# Registry and target are kept between builds; the program is copied out of the cache.
+# Registry and target folder stay in the cache between builds; the program is copied out of it.
 RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \
     cargo build --release --locked --bin tracktwin && cp target/release/tracktwin /tracktwin
 
@@ -17,7 +17,7 @@ COPY --from=build /tracktwin /usr/local/bin/tracktwin
 USER tracktwin
 WORKDIR /var/lib/tracktwin
 EXPOSE 7700 7780
-# Well is a coordinator whose library answers.
+# Healthy: the library responds.
 HEALTHCHECK --interval=10s --timeout=5s --start-period=20s \
     CMD curl --fail --silent http://127.0.0.1:7780/healthz
 ENTRYPOINT ["tracktwin"]

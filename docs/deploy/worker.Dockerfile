@@ -1,10 +1,10 @@
 # A worker: `docker build -f docs/deploy/worker.Dockerfile -t tracktwin-worker .`
 #
-# Build both images from one commit: a worker whose physics differs is refused.
+# Build both images from one commit: a worker with other physics is refused.
 FROM rust:1.95-slim-bookworm AS build
 RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
-# Line tables would be four fifths of the program.
+# Without line tables, which would be four fifths of the program.
 ENV CARGO_PROFILE_RELEASE_STRIP=debuginfo
 COPY . .
 RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \
@@ -17,8 +17,8 @@ RUN apt-get update && apt-get install -y --no-install-recommends curl \
 COPY --from=build /tracktwin-worker /usr/local/bin/tracktwin-worker
 USER tracktwin
 ENV TRACKTWIN_HEALTH=127.0.0.1:7701
-# Well is a worker that answers; one that waits for its coordinator is well, too.
+# Healthy: the worker responds, also while it waits for a coordinator.
 HEALTHCHECK --interval=10s --timeout=5s CMD curl --fail --silent http://127.0.0.1:7701/healthz
-# It finishes or hands back what it has within ten seconds.
+# It finishes or returns its cases within ten seconds.
 STOPSIGNAL SIGTERM
 ENTRYPOINT ["tracktwin-worker"]

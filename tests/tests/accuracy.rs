@@ -160,7 +160,7 @@ fn levels_of_set_b_agree_with_the_reference() {
 }
 
 #[test]
-#[ignore = "takes minutes; makes the tables of docs/accuracy.md"]
+#[ignore = "takes minutes; makes the tables of docs/measurements/accuracy.md"]
 fn levels_over_thirty_surfaces_agree_with_the_reference() {
     for name in ["A", "B"] {
         agrees(name, 30);

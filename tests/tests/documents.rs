@@ -1,9 +1,9 @@
-//! Every command that the documents tell readers to type, and every setting of the files for deployment, is
-//! one that the programs understand.
+//! Every documented command and every setting of the deployment files is one that the programs accept, and
+//! every link between pages leads to a file and a heading.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
-use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag};
+use pulldown_cmark::{CodeBlockKind, CowStr, Event, Options, Parser, Tag, TagEnd};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,6 +24,14 @@ fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
         }
     }
     found
+}
+
+/// Every page of the documentation.
+fn pages(root: &Path) -> Vec<PathBuf> {
+    let mut pages = files(&root.join("docs"), "md");
+    let first = ["README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"];
+    pages.extend(first.map(|it| root.join(it)));
+    pages
 }
 
 /// What a page gives to a shell: its blocks of shell, and code within its text.
@@ -91,9 +99,8 @@ fn example(word: &str) -> &str {
 #[test]
 fn documented_commands_are_understood() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let mut pages = files(&root.join("docs"), "md");
-    pages.push(root.join("README.md"));
-    let of_pages = pages.into_iter().map(|file| (shell(&fs::read_to_string(&file).unwrap()), file));
+    let of_pages =
+        pages(&root).into_iter().map(|file| (shell(&fs::read_to_string(&file).unwrap()), file));
     let scripts = files(&root.join("docs"), "sh").into_iter();
     let of_scripts = scripts.map(|file| (fs::read_to_string(&file).unwrap(), file));
     let mut count = 0;
@@ -131,4 +138,54 @@ fn settings_of_deployed_programs_are_understood() {
         }
     }
     assert!(count > 10, "only {count} settings were found");
+}
+
+/// The anchors of a page's headings, as GitHub makes them.
+fn anchors(page: &str) -> BTreeSet<String> {
+    let mut anchors = BTreeSet::new();
+    let mut heading = String::new();
+    for event in Parser::new_ext(page, Options::ENABLE_TABLES) {
+        match event {
+            Event::Start(Tag::Heading { .. }) => heading.clear(),
+            Event::Text(text) | Event::Code(text) => heading += &text,
+            Event::End(TagEnd::Heading(_)) => {
+                let is_kept = |it: &char| it.is_alphanumeric() || matches!(it, '-' | '_');
+                let words = heading.to_lowercase().replace(' ', "-");
+                anchors.insert(words.chars().filter(is_kept).collect());
+            }
+            _ => {}
+        }
+    }
+    anchors
+}
+
+/// The links of a page that stay in the repository: path and anchor, either of which may be empty.
+fn links(page: &str) -> Vec<(String, String)> {
+    let events = Parser::new_ext(page, Options::ENABLE_TABLES);
+    let targets = events.filter_map(|event| match event {
+        Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) => Some(dest_url),
+        _ => None,
+    });
+    let parts = |it: CowStr<'_>| {
+        let (path, anchor) = it.split_once('#').unwrap_or((&it, ""));
+        (path.to_owned(), anchor.to_owned())
+    };
+    targets.filter(|it| !it.contains("://")).map(parts).collect()
+}
+
+#[test]
+fn links_of_pages_lead_to_files_and_headings() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut count = 0;
+    for page in pages(&root) {
+        for (path, anchor) in links(&fs::read_to_string(&page).unwrap()) {
+            let target = if path.is_empty() { page.clone() } else { page.with_file_name(&path) };
+            assert!(target.exists(), "{}: {path}", page.display());
+            let is_heading =
+                || anchors(&fs::read_to_string(&target).unwrap()).contains(anchor.as_str());
+            assert!(anchor.is_empty() || is_heading(), "{}: {path}#{anchor}", page.display());
+            count += 1;
+        }
+    }
+    assert!(count > 100, "only {count} links were found");
 }

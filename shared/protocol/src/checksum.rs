@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn the_checksum_is_what_another_program_makes_of_the_described_bytes() {
-        // By docs/checksums.py, which follows docs/checksums.md alone.
+        // By the Python program in docs/checksums.md.
         assert_eq!(of(passes()), "6515178a279eba8a56b367fb8a26bc3d");
         let failed = Outcome::Failed { reason: "it floats".to_owned() };
         assert_eq!(checksum(5, "ab", &failed), "d4bcc80d552a55b2340ce718784d67c9");

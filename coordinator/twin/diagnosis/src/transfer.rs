@@ -65,7 +65,7 @@ impl Transfer {
         }
     }
 
-    /// Source: mismatch design, eq. 2: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.
+    /// Source: docs/diagnosis.md, eq. 2, 3: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.
     fn on_rail(model: TrackModel, lines_hz: &[f64], direct: Arc<Vec<Vec<Complex64>>>) -> Self {
         let hertz = hertz(&model);
         let wheel_receptance: Vec<Complex64> =

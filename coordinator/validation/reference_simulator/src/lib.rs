@@ -4,7 +4,7 @@
 //! modes of the rail and Ritz modes of the sleepers instead of finite elements, steps that are exact
 //! for the modes instead of Newmark's, and an irregularity of its own making. Whether a diagnosis
 //! finds what is hidden is left to those who diagnose. How it works and what was checked stands in
-//! `docs/truth.md`.
+//! `docs/reference-simulator.md`.
 
 mod chain;
 mod contact;

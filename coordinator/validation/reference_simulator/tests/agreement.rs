@@ -71,7 +71,7 @@ fn levels_of_one_surface_agree_with_the_twins() {
             let table: Vec<String> =
                 centres.iter().zip(&off).map(|(f, d)| format!("{f:.0}:{d:+.2}")).collect();
             println!("track {seed}, {speed_km_h} km/h: {}", table.join(" "));
-            // Two discretisations of one track; docs/truth.md tells where the rest comes from.
+            // Two discretisations of one track; docs/reference-simulator.md explains the rest.
             assert!(off.iter().all(|difference| difference.abs() < 1.0), "{off:?}");
         }
     }

@@ -1,6 +1,6 @@
 //! Which effects are hidden, where, and how strong: ranges of the catalogue at V-Track scale.
 //!
-//! Strengths are drawn evenly in their logarithm (mismatch design, section 3.4), so that some are
+//! Strengths are drawn evenly in their logarithm (ranges: docs/extensions.md), so that some are
 //! too weak for anybody to see: the scores say how strong each was.
 
 use crate::draw::Class;
