@@ -1,10 +1,12 @@
 //! How often estimates hold and refusals are right: unseen tracks are simulated inside the
 //! library's ranges, beyond each of their ends and with sleepers that differ, then evaluated.
 
+mod inversion;
 mod plan;
 mod score;
 mod track;
 
+pub use inversion::{InversionCoverageError, InversionRow, InversionScore, inversion_rows};
 pub use plan::{Counts, Kind};
 pub use score::{Compared, Row};
 pub use track::TrackError;

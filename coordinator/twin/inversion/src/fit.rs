@@ -24,7 +24,8 @@ const OVERLAP: usize = 8;
 pub struct Fitted {
     /// Where each value stands, and the variation that was learned.
     pub unknowns: Unknowns,
-    /// Logarithms of the values of greatest posterior probability.
+    /// Logarithms of the values of greatest posterior probability. A level is that of a surface of
+    /// eq. B.6 (Shen et al. 2023) whose power is, in the mean over wave numbers, the one found.
     pub values: DVector<f64>,
     /// Standard deviations of these logarithms.
     pub deviations: DVector<f64>,
@@ -90,8 +91,20 @@ fn factor(misfit: f64) -> f64 {
 
 impl Fitted {
     fn of(unknowns: Unknowns, calibration: Calibration, factors: &[f64]) -> Self {
-        let deviations = calibration.precision.inverse().diagonal().map(f64::sqrt);
         let misfit = misfit(&calibration, factors);
-        Self { unknowns, values: calibration.values, deviations, misfit }
+        let covariance = calibration.precision.inverse();
+        let (mut values, mut deviations) = (calibration.values, covariance.diagonal());
+        // The spectrum's mean and the level are one quantity: the surface's power.
+        let spectrum = unknowns.spectrum();
+        let share = 1.0 / spectrum.len() as f64;
+        let mean = share * values.rows(spectrum.start, spectrum.len()).sum();
+        let knots = covariance.rows(spectrum.start, spectrum.len());
+        let own = share.powi(2) * knots.columns(spectrum.start, spectrum.len()).sum();
+        for index in unknowns.level() {
+            values[index] += mean;
+            deviations[index] += own + 2.0 * share * knots.column(index).sum();
+        }
+        let deviations = deviations.map(f64::sqrt);
+        Self { unknowns, values, deviations, misfit }
     }
 }

@@ -31,7 +31,7 @@ mod vtrack;
 pub use error::TruthError;
 pub use hidden::Hidden;
 pub use pass::{Drive, Driven, drive};
-pub use record::record;
+pub use record::{record, simulate};
 pub use scene::{Chain, PassPlan, Scene, SleeperTruth};
 pub use surface::WheelAngle;
 pub use vtrack::SPACING_M;

@@ -34,8 +34,11 @@ pub fn record(scene: &Scene, folder: &Path) -> Result<(), TruthError> {
     Ok(recording.write(folder)?)
 }
 
-/// The recording in memory.
-fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
+/// The same recording in memory, without a name.
+///
+/// # Errors
+/// [`TruthError`] where the scene cannot be.
+pub fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
     scene.check()?;
     let track = Track::new(scene);
     let shared = irregularity(scene, 0);

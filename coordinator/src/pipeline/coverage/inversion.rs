@@ -1,0 +1,167 @@
+//! How well inversion tells the sleepers of uneven tracks that the reference simulator recorded.
+
+use crate::pipeline::invert::{InvertingError, invert};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use tracktwin_inversion::Inversion;
+use tracktwin_library::Library;
+use tracktwin_parameters::{Parameter, TrackDesign};
+use tracktwin_reference_simulator::{Scene, TruthError, simulate};
+
+/// Standard deviation of the logarithm from sleeper to sleeper.
+const SCATTER: [f64; 3] = [0.05, 0.15, 0.3];
+
+/// Standard deviations on either side that hold 90 % of a normal distribution.
+const WIDTH_90: f64 = 1.644_853_626_951_472_7;
+
+/// Sleepers at either end of a recording that are not scored: the run-in is heard there.
+const ENDS: usize = 1;
+
+/// Why inversion can't be scored.
+#[derive(Debug, thiserror::Error)]
+pub enum InversionCoverageError {
+    /// A track can't be simulated.
+    #[error("a simulated track: {0}")]
+    Track(#[from] TruthError),
+    /// A recording can't be evaluated.
+    #[error("a simulated recording: {0}")]
+    Inverting(#[from] InvertingError),
+}
+
+/// What came of the tracks of one scatter.
+#[derive(Clone, Debug, Serialize)]
+pub struct InversionRow {
+    /// Scatter from sleeper to sleeper.
+    pub scatter: f64,
+    /// Tracks.
+    pub tracks: u32,
+    /// Share of the sleepers whose estimates are called not valid.
+    pub invalid: f64,
+    /// Estimates against the truth.
+    pub estimates: BTreeMap<Parameter, InversionScore>,
+}
+
+/// Estimates of one parameter against the truth, over the sleepers of all tracks.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct InversionScore {
+    /// Sleepers compared.
+    pub sleepers: usize,
+    /// Median of the absolute error of the logarithm.
+    pub median_log_error: f64,
+    /// Share of truths inside the 90 % interval.
+    pub holds_90: f64,
+    /// Correlation of estimates and truths along a track, in the logarithm, mean over the tracks.
+    pub correlation: f64,
+}
+
+/// Simulates and evaluates `tracks` tracks of each scatter; tells how many of how many are done.
+///
+/// # Errors
+/// [`InversionCoverageError`] of the first track that has one.
+pub async fn inversion_rows(
+    tracks: u32,
+    seed: u64,
+    library: Option<&Library>,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<Vec<InversionRow>, InversionCoverageError> {
+    let total = SCATTER.len() as u64 * u64::from(tracks);
+    let mut done = 0;
+    let mut rows = Vec::new();
+    for scatter in SCATTER {
+        let mut scores = Scores::default();
+        for number in 0..tracks {
+            let scene = Scene::uneven(seed.wrapping_mul(1000) + u64::from(number), scatter);
+            let mut recording = tokio::task::block_in_place(|| simulate(&scene))?;
+            recording.name = format!("track {number}");
+            let design = TrackDesign::v_track();
+            let inversion = invert(&recording, &design, library, &|_, _| ()).await?;
+            scores.add(&scene, &inversion);
+            done += 1;
+            progress(done, total);
+        }
+        rows.push(scores.row(scatter, tracks));
+    }
+    Ok(rows)
+}
+
+/// The estimates of all tracks so far.
+#[derive(Default)]
+struct Scores {
+    errors: BTreeMap<Parameter, Vec<f64>>,
+    held: BTreeMap<Parameter, usize>,
+    correlations: BTreeMap<Parameter, Vec<f64>>,
+    sleepers: usize,
+    invalid: usize,
+}
+
+impl Scores {
+    fn add(&mut self, scene: &Scene, inversion: &Inversion) {
+        let inner = ENDS..inversion.sleepers.len().saturating_sub(ENDS);
+        let sleepers = &inversion.sleepers[inner];
+        self.sleepers += sleepers.len();
+        self.invalid += sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
+        for parameter in [Parameter::RailpadStiffness, Parameter::BallastStiffness] {
+            let mut pairs = Vec::new();
+            for sleeper in sleepers {
+                let estimate = sleeper.estimates[&parameter];
+                let truth = truth(scene, &sleeper.id, parameter);
+                let error = (estimate.mean / truth).ln();
+                self.errors.entry(parameter).or_default().push(error.abs());
+                let holds = (estimate.mean - truth).abs() <= WIDTH_90 * estimate.sd;
+                *self.held.entry(parameter).or_default() += usize::from(holds);
+                pairs.push((estimate.mean.ln(), truth.ln()));
+            }
+            self.correlations.entry(parameter).or_default().push(correlation(&pairs));
+        }
+    }
+
+    fn row(mut self, scatter: f64, tracks: u32) -> InversionRow {
+        let mut estimates = BTreeMap::new();
+        for (&parameter, errors) in &mut self.errors {
+            errors.sort_by(f64::total_cmp);
+            let correlations = &self.correlations[&parameter];
+            let score = InversionScore {
+                sleepers: errors.len(),
+                median_log_error: errors[errors.len() / 2],
+                holds_90: self.held[&parameter] as f64 / errors.len() as f64,
+                correlation: correlations.iter().sum::<f64>() / correlations.len() as f64,
+            };
+            estimates.insert(parameter, score);
+        }
+        let invalid = self.invalid as f64 / self.sleepers.max(1) as f64;
+        InversionRow { scatter, tracks, invalid, estimates }
+    }
+}
+
+/// The true value at the sleeper of this name: `SN` and its number.
+fn truth(scene: &Scene, id: &str, parameter: Parameter) -> f64 {
+    let number: usize = id.trim_start_matches("SN").parse().expect("sleepers are numbered");
+    let sleeper = &scene.sleepers[number];
+    match parameter {
+        Parameter::RailpadStiffness => sleeper.railpad_stiffness_n_m,
+        Parameter::BallastStiffness => sleeper.ballast_stiffness_n_m,
+        other => unreachable!("{other} is not compared"),
+    }
+}
+
+fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let count = pairs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+    let (x, y) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let sum =
+        |of: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|p| of(p.0 - x, p.1 - y)).sum::<f64>();
+    sum(&|a, b| a * b) / (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::correlation;
+
+    #[test]
+    fn values_in_proportion_correlate_and_opposite_ones_do_the_contrary() {
+        let pairs = [(1.0, 2.0), (2.0, 4.0), (4.0, 8.0)];
+        assert!((correlation(&pairs) - 1.0).abs() < 1e-12);
+        let opposite = pairs.map(|(x, y)| (x, -y));
+        assert!((correlation(&opposite) + 1.0).abs() < 1e-12);
+    }
+}
