@@ -16,4 +16,5 @@ mod results;
 mod support;
 mod trials;
 mod upgrade;
+mod views;
 mod workers;
