@@ -40,6 +40,11 @@ pub(crate) enum Text {
 }
 
 impl Text {
+    /// The same in both databases.
+    pub(crate) const fn same(text: &'static str) -> Self {
+        Self::Same(Cow::Borrowed(text))
+    }
+
     /// As this database understands it.
     fn of(self, dialect: Dialect) -> Cow<'static, str> {
         match (self, dialect) {
@@ -52,7 +57,7 @@ impl Text {
 
 impl From<&'static str> for Text {
     fn from(text: &'static str) -> Self {
-        Self::Same(Cow::Borrowed(text))
+        Self::same(text)
     }
 }
 

@@ -1,6 +1,6 @@
 //! A row a case, and a row for the series of a pass, as a server has it.
 
-use super::{LEVEL_COLUMNS, of_report};
+use super::columns::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
 use crate::engine::{Connection, Value, sql};
 use crate::report::Report;
