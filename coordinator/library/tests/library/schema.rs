@@ -13,8 +13,7 @@ const SQLITE: &str = "
     union all
     select 'view ' || schema.name || ' (' || group_concat(columns.name, ', ') || ')'
     from sqlite_schema as schema join pragma_table_info(schema.name) as columns
-    where schema.type = 'view' group by schema.name
-    order by text";
+    where schema.type = 'view' group by schema.name";
 
 /// Tables with their columns and constraints, indexes, triggers, functions, and the columns of views. Views and
 /// functions are not written out: each version of the server writes them otherwise.
@@ -54,19 +53,19 @@ const POSTGRES: &str = "
     where not tgisinternal
     union all
     select 'function ' || cast(oid::regprocedure as text) from pg_proc
-    where pronamespace = current_schema()::regnamespace
-    order by text";
+    where pronamespace = current_schema()::regnamespace";
 
 async fn schema(home: &Home, ask_for: &str) -> String {
     let library = Library::open_or_create(&home.url).await.unwrap();
     let text = |row: Vec<Cell>| match &row[..] {
-        [Cell::Text(text)] => format!("{text}\n\n"),
+        // Names of schemas are a database's own.
+        [Cell::Text(text)] => text.replace("public.", ""),
         other => panic!("{other:?}"),
     };
-    let schema = ask(&library, ask_for).await.rows.into_iter().map(text).collect::<String>();
+    let mut objects: Vec<_> = ask(&library, ask_for).await.rows.into_iter().map(text).collect();
     library.close().await;
-    // Names of schemas are a database's own.
-    schema.replace("public.", "").trim_end().to_owned() + "\n"
+    objects.sort();
+    objects.join("\n\n") + "\n"
 }
 
 #[tokio::test]
