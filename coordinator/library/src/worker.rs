@@ -58,6 +58,12 @@ pub struct WorkerRecord {
 }
 
 impl WorkerRecord {
+    /// Why it is in quarantine, if it is.
+    pub fn quarantine(self) -> Option<String> {
+        let reason = self.reason.unwrap_or_else(|| "no reason given".to_owned());
+        (self.state == WorkerState::Quarantined).then_some(reason)
+    }
+
     /// Mean computing time of a case, in s.
     pub fn mean_case_s(&self) -> Option<f64> {
         (self.cases_finished > 0).then(|| self.busy_s / f64::from(self.cases_finished))

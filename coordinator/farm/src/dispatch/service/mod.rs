@@ -73,7 +73,7 @@ impl Dispatch {
     async fn note(&self, worker: &str) -> Result<(), Status> {
         let known = self.library.heartbeat(worker, self.now_unix_ms()).await;
         if let Some(record) = known.map_err(|error| unavailable(&error))? {
-            self.roster.quarantine(worker, record.state, record.reason);
+            self.roster.set_quarantine(worker, record.quarantine());
         }
         Ok(())
     }
@@ -107,8 +107,8 @@ impl Farm for Dispatch {
         let state = self.library.register_worker(registration).await;
         if state.map_err(|error| unavailable(&error))? == WorkerState::Quarantined {
             let record = self.library.worker(&worker).await.map_err(|error| unavailable(&error))?;
-            let reason = record.and_then(|record| record.reason);
-            self.roster.quarantine(&worker, WorkerState::Quarantined, reason);
+            let reason = record.and_then(library::WorkerRecord::quarantine);
+            self.roster.set_quarantine(&worker, reason);
         }
         self.counts.registered.inc();
         let heartbeat_s = self.settings.timing.heartbeat.as_secs_f64();

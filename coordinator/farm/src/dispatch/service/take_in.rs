@@ -9,7 +9,7 @@ use crate::dispatch::roster::Standing;
 use std::sync::Arc;
 use tonic::Status;
 use tracktwin_experiment::Outcome;
-use tracktwin_library::{Report, Verdict, WorkerState};
+use tracktwin_library::{Report, Verdict};
 use tracktwin_protocol::{CaseReport, farm};
 use tracktwin_traces::Step;
 
@@ -116,7 +116,7 @@ impl Dispatch {
             Some(Found::Wrong { worker, reason }) => {
                 self.counts.audited.inc();
                 self.counts.differed.inc();
-                self.roster.quarantine(&worker, WorkerState::Quarantined, Some(reason));
+                self.roster.set_quarantine(&worker, Some(reason));
                 Verdict::Duplicate
             }
         })
