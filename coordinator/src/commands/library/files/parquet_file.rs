@@ -264,7 +264,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("series.parquet");
         let table = Table::named("stored_array").unwrap();
-        let of = |kind| if kind == ColumnKind::Doubles { Cell::Doubles(vec![1.5, 2.0]) } else { Cell::Null };
+        let of = |kind| {
+            if kind == ColumnKind::Doubles { Cell::Doubles(vec![1.5, 2.0]) } else { Cell::Null }
+        };
         let empty = vec![vec![Cell::Null; table.columns.len()]; 2];
         let full = vec![table.columns.iter().map(|column| of(column.kind)).collect::<Vec<_>>()];
         let mut file = ParquetFile::create(&path, table).unwrap();
