@@ -1,7 +1,13 @@
 //! The table `stored_array`: series of numbers that are dear to compute.
 
 use crate::engine::{Connection, Write, sql};
+use crate::library::Dated;
 use crate::{Library, LibraryError};
+
+/// Keeps a series; one that is there stays as it is.
+const INSERT: &str = "
+    insert into stored_array (key, kind, meta, numbers, created_at) values ($1, $2, $3, $4, $5)
+    on conflict (key) do nothing";
 
 /// A stored series of numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +28,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
     pub async fn store_array(&self, array: StoredArray) -> Result<(), LibraryError> {
-        self.write(array).await
+        self.write_dated(array).await
     }
 
     /// The series of this key, if it is there.
@@ -41,20 +47,16 @@ impl Library {
     }
 }
 
-impl Write for StoredArray {
+impl Write for Dated<StoredArray> {
     type Answer = ();
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let insert = format!(
-            "insert into stored_array (key, kind, meta, numbers, created_at)
-            values ($1, $2, $3, $4, {}) on conflict (key) do nothing",
-            connection.dialect().now()
-        );
-        let insert = sql(insert)
-            .bind(&self.key)
-            .bind(&self.kind)
-            .bind(&self.meta_json)
-            .bind(&self.numbers[..]);
+        let insert = sql(INSERT)
+            .bind(&self.it.key)
+            .bind(&self.it.kind)
+            .bind(&self.it.meta_json)
+            .bind(&self.it.numbers[..])
+            .bind(&self.at);
         connection.execute(insert).await.map(drop)
     }
 }

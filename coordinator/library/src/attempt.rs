@@ -1,15 +1,60 @@
 //! The table `attempt`: leases that ended without a result.
 
-use crate::engine::{Connection, Dialect, sql};
+use crate::engine::{Connection, Text, sql};
 use crate::{LibraryError, Report, State};
 
-/// One case.
-const CASE: &str = "campaign_id = $1 and sobol_index = $2";
+/// Puts leases of a campaign's ($1) cases ($2) on record as ended at $3, so ($4), with this error ($5); a lease is on
+/// record once.
+const NOTE: Text = Text::Each {
+    sqlite: "
+        insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms, ended_unix_ms, ending, error)
+        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $3, $4, $5
+        from campaign_case where campaign_id = $1 and sobol_index in (select value from json_each($2))
+        on conflict (campaign_id, sobol_index, epoch) do nothing",
+    postgres: "
+        insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms, ended_unix_ms, ending, error)
+        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $3, $4, $5
+        from campaign_case where campaign_id = $1 and sobol_index = any($2)
+        on conflict (campaign_id, sobol_index, epoch) do nothing",
+};
 
-/// Cases, as many as are listed.
-fn cases(dialect: Dialect) -> String {
-    format!("campaign_id = $1 and sobol_index {}", dialect.listed("$2"))
-}
+/// Ends attempts that count.
+const END: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = $3, attempts = $4, error = $5, lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index in (select value from json_each($2))",
+    postgres: "
+        update campaign_case set state = $3, attempts = $4, error = $5, lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index = any($2)",
+};
+
+/// How many of a case's last $3 attempts that count have failed.
+const FAILURES: &str = "
+    select count(*) as failures from (
+        select ending from attempt
+        where campaign_id = $1 and sobol_index = $2 and ending in ('failed', 'lost')
+        order by epoch desc limit $3) as counted
+    where ending = 'failed'";
+
+/// Everything that is leased of a campaign; what is leased after this stays leased.
+const LEASED: Text = Text::Each {
+    sqlite: "
+        select sobol_index from campaign_case where campaign_id = $1 and state = 'leased'
+        order by sobol_index",
+    postgres: "
+        select sobol_index from campaign_case where campaign_id = $1 and state = 'leased'
+        order by sobol_index for update",
+};
+
+/// Lets cases wait again; no attempt is counted.
+const WAIT: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = 'waiting', lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index in (select value from json_each($2))",
+    postgres: "
+        update campaign_case set state = 'waiting', lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index = any($2)",
+};
 
 /// Leases that end without result, and where that leaves their cases.
 pub(crate) struct Ended<'a> {
@@ -23,41 +68,29 @@ pub(crate) struct Ended<'a> {
     pub(crate) now_unix_ms: i64,
 }
 
-/// Statement that puts leases of the cases `which` on record as ended so and then; a lease is on
-/// record once.
-pub(crate) fn ended(which: &str, ended_unix_ms: &str, ending: &str, error: &str) -> String {
-    format!(
-        "insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms,
-            ended_unix_ms, ending, error)
-        select campaign_id, sobol_index, epoch, worker, leased_unix_ms,
-            {ended_unix_ms}, {ending}, {error}
-        from campaign_case where {which}
-        on conflict (campaign_id, sobol_index, epoch) do nothing"
-    )
-}
-
 /// Ends attempts that count.
 pub(crate) async fn end(connection: &mut Connection, it: Ended<'_>) -> Result<(), LibraryError> {
-    let cases = cases(connection.dialect());
-    let note = sql(ended(&cases, "$3", "$4", "$5"))
-        .bind(it.campaign)
-        .bind(it.indices.clone())
-        .bind(it.now_unix_ms)
-        .bind(it.ending)
-        .bind(it.error);
-    connection.execute(note).await?;
-    let end = format!(
-        "update campaign_case set state = $3, attempts = $4, error = $5,
-            lease_expires_unix_ms = null
-        where {cases}"
-    );
-    let end = sql(end)
+    let error = Some(it.error.to_owned());
+    note(connection, it.campaign, it.indices.clone(), it.now_unix_ms, it.ending, error).await?;
+    let end = sql(END)
         .bind(it.campaign)
         .bind(it.indices)
         .bind(it.state.name())
         .bind(it.attempts)
         .bind(it.error);
     connection.execute(end).await.map(drop)
+}
+
+async fn note(
+    connection: &mut Connection,
+    campaign: &str,
+    indices: Vec<i64>,
+    now_unix_ms: i64,
+    ending: &'static str,
+    error: Option<String>,
+) -> Result<(), LibraryError> {
+    let note = sql(NOTE).bind(campaign).bind(indices).bind(now_unix_ms).bind(ending).bind(error);
+    connection.execute(note).await.map(drop)
 }
 
 /// How many of a case's last so many attempts that count have failed.
@@ -67,12 +100,7 @@ pub(crate) async fn failures(
     index: u32,
     attempts: u32,
 ) -> Result<u32, LibraryError> {
-    let ask = "select count(*) as failures from (
-            select ending from attempt
-            where campaign_id = $1 and sobol_index = $2 and ending in ('failed', 'lost')
-            order by epoch desc limit $3) as counted
-        where ending = 'failed'";
-    let ask = sql(ask).bind(&report.campaign).bind(index).bind(attempts);
+    let ask = sql(FAILURES).bind(&report.campaign).bind(index).bind(attempts);
     connection.row(ask).await?.map_or(Ok(0), |row| row.get_u32("failures"))
 }
 
@@ -83,26 +111,9 @@ pub(crate) async fn end_all(
     ending: &'static str,
     now_unix_ms: i64,
 ) -> Result<(), LibraryError> {
-    let dialect = connection.dialect();
-    // What is leased after this stays leased.
-    let leased = format!(
-        "select sobol_index from campaign_case where campaign_id = $1 and state = 'leased'
-        order by sobol_index {}",
-        dialect.locking()
-    );
-    let leased = connection.indices(sql(leased).bind(campaign)).await?;
-    let cases = cases(dialect);
-    let note = sql(ended(&cases, "$3", "$4", "null"))
-        .bind(campaign)
-        .bind(leased.clone())
-        .bind(now_unix_ms)
-        .bind(ending);
-    connection.execute(note).await?;
-    let end = format!(
-        "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
-        where {cases}"
-    );
-    connection.execute(sql(end).bind(campaign).bind(leased)).await.map(drop)
+    let leased = connection.indices(sql(LEASED).bind(campaign)).await?;
+    note(connection, campaign, leased.clone(), now_unix_ms, ending, None).await?;
+    connection.execute(sql(WAIT).bind(campaign).bind(leased)).await.map(drop)
 }
 
 /// Notes that a case's present lease is overtaken by the result of an earlier one.
@@ -111,9 +122,6 @@ pub(crate) async fn overtake(
     report: &Report,
     index: u32,
 ) -> Result<(), LibraryError> {
-    let note = sql(ended(CASE, "$3", "'overtaken'", "null"))
-        .bind(&report.campaign)
-        .bind(index)
-        .bind(report.now_unix_ms);
-    connection.execute(note).await.map(drop)
+    let case = vec![index.into()];
+    note(connection, &report.campaign, case, report.now_unix_ms, "overtaken", None).await
 }

@@ -4,13 +4,87 @@
 //! choose. What the second worker finds is compared by who asks; here it is only kept.
 
 use crate::case::case_of;
-use crate::engine::{Connection, Row, Write, sql};
+use crate::engine::{Connection, Row, Text, Write, sql};
+use crate::quarantine::Flag;
 use crate::state::named;
-use crate::worker::Flag;
 use crate::{Library, LibraryError, Report};
 use std::collections::HashMap;
 use tracktwin_parameters::Case;
 use tracktwin_protocol::CaseReport;
+
+/// Marks cases ($2) of a campaign ($1) whose results ($3's) are to be audited.
+const MARK: Text = Text::Each {
+    sqlite: "
+        insert into audit (campaign_id, sobol_index, worker)
+        select campaign_id, sobol_index, $3 from campaign_case
+        where campaign_id = $1 and sobol_index in (select value from json_each($2))
+        on conflict (campaign_id, sobol_index) do nothing",
+    postgres: "
+        insert into audit (campaign_id, sobol_index, worker)
+        select campaign_id, sobol_index, $3 from campaign_case
+        where campaign_id = $1 and sobol_index = any($2)
+        on conflict (campaign_id, sobol_index) do nothing",
+};
+
+/// Leases until $5 the first $4 audits of a running campaign ($1) that nobody does now ($3), and of nobody's own ($2)
+/// results.
+const TAKE: Text = Text::Each {
+    sqlite: "
+        with next as (
+            select campaign_id as next_campaign, sobol_index as next_index from audit
+            where campaign_id = $1 and worker <> $2
+                and (state = 'waiting' or (state = 'leased' and lease_expires_unix_ms <= $3))
+                and exists (select 1 from campaign where id = $1 and state = 'running')
+            order by sobol_index limit $4)
+        update audit set state = 'leased', auditor = $2, lease_expires_unix_ms = $5
+        from next where campaign_id = next_campaign and sobol_index = next_index
+        returning sobol_index, worker",
+    postgres: "
+        with next as (
+            select campaign_id as next_campaign, sobol_index as next_index from audit
+            where campaign_id = $1 and worker <> $2
+                and (state = 'waiting' or (state = 'leased' and lease_expires_unix_ms <= $3))
+                and exists (select 1 from campaign where id = $1 and state = 'running')
+            order by sobol_index limit $4 for update skip locked)
+        update audit set state = 'leased', auditor = $2, lease_expires_unix_ms = $5
+        from next where campaign_id = next_campaign and sobol_index = next_index
+        returning sobol_index, worker",
+};
+
+/// The cases that audits are of.
+const CASES: Text = Text::Each {
+    sqlite: "
+        select * from campaign_case
+        where campaign_id = $1 and sobol_index in (select value from json_each($2))
+        order by sobol_index",
+    postgres: "
+        select * from campaign_case
+        where campaign_id = $1 and sobol_index = any($2)
+        order by sobol_index",
+};
+
+/// Keeps what came of an audit that is this worker's ($3) still; answers whose result it is about.
+const KEEP: &str = "
+    update audit set state = $4, difference_dB = $5, ended_unix_ms = $6, lease_expires_unix_ms = null
+    where campaign_id = $1 and sobol_index = $2 and auditor = $3 and state = 'leased'
+    returning worker";
+
+/// Gives audits back that are this worker's ($2) still.
+const RELEASE: Text = Text::Each {
+    sqlite: "
+        update audit set state = 'waiting', lease_expires_unix_ms = null
+        where campaign_id = $1 and auditor = $2 and state = 'leased'
+            and sobol_index in (select value from json_each($3))",
+    postgres: "
+        update audit set state = 'waiting', lease_expires_unix_ms = null
+        where campaign_id = $1 and auditor = $2 and state = 'leased' and sobol_index = any($3)",
+};
+
+/// Open audits that somebody could do who was heard of since $2.
+const TO_DO: &str = "
+    select count(*) as cases from audit
+    where campaign_id = $1 and state in ('waiting', 'leased') and exists (
+        select 1 from worker where id <> audit.worker and state = 'active' and last_seen_unix_ms >= $2)";
 
 /// A finished case to be simulated again.
 #[derive(Clone, Debug, PartialEq)]
@@ -137,11 +211,7 @@ impl Library {
         campaign: &str,
         since_unix_ms: i64,
     ) -> Result<u32, LibraryError> {
-        let ask = "select count(*) as cases from audit
-            where campaign_id = $1 and state in ('waiting', 'leased') and exists (
-                select 1 from worker where id <> audit.worker and state = 'active'
-                    and last_seen_unix_ms >= $2)";
-        let rows = self.readers().rows(sql(ask).bind(campaign).bind(since_unix_ms)).await?;
+        let rows = self.readers().rows(sql(TO_DO).bind(campaign).bind(since_unix_ms)).await?;
         rows.first().map_or(Ok(0), |row| row.get_u32("cases"))
     }
 
@@ -176,14 +246,7 @@ pub(crate) async fn sample<'a>(
     if sampled.is_empty() {
         return Ok(());
     }
-    let mark = format!(
-        "insert into audit (campaign_id, sobol_index, worker)
-        select campaign_id, sobol_index, $3 from campaign_case
-        where campaign_id = $1 and sobol_index {}
-        on conflict (campaign_id, sobol_index) do nothing",
-        connection.dialect().listed("$2")
-    );
-    let mark = sql(mark).bind(&report.campaign).bind(sampled).bind(&report.worker);
+    let mark = sql(MARK).bind(&report.campaign).bind(sampled).bind(&report.worker);
     connection.execute(mark).await.map(drop)
 }
 
@@ -209,19 +272,7 @@ impl Write for Sample {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Vec<Audit>, LibraryError> {
-        let take = format!(
-            "with next as (
-                select campaign_id as next_campaign, sobol_index as next_index from audit
-                where campaign_id = $1 and worker <> $2 and (state = 'waiting'
-                    or (state = 'leased' and lease_expires_unix_ms <= $3))
-                    and exists (select 1 from campaign where id = $1 and state = 'running')
-                order by sobol_index limit $4 {})
-            update audit set state = 'leased', auditor = $2, lease_expires_unix_ms = $5
-            from next where campaign_id = next_campaign and sobol_index = next_index
-            returning sobol_index, worker",
-            connection.dialect().skipping_locked()
-        );
-        let take = sql(take)
+        let take = sql(TAKE)
             .bind(&self.campaign)
             .bind(&self.worker)
             .bind(self.now_unix_ms)
@@ -245,13 +296,8 @@ impl Sample {
         if taken.is_empty() {
             return Ok(Vec::new());
         }
-        let ask = format!(
-            "select * from campaign_case where campaign_id = $1 and sobol_index {}
-            order by sobol_index",
-            connection.dialect().listed("$2")
-        );
         let indices: Vec<_> = taken.keys().copied().map(i64::from).collect();
-        let rows = connection.rows(sql(ask).bind(&self.campaign).bind(indices)).await?;
+        let rows = connection.rows(sql(CASES).bind(&self.campaign).bind(indices)).await?;
         let mut audits = Vec::with_capacity(rows.len());
         for row in &rows {
             let case = case_of(row)?;
@@ -280,11 +326,7 @@ impl Write for Found {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Option<String>, LibraryError> {
-        let keep = "update audit set state = $4, difference_dB = $5, ended_unix_ms = $6,
-                lease_expires_unix_ms = null
-            where campaign_id = $1 and sobol_index = $2 and auditor = $3 and state = 'leased'
-            returning worker";
-        let keep = sql(keep)
+        let keep = sql(KEEP)
             .bind(&self.campaign)
             .bind(self.index)
             .bind(&self.auditor)
@@ -313,13 +355,8 @@ impl Write for ReleaseAudits {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let release = format!(
-            "update audit set state = 'waiting', lease_expires_unix_ms = null
-            where campaign_id = $1 and auditor = $2 and state = 'leased' and sobol_index {}",
-            connection.dialect().listed("$3")
-        );
         let indices: Vec<_> = self.indices.iter().copied().map(i64::from).collect();
-        let release = sql(release).bind(&self.campaign).bind(&self.auditor).bind(indices);
+        let release = sql(RELEASE).bind(&self.campaign).bind(&self.auditor).bind(indices);
         connection.execute(release).await.map(drop)
     }
 }

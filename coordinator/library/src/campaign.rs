@@ -1,7 +1,14 @@
 //! The table `campaign`.
 
 use crate::engine::{Connection, Row, Write, sql};
+use crate::library::Dated;
 use crate::{Library, LibraryError, bins};
+
+/// Stores a campaign; one that is there stays as it is.
+const INSERT: &str = "
+    insert into campaign (id, name, definition, definition_hash, experiment, experiment_hash, speeds_km_h, seed,
+        created_at)
+    values ($1, $2, $3, $4, $5, $6, $7, $8, $9) on conflict (id) do nothing";
 
 /// A campaign as the library keeps it.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +37,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError::OtherDefinition`] when the id stands for something else already.
     pub async fn insert_campaign(&self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
-        self.write(Insert(campaign.clone())).await
+        self.write_dated(campaign.clone()).await
     }
 
     /// All campaigns, oldest first.
@@ -81,21 +88,13 @@ fn record(row: &Row) -> Result<CampaignRecord, LibraryError> {
     })
 }
 
-struct Insert(CampaignRecord);
-
-impl Write for Insert {
+impl Write for Dated<CampaignRecord> {
     type Answer = ();
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let campaign = &self.0;
+        let campaign = &self.it;
         let speeds = serde_json::to_string(&campaign.speeds_km_h).expect("numbers become JSON");
-        let insert = format!(
-            "insert into campaign (id, name, definition, definition_hash, experiment,
-                experiment_hash, speeds_km_h, seed, created_at)
-            values ($1, $2, $3, $4, $5, $6, $7, $8, {}) on conflict (id) do nothing",
-            connection.dialect().now()
-        );
-        let insert = sql(insert)
+        let insert = sql(INSERT)
             .bind(&campaign.id)
             .bind(&campaign.name)
             .bind(&campaign.definition_json)
@@ -103,7 +102,8 @@ impl Write for Insert {
             .bind(&campaign.experiment_json)
             .bind(&campaign.experiment_hash)
             .bind(speeds)
-            .bind(sql_seed(campaign.seed)?);
+            .bind(sql_seed(campaign.seed)?)
+            .bind(&self.at);
         connection.execute(insert).await?;
         let ask = sql("select definition_hash from campaign where id = $1").bind(&campaign.id);
         let stored = connection.row(ask).await?.map(|row| row.get::<String>("definition_hash"));

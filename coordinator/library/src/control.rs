@@ -2,10 +2,60 @@
 //! which are tried again.
 
 use crate::attempt;
-use crate::engine::{Connection, Write, sql};
+use crate::engine::{Connection, Text, Write, sql};
 use crate::result::{Attested, StoredCase};
 use crate::{CampaignState, Library, LibraryError, result};
 use std::collections::BTreeMap;
+
+/// Lets all cases of a campaign that were given up wait again, as if for the first time.
+const RETRY_FAILED: &str = "
+    update campaign_case set state = 'waiting', attempts = 0, error = null
+    where campaign_id = $1 and state = 'failed'";
+
+/// The same of some ($2).
+const RETRY_CASES: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = 'waiting', attempts = 0, error = null
+        where campaign_id = $1 and state = 'failed' and sobol_index in (select value from json_each($2))",
+    postgres: "
+        update campaign_case set state = 'waiting', attempts = 0, error = null
+        where campaign_id = $1 and state = 'failed' and sobol_index = any($2)",
+};
+
+/// Finished cases whose results are flagged; what is flagged after this waits for the next retry.
+const FLAGGED: Text = Text::Each {
+    sqlite: "
+        select sobol_index from campaign_case
+        where campaign_id = $1 and state = 'finished' and sobol_index in (
+            select sobol_index from result where campaign_id = $1 and flagged is not null)
+        order by sobol_index",
+    postgres: "
+        select sobol_index from campaign_case
+        where campaign_id = $1 and state = 'finished' and sobol_index in (
+            select sobol_index from case_result where campaign_id = $1 and flagged is not null)
+        order by sobol_index for update",
+};
+
+/// Takes the audits of cases away.
+const DISCARD_AUDITS: Text = Text::Each {
+    sqlite: "delete from audit where campaign_id = $1 and sobol_index in (select value from json_each($2))",
+    postgres: "delete from audit where campaign_id = $1 and sobol_index = any($2)",
+};
+
+/// Lets finished cases wait again.
+const RETRY_FINISHED: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = 'waiting', attempts = 0, error = null
+        where campaign_id = $1 and state = 'finished' and sobol_index in (select value from json_each($2))",
+    postgres: "
+        update campaign_case set state = 'waiting', attempts = 0, error = null
+        where campaign_id = $1 and state = 'finished' and sobol_index = any($2)",
+};
+
+/// Cases with results that are not finished.
+const INCOMPLETE: &str = "
+    select distinct campaign_id, sobol_index from result join campaign_case using (campaign_id, sobol_index)
+    where state <> 'finished' order by campaign_id, sobol_index";
 
 /// Which cases are tried again.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -89,11 +139,8 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be read or written.
     pub async fn discard_incomplete(&self) -> Result<u64, LibraryError> {
-        let ask = "select distinct campaign_id, sobol_index
-            from result join campaign_case using (campaign_id, sobol_index)
-            where state <> 'finished' order by campaign_id, sobol_index";
         let mut of_campaign: BTreeMap<String, Vec<i64>> = BTreeMap::new();
-        for row in self.readers().rows(sql(ask)).await? {
+        for row in self.readers().rows(sql(INCOMPLETE)).await? {
             of_campaign.entry(row.get("campaign_id")?).or_default().push(row.get("sobol_index")?);
         }
         let mut count = 0;
@@ -158,19 +205,10 @@ impl Write for RetryCases {
 
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
         match &self.which {
-            Retry::Failed => {
-                let again = "update campaign_case set state = 'waiting', attempts = 0, error = null
-                    where campaign_id = $1 and state = 'failed'";
-                connection.execute(sql(again).bind(&self.campaign)).await
-            }
+            Retry::Failed => connection.execute(sql(RETRY_FAILED).bind(&self.campaign)).await,
             Retry::Cases(indices) => {
-                let again = format!(
-                    "update campaign_case set state = 'waiting', attempts = 0, error = null
-                    where campaign_id = $1 and state = 'failed' and sobol_index {}",
-                    connection.dialect().listed("$2")
-                );
                 let indices: Vec<i64> = indices.iter().copied().map(i64::from).collect();
-                connection.execute(sql(again).bind(&self.campaign).bind(indices)).await
+                connection.execute(sql(RETRY_CASES).bind(&self.campaign).bind(indices)).await
             }
             Retry::Flagged | Retry::Altered => self.discard_flagged(connection).await,
         }
@@ -179,17 +217,7 @@ impl Write for RetryCases {
 
 impl RetryCases {
     async fn discard_flagged(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        let dialect = connection.dialect();
-        // What is flagged after this waits for the next retry.
-        let flagged = format!(
-            "select sobol_index from campaign_case
-            where campaign_id = $1 and state = 'finished' and sobol_index in (
-                select sobol_index from {} where campaign_id = $1 and flagged is not null)
-            order by sobol_index {}",
-            result::table(dialect),
-            dialect.locking()
-        );
-        let flagged = connection.indices(sql(flagged).bind(&self.campaign)).await?;
+        let flagged = connection.indices(sql(FLAGGED).bind(&self.campaign)).await?;
         discard(connection, &self.campaign, &flagged).await
     }
 }
@@ -213,15 +241,8 @@ async fn discard(
     campaign: &str,
     indices: &[i64],
 ) -> Result<u64, LibraryError> {
-    let of = format!("campaign_id = $1 and sobol_index {}", connection.dialect().listed("$2"));
-    for change in [
-        // Their audits looked at results that are no more.
-        format!("delete from audit where {of}"),
-        format!(
-            "update campaign_case set state = 'waiting', attempts = 0, error = null
-            where state = 'finished' and {of}"
-        ),
-    ] {
+    // Audits looked at results that are no more.
+    for change in [DISCARD_AUDITS, RETRY_FINISHED] {
         connection.execute(sql(change).bind(campaign).bind(indices.to_vec())).await?;
     }
     result::discard(connection, campaign, indices).await?;

@@ -1,8 +1,8 @@
 //! The model library: campaigns, their cases, and what came out of each, in SQL.
 //!
 //! Owns the schema's use and every statement; nothing else in the program speaks SQL. It stores and
-//! counts but decides nothing: what becomes of a case whose attempt ended is asked of a [`Policy`],
-//! and what time it is comes in as an argument where anything depends on it.
+//! counts, and decides by what it is told: after how many attempts a case is given up ([`AttemptsMax`]) and what time
+//! it is come in as arguments where anything depends on them.
 
 mod array;
 mod attempt;
@@ -20,6 +20,7 @@ mod library;
 mod overview;
 mod pace;
 mod provenance;
+mod quarantine;
 mod recent;
 mod report;
 mod result;
@@ -45,6 +46,6 @@ pub use provenance::{
 };
 pub use report::{Report, Verdict};
 pub use result::{ContactLoss, LibraryEntry};
-pub use state::{CampaignState, Ending, Policy, State};
+pub use state::{AttemptsMax, CampaignState, State};
 pub use trial::{Question, TrialAnswer, TrialRecord};
 pub use worker::{Registration, WorkerRecord, WorkerState};

@@ -1,7 +1,7 @@
 //! Opening and closing a library; the connections to it.
 
 use crate::LibraryError;
-use crate::engine::{self, Connection, FileLock, Opened, Readers, Target, Write, sql};
+use crate::engine::{self, Connection, FileLock, Opened, Readers, Target, Write, iso_utc, sql};
 use crate::lease::Horizon;
 use std::path::Path;
 use std::sync::Arc;
@@ -136,6 +136,24 @@ impl Library {
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
         self.opened.writer.write(write).await
     }
+
+    /// Stores something with the time that it is.
+    pub(crate) async fn write_dated<T>(
+        &self,
+        it: T,
+    ) -> Result<<Dated<T> as Write>::Answer, LibraryError>
+    where
+        Dated<T>: Write,
+    {
+        self.write(Dated { it, at: iso_utc(self.now_unix_ms()) }).await
+    }
+}
+
+/// Something that is stored, and when that is.
+pub(crate) struct Dated<T> {
+    pub(crate) it: T,
+    /// By the library's clock, as ISO 8601.
+    pub(crate) at: String,
 }
 
 /// Changes nothing.

@@ -82,18 +82,33 @@ impl CampaignState {
 
 /// How an attempt ended that brought no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub(crate) enum Ending {
     /// The worker could not simulate the case.
     Failed,
     /// The lease expired.
     Lost,
 }
 
-/// What becomes of a case whose last attempt ended so, after so many attempts: those that failed where it
-/// [failed](Ending::Failed), all that were without result where it was [lost](Ending::Lost).
-///
-/// It is to answer [`State::Waiting`] or [`State::Failed`].
-pub type Policy = fn(Ending, attempts: u32) -> State;
+/// After how many attempts without result a case is given up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AttemptsMax {
+    /// Where the last one failed: so many that failed.
+    pub failed: u32,
+    /// Where the last one's worker was lost: so many that were without result.
+    pub lost: u32,
+}
+
+impl AttemptsMax {
+    /// Where a case stands after so many attempts, the last of which ended so: those that failed where it failed, all
+    /// that were without result where it was lost.
+    pub(crate) const fn after(self, ending: Ending, attempts: u32) -> State {
+        let most = match ending {
+            Ending::Failed => self.failed,
+            Ending::Lost => self.lost,
+        };
+        if attempts < most { State::Waiting } else { State::Failed }
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -111,5 +126,14 @@ mod tests {
         for error in unknown {
             assert!(matches!(error, Some(LibraryError::Damaged { .. })), "{error:?}");
         }
+    }
+
+    #[test]
+    fn a_case_is_given_up_after_so_many_failures_or_lost_workers() {
+        let most = AttemptsMax { failed: 3, lost: 20 };
+        let states = |ending| [1, 2, 3, 19, 20].map(|attempts| most.after(ending, attempts));
+        let (wait, give_up) = (State::Waiting, State::Failed);
+        assert_eq!(states(Ending::Failed), [wait, wait, give_up, give_up, give_up]);
+        assert_eq!(states(Ending::Lost), [wait, wait, wait, wait, give_up]);
     }
 }

@@ -1,11 +1,38 @@
 //! What reports add up to: the tables `worker` (its counts) and `progress`.
 
-use crate::engine::{Connection, sql};
+use crate::engine::{Connection, Text, sql};
 use crate::{LibraryError, Report, Verdict};
 use tracktwin_experiment::Outcome;
 
 /// Length of the intervals in which progress is told, in s.
 pub(crate) const INTERVAL_S: i64 = 10;
+
+/// Adds to a worker's ($1) counts; answers why its results are not to be trusted, if so.
+const ADD_TO_WORKER: &str = "
+    update worker set cases_finished = cases_finished + $2, cases_failed = cases_failed + $3, busy_s = busy_s + $4,
+        failures_in_a_row = case when $2 > 0 then $5 else failures_in_a_row + $5 end,
+        last_seen_unix_ms = case when last_seen_unix_ms < $6 then $6 else last_seen_unix_ms end
+    where id = $1
+    returning case when state = 'quarantined' then reason end as quarantine";
+
+/// Adds to what was done of a campaign ($1) in an interval ($2). On a server each connection adds to a row of its own,
+/// so that none waits for another.
+const ADD_TO_PROGRESS: Text = Text::Each {
+    sqlite: "
+        insert into progress (campaign_id, from_unix_s, writer, finished, failed, busy_s)
+        values ($1, $2, 0, $3, $4, $5)
+        on conflict (campaign_id, from_unix_s, writer) do update set
+            finished = progress.finished + excluded.finished,
+            failed = progress.failed + excluded.failed,
+            busy_s = progress.busy_s + excluded.busy_s",
+    postgres: "
+        insert into progress (campaign_id, from_unix_s, writer, finished, failed, busy_s)
+        values ($1, $2, pg_backend_pid(), $3, $4, $5)
+        on conflict (campaign_id, from_unix_s, writer) do update set
+            finished = progress.finished + excluded.finished,
+            failed = progress.failed + excluded.failed,
+            busy_s = progress.busy_s + excluded.busy_s",
+};
 
 /// What one report adds.
 pub(crate) struct Tally<'a> {
@@ -46,14 +73,7 @@ impl<'a> Tally<'a> {
         if self.finished + self.failed == 0 {
             return Ok(None);
         }
-        let worker = "update worker set cases_finished = cases_finished + $2,
-                cases_failed = cases_failed + $3, busy_s = busy_s + $4,
-                failures_in_a_row = case when $2 > 0 then $5 else failures_in_a_row + $5 end,
-                last_seen_unix_ms = case when last_seen_unix_ms < $6 then $6
-                    else last_seen_unix_ms end
-            where id = $1
-            returning case when state = 'quarantined' then reason end as quarantine";
-        let worker = sql(worker)
+        let worker = sql(ADD_TO_WORKER)
             .bind(&self.report.worker)
             .bind(self.finished)
             .bind(self.failed)
@@ -61,16 +81,7 @@ impl<'a> Tally<'a> {
             .bind(self.failed_since)
             .bind(self.report.now_unix_ms);
         let worker = connection.row(worker).await?;
-        let progress = format!(
-            "insert into progress (campaign_id, from_unix_s, writer, finished, failed, busy_s)
-            values ($1, $2, {}, $3, $4, $5)
-            on conflict (campaign_id, from_unix_s, writer) do update set
-                finished = progress.finished + excluded.finished,
-                failed = progress.failed + excluded.failed,
-                busy_s = progress.busy_s + excluded.busy_s",
-            connection.dialect().writer()
-        );
-        let progress = sql(progress)
+        let progress = sql(ADD_TO_PROGRESS)
             .bind(&self.report.campaign)
             .bind(interval(self.report.now_unix_ms))
             .bind(self.finished)

@@ -4,7 +4,8 @@
 //! for it follows from the answers; who works on one stands here, and an answer is kept once.
 
 use crate::campaign::sql_seed;
-use crate::engine::{Connection, Row, Statement, Write, sql};
+use crate::engine::{Connection, Row, Statement, Text, Write, sql};
+use crate::library::Dated;
 use crate::state::named;
 use crate::{DiagnosisRecord, Library, LibraryError};
 
@@ -13,6 +14,60 @@ const HASH_DIGITS: usize = 12;
 
 /// Cases sealed in one statement, of three values each.
 const SEALS_A_STATEMENT: usize = 1000;
+
+/// Stores a trial; one that is there stays as it is.
+const INSERT: &str = "
+    insert into trial (id, seed, code_version, model_hash, created_at) values ($1, $2, $3, $4, $5)
+    on conflict (id) do nothing";
+
+/// Leases until $5 to worker $3 the first of a trial's ($1) cases ($2) that nobody else works on now ($4).
+const TAKE: Text = Text::Each {
+    sqlite: "
+        with next as (
+            select trial_id as next_trial, case_number as next_number from trial_case
+            where trial_id = $1 and case_number in (select value from json_each($2)) and not exists (
+                select 1 from trial_lease
+                where trial_lease.trial_id = trial_case.trial_id
+                    and trial_lease.case_number = trial_case.case_number
+                    and lease_expires_unix_ms > $4 and worker <> $3)
+            order by case_number limit 1)
+        insert into trial_lease (trial_id, case_number, worker, lease_expires_unix_ms)
+        select next_trial, next_number, $3, $5 from next where true
+        on conflict (trial_id, case_number) do update set
+            worker = excluded.worker, lease_expires_unix_ms = excluded.lease_expires_unix_ms
+            where trial_lease.lease_expires_unix_ms <= $4 or trial_lease.worker = $3
+        returning case_number",
+    postgres: "
+        with next as (
+            select trial_id as next_trial, case_number as next_number from trial_case
+            where trial_id = $1 and case_number = any($2) and not exists (
+                select 1 from trial_lease
+                where trial_lease.trial_id = trial_case.trial_id
+                    and trial_lease.case_number = trial_case.case_number
+                    and lease_expires_unix_ms > $4 and worker <> $3)
+            order by case_number limit 1 for update skip locked)
+        insert into trial_lease (trial_id, case_number, worker, lease_expires_unix_ms)
+        select next_trial, next_number, $3, $5 from next where true
+        on conflict (trial_id, case_number) do update set
+            worker = excluded.worker, lease_expires_unix_ms = excluded.lease_expires_unix_ms
+            where trial_lease.lease_expires_unix_ms <= $4 or trial_lease.worker = $3
+        returning case_number",
+};
+
+/// Lets a lease last until $4, if it is the worker's still.
+const RENEW: &str = "
+    update trial_lease set lease_expires_unix_ms = $4
+    where trial_id = $1 and case_number = $2 and worker = $3";
+
+/// Gives a case back.
+const RELEASE: &str =
+    "delete from trial_lease where trial_id = $1 and case_number = $2 and worker = $3";
+
+/// Keeps an answer; a question that is answered already stays as it is.
+const INSERT_ANSWER: &str = "
+    insert into trial_answer (trial_id, case_number, question, diagnosis_id, score, worker, answered_at)
+    values ($1, $2, $3, $4, $5, $6, $7)
+    on conflict (trial_id, case_number, question) do nothing";
 
 /// A trial as the library keeps it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,7 +124,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError::OtherTruth`] when a case is sealed with another truth.
     pub async fn seal_trial(&self, trial: TrialRecord) -> Result<(), LibraryError> {
-        self.write(trial).await
+        self.write_dated(trial).await
     }
 
     /// All answers of a trial, by case.
@@ -145,7 +200,7 @@ impl Library {
         diagnosis: Option<DiagnosisRecord>,
     ) -> Result<(), LibraryError> {
         let (trial, worker) = (trial.to_owned(), worker.to_owned());
-        self.write(Told { trial, worker, answer, diagnosis }).await
+        self.write_dated(Told { trial, worker, answer, diagnosis }).await
     }
 }
 
@@ -171,23 +226,20 @@ fn answer(row: &Row) -> Result<TrialAnswer, LibraryError> {
     })
 }
 
-impl Write for TrialRecord {
+impl Write for Dated<TrialRecord> {
     type Answer = ();
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let id = self.id();
-        let insert = format!(
-            "insert into trial (id, seed, code_version, model_hash, created_at)
-            values ($1, $2, $3, $4, {}) on conflict (id) do nothing",
-            connection.dialect().now()
-        );
-        let insert = sql(insert)
+        let trial = &self.it;
+        let id = trial.id();
+        let insert = sql(INSERT)
             .bind(&id)
-            .bind(sql_seed(self.seed)?)
-            .bind(&self.code_version)
-            .bind(&self.model_hash);
+            .bind(sql_seed(trial.seed)?)
+            .bind(&trial.code_version)
+            .bind(&trial.model_hash)
+            .bind(&self.at);
         connection.execute(insert).await?;
-        let numbered: Vec<_> = (0_u32..).zip(&self.seals).collect();
+        let numbered: Vec<_> = (0_u32..).zip(&trial.seals).collect();
         for some in numbered.chunks(SEALS_A_STATEMENT) {
             let insert = format!(
                 "insert into trial_case (trial_id, case_number, truth_sha256) values {}
@@ -203,7 +255,7 @@ impl Write for TrialRecord {
         for row in connection.rows(sql(ask).bind(&id)).await? {
             let number = row.get_u32("case_number")?;
             let stored: String = row.get("truth_sha256")?;
-            if self.seals.get(number as usize).is_some_and(|seal| *seal != stored) {
+            if trial.seals.get(number as usize).is_some_and(|seal| *seal != stored) {
                 return Err(LibraryError::OtherTruth { trial: id, number });
             }
         }
@@ -227,26 +279,7 @@ impl Write for Take {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Option<u32>, LibraryError> {
-        let dialect = connection.dialect();
-        let take = format!(
-            "with next as (
-                select trial_id as next_trial, case_number as next_number from trial_case
-                where trial_id = $1 and case_number {} and not exists (
-                    select 1 from trial_lease where trial_lease.trial_id = trial_case.trial_id
-                        and trial_lease.case_number = trial_case.case_number
-                        and lease_expires_unix_ms > $4 and worker <> $3)
-                order by case_number limit 1 {})
-            insert into trial_lease (trial_id, case_number, worker, lease_expires_unix_ms)
-            select next_trial, next_number, $3, $5 from next where true
-            on conflict (trial_id, case_number) do update
-                set worker = excluded.worker,
-                    lease_expires_unix_ms = excluded.lease_expires_unix_ms
-                where trial_lease.lease_expires_unix_ms <= $4 or trial_lease.worker = $3
-            returning case_number",
-            dialect.listed("$2"),
-            dialect.skipping_locked()
-        );
-        let take = sql(take)
+        let take = sql(TAKE)
             .bind(&self.trial)
             .bind(self.of.clone())
             .bind(&self.worker)
@@ -272,15 +305,10 @@ impl Write for Keep {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let theirs = "where trial_id = $1 and case_number = $2 and worker = $3";
+        let of = |text| sql(text).bind(&self.trial).bind(self.number).bind(&self.worker);
         let keep = match self.until_unix_ms {
-            Some(_) => format!("update trial_lease set lease_expires_unix_ms = $4 {theirs}"),
-            None => format!("delete from trial_lease {theirs}"),
-        };
-        let keep = sql(keep).bind(&self.trial).bind(self.number).bind(&self.worker);
-        let keep = match self.until_unix_ms {
-            Some(until_unix_ms) => keep.bind(until_unix_ms),
-            None => keep,
+            Some(until_unix_ms) => of(RENEW).bind(until_unix_ms),
+            None => of(RELEASE),
         };
         connection.execute(keep).await.map(drop)
     }
@@ -293,32 +321,27 @@ struct Told {
     diagnosis: Option<DiagnosisRecord>,
 }
 
-impl Write for Told {
+impl Write for Dated<Told> {
     type Answer = ();
 
     fn worker(&self) -> Option<&str> {
-        Some(&self.worker)
+        Some(&self.it.worker)
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let diagnosis = match &self.diagnosis {
-            Some(diagnosis) => Some(diagnosis.apply(connection).await?),
+        let Told { trial, worker, answer, diagnosis } = &self.it;
+        let diagnosis = match diagnosis {
+            Some(diagnosis) => Some(diagnosis.store(connection, &self.at).await?),
             None => None,
         };
-        let insert = format!(
-            "insert into trial_answer (trial_id, case_number, question, diagnosis_id, score, worker,
-                answered_at)
-            values ($1, $2, $3, $4, $5, $6, {})
-            on conflict (trial_id, case_number, question) do nothing",
-            connection.dialect().now()
-        );
-        let insert = sql(insert)
-            .bind(&self.trial)
-            .bind(self.answer.number)
-            .bind(self.answer.question.name())
+        let insert = sql(INSERT_ANSWER)
+            .bind(trial)
+            .bind(answer.number)
+            .bind(answer.question.name())
             .bind(diagnosis)
-            .bind(&self.answer.score_json)
-            .bind(&self.worker);
+            .bind(&answer.score_json)
+            .bind(worker)
+            .bind(&self.at);
         connection.execute(insert).await.map(drop)
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::engine::{Connection, Row, Write, sql};
 use crate::state::named;
-use crate::{Library, LibraryError, result};
+use crate::{Library, LibraryError};
 
 /// Whether a worker is given cases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -58,6 +58,12 @@ pub struct WorkerRecord {
 }
 
 impl WorkerRecord {
+    /// Why it is in quarantine, if it is.
+    pub fn quarantine(self) -> Option<String> {
+        let reason = self.reason.unwrap_or_else(|| "no reason given".to_owned());
+        (self.state == WorkerState::Quarantined).then_some(reason)
+    }
+
     /// Mean computing time of a case, in s.
     pub fn mean_case_s(&self) -> Option<f64> {
         (self.cases_finished > 0).then(|| self.busy_s / f64::from(self.cases_finished))
@@ -105,23 +111,6 @@ impl Library {
         let ask = sql("select * from worker where last_seen_unix_ms >= $1 order by id");
         self.readers().rows(ask.bind(since_unix_ms)).await?.iter().map(record).collect()
     }
-
-    /// Puts a worker into quarantine: it gets no more cases, and its results are flagged with the
-    /// reason; answers how many. [`crate::Retry::Flagged`] has them computed again.
-    ///
-    /// # Errors
-    /// [`LibraryError::UnknownWorker`], or when the library cannot be written.
-    pub async fn flag_worker(&self, worker: &str, reason: &str) -> Result<u64, LibraryError> {
-        self.write(Flag { worker: worker.to_owned(), reason: reason.to_owned() }).await
-    }
-
-    /// Gives cases to a worker again. Its flagged results stay flagged.
-    ///
-    /// # Errors
-    /// [`LibraryError::UnknownWorker`], or when the library cannot be written.
-    pub async fn pardon_worker(&self, worker: &str) -> Result<(), LibraryError> {
-        self.write(Quarantine { worker: worker.to_owned(), reason: None }).await
-    }
 }
 
 fn record(row: &Row) -> Result<WorkerRecord, LibraryError> {
@@ -142,7 +131,7 @@ fn record(row: &Row) -> Result<WorkerRecord, LibraryError> {
 }
 
 impl WorkerState {
-    const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Active => "active",
             Self::Quarantined => "quarantined",
@@ -155,6 +144,14 @@ fn state(row: &Row) -> Result<WorkerState, LibraryError> {
     named("a worker", &name, [WorkerState::Active, WorkerState::Quarantined], WorkerState::name)
 }
 
+/// Notes that a worker has come; one that comes again keeps its counts and its state.
+const REGISTER: &str = "
+    insert into worker (id, code_version, model_hash, cores, registered_unix_ms, last_seen_unix_ms)
+    values ($1, $2, $3, $4, $5, $5)
+    on conflict (id) do update set code_version = excluded.code_version, model_hash = excluded.model_hash,
+        cores = excluded.cores, last_seen_unix_ms = excluded.last_seen_unix_ms
+    returning state";
+
 impl Write for Registration {
     type Answer = WorkerState;
 
@@ -163,14 +160,7 @@ impl Write for Registration {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<WorkerState, LibraryError> {
-        let insert = "insert into worker (id, code_version, model_hash, cores, registered_unix_ms,
-                last_seen_unix_ms)
-            values ($1, $2, $3, $4, $5, $5)
-            on conflict (id) do update set code_version = excluded.code_version,
-                model_hash = excluded.model_hash, cores = excluded.cores,
-                last_seen_unix_ms = excluded.last_seen_unix_ms
-            returning state";
-        let insert = sql(insert)
+        let insert = sql(REGISTER)
             .bind(&self.worker)
             .bind(&self.code_version)
             .bind(&self.model_hash)
@@ -198,55 +188,5 @@ impl Write for Heartbeat {
             .bind(&self.worker)
             .bind(self.now_unix_ms);
         connection.row(seen).await?.as_ref().map(record).transpose()
-    }
-}
-
-struct Quarantine {
-    worker: String,
-    reason: Option<String>,
-}
-
-impl Write for Quarantine {
-    type Answer = ();
-
-    fn worker(&self) -> Option<&str> {
-        Some(&self.worker)
-    }
-
-    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let state =
-            if self.reason.is_some() { WorkerState::Quarantined } else { WorkerState::Active };
-        let set = "update worker set state = $2, reason = $3, failures_in_a_row = 0 where id = $1";
-        let set = sql(set).bind(&self.worker).bind(state.name()).bind(self.reason.clone());
-        if connection.execute(set).await? == 0 {
-            return Err(LibraryError::UnknownWorker { id: self.worker.clone() });
-        }
-        Ok(())
-    }
-}
-
-pub(crate) struct Flag {
-    pub(crate) worker: String,
-    pub(crate) reason: String,
-}
-
-impl Write for Flag {
-    type Answer = u64;
-
-    fn worker(&self) -> Option<&str> {
-        Some(&self.worker)
-    }
-
-    async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        let (worker, reason) = (self.worker.clone(), Some(self.reason.clone()));
-        Quarantine { worker, reason }.apply(connection).await?;
-        let theirs = "select count(*) as results from result where worker = $1 and flagged is null";
-        let theirs = connection.rows(sql(theirs).bind(&self.worker)).await?;
-        let flag = format!(
-            "update {} set flagged = $2 where worker = $1 and flagged is null",
-            result::table(connection.dialect())
-        );
-        connection.execute(sql(flag).bind(&self.worker).bind(&self.reason)).await?;
-        theirs.first().map_or(Ok(0), |row| row.get_u32("results").map(u64::from))
     }
 }

@@ -3,7 +3,9 @@
 use tempfile::TempDir;
 use tokio::task::JoinSet;
 use tracktwin_experiment::{Outcome, PassFeatures};
-use tracktwin_library::{CampaignRecord, LeaseRequest, Leased, Library, Report, State, Verdict};
+use tracktwin_library::{
+    AttemptsMax, CampaignRecord, LeaseRequest, Leased, Library, Report, Verdict,
+};
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 use tracktwin_protocol::{CaseReport, checksum};
 use tracktwin_signal::{Features, ThirdOctave};
@@ -20,6 +22,9 @@ const WORKERS: u32 = 8;
 /// Three passes of 500 bins: 12 kB a case.
 const SPEEDS_KM_H: [f64; 3] = [7.0, 10.0, 13.0];
 const BINS: usize = 500;
+
+/// No case of these fails.
+const NEVER_GIVEN_UP: AttemptsMax = AttemptsMax { failed: u32::MAX, lost: u32::MAX };
 
 /// A folder in `$TRACKTWIN_BENCH_DIR`, or here, and the URL of an `SQLite` library in it.
 ///
@@ -95,7 +100,7 @@ async fn work(library: &Library, worker: &str, cases: u32, batch: u32) -> Result
             speeds_km_h: SPEEDS_KM_H.to_vec(),
             cases: leased.iter().map(finished).collect(),
             now_unix_ms: library.now_unix_ms(),
-            after_failure: |_, _| State::Waiting,
+            attempts_max: NEVER_GIVEN_UP,
             audit_share: 0.0,
         };
         let verdicts = library.report(report).await?;
@@ -121,7 +126,7 @@ pub async fn lease(
         held: Vec::new(),
         now_unix_ms: library.now_unix_ms(),
         lease_ms: 12_000,
-        after_loss: |_, _| State::Waiting,
+        attempts_max: NEVER_GIVEN_UP,
         alone_after: u32::MAX,
     };
     let lease = library.lease(request).await?;

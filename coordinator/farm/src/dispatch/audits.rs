@@ -16,7 +16,22 @@ use tracktwin_protocol::{CaseLease, CaseReport, LeasedCase};
 use tracktwin_signal::Features;
 
 /// The lease number of audited cases: the library counts real ones from 1.
-pub(crate) const EPOCH: u32 = 0;
+const EPOCH: u32 = 0;
+
+/// What a lease is of, as its number says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LeaseKind {
+    /// A case that waited.
+    Case,
+    /// A finished case that is simulated again.
+    Audit,
+}
+
+impl LeaseKind {
+    pub(crate) const fn of(epoch: u32) -> Self {
+        if epoch == EPOCH { Self::Audit } else { Self::Case }
+    }
+}
 
 /// Largest difference of a one-third-octave level between two workers, in dB.
 ///

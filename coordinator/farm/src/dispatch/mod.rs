@@ -18,6 +18,6 @@ pub use batch::Pace;
 pub use breaker::Breaker;
 pub use campaigns::DispatchError;
 pub use counts::Counts;
-pub use policy::{FAILURES_MAX, LOSSES_MAX, SUSPECT_AFTER, after_attempt};
+pub use policy::{ATTEMPTS_MAX, FAILURES_MAX, LOSSES_MAX, SUSPECT_AFTER};
 pub use service::Dispatch;
 pub use settings::{Clock, Scope, Settings, Timing};

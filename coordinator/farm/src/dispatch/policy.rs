@@ -1,6 +1,6 @@
-//! What becomes of a case whose attempt ended without result.
+//! After how many attempts without result a case is given up, or handed out alone.
 
-use tracktwin_library::{Ending, State};
+use tracktwin_library::AttemptsMax;
 
 /// Attempts after which a case that fails is given up.
 ///
@@ -19,24 +19,5 @@ pub const LOSSES_MAX: u32 = 20;
 /// with it if it is what ends its workers, and is soon done if it isn't.
 pub const SUSPECT_AFTER: u32 = 4;
 
-/// Where a case goes after so many attempts without result, the last of which ended so.
-pub const fn after_attempt(ending: Ending, attempts: u32) -> State {
-    match ending {
-        Ending::Failed if attempts < FAILURES_MAX => State::Waiting,
-        Ending::Lost if attempts < LOSSES_MAX => State::Waiting,
-        Ending::Failed | Ending::Lost => State::Failed,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_case_is_given_up_after_three_failures_or_twenty_lost_workers() {
-        let states = |ending| [1, 2, 3, 19, 20].map(|attempts| after_attempt(ending, attempts));
-        let (wait, give_up) = (State::Waiting, State::Failed);
-        assert_eq!(states(Ending::Failed), [wait, wait, give_up, give_up, give_up]);
-        assert_eq!(states(Ending::Lost), [wait, wait, wait, wait, give_up]);
-    }
-}
+/// Both, as the library is told them.
+pub const ATTEMPTS_MAX: AttemptsMax = AttemptsMax { failed: FAILURES_MAX, lost: LOSSES_MAX };

@@ -5,7 +5,6 @@ use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 use tokio::time::Instant;
-use tracktwin_library::WorkerState;
 use tracktwin_protocol::Registration;
 
 /// A worker that was not heard of for so long is forgotten; if it comes back, it registers anew.
@@ -95,11 +94,10 @@ impl Roster {
         })
     }
 
-    /// Notes whether the library has a worker in quarantine.
-    pub(crate) fn quarantine(&self, worker: &str, state: WorkerState, reason: Option<String>) {
+    /// Notes why a worker is in quarantine, or that it is not.
+    pub(crate) fn set_quarantine(&self, worker: &str, reason: Option<String>) {
         if let Some(worker) = self.lock().get_mut(worker) {
-            let reason = reason.unwrap_or_else(|| "no reason given".to_owned());
-            worker.quarantine = (state == WorkerState::Quarantined).then_some(reason);
+            worker.quarantine = reason;
         }
     }
 
@@ -176,10 +174,10 @@ mod tests {
     #[test]
     fn quarantine_is_told_with_its_reason() {
         let roster = roster(&["w"]);
-        roster.quarantine("w", WorkerState::Quarantined, Some("it differs".to_owned()));
+        roster.set_quarantine("w", Some("it differs".to_owned()));
         let (_, reason) = roster.standing("w").unwrap().aside.unwrap();
         assert_eq!(reason, "in quarantine: it differs");
-        roster.quarantine("w", WorkerState::Active, None);
+        roster.set_quarantine("w", None);
         assert!(roster.standing("w").unwrap().aside.is_none());
     }
 }

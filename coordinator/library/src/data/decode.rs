@@ -3,7 +3,7 @@
 use super::{Cell, Column, ColumnKind, Table};
 use crate::LibraryError;
 use crate::engine::{Row, series};
-use sqlx::postgres::{PgRow, PgValueFormat, PgValueRef};
+use sqlx::postgres::PgRow;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row as _, TypeInfo, ValueRef};
 use std::fmt::Write as _;
@@ -77,8 +77,8 @@ fn is_series(name: &str) -> bool {
 }
 
 /// Types that [`postgres_cell`] reads otherwise than as text.
-const POSTGRES_NUMBERS: [&str; 9] =
-    ["BOOL", "INT2", "INT4", "INT8", "FLOAT4", "FLOAT8", "FLOAT8[]", "BYTEA", "NUMERIC"];
+const POSTGRES_NUMBERS: [&str; 8] =
+    ["BOOL", "INT2", "INT4", "INT8", "FLOAT4", "FLOAT8", "FLOAT8[]", "BYTEA"];
 
 /// Types that PostgreSQL sends as the text itself.
 const POSTGRES_TEXTS: [&str; 6] = ["TEXT", "VARCHAR", "CHAR", "NAME", "UNKNOWN", "JSON"];
@@ -102,36 +102,28 @@ fn postgres_cell(row: &PgRow, place: usize, name: &str) -> Result<Cell, LibraryE
         "FLOAT8" => Cell::Real(row.try_get(place)?),
         "FLOAT8[]" => Cell::Doubles(row.try_get(place)?),
         "BYTEA" => bytes_cell(row.try_get(place)?, name),
-        "NUMERIC" => {
-            let unreadable = || LibraryError::BadQuery { reason: format!("{name} is no number") };
-            numeric(&value).ok_or_else(unreadable)?
-        }
         _ => Cell::Text(row.try_get_unchecked(place)?),
     })
 }
 
-/// A decimal number of any length, as PostgreSQL sends it: how many digits to base 10,000, the weight
-/// of the first, the sign, the decimals to show, the digits; each in two bytes. Sums and means of
-/// integers are such.
-fn numeric(value: &PgValueRef<'_>) -> Option<Cell> {
-    let bytes = value.as_bytes().ok()?;
-    if value.format() == PgValueFormat::Text {
-        return std::str::from_utf8(bytes).ok()?.parse().ok().map(Cell::Real);
-    }
-    let (words, _) = bytes.as_chunks::<2>();
-    let words: Vec<u16> = words.iter().map(|word| u16::from_be_bytes(*word)).collect();
-    let [_, weight, sign, decimals, digits @ ..] = &words[..] else { return None };
-    let mut text = if *sign == 0x4000 { "-0".to_owned() } else { "0".to_owned() };
-    for digit in digits {
-        let _ = write!(text, "{digit:04}");
-    }
-    let exponent = 4 * (i64::from(weight.cast_signed()) + 1 - i64::try_from(digits.len()).ok()?);
-    let real: f64 = format!("{text}e{exponent}").parse().ok()?;
-    // Whole numbers below 2^53 are exact.
-    let is_whole = *decimals == 0 && real.abs() < 2_f64.powi(53);
-    match *sign {
-        0 | 0x4000 if is_whole => Some(Cell::Integer(real as i64)),
-        0 | 0x4000 => Some(Cell::Real(real)),
-        _ => Some(Cell::Real(f64::NAN)),
+/// The number that a server writes so: sums and means of integers are decimal numbers of any length.
+pub(super) fn number(text: &str) -> Cell {
+    let integer = text.parse().map(Cell::Integer);
+    integer
+        .or_else(|_| text.parse().map(Cell::Real))
+        .unwrap_or_else(|_| Cell::Text(text.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_without_decimals_are_integers() {
+        assert_eq!(number("-6"), Cell::Integer(-6));
+        assert_eq!(number("1.5000000000000000"), Cell::Real(1.5));
+        assert_eq!(number("2.0"), Cell::Real(2.0));
+        assert_eq!(number("100000000000000000000"), Cell::Real(1e20));
+        assert_eq!(number("-Infinity"), Cell::Real(f64::NEG_INFINITY));
     }
 }

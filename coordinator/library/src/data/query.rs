@@ -76,6 +76,8 @@ async fn postgres<A: Answer>(
     let mut statement = connection.prepare(asked).await.map_err(refused)?;
     let columns = names(statement.columns());
     answer.columns(&columns)?;
+    let is_decimal = |column: &PgColumn| column.type_info().name() == "NUMERIC";
+    let decimal: Vec<_> = statement.columns().iter().map(is_decimal).collect();
     if let Some(text) = with_texts(text, statement.columns()) {
         let text = AssertSqlSafe(text).into_sql_str();
         statement = connection.prepare(text).await.map_err(refused)?;
@@ -83,13 +85,19 @@ async fn postgres<A: Answer>(
     let mut rows = statement.query().fetch(&mut connection);
     while let Some(row) = rows.next().await {
         let row = Row::Postgres(row.map_err(refused)?);
-        answer.row(decode::any_row(&row, &columns)?)?;
+        let mut cells = decode::any_row(&row, &columns)?;
+        for (cell, _) in cells.iter_mut().zip(&decimal).filter(|(_, is_decimal)| **is_decimal) {
+            if let Cell::Text(text) = cell {
+                *cell = decode::number(text);
+            }
+        }
+        answer.row(cells)?;
     }
     Ok(())
 }
 
-/// The same question with times, arrays of integers and whatever else no cell is made for as texts, as the
-/// server writes them; none where there are no such columns.
+/// The same question with times, decimal numbers, arrays of integers and whatever else no cell is made for as texts,
+/// as the server writes them; none where there are no such columns.
 fn with_texts(text: &str, columns: &[PgColumn]) -> Option<String> {
     let is_cell = |column: &PgColumn| decode::is_postgres_cell(column.type_info().name());
     if columns.iter().all(is_cell) {

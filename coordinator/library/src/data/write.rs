@@ -2,7 +2,7 @@
 
 use super::{Cell, Column, Table, decode};
 use crate::case::case_in;
-use crate::engine::{Connection, Dialect, Statement, Write, sql};
+use crate::engine::{Connection, Dialect, Statement, Text, Write, sql};
 use crate::result::{Attested, Gathering};
 use crate::{Library, LibraryError, result};
 use std::collections::HashSet;
@@ -10,6 +10,54 @@ use std::collections::HashSet;
 /// Rows in one statement: of the widest table's 38 columns well below the 32,766 values that
 /// `SQLite` takes.
 const ROWS_A_STATEMENT: usize = 250;
+
+/// Says that cases which have a result at each speed are finished.
+const SETTLE: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
+        where state <> 'finished'
+            and (select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                and result.sobol_index = campaign_case.sobol_index)
+            = (select json_array_length(speeds_km_h) from campaign where campaign.id = campaign_case.campaign_id)",
+    postgres: "
+        update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
+        where state <> 'finished'
+            and (select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                and result.sobol_index = campaign_case.sobol_index)
+            = (select jsonb_array_length(speeds_km_h::jsonb) from campaign
+                where campaign.id = campaign_case.campaign_id)",
+};
+
+/// The same of a campaign's ($1) cases ($2).
+const SETTLE_CASES: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index in (select value from json_each($2)) and state <> 'finished'
+            and (select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                and result.sobol_index = campaign_case.sobol_index)
+            = (select json_array_length(speeds_km_h) from campaign where campaign.id = campaign_case.campaign_id)",
+    postgres: "
+        update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index = any($2) and state <> 'finished'
+            and (select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                and result.sobol_index = campaign_case.sobol_index)
+            = (select jsonb_array_length(speeds_km_h::jsonb) from campaign
+                where campaign.id = campaign_case.campaign_id)",
+};
+
+/// The passes of cases, and how many speeds their campaign has.
+const PASSES: Text = Text::Each {
+    sqlite: "
+        select *, (select json_array_length(speeds_km_h) from campaign where id = $1) as speeds
+        from result_with_parameters
+        where campaign_id = $1 and sobol_index in (select value from json_each($2))
+        order by sobol_index, speed_km_h",
+    postgres: "
+        select *, (select jsonb_array_length(speeds_km_h::jsonb) from campaign where id = $1) as speeds
+        from result_with_parameters
+        where campaign_id = $1 and sobol_index = any($2)
+        order by sobol_index, speed_km_h",
+};
 
 impl Library {
     /// Adds rows that are not there yet; answers how many these were.
@@ -220,14 +268,9 @@ impl Rows {
     async fn settle(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let mut campaigns = self.texts("campaign_id");
         campaigns.dedup();
-        let settle = format!(
-            "{} and campaign_id = $1 and sobol_index {}",
-            settle(connection.dialect()),
-            connection.dialect().listed("$2")
-        );
         let indices = self.integers("sobol_index");
         for campaign in campaigns {
-            let settle = sql(settle.clone()).bind(campaign).bind(indices.clone());
+            let settle = sql(SETTLE_CASES).bind(campaign).bind(indices.clone());
             connection.execute(settle).await?;
         }
         Ok(())
@@ -236,18 +279,10 @@ impl Rows {
     /// Reads these rows' cases again as they are stored now, and refuses them where one whose passes are all
     /// here does not have its checksum.
     async fn refuse_altered(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let dialect = connection.dialect();
-        let ask = format!(
-            "select *, (select {} from campaign where id = $1) as speeds
-            from result_with_parameters where campaign_id = $1 and sobol_index {}
-            order by sobol_index, speed_km_h",
-            dialect.json_length("speeds_km_h"),
-            dialect.listed("$2")
-        );
         let mut campaigns = self.texts("campaign_id");
         campaigns.dedup();
         for campaign in campaigns {
-            let ask = sql(ask.clone()).bind(&campaign).bind(self.integers("sobol_index"));
+            let ask = sql(PASSES).bind(&campaign).bind(self.integers("sobol_index"));
             let rows = connection.rows(ask).await?;
             let speeds = rows.first().map_or(Ok(0), |row| row.get_count("speeds"))?;
             let mut gathering = Gathering::default();
@@ -324,18 +359,6 @@ impl Write for Settle {
     type Answer = u64;
 
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        connection.execute(sql(settle(connection.dialect()))).await
+        connection.execute(sql(SETTLE)).await
     }
-}
-
-/// Cases that have a result at each speed are finished.
-fn settle(dialect: Dialect) -> String {
-    format!(
-        "update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
-        where state <> 'finished' and (
-            select count(*) from result where result.campaign_id = campaign_case.campaign_id
-                and result.sobol_index = campaign_case.sobol_index)
-        = (select {} from campaign where campaign.id = campaign_case.campaign_id)",
-        dialect.json_length("speeds_km_h")
-    )
 }

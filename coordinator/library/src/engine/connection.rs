@@ -9,6 +9,9 @@ use sqlx::{Connection as _, PgConnection, PgPool, SqliteConnection, SqlitePool};
 use std::pin::Pin;
 use tokio_stream::{Stream, StreamExt};
 
+/// Where every statement of a connection that writes is shown, at the level `trace`.
+const STATEMENTS: &str = "tracktwin_library::statements";
+
 /// A connection that writes, inside a transaction.
 pub(crate) enum Connection {
     Sqlite(SqliteConnection, OpenFile),
@@ -25,6 +28,7 @@ impl Connection {
 
     /// Runs a statement; answers how many rows it changed.
     pub(crate) async fn execute(&mut self, statement: Statement) -> Result<u64, LibraryError> {
+        self.tell(&statement);
         Ok(match self {
             Self::Sqlite(connection, _) => {
                 statement.for_sqlite().execute(connection).await?.rows_affected()
@@ -36,6 +40,7 @@ impl Connection {
     }
 
     pub(crate) async fn rows(&mut self, statement: Statement) -> Result<Vec<Row>, LibraryError> {
+        self.tell(&statement);
         Ok(match self {
             Self::Sqlite(connection, _) => {
                 let rows = statement.for_sqlite().fetch_all(connection).await?;
@@ -46,6 +51,12 @@ impl Connection {
                 rows.into_iter().map(Row::Postgres).collect()
             }
         })
+    }
+
+    /// Shows a statement to whoever listens: the account of the lease protocol is held against these
+    /// (docs/lease-protocol.md).
+    fn tell(&self, statement: &Statement) {
+        tracing::trace!(target: STATEMENTS, text = &*statement.text(self.dialect()));
     }
 
     pub(crate) async fn row(&mut self, statement: Statement) -> Result<Option<Row>, LibraryError> {
@@ -162,7 +173,7 @@ impl Readers {
     /// [`LibraryError::Malformed`].
     pub(crate) async fn refuse_malformed(&self) -> Result<(), LibraryError> {
         match self {
-            Self::Sqlite(pool) => super::sqlite::refuse_malformed(pool).await,
+            Self::Sqlite(pool) => super::sqlite_schema::refuse_malformed(pool).await,
             Self::Postgres(_) => Ok(()),
         }
     }

@@ -1,4 +1,5 @@
-//! The few phrases that the two databases spell differently.
+//! What statements that are made of a table's columns spell differently for each database. All others are written
+//! down whole: see [`super::Text`].
 
 use std::fmt::Write as _;
 
@@ -10,32 +11,6 @@ pub(crate) enum Dialect {
 }
 
 impl Dialect {
-    /// Ends a selection of rows that only this transaction may take, passing over those that another
-    /// has locked. `SQLite` has one writer, so nobody is in the way.
-    pub(crate) const fn skipping_locked(self) -> &'static str {
-        match self {
-            Self::Sqlite => "",
-            Self::Postgres => "for update skip locked",
-        }
-    }
-
-    /// Follows `campaign_case` where its first waiting cases are asked for: `SQLite` without statistics would
-    /// go through all that are finished.
-    pub(crate) const fn by_state(self) -> &'static str {
-        match self {
-            Self::Sqlite => "indexed by campaign_case_by_state",
-            Self::Postgres => "",
-        }
-    }
-
-    /// Ends a selection of rows that nobody else may change before this transaction ends.
-    pub(crate) const fn locking(self) -> &'static str {
-        match self {
-            Self::Sqlite => "",
-            Self::Postgres => "for update",
-        }
-    }
-
     /// That a value is one of the list bound as `$N`.
     pub(crate) fn listed(self, list: &str) -> String {
         match self {
@@ -62,32 +37,6 @@ impl Dialect {
             text.push(')');
         }
         text
-    }
-
-    /// Who counts, in the tables that each writer counts in on its own.
-    pub(crate) const fn writer(self) -> &'static str {
-        match self {
-            Self::Sqlite => "0",
-            Self::Postgres => "pg_backend_pid()",
-        }
-    }
-
-    /// The present instant as ISO 8601, by the database's clock.
-    pub(crate) const fn now(self) -> &'static str {
-        match self {
-            Self::Sqlite => "strftime('%Y-%m-%dT%H:%M:%fZ', 'now')",
-            Self::Postgres => {
-                "to_char(clock_timestamp() at time zone 'utc', 'YYYY-MM-DD\"T\"HH24:MI:SS.MS\"Z\"')"
-            }
-        }
-    }
-
-    /// How many elements a text column that holds a JSON array has.
-    pub(crate) fn json_length(self, column: &str) -> String {
-        match self {
-            Self::Sqlite => format!("json_array_length({column})"),
-            Self::Postgres => format!("jsonb_array_length({column}::jsonb)"),
-        }
     }
 }
 

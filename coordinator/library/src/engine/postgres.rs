@@ -1,7 +1,7 @@
 //! A library on a server.
 
 use super::clock::Clock;
-use super::{Connection, Readers};
+use super::{Connection, Readers, views};
 use crate::LibraryError;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
@@ -19,6 +19,9 @@ const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(10);
 /// How long a connection may take: a server on the other side of the world answers within a second or two.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
+/// What those hold who make views; any number that nobody else has.
+const VIEWS_LOCK: i64 = 0x7477_696e;
+
 /// Opens the library in this database and brings its schema up to date; answers also the server's clock.
 pub(super) async fn open(
     options: &PgConnectOptions,
@@ -31,7 +34,11 @@ pub(super) async fn open(
     if !is_there && !create {
         return Err(LibraryError::Empty { library: name.to_owned() });
     }
-    migrate(&mut connection, name, is_there).await?;
+    if migrate(&mut connection, name, is_there).await? {
+        make_views(&mut connection).await?;
+    } else if views_version(&mut connection).await? < views::VERSION {
+        views::made(make_views(&mut connection).await, name)?;
+    }
     let clock = Clock::server(unix_ms(&mut connection).await?);
     connection.close().await?;
     let readers = PgPoolOptions::new()
@@ -89,13 +96,13 @@ async fn refuse_strangers(connection: &mut PgConnection, name: &str) -> Result<b
     }
 }
 
-/// Brings the schema up to date. Somebody who may only read is not asked to write where nothing
-/// needs to be.
+/// Brings the tables up to date; answers whether anything was to be done. Somebody who may only read is not asked to
+/// write where nothing needs to be.
 async fn migrate(
     connection: &mut PgConnection,
     name: &str,
     is_there: bool,
-) -> Result<(), LibraryError> {
+) -> Result<bool, LibraryError> {
     let known = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0);
     if is_there {
         let found: i64 = sqlx::query_scalar("select max(version) from _sqlx_migrations")
@@ -105,16 +112,35 @@ async fn migrate(
             return Err(LibraryError::NewerSchema { library: name.to_owned(), found, known });
         }
         if found == known {
-            return Ok(());
+            return Ok(false);
         }
     }
-    MIGRATIONS.run(connection).await.map_err(|error| match error {
+    MIGRATIONS.run(connection).await.map(|()| true).map_err(|error| match error {
         // Another program was quicker.
         MigrateError::VersionMissing(found) if found > known => {
             LibraryError::NewerSchema { library: name.to_owned(), found, known }
         }
         other => other.into(),
     })
+}
+
+/// Makes the views as this program has them, unless they are of a later one.
+async fn make_views(connection: &mut PgConnection) -> Result<(), LibraryError> {
+    let mut alone = connection.begin().await?;
+    // Of those who open it at once one makes them after the other.
+    sqlx::query("select pg_advisory_xact_lock($1)").bind(VIEWS_LOCK).execute(&mut *alone).await?;
+    if views_version(&mut alone).await? <= views::VERSION {
+        sqlx::raw_sql(views::POSTGRES).execute(&mut *alone).await?;
+    }
+    Ok(alone.commit().await?)
+}
+
+/// Version of the views that are there; 0 for those that migrations made. A comment can be read by who may read
+/// nothing else.
+async fn views_version(connection: &mut PgConnection) -> Result<i64, LibraryError> {
+    let ask = "select coalesce(cast(substring(
+            obj_description(to_regclass('campaign_status'), 'pg_class') from '[0-9]+$') as bigint), 0)";
+    Ok(sqlx::query_scalar(ask).fetch_one(connection).await?)
 }
 
 /// The server's time, in ms since 1970.

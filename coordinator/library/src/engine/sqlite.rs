@@ -3,18 +3,16 @@
 use super::file_lock::{Identity, identity};
 use super::file_system::shared_between_hosts;
 use super::patience::Patience;
+use super::sqlite_schema::bring_up_to_date;
 use super::{Connection, Readers};
 use crate::LibraryError;
-use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
-use sqlx::{ConnectOptions, Connection as _, SqliteConnection, SqliteExecutor};
+use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
 use std::ffi::OsStr;
 use std::io::{ErrorKind, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations/sqlite");
 
 /// `application_id` of a library, set by the first migration.
 const APPLICATION_ID: i64 = 0x7477_696e;
@@ -68,7 +66,7 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connecti
             opened => break opened?,
         }
     };
-    migrate(&mut connection, path).await?;
+    bring_up_to_date(&mut connection, path).await?;
     let readers = SqlitePoolOptions::new()
         .max_connections(READERS)
         .connect_lazy_with(options.create_if_missing(false).pragma("query_only", "on"));
@@ -224,52 +222,4 @@ async fn refuse_strangers(
         return Err(LibraryError::NotALibrary { library: path.display().to_string() });
     }
     Ok(application_id != APPLICATION_ID && tables == 0)
-}
-
-async fn migrate(connection: &mut SqliteConnection, path: &Path) -> Result<(), LibraryError> {
-    let known = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0);
-    let newer = |error| match error {
-        MigrateError::VersionMissing(found) if found > known => {
-            LibraryError::NewerSchema { library: path.display().to_string(), found, known }
-        }
-        other => other.into(),
-    };
-    // Fails where there is no such table yet.
-    let ask = sqlx::query_scalar("select max(version) from _sqlx_migrations");
-    let found: i64 = ask.fetch_one(&mut *connection).await.unwrap_or(0);
-    if found >= known {
-        return MIGRATIONS.run(connection).await.map_err(newer);
-    }
-    if found > 0 {
-        refuse_malformed(&mut *connection).await?;
-    }
-    // One of those who open it at once does it; the others wait, and find it done.
-    let mut alone = connection.begin_with("begin immediate").await?;
-    MIGRATIONS.run(&mut *alone).await.map_err(newer)?;
-    Ok(alone.commit().await?)
-}
-
-/// Refuses a file whose pages do not fit together, before anything is written to it.
-///
-/// # Errors
-/// [`LibraryError::Malformed`] with the first thing that `SQLite` finds.
-pub(super) async fn refuse_malformed<'c>(
-    connection: impl SqliteExecutor<'c>,
-) -> Result<(), LibraryError> {
-    let found: String = sqlx::query_scalar("pragma quick_check(1)").fetch_one(connection).await?;
-    if found == "ok" {
-        return Ok(());
-    }
-    let last = found.lines().last().unwrap_or_default();
-    Err(LibraryError::Malformed { reason: last.to_owned() })
-}
-
-/// Kind, name and text of what the present schema consists of.
-pub(crate) async fn schema_objects() -> Result<Vec<(String, String, String)>, LibraryError> {
-    let mut memory = SqliteConnectOptions::new().in_memory(true).connect().await?;
-    MIGRATIONS.run(&mut memory).await?;
-    let ask = "select type, name, sql from sqlite_schema where sql is not null";
-    let objects = sqlx::query_as(ask).fetch_all(&mut memory).await?;
-    memory.close().await?;
-    Ok(objects)
 }

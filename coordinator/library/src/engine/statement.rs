@@ -1,5 +1,6 @@
 //! A statement and its values, for either database.
 
+use super::Dialect;
 use sqlx::postgres::PgArguments;
 use sqlx::query::Query;
 use sqlx::sqlite::SqliteArguments;
@@ -14,7 +15,7 @@ pub(crate) enum Value {
     Real(Option<f64>),
     /// A series of numbers as it is stored: big-endian doubles, one after the other.
     Series(Option<Vec<u8>>),
-    /// A list for a statement's own use; with `SQLite` JSON. See [`super::Dialect::listed`].
+    /// A list for a statement's own use; with `SQLite` JSON. See [`Dialect::listed`].
     Integers(Vec<i64>),
     /// The same of texts.
     Texts(Vec<String>),
@@ -24,15 +25,57 @@ pub(crate) enum Value {
     OptionalReals(Vec<Option<f64>>),
 }
 
+/// What a statement says.
+#[derive(Clone, Debug)]
+pub(crate) enum Text {
+    /// The same in both databases.
+    Same(Cow<'static, str>),
+    /// To each database in its own words.
+    Each {
+        /// As `sqlite3` takes it.
+        sqlite: &'static str,
+        /// As `psql` takes it.
+        postgres: &'static str,
+    },
+}
+
+impl Text {
+    /// The same in both databases.
+    pub(crate) const fn same(text: &'static str) -> Self {
+        Self::Same(Cow::Borrowed(text))
+    }
+
+    /// As this database understands it.
+    fn of(self, dialect: Dialect) -> Cow<'static, str> {
+        match (self, dialect) {
+            (Self::Same(text), _) => text,
+            (Self::Each { sqlite, .. }, Dialect::Sqlite) => Cow::Borrowed(sqlite),
+            (Self::Each { postgres, .. }, Dialect::Postgres) => Cow::Borrowed(postgres),
+        }
+    }
+}
+
+impl From<&'static str> for Text {
+    fn from(text: &'static str) -> Self {
+        Self::same(text)
+    }
+}
+
+impl From<String> for Text {
+    fn from(text: String) -> Self {
+        Self::Same(Cow::Owned(text))
+    }
+}
+
 /// A statement of this crate's own making.
 #[derive(Clone, Debug)]
 pub(crate) struct Statement {
-    text: Cow<'static, str>,
+    text: Text,
     values: Vec<Value>,
 }
 
 /// A statement without values yet. `text` must not hold anything that came from outside.
-pub(crate) fn sql(text: impl Into<Cow<'static, str>>) -> Statement {
+pub(crate) fn sql(text: impl Into<Text>) -> Statement {
     Statement { text: text.into(), values: Vec::new() }
 }
 
@@ -43,8 +86,13 @@ impl Statement {
         self
     }
 
+    /// What it says to this database.
+    pub(super) fn text(&self, dialect: Dialect) -> Cow<'static, str> {
+        self.text.clone().of(dialect)
+    }
+
     pub(super) fn for_sqlite(self) -> Query<'static, Sqlite, SqliteArguments> {
-        let query = sqlx::query(AssertSqlSafe(self.text));
+        let query = sqlx::query(AssertSqlSafe(self.text.of(Dialect::Sqlite)));
         self.values.into_iter().fold(query, |query, value| match value {
             Value::Text(text) => query.bind(text),
             Value::Integer(integer) => query.bind(integer),
@@ -58,7 +106,7 @@ impl Statement {
     }
 
     pub(super) fn for_postgres(self) -> Query<'static, Postgres, PgArguments> {
-        let query = sqlx::query(AssertSqlSafe(self.text));
+        let query = sqlx::query(AssertSqlSafe(self.text.of(Dialect::Postgres)));
         self.values.into_iter().fold(query, |query, value| match value {
             Value::Text(text) => query.bind(text),
             Value::Integer(integer) => query.bind(integer),

@@ -1,25 +1,84 @@
 //! What a worker holds: kept, or taken back.
 
 use super::Held;
-use crate::engine::{Connection, Dialect, Row, Statement, Write, sql};
+use crate::engine::{Connection, Row, Statement, Text, Write, sql};
 use crate::{LibraryError, attempt};
 use std::collections::HashSet;
 
-/// That a case is worker `$2`'s under one of its leases: their indices are `$3`, and these with their
-/// epochs as one number each `$4`.
-///
-/// The indices alone stand first: by them cases are found, in both databases.
-fn is_held(dialect: Dialect) -> String {
-    format!(
-        "campaign_id = $1 and worker = $2 and state = 'leased' and sobol_index {}
-            and ((sobol_index << 32) | epoch) {}",
-        dialect.listed("$3"),
-        dialect.listed("$4")
-    )
-}
+// In these statements the leases of worker $2 are told twice: the indices of their cases are $3, and these with
+// their epochs, as one number each, $4. The indices alone stand first: by them cases are found, in both databases.
 
-/// A statement about leases of a worker, bound as [`is_held`] wants them.
-fn about(text: String, campaign: &str, worker: &str, held: &[Held]) -> Statement {
+/// Lets leases last until $5.
+const RENEW: Text = Text::Each {
+    sqlite: "
+        update campaign_case set lease_expires_unix_ms = $5
+        where campaign_id = $1 and worker = $2 and state = 'leased'
+            and sobol_index in (select value from json_each($3))
+            and ((sobol_index << 32) | epoch) in (select value from json_each($4))
+        returning sobol_index, epoch",
+    postgres: "
+        update campaign_case set lease_expires_unix_ms = $5
+        where campaign_id = $1 and worker = $2 and state = 'leased'
+            and sobol_index = any($3) and ((sobol_index << 32) | epoch) = any($4)
+        returning sobol_index, epoch",
+};
+
+/// Those that their worker ended itself: by a result, by saying that the case failed, or by giving it back.
+const ENDED_BY_THE_WORKER: Text = Text::Each {
+    sqlite: "
+        select sobol_index, epoch from campaign_case
+        where campaign_id = $1 and worker = $2 and state = 'finished'
+            and sobol_index in (select value from json_each($3))
+            and ((sobol_index << 32) | epoch) in (select value from json_each($4))
+        union
+        select sobol_index, epoch from attempt
+        where campaign_id = $1 and worker = $2 and ending in ('failed', 'returned')
+            and sobol_index in (select value from json_each($3))
+            and ((sobol_index << 32) | epoch) in (select value from json_each($4))",
+    postgres: "
+        select sobol_index, epoch from campaign_case
+        where campaign_id = $1 and worker = $2 and state = 'finished'
+            and sobol_index = any($3) and ((sobol_index << 32) | epoch) = any($4)
+        union
+        select sobol_index, epoch from attempt
+        where campaign_id = $1 and worker = $2 and ending in ('failed', 'returned')
+            and sobol_index = any($3) and ((sobol_index << 32) | epoch) = any($4)",
+};
+
+/// Puts on record that their worker gave them back at $5.
+const NOTE_RETURN: Text = Text::Each {
+    sqlite: "
+        insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms, ended_unix_ms, ending, error)
+        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $5, 'returned', null
+        from campaign_case
+        where campaign_id = $1 and worker = $2 and state = 'leased'
+            and sobol_index in (select value from json_each($3))
+            and ((sobol_index << 32) | epoch) in (select value from json_each($4))
+        on conflict (campaign_id, sobol_index, epoch) do nothing",
+    postgres: "
+        insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms, ended_unix_ms, ending, error)
+        select campaign_id, sobol_index, epoch, worker, leased_unix_ms, $5, 'returned', null
+        from campaign_case
+        where campaign_id = $1 and worker = $2 and state = 'leased'
+            and sobol_index = any($3) and ((sobol_index << 32) | epoch) = any($4)
+        on conflict (campaign_id, sobol_index, epoch) do nothing",
+};
+
+/// Lets their cases wait again; no attempt is counted.
+const RETURN: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = 'waiting', lease_expires_unix_ms = null
+        where campaign_id = $1 and worker = $2 and state = 'leased'
+            and sobol_index in (select value from json_each($3))
+            and ((sobol_index << 32) | epoch) in (select value from json_each($4))",
+    postgres: "
+        update campaign_case set state = 'waiting', lease_expires_unix_ms = null
+        where campaign_id = $1 and worker = $2 and state = 'leased'
+            and sobol_index = any($3) and ((sobol_index << 32) | epoch) = any($4)",
+};
+
+/// A statement about leases of a worker.
+fn about(text: Text, campaign: &str, worker: &str, held: &[Held]) -> Statement {
     let index = |held: &Held| i64::from(held.index);
     let indices: Vec<_> = held.iter().map(index).collect();
     let leases: Vec<_> =
@@ -63,18 +122,11 @@ impl Renew {
         connection: &mut Connection,
         held: &[Held],
     ) -> Result<HashSet<Held>, LibraryError> {
-        let dialect = connection.dialect();
-        let (cases, numbers) = (dialect.listed("$3"), dialect.listed("$4"));
-        let ask = format!(
-            "select sobol_index, epoch from campaign_case
-            where campaign_id = $1 and worker = $2 and state = 'finished' and sobol_index {cases}
-                and ((sobol_index << 32) | epoch) {numbers}
-            union
-            select sobol_index, epoch from attempt
-            where campaign_id = $1 and worker = $2 and ending in ('failed', 'returned')
-                and sobol_index {cases} and ((sobol_index << 32) | epoch) {numbers}"
-        );
-        leases(&connection.rows(about(ask, &self.campaign, &self.worker, held)).await?)
+        leases(
+            &connection
+                .rows(about(ENDED_BY_THE_WORKER, &self.campaign, &self.worker, held))
+                .await?,
+        )
     }
 }
 
@@ -93,12 +145,7 @@ pub(super) async fn renew(
     held: &[Held],
     until_unix_ms: i64,
 ) -> Result<HashSet<Held>, LibraryError> {
-    let renew = format!(
-        "update campaign_case set lease_expires_unix_ms = $5 where {}
-        returning sobol_index, epoch",
-        is_held(connection.dialect())
-    );
-    let renew = about(renew, campaign, worker, held).bind(until_unix_ms);
+    let renew = about(RENEW, campaign, worker, held).bind(until_unix_ms);
     leases(&connection.rows(renew).await?)
 }
 
@@ -117,15 +164,9 @@ impl Write for Release {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let theirs = is_held(connection.dialect());
-        let note = attempt::ended(&theirs, "$5", "'returned'", "null");
-        let end = format!(
-            "update campaign_case set state = 'waiting', lease_expires_unix_ms = null
-            where {theirs}"
-        );
         let bound = |text| about(text, &self.campaign, &self.worker, &self.held);
-        connection.execute(bound(note).bind(self.now_unix_ms)).await?;
-        connection.execute(bound(end)).await.map(drop)
+        connection.execute(bound(NOTE_RETURN).bind(self.now_unix_ms)).await?;
+        connection.execute(bound(RETURN)).await.map(drop)
     }
 }
 

@@ -6,7 +6,7 @@ mod take;
 
 pub(crate) use horizon::Horizon;
 
-use crate::{Library, LibraryError, Policy};
+use crate::{AttemptsMax, Library, LibraryError};
 use hold::{Release, ReleaseAll, Renew};
 use take::Take;
 use tracktwin_parameters::Case;
@@ -30,8 +30,8 @@ pub struct LeaseRequest {
     pub now_unix_ms: i64,
     /// How long the lease lasts without renewal.
     pub lease_ms: i64,
-    /// What becomes of cases whose lease has expired.
-    pub after_loss: Policy,
+    /// When cases whose lease has expired are given up.
+    pub attempts_max: AttemptsMax,
     /// Attempts without result after which a case is handed out alone: if it is what ends its
     /// workers, it takes no other case with it.
     pub alone_after: u32,

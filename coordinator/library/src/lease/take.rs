@@ -4,8 +4,9 @@ use super::hold::renew;
 use super::{Horizon, Lease, LeaseRequest, Leased};
 use crate::attempt::{self, Ended};
 use crate::case::case_of;
-use crate::engine::{Connection, Row, Write, sql};
-use crate::{Ending, LibraryError, Policy};
+use crate::engine::{Connection, Row, Text, Write, sql};
+use crate::state::Ending;
+use crate::{AttemptsMax, LibraryError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -16,6 +17,62 @@ const CAMPAIGNS_TRIED: u32 = 4;
 
 /// Expired leases ended with one lease; more wait for the next.
 const EXPIRED_MAX: u32 = 500;
+
+/// Expired leases, the first first; those that somebody else ends just now are passed over.
+const EXPIRED: Text = Text::Each {
+    sqlite: "
+        select campaign_id, sobol_index, attempts from campaign_case
+        where state = 'leased' and lease_expires_unix_ms <= $1
+        order by lease_expires_unix_ms limit $2",
+    postgres: "
+        select campaign_id, sobol_index, attempts from campaign_case
+        where state = 'leased' and lease_expires_unix_ms <= $1
+        order by lease_expires_unix_ms limit $2 for update skip locked",
+};
+
+/// The $2 most urgent campaigns that have waiting cases and are handed out; none for a worker ($1) in quarantine.
+const CAMPAIGNS: &str = "
+    select id from campaign
+    where state = 'running'
+        and not exists (select 1 from worker where id = $1 and state = 'quarantined')
+        and 0 < (select coalesce(sum(cases), 0) from case_count
+            where campaign_id = campaign.id and case_count.state = 'waiting')
+    order by priority desc, created_at, id limit $2";
+
+/// The same of one campaign ($3).
+const CAMPAIGN: &str = "
+    select id from campaign
+    where id = $3 and state = 'running'
+        and not exists (select 1 from worker where id = $1 and state = 'quarantined')
+        and 0 < (select coalesce(sum(cases), 0) from case_count
+            where campaign_id = campaign.id and case_count.state = 'waiting')
+    order by priority desc, created_at, id limit $2";
+
+/// The first $4 waiting cases of a campaign from $2 on and below $3, which nobody else may take before this
+/// transaction ends. `SQLite` is told by which index, for without statistics it would go through all that are
+/// finished.
+const WAITING: Text = Text::Each {
+    sqlite: "
+        select * from campaign_case indexed by campaign_case_by_state
+        where campaign_id = $1 and state = 'waiting' and sobol_index >= $2 and sobol_index < $3
+        order by sobol_index limit $4",
+    postgres: "
+        select * from campaign_case
+        where campaign_id = $1 and state = 'waiting' and sobol_index >= $2 and sobol_index < $3
+        order by sobol_index limit $4 for update skip locked",
+};
+
+/// Leases cases ($2) of a campaign to worker $3 from $4 until $5.
+const TAKE: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = 'leased', epoch = epoch + 1, worker = $3, leased_unix_ms = $4,
+            lease_expires_unix_ms = $5
+        where campaign_id = $1 and sobol_index in (select value from json_each($2))",
+    postgres: "
+        update campaign_case set state = 'leased', epoch = epoch + 1, worker = $3, leased_unix_ms = $4,
+            lease_expires_unix_ms = $5
+        where campaign_id = $1 and sobol_index = any($2)",
+};
 
 pub(super) struct Take {
     pub(super) request: LeaseRequest,
@@ -48,13 +105,13 @@ impl Write for Take {
 impl Take {
     /// Ends leases that have expired, but for those that are known to be held.
     async fn end_expired(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let LeaseRequest { campaign, worker, held, now_unix_ms, lease_ms, after_loss, .. } =
+        let LeaseRequest { campaign, worker, held, now_unix_ms, lease_ms, attempts_max, .. } =
             &self.request;
         if let (Some(campaign), false) = (campaign, held.is_empty()) {
             let until_unix_ms = now_unix_ms.saturating_add(*lease_ms);
             renew(connection, campaign, worker, held, until_unix_ms).await?;
         }
-        end_expired(connection, *now_unix_ms, *after_loss).await
+        end_expired(connection, *now_unix_ms, *attempts_max).await
     }
 
     /// The first cases that wait, of the most urgent campaign that has some.
@@ -70,18 +127,10 @@ impl Take {
 
     /// Campaigns that have waiting cases, the most urgent first.
     async fn candidates(&self, connection: &mut Connection) -> Result<Vec<String>, LibraryError> {
-        let only = if self.request.campaign.is_some() { "id = $3 and" } else { "" };
-        let ask = format!(
-            "select id from campaign where {only} state = 'running'
-                and not exists (select 1 from worker where id = $1 and state = 'quarantined')
-                and 0 < (select coalesce(sum(cases), 0) from case_count
-                    where campaign_id = campaign.id and case_count.state = 'waiting')
-            order by priority desc, created_at, id limit $2"
-        );
-        let ask = sql(ask).bind(&self.request.worker).bind(CAMPAIGNS_TRIED);
+        let (worker, most) = (&self.request.worker, CAMPAIGNS_TRIED);
         let ask = match &self.request.campaign {
-            Some(campaign) => ask.bind(campaign),
-            None => ask,
+            Some(campaign) => sql(CAMPAIGN).bind(worker).bind(most).bind(campaign),
+            None => sql(CAMPAIGNS).bind(worker).bind(most),
         };
         connection.rows(ask).await?.iter().map(|row| row.get("id")).collect()
     }
@@ -94,36 +143,22 @@ impl Take {
     ) -> Result<Vec<Leased>, LibraryError> {
         let from = self.horizon.first_waiting(campaign);
         let waiting = self.waiting(connection, campaign, from).await?;
-        if waiting.is_empty() {
-            return Ok(Vec::new());
-        }
-        let indices = share(&waiting, self.request.alone_after);
+        let Some(last) = waiting.last() else { return Ok(Vec::new()) };
+        let next = last.index() + 1;
+        let (taken, passed_over) = share(waiting, self.request.alone_after);
         // What was passed over waits on.
-        let passed_over = waiting.iter().map(|it| it.index).find(|it| !indices.contains(it));
-        let next = waiting.last().map_or(from, |last| last.index + 1);
-        self.horizon.advance(campaign, from, passed_over.unwrap_or(next));
+        let first = passed_over.first().map_or(next, Waiting::index);
+        self.horizon.advance(campaign, from, first);
 
-        let take = format!(
-            "update campaign_case set state = 'leased', epoch = epoch + 1, worker = $3,
-                leased_unix_ms = $4, lease_expires_unix_ms = $5
-            where campaign_id = $1 and sobol_index {}
-            returning sobol_index, railpad_stiffness_N_m, railpad_damping_N_s_m,
-                ballast_stiffness_N_m, ballast_damping_N_s_m, sleeper_EI_N_m2, irregularity_level,
-                surface_seed, epoch",
-            connection.dialect().listed("$2")
-        );
         let LeaseRequest { worker, now_unix_ms, lease_ms, .. } = &self.request;
-        let take = sql(take)
+        let take = sql(TAKE)
             .bind(campaign)
-            .bind(indices.into_iter().map(i64::from).collect::<Vec<_>>())
+            .bind(taken.iter().map(|it| i64::from(it.index())).collect::<Vec<_>>())
             .bind(worker)
             .bind(*now_unix_ms)
             .bind(now_unix_ms.saturating_add(*lease_ms));
-        let leased = |row: &Row| Ok(Leased { case: case_of(row)?, epoch: row.get_u32("epoch")? });
-        let rows = connection.rows(take).await?;
-        let mut cases = rows.iter().map(leased).collect::<Result<Vec<_>, LibraryError>>()?;
-        cases.sort_by_key(|leased| leased.case.index);
-        Ok(cases)
+        connection.execute(take).await?;
+        Ok(taken.into_iter().map(|it| it.leased).collect())
     }
 
     /// A campaign's first waiting cases from a place on, which nobody else may take.
@@ -133,20 +168,14 @@ impl Take {
         campaign: &str,
         from: u32,
     ) -> Result<Vec<Waiting>, LibraryError> {
-        let ask = format!(
-            "select sobol_index, attempts from campaign_case {}
-            where campaign_id = $1 and state = 'waiting' and sobol_index >= $2 and sobol_index < $3
-            order by sobol_index limit $4 {}",
-            connection.dialect().by_state(),
-            connection.dialect().skipping_locked()
-        );
-        let ask = sql(ask)
+        let ask = sql(WAITING)
             .bind(campaign)
             .bind(from)
             .bind(self.request.indices_below)
             .bind(self.request.cases_max);
         let waiting = |row: &Row| {
-            Ok(Waiting { index: row.get_u32("sobol_index")?, attempts: row.get_u32("attempts")? })
+            let leased = Leased { case: case_of(row)?, epoch: row.get_u32("epoch")? + 1 };
+            Ok(Waiting { leased, attempts: row.get_u32("attempts")? })
         };
         connection.rows(ask).await?.iter().map(waiting).collect()
     }
@@ -154,17 +183,25 @@ impl Take {
 
 /// A case to be handed out.
 struct Waiting {
-    index: u32,
+    /// As it is once it is.
+    leased: Leased,
     attempts: u32,
 }
 
-/// Which of the first waiting cases go into one lease: each of those with so many attempts without
-/// result goes alone.
-fn share(waiting: &[Waiting], alone_after: u32) -> Vec<u32> {
-    match waiting {
-        [first, ..] if first.attempts >= alone_after => vec![first.index],
-        _ => waiting.iter().filter(|it| it.attempts < alone_after).map(|it| it.index).collect(),
+impl Waiting {
+    const fn index(&self) -> u32 {
+        self.leased.case.index
     }
+}
+
+/// Which of the first waiting cases go into one lease, and which don't: each of those with so many attempts without
+/// result goes alone.
+fn share(mut waiting: Vec<Waiting>, alone_after: u32) -> (Vec<Waiting>, Vec<Waiting>) {
+    if waiting.first().is_some_and(|first| first.attempts >= alone_after) {
+        let others = waiting.split_off(1);
+        return (waiting, others);
+    }
+    waiting.into_iter().partition(|it| it.attempts < alone_after)
 }
 
 /// A case whose lease has expired.
@@ -179,14 +216,8 @@ struct Expired {
 async fn end_expired(
     connection: &mut Connection,
     now_unix_ms: i64,
-    policy: Policy,
+    attempts_max: AttemptsMax,
 ) -> Result<(), LibraryError> {
-    let ask = format!(
-        "select campaign_id, sobol_index, attempts from campaign_case
-        where state = 'leased' and lease_expires_unix_ms <= $1
-        order by lease_expires_unix_ms limit $2 {}",
-        connection.dialect().skipping_locked()
-    );
     let expired = |row: &Row| {
         Ok(Expired {
             campaign: row.get("campaign_id")?,
@@ -194,14 +225,14 @@ async fn end_expired(
             attempts: row.get_u32("attempts")? + 1,
         })
     };
-    let rows = connection.rows(sql(ask).bind(now_unix_ms).bind(EXPIRED_MAX)).await?;
+    let rows = connection.rows(sql(EXPIRED).bind(now_unix_ms).bind(EXPIRED_MAX)).await?;
     let expired = rows.iter().map(expired).collect::<Result<Vec<_>, LibraryError>>()?;
     for ((campaign, attempts), indices) in alike(expired) {
         let ended = Ended {
             campaign: &campaign,
             indices,
             attempts,
-            state: policy(Ending::Lost, attempts),
+            state: attempts_max.after(Ending::Lost, attempts),
             ending: "lost",
             error: "the lease expired: its worker fell silent",
             now_unix_ms,

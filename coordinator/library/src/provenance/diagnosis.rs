@@ -1,7 +1,24 @@
 //! The tables `diagnosis`, `mismatch` and `hypothesis`.
 
 use crate::engine::{Connection, Value, Write, sql};
+use crate::library::Dated;
 use crate::{Library, LibraryError};
+
+/// Keeps a diagnosis; one that is there stays as it is.
+const INSERT: &str = "
+    insert into diagnosis (id, recording, verdict, code_version, document, created_at)
+    values ($1, $2, $3, $4, $5, $6) on conflict (id) do nothing";
+
+/// Keeps one of its mismatches.
+const INSERT_MISMATCH: &str = "
+    insert into mismatch (diagnosis_id, place, from_x_m, to_x_m, from_frequency_Hz, to_frequency_Hz, level_dB,
+        p_value)
+    values ($1, $2, $3, $4, $5, $6, $7, $8) on conflict (diagnosis_id, place) do nothing";
+
+/// Keeps one of its hypotheses.
+const INSERT_HYPOTHESIS: &str = "
+    insert into hypothesis (diagnosis_id, place, physics, probability, from_x_m, to_x_m, parameters)
+    values ($1, $2, $3, $4, $5, $6, $7) on conflict (diagnosis_id, place) do nothing";
 
 /// A diagnosed recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,26 +69,25 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
     pub async fn record_diagnosis(&self, record: DiagnosisRecord) -> Result<String, LibraryError> {
-        self.write(record).await
+        self.write_dated(record).await
     }
 }
 
-impl Write for DiagnosisRecord {
-    type Answer = String;
-
-    async fn apply(&self, connection: &mut Connection) -> Result<String, LibraryError> {
+impl DiagnosisRecord {
+    /// Stores it as of this time; answers its id.
+    pub(crate) async fn store(
+        &self,
+        connection: &mut Connection,
+        at: &str,
+    ) -> Result<String, LibraryError> {
         let id = super::id("tracktwin diagnosis 1", &[&self.recording, &self.document_json]);
-        let insert = format!(
-            "insert into diagnosis (id, recording, verdict, code_version, document, created_at)
-            values ($1, $2, $3, $4, $5, {}) on conflict (id) do nothing",
-            connection.dialect().now()
-        );
-        let insert = sql(insert)
+        let insert = sql(INSERT)
             .bind(&id)
             .bind(&self.recording)
             .bind(&self.verdict)
             .bind(&self.code_version)
-            .bind(&self.document_json);
+            .bind(&self.document_json)
+            .bind(at);
         connection.execute(insert).await?;
         for (place, mismatch) in (1..).zip(&self.mismatches) {
             mismatch.insert(connection, &id, place).await?;
@@ -83,6 +99,14 @@ impl Write for DiagnosisRecord {
     }
 }
 
+impl Write for Dated<DiagnosisRecord> {
+    type Answer = String;
+
+    async fn apply(&self, connection: &mut Connection) -> Result<String, LibraryError> {
+        self.it.store(connection, &self.at).await
+    }
+}
+
 impl MismatchRecord {
     async fn insert(
         &self,
@@ -90,10 +114,7 @@ impl MismatchRecord {
         id: &str,
         place: u32,
     ) -> Result<(), LibraryError> {
-        let insert = "insert into mismatch (diagnosis_id, place, from_x_m, to_x_m,
-                from_frequency_Hz, to_frequency_Hz, level_dB, p_value)
-            values ($1, $2, $3, $4, $5, $6, $7, $8) on conflict (diagnosis_id, place) do nothing";
-        let insert = sql(insert)
+        let insert = sql(INSERT_MISMATCH)
             .bind(id)
             .bind(place)
             .bind(self.x_m[0])
@@ -113,10 +134,7 @@ impl HypothesisRecord {
         id: &str,
         place: u32,
     ) -> Result<(), LibraryError> {
-        let insert = "insert into hypothesis (diagnosis_id, place, physics, probability, from_x_m,
-                to_x_m, parameters)
-            values ($1, $2, $3, $4, $5, $6, $7) on conflict (diagnosis_id, place) do nothing";
-        let insert = sql(insert)
+        let insert = sql(INSERT_HYPOTHESIS)
             .bind(id)
             .bind(place)
             .bind(&self.physics)

@@ -1,10 +1,16 @@
 //! The tables `evaluation` and `sleeper_estimate`.
 
 use crate::engine::{Connection, Value, Write, sql};
+use crate::library::Dated;
 use crate::{Library, LibraryError};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use tracktwin_parameters::Parameter;
+
+/// Keeps an evaluation; one that is there stays as it is.
+const INSERT: &str = "
+    insert into evaluation (id, recording, method, campaign_id, library_digest, code_version, document, created_at)
+    values ($1, $2, $3, $4, $5, $6, $7, $8) on conflict (id) do nothing";
 
 /// An evaluated recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,32 +53,28 @@ impl Library {
         &self,
         record: EvaluationRecord,
     ) -> Result<String, LibraryError> {
-        self.write(record).await
+        self.write_dated(record).await
     }
 }
 
-impl Write for EvaluationRecord {
+impl Write for Dated<EvaluationRecord> {
     type Answer = String;
 
     async fn apply(&self, connection: &mut Connection) -> Result<String, LibraryError> {
-        let texts = [&self.recording, &self.campaign, &self.document_json];
+        let record = &self.it;
+        let texts = [&record.recording, &record.campaign, &record.document_json];
         let id = super::id("tracktwin evaluation 1", &texts.map(String::as_str));
-        let insert = format!(
-            "insert into evaluation (id, recording, method, campaign_id, library_digest,
-                code_version, document, created_at)
-            values ($1, $2, $3, $4, $5, $6, $7, {}) on conflict (id) do nothing",
-            connection.dialect().now()
-        );
-        let insert = sql(insert)
+        let insert = sql(INSERT)
             .bind(&id)
-            .bind(&self.recording)
-            .bind(&self.method)
-            .bind(&self.campaign)
-            .bind(&self.library_digest)
-            .bind(&self.code_version)
-            .bind(&self.document_json);
+            .bind(&record.recording)
+            .bind(&record.method)
+            .bind(&record.campaign)
+            .bind(&record.library_digest)
+            .bind(&record.code_version)
+            .bind(&record.document_json)
+            .bind(&self.at);
         connection.execute(insert).await?;
-        for sleeper in &self.sleepers {
+        for sleeper in &record.sleepers {
             sleeper.insert(connection, &id).await?;
         }
         Ok(id)

@@ -1,8 +1,20 @@
 //! The tables `training` and `surrogate`.
 
 use crate::engine::{Connection, Write, sql};
+use crate::library::Dated;
 use crate::{Library, LibraryError};
 use tracktwin_parameters::Parameter;
+
+/// Keeps a training; one that is there stays as it is.
+const INSERT: &str = "
+    insert into training (id, campaign_id, library_digest, cases, seed, code_version, created_at)
+    values ($1, $2, $3, $4, $5, $6, $7) on conflict (id) do nothing";
+
+/// Keeps how well one of its surrogates does.
+const INSERT_SURROGATE: &str = "
+    insert into surrogate (training_id, feature, speeds_km_h, parameter, mase_test, mase_folds, coverage_90_test)
+    values ($1, $2, $3, $4, $5, $6, $7)
+    on conflict (training_id, feature, speeds_km_h, parameter) do nothing";
 
 /// Surrogates trained together.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +56,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
     pub async fn record_training(&self, record: TrainingRecord) -> Result<String, LibraryError> {
-        self.write(record).await
+        self.write_dated(record).await
     }
 }
 
@@ -62,32 +74,24 @@ impl TrainingRecord {
     }
 }
 
-impl Write for TrainingRecord {
+impl Write for Dated<TrainingRecord> {
     type Answer = String;
 
     async fn apply(&self, connection: &mut Connection) -> Result<String, LibraryError> {
-        let id = self.id();
-        let insert = format!(
-            "insert into training (id, campaign_id, library_digest, cases, seed, code_version,
-                created_at)
-            values ($1, $2, $3, $4, $5, $6, {}) on conflict (id) do nothing",
-            connection.dialect().now()
-        );
-        let insert = sql(insert)
+        let record = &self.it;
+        let id = record.id();
+        let insert = sql(INSERT)
             .bind(&id)
-            .bind(&self.campaign)
-            .bind(&self.library_digest)
-            .bind(self.cases)
-            .bind(crate::campaign::sql_seed(self.seed)?)
-            .bind(&self.code_version);
+            .bind(&record.campaign)
+            .bind(&record.library_digest)
+            .bind(record.cases)
+            .bind(crate::campaign::sql_seed(record.seed)?)
+            .bind(&record.code_version)
+            .bind(&self.at);
         connection.execute(insert).await?;
-        for it in &self.surrogates {
+        for it in &record.surrogates {
             let speeds = serde_json::to_string(&it.speeds_km_h).expect("numbers become JSON");
-            let insert = "insert into surrogate (training_id, feature, speeds_km_h, parameter,
-                    mase_test, mase_folds, coverage_90_test)
-                values ($1, $2, $3, $4, $5, $6, $7)
-                on conflict (training_id, feature, speeds_km_h, parameter) do nothing";
-            let insert = sql(insert)
+            let insert = sql(INSERT_SURROGATE)
                 .bind(&id)
                 .bind(&it.feature)
                 .bind(speeds)

@@ -1,6 +1,6 @@
 //! A row a case, and a row for the series of a pass, as a server has it.
 
-use super::{LEVEL_COLUMNS, of_report};
+use super::columns::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
 use crate::engine::{Connection, Value, sql};
 use crate::report::Report;
@@ -12,20 +12,22 @@ const CASES_A_STATEMENT: usize = 64;
 
 /// Rows of cases and passes out of lists: what is one for a report in $1 to $7 and $15, cases in $8 to $11,
 /// their levels ($12), series ($13) and shares of lost contact ($14) one after the other.
-const INSERT: &str = "with given as (
+const INSERT: &str = "
+    with given as (
         select sobol_index, duration_s, parameter_hash, checksum, cast(place as integer) as place
-        from unnest($8, $9, $10, $11) with ordinality
+        from unnest($8::bigint[], $9::double precision[], $10::text[], $11::text[]) with ordinality
             as of (sobol_index, duration_s, parameter_hash, checksum, place)),
     size as (
-        select cardinality($7) as passes, cardinality($12) / cardinality($8) as levels,
-            length($13) / (cardinality($8) * cardinality($7)) as bytes),
+        select cardinality($7::double precision[]) as passes,
+            cardinality($12::double precision[]) / cardinality($8) as levels,
+            length($13::bytea) / (cardinality($8) * cardinality($7)) as bytes),
     stored as (
         insert into case_result (campaign_id, worker, code_version, model_hash, experiment_hash,
             finished_at, speeds_km_h, sobol_index, duration_s, parameter_hash, checksum, levels_dB,
             contact_loss_shares, flagged)
         select $1, $2, $3, $4, $5, $6, $7, sobol_index, duration_s, parameter_hash, checksum,
             ($12)[levels * (place - 1) + 1:levels * place],
-            ($14)[passes * (place - 1) + 1:passes * place], $15
+            ($14::double precision[])[passes * (place - 1) + 1:passes * place], $15
         from given, size
         returning id, sobol_index)
     insert into case_series (result_id, speed_km_h, log_power)
@@ -70,7 +72,7 @@ pub(crate) async fn lock(
     indices: Vec<i64>,
 ) -> Result<u64, LibraryError> {
     let lock = "select sobol_index from campaign_case
-        where (campaign_id, sobol_index) in (select * from unnest($1, $2))
+        where (campaign_id, sobol_index) in (select * from unnest($1::text[], $2::bigint[]))
         order by campaign_id, sobol_index for update";
     connection.execute(sql(lock).bind(Value::Texts(campaigns)).bind(indices)).await
 }

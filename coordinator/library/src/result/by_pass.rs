@@ -1,6 +1,6 @@
 //! A row a pass, as a file has it.
 
-use super::{LEVEL_COLUMNS, of_report};
+use super::columns::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
 use crate::engine::{Connection, sql};
 use crate::report::Report;

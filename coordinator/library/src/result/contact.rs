@@ -1,7 +1,18 @@
 //! How many cases lost the rail.
 
-use crate::engine::{Dialect, sql};
+use crate::engine::{Text, sql};
 use crate::{Library, LibraryError};
+
+/// Cases of a campaign that lost the rail, and the largest share; both databases read an index of these cases alone.
+const LOST: Text = Text::Each {
+    sqlite: "
+        select count(distinct sobol_index) as cases, max(contact_loss_share) as share
+        from result where campaign_id = $1 and contact_loss_share > 0",
+    postgres: "
+        select count(*) as cases,
+            max((select max(share) from unnest(contact_loss_shares) as of (share))) as share
+        from case_result where campaign_id = $1 and 0 < any (contact_loss_shares)",
+};
 
 /// Cases of a campaign whose wheel was in the air for some of the recorded time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,19 +30,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
     pub async fn contact_loss(&self, campaign: &str) -> Result<ContactLoss, LibraryError> {
-        // Both read an index of these cases alone.
-        let ask = match self.readers().dialect() {
-            Dialect::Sqlite => {
-                "select count(distinct sobol_index) as cases, max(contact_loss_share) as share
-                from result where campaign_id = $1 and contact_loss_share > 0"
-            }
-            Dialect::Postgres => {
-                "select count(*) as cases,
-                    max((select max(share) from unnest(contact_loss_shares) as of (share))) as share
-                from case_result where campaign_id = $1 and 0 < any (contact_loss_shares)"
-            }
-        };
-        let Some(row) = self.readers().row(sql(ask).bind(campaign)).await? else {
+        let Some(row) = self.readers().row(sql(LOST).bind(campaign)).await? else {
             return Ok(ContactLoss::default());
         };
         let largest_share = row.get::<Option<f64>>("share")?.unwrap_or(0.0);

@@ -5,108 +5,44 @@
 
 mod by_case;
 mod by_pass;
+mod columns;
 mod contact;
+mod entry;
 mod stored;
+mod training_set;
 
 pub use contact::ContactLoss;
+pub use entry::LibraryEntry;
 
 pub(crate) use by_case::{gathering, lock};
+pub(crate) use columns::{LEVEL_COLUMNS, features_of};
 pub(crate) use stored::{Attested, Gathering, StoredCase, passes_of};
 
-use crate::engine::{Connection, Dialect, Row, Statement, iso_utc, sql};
+use crate::LibraryError;
+use crate::engine::{Connection, Dialect, Text, sql};
 use crate::report::Report;
-use crate::{Library, LibraryError};
 use tracktwin_experiment::PassFeatures;
-use tracktwin_parameters::Case;
 use tracktwin_protocol::CaseReport;
 use tracktwin_signal::Features;
 
-/// The columns of one-third-octave levels, ascending; 50 to 4000 Hz.
-pub(crate) const LEVEL_COLUMNS: [&str; 20] = [
-    "level_50_Hz_dB",
-    "level_63_Hz_dB",
-    "level_80_Hz_dB",
-    "level_100_Hz_dB",
-    "level_125_Hz_dB",
-    "level_160_Hz_dB",
-    "level_200_Hz_dB",
-    "level_250_Hz_dB",
-    "level_315_Hz_dB",
-    "level_400_Hz_dB",
-    "level_500_Hz_dB",
-    "level_630_Hz_dB",
-    "level_800_Hz_dB",
-    "level_1000_Hz_dB",
-    "level_1250_Hz_dB",
-    "level_1600_Hz_dB",
-    "level_2000_Hz_dB",
-    "level_2500_Hz_dB",
-    "level_3150_Hz_dB",
-    "level_4000_Hz_dB",
-];
+/// Takes the results of a campaign's ($1) cases ($2) away.
+const DISCARD: Text = Text::Each {
+    sqlite: "delete from result where campaign_id = $1 and sobol_index in (select value from json_each($2))",
+    postgres: "
+        with discarded as (
+            delete from case_result where campaign_id = $1 and sobol_index = any($2) returning id)
+        delete from case_series where result_id in (select id from discarded)",
+};
 
-/// A finished case: what went in and what came out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LibraryEntry {
-    /// The case.
-    pub case: Case,
-    /// Features, one a speed of the campaign, by ascending speed.
-    pub features: Vec<Features>,
-}
+/// How many results of a worker ($1) are not flagged.
+const UNFLAGGED: &str =
+    "select count(*) as results from result where worker = $1 and flagged is null";
 
-impl Library {
-    /// Hands every finished case of a campaign to `take`, by ascending index.
-    ///
-    /// One entry is held at a time, so a million cases need no more memory than one.
-    ///
-    /// # Errors
-    /// [`LibraryError`] when the library cannot be read, a case lacks a speed, or its results do not have
-    /// their checksum.
-    pub async fn training_set(
-        &self,
-        campaign: &str,
-        mut take: impl FnMut(LibraryEntry),
-    ) -> Result<(), LibraryError> {
-        let speeds = self.campaign(campaign).await?.speeds_km_h.len();
-        let complete = |case: StoredCase| complete(case, speeds).map(&mut take);
-        self.stored_cases(campaign, complete).await
-    }
-}
-
-fn complete(case: StoredCase, speeds: usize) -> Result<LibraryEntry, LibraryError> {
-    let (index, found) = (case.case.index, case.passes.len());
-    if found == speeds {
-        return case.entry();
-    }
-    Err(LibraryError::Damaged { what: format!("case {index} has {found} of {speeds} results") })
-}
-
-pub(crate) fn features_of(row: &Row) -> Result<Features, LibraryError> {
-    Ok(Features { log_power: row.doubles("log_power")?, band_levels_db: levels_of(row)? })
-}
-
-fn levels_of(row: &Row) -> Result<Vec<f64>, LibraryError> {
-    LEVEL_COLUMNS.iter().map(|&column| row.get(column)).collect()
-}
-
-/// Binds what both databases keep of a report: campaign, worker, version, model, experiment and time.
-fn of_report(insert: Statement, report: &Report) -> Statement {
-    insert
-        .bind(&report.campaign)
-        .bind(&report.worker)
-        .bind(&report.code_version)
-        .bind(&report.model_hash)
-        .bind(&report.experiment_hash)
-        .bind(iso_utc(report.now_unix_ms))
-}
-
-/// The table that results are written to.
-pub(crate) const fn table(dialect: Dialect) -> &'static str {
-    match dialect {
-        Dialect::Sqlite => "result",
-        Dialect::Postgres => "case_result",
-    }
-}
+/// Flags these, for this reason ($2).
+const FLAG: Text = Text::Each {
+    sqlite: "update result set flagged = $2 where worker = $1 and flagged is null",
+    postgres: "update case_result set flagged = $2 where worker = $1 and flagged is null",
+};
 
 /// Takes the results of cases away.
 pub(crate) async fn discard(
@@ -114,20 +50,18 @@ pub(crate) async fn discard(
     campaign: &str,
     indices: &[i64],
 ) -> Result<(), LibraryError> {
-    let dialect = connection.dialect();
-    let of = format!("campaign_id = $1 and sobol_index {}", dialect.listed("$2"));
-    let series = format!(
-        "delete from case_series where result_id in (select id from case_result where {of})"
-    );
-    let results = format!("delete from {} where {of}", table(dialect));
-    let both = match dialect {
-        Dialect::Sqlite => vec![results],
-        Dialect::Postgres => vec![series, results],
-    };
-    for delete in both {
-        connection.execute(sql(delete).bind(campaign).bind(indices.to_vec())).await?;
-    }
-    Ok(())
+    connection.execute(sql(DISCARD).bind(campaign).bind(indices.to_vec())).await.map(drop)
+}
+
+/// Flags all results of a worker that are not flagged; answers how many.
+pub(crate) async fn flag(
+    connection: &mut Connection,
+    worker: &str,
+    reason: &str,
+) -> Result<u64, LibraryError> {
+    let theirs = connection.row(sql(UNFLAGGED).bind(worker)).await?;
+    connection.execute(sql(FLAG).bind(worker).bind(reason)).await?;
+    theirs.map_or(Ok(0), |row| row.get_u32("results").map(u64::from))
 }
 
 /// Stores the results of cases that have none, flagged where there is a reason to.

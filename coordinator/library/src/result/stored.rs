@@ -1,6 +1,7 @@
 //! What is stored of a case, put together again from its passes, beside the checksum it came with.
 
-use super::{LibraryEntry, levels_of};
+use super::columns::levels_of;
+use super::entry::LibraryEntry;
 use crate::case::case_of;
 use crate::engine::{Row, Statement, sql};
 use crate::{Library, LibraryError};

@@ -1,7 +1,7 @@
 //! The library as plain tables: asked, copied, looked over.
 
 use crate::support::{CAMPAIGN, Home, failed, fill, finished, lease, on_both_databases, report};
-use sqlx::{Connection, PgConnection, SqliteConnection};
+use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
 use tracktwin_library::{Answer, Cell, Library, LibraryError, Table, Verdict};
 
 /// An answer, kept.
@@ -25,7 +25,7 @@ impl Answer for Kept {
     }
 }
 
-async fn ask(library: &Library, text: &str) -> Kept {
+pub(crate) async fn ask(library: &Library, text: &str) -> Kept {
     let mut kept = Kept::default();
     library.query(text, &mut kept).await.unwrap();
     kept
@@ -62,7 +62,8 @@ pub(crate) async fn copy(from: &Library, to: &Library) -> u64 {
 }
 
 /// Does something to the database behind the library's back.
-pub(crate) async fn sql(home: &Home, statement: &'static str) {
+pub(crate) async fn sql(home: &Home, statement: impl Into<String>) {
+    let statement = AssertSqlSafe(statement.into());
     if home.folder.is_some() {
         let mut connection = SqliteConnection::connect(&home.url).await.unwrap();
         sqlx::raw_sql(statement).execute(&mut connection).await.unwrap();

@@ -4,7 +4,7 @@ use tempfile::TempDir;
 use test_postgres::Server;
 use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_library::{
-    CampaignRecord, Ending, Held, LeaseRequest, Leased, Library, Report, State, Verdict,
+    AttemptsMax, CampaignRecord, Held, LeaseRequest, Leased, Library, Report, Verdict,
 };
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 use tracktwin_protocol::{CaseReport, checksum};
@@ -15,9 +15,8 @@ pub(crate) const CAMPAIGN: &str = "test-000000000000";
 /// Attempts before a case is given up, in these tests.
 pub(crate) const ATTEMPTS_MAX: u32 = 3;
 
-pub(crate) fn policy(_: Ending, attempts: u32) -> State {
-    if attempts < ATTEMPTS_MAX { State::Waiting } else { State::Failed }
-}
+/// The same, as the library is told.
+pub(crate) const GIVE_UP: AttemptsMax = AttemptsMax { failed: ATTEMPTS_MAX, lost: ATTEMPTS_MAX };
 
 /// Where a test's library is: nobody else's.
 pub(crate) struct Home {
@@ -143,7 +142,7 @@ pub(crate) fn request(worker: &str, max: u32, now: i64) -> LeaseRequest {
         held: Vec::new(),
         now_unix_ms: now,
         lease_ms: 1000,
-        after_loss: policy,
+        attempts_max: GIVE_UP,
         alone_after: u32::MAX,
     }
 }
@@ -207,7 +206,7 @@ pub(crate) fn message(worker: &str, cases: Vec<CaseReport>) -> Report {
         speeds_km_h: record().speeds_km_h,
         cases,
         now_unix_ms: 1_700_000_000_000,
-        after_failure: policy,
+        attempts_max: GIVE_UP,
         audit_share: 0.0,
     }
 }

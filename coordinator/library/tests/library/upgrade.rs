@@ -1,6 +1,6 @@
 //! Libraries that earlier programs wrote are brought up to date, and hold what they held.
 
-use crate::support::{Home, policy};
+use crate::support::{GIVE_UP, Home};
 use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
 use tracktwin_library::{LeaseRequest, Library, State, Status};
 
@@ -45,7 +45,7 @@ async fn a_library_of_the_first_schema_is_gone_on_with() {
         // Its lease has expired long ago.
         now_unix_ms: library.now_unix_ms(),
         lease_ms: 1000,
-        after_loss: policy,
+        attempts_max: GIVE_UP,
         alone_after: u32::MAX,
     };
     let lease = library.lease(request).await.unwrap().unwrap();

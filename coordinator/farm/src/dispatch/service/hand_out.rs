@@ -3,7 +3,7 @@
 use super::{Dispatch, unix_ms};
 use crate::dispatch::campaigns::{DispatchError, Served};
 use crate::dispatch::messages::unavailable;
-use crate::dispatch::{SUSPECT_AFTER, after_attempt};
+use crate::dispatch::{ATTEMPTS_MAX, SUSPECT_AFTER};
 use std::time::Duration;
 use tokio::time::Instant;
 use tonic::Status;
@@ -42,7 +42,7 @@ impl Dispatch {
             held: self.held_here(),
             now_unix_ms: self.now_unix_ms(),
             lease_ms: unix_ms(self.settings.timing.lease),
-            after_loss: after_attempt,
+            attempts_max: ATTEMPTS_MAX,
             alone_after: SUSPECT_AFTER,
         };
         let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;

@@ -4,7 +4,7 @@ mod hand_out;
 mod take_in;
 
 use super::Counts;
-use super::audits::{self, Audits};
+use super::audits::{Audits, LeaseKind};
 use super::campaigns::{Campaigns, DispatchError};
 use super::messages::{held, malformed, unavailable, unfit};
 use super::roster::{Roster, Standing};
@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 use tokio::time::Instant;
 use tonic::{Request, Response, Status};
-use tracktwin_library::{self as library, Library, WorkerState};
+use tracktwin_library::{self as library, Held, Library, WorkerState};
 use tracktwin_protocol::farm::farm_server::Farm;
 use tracktwin_protocol::{BadMessage, CaseReport, Lease, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
@@ -73,7 +73,7 @@ impl Dispatch {
     async fn note(&self, worker: &str) -> Result<(), Status> {
         let known = self.library.heartbeat(worker, self.now_unix_ms()).await;
         if let Some(record) = known.map_err(|error| unavailable(&error))? {
-            self.roster.quarantine(worker, record.state, record.reason);
+            self.roster.set_quarantine(worker, record.quarantine());
         }
         Ok(())
     }
@@ -107,8 +107,8 @@ impl Farm for Dispatch {
         let state = self.library.register_worker(registration).await;
         if state.map_err(|error| unavailable(&error))? == WorkerState::Quarantined {
             let record = self.library.worker(&worker).await.map_err(|error| unavailable(&error))?;
-            let reason = record.and_then(|record| record.reason);
-            self.roster.quarantine(&worker, WorkerState::Quarantined, reason);
+            let reason = record.and_then(library::WorkerRecord::quarantine);
+            self.roster.set_quarantine(&worker, reason);
         }
         self.counts.registered.inc();
         let heartbeat_s = self.settings.timing.heartbeat.as_secs_f64();
@@ -153,7 +153,8 @@ impl Farm for Dispatch {
         let [worker, campaign_id] = names(worker, campaign_id)?;
         let until = self.now_unix_ms().saturating_add(unix_ms(self.settings.timing.lease));
         // Audits are not leases of the library, and long enough.
-        let held = held(cases)?.into_iter().filter(|held| held.epoch != audits::EPOCH).collect();
+        let is_case = |held: &Held| LeaseKind::of(held.epoch) == LeaseKind::Case;
+        let held = held(cases)?.into_iter().filter(is_case).collect();
         let lost = self.library.renew(&campaign_id, &worker, held, until).await;
         let lost = lost.map_err(|error| unavailable(&error))?;
         if self.roster.standing(&worker).is_some_and(|standing| standing.to_be_noted) {
@@ -204,8 +205,9 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::ReleaseResponse>, Status> {
         let farm::ReleaseRequest { worker, campaign_id, cases } = request.into_inner();
         let [worker, campaign_id] = names(worker, campaign_id)?;
-        let (audits, held): (Vec<_>, Vec<_>) =
-            held(cases)?.into_iter().partition(|held| held.epoch == audits::EPOCH);
+        let (audits, held): (Vec<_>, Vec<_>) = held(cases)?
+            .into_iter()
+            .partition(|held| LeaseKind::of(held.epoch) == LeaseKind::Audit);
         if !audits.is_empty() {
             let indices = audits.into_iter().map(|held| held.index).collect();
             let released = self.audits.release(&worker, &campaign_id, indices).await;

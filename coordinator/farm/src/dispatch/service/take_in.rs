@@ -1,15 +1,15 @@
 //! Workers' results, into the library.
 
 use super::Dispatch;
-use crate::dispatch::after_attempt;
-use crate::dispatch::audits::{self, Found};
+use crate::dispatch::ATTEMPTS_MAX;
+use crate::dispatch::audits::{Found, LeaseKind};
 use crate::dispatch::campaigns::Served;
 use crate::dispatch::messages::{unavailable, verdict_message};
 use crate::dispatch::roster::Standing;
 use std::sync::Arc;
 use tonic::Status;
 use tracktwin_experiment::Outcome;
-use tracktwin_library::{Report, Verdict, WorkerState};
+use tracktwin_library::{Report, Verdict};
 use tracktwin_protocol::{CaseReport, farm};
 use tracktwin_traces::Step;
 
@@ -32,11 +32,14 @@ impl Dispatch {
                 self.counts.malformed.inc();
                 continue;
             };
-            if report.epoch == audits::EPOCH {
-                verdicts[place] = verdict_message(self.audited(worker, served, report).await?);
-            } else {
-                places.push(place);
-                ordinary.push(report);
+            match LeaseKind::of(report.epoch) {
+                LeaseKind::Audit => {
+                    verdicts[place] = verdict_message(self.audited(worker, served, report).await?);
+                }
+                LeaseKind::Case => {
+                    places.push(place);
+                    ordinary.push(report);
+                }
             }
         }
         if !ordinary.is_empty() {
@@ -69,7 +72,7 @@ impl Dispatch {
             speeds_km_h: served.shape.speeds_km_h.clone(),
             cases: reports,
             now_unix_ms: self.now_unix_ms(),
-            after_failure: after_attempt,
+            attempts_max: ATTEMPTS_MAX,
             audit_share: self.settings.audit_share,
         };
         let verdicts = self.library.report(report).await.map_err(|error| {
@@ -113,7 +116,7 @@ impl Dispatch {
             Some(Found::Wrong { worker, reason }) => {
                 self.counts.audited.inc();
                 self.counts.differed.inc();
-                self.roster.quarantine(&worker, WorkerState::Quarantined, Some(reason));
+                self.roster.set_quarantine(&worker, Some(reason));
                 Verdict::Duplicate
             }
         })

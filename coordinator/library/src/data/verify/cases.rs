@@ -2,51 +2,71 @@
 
 use super::{Fault, Survey};
 use crate::case::case_of;
-use crate::engine::sql;
+use crate::engine::{Text, sql};
 use crate::{CampaignRecord, LibraryError};
 use tokio_stream::StreamExt;
 
 /// Statements that find the indices of cases with a fault; `$1` is the campaign.
-const FAULTS: [(&str, &str); 7] = [
+const FAULTS: [(&str, Text); 7] = [
     (
         "finished cases without result at every speed",
-        "select sobol_index from campaign_case where campaign_id = $1 and state = 'finished'
-            and (select count(*) from result where result.campaign_id = campaign_case.campaign_id
-                and result.sobol_index = campaign_case.sobol_index)
-            <> (select {speeds} from campaign where id = $1)",
+        Text::Each {
+            sqlite: "
+                select sobol_index from campaign_case where campaign_id = $1 and state = 'finished'
+                    and (select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                        and result.sobol_index = campaign_case.sobol_index)
+                    <> (select json_array_length(speeds_km_h) from campaign where id = $1)",
+            postgres: "
+                select sobol_index from campaign_case where campaign_id = $1 and state = 'finished'
+                    and (select count(*) from result where result.campaign_id = campaign_case.campaign_id
+                        and result.sobol_index = campaign_case.sobol_index)
+                    <> (select jsonb_array_length(speeds_km_h::jsonb) from campaign where id = $1)",
+        },
     ),
     (
         "results of cases that are not finished",
-        "select distinct sobol_index from result join campaign_case using (campaign_id, sobol_index)
+        Text::same(
+            "select distinct sobol_index from result join campaign_case using (campaign_id, sobol_index)
         where campaign_id = $1 and campaign_case.state <> 'finished'",
+        ),
     ),
     (
         "results of other parameters than their case has",
-        "select distinct sobol_index from result join campaign_case using (campaign_id, sobol_index)
+        Text::same(
+            "select distinct sobol_index from result join campaign_case using (campaign_id, sobol_index)
         where campaign_id = $1 and result.parameter_hash <> campaign_case.parameter_hash",
+        ),
     ),
     (
         "results of another experiment than the campaign's",
-        "select distinct sobol_index from result
+        Text::same(
+            "select distinct sobol_index from result
         where campaign_id = $1
             and experiment_hash <> (select experiment_hash from campaign where id = $1)",
+        ),
     ),
     (
         "cases with the parameters and surface of an earlier one",
-        "select max(sobol_index) as sobol_index from campaign_case where campaign_id = $1
+        Text::same(
+            "select max(sobol_index) as sobol_index from campaign_case where campaign_id = $1
         group by parameter_hash having count(*) > 1",
+        ),
     ),
     (
         "gaps in the cases' indices",
-        "select sobol_index from campaign_case as after_gap
+        Text::same(
+            "select sobol_index from campaign_case as after_gap
         where campaign_id = $1 and sobol_index > 0 and not exists (
             select 1 from campaign_case as before_gap where before_gap.campaign_id = $1
                 and before_gap.sobol_index = after_gap.sobol_index - 1)",
+        ),
     ),
     (
         "leases that their case never had",
-        "select distinct sobol_index from attempt join campaign_case using (campaign_id, sobol_index)
+        Text::same(
+            "select distinct sobol_index from attempt join campaign_case using (campaign_id, sobol_index)
         where campaign_id = $1 and attempt.epoch not between 1 and campaign_case.epoch",
+        ),
     ),
 ];
 
@@ -54,8 +74,7 @@ impl<F: FnMut()> Survey<'_, F> {
     pub(super) async fn faults(&mut self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
         let readers = self.library.readers();
         for (what, ask) in FAULTS {
-            let speeds = readers.dialect().json_length("speeds_km_h");
-            let ask = sql(ask.replace("{speeds}", &speeds)).bind(&campaign.id);
+            let ask = sql(ask).bind(&campaign.id);
             let mut fault = Fault::default();
             let mut rows = readers.stream(ask);
             while let Some(row) = rows.next().await {

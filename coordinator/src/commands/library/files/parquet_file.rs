@@ -45,12 +45,12 @@ impl ParquetFile {
         rows: &[Vec<Cell>],
     ) -> Result<(), ParquetError> {
         let mut group = self.writer.next_row_group()?;
-        for place in 0..self.columns.len() {
+        for (place, Column { kind, .. }) in self.columns.iter().enumerate() {
             let cells = rows.iter().map(|row| &row[place]);
             let mut column = group
                 .next_column()?
                 .ok_or_else(|| ParquetError::General("the file has too few columns".to_owned()))?;
-            write_column(column.untyped(), cells)?;
+            write_column(column.untyped(), *kind, cells)?;
             column.close()?;
         }
         group.close().map(drop)
@@ -80,43 +80,40 @@ fn message_type(table: &Table) -> String {
 
 fn write_column<'a>(
     column: &mut ColumnWriter<'_>,
+    kind: ColumnKind,
     cells: impl Iterator<Item = &'a Cell> + Clone,
 ) -> Result<(), ParquetError> {
     let levels: Vec<i16> =
         cells.clone().map(|cell| PRESENT * i16::from(*cell != Cell::Null)).collect();
-    match column {
-        ColumnWriter::ByteArrayColumnWriter(column) => {
+    match (column, kind) {
+        (ColumnWriter::ByteArrayColumnWriter(column), ColumnKind::Text) => {
             let texts = cells.filter_map(|cell| match cell {
                 Cell::Text(text) => Some(ByteArray::from(text.as_str())),
                 _ => None,
             });
             column.write_batch(&texts.collect::<Vec<_>>(), Some(&levels), None)
         }
-        ColumnWriter::Int64ColumnWriter(column) => {
+        (ColumnWriter::Int64ColumnWriter(column), ColumnKind::Integer) => {
             let integers = cells.filter_map(|cell| match cell {
                 Cell::Integer(integer) => Some(*integer),
                 _ => None,
             });
             column.write_batch(&integers.collect::<Vec<_>>(), Some(&levels), None)
         }
-        ColumnWriter::DoubleColumnWriter(column) if !is_list(cells.clone()) => {
+        (ColumnWriter::DoubleColumnWriter(column), ColumnKind::Real) => {
             let reals = cells.filter_map(|cell| match cell {
                 Cell::Real(real) => Some(*real),
                 _ => None,
             });
             column.write_batch(&reals.collect::<Vec<_>>(), Some(&levels), None)
         }
-        ColumnWriter::DoubleColumnWriter(column) => {
+        (ColumnWriter::DoubleColumnWriter(column), ColumnKind::Doubles) => {
             let lists = Lists::of(cells);
             column.write_batch(&lists.values, Some(&lists.defined), Some(&lists.repeated))
         }
         _ => Err(ParquetError::General("a column of an unknown type".to_owned())),
     }
     .map(drop)
-}
-
-fn is_list<'a>(mut cells: impl Iterator<Item = &'a Cell>) -> bool {
-    cells.any(|cell| matches!(cell, Cell::Doubles(_)))
 }
 
 /// Lists as Parquet has them: all values in a row, and for each whether it is there and whether it
@@ -256,4 +253,33 @@ fn with_gaps(values: impl IntoIterator<Item = Cell>, levels: &[i16]) -> Vec<Cell
         _ => Cell::Null,
     };
     levels.iter().map(cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_column_of_lists_without_any_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("series.parquet");
+        let table = Table::named("stored_array").unwrap();
+        let of = |kind| {
+            if kind == ColumnKind::Doubles { Cell::Doubles(vec![1.5, 2.0]) } else { Cell::Null }
+        };
+        let empty = vec![vec![Cell::Null; table.columns.len()]; 2];
+        let full = vec![table.columns.iter().map(|column| of(column.kind)).collect::<Vec<_>>()];
+        let mut file = ParquetFile::create(&path, table).unwrap();
+        for rows in [&empty, &full] {
+            file.write(rows).unwrap();
+        }
+        file.end().unwrap();
+        let mut found = Vec::new();
+        let take = async |rows: Vec<Vec<Cell>>| {
+            found.extend(rows);
+            Ok::<(), ParquetError>(())
+        };
+        read(&path, table, take).await.unwrap();
+        assert_eq!(found, [empty, full].concat());
+    }
 }

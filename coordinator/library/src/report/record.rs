@@ -1,65 +1,46 @@
-//! Taking reports: each case's first result is stored, and whatever comes later changes nothing.
+//! What a report changes, in one transaction.
 
+use super::{Report, Verdict};
 use crate::attempt::{self, Ended};
-use crate::engine::{Connection, Row, Write, sql};
+use crate::engine::{Connection, Row, Text, Write, sql};
 use crate::result::insert_results;
+use crate::state::Ending;
 use crate::tally::Tally;
-use crate::{Ending, Held, Library, LibraryError, Policy, State, audit};
+use crate::{Held, LibraryError, State, audit};
 use std::collections::{HashMap, HashSet};
 use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_protocol::CaseReport;
 
-/// What a worker hands in.
-#[derive(Clone, Debug)]
-pub struct Report {
-    /// The campaign.
-    pub campaign: String,
-    /// Who reports.
-    pub worker: String,
-    /// Version of the worker's program.
-    pub code_version: String,
-    /// Hash of the worker's physics.
-    pub model_hash: String,
-    /// Hash of the experiment.
-    pub experiment_hash: String,
-    /// The speeds of the experiment in km/h, as many as every case has passes.
-    pub speeds_km_h: Vec<f64>,
-    /// The cases, each with the checksum that came with it.
-    pub cases: Vec<CaseReport>,
-    /// The library's clock.
-    pub now_unix_ms: i64,
-    /// What becomes of cases that could not be simulated.
-    pub after_failure: Policy,
-    /// Share of the stored cases that another worker is to simulate again, 0 to 1.
-    pub audit_share: f64,
-}
+/// Where cases ($2) of a campaign stand, locked against others until this transaction ends.
+const STANDINGS: Text = Text::Each {
+    sqlite: "
+        select sobol_index, state, epoch, attempts, worker, parameter_hash from campaign_case
+        where campaign_id = $1 and sobol_index in (select value from json_each($2)) order by sobol_index",
+    postgres: "
+        select sobol_index, state, epoch, attempts, worker, parameter_hash from campaign_case
+        where campaign_id = $1 and sobol_index = any($2) order by sobol_index for update",
+};
 
-/// What was done with the report of a case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// Stored.
-    Stored,
-    /// A result was there already; nothing changed.
-    Duplicate,
-    /// The failure of a lease that has ended; nothing changed.
-    Late,
-    /// No such case, never leased so to this worker, or other parameters than the case has; nothing
-    /// changed.
-    Refused,
-}
+/// Leases of cases ($3) that a worker ($2) had, and that ended without result.
+const EARLIER_LEASES: Text = Text::Each {
+    sqlite:
+        "
+        select sobol_index, epoch from attempt
+        where campaign_id = $1 and worker = $2 and sobol_index in (select value from json_each($3))",
+    postgres: "
+        select sobol_index, epoch from attempt
+        where campaign_id = $1 and worker = $2 and sobol_index = any($3)",
+};
 
-impl Library {
-    /// Stores what a worker reports, one verdict a case. Repeating it changes nothing.
-    ///
-    /// A result is stored if there is none yet, even when its lease has expired: it is the same
-    /// result. A failure counts only under the lease it happened in.
-    ///
-    /// # Errors
-    /// [`LibraryError`] when the library cannot be written; then nothing is stored.
-    pub async fn report(&self, report: Report) -> Result<Vec<Verdict>, LibraryError> {
-        self.write(report).await
-    }
-}
+/// Says that cases ($3) are finished, by this worker ($2).
+const FINISH: Text = Text::Each {
+    sqlite: "
+        update campaign_case set state = 'finished', worker = $2, error = null, lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index in (select value from json_each($3))",
+    postgres: "
+        update campaign_case set state = 'finished', worker = $2, error = null, lease_expires_unix_ms = null
+        where campaign_id = $1 and sobol_index = any($3)",
+};
 
 impl Write for Report {
     type Answer = Vec<Verdict>;
@@ -114,14 +95,7 @@ impl Report {
         &self,
         connection: &mut Connection,
     ) -> Result<HashMap<u32, Standing>, LibraryError> {
-        let dialect = connection.dialect();
-        let ask = format!(
-            "select sobol_index, state, epoch, attempts, worker, parameter_hash from campaign_case
-            where campaign_id = $1 and sobol_index {} order by sobol_index {}",
-            dialect.listed("$2"),
-            dialect.locking()
-        );
-        let ask = sql(ask).bind(&self.campaign).bind(self.indices(|_| true));
+        let ask = sql(STANDINGS).bind(&self.campaign).bind(self.indices(|_| true));
         let standing = |row: &Row| {
             let standing = Standing {
                 state: State::from_name(&row.get::<String>("state")?)?,
@@ -148,12 +122,7 @@ impl Report {
         if late.is_empty() {
             return Ok(HashSet::new());
         }
-        let ask = format!(
-            "select sobol_index, epoch from attempt
-            where campaign_id = $1 and worker = $2 and sobol_index {}",
-            connection.dialect().listed("$3")
-        );
-        let ask = sql(ask).bind(&self.campaign).bind(&self.worker).bind(late);
+        let ask = sql(EARLIER_LEASES).bind(&self.campaign).bind(&self.worker).bind(late);
         let held = |row: &Row| {
             Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? })
         };
@@ -197,7 +166,7 @@ impl Report {
     ) -> Result<State, LibraryError> {
         let failures =
             attempt::failures(connection, self, case.index, standing.attempts).await? + 1;
-        let state = (self.after_failure)(Ending::Failed, failures);
+        let state = self.attempts_max.after(Ending::Failed, failures);
         let ended = Ended {
             campaign: &self.campaign,
             indices: vec![case.index.into()],
@@ -221,15 +190,9 @@ impl Report {
             return Ok(());
         }
         insert_results(connection, self, finished, flagged).await?;
-        let update = format!(
-            "update campaign_case set state = 'finished', worker = $2, error = null,
-                lease_expires_unix_ms = null
-            where campaign_id = $1 and sobol_index {}",
-            connection.dialect().listed("$3")
-        );
         let indices = finished.iter().map(|(case, _)| i64::from(case.index)).collect::<Vec<_>>();
         connection
-            .execute(sql(update).bind(&self.campaign).bind(&self.worker).bind(indices))
+            .execute(sql(FINISH).bind(&self.campaign).bind(&self.worker).bind(indices))
             .await?;
         audit::sample(connection, self, finished.iter().map(|(case, _)| *case)).await
     }

@@ -1,0 +1,85 @@
+//! The schema of a library in a file: numbered migrations, and views.
+
+use super::views;
+use crate::LibraryError;
+use sqlx::migrate::{MigrateError, Migrator};
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{ConnectOptions, Connection as _, SqliteConnection, SqliteExecutor};
+use std::path::Path;
+
+static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations/sqlite");
+
+/// Brings the schema up to date.
+pub(super) async fn bring_up_to_date(
+    connection: &mut SqliteConnection,
+    path: &Path,
+) -> Result<(), LibraryError> {
+    let known = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or(0);
+    let newer = |error| match error {
+        MigrateError::VersionMissing(found) if found > known => {
+            LibraryError::NewerSchema { library: path.display().to_string(), found, known }
+        }
+        other => other.into(),
+    };
+    // Fails where there is no such table yet.
+    let ask = sqlx::query_scalar("select max(version) from _sqlx_migrations");
+    let found: i64 = ask.fetch_one(&mut *connection).await.unwrap_or(0);
+    if found >= known {
+        MIGRATIONS.run(&mut *connection).await.map_err(newer)?;
+        return views::made(renew_views(connection).await, &path.display().to_string());
+    }
+    if found > 0 {
+        refuse_malformed(&mut *connection).await?;
+    }
+    // One of those who open it at once does it; the others wait, and find it done.
+    let mut alone = connection.begin_with("begin immediate").await?;
+    MIGRATIONS.run(&mut *alone).await.map_err(newer)?;
+    sqlx::raw_sql(views::SQLITE).execute(&mut *alone).await?;
+    Ok(alone.commit().await?)
+}
+
+/// Makes the views anew where they are of an earlier version.
+async fn renew_views(connection: &mut SqliteConnection) -> Result<(), LibraryError> {
+    if views_version(&mut *connection).await? >= views::VERSION {
+        return Ok(());
+    }
+    refuse_malformed(&mut *connection).await?;
+    let mut alone = connection.begin_with("begin immediate").await?;
+    if views_version(&mut *alone).await? < views::VERSION {
+        sqlx::raw_sql(views::SQLITE).execute(&mut *alone).await?;
+    }
+    Ok(alone.commit().await?)
+}
+
+/// Version of the views that are there; 0 for those that migrations made.
+async fn views_version<'c>(connection: impl SqliteExecutor<'c>) -> Result<i64, LibraryError> {
+    Ok(sqlx::query_scalar("select user_version from pragma_user_version")
+        .fetch_one(connection)
+        .await?)
+}
+
+/// Refuses a file whose pages do not fit together, before anything is written to it.
+///
+/// # Errors
+/// [`LibraryError::Malformed`] with the first thing that `SQLite` finds.
+pub(super) async fn refuse_malformed<'c>(
+    connection: impl SqliteExecutor<'c>,
+) -> Result<(), LibraryError> {
+    let found: String = sqlx::query_scalar("pragma quick_check(1)").fetch_one(connection).await?;
+    if found == "ok" {
+        return Ok(());
+    }
+    let last = found.lines().last().unwrap_or_default();
+    Err(LibraryError::Malformed { reason: last.to_owned() })
+}
+
+/// Kind, name and text of what the present schema consists of.
+pub(crate) async fn schema_objects() -> Result<Vec<(String, String, String)>, LibraryError> {
+    let mut memory = SqliteConnectOptions::new().in_memory(true).connect().await?;
+    MIGRATIONS.run(&mut memory).await?;
+    sqlx::raw_sql(views::SQLITE).execute(&mut memory).await?;
+    let ask = "select type, name, sql from sqlite_schema where sql is not null";
+    let objects = sqlx::query_as(ask).fetch_all(&mut memory).await?;
+    memory.close().await?;
+    Ok(objects)
+}

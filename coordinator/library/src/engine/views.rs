@@ -1,0 +1,41 @@
+//! The views: one file a database, outside the numbered migrations.
+//!
+//! Opening a library makes them anew where those that are there are of an earlier version.
+
+use crate::LibraryError;
+
+/// Version of both files; to be raised with every change of one, as a test demands.
+pub(super) const VERSION: i64 = 1;
+
+pub(super) const SQLITE: &str = include_str!("../../../../migrations/sqlite/views.sql");
+pub(super) const POSTGRES: &str = include_str!("../../../../migrations/postgres/views.sql");
+
+/// Takes what kept somebody from making views anew for a warning, where those that are there do: for who may only
+/// read, and for who opens a malformed library to see what is left of it.
+///
+/// # Errors
+/// Whatever else went wrong.
+pub(super) fn made(done: Result<(), LibraryError>, library: &str) -> Result<(), LibraryError> {
+    use LibraryError::{Busy, DiskFull, Malformed, NotWritable};
+    match done {
+        Err(error @ (Busy | DiskFull | Malformed { .. } | NotWritable { .. })) => {
+            tracing::warn!(
+                "library {library}: its views are an earlier program's, and stay so: {error}"
+            );
+            Ok(())
+        }
+        done => done,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_file_leaves_its_version_behind() {
+        assert!(SQLITE.ends_with(&format!("pragma user_version = {VERSION};\n")));
+        let comment = format!("comment on view campaign_status is 'views of version {VERSION}';\n");
+        assert!(POSTGRES.ends_with(&comment));
+    }
+}

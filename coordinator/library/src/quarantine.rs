@@ -1,0 +1,76 @@
+//! Quarantine: who is in it gets no cases.
+
+use crate::engine::{Connection, Write, sql};
+use crate::{Library, LibraryError, WorkerState, result};
+
+impl Library {
+    /// Puts a worker into quarantine: it gets no more cases, and its results are flagged with the
+    /// reason; answers how many. [`crate::Retry::Flagged`] has them computed again.
+    ///
+    /// # Errors
+    /// [`LibraryError::UnknownWorker`], or when the library cannot be written.
+    pub async fn flag_worker(&self, worker: &str, reason: &str) -> Result<u64, LibraryError> {
+        self.write(Flag { worker: worker.to_owned(), reason: reason.to_owned() }).await
+    }
+
+    /// Gives cases to a worker again. Its flagged results stay flagged.
+    ///
+    /// # Errors
+    /// [`LibraryError::UnknownWorker`], or when the library cannot be written.
+    pub async fn pardon_worker(&self, worker: &str) -> Result<(), LibraryError> {
+        self.write(Pardon { worker: worker.to_owned() }).await
+    }
+}
+
+/// Sets a worker's state and the reason for it.
+const SET: &str = "update worker set state = $2, reason = $3, failures_in_a_row = 0 where id = $1";
+
+/// Puts a worker into quarantine for a reason, or lifts it.
+async fn set_quarantine(
+    connection: &mut Connection,
+    worker: &str,
+    reason: Option<String>,
+) -> Result<(), LibraryError> {
+    let state = if reason.is_some() { WorkerState::Quarantined } else { WorkerState::Active };
+    let set = sql(SET).bind(worker).bind(state.name()).bind(reason);
+    if connection.execute(set).await? == 0 {
+        return Err(LibraryError::UnknownWorker { id: worker.to_owned() });
+    }
+    Ok(())
+}
+
+/// Lifts it.
+struct Pardon {
+    worker: String,
+}
+
+impl Write for Pardon {
+    type Answer = ();
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
+    async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+        set_quarantine(connection, &self.worker, None).await
+    }
+}
+
+/// Imposes it, and flags the worker's results.
+pub(crate) struct Flag {
+    pub(crate) worker: String,
+    pub(crate) reason: String,
+}
+
+impl Write for Flag {
+    type Answer = u64;
+
+    fn worker(&self) -> Option<&str> {
+        Some(&self.worker)
+    }
+
+    async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
+        set_quarantine(connection, &self.worker, Some(self.reason.clone())).await?;
+        result::flag(connection, &self.worker, &self.reason).await
+    }
+}

@@ -1,0 +1,32 @@
+//! What surrogates are trained on.
+
+use super::entry::LibraryEntry;
+use super::stored::StoredCase;
+use crate::{Library, LibraryError};
+
+impl Library {
+    /// Hands every finished case of a campaign to `take`, by ascending index.
+    ///
+    /// One entry is held at a time, so a million cases need no more memory than one.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the library cannot be read, a case lacks a speed, or its results do not have
+    /// their checksum.
+    pub async fn training_set(
+        &self,
+        campaign: &str,
+        mut take: impl FnMut(LibraryEntry),
+    ) -> Result<(), LibraryError> {
+        let speeds = self.campaign(campaign).await?.speeds_km_h.len();
+        let complete = |case: StoredCase| complete(case, speeds).map(&mut take);
+        self.stored_cases(campaign, complete).await
+    }
+}
+
+fn complete(case: StoredCase, speeds: usize) -> Result<LibraryEntry, LibraryError> {
+    let (index, found) = (case.case.index, case.passes.len());
+    if found == speeds {
+        return case.entry();
+    }
+    Err(LibraryError::Damaged { what: format!("case {index} has {found} of {speeds} results") })
+}

@@ -1,0 +1,272 @@
+//! What a lease, a report and an audit do, statement by statement, and how each database goes about it. The
+//! account in words is docs/lease-protocol.md.
+
+use crate::snapshot::assert_kept;
+use crate::support::{CAMPAIGN, Home, failed, fill, finished, lease, message, report, request};
+use crate::workers::registration;
+use sqlx::{AssertSqlSafe, Connection, PgConnection, Row, SqliteConnection};
+use std::fmt::Write as _;
+use std::sync::{Arc, Mutex};
+use tracing::field::{Field, Visit};
+use tracing::span::{Attributes, Id, Record};
+use tracing::{Event, Metadata, Subscriber};
+use tracktwin_library::{AuditFinding, Held, LeaseRequest, Library, Report};
+
+/// The server whose plans are kept: another one may plan otherwise.
+const POSTGRES_VERSION: &str = "15";
+
+/// Keeps the statements of connections that write.
+#[derive(Clone, Default)]
+struct Listener(Arc<Mutex<Vec<String>>>);
+
+impl Listener {
+    /// What was said since it was asked last.
+    fn heard(&self) -> Vec<String> {
+        std::mem::take(&mut self.0.lock().unwrap())
+    }
+}
+
+impl Subscriber for Listener {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        metadata.target() == "tracktwin_library::statements"
+    }
+
+    fn new_span(&self, _: &Attributes<'_>) -> Id {
+        Id::from_u64(1)
+    }
+
+    fn record(&self, _: &Id, _: &Record<'_>) {}
+
+    fn record_follows_from(&self, _: &Id, _: &Id) {}
+
+    fn event(&self, event: &Event<'_>) {
+        event.record(&mut Statements(&mut self.0.lock().unwrap()));
+    }
+
+    fn enter(&self, _: &Id) {}
+
+    fn exit(&self, _: &Id) {}
+}
+
+struct Statements<'a>(&'a mut Vec<String>);
+
+impl Visit for Statements<'_> {
+    fn record_debug(&mut self, _: &Field, _: &dyn std::fmt::Debug) {}
+
+    fn record_str(&mut self, _: &Field, text: &str) {
+        self.0.push(text.to_owned());
+    }
+}
+
+/// What is done, and the statements that did it.
+struct Step {
+    what: &'static str,
+    statements: Vec<String>,
+}
+
+/// Does everything that the protocol has, one after the other.
+struct Scenario {
+    library: Library,
+    listener: Listener,
+    steps: Vec<Step>,
+}
+
+impl Scenario {
+    /// A library in which some cases are finished, some given up, and most wait.
+    async fn new(home: &Home, listener: Listener) -> Self {
+        let library = home.library(2000).await;
+        fill(&library, "other-000000000000", 100).await;
+        for worker in ["a", "b", "c"] {
+            library.register_worker(registration(worker, 0)).await.unwrap();
+        }
+        for _ in 0..4 {
+            let leased = lease(&library, "a", 100, 0).await;
+            report(&library, "a", leased.iter().map(finished).collect()).await;
+        }
+        listener.heard();
+        Self { library, listener, steps: Vec::new() }
+    }
+
+    fn done(&mut self, what: &'static str) {
+        self.steps.push(Step { what, statements: self.listener.heard() });
+    }
+
+    async fn play(&mut self) {
+        self.leases().await;
+        self.heartbeats().await;
+        self.reports().await;
+        self.audits().await;
+        self.library.cancel(CAMPAIGN).await.unwrap();
+        self.done("a campaign is cancelled: its leases end");
+    }
+
+    async fn leases(&mut self) {
+        let library = self.library.clone();
+        let first = LeaseRequest { lease_ms: 240_000, ..request("b", 3, 1_000_000) };
+        library.lease(first.clone()).await.unwrap().unwrap();
+        self.done("a lease that looks at all: nothing has expired");
+        library.lease(first.clone()).await.unwrap().unwrap();
+        self.done("a lease that begins where the last one ended");
+        let held = vec![Held { index: 400, epoch: 1 }];
+        let campaign = Some(CAMPAIGN.to_owned());
+        let later = LeaseRequest { campaign, held, now_unix_ms: 2_000_000, ..first };
+        library.lease(later).await.unwrap().unwrap();
+        self.done("a lease that ends expired ones, of a worker in the same process that holds one");
+    }
+
+    async fn heartbeats(&mut self) {
+        let library = self.library.clone();
+        library.heartbeat("c", 2_000_000).await.unwrap();
+        self.done("a heartbeat: the worker was heard of");
+        let mine = vec![Held { index: 400, epoch: 1 }];
+        library.renew(CAMPAIGN, "b", mine.clone(), 3_000_000).await.unwrap();
+        self.done("a heartbeat: leases that it names are renewed");
+        let lost = vec![Held { index: 401, epoch: 1 }];
+        assert_eq!(library.renew(CAMPAIGN, "b", lost.clone(), 3_000_000).await.unwrap(), lost);
+        self.done("a heartbeat: one of its leases was lost");
+        library.release(CAMPAIGN, "b", mine).await.unwrap();
+        self.done("cases are handed back");
+    }
+
+    async fn reports(&mut self) {
+        let library = self.library.clone();
+        let leased = lease(&library, "c", 3, 2_100_000).await;
+        let again = {
+            let later = request("b", 1, 3_000_000);
+            library.lease(later).await.unwrap().unwrap().cases.remove(0)
+        };
+        assert_eq!(again.case, leased[0].case);
+        self.listener.heard();
+        let audited = Report { audit_share: 1.0, ..message("a", Vec::new()) };
+        let cases = vec![finished(&lease(&library, "a", 1, 3_000_000).await[0])];
+        self.listener.heard();
+        library.report(Report { cases, ..audited }).await.unwrap();
+        self.done("a report of a result, drawn for an audit");
+        let broken = lease(&library, "a", 1, 3_000_000).await;
+        self.listener.heard();
+        report(&library, "a", vec![failed(&broken[0])]).await;
+        self.done("a report of a case that could not be simulated");
+        report(&library, "c", vec![finished(&leased[0])]).await;
+        self.done("a report under an earlier lease, while a later one is held");
+        report(&library, "c", vec![finished(&leased[0])]).await;
+        self.done("the same report again");
+    }
+
+    async fn audits(&mut self) {
+        let library = self.library.clone();
+        let audits = library.audit_sample(CAMPAIGN, "b", 3, 1000).await.unwrap();
+        self.done("an audit is handed out");
+        let index = audits[0].case.index;
+        library.release_audits(CAMPAIGN, "b", vec![index]).await.unwrap();
+        self.done("an audit is handed back");
+        library.audit_sample(CAMPAIGN, "b", 3, 1000).await.unwrap();
+        self.listener.heard();
+        let differs = AuditFinding { agrees: false, difference_db: 3.0 };
+        let wrong = Some(("a", "its results differ"));
+        library.audited(CAMPAIGN, index, "b", differs, wrong).await.unwrap();
+        self.done("an audit that finds a worker wrong");
+    }
+}
+
+/// How a database goes about a statement, one line a step.
+trait Plan {
+    async fn plan(&mut self, statement: &str) -> Vec<String>;
+}
+
+impl Plan for SqliteConnection {
+    async fn plan(&mut self, statement: &str) -> Vec<String> {
+        let ask = AssertSqlSafe(format!("explain query plan {statement}"));
+        let rows = sqlx::query(ask).fetch_all(self).await.unwrap();
+        rows.iter().map(|row| row.get("detail")).collect()
+    }
+}
+
+impl Plan for PgConnection {
+    async fn plan(&mut self, statement: &str) -> Vec<String> {
+        let prepare = AssertSqlSafe(format!("prepare planned as {statement}"));
+        sqlx::raw_sql(prepare).execute(&mut *self).await.unwrap();
+        let values = "select cardinality(parameter_types) from pg_prepared_statements
+            where name = 'planned'";
+        let values: i32 = sqlx::query_scalar(values).fetch_one(&mut *self).await.unwrap();
+        let values = if values == 0 {
+            String::new()
+        } else {
+            format!("({})", vec!["null"; values.unsigned_abs() as usize].join(", "))
+        };
+        let ask = format!("explain (costs off) execute planned{values}");
+        let rows = sqlx::raw_sql(AssertSqlSafe(ask)).fetch_all(&mut *self).await.unwrap();
+        sqlx::raw_sql("deallocate planned").execute(self).await.unwrap();
+        rows.iter().map(|row| row.get(0)).collect()
+    }
+}
+
+/// What each step begins and ends with.
+const BRACKETS: [&str; 3] = ["begin immediate", "begin", "commit"];
+
+/// A statement without the blanks that it has from its place in the program.
+fn to_the_left(statement: &str) -> String {
+    let lines = statement.trim_end().lines().filter(|line| !line.is_empty());
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    let least = lines.clone().map(indent).min().unwrap_or(0);
+    lines.map(|line| &line[least..]).collect::<Vec<_>>().join("\n")
+}
+
+/// The steps with their statements, each with its plan where it stands first. All of a step is one transaction.
+async fn account(steps: Vec<Step>, database: &mut impl Plan) -> String {
+    let mut account = String::new();
+    let mut known: Vec<(String, String)> = Vec::new();
+    for Step { what, statements } in steps {
+        let _ = writeln!(account, "-- ## {what}\n");
+        let inside = statements.iter().filter(|text| !BRACKETS.contains(&text.as_str()));
+        for (number, text) in (1..).zip(inside) {
+            let text = to_the_left(text);
+            if let Some((_, place)) = known.iter().find(|(known, _)| *known == text) {
+                let _ = writeln!(account, "-- {number}: {place}\n");
+            } else {
+                let _ = writeln!(account, "-- {number}\n{text};");
+                for line in database.plan(&text).await {
+                    let _ = writeln!(account, "--     {line}");
+                }
+                account.push('\n');
+                known.push((text, format!("as {number} of \"{what}\"")));
+            }
+        }
+    }
+    account.trim_end().to_owned() + "\n"
+}
+
+/// The account on a database: what was heard while everything was done.
+async fn heard(home: &Home) -> Vec<Step> {
+    let listener = Listener::default();
+    let _listening = tracing::subscriber::set_default(listener.clone());
+    let mut scenario = Scenario::new(home, listener).await;
+    scenario.play().await;
+    scenario.library.close().await;
+    scenario.steps
+}
+
+// One thread: it is the one that listens.
+#[tokio::test]
+async fn the_protocol_s_statements_and_their_plans_in_a_file_are_those_that_are_kept() {
+    let home = Home::sqlite();
+    let steps = heard(&home).await;
+    let mut file = SqliteConnection::connect(&home.url).await.unwrap();
+    assert_kept("protocol.sqlite.sql", &account(steps, &mut file).await);
+}
+
+#[tokio::test]
+async fn the_protocol_s_statements_and_their_plans_on_a_server_are_those_that_are_kept() {
+    let Some(home) = Home::postgres() else { return };
+    let steps = heard(&home).await;
+    let mut server = PgConnection::connect(&home.url).await.unwrap();
+    let version: String =
+        sqlx::query_scalar("show server_version").fetch_one(&mut server).await.unwrap();
+    if !version.starts_with(POSTGRES_VERSION) {
+        test_needs::skipped("plans of PostgreSQL 15; another version plans otherwise");
+        return;
+    }
+    // Plans for any values, and by an index wherever there is one, however small the tables of this test are.
+    let set = "analyze; set plan_cache_mode = force_generic_plan; set enable_seqscan = off";
+    sqlx::raw_sql(set).execute(&mut server).await.unwrap();
+    assert_kept("protocol.postgres.sql", &account(steps, &mut server).await);
+}

@@ -1,0 +1,29 @@
+//! Texts that are kept beside the tests, and compared.
+
+use std::fs;
+use std::path::Path;
+
+/// Set to write the texts anew.
+const WRITE: &str = "TRACKTWIN_WRITE_GOLDEN";
+
+fn file(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/library/snapshots").join(name)
+}
+
+/// What is kept under this name; nothing where nothing is.
+pub(crate) fn kept(name: &str) -> String {
+    fs::read_to_string(file(name)).unwrap_or_default()
+}
+
+/// Compares a text with what is kept under this name.
+pub(crate) fn assert_kept(name: &str, text: &str) {
+    if std::env::var_os(WRITE).is_some() {
+        fs::write(file(name), text).unwrap();
+    }
+    let kept = kept(name);
+    let differing = kept.lines().zip(text.lines()).find(|(kept, now)| kept != now);
+    assert!(
+        kept == text,
+        "{name} was kept otherwise, from {differing:?}; {WRITE}=1 writes it anew"
+    );
+}
