@@ -20,7 +20,7 @@ use tracktwin_parameters::TrackDesign;
 use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
-use tracktwin_track::extension::KINDS;
+use tracktwin_track::extension;
 
 /// Steps of a stage's progress bar.
 const STEPS: u64 = 100;
@@ -53,7 +53,7 @@ pub(super) struct Arguments {
 
 /// Names of the catalogue.
 fn names() -> impl Iterator<Item = &'static str> {
-    KINDS.iter().map(|kind| kind.physics)
+    extension::Kind::all().map(|kind| kind.physics)
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {

@@ -38,7 +38,7 @@ pub use null_model::{NullError, NullModel};
 pub use observation::Observation;
 pub use outcome::{
     BeforeAfter, Diagnosis, Estimate, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score,
-    Scores, SleeperValues, Verdict,
+    Scores, SleeperValues, UNKNOWN, Verdict,
 };
 pub use port_scan::{Port, PortPlace, PortScan};
 pub use screen::{Template, templates};

@@ -8,6 +8,9 @@ use tracktwin_inspection::chain::LossOfContact;
 /// Name and version of the format.
 pub const FORMAT: &str = "tracktwin-diagnosis/1";
 
+/// What is called by no name of the catalogue.
+pub const UNKNOWN: &str = "unknown_physics";
+
 /// What a recording is, compared with the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

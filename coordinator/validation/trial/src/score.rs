@@ -1,9 +1,11 @@
 //! One diagnosis against its truth.
 
-use crate::draw::{Class, Plan};
+use crate::class::Class;
+use crate::draw::Plan;
+use crate::known::{is_artefact, kind};
 use crate::paper::Paper;
 use serde::{Deserialize, Serialize};
-use tracktwin_diagnosis::{Diagnosis, Hypothesis, Verdict};
+use tracktwin_diagnosis::{Diagnosis, Hypothesis, UNKNOWN, Verdict};
 use tracktwin_parameters::{Axis, Parameter, Preset};
 use tracktwin_reference_simulator::{Hidden, Scene};
 
@@ -205,8 +207,7 @@ fn becomes(
 
 /// Whether a name is right; for what the catalogue lacks it is "unknown".
 fn is_it(hidden: &Hidden, physics: &str) -> bool {
-    let right = if hidden.in_catalogue() { hidden.physics() } else { "unknown_physics" };
-    physics == right
+    physics == kind(hidden).map_or(UNKNOWN, |kind| kind.physics)
 }
 
 /// Whether a hypothesis has an effect's place, within a sleeper; where either is everywhere, it has.
@@ -252,7 +253,7 @@ fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Ve
 /// Whether a place is next to physics that is hidden; all places are if it is everywhere, or none is
 /// hidden.
 pub(crate) fn near(scene: &Scene, x_m: f64) -> bool {
-    let mut physical = scene.left_out.iter().filter(|hidden| !hidden.is_artefact()).peekable();
+    let mut physical = scene.left_out.iter().filter(|hidden| !is_artefact(hidden)).peekable();
     let is_near = |hidden: &Hidden| {
         hidden.place().is_none_or(|[from_m, to_m]| {
             from_m - 1.01 * SPACING_M <= x_m && x_m <= to_m + 1.01 * SPACING_M
@@ -263,7 +264,7 @@ pub(crate) fn near(scene: &Scene, x_m: f64) -> bool {
 
 /// Errors at the sleepers next to all that is hidden; everywhere if it is everywhere.
 fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
-    if scene.left_out.iter().all(Hidden::is_artefact) {
+    if scene.left_out.iter().all(is_artefact) {
         return None;
     }
     let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
