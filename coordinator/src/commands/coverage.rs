@@ -5,6 +5,7 @@ use super::library_url::LibraryUrl;
 use super::progress::Progress;
 use super::simulate::Setting;
 use super::{OrInput, Stop, say};
+use crate::pipeline::compute::compute;
 use crate::pipeline::coverage::{Counts, Coverage, Kind, Row};
 use crate::pipeline::evaluate::Evaluator;
 use anyhow::anyhow;
@@ -60,7 +61,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     library.close().await;
     let Arguments { tracks, sleepers, seed, json, .. } = arguments;
     let counts = Counts { tracks: tracks as usize, sleepers: sleepers as usize, seed };
-    let rows = tokio::task::spawn_blocking(move || rows(&evaluator, settings, counts)).await??;
+    let rows = compute(|| rows(&evaluator, settings, counts))?;
     if json {
         say(&serde_json::to_string_pretty(&rows)?);
     } else {

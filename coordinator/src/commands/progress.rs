@@ -1,7 +1,9 @@
 //! How far long work has come: a bar in a terminal, a line now and then elsewhere.
 
 use super::note;
+use crate::pipeline::models::group_name;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::cell::RefCell;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
@@ -65,5 +67,23 @@ impl Progress {
             }
         };
         note(&format!("{}: {done} of {total}, {left} left {remark}", self.stage));
+    }
+}
+
+/// The progress of training, which says with its first step how many there are.
+#[derive(Default)]
+pub(super) struct TrainingBar(RefCell<Option<Progress>>);
+
+impl TrainingBar {
+    /// Shows which group of models is trained.
+    pub(super) fn at(&self, at: &tracktwin_surrogate::Progress<'_>) {
+        let mut bar = self.0.borrow_mut();
+        let bar = bar.get_or_insert_with(|| Progress::begin("training", 0, at.groups as u64));
+        bar.at(at.finished as u64, &at.next.map(group_name).unwrap_or_default());
+    }
+
+    /// Ends the stage.
+    pub(super) fn end(self) {
+        self.0.into_inner().into_iter().for_each(Progress::end);
     }
 }
