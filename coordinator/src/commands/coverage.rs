@@ -10,8 +10,8 @@ use crate::pipeline::coverage::{Counts, Coverage, Kind, Row};
 use crate::pipeline::evaluate::Evaluator;
 use anyhow::anyhow;
 use clap::Args;
+use parking_lot::Mutex;
 use std::path::PathBuf;
-use std::sync::Mutex;
 use tracktwin_parameters::Parameter;
 use tracktwin_surrogate::{Side, Trained};
 
@@ -94,12 +94,10 @@ fn rows(
     };
     let bar = Mutex::new(None::<Progress>);
     let rows = coverage.rows(&|done, total| {
-        if let Ok(mut bar) = bar.lock() {
-            let begin = || Progress::begin("tracks", 0, total as u64);
-            bar.get_or_insert_with(begin).at(done as u64, "");
-        }
+        let begin = || Progress::begin("tracks", 0, total as u64);
+        bar.lock().get_or_insert_with(begin).at(done as u64, "");
     })?;
-    bar.into_inner().ok().flatten().into_iter().for_each(Progress::end);
+    bar.into_inner().into_iter().for_each(Progress::end);
     Ok(rows)
 }
 
