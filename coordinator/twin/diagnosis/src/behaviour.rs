@@ -1,9 +1,9 @@
 //! What an unknown dynamic stiffness behaves like: a spring, a damper, a mass, or a mass on a spring.
 //!
 //! Each has a dynamic stiffness of known form, so that how well it explains what is left follows from
-//! the port scan's own traces (mismatch design, 4.7).
+//! the port scan's own traces (docs/diagnosis.md).
 
-use crate::outcome::Estimate;
+use crate::estimate::Estimate;
 use nalgebra::{DMatrix, DVector};
 use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};

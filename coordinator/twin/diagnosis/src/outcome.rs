@@ -1,6 +1,7 @@
 //! The diagnosis as files and pages have it (`tracktwin-diagnosis/1`).
 
 use crate::behaviour::Element;
+use crate::estimate::Estimate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use tracktwin_inspection::chain::LossOfContact;
@@ -127,15 +128,6 @@ pub struct Location {
     pub x_m: [f64; 2],
     /// The sleepers there.
     pub sleepers: Vec<String>,
-}
-
-/// A mean and a standard deviation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation.
-    pub sd: f64,
 }
 
 /// Without and with what was named.

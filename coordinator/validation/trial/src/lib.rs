@@ -9,6 +9,7 @@ mod draw;
 mod effect;
 mod known;
 mod paper;
+mod place;
 mod rate;
 mod score;
 mod seal;

@@ -2,7 +2,8 @@
 
 use super::{Evidence, FAILED_SHARE, names};
 use crate::behaviour::Behaviour;
-use crate::outcome::{Estimate, Hypothesis, UNKNOWN};
+use crate::estimate::Estimate;
+use crate::outcome::{Hypothesis, UNKNOWN};
 use crate::port_scan::Port;
 use crate::search::{Fitted, Probabilities, Round};
 use std::collections::BTreeMap;
