@@ -11,7 +11,7 @@ use tracktwin_track::extension::{
 use tracktwin_track::model::Assembly;
 
 /// A tuned mass under the rail.
-pub const RAIL_ABSORBER: Kind = Kind {
+pub static RAIL_ABSORBER: Kind = Kind {
     physics: "rail_absorber",
     summary: "a mass hangs under the rail on a damped spring",
     classes: &[Class::Frequency, Class::Local],

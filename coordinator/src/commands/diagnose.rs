@@ -10,8 +10,8 @@ use crate::pipeline::provenance;
 use anyhow::Context;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
+use parking_lot::Mutex;
 use std::path::PathBuf;
-use std::sync::Mutex;
 use tracktwin_diagnosis::{Verdict, check_track};
 use tracktwin_experiment::CODE_VERSION;
 use tracktwin_files::{FileName, Kind, Output};
@@ -85,7 +85,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     output.add(&FileName::new("diagnosis.json")?, json.as_bytes())?;
     output.commit()?;
     if let Some(library) = &library {
-        let record = provenance::diagnosis(&diagnosis, json)?;
+        let record = provenance::diagnosis(&diagnosis, json);
         if let Err(error) = library.record_diagnosis(record).await {
             // The answer stands in the folder all the same.
             tracing::warn!("the library does not keep this diagnosis: {error:?}");
@@ -143,7 +143,7 @@ struct Shown(Mutex<Option<(&'static str, Progress)>>);
 
 impl Shown {
     fn at(&self, stage: &'static str, share: f64) {
-        let mut shown = self.0.lock().expect("nobody panics while holding it");
+        let mut shown = self.0.lock();
         if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
             if let Some((_, progress)) = shown.take() {
                 progress.end();
@@ -156,7 +156,7 @@ impl Shown {
     }
 
     fn end(self) {
-        let shown = self.0.into_inner().expect("nobody panics while holding it");
+        let shown = self.0.into_inner();
         if let Some((_, progress)) = shown {
             progress.end();
         }

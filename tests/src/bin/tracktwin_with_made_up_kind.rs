@@ -5,6 +5,6 @@ use system_tests::RAIL_ABSORBER;
 use tracktwin_track::extension::Kind;
 
 fn main() -> ExitCode {
-    Kind::add(RAIL_ABSORBER).expect("no other kind was added");
+    Kind::add(&RAIL_ABSORBER).expect("no other kind was added");
     tracktwin::commands::main()
 }

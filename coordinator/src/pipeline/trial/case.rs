@@ -147,8 +147,7 @@ impl Trial {
         let path = self.folder.join(format!("diagnoses/{number:04}{control}.json"));
         let document = text(diagnosis);
         replace(&path, document.as_bytes())?;
-        let record = provenance::diagnosis(diagnosis, document)
-            .map_err(|source| TrialError::Json { path: path.display().to_string(), source })?;
+        let record = provenance::diagnosis(diagnosis, document);
         Ok(DiagnosisRecord {
             recording: format!("trial {} case {number}{control}", self.seed),
             ..record

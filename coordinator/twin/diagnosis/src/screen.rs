@@ -87,7 +87,7 @@ impl Template {
     }
 
     /// Logarithm of the evidence for the effect in a whitened residual, against the baseline alone:
-    /// with strength `N(1, 0.3^2)` times the trial's (mismatch design, eq. 8).
+    /// with strength `N(1, 0.3^2)` times the trial's (docs/diagnosis.md).
     ///
     /// `felt` is the residual's product with the baseline's derivatives; for the residual of a
     /// calibration its gradient, which is zero where it came to its end.

@@ -193,6 +193,7 @@ impl KindParameter {
     }
 
     /// With its ranges on V-Track and at real scale, and a typical value on V-Track.
+    #[must_use]
     pub const fn ranges(mut self, v_track: [f64; 2], real_scale: [f64; 2], typical: f64) -> Self {
         self.v_track = v_track;
         self.real_scale = real_scale;
@@ -201,18 +202,21 @@ impl KindParameter {
     }
 
     /// With another slack than a factor of e.
+    #[must_use]
     pub const fn slack(mut self, slack: f64) -> Self {
         self.slack = slack;
         self
     }
 
     /// With a value that holds where none is given.
+    #[must_use]
     pub const fn or(mut self, default: f64) -> Self {
         self.default = Some(default);
         self
     }
 
     /// With another bound.
+    #[must_use]
     pub const fn bound(mut self, bound: Bound) -> Self {
         self.bound = bound;
         self
@@ -222,7 +226,7 @@ impl KindParameter {
 impl Kind {
     /// Every kind of the catalogue: physics first, then the measuring chain.
     pub fn all() -> impl Iterator<Item = &'static Self> {
-        registry::KINDS.iter().chain(registry::ADDED.get())
+        registry::KINDS.iter().chain(registry::ADDED.get().copied())
     }
 
     /// The kind of that name, if there is one.
@@ -238,7 +242,7 @@ impl Kind {
     /// # Errors
     /// The kind, where another one has been added.
     #[doc(hidden)]
-    pub fn add(kind: Self) -> Result<(), Self> {
+    pub fn add(kind: &'static Self) -> Result<(), &'static Self> {
         registry::ADDED.set(kind)
     }
 

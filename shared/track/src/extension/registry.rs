@@ -31,7 +31,7 @@ pub(super) static KINDS: &[Kind] = &[
 ];
 
 /// A kind that a test adds.
-pub(super) static ADDED: OnceLock<Kind> = OnceLock::new();
+pub(super) static ADDED: OnceLock<&'static Kind> = OnceLock::new();
 
 // Kinds that the passes of a recording show by themselves: who looks for one names it here.
 /// Clipping.

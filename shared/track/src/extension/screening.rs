@@ -60,6 +60,7 @@ impl Screening {
     }
 
     /// Suggested by the passes alone, with these parameters to be fitted.
+    #[must_use]
     pub const fn suggested(self, free: &'static [&'static str]) -> Self {
         Self { suggested: free, ..self }
     }
@@ -72,6 +73,7 @@ impl Family {
     }
 
     /// With parameters held at a value.
+    #[must_use]
     pub const fn held(self, held: &'static [(&'static str, f64)]) -> Self {
         Self { held, ..self }
     }

@@ -2,7 +2,7 @@
 //!
 //! The wheel at `x` is excited by the surface through the quasi-static transfer
 //! `|H| = 1 / (m |1/k_H + alpha_r(x, x) + alpha_w|)`; the mean power in a band over a sleeper is
-//! the surface's spectrum times `|H|^2`, averaged over band and window (mismatch design, eq. 2, 3).
+//! the surface's spectrum times `|H|^2`, averaged over band and window (docs/diagnosis.md).
 
 mod beyond;
 mod derivatives;

@@ -4,7 +4,7 @@
 //! Whatever a sleeper, its railpad or its ballast have that the model lacks acts on the rail as an
 //! additional dynamic stiffness at the rail seat, free in every frequency; whatever links two
 //! sleepers, between their seats; whatever the vehicle has, at the wheel. Its trace is linear in
-//! that stiffness, so that the evidence for it has a closed form (mismatch design, eq. 9).
+//! that stiffness, so that the evidence for it has a closed form (docs/diagnosis.md).
 
 mod bumps;
 mod filter;
