@@ -1,4 +1,7 @@
 //! What the program can be told to do: one file a subcommand, each load, compute, store, report.
+//!
+//! Files are read and written where a command stands, in asynchronous ones too: it has nothing else to do
+//! meanwhile. Long computations go through `pipeline::compute`.
 
 mod campaign;
 mod certs;
