@@ -95,11 +95,14 @@ fn the_program_lists_it_simulates_it_and_names_it_in_a_diagnosis() {
     assert!(list.contains(RAIL_ABSORBER.summary), "{list}");
 
     let absorber = format!("{NAME}@1.5m:mass_kg=1.2,frequency_Hz=900,damping_ratio=0.05");
-    let arguments = ["simulate", "--passes", "2", "--seed", "3", "--extend", &absorber];
+    let arguments = ["simulate", "--seed", "3", "--extend", &absorber];
     let speeds = ["--speed", "13", "--speed", "10", "--out", &recording];
     run(PROGRAM, &[&arguments[..], &speeds].concat()).succeeded();
 
-    let answer = run(PROGRAM, &["diagnose", &recording, "--out", &out]);
+    // Nothing else is asked for: that takes a third of the time.
+    let others = Kind::all().map(|kind| kind.physics).filter(|physics| *physics != NAME);
+    let without: Vec<&str> = others.flat_map(|physics| ["--without", physics]).collect();
+    let answer = run(PROGRAM, &[&["diagnose", &recording, "--out", &out], &without[..]].concat());
     assert_eq!(answer.code, Some(1), "{}", answer.err);
     assert!(answer.out.contains(RAIL_ABSORBER.summary), "{}", answer.out);
     let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
