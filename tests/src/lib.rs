@@ -1,7 +1,9 @@
 //! What the tests of the whole program share: starting it, stopping it, reading what it says.
 
+mod made_up;
 mod process;
 
+pub use made_up::RAIL_ABSORBER;
 pub use process::{Process, until};
 pub use test_needs::free_port;
 

@@ -1,7 +1,8 @@
 //! The line to one coordinator.
 
-use crate::agent::{AgentError, Dial};
+use crate::config::Dial;
 use crate::credentials::{Bearer, Credentials};
+use crate::error::AgentError;
 use std::time::Duration;
 use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint};

@@ -1,12 +1,14 @@
 //! The coordinators of a worker: each call goes to one that answers.
 
-use crate::agent::{AgentError, Config};
 use crate::backoff::Backoff;
+use crate::config::Config;
 use crate::connection::{Client, connect};
 use crate::counters::Counters;
+use crate::error::AgentError;
+use parking_lot::Mutex;
 use std::error::Error;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
@@ -38,7 +40,7 @@ struct Contact {
 impl Coordinators {
     pub(crate) fn new(config: &Config, give_up: CancellationToken) -> Result<Self, AgentError> {
         let line =
-            |url: &String| Ok((url.clone(), connect(url, &config.credentials, config.dial)?));
+            |url: &String| Ok((url.clone(), connect(url, &config.credentials, config.seams.dial)?));
         let known = config.coordinators.iter().map(line).collect::<Result<Vec<_>, AgentError>>()?;
         if known.is_empty() {
             return Err(AgentError::NoCoordinator);
@@ -124,15 +126,11 @@ impl Coordinators {
 
     /// For how long no coordinator has answered.
     pub(crate) fn silent_for(&self) -> Duration {
-        self.contact().answered.elapsed()
-    }
-
-    fn contact(&self) -> std::sync::MutexGuard<'_, Contact> {
-        self.contact.lock().expect("nobody panics while holding it")
+        self.contact.lock().answered.elapsed()
     }
 
     fn heard(&self, url: &str) {
-        let mut contact = self.contact();
+        let mut contact = self.contact.lock();
         contact.answered = Instant::now();
         if contact.warned.take().is_some() {
             tracing::warn!(coordinator = url, "the coordinator answers again");
@@ -141,7 +139,7 @@ impl Coordinators {
     }
 
     fn warn(&self, url: &str, status: &Status) {
-        let mut contact = self.contact();
+        let mut contact = self.contact.lock();
         if contact.warned.is_none_or(|warned| warned.elapsed() >= WARN_EVERY) {
             contact.warned = Some(Instant::now());
             let reason = reason(url, status);

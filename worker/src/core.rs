@@ -1,15 +1,20 @@
 //! What one core of a worker does: a lease at a time, a group of cases at a time.
 
-use crate::agent::{AgentError, GROUP};
 use crate::counters::Counters;
-use crate::outbox::{Finished, Outbox};
+use crate::error::AgentError;
+use crate::finished::Finished;
+use crate::outbox::Outbox;
 use crate::session::Session;
+use parking_lot::Mutex;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tracktwin_experiment::{Case, Experiment, Outcome, Prepare, Simulate};
 use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase, checksum};
 use tracktwin_traces::{Step, Value};
+
+/// Cases simulated side by side on one core: the lanes of the track model's fast solver.
+pub const GROUP: usize = 8;
 
 /// The longest wait for work, whatever a coordinator says: as long as one that was put aside waits.
 const WAIT_MAX: Duration = Duration::from_mins(10);
@@ -189,7 +194,7 @@ impl Prepared {
     }
 
     fn of(&self, lease: &CaseLease) -> Result<Arc<dyn Simulate>, AgentError> {
-        let mut latest = self.latest.lock().expect("preparing does not panic");
+        let mut latest = self.latest.lock();
         if let Some((hash, simulation)) = latest.as_ref()
             && *hash == lease.experiment_hash
         {

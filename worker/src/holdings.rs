@@ -1,9 +1,10 @@
 //! The cases a worker holds.
 
 use crate::counters::Counters;
+use parking_lot::Mutex;
 use prometheus_client::metrics::gauge::Gauge;
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 use tracktwin_protocol::{CASES_MAX, CaseLease, farm};
 
 /// A case this worker holds: campaign, index, epoch.
@@ -24,7 +25,7 @@ impl Holdings {
 
     /// The cases of a campaign that the worker holds, as (index, epoch).
     pub fn of(&self, campaign: &str) -> Vec<(u32, u32)> {
-        let held = self.lock();
+        let held = self.held.lock();
         let of_campaign = held.iter().filter(|(of, ..)| of == campaign);
         of_campaign.map(|&(_, index, epoch)| (index, epoch)).collect()
     }
@@ -51,17 +52,17 @@ impl Holdings {
 
     /// Whether a case is still this worker's, as far as it knows.
     pub(crate) fn has(&self, campaign: &str, index: u32, epoch: u32) -> bool {
-        self.lock().contains(&(campaign.to_owned(), index, epoch))
+        self.held.lock().contains(&(campaign.to_owned(), index, epoch))
     }
 
     pub(crate) fn is_empty(&self) -> bool {
-        self.lock().is_empty()
+        self.held.lock().is_empty()
     }
 
     /// What to renew, in requests of one campaign and a bounded number of cases.
     pub(crate) fn renewals(&self, worker: &str) -> Vec<farm::RenewRequest> {
         let mut requests: Vec<farm::RenewRequest> = Vec::new();
-        for (campaign, index, epoch) in self.lock().iter() {
+        for (campaign, index, epoch) in self.held.lock().iter() {
             let case = farm::HeldCase { sobol_index: *index, epoch: *epoch };
             match requests.last_mut() {
                 Some(request)
@@ -80,14 +81,10 @@ impl Holdings {
     }
 
     fn change<T>(&self, change: impl FnOnce(&mut BTreeSet<Held>) -> T) -> T {
-        let mut held = self.lock();
+        let mut held = self.held.lock();
         let changed = change(&mut held);
         self.count.set(i64::try_from(held.len()).unwrap_or(i64::MAX));
         changed
-    }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeSet<Held>> {
-        self.held.lock().expect("nobody panics while holding it")
     }
 }
 

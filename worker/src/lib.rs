@@ -6,11 +6,14 @@
 pub mod agent;
 mod backoff;
 pub mod command;
+mod config;
 mod connection;
 mod coordinators;
 mod core;
 mod counters;
 mod credentials;
+mod error;
+mod finished;
 mod health;
 mod holdings;
 mod logging;

@@ -1,18 +1,20 @@
 //! A worker's talk with its coordinators: each call is repeated until it is answered.
 
-use crate::agent::{AgentError, Config};
+use crate::config::Config;
 use crate::coordinators::Coordinators;
 use crate::counters::Counters;
+use crate::error::AgentError;
+use crate::finished::Finished;
 use crate::holdings::Holdings;
-use crate::outbox::Finished;
+use parking_lot::Mutex;
 use std::collections::HashSet;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::RwLock;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::Code;
-use tracktwin_experiment::{CODE_VERSION, MODEL_HASH, Outcome};
+use tracktwin_experiment::{CODE_VERSION, Outcome};
 use tracktwin_protocol::{Lease, PROTOCOL_VERSION, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
 
@@ -62,7 +64,7 @@ impl Session {
         Ok(Self {
             worker: config.worker.clone(),
             cores: u32::try_from(config.cores.get()).unwrap_or(u32::MAX),
-            model_hash: config.model_hash.clone().unwrap_or_else(|| MODEL_HASH.to_owned()),
+            model_hash: config.seams.model_hash.clone(),
             coordinators: Coordinators::new(config, give_up.clone())?,
             holdings: config.holdings.clone(),
             counters: config.counters.clone(),
@@ -103,7 +105,7 @@ impl Session {
         let [shortest, longest] = HEARTBEATS_S;
         if answer.heartbeat_s.is_finite() {
             let heartbeat = Duration::from_secs_f64(answer.heartbeat_s.clamp(shortest, longest));
-            *self.heartbeat.lock().expect("nobody panics while holding it") = heartbeat;
+            *self.heartbeat.lock() = heartbeat;
         }
         *registrations += 1;
         Ok(())
@@ -249,7 +251,7 @@ impl Session {
     /// computation and no slow report makes a live worker look dead.
     pub(crate) async fn keep_alive(&self) {
         loop {
-            let heartbeat = *self.heartbeat.lock().expect("nobody panics while holding it");
+            let heartbeat = *self.heartbeat.lock();
             tokio::time::sleep(heartbeat).await;
             for request in self.holdings.renewals(&self.worker) {
                 let campaign = request.campaign_id.clone();
@@ -287,7 +289,7 @@ impl Session {
 
     /// Notes that there is something to do.
     pub(crate) fn worked(&self) {
-        *self.last_work.lock().expect("nobody panics while holding it") = Instant::now();
+        *self.last_work.lock() = Instant::now();
     }
 
     /// For how long there was nothing to do.
@@ -295,7 +297,7 @@ impl Session {
         if !self.holdings.is_empty() {
             return Duration::ZERO;
         }
-        self.last_work.lock().expect("nobody panics while holding it").elapsed()
+        self.last_work.lock().elapsed()
     }
 }
 

@@ -5,12 +5,13 @@ use super::library_url::open_or_create;
 use super::progress::Progress;
 use super::simulate::Setting;
 use super::{OrInput, Stop, say};
+use crate::pipeline::compute::compute;
 use crate::pipeline::coverage::{Counts, Coverage, Kind, Row, inversion_rows};
 use crate::pipeline::evaluate::Evaluator;
 use anyhow::{Context, anyhow};
 use clap::Args;
+use parking_lot::Mutex;
 use std::path::PathBuf;
-use std::sync::Mutex;
 use tracktwin_library::Library;
 use tracktwin_parameters::Parameter;
 use tracktwin_surrogate::{Side, Trained};
@@ -73,7 +74,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     library.close().await;
     let Arguments { tracks, sleepers, seed, json, .. } = arguments;
     let counts = Counts { tracks: tracks as usize, sleepers: sleepers as usize, seed };
-    let rows = tokio::task::spawn_blocking(move || rows(&evaluator, settings, counts)).await??;
+    let rows = compute(|| rows(&evaluator, settings, counts))?;
     if json {
         say(&serde_json::to_string_pretty(&rows)?);
     } else {
@@ -92,14 +93,10 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
     };
     let total = 3 * u64::from(arguments.tracks);
     let bar = Mutex::new(Progress::begin("tracks", 0, total));
-    let watch = |done, _| {
-        if let Ok(mut bar) = bar.lock() {
-            bar.at(done, "");
-        }
-    };
+    let watch = |done, _| bar.lock().at(done, "");
     let rows = inversion_rows(arguments.tracks, arguments.seed, library.as_ref(), &watch);
     let rows = rows.await.context("inversion can't be scored")?;
-    bar.into_inner().into_iter().for_each(Progress::end);
+    bar.into_inner().end();
     if arguments.json {
         say(&serde_json::to_string_pretty(&rows)?);
         return Ok(());
@@ -146,12 +143,10 @@ fn rows(
     };
     let bar = Mutex::new(None::<Progress>);
     let rows = coverage.rows(&|done, total| {
-        if let Ok(mut bar) = bar.lock() {
-            let begin = || Progress::begin("tracks", 0, total as u64);
-            bar.get_or_insert_with(begin).at(done as u64, "");
-        }
+        let begin = || Progress::begin("tracks", 0, total as u64);
+        bar.lock().get_or_insert_with(begin).at(done as u64, "");
     })?;
-    bar.into_inner().ok().flatten().into_iter().for_each(Progress::end);
+    bar.into_inner().into_iter().for_each(Progress::end);
     Ok(rows)
 }
 

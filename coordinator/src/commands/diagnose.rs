@@ -19,7 +19,7 @@ use tracktwin_parameters::TrackDesign;
 use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
-use tracktwin_track::extension::KINDS;
+use tracktwin_track::extension;
 
 /// What `diagnose` is told.
 #[derive(Args)]
@@ -49,7 +49,7 @@ pub(super) struct Arguments {
 
 /// Names of the catalogue.
 fn names() -> impl Iterator<Item = &'static str> {
-    KINDS.iter().map(|kind| kind.physics)
+    extension::Kind::all().map(|kind| kind.physics)
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
@@ -81,7 +81,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     output.add(&FileName::new("diagnosis.json")?, json.as_bytes())?;
     output.commit()?;
     if let Some(library) = &library {
-        let record = provenance::diagnosis(&diagnosis, json)?;
+        let record = provenance::diagnosis(&diagnosis, json);
         if let Err(error) = library.record_diagnosis(record).await {
             // The answer stands in the folder all the same.
             tracing::warn!("the library does not keep this diagnosis: {error:?}");

@@ -1,4 +1,7 @@
 //! What the program can be told to do: one file a subcommand, each load, compute, store, report.
+//!
+//! Files are read and written where a command stands, in asynchronous ones too: it has nothing else to do
+//! meanwhile. Long computations go through `pipeline::compute`.
 
 mod campaign;
 mod certs;
@@ -31,6 +34,7 @@ use stop::{OrInput, Stop};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 use tracing_subscriber::EnvFilter;
 use tracktwin_worker::{LogFormat, log_to_stderr};
 
@@ -103,7 +107,12 @@ enum Command {
 pub fn main() -> ExitCode {
     let program = Program::parse();
     log_to_stderr(program.log_format, filter(&program));
-    match run(program.command) {
+    let ended = run(program.command);
+    if let Some(error) = UNWRITTEN.get() {
+        note(&format!("tracktwin: standard output: {error}"));
+        return ExitCode::from(3);
+    }
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(Stop::Negative) => ExitCode::from(1),
         Err(Stop::Input(error)) => report(&error, 2),
@@ -182,6 +191,9 @@ fn say(line: &str) {
     answer(format!("{line}\n").as_bytes());
 }
 
+/// What kept an answer from being written; the program ends with it, once all else is wound up.
+static UNWRITTEN: OnceLock<std::io::Error> = OnceLock::new();
+
 /// Whether anybody reads: who did may have gone, as `head` does once it has its lines, and then nothing
 /// is amiss.
 fn answer(text: &[u8]) -> bool {
@@ -190,8 +202,9 @@ fn answer(text: &[u8]) -> bool {
         Ok(()) => true,
         Err(error) if error.kind() == ErrorKind::BrokenPipe => false,
         Err(error) => {
-            note(&format!("tracktwin: standard output: {error}"));
-            std::process::exit(3);
+            // The first one says it all.
+            let _ = UNWRITTEN.set(error);
+            false
         }
     }
 }

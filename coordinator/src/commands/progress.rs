@@ -1,9 +1,11 @@
 //! How far long work has come: a bar in a terminal, a line now and then elsewhere.
 
 use super::note;
+use crate::pipeline::models::group_name;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use parking_lot::Mutex;
+use std::cell::RefCell;
 use std::io::IsTerminal;
-use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Between two lines where there is no terminal.
@@ -79,7 +81,7 @@ pub(super) struct Stages(Mutex<Option<(&'static str, Progress)>>);
 impl Stages {
     /// Shows which share of a stage is done.
     pub(super) fn at(&self, stage: &'static str, share: f64) {
-        let mut shown = self.0.lock().expect("nobody panics while holding it");
+        let mut shown = self.0.lock();
         if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
             if let Some((_, progress)) = shown.take() {
                 progress.end();
@@ -93,9 +95,27 @@ impl Stages {
 
     /// Ends the stage that goes on.
     pub(super) fn end(self) {
-        let shown = self.0.into_inner().expect("nobody panics while holding it");
+        let shown = self.0.into_inner();
         if let Some((_, progress)) = shown {
             progress.end();
         }
+    }
+}
+
+/// The progress of training, which says with its first step how many there are.
+#[derive(Default)]
+pub(super) struct TrainingBar(RefCell<Option<Progress>>);
+
+impl TrainingBar {
+    /// Shows which group of models is trained.
+    pub(super) fn at(&self, at: &tracktwin_surrogate::Progress<'_>) {
+        let mut bar = self.0.borrow_mut();
+        let bar = bar.get_or_insert_with(|| Progress::begin("training", 0, at.groups as u64));
+        bar.at(at.finished as u64, &at.next.map(group_name).unwrap_or_default());
+    }
+
+    /// Ends the stage.
+    pub(super) fn end(self) {
+        self.0.into_inner().into_iter().for_each(Progress::end);
     }
 }

@@ -3,10 +3,12 @@
 use super::files::{Force, check, make_folder};
 use super::library::{MEND, choose};
 use super::library_url::LibraryUrl;
-use super::progress::Progress;
-use super::{OrInput, Stop, evaluate, say, train};
+use super::progress::{Progress, TrainingBar};
+use super::{OrInput, Stop, evaluate, say};
 use crate::pipeline;
+use crate::pipeline::compute::compute;
 use crate::pipeline::evaluate::Evaluator;
+use crate::pipeline::models::{check_files, train_into};
 use crate::pipeline::reproduce::ReproducingError;
 use anyhow::anyhow;
 use clap::Args;
@@ -14,7 +16,7 @@ use std::path::{Path, PathBuf};
 use tracktwin_experiment::Experiment;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
-use tracktwin_reproduction::{Compared, Figure, Provenance, Reproduction, Verdict};
+use tracktwin_reproduction::{Compared, Figure, Provenance, Reproduction, Results, Verdict};
 use tracktwin_surrogate::{Trained, TrainingSet};
 
 /// What `reproduce` is told.
@@ -78,15 +80,29 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let models = match given {
         Some(models) => Some(models),
         None if needed => {
-            let folder = out.join("models");
-            Some(train::train(&library, &campaign, SEED, &folder, arguments.force).await?)
+            Some(train(&library, &campaign, &out.join("models"), arguments.force).await?)
         }
         None => None,
     };
     let material = Material::read(&library, &campaign, models).await?;
-    let compare = move || compare(&figures, &experiment, &material);
-    let reproduction = tokio::task::spawn_blocking(compare).await?.or_input()?;
+    let reproduction = compute(|| compare(&figures, &experiment, &material)).or_input()?;
     answer(&reproduction, out, arguments.force)
+}
+
+/// Models of the campaign, where none were given.
+async fn train(
+    library: &Library,
+    campaign: &CampaignRecord,
+    folder: &Path,
+    Force { force }: Force,
+) -> Result<Trained, Stop> {
+    check_files(folder, force)?;
+    make_folder(folder)?;
+    let bar = TrainingBar::default();
+    let watch = |at: tracktwin_surrogate::Progress<'_>| bar.at(&at);
+    let trained = train_into(folder, force, library, campaign, SEED, &watch).await?;
+    bar.end();
+    Ok(trained)
 }
 
 /// The figures of these names, each once and in the paper's order; all if there are no names.
@@ -169,22 +185,19 @@ fn compare(
     } else {
         std::collections::BTreeMap::new()
     };
+    let evaluator = material.evaluator();
+    let results = Results {
+        design: &experiment.design,
+        wavelet_centre_rad: experiment.features.wavelet_centre_rad,
+        set,
+        seed: evaluator.map_or(SEED, |evaluator| evaluator.models().split_seed()),
+    };
     let mut progress = Progress::begin("comparing", 0, figures.len() as u64);
     let mut all: Vec<Compared> = Vec::new();
     for (done, &figure) in figures.iter().enumerate() {
         progress.at(done as u64, figure.name());
-        let evaluator = material.evaluator();
-        let seed = evaluator.map_or(SEED, |evaluator| evaluator.models().split_seed());
-        let compared = match (examples.remove(&figure), evaluator) {
-            (Some(recordings), Some(evaluator)) => {
-                Some(pipeline::reproduce::from_examples(figure, evaluator, recordings)?)
-            }
-            (None, Some(evaluator)) if figure.needs_models() => {
-                Some(pipeline::reproduce::test_errors(set, evaluator.models())?)
-            }
-            _ => pipeline::reproduce::from_library(figure, experiment, set, seed)?,
-        };
-        all.extend(compared);
+        let recordings = examples.remove(&figure).unwrap_or_default();
+        all.extend(pipeline::reproduce::compared(figure, &results, evaluator, recordings)?);
     }
     progress.end();
     let provenance = Provenance {

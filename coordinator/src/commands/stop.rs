@@ -1,5 +1,6 @@
 //! Why a command ends without being done.
 
+use crate::pipeline::models::ModelsError;
 use tracktwin_farm::campaign::StoreError;
 use tracktwin_farm::embedded::FarmError;
 use tracktwin_files::FilesError;
@@ -32,6 +33,9 @@ impl<E: Into<anyhow::Error>> From<E> for Stop {
 fn is_wrong_input(error: &anyhow::Error) -> Option<bool> {
     if let Some(library) = library_error(error) {
         return Some(library.is_wrong_input());
+    }
+    if let Some(models) = error.downcast_ref::<ModelsError>() {
+        return Some(models.is_wrong_input());
     }
     let file = error.chain().find_map(|cause| cause.downcast_ref::<FilesError>());
     file.map(FilesError::is_wrong_input)

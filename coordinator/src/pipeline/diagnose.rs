@@ -3,7 +3,9 @@
 //! Owns the order of the stages; what each does is the diagnosis crate's, where null simulations
 //! are kept the library's.
 
+use crate::pipeline::compute::compute;
 use crate::pipeline::null_models::{self, NullModelError};
+use nalgebra::DVector;
 use tracktwin_diagnosis::{
     CalibrationError, Candidate, Diagnosis, Evidence, Search, Stage, Subject, SubjectError,
     check_track, first_calibration, passes_alone, search,
@@ -81,8 +83,8 @@ pub async fn diagnose(
     let allowed = |physics: &str| !without.iter().any(|other| other == physics);
     check_track(recording, design)?;
     watch("first look", 0.0);
-    let mut look = first_look(recording);
-    let mut subject = match Subject::new(recording, design) {
+    let mut look = compute(|| first_look(recording));
+    let mut subject = match compute(|| Subject::new(recording, design)) {
         Ok(subject) => subject,
         Err(reason) => {
             look.forget(allowed);
@@ -101,9 +103,7 @@ pub async fn diagnose(
     }
     let suggested = subject.suggested(&look);
     watch("baseline", 0.0);
-    let start = first_calibration(&subject).map_err(DiagnosingError::Baseline)?;
-    let beyond = subject.forward.allow_beyond(&start).map_err(CalibrationError::from);
-    beyond.map_err(DiagnosingError::Baseline)?;
+    let start = compute(|| baseline(&mut subject)).map_err(DiagnosingError::Baseline)?;
     watch("null model", 0.0);
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
@@ -112,10 +112,17 @@ pub async fn diagnose(
     all.extend(suggested);
     all.retain(|candidate: &Candidate| allowed(candidate.kind.physics));
     let progress = |stage, share| watch(name(stage), share);
-    let found = tokio::task::block_in_place(|| search(&subject, &null, start, &all, &progress));
+    let found = compute(|| search(&subject, &null, start, &all, &progress));
     let search = found.map_err(DiagnosingError::Search)?;
-    let diagnosis = conclude(recording, &subject, &look, &search)?;
+    let diagnosis = compute(|| conclude(recording, &subject, &look, &search))?;
     Ok(Diagnosed { diagnosis, compared: Some(Compared { subject, search }) })
+}
+
+/// The track re-tuned with nothing left out, and what may differ beyond the section.
+fn baseline(subject: &mut Subject) -> Result<DVector<f64>, CalibrationError> {
+    let start = first_calibration(subject)?;
+    subject.forward.allow_beyond(&start)?;
+    Ok(start)
 }
 
 fn conclude(

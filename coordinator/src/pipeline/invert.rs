@@ -1,5 +1,6 @@
 //! From a recording to its evaluation by the physics: sections, null model, fits.
 
+use crate::pipeline::compute::compute;
 use crate::pipeline::null_models::{self, NullModelError};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -38,14 +39,14 @@ pub async fn invert(
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Inversion, InvertingError> {
     watch("spectra", 0.0);
-    let subjects = tokio::task::block_in_place(|| sections(recording, design))?;
-    let started = tokio::task::block_in_place(|| start(subjects, watch))?;
+    let subjects = compute(|| sections(recording, design))?;
+    let started = compute(|| start(subjects, watch))?;
     let (subject, values) = &started[started.len() / 2];
     watch("null model", 0.0);
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
     let null = null_models::of(subject, values, library, share).await?;
-    let fitted = tokio::task::block_in_place(|| fit_all(started, &null, watch))?;
+    let fitted = compute(|| fit_all(started, &null, watch))?;
     let mut inversion = Inversion::of(recording, &fitted);
     if let Some(lost) = chain::loss_of_contact(recording) {
         let there = inversion.sleepers.iter_mut().filter(|it| lost.sleepers.contains(&it.id));

@@ -1,5 +1,6 @@
 //! Null simulations of a recording's track: taken from the library, or made and kept there.
 
+use super::compute::compute;
 use nalgebra::DVector;
 use serde::Serialize;
 use tracktwin_diagnosis::{NullError, NullModel, Subject};
@@ -70,7 +71,7 @@ pub async fn of(
     {
         return Ok(null);
     }
-    let simulated = tokio::task::block_in_place(|| {
+    let simulated = compute(|| {
         NullModel::simulate(forward, &grid, u64::from(SURFACES), SEED, |done| progress(done as u64))
     });
     let null = simulated?;

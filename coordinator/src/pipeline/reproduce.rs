@@ -1,10 +1,11 @@
 //! From a library and models to the paper's figures: simulates its examples, asks the models.
 
 use crate::pipeline::evaluate::Evaluator;
+use crate::pipeline::train;
 use std::collections::BTreeMap;
 use tracktwin_experiment::Experiment;
 use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
-use tracktwin_reproduction::{Compared, Error, Example, Figure, HammerTest, SPEED_KM_H, Told};
+use tracktwin_reproduction::{Compared, Error, Example, Figure, Results, SPEED_KM_H, Source, Told};
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_signal::{FeatureSet, Signal};
 use tracktwin_surrogate::{Trained, TrainingSet};
@@ -70,61 +71,39 @@ pub fn check(experiment: &Experiment, figures: &[Figure]) -> Result<(), Reproduc
     Ok(())
 }
 
-/// A figure that needs no models.
-///
-/// # Errors
-/// [`ReproducingError::Figure`].
-pub fn from_library(
-    figure: Figure,
-    experiment: &Experiment,
-    set: &TrainingSet,
-    seed: u64,
-) -> Result<Option<Compared>, ReproducingError> {
-    let compared = match figure {
-        Figure::Fig9 => {
-            let tests: Vec<HammerTest> = tracktwin_reproduction::hammer_tests(&experiment.design)?;
-            tracktwin_reproduction::receptance(&tests)
-        }
-        Figure::Fig10 => {
-            tracktwin_reproduction::speed(set, experiment.features.wavelet_centre_rad)?
-        }
-        Figure::Fig12 => tracktwin_reproduction::sensitivity(set)?,
-        Figure::Fig13 => tracktwin_reproduction::selector(set, seed)?,
-        _ => return Ok(None),
-    };
-    Ok(Some(compared))
-}
-
-/// The models' test errors.
-///
-/// # Errors
-/// [`ReproducingError::Figure`] or [`ReproducingError::Surrogate`].
-pub fn test_errors(set: &TrainingSet, models: &Trained) -> Result<Compared, ReproducingError> {
-    let single = models.group(&[SPEED_KM_H], FeatureSet::Gf.name());
-    let tested =
-        single.map(|group| crate::pipeline::train::tested_by(set, models, group)).transpose()?;
-    Ok(tracktwin_reproduction::test_errors(models, &tested.unwrap_or_default())?)
-}
-
-/// A numerical example's figure, of what the models say of its recordings.
+/// A figure beside the paper's; none where it asks models and there are none.
 ///
 /// # Errors
 /// [`ReproducingError`].
-pub fn from_examples(
+pub fn compared(
     figure: Figure,
+    results: &Results<'_>,
+    evaluator: Option<&Evaluator>,
+    recordings: Vec<(Example, Recording)>,
+) -> Result<Option<Compared>, ReproducingError> {
+    Ok(match (figure.source(), evaluator) {
+        (Source::Results(compare), _) => Some(compare(results)?),
+        (Source::Models | Source::Examples(_), None) => None,
+        (Source::Models, Some(evaluator)) => Some(test_errors(results.set, evaluator.models())?),
+        (Source::Examples(compare), Some(evaluator)) => {
+            Some(compare(&evaluated(evaluator, recordings)?))
+        }
+    })
+}
+
+fn test_errors(set: &TrainingSet, models: &Trained) -> Result<Compared, ReproducingError> {
+    let single = models.group(&[SPEED_KM_H], FeatureSet::Gf.name());
+    let tested = single.map(|group| train::tested_by(set, models, group)).transpose()?;
+    Ok(tracktwin_reproduction::test_errors(models, &tested.unwrap_or_default())?)
+}
+
+/// What the models say of the examples' recordings.
+fn evaluated(
     evaluator: &Evaluator,
     recordings: Vec<(Example, Recording)>,
-) -> Result<Compared, ReproducingError> {
-    let told = recordings
-        .into_iter()
-        .map(|(example, recording)| Ok(Told::new(example, &evaluator.evaluate(&recording)?)?))
-        .collect::<Result<Vec<_>, ReproducingError>>()?;
-    Ok(match figure {
-        Figure::Fig16 => tracktwin_reproduction::step(&told),
-        Figure::Fig17 => tracktwin_reproduction::irregularity(&told),
-        Figure::Fig18 => tracktwin_reproduction::bending_stiffness(&told),
-        _ => tracktwin_reproduction::local_change(&told),
-    })
+) -> Result<Vec<Told>, ReproducingError> {
+    let told = |(example, recording)| Ok(Told::new(example, &evaluator.evaluate(&recording)?)?);
+    recordings.into_iter().map(told).collect()
 }
 
 /// Recordings of these figures' examples, each example on a surface of its own that it keeps at all

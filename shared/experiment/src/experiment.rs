@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use tracktwin_parameters::quantity::SPEED;
 use tracktwin_parameters::{Case, QuantityError, TrackDesign};
-use tracktwin_signal::{DefinitionError, FeatureDefinition, ThirdOctave};
+use tracktwin_signal::{FeatureDefinition, FeatureError, ThirdOctave};
 use tracktwin_track::extension::{ExtensionInstance, InstanceError, SampledExtension};
 
 /// Spans between what is evaluated and the held ends of the rail, at least.
@@ -112,8 +112,8 @@ pub enum ExperimentError {
     #[error("extension: {0}")]
     Extension(#[from] InstanceError),
     /// The features can't be extracted.
-    #[error("features: {0}")]
-    Features(#[from] DefinitionError),
+    #[error(transparent)]
+    Features(#[from] FeatureError),
     /// The features lack one-third octaves that the library keeps.
     #[error("features: the range must hold all one-third octaves from 50 to 4000 Hz")]
     Bands,
@@ -180,7 +180,7 @@ impl Experiment {
     /// [`ExperimentError`] names the setting that prevents it, and what would do.
     pub fn checked(self) -> Result<Self, ExperimentError> {
         self.check_speeds()?;
-        self.features.check()?;
+        self.features.check().map_err(FeatureError::from)?;
         if self.features.bands().count() != ThirdOctave::COUNT {
             return Err(ExperimentError::Bands);
         }

@@ -74,10 +74,7 @@ impl Simulation {
     /// [`ExperimentError`] when it can't be done.
     pub fn new(experiment: &Experiment) -> Result<Self, ExperimentError> {
         let experiment = experiment.clone().checked()?;
-        let extractor = Extractor::new(&experiment.features).map_err(|error| match error {
-            FeatureError::Definition(error) => ExperimentError::Features(error),
-            other => ExperimentError::Json { message: other.to_string() },
-        })?;
+        let extractor = Extractor::new(&experiment.features)?;
         Ok(Self { experiment, extractor })
     }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use tracktwin_experiment::{Case, Experiment, Outcome, Simulate, Simulation};
 use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
-use tracktwin_track::extension::{KINDS, Kind, PlaceKind};
+use tracktwin_track::extension::{Kind, PlaceKind};
 
 /// Every so many bins are kept.
 const BINS_APART: usize = 8;
@@ -64,7 +64,7 @@ fn golden() -> Golden {
         ("soft track, high level", v_track(), soft),
         ("five times as large", real_scale, nominal),
     ];
-    let kinds = KINDS.iter().map(|kind| (kind.physics, with(kind), nominal));
+    let kinds = Kind::all().map(|kind| (kind.physics, with(kind), nominal));
     let cases = tracks.into_iter().chain(kinds);
     cases.map(|(name, experiment, set)| (name.to_owned(), features(experiment, set))).collect()
 }

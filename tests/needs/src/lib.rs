@@ -2,6 +2,10 @@
 //!
 //! Where it is missing, a test skips and the run says so in one line, unless it is demanded.
 
+mod snapshot;
+
+pub use snapshot::assert_snapshot;
+
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::net::{Ipv4Addr, TcpListener};

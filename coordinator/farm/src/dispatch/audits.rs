@@ -5,9 +5,10 @@
 
 use super::campaigns::{Campaigns, Served};
 use super::settings::Settings;
+use parking_lot::Mutex;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::time::Instant;
 use tracktwin_experiment::{Case, Outcome, Prepare};
@@ -94,7 +95,7 @@ impl Audits {
             for audit in sample {
                 self.put(worker.to_owned(), audit);
             }
-            *self.next.lock().expect("nobody panics while holding it") = None;
+            *self.next.lock() = None;
             return Ok(Some(lease));
         }
         Ok(None)
@@ -115,12 +116,12 @@ impl Audits {
 
     fn put(&self, worker: String, audit: Audit) {
         let key = (audit.campaign.clone(), audit.case.index);
-        self.under_way.lock().expect("nobody panics while holding it").insert(key, (worker, audit));
+        self.under_way.lock().insert(key, (worker, audit));
     }
 
     /// What a worker was asked to audit; another's audit stays.
     fn take(&self, worker: &str, campaign: &str, index: u32) -> Option<Audit> {
-        let mut under_way = self.under_way.lock().expect("nobody panics while holding it");
+        let mut under_way = self.under_way.lock();
         match under_way.entry((campaign.to_owned(), index)) {
             Entry::Occupied(entry) if entry.get().0 == worker => Some(entry.remove().1),
             _ => None,
@@ -130,7 +131,7 @@ impl Audits {
     /// Whether there may be something to audit; the next to ask waits for a while.
     fn is_time(&self) -> bool {
         let now = Instant::now();
-        let mut next = self.next.lock().expect("nobody panics while holding it");
+        let mut next = self.next.lock();
         let is_time = next.is_none_or(|next| next <= now);
         if is_time {
             *next = Some(now + PAUSE);

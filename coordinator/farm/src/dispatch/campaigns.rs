@@ -1,8 +1,9 @@
 //! The campaigns whose cases are handed out, as messages need them.
 
 use super::Pace;
+use parking_lot::Mutex;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use tracktwin_experiment::{Experiment, ExperimentError};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 use tracktwin_protocol::Shape;
@@ -44,13 +45,13 @@ impl Served {
 
     /// Takes measured computing times of cases, in s.
     pub(crate) fn measured(&self, durations_s: impl IntoIterator<Item = f64>) {
-        let mut pace = self.pace.lock().expect("nobody panics while holding it");
+        let mut pace = self.pace.lock();
         durations_s.into_iter().for_each(|case_s| pace.measured(case_s));
     }
 
     /// Cases of a lease where so many cores are at work.
     fn cases_per_lease(&self, cores: u32) -> u32 {
-        self.pace.lock().expect("nobody panics while holding it").cases_per_lease(cores)
+        self.pace.lock().cases_per_lease(cores)
     }
 }
 
@@ -68,23 +69,23 @@ impl Campaigns {
 
     /// A campaign of the library.
     pub(crate) async fn of(&self, id: &str) -> Result<Arc<Served>, DispatchError> {
-        let known = self.known.lock().expect("nobody panics while holding it").get(id).cloned();
+        let known = self.known.lock().get(id).cloned();
         if let Some(served) = known {
             return Ok(served);
         }
         let served = Arc::new(Served::new(self.library.campaign(id).await?)?);
-        let mut known = self.known.lock().expect("nobody panics while holding it");
+        let mut known = self.known.lock();
         Ok(known.entry(id.to_owned()).or_insert(served).clone())
     }
 
     /// Remembers whose cases were handed out last: the next will most likely be of the same.
     pub(crate) fn leased(&self, served: &Arc<Served>) {
-        *self.latest.lock().expect("nobody panics while holding it") = Some(served.clone());
+        *self.latest.lock() = Some(served.clone());
     }
 
     /// Cases of the next lease, as far as one can know before.
     pub(crate) fn cases_per_lease(&self, cores: u32) -> u32 {
-        let latest = self.latest.lock().expect("nobody panics while holding it");
+        let latest = self.latest.lock();
         let unknown = || Pace::default().cases_per_lease(cores);
         latest.as_ref().map_or_else(unknown, |it| it.cases_per_lease(cores))
     }

@@ -1,8 +1,8 @@
 //! The workers that talk to this coordinator.
 
 use super::Breaker;
+use parking_lot::Mutex;
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 use tokio::time::Instant;
 use tracktwin_protocol::Registration;
@@ -55,7 +55,7 @@ pub(crate) struct Full;
 impl Roster {
     /// Takes in a worker, or takes it in anew.
     pub(crate) fn add(&self, registration: Registration) -> Result<(), Full> {
-        let mut workers = self.lock();
+        let mut workers = self.0.lock();
         workers.retain(|_, worker| worker.heard_of.elapsed() < FORGET_AFTER);
         if workers.len() >= WORKERS_MAX && !workers.contains_key(&registration.worker) {
             return Err(Full);
@@ -71,7 +71,7 @@ impl Roster {
 
     /// How a worker stands; nothing if it has not registered.
     pub(crate) fn standing(&self, worker: &str) -> Option<Standing> {
-        let mut workers = self.lock();
+        let mut workers = self.0.lock();
         let worker = workers.get_mut(worker)?;
         let now = Instant::now();
         worker.heard_of = now;
@@ -96,7 +96,7 @@ impl Roster {
 
     /// Notes why a worker is in quarantine, or that it is not.
     pub(crate) fn set_quarantine(&self, worker: &str, reason: Option<String>) {
-        if let Some(worker) = self.lock().get_mut(worker) {
+        if let Some(worker) = self.0.lock().get_mut(worker) {
             worker.quarantine = reason;
         }
     }
@@ -105,7 +105,7 @@ impl Roster {
     ///
     /// Only where others succeed: where everybody fails, the cases are at fault.
     pub(crate) fn reported(&self, worker: &str, failed: &[bool]) -> bool {
-        let mut workers = self.lock();
+        let mut workers = self.0.lock();
         let Some(it) = workers.get_mut(worker) else { return false };
         it.breaker.reported(failed.iter().copied());
         let present = |it: &Worker| it.heard_of.elapsed() < PRESENT;
@@ -121,15 +121,11 @@ impl Roster {
 
     /// How many workers are present, and their cores.
     pub(crate) fn present(&self) -> (usize, u32) {
-        let workers = self.lock();
+        let workers = self.0.lock();
         let present = workers.values().filter(|worker| worker.heard_of.elapsed() < PRESENT);
         present.fold((0, 0), |(count, cores), worker| {
             (count + 1, cores.saturating_add(worker.registration.cores))
         })
-    }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<String, Worker>> {
-        self.0.lock().expect("nobody panics while holding it")
     }
 }
 

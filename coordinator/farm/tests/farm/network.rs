@@ -26,7 +26,7 @@ use tracktwin_library::Library;
 use tracktwin_protocol::farm::farm_server::{Farm, FarmServer};
 use tracktwin_protocol::farm::{self as messages};
 use tracktwin_worker::Credentials;
-use tracktwin_worker::agent::{self, Config};
+use tracktwin_worker::agent::{self, Config, Seams};
 use turmoil::net::{TcpListener, TcpStream};
 
 /// Seeds of an ordinary test run; each takes a few tenths of a second.
@@ -247,8 +247,7 @@ async fn work(name: &'static str) -> turmoil::Result {
         worker: name.to_owned(),
         credentials: Credentials { insecure: true, ..Credentials::default() },
         prepare: stand_in,
-        dial,
-        inline: true,
+        seams: Seams { dial, inline: true, ..Seams::default() },
         ..Config::new(format!("http://coordinator:{PORT}"), CORES)
     };
     agent::run(config, CancellationToken::new()).await?;

@@ -16,7 +16,7 @@ use tracktwin_protocol::farm::{
     self as messages, LeaseRequest, RegisterRequest, ReportRequest, Verdict,
 };
 use tracktwin_signal::ThirdOctave;
-use tracktwin_worker::agent::{self, AgentError, Config};
+use tracktwin_worker::agent::{self, AgentError, Config, Seams};
 
 #[tokio::test]
 async fn a_worker_of_other_physics_is_refused_with_both_hashes() {
@@ -27,8 +27,8 @@ async fn a_worker_of_other_physics_is_refused_with_both_hashes() {
     assert!(status.message().contains("other") && status.message().contains(MODEL_HASH));
 
     let config = Config {
-        model_hash: Some("other".to_owned()),
         prepare: stand_in,
+        seams: Seams { model_hash: "other".to_owned(), ..Seams::default() },
         ..Config::new(coordinator.url.clone(), CORES)
     };
     let error = agent::run(config, CancellationToken::new()).await.unwrap_err();

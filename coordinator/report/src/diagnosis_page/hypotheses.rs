@@ -2,10 +2,10 @@
 
 use super::quantity::{per_cent, signed};
 use super::words::{
-    UNKNOWN, accepted, addition, chance, is_chain, is_fitted, list, physics, place, summary,
+    accepted, addition, chance, is_chain, is_fitted, list, physics, place, summary,
 };
 use maud::{Markup, html};
-use tracktwin_diagnosis::{Diagnosis, Hypothesis, Verdict};
+use tracktwin_diagnosis::{Diagnosis, Hypothesis, UNKNOWN, Verdict};
 
 /// Hypotheses that are shown one by one, accepted ones apart.
 const SHOWN: usize = 8;

@@ -1,6 +1,6 @@
 //! Names of physics, sleepers and places as a reader says them.
 
-use tracktwin_diagnosis::{Diagnosis, Hypothesis, Location};
+use tracktwin_diagnosis::{Diagnosis, Hypothesis, Location, UNKNOWN};
 use tracktwin_track::extension::Kind;
 
 /// Sleepers that are named one by one.
@@ -24,9 +24,6 @@ pub(super) fn summary(name: &str) -> &'static str {
 pub(super) fn is_chain(name: &str) -> bool {
     Kind::from_name(name).is_some_and(|kind| kind.measuring_chain)
 }
-
-/// The name of what no kind explains.
-pub(super) const UNKNOWN: &str = "unknown_physics";
 
 /// What was accepted.
 pub(super) fn accepted(diagnosis: &Diagnosis) -> impl Iterator<Item = &Hypothesis> {

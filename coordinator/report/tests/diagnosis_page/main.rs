@@ -4,6 +4,8 @@
 mod examples;
 
 use self::examples::{SLEEPERS, chain, consistent, estimates, hypothesis, left_out, unknown};
+use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::Path;
 use tracktwin_diagnosis::{Diagnosis, Levels, SleeperValues, Verdict};
 use tracktwin_report::{Origin, diagnosis_page};
@@ -189,4 +191,29 @@ fn missing_levels_leave_gaps_and_no_levels_leave_out_the_pictures() {
     let page =
         page("nothing", &Diagnosis { levels: Levels::default(), track: Vec::new(), ..unknown() });
     assert_reads(&page, &["unknown physics", "800 to 1425 Hz"]);
+}
+
+/// Names of the fields of a document, each with those that it stands in.
+fn fields(value: &Value, name: &str, all: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(fields) => {
+            for (field, value) in fields {
+                let name = format!("{name}.{field}");
+                self::fields(value, &name, all);
+                all.insert(name);
+            }
+        }
+        Value::Array(values) => values.iter().for_each(|it| fields(it, &format!("{name}[]"), all)),
+        _ => {}
+    }
+}
+
+#[test]
+fn a_diagnosis_has_the_fields_that_are_kept() {
+    let mut all = BTreeSet::new();
+    for diagnosis in [left_out(), consistent(), unknown(), chain()] {
+        fields(&serde_json::to_value(diagnosis).expect("a diagnosis is JSON"), "", &mut all);
+    }
+    let lines: Vec<String> = all.into_iter().map(|name| name + "\n").collect();
+    test_needs::assert_snapshot("diagnosis-fields.txt", &lines.concat());
 }

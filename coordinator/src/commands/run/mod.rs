@@ -6,11 +6,12 @@ mod sample;
 use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::numbers::{cores, count};
-use super::progress::Progress;
+use super::progress::{Progress, TrainingBar};
 use super::signals::stop_on_signal;
-use super::{OrInput, Stop, continuity, evaluate, note, say, train};
+use super::{OrInput, Stop, continuity, evaluate, note, say};
 use crate::commands::contact::contact_sentence;
 use crate::pipeline::lack::check_for_training;
+use crate::pipeline::models;
 use anyhow::anyhow;
 use clap::Args;
 use std::num::NonZeroUsize;
@@ -78,7 +79,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     let out = &arguments.out;
     if trains {
-        train::check_files(&out.join(MODELS), arguments.force)?;
+        models::check_files(&out.join(MODELS), arguments.force.force)?;
         sample::check_files(&out.join("sample"), arguments.force)?;
         evaluate::check_files(out, arguments.force)?;
     }
@@ -113,7 +114,10 @@ async fn chain(
     }
     let out = &arguments.out;
     let record = library.campaign(&campaign.id()).await?;
-    let models = train::train(library, &record, 0, &out.join(MODELS), arguments.force).await?;
+    let (folder, force) = (out.join(MODELS), arguments.force.force);
+    let bar = TrainingBar::default();
+    let models = models::train_into(&folder, force, library, &record, 0, &|at| bar.at(&at)).await?;
+    bar.end();
     let Some(recording) = recording else {
         let models = out.join(MODELS);
         let line = format!("models: {}; `tracktwin evaluate` takes a recording", models.display());

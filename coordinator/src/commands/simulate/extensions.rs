@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use serde::Deserialize;
 use std::path::PathBuf;
-use tracktwin_track::extension::{ExtensionInstance, KINDS, Kind, KindParameter};
+use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter};
 
 /// Physics beyond the paper's model, and faults of the measuring chain.
 #[derive(Args)]
@@ -72,5 +72,5 @@ pub(in crate::commands) fn list() -> String {
         let parameters: String = kind.parameters.iter().map(parameter).collect();
         format!("{}: {}{chain}\n  {}{parameters}", kind.physics, kind.summary, kind.place.form())
     };
-    KINDS.iter().map(kind).collect::<Vec<_>>().join("\n")
+    Kind::all().map(kind).collect::<Vec<_>>().join("\n")
 }

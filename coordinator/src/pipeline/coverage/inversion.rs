@@ -1,5 +1,6 @@
 //! How well inversion tells the sleepers of uneven tracks that the reference simulator recorded.
 
+use crate::pipeline::compute::compute;
 use crate::pipeline::invert::{InvertingError, invert};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -71,7 +72,7 @@ pub async fn inversion_rows(
         let mut scores = Scores::default();
         for number in 0..tracks {
             let scene = Scene::uneven(seed.wrapping_mul(1000) + u64::from(number), scatter);
-            let mut recording = tokio::task::block_in_place(|| simulate(&scene))?;
+            let mut recording = compute(|| simulate(&scene))?;
             recording.name = format!("track {number}");
             let design = TrackDesign::v_track();
             let inversion = invert(&recording, &design, library, &|_, _| ()).await?;

@@ -2,6 +2,7 @@
 
 use super::{SEALS, Trial, TrialError, file, sealed, text};
 use crate::pipeline;
+use crate::pipeline::compute::compute;
 use crate::pipeline::diagnose::{Compared, Diagnosed, Setting};
 use crate::pipeline::provenance;
 use rustix::time::{ClockId, clock_gettime};
@@ -58,12 +59,10 @@ impl Trial {
         let cpu_s = cpu_s() - before;
         let record = self.written(number, "", &diagnosis)?;
         let plan = self.opened(number)?;
-        let lengths: Vec<Option<f64>> = plan
-            .scene
-            .left_out
-            .iter()
-            .map(|hidden| detectability(recording, &subject, &search, &plan.scene, hidden))
-            .collect::<Result<_, _>>()?;
+        let scene = &plan.scene;
+        let length = |hidden| detectability(recording, &subject, &search, scene, hidden);
+        let lengths: Vec<Option<f64>> =
+            compute(|| scene.left_out.iter().map(length).collect::<Result<_, _>>())?;
         let score = score(&plan, &diagnosis, &lengths, cpu_s);
         self.keep(number, Question::Catalogue, &score, Some(record)).await
     }
@@ -110,7 +109,7 @@ impl Trial {
         let Some(evaluator) = &self.paper else { return Ok(()) };
         let speeds = &evaluator.set().speeds_km_h;
         let evaluation = check_recording(recording, evaluator.design(), speeds)
-            .and_then(|()| evaluator.evaluate(recording))
+            .and_then(|()| compute(|| evaluator.evaluate(recording)))
             .map_err(|source| TrialError::Paper { number, source })?;
         let paper = Paper::of(&self.opened(number)?.scene, &evaluation);
         self.keep(number, Question::Paper, &paper, None).await
@@ -124,9 +123,7 @@ impl Trial {
             let unfinished = folder.with_extension("unfinished");
             let _ = std::fs::remove_dir_all(&unfinished);
             let plan = tracktwin_trial::plan(self.seed, number);
-            tokio::task::block_in_place(|| {
-                tracktwin_reference_simulator::record(&plan.scene, &unfinished)
-            })?;
+            compute(|| tracktwin_reference_simulator::record(&plan.scene, &unfinished))?;
             std::fs::rename(&unfinished, &folder).map_err(|source| file(&folder, source))?;
         }
         Ok(Recording::open(folder)?)
@@ -150,8 +147,7 @@ impl Trial {
         let path = self.folder.join(format!("diagnoses/{number:04}{control}.json"));
         let document = text(diagnosis);
         replace(&path, document.as_bytes())?;
-        let record = provenance::diagnosis(diagnosis, document)
-            .map_err(|source| TrialError::Json { path: path.display().to_string(), source })?;
+        let record = provenance::diagnosis(diagnosis, document);
         Ok(DiagnosisRecord {
             recording: format!("trial {} case {number}{control}", self.seed),
             ..record

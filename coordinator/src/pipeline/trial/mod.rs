@@ -323,7 +323,7 @@ impl Trial {
             let known = Seals::from_text(&known)?;
             // A longer trial of the same seed has more seals, but none other.
             seals.agree(&known)?;
-            if known.count() > self.cases {
+            if known.count() > self.cases as usize {
                 return Ok(known.digest());
             }
         }

@@ -3,7 +3,7 @@
 //! Each has a dynamic stiffness of known form, so that how well it explains what is left follows from
 //! the port scan's own traces (docs/diagnosis.md, section 5).
 
-use crate::outcome::Estimate;
+use crate::estimate::Estimate;
 use nalgebra::{DMatrix, DVector};
 use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,7 @@
 //! What may be left out, where and how strong: the list that a recording is screened with.
 
 use crate::section::Section;
-use tracktwin_track::extension::{
-    Class, ExtensionInstance, Family, KINDS, Kind, KindParameter, Places,
-};
+use tracktwin_track::extension::{Class, ExtensionInstance, Family, Kind, KindParameter, Places};
 
 /// Of a parameter that may be zero, the least part of its greatest value that counts.
 const LEAST: f64 = 1e-2;
@@ -82,7 +80,7 @@ impl Candidate {
 
 /// Every candidate for a section: each kind at each place it may have, as its screening says.
 pub fn candidates(section: &Section) -> Vec<Candidate> {
-    KINDS.iter().flat_map(|kind| of_kind(kind, section)).collect()
+    Kind::all().flat_map(|kind| of_kind(kind, section)).collect()
 }
 
 /// Those of a kind: families with the same places go through them together.

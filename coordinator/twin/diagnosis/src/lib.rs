@@ -10,6 +10,7 @@ mod behaviour;
 mod calibration;
 mod candidate;
 mod conclusion;
+mod estimate;
 mod forward;
 mod held_out;
 mod null_model;
@@ -33,12 +34,13 @@ pub use behaviour::{Behaviour, Element};
 pub use calibration::{Calibration, CalibrationError, Problem};
 pub use candidate::{Candidate, candidates};
 pub use conclusion::{Evidence, passes_alone};
+pub use estimate::Estimate;
 pub use forward::{Forward, Linearised};
 pub use null_model::{NullError, NullModel};
 pub use observation::Observation;
 pub use outcome::{
-    BeforeAfter, Diagnosis, Estimate, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score,
-    Scores, SleeperValues, Verdict,
+    BeforeAfter, Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score, Scores,
+    SleeperValues, UNKNOWN, Verdict,
 };
 pub use port_scan::{Port, PortPlace, PortScan};
 pub use screen::{Template, templates};

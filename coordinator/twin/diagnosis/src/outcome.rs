@@ -1,12 +1,16 @@
 //! The diagnosis as files and pages have it (`tracktwin-diagnosis/1`).
 
 use crate::behaviour::Element;
+use crate::estimate::Estimate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use tracktwin_inspection::chain::LossOfContact;
 
 /// Name and version of the format.
 pub const FORMAT: &str = "tracktwin-diagnosis/1";
+
+/// What is called by no name of the catalogue.
+pub const UNKNOWN: &str = "unknown_physics";
 
 /// What a recording is, compared with the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -124,15 +128,6 @@ pub struct Location {
     pub x_m: [f64; 2],
     /// The sleepers there.
     pub sleepers: Vec<String>,
-}
-
-/// A mean and a standard deviation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation.
-    pub sd: f64,
 }
 
 /// Without and with what was named.

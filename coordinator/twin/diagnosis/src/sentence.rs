@@ -131,7 +131,8 @@ fn words(parameter: &str) -> &str {
 mod tests {
     use super::*;
     use crate::behaviour::Element;
-    use crate::outcome::{Estimate, Location, Score, Scores};
+    use crate::estimate::Estimate;
+    use crate::outcome::{Location, Score, Scores};
 
     fn hypothesis(physics: &str, location: Option<Location>) -> Hypothesis {
         Hypothesis {

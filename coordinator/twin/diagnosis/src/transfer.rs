@@ -172,7 +172,7 @@ impl Transfer {
 /// `|F_1|^2 = (|a_2|^2 + |b|^2) / |a_1 a_2 - b^2|^2 S`: what the wheels meet at one time is the same surface
 /// a distance apart, whose phase turns many times within a band. Several further wheels are taken one
 /// by one.
-/// Source: T. X. Wu and D. J. Thompson, Vehicle System Dynamics 34 (2001); mismatch catalogue 17.
+/// Source: T. X. Wu and D. J. Thompson, Vehicle System Dynamics 34 (2001).
 fn by_further_wheel(
     model: &TrackModel,
     lines_hz: &[f64],

@@ -290,29 +290,6 @@ impl Hidden {
             }
         }
     }
-
-    /// Whether it is a fault of the measuring chain, not physics of track or vehicle.
-    pub const fn is_artefact(&self) -> bool {
-        matches!(
-            self,
-            Self::SensorMountResonance { .. }
-                | Self::Clipping { .. }
-                | Self::GainError { .. }
-                | Self::PositionError { .. }
-                | Self::ElectricalHum { .. }
-        )
-    }
-
-    /// Whether the twin's catalogue of extensions has it; if not, the right answer is "unknown".
-    pub const fn in_catalogue(&self) -> bool {
-        !matches!(
-            self,
-            Self::RailAbsorber { .. }
-                | Self::CrackedSleeper { .. }
-                | Self::LinkedSleepers { .. }
-                | Self::WheelMode { .. }
-        )
-    }
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ mod pass;
 mod port;
 mod ports;
 mod rail;
+mod rail_state;
 mod record;
 mod rest;
 mod scene;

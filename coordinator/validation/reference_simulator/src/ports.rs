@@ -1,7 +1,7 @@
 //! The forces of all ports during a step: railpads, clamps, joints and absorbers.
 
-use crate::motion::RailState;
 use crate::port::Behind;
+use crate::rail_state::RailState;
 use crate::rest::Rest;
 use crate::system::dot;
 use crate::track::{Track, seat_m};

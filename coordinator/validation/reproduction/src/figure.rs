@@ -69,16 +69,6 @@ impl Figure {
             Self::Fig19 => "Example: stiffness reduced at a few sleepers",
         }
     }
-
-    /// Whether it asks trained models.
-    pub const fn needs_models(self) -> bool {
-        matches!(self, Self::Fig14) || self.is_example()
-    }
-
-    /// Whether it is one of the numerical examples, whose passes are simulated.
-    pub const fn is_example(self) -> bool {
-        matches!(self, Self::Fig16 | Self::Fig17 | Self::Fig18 | Self::Fig19)
-    }
 }
 
 impl std::fmt::Display for Figure {

@@ -10,7 +10,7 @@ use tracktwin_parameters::Parameter::{self, BallastStiffness, RailpadStiffness};
 const TAKEN: &str = "the text does not say from which set to which; A2 to A3 was taken";
 
 /// What was told of the three reductions beside the paper's Fig. 19.
-pub fn local_change(told: &[Told]) -> Compared {
+pub(crate) fn local_change(told: &[Told]) -> Compared {
     let caption = "Truth and estimates where railpads and ballast are reduced from parameter set \
                    A2 to A3 at sleeper 4, at 4 to 6 and at 5 to 9.";
     let mut compared = Compared::new(Figure::Fig19, caption);

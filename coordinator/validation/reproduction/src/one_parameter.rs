@@ -16,7 +16,7 @@ const FINE: std::ops::RangeInclusive<usize> = 1..=4;
 const COARSE: std::ops::RangeInclusive<usize> = 6..=9;
 
 /// What was told of three levels of irregularity beside the paper's Fig. 17.
-pub fn irregularity(told: &[Told]) -> Compared {
+pub(crate) fn irregularity(told: &[Told]) -> Compared {
     let caption = "Truth and estimates at irregularity levels 2, 3 and 4; parameter set A2.";
     let mut compared = one_parameter(Figure::Fig17, caption, told, IrregularityLevel);
     for parameter in SAME {
@@ -26,7 +26,7 @@ pub fn irregularity(told: &[Told]) -> Compared {
 }
 
 /// What was told of three bending stiffnesses of the sleepers beside the paper's Fig. 18.
-pub fn bending_stiffness(told: &[Told]) -> Compared {
+pub(crate) fn bending_stiffness(told: &[Told]) -> Compared {
     let caption = "Truth and estimates at three bending stiffnesses of the sleepers, 4000, 5000 \
                    and 6000 N m²; parameter set A2.";
     let mut compared = one_parameter(Figure::Fig18, caption, told, SleeperBendingStiffness);

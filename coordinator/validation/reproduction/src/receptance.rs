@@ -25,7 +25,7 @@ const STEPS: std::ops::Range<u32> = 10..1600;
 
 /// The receptance of a hammer test.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HammerTest {
+pub(crate) struct HammerTest {
     /// Spans of the track.
     pub spans: usize,
     /// Where it was struck and measured: above a sleeper or between two.
@@ -40,7 +40,7 @@ pub struct HammerTest {
 ///
 /// # Errors
 /// [`Error::Model`] or [`Error::Frequency`].
-pub fn hammer_tests(design: &TrackDesign) -> Result<Vec<HammerTest>, Error> {
+pub(crate) fn hammer_tests(design: &TrackDesign) -> Result<Vec<HammerTest>, Error> {
     let frequencies_hz: Vec<f64> = STEPS.map(|step| STEP_HZ * f64::from(step)).collect();
     let mut tests = Vec::new();
     for spans in [PAPER_SPANS, LONG_SPANS] {
@@ -68,7 +68,7 @@ impl HammerTest {
 }
 
 /// Peaks of hammer tests beside the paper's Fig. 9.
-pub fn receptance(tests: &[HammerTest]) -> Compared {
+pub(crate) fn receptance(tests: &[HammerTest]) -> Compared {
     let caption = "Point receptance of the rail at the middle of the nominal track, on the paper's \
                    25 spans and on 200, where the ends are not heard.";
     let mut compared = Compared::new(Figure::Fig9, caption);

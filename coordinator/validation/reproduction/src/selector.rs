@@ -32,7 +32,7 @@ struct Curve {
 ///
 /// # Errors
 /// [`Error::NoSpeed`], [`Error::TooFewCases`], or what the selector reports.
-pub fn selector(set: &TrainingSet, seed: u64) -> Result<Compared, Error> {
+pub(crate) fn selector(set: &TrainingSet, seed: u64) -> Result<Compared, Error> {
     let figure = Figure::Fig13;
     let speed = speed_index(set, figure)?;
     enough(set, figure, MATCHES)?;

@@ -35,7 +35,7 @@ struct Effect {
 ///
 /// # Errors
 /// [`Error::NoSpeed`], [`Error::NotVaried`] or [`Error::TooFewCases`].
-pub fn sensitivity(set: &TrainingSet) -> Result<Compared, Error> {
+pub(crate) fn sensitivity(set: &TrainingSet) -> Result<Compared, Error> {
     let figure = Figure::Fig12;
     let speed = speed_index(set, figure)?;
     enough(set, figure, GROUPS)?;

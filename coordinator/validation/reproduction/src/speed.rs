@@ -25,7 +25,7 @@ fn resolution(centre_rad: f64) -> f64 {
 ///
 /// # Errors
 /// [`Error::OneSpeed`] or [`Error::TooFewCases`].
-pub fn speed(set: &TrainingSet, centre_rad: f64) -> Result<Compared, Error> {
+pub(crate) fn speed(set: &TrainingSet, centre_rad: f64) -> Result<Compared, Error> {
     let figure = Figure::Fig10;
     if set.speeds_km_h.len() < 2 {
         return Err(Error::OneSpeed { figure });

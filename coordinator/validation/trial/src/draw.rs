@@ -2,29 +2,13 @@
 //!
 //! Owns shares of classes, places and strengths; what a track looks like is the truth simulator's.
 
-use crate::effect;
+use crate::class::Class;
+use crate::effect::{self, Draw};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::Distribution;
 use rand_distr::uniform::Uniform;
-use serde::{Deserialize, Serialize};
 use tracktwin_reference_simulator::Scene;
-
-/// What kind of case it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Class {
-    /// Nothing is hidden.
-    Control,
-    /// A fault of the measuring chain.
-    Artefact,
-    /// One effect of the catalogue.
-    Single,
-    /// Two effects of the catalogue.
-    Double,
-    /// An effect that the catalogue lacks.
-    Unknown,
-}
 
 /// A case of a trial.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,30 +47,9 @@ pub fn plan(seed: u64, number: u32) -> Plan {
     let mut scene = Scene::typical(scene_seed);
     let wanted = effects.into_iter().cycle().skip(before * class.effects()).take(class.effects());
     let level = scene.irregularity_level;
-    scene.left_out = wanted.map(|effect| effect.draw(level, &mut rng)).collect();
+    let mut draw = Draw { level, rng: &mut rng };
+    scene.left_out = wanted.map(|effect| effect(&mut draw)).collect();
     Plan { number, class, scene }
-}
-
-impl Class {
-    /// Its name in files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Control => "control",
-            Self::Artefact => "artefact",
-            Self::Single => "single",
-            Self::Double => "double",
-            Self::Unknown => "unknown",
-        }
-    }
-
-    /// How many effects are hidden.
-    const fn effects(self) -> usize {
-        match self {
-            Self::Control => 0,
-            Self::Double => 2,
-            Self::Artefact | Self::Single | Self::Unknown => 1,
-        }
-    }
 }
 
 fn blocks() -> Vec<Class> {
@@ -111,6 +74,7 @@ fn shuffled<T>(mut items: Vec<T>, rng: &mut ChaCha8Rng) -> Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::known::{is_artefact, kind};
 
     #[test]
     fn a_case_follows_from_seed_and_number_alone() {
@@ -148,8 +112,8 @@ mod tests {
             scene.check().unwrap();
             assert_eq!(scene.left_out.len(), class.effects());
             for hidden in &scene.left_out {
-                assert_eq!(hidden.is_artefact(), class == Class::Artefact);
-                assert_eq!(hidden.in_catalogue(), class != Class::Unknown);
+                assert_eq!(is_artefact(hidden), class == Class::Artefact);
+                assert_eq!(kind(hidden).is_some(), class != Class::Unknown);
             }
         }
     }

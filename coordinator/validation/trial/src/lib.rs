@@ -4,9 +4,12 @@
 //! The recordings come from a simulator that shares no discretisation with the diagnosis; diagnosing
 //! and files belong to the command.
 
+mod class;
 mod draw;
 mod effect;
+mod known;
 mod paper;
+mod place;
 mod rate;
 mod score;
 mod seal;
@@ -14,7 +17,8 @@ mod summary;
 mod table;
 mod visible;
 
-pub use draw::{Class, Plan, orders, plan};
+pub use class::Class;
+pub use draw::{Plan, orders, plan};
 pub use paper::Paper;
 pub use rate::Rate;
 pub use score::{Bias, KnockedOut, Named, Placed, Score, placed, score};

@@ -1,7 +1,7 @@
 //! Whether the paper's own pipeline looks content with a recording in which something is hidden.
 
+use crate::place::near;
 use crate::rate::median;
-use crate::score::near;
 use serde::{Deserialize, Serialize};
 use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
 use tracktwin_parameters::{Axis, Preset};

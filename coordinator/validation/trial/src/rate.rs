@@ -33,9 +33,7 @@ impl Rate {
     }
 
     /// Its 95 % interval (Clopper and Pearson, 1934): exact for a binomial count.
-    ///
-    /// # Panics
-    /// Never: counts of hits and misses plus one are shapes of a beta distribution.
+    #[expect(clippy::missing_panics_doc, reason = "a count and a count plus one are shapes")]
     pub fn interval_95(self) -> [f64; 2] {
         let (hits, misses) = (self.hits as f64, (self.of - self.hits) as f64);
         let quantile = |a: f64, b: f64, p: f64| {

@@ -1,17 +1,14 @@
 //! One diagnosis against its truth.
 
-use crate::draw::{Class, Plan};
+use crate::class::Class;
+use crate::draw::Plan;
+use crate::known::{is_artefact, kind};
 use crate::paper::Paper;
+use crate::place::{SPACING_M, is_placed, local, near};
 use serde::{Deserialize, Serialize};
-use tracktwin_diagnosis::{Diagnosis, Hypothesis, Verdict};
+use tracktwin_diagnosis::{Diagnosis, Hypothesis, UNKNOWN, Verdict};
 use tracktwin_parameters::{Axis, Parameter, Preset};
 use tracktwin_reference_simulator::{Hidden, Scene};
-
-/// Spacing of the sleepers in m.
-const SPACING_M: f64 = 0.125;
-
-/// Longest effect in spacings that has a place to be found.
-const LOCAL_SPACINGS: f64 = 3.0;
 
 /// Probability that the set of answers must hold together.
 const SET: f64 = 0.9;
@@ -205,21 +202,7 @@ fn becomes(
 
 /// Whether a name is right; for what the catalogue lacks it is "unknown".
 fn is_it(hidden: &Hidden, physics: &str) -> bool {
-    let right = if hidden.in_catalogue() { hidden.physics() } else { "unknown_physics" };
-    physics == right
-}
-
-/// Whether a hypothesis has an effect's place, within a sleeper; where either is everywhere, it has.
-fn is_placed(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
-    let (Some([from_m, to_m]), Some(location)) = (hidden.place(), &hypothesis.location) else {
-        return true;
-    };
-    from_m - 1.01 * SPACING_M <= location.x_m[1] && location.x_m[0] <= to_m + 1.01 * SPACING_M
-}
-
-/// The place of an effect that has one.
-fn local(hidden: &Hidden) -> Option<[f64; 2]> {
-    hidden.place().filter(|[from_m, to_m]| to_m - from_m <= LOCAL_SPACINGS * SPACING_M)
+    physics == kind(hidden).map_or(UNKNOWN, |kind| kind.physics)
 }
 
 /// The most probable names that hold 90 % of all probability together.
@@ -249,21 +232,9 @@ fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Ve
     all
 }
 
-/// Whether a place is next to physics that is hidden; all places are if it is everywhere, or none is
-/// hidden.
-pub(crate) fn near(scene: &Scene, x_m: f64) -> bool {
-    let mut physical = scene.left_out.iter().filter(|hidden| !hidden.is_artefact()).peekable();
-    let is_near = |hidden: &Hidden| {
-        hidden.place().is_none_or(|[from_m, to_m]| {
-            from_m - 1.01 * SPACING_M <= x_m && x_m <= to_m + 1.01 * SPACING_M
-        })
-    };
-    physical.peek().is_none() || physical.any(is_near)
-}
-
 /// Errors at the sleepers next to all that is hidden; everywhere if it is everywhere.
 fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
-    if scene.left_out.iter().all(Hidden::is_artefact) {
+    if scene.left_out.iter().all(is_artefact) {
         return None;
     }
     let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
@@ -304,32 +275,4 @@ fn cells_inside(diagnosis: &Diagnosis) -> bool {
             cells.into_iter().all(|((m, b), sd)| (m - b).abs() <= CELL_DEVIATIONS * sd)
         })
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeMap;
-    use tracktwin_diagnosis::Location;
-
-    #[test]
-    fn a_right_name_at_a_wrong_place_is_wrong() {
-        let hidden = Hidden::Squat { x_m: [2.5, 2.5], depth_m: 2e-5, length_m: 6e-3 };
-        let squat_at = |x_m: Option<f64>| Hypothesis {
-            physics: "squat".to_owned(),
-            probability: 0.5,
-            accepted: false,
-            location: x_m.map(|x_m| Location { x_m: [x_m, x_m], sleepers: Vec::new() }),
-            port: None,
-            behaviour: None,
-            parameters: BTreeMap::new(),
-            look_alikes: Vec::new(),
-            would_separate: String::new(),
-            detectability: 0.0,
-            log_evidence: 0.0,
-        };
-        let places = [Some(2.5), Some(2.6), Some(2.7), Some(1.0), None];
-        let placed = places.map(|x_m| is_placed(&hidden, &squat_at(x_m)));
-        assert_eq!(placed, [true, true, false, false, true]);
-    }
 }

@@ -1,6 +1,6 @@
 //! What a trial comes to: rates with their intervals, against what was set as a goal.
 
-use crate::draw::Class;
+use crate::class::Class;
 use crate::paper::Usual;
 use crate::rate::{Rate, median};
 use crate::score::{KnockedOut, Named, Placed, Score};

@@ -2,6 +2,7 @@
 //!
 //! Opens the truth, so it comes after the diagnosis was written down.
 
+use crate::known::kind;
 use nalgebra::DVector;
 use tracktwin_diagnosis::{CalibrationError, Search, Subject, signature};
 use tracktwin_reference_simulator::{Hidden, Scene};
@@ -31,10 +32,8 @@ fn in_recording(
     subject: &Subject,
     hidden: &Hidden,
 ) -> Option<ExtensionInstance> {
-    let in_model = matches!(hidden, Hidden::SensorMountResonance { .. }) || !hidden.is_artefact();
-    if !hidden.in_catalogue() || !in_model {
-        return None;
-    }
+    // Faults of the measuring chain are in the model where it is searched for them.
+    kind(hidden).filter(|kind| !kind.measuring_chain || !kind.screening.families.is_empty())?;
     let json = serde_json::to_value(hidden).ok()?;
     let mut extension: ExtensionInstance = serde_json::from_value(json).ok()?;
     let compared: Vec<Option<usize>> =

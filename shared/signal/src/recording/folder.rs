@@ -4,6 +4,7 @@ use super::columns::{Columns, NAMES};
 use super::error::{Fault, RecordingError};
 use super::manifest::{FILE_NAME, Manifest, PassEntry};
 use super::odometer::Odometer;
+use super::sleeper::Sleeper;
 use super::{check, limits, parquet_file, quiet};
 use crate::Signal;
 use serde_json::{Map, Value};
@@ -52,15 +53,6 @@ pub struct Pass {
     /// Share of the time, 0 to 1, in which the wheel did not touch the rail: known of simulated passes only,
     /// and read by no test of a recording.
     pub contact_loss_share: Option<f64>,
-}
-
-/// A sleeper and its place.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sleeper {
-    /// Its name, such as `SN8`.
-    pub id: String,
-    /// Its place along the track in m, on the scale of the passes' positions.
-    pub x_m: f64,
 }
 
 impl Recording {

@@ -1,7 +1,7 @@
 //! `recording.json`: tolerant of fields it does not know, strict about those it needs.
 
 use super::error::{Fault, RecordingError};
-use super::folder::Sleeper;
+use super::sleeper::Sleeper;
 use serde_json::{Map, Value, json};
 use std::collections::HashSet;
 use std::path::Path;

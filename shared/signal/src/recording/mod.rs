@@ -16,10 +16,12 @@ mod manifest;
 mod odometer;
 mod parquet_file;
 mod quiet;
+mod sleeper;
 #[cfg(test)]
 mod tests;
 mod track;
 
 pub use error::{Fault, RecordingError};
-pub use folder::{Pass, Recording, Sleeper};
+pub use folder::{Pass, Recording};
+pub use sleeper::Sleeper;
 pub use track::{OtherTrack, compare_designs, nominal};

@@ -22,8 +22,8 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// `|H|² = 1 / (1 + pi/4 (kappa a)³)` for a patch of half length `a` (Remington 1976, as in
-/// mismatch catalogue 21). It filters the random irregularity, not what other kinds add to it.
+/// `|H|² = 1 / (1 + pi/4 (kappa a)³)` for a patch of half length `a` (Remington 1976).
+/// It filters the random irregularity, not what other kinds add to it.
 #[derive(Debug)]
 struct ContactPatchFilter {
     half_length_m: f64,

@@ -49,8 +49,7 @@ const PHASE_STEP: f64 = 0.618_033_988_749_894_9;
 /// Length in wavelengths over which the waves grow and fade at the ends of the stretch.
 const FADE_WAVES: f64 = 2.0;
 
-/// `A sin(2 pi x / L)` on a stretch, or a band of such waves with the same mean square
-/// (mismatch catalogue 19).
+/// `A sin(2 pi x / L)` on a stretch, or a band of such waves with the same mean square.
 #[derive(Debug)]
 struct Corrugation {
     stretch_m: [f64; 2],

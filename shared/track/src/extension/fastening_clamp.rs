@@ -40,7 +40,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// Springs between rail and rail seat, and against the rail's rotation over the sleeper, which
-/// itself does not tilt (mismatch catalogue 10).
+/// itself does not tilt.
 #[derive(Debug)]
 struct FasteningClamp {
     sleepers: Vec<usize>,

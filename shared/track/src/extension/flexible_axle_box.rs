@@ -51,7 +51,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// Two masses `m_1 + m_2 = m_w` with a spring between, the contact on the first and the sensor on
-/// the second (mismatch catalogue 22).
+/// the second.
 ///
 /// Their relative motion `r = u_1 - u_2` is an oscillator of its own, of the reduced mass
 /// `mu = m_1 m_2 / m_w`, driven by `-mu F / m_1`. In terms of `q = -r m_2 / m_w`, by which the

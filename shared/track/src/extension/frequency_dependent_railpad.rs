@@ -37,7 +37,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// A Maxwell branch beside spring and damper of the railpad: `k_0 + k_1 i w tau / (1 + i w tau)`
-/// with `k_1` a multiple of `k_0` (standard linear solid; mismatch catalogue 12).
+/// with `k_1` a multiple of `k_0` (standard linear solid).
 #[derive(Debug)]
 struct FrequencyDependentRailpad {
     sleepers: Vec<usize>,

@@ -34,7 +34,7 @@ pub(super) const KIND: Kind = Kind {
 const ONSET_M: f64 = 1e-6;
 
 /// Ballast that pushes `k_b (u - g) + c_b u'` where the sleeper has sunk by more than the gap `g`,
-/// and never pulls (mismatch catalogue 7; Lundqvist & Dahlberg 2005).
+/// and never pulls (Lundqvist & Dahlberg 2005).
 ///
 /// The matrices hold the ballast if the gap closes under a wheel that stands on the sleeper.
 #[derive(Debug)]

@@ -93,11 +93,12 @@ pub enum InstanceError {
 }
 
 /// What a kind is built from: all checked.
-pub(super) struct Inputs<'a> {
+#[derive(Debug)]
+pub struct Inputs<'a> {
     kind: &'static Kind,
     instance: &'a ExtensionInstance,
     /// What the track and the wheel are.
-    pub(super) design: &'a TrackDesign,
+    pub design: &'a TrackDesign,
     spans: usize,
 }
 
@@ -172,30 +173,30 @@ impl ExtensionInstance {
 
 impl Inputs<'_> {
     /// The value of a parameter of the kind: given, or else its default.
-    pub(super) fn value(&self, name: &str) -> f64 {
+    pub fn value(&self, name: &str) -> f64 {
         let default = self.kind.parameter(name).and_then(|parameter| parameter.default);
         let given = self.instance.parameters.get(name).copied();
         given.or(default).expect("parameters were checked against the registry")
     }
 
     /// The point of the rail in m.
-    pub(super) fn point_m(&self) -> f64 {
+    pub fn point_m(&self) -> f64 {
         self.stretch_m()[0]
     }
 
     /// The stretch of the rail in m.
-    pub(super) fn stretch_m(&self) -> [f64; 2] {
+    pub fn stretch_m(&self) -> [f64; 2] {
         self.instance.x_m.unwrap_or([0.0, self.length_m()])
     }
 
     /// Numbers of the sleepers.
-    pub(super) fn sleepers(&self) -> Vec<usize> {
+    pub fn sleepers(&self) -> Vec<usize> {
         let all = || (0..self.sleeper_count()).collect();
         self.instance.sleepers.clone().unwrap_or_else(all)
     }
 
     /// Refuses the value of a parameter.
-    pub(super) fn refuse(&self, parameter: &str, form: &'static str) -> InstanceError {
+    pub fn refuse(&self, parameter: &str, form: &'static str) -> InstanceError {
         InstanceError::Value {
             physics: self.kind.physics.to_owned(),
             parameter: parameter.to_owned(),
@@ -267,7 +268,7 @@ impl Inputs<'_> {
 }
 
 fn known_kinds() -> String {
-    let names: Vec<_> = super::KINDS.iter().map(|kind| kind.physics).collect();
+    let names: Vec<_> = Kind::all().map(|kind| kind.physics).collect();
     names.join(", ")
 }
 

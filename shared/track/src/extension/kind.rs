@@ -1,7 +1,6 @@
 //! What a kind of extension is: name, class, place, parameters, how to build it.
 
-use super::instance::Inputs;
-use super::{Extension, InstanceError, Screening};
+use super::{Extension, Inputs, InstanceError, Screening, registry};
 use std::sync::Arc;
 use tracktwin_parameters::Quantity;
 
@@ -33,7 +32,7 @@ pub struct Kind {
     /// How a recording is searched for it.
     pub screening: Screening,
     /// Makes it, once the registry has checked what it is made of.
-    pub(super) build: fn(&Inputs<'_>) -> Result<Arc<dyn Extension>, InstanceError>,
+    pub build: fn(&Inputs<'_>) -> Result<Arc<dyn Extension>, InstanceError>,
 }
 
 /// How the trace of an effect behaves over passes: a letter of its bar-code.
@@ -160,7 +159,7 @@ pub struct KindParameter {
 
 impl KindParameter {
     /// A parameter that must be given, and be more than zero.
-    pub(super) const fn new(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+    pub const fn new(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self {
             name,
             unit,
@@ -194,12 +193,8 @@ impl KindParameter {
     }
 
     /// With its ranges on V-Track and at real scale, and a typical value on V-Track.
-    pub(super) const fn ranges(
-        mut self,
-        v_track: [f64; 2],
-        real_scale: [f64; 2],
-        typical: f64,
-    ) -> Self {
+    #[must_use]
+    pub const fn ranges(mut self, v_track: [f64; 2], real_scale: [f64; 2], typical: f64) -> Self {
         self.v_track = v_track;
         self.real_scale = real_scale;
         self.typical = typical;
@@ -207,28 +202,48 @@ impl KindParameter {
     }
 
     /// With another slack than a factor of e.
-    pub(super) const fn slack(mut self, slack: f64) -> Self {
+    #[must_use]
+    pub const fn slack(mut self, slack: f64) -> Self {
         self.slack = slack;
         self
     }
 
     /// With a value that holds where none is given.
-    pub(super) const fn or(mut self, default: f64) -> Self {
+    #[must_use]
+    pub const fn or(mut self, default: f64) -> Self {
         self.default = Some(default);
         self
     }
 
     /// With another bound.
-    pub(super) const fn bound(mut self, bound: Bound) -> Self {
+    #[must_use]
+    pub const fn bound(mut self, bound: Bound) -> Self {
         self.bound = bound;
         self
     }
 }
 
 impl Kind {
+    /// Every kind of the catalogue: physics first, then the measuring chain.
+    pub fn all() -> impl Iterator<Item = &'static Self> {
+        registry::KINDS.iter().chain(registry::ADDED.get().copied())
+    }
+
     /// The kind of that name, if there is one.
     pub fn from_name(physics: &str) -> Option<&'static Self> {
-        super::KINDS.iter().find(|kind| kind.physics == physics)
+        Self::all().find(|kind| kind.physics == physics)
+    }
+
+    /// Adds one kind to the catalogue of this process; a second one is handed back.
+    ///
+    /// For tests of what follows from a kind's definition alone: a kind that stays is a line in the
+    /// registry.
+    ///
+    /// # Errors
+    /// The kind, where another one has been added.
+    #[doc(hidden)]
+    pub fn add(kind: &'static Self) -> Result<(), &'static Self> {
+        registry::ADDED.set(kind)
     }
 
     /// The parameter of that name, if the kind has it.

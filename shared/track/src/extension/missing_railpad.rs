@@ -27,7 +27,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// Another stiffness of some railpads; their damping changes in proportion (mismatch catalogue 5).
+/// Another stiffness of some railpads; their damping changes in proportion.
 #[derive(Debug)]
 struct MissingRailpad {
     sleepers: Vec<usize>,

@@ -38,11 +38,11 @@ mod testing;
 mod wheel_flat;
 mod wheel_out_of_round;
 
-pub use instance::{ExtensionInstance, InstanceError};
+pub use instance::{ExtensionInstance, Inputs, InstanceError};
 pub use kind::{Bound, Class, Kind, KindParameter, PlaceKind};
 pub use measured::Measured;
 pub use registry::{
-    CLIPPING, CORRUGATION, ELECTRICAL_HUM, GAIN_ERROR, KINDS, POSITION_ERROR, RAIL_JOINT, SQUAT,
+    CLIPPING, CORRUGATION, ELECTRICAL_HUM, GAIN_ERROR, POSITION_ERROR, RAIL_JOINT, SQUAT,
     WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
 };
 pub use sampled::{SampledExtension, SampledValue};

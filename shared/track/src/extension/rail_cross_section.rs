@@ -43,7 +43,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// A compliance `1 / (k (1 - (f/f_c)² + i eta f/f_c))` in series with the contact, wherever the
-/// wheel is (mismatch catalogue 16, minimal form; Wu & Thompson 1999).
+/// wheel is (Wu & Thompson 1999).
 #[derive(Debug)]
 struct RailCrossSection {
     resonance_rad_s: f64,

@@ -53,7 +53,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// Dip `d exp(-|x - x0| / l)`, a kink of angle `2 d / l`, over a rail whose bending stiffness is
-/// `beta EI` on a short length (mismatch catalogue 1 to 3; Jenkins 1974).
+/// `beta EI` on a short length (Jenkins 1974).
 #[derive(Debug)]
 struct RailJoint {
     centre_m: f64,

@@ -1,9 +1,10 @@
 //! The kinds of extensions that there are.
 
 use super::Kind;
+use std::sync::OnceLock;
 
 /// All kinds, physics first, the measuring chain last.
-pub static KINDS: &[Kind] = &[
+pub(super) static KINDS: &[Kind] = &[
     super::rail_joint::KIND,
     super::squat::KIND,
     super::corrugation::KIND,
@@ -28,6 +29,9 @@ pub static KINDS: &[Kind] = &[
     super::gain_error::KIND,
     super::electrical_hum::KIND,
 ];
+
+/// A kind that a test adds.
+pub(super) static ADDED: OnceLock<&'static Kind> = OnceLock::new();
 
 // Kinds that the passes of a recording show by themselves: who looks for one names it here.
 /// Clipping.
@@ -77,7 +81,7 @@ mod tests {
         let design = TrackDesign::v_track();
         let supports = vec![Support::from(&ParameterSet::nominal()); SPANS - 1];
         let mesh = Mesh::uniform(SPANS, 4, 4);
-        for kind in KINDS {
+        for kind in Kind::all() {
             let extension = typical(kind).build(&design, SPANS);
             let extension = extension.unwrap_or_else(|error| panic!("{error}"));
             TrackModel::build(&design, &mesh, &supports, &[extension]).unwrap();
@@ -86,9 +90,9 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_look_alikes_exist() {
-        let names: HashSet<_> = KINDS.iter().map(|kind| kind.physics).collect();
+        let names: HashSet<_> = Kind::all().map(|kind| kind.physics).collect();
         assert_eq!(names.len(), KINDS.len());
-        for kind in KINDS {
+        for kind in Kind::all() {
             for other in kind.look_alikes {
                 assert!(names.contains(other) && other != &kind.physics, "{}", kind.physics);
             }
@@ -97,7 +101,7 @@ mod tests {
 
     #[test]
     fn every_kind_is_searched_for_or_says_why_not() {
-        for kind in KINDS {
+        for kind in Kind::all() {
             let Screening { families, suggested, not_tried } = &kind.screening;
             let is_searched = !families.is_empty() || !suggested.is_empty();
             assert!(is_searched != not_tried.is_some_and(|it| !it.is_empty()), "{}", kind.physics);
@@ -115,7 +119,7 @@ mod tests {
 
     #[test]
     fn typical_values_lie_inside_their_ranges_and_bounds() {
-        for kind in KINDS {
+        for kind in Kind::all() {
             for parameter in kind.parameters {
                 let [low, high] = parameter.v_track;
                 let inside = (low..=high).contains(&parameter.typical);
@@ -129,7 +133,7 @@ mod tests {
     #[test]
     fn the_catalogue_in_the_documentation_has_every_kind_and_parameter() {
         let catalogue = include_str!("../../../../docs/extensions.md");
-        for kind in KINDS {
+        for kind in Kind::all() {
             for parameter in kind.parameters {
                 let row = format!("| `{}` | `{}` |", kind.physics, parameter.name);
                 assert!(catalogue.contains(&row), "{row}");
@@ -140,7 +144,7 @@ mod tests {
 
     #[test]
     fn an_instance_survives_json_with_its_parameters_beside_its_name() {
-        for kind in KINDS {
+        for kind in Kind::all() {
             let instance = typical(kind);
             let json = serde_json::to_value(&instance).unwrap();
             for (name, value) in &instance.parameters {

@@ -48,8 +48,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// A straight line and a bump in dB over the logarithm of wave number, on top of eq. B.6
-/// (mismatch catalogue 18).
+/// A straight line and a bump in dB over the logarithm of wave number, on top of eq. B.6.
 #[derive(Debug)]
 struct RoughnessSpectrum {
     level_db: f64,

@@ -50,29 +50,31 @@ pub enum Trials {
 
 impl Screening {
     /// Tried with these families, and never suggested by the passes alone.
-    pub(super) const fn tried(families: &'static [Family]) -> Self {
+    pub const fn tried(families: &'static [Family]) -> Self {
         Self { families, suggested: &[], not_tried: None }
     }
 
     /// Neither tried nor suggested, for this reason.
-    pub(super) const fn not_tried(reason: &'static str) -> Self {
+    pub const fn not_tried(reason: &'static str) -> Self {
         Self { families: &[], suggested: &[], not_tried: Some(reason) }
     }
 
     /// Suggested by the passes alone, with these parameters to be fitted.
-    pub(super) const fn suggested(self, free: &'static [&'static str]) -> Self {
+    #[must_use]
+    pub const fn suggested(self, free: &'static [&'static str]) -> Self {
         Self { suggested: free, ..self }
     }
 }
 
 impl Family {
     /// A family at these places with these parameters free.
-    pub(super) const fn new(places: Places, free: &'static [&'static str], trials: Trials) -> Self {
+    pub const fn new(places: Places, free: &'static [&'static str], trials: Trials) -> Self {
         Self { places, held: &[], free, trials }
     }
 
     /// With parameters held at a value.
-    pub(super) const fn held(self, held: &'static [(&'static str, f64)]) -> Self {
+    #[must_use]
+    pub const fn held(self, held: &'static [(&'static str, f64)]) -> Self {
         Self { held, ..self }
     }
 }

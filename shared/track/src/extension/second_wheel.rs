@@ -43,8 +43,8 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// A wheel of the same mass and load, rigid, at a fixed distance; its contact makes the rail
-/// `alpha_xx - alpha_xd² / (alpha_dd + 1/k_H + alpha_w)` under the first (mismatch catalogue 17;
-/// Wu & Thompson 2001).
+/// `alpha_xx - alpha_xd² / (alpha_dd + 1/k_H + alpha_w)` under the first
+/// (Wu & Thompson 2001).
 #[derive(Debug)]
 struct SecondWheel {
     distance_m: f64,

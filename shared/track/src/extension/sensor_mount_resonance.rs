@@ -45,7 +45,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// The sensor as a mass on a spring and damper, shaken at its foot:
-/// `(1 + 2 i zeta r) / (1 - r² + 2 i zeta r)` with `r = f / f_s` (mismatch catalogue 24).
+/// `(1 + 2 i zeta r) / (1 - r² + 2 i zeta r)` with `r = f / f_s`.
 #[derive(Debug)]
 struct SensorMountResonance {
     frequency_hz: f64,

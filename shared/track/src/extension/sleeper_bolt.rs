@@ -33,7 +33,7 @@ pub(super) const KIND: Kind = Kind {
 ///
 /// V-Track's sleepers are bolted down; the paper leaves the bolts out and widens the range of the
 /// sleeper's bending stiffness instead (Appendix D). As a spring on the port of the sleeper's tip
-/// a bolt adds `k b bᵀ` to the stiffness (mismatch catalogue 8).
+/// a bolt adds `k b bᵀ` to the stiffness.
 #[derive(Debug)]
 struct SleeperBolt {
     sleepers: Vec<usize>,
@@ -85,7 +85,7 @@ mod tests {
         let (own, changed) = (of(&plain, tip, tip), of(&bolted, rail, rail));
         for index in 0..frequencies.len() {
             let drop = cross[index].powi(2) * STIFFNESS / (Complex64::ONE + own[index] * STIFFNESS);
-            // Mismatch catalogue, eq. 4: exact, so that only the rounding of the solves remains.
+            // Exact, so that only the rounding of the solves remains.
             let error = (changed[index] - (direct[index] - drop)).norm();
             assert!(error < 1e-9 * direct[index].norm(), "{} Hz: {error}", frequencies[index]);
             assert!(drop.norm() > 1e-4 * direct[index].norm(), "{} Hz", frequencies[index]);

@@ -39,7 +39,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// Hollow `d/2 (1 + cos 2 pi (x - x0) / l)` over the length `l` (mismatch catalogue 4).
+/// Hollow `d/2 (1 + cos 2 pi (x - x0) / l)` over the length `l`.
 #[derive(Debug)]
 #[expect(clippy::struct_field_names, reason = "the unit belongs to the name")]
 struct Squat {

@@ -53,7 +53,7 @@ pub(super) const KIND: Kind =
     };
 
 /// One rigid mass under each half sleeper: all of the ballast stands on it, and it on the ground
-/// (mismatch catalogue 9 and 15; Zhai et al. 2004 without shear between neighbours).
+/// (Zhai et al. 2004 without shear between neighbours).
 #[derive(Debug)]
 struct SubgradeLayer {
     sleepers: Vec<usize>,

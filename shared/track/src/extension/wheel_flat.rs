@@ -36,7 +36,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// A worn flat of length `l` on a wheel of radius `R`: `d/2 (1 + cos 2 pi s / l)` deep at a
-/// distance `s` along the tread from its middle, with `d = l² / (16 R)` (mismatch catalogue 20).
+/// distance `s` along the tread from its middle, with `d = l² / (16 R)`.
 #[derive(Debug)]
 #[expect(clippy::struct_field_names, reason = "the unit belongs to the name")]
 struct WheelFlat {

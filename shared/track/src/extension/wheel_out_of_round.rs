@@ -41,7 +41,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// `a cos(n x / R + phi)` (mismatch catalogue 20).
+/// `a cos(n x / R + phi)`.
 #[derive(Debug)]
 struct WheelOutOfRound {
     /// Wave number along the tread in rad/m.

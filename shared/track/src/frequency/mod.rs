@@ -12,9 +12,11 @@ mod lane;
 mod peaks;
 mod rail;
 mod receptance;
+mod receptances;
 mod states;
 
 pub use ahead::{receptances_ahead, shares};
 pub use peaks::{Peak, peaks};
-pub use rail::{RailReceptances, seat_stiffness};
+pub use rail::seat_stiffness;
 pub use receptance::{FrequencyError, Place, receptance};
+pub use receptances::RailReceptances;

@@ -5,21 +5,12 @@
 //! place after the other, on the same matrices.
 
 use super::lane::{Banded, LANES, Lane};
+use super::receptances::RailReceptances;
 use super::states::States;
 use crate::model::{Matrices, TrackModel};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
-
-/// Receptances of the rail at a set of frequencies, in m/N.
-#[derive(Clone, Debug)]
-pub struct RailReceptances {
-    /// Direct receptance of every rail node: `[frequency][node]`, zero where the rail is held.
-    pub direct: Vec<Vec<Complex64>>,
-    /// From a force at each rail seat to every rail node: `[frequency][sleeper][node]`; empty
-    /// unless asked for.
-    pub from_seats: Vec<Vec<Vec<Complex64>>>,
-}
 
 /// Degrees of freedom off the rail that hang together, such as a sleeper's.
 struct Piece {

@@ -1,6 +1,6 @@
 //! Force laws take hold or not, by where the wheel stands.
 
-use super::rail::RailReceptances;
+use super::receptances::RailReceptances;
 use crate::model::{ForceLaw, TrackModel};
 use crate::time::Standing;
 use rustfft::num_complex::Complex64;

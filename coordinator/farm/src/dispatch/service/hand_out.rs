@@ -47,7 +47,7 @@ impl Dispatch {
         };
         let leased = self.library.lease(request).await.map_err(|error| unavailable(&error))?;
         let Some(leased) = leased else {
-            let mut until = self.nothing_until.lock().expect("nobody panics while holding it");
+            let mut until = self.nothing_until.lock();
             *until = Some(Instant::now() + NOTHING.min(self.settings.timing.retry));
             return Ok(self.none_now());
         };
@@ -85,7 +85,7 @@ impl Dispatch {
     }
 
     fn had_nothing(&self) -> bool {
-        let until = self.nothing_until.lock().expect("nobody panics while holding it");
+        let until = self.nothing_until.lock();
         until.is_some_and(|until| until > Instant::now())
     }
 

@@ -1,8 +1,8 @@
 //! What the passes show alone, as hypotheses beside those of the model.
 
-use super::nameless::UNKNOWN;
 use super::{Evidence, FAILED_SHARE, names};
-use crate::outcome::{Estimate, Hypothesis, Location};
+use crate::estimate::Estimate;
+use crate::outcome::{Hypothesis, Location, UNKNOWN};
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind};
 

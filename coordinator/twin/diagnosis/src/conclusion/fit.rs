@@ -3,9 +3,8 @@
 use super::Evidence;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
-use crate::outcome::{
-    BeforeAfter, Estimate, Fit, Hypothesis, Levels, Score, Scores, SleeperValues,
-};
+use crate::estimate::Estimate;
+use crate::outcome::{BeforeAfter, Fit, Hypothesis, Levels, Score, Scores, SleeperValues};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

@@ -10,9 +10,8 @@ mod place;
 mod round;
 
 pub use self::alone::passes_alone;
-use self::nameless::UNKNOWN;
 use crate::calibration::CalibrationError;
-use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Verdict};
+use crate::outcome::{Diagnosis, FORMAT, Hypothesis, UNKNOWN, Verdict};
 use crate::search::Search;
 use crate::sentence::sentence;
 use crate::subject::Subject;
@@ -118,7 +117,7 @@ impl Evidence<'_> {
 
     fn hypotheses(&self) -> Vec<Hypothesis> {
         let mut all: Vec<Hypothesis> = Vec::new();
-        let rounds = self.search.rounds.iter().filter(|round| round.p_value <= 0.05);
+        let rounds = self.search.rounds.iter().filter(|round| round.is_significant());
         for round in rounds {
             for hypothesis in self.of_round(round) {
                 let known = all.iter_mut().find(|known| self.is_same(known, &hypothesis));

@@ -2,13 +2,10 @@
 
 use super::finding::seen;
 use super::{Evidence, FAILED_SHARE};
-use crate::outcome::{Hypothesis, Location};
+use crate::outcome::{Hypothesis, Location, UNKNOWN};
 use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind};
-
-/// What a finding without a name is called.
-pub(super) const UNKNOWN: &str = "unknown_physics";
 
 impl Evidence<'_> {
     /// A finding without a name is unknown, at its place, unless something other than a shape of

@@ -30,7 +30,7 @@ impl Evidence<'_> {
 
     /// What the last search left without a name.
     fn remainder(&self) -> Option<String> {
-        let round = self.search.rounds.last().filter(|round| round.p_value <= 0.05)?;
+        let round = self.search.rounds.last().filter(|round| round.is_significant())?;
         let place = round.port.as_ref().map_or(String::new(), |port| match &port.place {
             PortPlace::Wheel => " at the wheel".to_owned(),
             PortPlace::Seats(seats) if seats.len() <= 2 => format!(" near {}", self.id(seats[0])),

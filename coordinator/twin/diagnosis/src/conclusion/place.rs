@@ -73,7 +73,7 @@ impl Evidence<'_> {
         if verdict == Verdict::Consistent {
             return Vec::new();
         }
-        let rounds = self.search.rounds.iter().filter(|round| round.p_value <= 0.05);
+        let rounds = self.search.rounds.iter().filter(|round| round.is_significant());
         let found = rounds.filter_map(|round| {
             let named = round.fitted.first().map(|fitted| &fitted.change);
             let unknown = round.port.as_ref().map(|port| &port.change);

@@ -1,9 +1,9 @@
 //! What a search fitted, as hypotheses.
 
-use super::nameless::UNKNOWN;
 use super::{Evidence, FAILED_SHARE, names};
 use crate::behaviour::Behaviour;
-use crate::outcome::{Estimate, Hypothesis};
+use crate::estimate::Estimate;
+use crate::outcome::{Hypothesis, UNKNOWN};
 use crate::port_scan::Port;
 use crate::search::{Fitted, Probabilities, Round};
 use std::collections::BTreeMap;

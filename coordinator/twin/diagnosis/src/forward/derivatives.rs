@@ -1,7 +1,7 @@
 //! How predicted log powers change with the baseline's unknowns, and with whatever hangs under a
 //! rail seat: exact in the receptances, without predicting anew for each unknown.
 
-use super::supports::{SupportChanges, VARIED};
+use super::supports::{NEIGHBOURS, SupportChanges, VARIED, Variation};
 use super::{Forward, mean};
 use crate::section::Window;
 use crate::transfer::Transfer;
@@ -16,12 +16,6 @@ use tracktwin_track::model::{ModelError, Support, TrackModel};
 
 /// Relative step by which stiffnesses are varied for derivatives.
 const STEP: f64 = 1e-4;
-
-/// Sleepers on either side whose supports are felt in a sleeper's window.
-pub(super) const NEIGHBOURS: usize = 9;
-
-/// Change of the dynamic stiffness at the rail seats: `[line][sleeper of the track]`.
-pub(super) type Variation = Vec<Vec<Complex64>>;
 
 /// A prediction and its derivatives by the baseline's unknowns.
 pub struct Linearised {

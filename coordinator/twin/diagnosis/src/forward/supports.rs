@@ -4,14 +4,20 @@
 //! node by node, as [`Transfer::felt`] has it, it takes several times as long.
 
 use super::Forward;
-use super::derivatives::{NEIGHBOURS, Variation};
 use crate::section::Window;
 use crate::transfer::Transfer;
 use rayon::prelude::*;
+use rustfft::num_complex::Complex64;
 use std::ops::Range;
 
 /// Values of a support that vary.
 pub(super) const VARIED: usize = 5;
+
+/// Sleepers on either side whose supports are felt in a sleeper's window.
+pub(super) const NEIGHBOURS: usize = 9;
+
+/// Change of the dynamic stiffness at the rail seats: `[line][sleeper of the track]`.
+pub(super) type Variation = Vec<Vec<Complex64>>;
 
 /// Changes of the power at level one: by sleeper of the track.
 pub(super) struct SupportChanges {

@@ -1,8 +1,9 @@
 //! Whether all speeds passed the same track.
 
 use super::chance::squares;
+use super::limits::FALSE_ALARM;
 use super::probability::TEMPERATURE;
-use super::round::{FALSE_ALARM, Setting};
+use super::round::Setting;
 use super::{Round, Search};
 use crate::calibration::{CalibrationError, Problem};
 use tracktwin_inspection::median;

@@ -5,7 +5,7 @@
 //! to a wheel that hardly feels what is below; beside such a railpad no trial of bolts gains
 //! anything.
 
-use super::round::REFINED_PER_KIND;
+use super::limits::REFINED_PER_KIND;
 use crate::baseline::Unknowns;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;

@@ -25,6 +25,7 @@ pub(super) struct Least<'a> {
 }
 
 impl Least<'_> {
+    /// The least log evidence for this candidate in nats.
     ///
     /// A shape that the passes alone show beside no accepted one is no small rest of another effect.
     pub(super) fn of(self, candidate: &Candidate) -> f64 {

@@ -6,6 +6,7 @@ mod extent;
 mod fit;
 mod imitated;
 mod least;
+mod limits;
 mod probability;
 mod remainder;
 mod round;
@@ -17,7 +18,8 @@ pub(crate) use probability::Probabilities;
 use self::extent::Extent;
 use self::fit::retuned;
 use self::least::Least;
-use self::round::{FALSE_ALARM, Setting, is_predicted, stays, sure};
+use self::limits::FALSE_ALARM;
+use self::round::{Setting, is_predicted, stays, sure};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
@@ -87,6 +89,13 @@ pub struct Round {
     /// Evidence in nats for something unknown that is left at the best's place, if it speaks against
     /// the best.
     pub remainder: Option<f64>,
+}
+
+impl Round {
+    /// Whether such evidence is rarer, where nothing is left out, than a false alarm may be.
+    pub fn is_significant(&self) -> bool {
+        self.p_value <= FALSE_ALARM
+    }
 }
 
 /// What was found.
@@ -260,7 +269,7 @@ impl Search {
         let Some(first) = self.rounds.first_mut().filter(|first| !first.accepted) else {
             return Ok(());
         };
-        if let Some(port) = first.port.as_ref().filter(|_| first.p_value <= FALSE_ALARM) {
+        if let Some(port) = first.port.as_ref().filter(|_| first.is_significant()) {
             let alone = setting.unknown_alone(&port.place, &self.baseline.values)?;
             first.port_strays = !stays(port.log_evidence, &alone);
         }

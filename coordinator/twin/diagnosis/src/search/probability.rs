@@ -4,7 +4,7 @@ use super::Round;
 use crate::port_scan::Port;
 use crate::screen::STRENGTHS;
 use std::collections::BTreeMap;
-use tracktwin_track::extension::KINDS;
+use tracktwin_track::extension::Kind;
 
 /// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
 pub(super) const TEMPERATURE: f64 = 3.0;
@@ -75,7 +75,7 @@ fn of(
     explained_share: f64,
     unseen: f64,
 ) -> Probabilities {
-    let prior = (1.0 - NOTHING_PRIOR) / KINDS.len() as f64;
+    let prior = (1.0 - NOTHING_PRIOR) / Kind::all().count() as f64;
     let named: Vec<f64> = named.collect();
     let best = named.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let temperature = TEMPERATURE + INEXACT_SHARE * best.max(0.0);
@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn without_evidence_a_name_has_its_prior() {
         let Probabilities { named, unknown, .. } = of([0.0].into_iter(), None, 1.0, 0.0);
-        let prior = 0.5 / KINDS.len() as f64;
+        let prior = 0.5 / Kind::all().count() as f64;
         assert!((named[0] - prior / (0.5 + prior)).abs() < 1e-12);
         assert_eq!(unknown, 0.0);
     }

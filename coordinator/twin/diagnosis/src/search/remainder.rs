@@ -2,7 +2,7 @@
 
 use super::extent::Extent;
 use super::least::is_local_shape;
-use super::round::FALSE_ALARM;
+use super::limits::FALSE_ALARM;
 use super::{Round, Search};
 use crate::candidate::Candidate;
 use crate::port_scan::{Port, PortPlace, PortScan};

@@ -4,6 +4,7 @@ use super::chance::{excess, tail_probability, whitened};
 use super::fit::fit;
 use super::imitated::Imitated;
 use super::least::{Least, is_local_shape};
+use super::limits::REFINED_PER_KIND;
 use super::probability::{Probabilities, unseen};
 use super::{Fitted, Round, Stage};
 use crate::calibration::{Calibration, CalibrationError, Problem};
@@ -18,11 +19,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_number::floored;
 
-/// Probability of a false alarm on a recording without anything left out.
-pub(super) const FALSE_ALARM: f64 = 0.05;
-
-/// Candidates of one kind, and in all, that are fitted together with the baseline.
-pub(super) const REFINED_PER_KIND: usize = 2;
+/// Candidates in all that are fitted together with the baseline.
 const REFINED_MAX: usize = 8;
 
 /// Least log evidence in screening for a candidate to be fitted.
@@ -140,7 +137,7 @@ impl<'a> Setting<'a> {
             let kind = all[template.candidate].kind.physics;
             (kind, template.at_strengths(&current.residual, &current.gradient))
         }));
-        if round.p_value <= FALSE_ALARM {
+        if round.is_significant() {
             let imitated = Imitated::new(problem, current, all)?;
             let mut starts = starts(problem, current, all, &templates, screened, least, hopeless);
             starts.extend(imitated.starts());

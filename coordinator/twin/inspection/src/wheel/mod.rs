@@ -4,13 +4,16 @@
 //! and how well a model of orders predicts what it hasn't heard. What repeats with the track is
 //! `impact`'s.
 
+mod block;
 mod comb;
 mod flat;
 mod order_model;
 mod out_of_round;
 
-pub use comb::{CIRCUMFERENCES_M, Comb, CombBlock, HeldOut, comb};
+pub use block::CombBlock;
+pub use comb::{CIRCUMFERENCES_M, Comb, comb};
 pub use flat::{Flat, flat};
+pub use order_model::HeldOut;
 pub use out_of_round::{Order, out_of_round};
 
 use std::f64::consts::TAU;

@@ -1,6 +1,6 @@
 //! How well a model of wheel orders predicts what it hasn't heard.
 
-use super::comb::{Block, CombBlock, HeldOut, padding, shifts};
+use super::block::{Block, CombBlock, PADDING, shifts};
 use crate::along::median;
 
 /// Width in Hz of the bands of the smooth spectrum.
@@ -10,6 +10,22 @@ const TOOTH_CELLS: f64 = 1.5;
 /// How far in fundamentals the held-out one may be from its neighbours' mean: the share of a
 /// resolution cell that the orders drift in a block.
 const FOLLOW: f64 = 1.5e-3;
+
+/// Scores on blocks that nothing was fitted on: odd ones, with the fundamental between those of
+/// the even blocks on either side and the even blocks' powers of order and background.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldOut {
+    /// Blocks that were held out.
+    pub blocks: usize,
+    /// Share of their variance explained, mean.
+    pub explained: f64,
+    /// The same of combs between the teeth.
+    pub by_chance: f64,
+    /// Mean gain in log predictive density over a smooth spectrum, in nats a block.
+    pub gain_nats: f64,
+    /// Blocks that are predicted better with the comb.
+    pub better: usize,
+}
 
 /// What a spectrum is expected to be: a smooth one, and orders above it.
 struct OrderModel {
@@ -97,7 +113,7 @@ impl OrderModel {
             (plain.ln() + power / plain) - (comb.ln() + power / comb)
         };
         // Padded bins repeat one another, and Hann leaves two of three cells independent.
-        block.bins(band_hz).map(gain).sum::<f64>() / (1.5 * padding() as f64)
+        block.bins(band_hz).map(gain).sum::<f64>() / (1.5 * PADDING as f64)
     }
 }
 
@@ -114,7 +130,7 @@ impl Block {
         let order = (frequency / fundamental).round();
         let away = (frequency - order * fundamental).abs() / self.step_hz;
         let band = ((frequency - band_hz[0]).max(0.0) / SMOOTH_HZ) as usize;
-        (band, order as usize, away < TOOTH_CELLS * padding() as f64)
+        (band, order as usize, away < TOOTH_CELLS * PADDING as f64)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Text tables: separated by comma, semicolon, tab or blanks, with or without a line of names.
 
 use super::super::error::{Fault, RecordingError};
-use super::table::{Column, Content, Oddity};
+use super::column::{Column, Content, Oddity};
 use super::text;
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! What a column of acceleration says against the unit and the direction that it is taken for.
 
-use super::table::Column;
+use super::column::Column;
 use super::unit::{AccelerationUnit, Unit};
 use tracktwin_number::significant;
 

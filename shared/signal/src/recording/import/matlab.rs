@@ -1,8 +1,8 @@
 //! Numeric arrays of MATLAB files of version 5 to 7.
 
 use super::super::error::{Fault, RecordingError};
+use super::column::{Column, matrix, other};
 use super::mat_listing::{Variable, list};
-use super::table::{Column, matrix, other};
 use matfile::{Array, MatFile, NumericData};
 use std::path::Path;
 

@@ -3,6 +3,7 @@
 //! Owns reading of CSV, Parquet, NumPy and MATLAB files into named columns, and the way from these
 //! to a recording. What a recording must satisfy is checked where it is opened.
 
+mod column;
 mod csv_table;
 mod doubt;
 mod foreign;
@@ -24,7 +25,8 @@ mod tests;
 mod text;
 mod unit;
 
+pub use column::{Column, Oddity};
 pub use layout::{Layout, LayoutError};
 pub use pass::{Imported, import};
-pub use table::{Column, Oddity, Table};
+pub use table::Table;
 pub use unit::{AccelerationUnit, PositionUnit, SpeedUnit, TimeUnit};

@@ -1,7 +1,7 @@
 //! NumPy arrays: single ones, columns of a matrix, and archives of several.
 
 use super::super::error::{Fault, RecordingError};
-use super::table::{Column, matrix, other};
+use super::column::{Column, matrix, other};
 use npyz::npz::array_name_from_file_name;
 use npyz::{DType, NpyFile, Order};
 use std::fs::File;

@@ -2,7 +2,7 @@
 
 use super::super::clock::{Pace, Stamps};
 use super::super::error::{Fault, RecordingError};
-use super::table::Column;
+use super::column::Column;
 use super::unit::{TimeUnit, Unit, bare_name, of_column};
 use super::{Layout, Table};
 use tracktwin_number::{rounded, significant};

@@ -1,7 +1,7 @@
 //! Units of columns: what a user says, what a file says, and what they are in SI.
 
 use super::super::error::Fault;
-use super::table::Column;
+use super::column::Column;
 use serde::Deserialize;
 
 /// A unit of some quantity.

@@ -1,0 +1,91 @@
+//! One block of a pass: its periodogram, and what combs explain of it.
+
+use crate::along::hann;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex64;
+use tracktwin_signal::recording::Pass;
+
+/// Bins to a resolution cell.
+pub(super) const PADDING: usize = 8;
+/// Combs whose teeth stand between those of the wheel: what chance explains.
+pub(super) const SHIFTS: usize = 15;
+
+/// One block of a pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CombBlock {
+    /// Begin in s from the pass's first sample.
+    pub start_s: f64,
+    /// Fundamental in Hz.
+    pub fundamental_hz: f64,
+    /// Share of the band's variance that the comb explains.
+    pub explained: f64,
+    /// The same of a comb between the teeth, the median of several.
+    pub by_chance: f64,
+    /// Whether none of those explains as much.
+    pub wins: bool,
+}
+
+/// A block's periodogram in the band.
+pub(super) struct Block {
+    pub start_s: f64,
+    pub speed_m_s: f64,
+    /// Distance of bins in Hz.
+    pub step_hz: f64,
+    /// Power by bin, the first at 0 Hz.
+    pub power: Vec<f64>,
+}
+
+impl Block {
+    pub(super) fn of(pass: &Pass, start: usize, length: usize, top_hz: f64) -> Self {
+        let rate = pass.signal.sample_rate_hz();
+        let samples = &pass.signal.samples()[start..start + length];
+        // Averages of neighbours: nothing above a few times the band is needed.
+        let every = ((rate / (8.0 * top_hz)) as usize).max(1);
+        let averages: Vec<f64> = samples
+            .chunks_exact(every)
+            .map(|part| part.iter().sum::<f64>() / every as f64)
+            .collect();
+        let count = averages.len();
+        let mean = averages.iter().sum::<f64>() / count as f64;
+        let mut lines: Vec<Complex64> = averages
+            .iter()
+            .enumerate()
+            .map(|(i, value)| Complex64::from((value - mean) * hann(i, count)))
+            .collect();
+        lines.resize(count * PADDING, Complex64::ZERO);
+        FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
+        let positions = &pass.position_m[start..start + length];
+        Self {
+            start_s: start as f64 / rate,
+            speed_m_s: (positions[length - 1] - positions[0]) / (length - 1) as f64 * rate,
+            step_hz: rate / every as f64 / lines.len() as f64,
+            power: lines[..lines.len() / 2].iter().map(Complex64::norm_sqr).collect(),
+        }
+    }
+
+    /// Share of the band's power that tones at the teeth `(n + shift) f` explain.
+    pub(super) fn explained(&self, fundamental: f64, shift: f64, band_hz: [f64; 2]) -> f64 {
+        let bins = self.bins(band_hz);
+        let total: f64 = self.power[bins].iter().sum();
+        // A tone's power under Hann, summed over padded bins, is 1.5 cells of its peak.
+        let cell = 1.5 * PADDING as f64;
+        let first = (band_hz[0] / fundamental - shift).ceil() as i64;
+        let last = (band_hz[1] / fundamental - shift).floor() as i64;
+        let tooth = |n: i64| {
+            let place = (n as f64 + shift) * fundamental / self.step_hz;
+            self.power.get(place.round() as usize).copied().unwrap_or(0.0)
+        };
+        cell * (first..=last).map(tooth).sum::<f64>() / total.max(f64::MIN_POSITIVE)
+    }
+
+    /// Bins of a band.
+    pub(super) fn bins(&self, [low, high]: [f64; 2]) -> std::ops::Range<usize> {
+        let bin = |frequency: f64| (frequency / self.step_hz).round() as usize;
+        bin(low)..bin(high).min(self.power.len())
+    }
+}
+
+/// Shifts of combs that stand between the teeth, as parts of the fundamental.
+pub(super) fn shifts() -> impl Iterator<Item = f64> {
+    (0..SHIFTS).map(|index| 0.2 + 0.6 * index as f64 / (SHIFTS - 1) as f64)
+}

@@ -1,0 +1,64 @@
+//! Where what is hidden is, and what is next to it.
+
+use crate::known::is_artefact;
+use tracktwin_diagnosis::Hypothesis;
+use tracktwin_reference_simulator::{Hidden, Scene};
+
+/// Spacing of the sleepers in m.
+pub(crate) const SPACING_M: f64 = 0.125;
+
+/// Longest effect in spacings that has a place to be found.
+const LOCAL_SPACINGS: f64 = 3.0;
+
+/// Whether a hypothesis has an effect's place, within a sleeper; where either is everywhere, it has.
+pub(crate) fn is_placed(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
+    let (Some([from_m, to_m]), Some(location)) = (hidden.place(), &hypothesis.location) else {
+        return true;
+    };
+    from_m - 1.01 * SPACING_M <= location.x_m[1] && location.x_m[0] <= to_m + 1.01 * SPACING_M
+}
+
+/// The place of an effect that has one.
+pub(crate) fn local(hidden: &Hidden) -> Option<[f64; 2]> {
+    hidden.place().filter(|[from_m, to_m]| to_m - from_m <= LOCAL_SPACINGS * SPACING_M)
+}
+
+/// Whether a place is next to physics that is hidden; all places are if it is everywhere, or none is
+/// hidden.
+pub(crate) fn near(scene: &Scene, x_m: f64) -> bool {
+    let mut physical = scene.left_out.iter().filter(|hidden| !is_artefact(hidden)).peekable();
+    let is_near = |hidden: &Hidden| {
+        hidden.place().is_none_or(|[from_m, to_m]| {
+            from_m - 1.01 * SPACING_M <= x_m && x_m <= to_m + 1.01 * SPACING_M
+        })
+    };
+    physical.peek().is_none() || physical.any(is_near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+    use tracktwin_diagnosis::Location;
+
+    #[test]
+    fn a_right_name_at_a_wrong_place_is_wrong() {
+        let hidden = Hidden::Squat { x_m: [2.5, 2.5], depth_m: 2e-5, length_m: 6e-3 };
+        let squat_at = |x_m: Option<f64>| Hypothesis {
+            physics: "squat".to_owned(),
+            probability: 0.5,
+            accepted: false,
+            location: x_m.map(|x_m| Location { x_m: [x_m, x_m], sleepers: Vec::new() }),
+            port: None,
+            behaviour: None,
+            parameters: BTreeMap::new(),
+            look_alikes: Vec::new(),
+            would_separate: String::new(),
+            detectability: 0.0,
+            log_evidence: 0.0,
+        };
+        let places = [Some(2.5), Some(2.6), Some(2.7), Some(1.0), None];
+        let placed = places.map(|x_m| is_placed(&hidden, &squat_at(x_m)));
+        assert_eq!(placed, [true, true, false, false, true]);
+    }
+}

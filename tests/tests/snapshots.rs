@@ -1,0 +1,91 @@
+//! What users and other versions of the program rely on: its arguments, and the messages of its farm.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{DescriptorProto, FieldDescriptorProto};
+use std::fmt::Write as _;
+use std::process::Command;
+use test_needs::assert_snapshot;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
+
+/// What a command says of itself, whatever the environment holds.
+fn help(program: &str, command: &[String]) -> String {
+    let said = Command::new(program).args(command).arg("--help").env_clear().output().unwrap();
+    assert!(said.status.success(), "{command:?}");
+    String::from_utf8(said.stdout).unwrap()
+}
+
+/// Names of the commands below one, as its help lists them.
+fn commands(help: &str) -> Vec<String> {
+    let list = help.split_once("\nCommands:\n").map_or("", |(_, list)| list);
+    let lines = list.lines().take_while(|line| !line.is_empty());
+    let entries = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let names = entries.filter_map(|line| line.split_whitespace().next());
+    names.filter(|name| *name != "help").map(str::to_owned).collect()
+}
+
+/// The help of a command and of all below it, each under its name.
+fn all_help(program: &str, name: &str, command: &[String]) -> String {
+    let help = help(program, command);
+    let mut text = format!("# {}\n\n{help}\n", [&[name.to_owned()], command].concat().join(" "));
+    for below in commands(&help) {
+        text += &all_help(program, name, &[command, &[below]].concat());
+    }
+    text
+}
+
+#[test]
+fn arguments_are_those_that_are_kept() {
+    let text = all_help(PROGRAM, "tracktwin", &[]);
+    assert!(text.matches("\n# ").count() > 20, "few commands were found");
+    assert_snapshot("help.txt", &text);
+    assert_snapshot("worker-help.txt", &all_help(WORKER, "tracktwin-worker", &[]));
+}
+
+/// A field as a line: number, how often, type, name.
+fn field(field: &FieldDescriptorProto) -> String {
+    let often = match (field.label(), field.proto3_optional(), field.oneof_index) {
+        (Label::Repeated, ..) => "repeated ",
+        (_, true, _) => "optional ",
+        (_, false, Some(_)) => "one of ",
+        _ => "",
+    };
+    let kind = match field.r#type() {
+        Type::Message | Type::Enum => field.type_name().to_owned(),
+        other => other.as_str_name().trim_start_matches("TYPE_").to_lowercase(),
+    };
+    format!("  {} {often}{kind} {}\n", field.number(), field.name())
+}
+
+fn message(text: &mut String, scope: &str, message: &DescriptorProto) {
+    let name = format!("{scope}.{}", message.name());
+    writeln!(text, "message {name}").unwrap();
+    let mut fields: Vec<_> = message.field.iter().collect();
+    fields.sort_by_key(|field| field.number());
+    text.extend(fields.into_iter().map(field));
+    for range in &message.reserved_range {
+        writeln!(text, "  reserved {} to {}", range.start(), range.end() - 1).unwrap();
+    }
+    message.nested_type.iter().for_each(|nested| self::message(text, &name, nested));
+}
+
+#[test]
+fn messages_are_those_that_are_kept() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../proto");
+    let files = protox::compile(["farm/v1/farm.proto"], [root]).unwrap().file;
+    let mut text = String::new();
+    for file in &files {
+        file.message_type.iter().for_each(|it| message(&mut text, file.package(), it));
+        for service in &file.service {
+            for method in &service.method {
+                let (name, service) = (method.name(), service.name());
+                let (takes, gives) = (method.input_type(), method.output_type());
+                writeln!(text, "call {service}/{name} {takes} {gives}").unwrap();
+            }
+        }
+    }
+    assert_snapshot("messages.txt", &text);
+}

@@ -1,0 +1,63 @@
+//! Why a worker ends before it is told to.
+
+use crate::credentials::CredentialsError;
+use tracktwin_experiment::ExperimentError;
+use tracktwin_protocol::BadMessage;
+
+/// Why a worker ends before it is told to.
+#[derive(Debug, thiserror::Error)]
+pub enum AgentError {
+    /// No address at all.
+    #[error("no coordinator is named; write --coordinator URL")]
+    NoCoordinator,
+    /// The address or the certificates can't be used.
+    #[error("coordinator {url}: cannot be called")]
+    Address {
+        /// The address.
+        url: String,
+        /// What is wrong with it.
+        source: tonic::transport::Error,
+    },
+    /// Address and credentials don't go together.
+    #[error(transparent)]
+    Credentials(#[from] CredentialsError),
+    /// The coordinator refuses the worker, or what it says.
+    #[error("refused by the coordinator: {reason}")]
+    Refused {
+        /// Why.
+        reason: String,
+    },
+    /// The coordinator can't make sense of what the worker says.
+    #[error("the coordinator does not understand this worker: {reason}")]
+    NotUnderstood {
+        /// What it says.
+        reason: String,
+    },
+    /// No coordinator has answered for longer than was asked for.
+    #[error("no coordinator answered for {silent_s} s: {reason}")]
+    GaveUp {
+        /// For how long, in s.
+        silent_s: u64,
+        /// What the last try came to.
+        reason: String,
+    },
+    /// The coordinator does not know the worker (any more).
+    #[error("the coordinator does not know this worker")]
+    Unknown,
+    /// The coordinator says what this worker does not understand.
+    #[error("the coordinator's message makes no sense here: {0}")]
+    BadMessage(#[from] BadMessage),
+    /// The experiment can't be done here.
+    #[error("the campaign's experiment cannot be done: {0}")]
+    Experiment(#[from] ExperimentError),
+    /// The experiment is not the one whose hash came with it.
+    #[error("the campaign's experiment does not have the hash that came with it")]
+    ExperimentHash,
+}
+
+impl AgentError {
+    /// Whether the same worker might succeed when it is started again.
+    pub const fn may_pass(&self) -> bool {
+        matches!(self, Self::GaveUp { .. })
+    }
+}
