@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use tracktwin_track::element::SpringDamper;
 use tracktwin_track::extension::{
-    Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
+    Trials,
 };
 use tracktwin_track::model::Assembly;
 
@@ -14,6 +15,7 @@ use tracktwin_track::model::Assembly;
 pub static RAIL_ABSORBER: Kind = Kind {
     physics: "rail_absorber",
     summary: "a mass hangs under the rail on a damped spring",
+    family: EffectFamily::Rail,
     classes: &[Class::Frequency, Class::Local],
     place: PlaceKind::Point,
     measuring_chain: false,

@@ -102,6 +102,7 @@ pub async fn diagnose(
         subject.shuffle(&orders(speeds, sleepers));
     }
     let suggested = subject.suggested(&look);
+    subject.without = without.to_vec();
     watch("baseline", 0.0);
     let start = compute(|| baseline(&mut subject)).map_err(DiagnosingError::Baseline)?;
     watch("null model", 0.0);

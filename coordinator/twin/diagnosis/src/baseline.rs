@@ -22,6 +22,8 @@ pub struct Unknowns {
     pub variation: [Variation; 3],
     /// Sleepers that differ from their neighbours by more than `variation` says.
     pub exceptions: Vec<Exception>,
+    /// Standard deviation of the sensor's response to power, in nats at each knot.
+    pub response_deviation: f64,
 }
 
 /// How the logarithm of a quantity varies along the track, about its mean.
@@ -103,8 +105,15 @@ impl Unknowns {
         frequencies_hz: Range<f64>,
     ) -> Self {
         let (knots, response_knots) = (knots(wave_numbers), knots(frequencies_hz));
-        let (variation, exceptions) = (prior::VARIATION, Vec::new());
-        Self { sleepers: section.sleepers, speeds, knots, response_knots, variation, exceptions }
+        Self {
+            sleepers: section.sleepers,
+            speeds,
+            knots,
+            response_knots,
+            variation: prior::VARIATION,
+            exceptions: Vec::new(),
+            response_deviation: prior::RESPONSE,
+        }
     }
 
     /// How many unknowns there are.
@@ -230,7 +239,7 @@ impl Unknowns {
             covariance[(index, index)] = prior::GAIN.powi(2);
         }
         for index in self.response() {
-            covariance[(index, index)] = prior::RESPONSE.powi(2);
+            covariance[(index, index)] = self.response_deviation.powi(2);
         }
         // One of the ends is there, each as probable as the others.
         for index in self.ends() {

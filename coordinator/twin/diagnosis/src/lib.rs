@@ -16,6 +16,7 @@ mod held_out;
 mod null_model;
 mod observation;
 mod outcome;
+mod patch_scan;
 mod port_scan;
 mod profile;
 mod screen;
@@ -42,6 +43,7 @@ pub use outcome::{
     BeforeAfter, Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score, Scores,
     SleeperValues, UNKNOWN, Verdict,
 };
+pub use patch_scan::{Fixed, Patch};
 pub use port_scan::{Port, PortPlace, PortScan};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, Search, Stage, first_calibration, search};

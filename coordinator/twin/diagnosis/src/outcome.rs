@@ -95,6 +95,13 @@ pub struct Mismatch {
 pub struct Hypothesis {
     /// Its name in the catalogue.
     pub physics: String,
+    /// The family of effects that it belongs to, which differ in name more than in what a recording
+    /// shows; none of what is unknown.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub family: Option<String>,
+    /// Probability that something of this family is present at the place.
+    #[serde(default)]
+    pub family_probability: f64,
     /// Probability that it is present.
     pub probability: f64,
     /// Whether it was accepted: its name is in the sentence.

@@ -7,6 +7,12 @@ use tracktwin_track::extension::{Kind, PlaceKind};
 /// Logarithm of a parameter's bias that is worth a word.
 const BIAS_MIN: f64 = 0.1;
 
+/// By how much a family is more probable than its member to be told first.
+const FAMILY_MORE: f64 = 0.02;
+
+/// Probability from which another name is told beside the first.
+const RIVAL_MIN: f64 = 0.05;
+
 /// Sleepers that are named one by one.
 const NAMED_MAX: usize = 3;
 
@@ -40,7 +46,8 @@ pub(crate) fn sentence(
         };
     };
     let others = accepted.map(|other| format!(" Also: {}", named(other, sleepers)));
-    let found = capital(&named(first, sleepers)) + &others.collect::<String>();
+    let found = capital(&named(first, sleepers)) + &rival(first, hypotheses);
+    let found = found + &others.collect::<String>();
     [found, gained(fit), biased(bias)].concat()
 }
 
@@ -50,7 +57,28 @@ fn named(hypothesis: &Hypothesis, sleepers: usize) -> String {
     let summary = Kind::from_name(physics)
         .map_or_else(|| unknown(hypothesis), |kind| kind.summary.to_owned());
     let place = place(hypothesis, sleepers);
-    format!("{place}{summary} ({physics}, {:.0} %).", 100.0 * probability)
+    let family = Kind::from_name(physics).map(|kind| kind.family.words());
+    match family.filter(|_| hypothesis.family_probability > probability + FAMILY_MORE) {
+        Some(family) => format!(
+            "{place}{family} differs from the model ({:.0} %); most probably {summary} ({physics}, {:.0} %).",
+            100.0 * hypothesis.family_probability,
+            100.0 * probability
+        ),
+        None => format!("{place}{summary} ({physics}, {:.0} %).", 100.0 * probability),
+    }
+}
+
+/// What else the first one could be, and what would tell them apart.
+fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
+    let is_rival = |other: &&Hypothesis| {
+        !other.accepted && other.physics != first.physics && other.probability >= RIVAL_MIN
+    };
+    let Some(other) = hypotheses.iter().find(is_rival) else { return String::new() };
+    let percent = 100.0 * other.probability;
+    format!(
+        " It could also be {} ({percent:.0} %); {} would tell them apart.",
+        other.physics, first.would_separate
+    )
 }
 
 /// Something that the catalogue lacks, with its port and what it does there.
@@ -137,6 +165,8 @@ mod tests {
     fn hypothesis(physics: &str, location: Option<Location>) -> Hypothesis {
         Hypothesis {
             physics: physics.to_owned(),
+            family: None,
+            family_probability: 0.987,
             probability: 0.987,
             accepted: true,
             location,

@@ -10,6 +10,7 @@ use std::ops::Range;
 use tracktwin_inspection::chain::Trouble;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::{OtherTrack, Recording, compare_designs};
+use tracktwin_track::extension::Kind;
 
 /// Bands compared in Hz, as far as the sample rate lets them: below, a window holds hardly a
 /// wavelet; above, hardly any irregularity.
@@ -103,6 +104,8 @@ pub struct Subject {
     pub first_sleeper: usize,
     /// Numbers in the recording of the passes at each speed.
     pub pass_numbers: Vec<Vec<usize>>,
+    /// Kinds of physics that may not be named.
+    pub without: Vec<String>,
     /// Where the passes alone show the rail's own shape, from and to in m; nowhere until
     /// [`Subject::suggested`].
     pub heard_m: Vec<[f64; 2]>,
@@ -186,8 +189,8 @@ impl Measured {
         let log_power = log_power(&forward, spectra, sleepers.start);
         let pass_variance = pass_variance(&forward, spectra);
         let pass_numbers = spectra.speeds.iter().map(|speed| speed.passes.clone()).collect();
-        let (first_sleeper, heard_m) = (sleepers.start, Vec::new());
-        Subject { forward, log_power, pass_variance, first_sleeper, pass_numbers, heard_m }
+        let (first_sleeper, without, heard_m) = (sleepers.start, Vec::new(), Vec::new());
+        Subject { forward, log_power, pass_variance, first_sleeper, pass_numbers, without, heard_m }
     }
 }
 
@@ -215,6 +218,11 @@ impl Subject {
         let measured = Measured::of(recording, design)?;
         let ranges = overlapping(measured.sleepers.clone(), length, overlap);
         Ok(ranges.into_iter().map(|range| measured.subject(recording, design, range)).collect())
+    }
+
+    /// Whether physics of a kind may be named.
+    pub(crate) fn may_be_named(&self, kind: &Kind) -> bool {
+        !self.without.iter().any(|other| other == kind.physics)
     }
 
     /// The same powers at other sleepers: those of each speed in an order of its own, `[speed][sleeper]`,

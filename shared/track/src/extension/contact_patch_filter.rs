@@ -1,12 +1,13 @@
 //! The contact patch, which averages the irregularity over its length.
 
-use super::{Class, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::FRAC_PI_4;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "contact_patch_filter",
     summary: "the contact patch averages short waves of the irregularity",
+    family: EffectFamily::Contact,
     classes: &[Class::Wavelength, Class::Global, Class::Load],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

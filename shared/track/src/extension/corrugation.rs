@@ -1,19 +1,20 @@
 //! Corrugation: waves of one length on the railhead.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "corrugation",
     summary: "waves of nearly one length on the railhead",
+    family: EffectFamily::RailSurface,
     classes: &[Class::Wavelength, Class::Global],
     place: PlaceKind::Stretch,
     measuring_chain: false,
     parameters: &[
         KindParameter::new("wavelength_m", "m", "length of the waves").ranges(
-            [2e-3, 1.2e-2],
-            [2e-2, 0.1],
+            [2e-3, 3e-2],
+            [2e-2, 0.15],
             5.7e-3,
         ),
         KindParameter::new("amplitude_m", "m", "amplitude, half of crest to trough").ranges(

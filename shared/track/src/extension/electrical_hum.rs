@@ -1,12 +1,15 @@
 //! The mains in the signal.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
+use super::{
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, Measured, PlaceKind, Screening,
+};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "electrical_hum",
     summary: "a tone of the electrical supply is added to the signal",
+    family: EffectFamily::MeasuringChain,
     classes: &[Class::Noise, Class::Frequency],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

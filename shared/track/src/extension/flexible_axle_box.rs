@@ -1,7 +1,8 @@
 //! An axle box on a spring of its own.
 
 use super::{
-    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
+    Screening, Trials,
 };
 use crate::model::{ContactOscillator, Vehicle};
 use std::sync::Arc;
@@ -9,6 +10,7 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "flexible_axle_box",
     summary: "part of the unsprung mass, with the sensor, is held to the wheel by a spring",
+    family: EffectFamily::Vehicle,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

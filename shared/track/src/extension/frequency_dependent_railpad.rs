@@ -1,6 +1,9 @@
 //! Railpads that are stiffer the faster they are loaded.
 
-use super::{Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials};
+use super::{
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
+    Trials,
+};
 use crate::element::SpringDamper;
 use crate::model::Assembly;
 use std::sync::Arc;
@@ -8,6 +11,7 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "frequency_dependent_railpad",
     summary: "railpads that relax: stiffer at high than at low frequency",
+    family: EffectFamily::Fastening,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

@@ -1,12 +1,13 @@
 //! A sensor or amplifier of wrong gain.
 
-use super::{Class, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
+use super::{Class, EffectFamily, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
 use rustfft::num_complex::Complex64;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "gain_error",
     summary: "all accelerations are recorded too large or too small by one factor",
+    family: EffectFamily::MeasuringChain,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

@@ -1,7 +1,8 @@
 //! Sleepers that hang on the rail over a void.
 
 use super::{
-    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
+    Screening, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::{Assembly, ForceLaw, Law, Reaction, Support};
@@ -10,22 +11,36 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "hanging_sleeper",
     summary: "a sleeper hangs on the rail over a gap and meets its ballast only when it closes",
+    family: EffectFamily::Support,
     classes: &[Class::Frequency, Class::Local, Class::Load, Class::Concentrated],
     place: PlaceKind::Sleepers,
     measuring_chain: false,
-    parameters: &[KindParameter::new("gap_m", "m", "gap between the unloaded sleeper and ballast")
-        .ranges([2e-5, 4e-4], [1e-4, 3e-3], 2e-4)
-        .bound(Bound::NotNegative)],
+    parameters: &[
+        KindParameter::new("gap_m", "m", "gap between the unloaded sleeper and ballast")
+            .ranges([2e-5, 4e-4], [1e-4, 3e-3], 2e-4)
+            .bound(Bound::NotNegative),
+        KindParameter::new(
+            "damping_share",
+            "1",
+            "share of the ballast's damping that acts while the gap is open",
+        )
+        .ranges([0.0, 0.9], [0.0, 0.9], 0.0)
+        .bound(Bound::Share)
+        .or(0.0),
+    ],
     look_alikes: &["support_variation", "rail_joint"],
     would_separate: "passes with another wheel load: a void closes, soft ballast does not",
     screening: Screening::tried(&[
         // Gaps that close while the wheel is above the sleeper, or near it; and one that no load closes.
         Family::new(Places::SleepersAndPairs, &["gap_m"], Trials::Grid(&[&[1e-4, 1.6e-4]])),
         Family::new(Places::SleepersAndPairs, &[], Trials::Grid(&[])).held(&[("gap_m", 4e-4)]),
+        // Loose ballast under a sleeper that it does not carry still damps.
+        Family::new(Places::SleepersAndPairs, &["damping_share"], Trials::Grid(&[&[0.15]]))
+            .held(&[("gap_m", 4e-4)]),
     ]),
     build: |inputs| {
-        let gap_m = inputs.value("gap_m");
-        Ok(Arc::new(HangingSleeper { sleepers: inputs.sleepers(), gap_m }))
+        let (gap_m, damping_share) = (inputs.value("gap_m"), inputs.value("damping_share"));
+        Ok(Arc::new(HangingSleeper { sleepers: inputs.sleepers(), gap_m, damping_share }))
     },
 };
 
@@ -41,6 +56,7 @@ const ONSET_M: f64 = 1e-6;
 struct HangingSleeper {
     sleepers: Vec<usize>,
     gap_m: f64,
+    damping_share: f64,
 }
 
 impl Extension for HangingSleeper {
@@ -49,11 +65,16 @@ impl Extension for HangingSleeper {
             let place_m = assembly.layout().sleepers()[index].position_m;
             for (port, ballast) in assembly.ballast(index) {
                 let linear = SpringDamper { stiffness: 0.0, damping: 0.0 };
-                let law = Arc::new(Gap { gap_m: self.gap_m, ballast });
+                let damping = (1.0 - self.damping_share) * ballast.damping;
+                let law = Arc::new(Gap {
+                    gap_m: self.gap_m,
+                    ballast: SpringDamper { damping, ..ballast },
+                });
                 assembly.add_force_law(ForceLaw { port, place_m, linear, law });
             }
             let support = assembly.supports()[index];
-            let open = Support { ballast_stiffness: 0.0, ballast_damping: 0.0, ..support };
+            let ballast_damping = self.damping_share * support.ballast_damping;
+            let open = Support { ballast_stiffness: 0.0, ballast_damping, ..support };
             assembly.set_support(index, open);
         }
     }
@@ -136,6 +157,26 @@ mod tests {
         assert_eq!(wide, wider);
         let plain = run(&track_on(rigid(), &[]));
         assert!(distance(&wide.acceleration_m_s2, &plain.acceleration_m_s2) > 0.02);
+    }
+
+    #[test]
+    fn a_gap_that_keeps_all_damping_lacks_the_stiffness_alone() {
+        let kept = instance("hanging_sleeper").on([5]).with("gap_m", 1.0);
+        let kept = track_on(rigid(), &[kept.with("damping_share", 0.4)]);
+        let plain = track_on(rigid(), &[]);
+        let seat = Place::SleeperSeat(5);
+        let of = |model: &TrackModel, hz| {
+            let receptance = receptance(model, seat, seat, &[hz]).unwrap()[0];
+            receptance.inv()
+        };
+        // What the support lacks at the seat: its stiffness, and the rest of its damping.
+        for hz in [20.0, 60.0] {
+            let missing = of(&plain, hz) - of(&kept, hz);
+            let support = rigid();
+            let damping = 0.6 * support.ballast_damping * std::f64::consts::TAU * hz;
+            assert!((missing.re / support.ballast_stiffness - 1.0).abs() < 1e-3, "{missing}");
+            assert!((missing.im / damping - 1.0).abs() < 1e-3, "{missing}");
+        }
     }
 
     #[test]

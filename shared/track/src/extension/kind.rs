@@ -17,6 +17,8 @@ pub struct Kind {
     pub physics: &'static str,
     /// What it is, in a sentence without a full stop.
     pub summary: &'static str,
+    /// What it has in common with kinds that differ from it in little but their name.
+    pub family: EffectFamily,
     /// What stays and what moves when speed, place or load change.
     pub classes: &'static [Class],
     /// Where it is.
@@ -33,6 +35,65 @@ pub struct Kind {
     pub screening: Screening,
     /// Makes it, once the registry has checked what it is made of.
     pub build: fn(&Inputs<'_>) -> Result<Arc<dyn Extension>, InstanceError>,
+}
+
+/// Effects that differ in name more than in what a recording shows of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EffectFamily {
+    /// A defect of the rail at a place: joint, weld, squat.
+    RailDefect,
+    /// The rail's surface over a stretch or all along.
+    RailSurface,
+    /// The rail's cross section.
+    Rail,
+    /// The contact of wheel and rail.
+    Contact,
+    /// The wheel's circumference.
+    Wheel,
+    /// The vehicle around the wheel.
+    Vehicle,
+    /// Rail fastening and railpad.
+    Fastening,
+    /// What holds sleepers down.
+    HoldDown,
+    /// Support under the sleepers: lost, soft or layered.
+    Support,
+    /// Sensor, mounting, clock, odometer.
+    MeasuringChain,
+}
+
+impl EffectFamily {
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::RailDefect => "rail_defect",
+            Self::RailSurface => "rail_surface",
+            Self::Rail => "rail_section",
+            Self::Contact => "contact",
+            Self::Wheel => "wheel",
+            Self::Vehicle => "vehicle",
+            Self::Fastening => "fastening",
+            Self::HoldDown => "sleeper_hold_down",
+            Self::Support => "sleeper_support",
+            Self::MeasuringChain => "measuring_chain",
+        }
+    }
+
+    /// The same in a sentence, after "differs in".
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::RailDefect => "a defect of the rail",
+            Self::RailSurface => "the surface of the rail",
+            Self::Rail => "the rail's cross section",
+            Self::Contact => "the contact of wheel and rail",
+            Self::Wheel => "the wheel's circumference",
+            Self::Vehicle => "the vehicle",
+            Self::Fastening => "the rail fastening",
+            Self::HoldDown => "what holds the sleepers down",
+            Self::Support => "the support of the sleepers",
+            Self::MeasuringChain => "the measuring chain",
+        }
+    }
 }
 
 /// How the trace of an effect behaves over passes: a letter of its bar-code.

@@ -1,6 +1,6 @@
 //! Railpads that are stiffer the more load they carry.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
 use crate::element::SpringDamper;
 use crate::model::{Assembly, ForceLaw, Law, Reaction};
 use std::sync::Arc;
@@ -8,6 +8,7 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "load_dependent_railpad",
     summary: "railpads that grow stiffer with the load that they carry",
+    family: EffectFamily::Fastening,
     classes: &[Class::Frequency, Class::Global, Class::Load],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

@@ -1,12 +1,16 @@
 //! Railpads that are missing or worn out.
 
-use super::{Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials};
+use super::{
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
+    Trials,
+};
 use crate::model::{Assembly, Support};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "missing_railpad",
     summary: "a railpad is missing or has lost most of its stiffness",
+    family: EffectFamily::Fastening,
     classes: &[Class::Frequency, Class::Local],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

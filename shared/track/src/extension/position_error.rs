@@ -1,11 +1,14 @@
 //! An odometer that is off.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
+use super::{
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, Measured, PlaceKind, Screening,
+};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "position_error",
     summary: "recorded positions are shifted or stretched",
+    family: EffectFamily::MeasuringChain,
     classes: &[Class::Noise],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

@@ -1,7 +1,8 @@
 //! Deformation of the rail's cross-section under the wheel.
 
 use super::{
-    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
+    Screening, Trials,
 };
 use crate::model::{ContactOscillator, Vehicle};
 use std::f64::consts::TAU;
@@ -10,6 +11,7 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "rail_cross_section",
     summary: "the rail's cross-section deforms under the wheel",
+    family: EffectFamily::Rail,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

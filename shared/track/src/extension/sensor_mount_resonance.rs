@@ -1,7 +1,8 @@
 //! A sensor whose mounting resonates.
 
 use super::{
-    Class, Extension, Family, Kind, KindParameter, Measured, PlaceKind, Places, Screening, Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, Measured, PlaceKind, Places,
+    Screening, Trials,
 };
 use rustfft::num_complex::Complex64;
 use std::sync::Arc;
@@ -9,6 +10,7 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "sensor_mount_resonance",
     summary: "the sensor resonates on its mounting",
+    family: EffectFamily::MeasuringChain,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

@@ -1,6 +1,9 @@
 //! Bolts that hold the sleepers' ends down on the substructure.
 
-use super::{Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials};
+use super::{
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
+    Trials,
+};
 use crate::element::SpringDamper;
 use crate::model::Assembly;
 use std::sync::Arc;
@@ -8,6 +11,7 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "sleeper_bolt",
     summary: "bolts hold the sleepers' ends down on the substructure",
+    family: EffectFamily::HoldDown,
     classes: &[Class::Frequency, Class::Local],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

@@ -1,12 +1,16 @@
 //! A squat: a short hollow of the railhead.
 
-use super::{Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials};
+use super::{
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
+    Trials,
+};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "squat",
     summary: "a short hollow of the railhead",
+    family: EffectFamily::RailDefect,
     classes: &[Class::Wavelength, Class::Local, Class::Concentrated],
     place: PlaceKind::Point,
     measuring_chain: false,

@@ -1,7 +1,8 @@
 //! A layer below the ballast that moves.
 
 use super::{
-    Bound, Class, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
+    Screening, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::Assembly;
@@ -11,6 +12,7 @@ pub(super) const KIND: Kind =
     Kind {
         physics: "subgrade_layer",
         summary: "the ballast rests on a mass with a spring and damper of its own",
+        family: EffectFamily::Support,
         classes: &[Class::Frequency, Class::Global],
         place: PlaceKind::Sleepers,
         measuring_chain: false,

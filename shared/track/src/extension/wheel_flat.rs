@@ -1,12 +1,13 @@
 //! A flat of the wheel's tread.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "wheel_flat",
     summary: "a flat of the wheel's tread, met once a turn",
+    family: EffectFamily::Wheel,
     classes: &[Class::Wavelength, Class::WheelAngle, Class::Concentrated],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

@@ -1,12 +1,13 @@
 //! A wheel that is not round.
 
-use super::{Bound, Class, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "wheel_out_of_round",
     summary: "waves around the wheel's tread",
+    family: EffectFamily::Wheel,
     classes: &[Class::Wavelength, Class::WheelAngle, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

@@ -50,6 +50,8 @@ pub(super) fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -
         |(&name, &(mean, sd)): (&&str, &(f64, f64))| (name.to_owned(), Estimate { mean, sd });
     Hypothesis {
         physics: finding.physics.to_owned(),
+        family: Some(kind.family.name().to_owned()),
+        family_probability: probability(finding),
         probability: probability(finding),
         accepted: true,
         location,

@@ -10,8 +10,9 @@ mod place;
 mod round;
 
 pub use self::alone::passes_alone;
+use self::nameless::meet;
 use crate::calibration::CalibrationError;
-use crate::outcome::{Diagnosis, FORMAT, Hypothesis, UNKNOWN, Verdict};
+use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict};
 use crate::search::Search;
 use crate::sentence::sentence;
 use crate::subject::Subject;
@@ -26,6 +27,9 @@ const ONE_SPEED_MAX: f64 = 0.5;
 
 /// Greatest probability where no pass repeats another: how far passes differ had to be assumed.
 const ONE_PASS_MAX: f64 = 0.9;
+
+/// Greatest probability of anything: the model that it rests on may be wrong.
+const MODEL_MAX: f64 = 0.97;
 
 /// What is left of a name's probability when it does not predict withheld speeds better, or a shape
 /// that it does not have shows.
@@ -53,10 +57,12 @@ impl Evidence<'_> {
     /// [`CalibrationError`] when a calibrated track makes no model.
     pub fn conclude(&self) -> Result<Diagnosis, CalibrationError> {
         let mut hypotheses = self.hypotheses();
+        self.add_patch(&mut hypotheses);
         let most = self.probability_max();
         for hypothesis in &mut hypotheses {
             hypothesis.probability = hypothesis.probability.min(most);
         }
+        add_families(&mut hypotheses, most);
         hypotheses.sort_by(|a, b| {
             b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
         });
@@ -93,7 +99,7 @@ impl Evidence<'_> {
         if self.speeds() == 1 {
             ONE_SPEED_MAX
         } else if self.repeats() {
-            1.0
+            MODEL_MAX
         } else {
             ONE_PASS_MAX
         }
@@ -156,6 +162,23 @@ impl Evidence<'_> {
         }
         all.retain(|hypothesis| hypothesis.accepted || hypothesis.probability >= PROBABILITY_MIN);
         all
+    }
+}
+
+/// Probability of each hypothesis's family at its place: members exclude each other there.
+fn add_families(hypotheses: &mut [Hypothesis], most: f64) {
+    let all: Vec<_> = hypotheses
+        .iter()
+        .map(|it| (it.family.clone(), it.location.clone(), it.probability))
+        .collect();
+    for hypothesis in hypotheses {
+        let is_member = |(family, location, _): &&(Option<String>, Option<Location>, f64)| {
+            family.is_some()
+                && *family == hypothesis.family
+                && meet(location.as_ref(), hypothesis.location.as_ref())
+        };
+        let members: f64 = all.iter().filter(is_member).map(|(.., share)| share).sum();
+        hypothesis.family_probability = members.max(hypothesis.probability).min(most);
     }
 }
 

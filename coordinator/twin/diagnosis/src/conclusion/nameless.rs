@@ -2,10 +2,15 @@
 
 use super::finding::seen;
 use super::{Evidence, FAILED_SHARE};
+use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, Location, UNKNOWN};
+use crate::patch_scan::Fixed;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind};
+
+/// Probability of a patch as strong if nothing is left out, up to which it is said to be there.
+const PATCH_ALARM: f64 = 0.01;
 
 impl Evidence<'_> {
     /// A finding without a name is unknown, at its place, unless something other than a shape of
@@ -35,6 +40,7 @@ impl Evidence<'_> {
         all.retain(|other| other.physics != UNKNOWN);
         all.push(Hypothesis {
             physics: UNKNOWN.to_owned(),
+            family: None,
             port: Some(port.to_owned()),
             parameters: BTreeMap::new(),
             look_alikes: Vec::new(),
@@ -44,12 +50,54 @@ impl Evidence<'_> {
     }
 }
 
+impl Evidence<'_> {
+    /// What the final model does not explain though an eye would see it: unknown, with its class, where
+    /// nothing was accepted.
+    pub(super) fn add_patch(&self, all: &mut Vec<Hypothesis>) {
+        let Some((patch, p_value)) = &self.search.patch else { return };
+        if *p_value > PATCH_ALARM || all.iter().any(|known| known.accepted) {
+            return;
+        }
+        let sleepers: Vec<usize> = patch.sleepers.clone().collect();
+        let (port, would_separate) = match patch.fixed {
+            Fixed::Wavelength(_) => {
+                ("rail_surface", "a look at the rail at the place, or its measured profile")
+            }
+            Fixed::Frequency(_) => {
+                ("rail_seat", "a hammer test at the place, above and between the sleepers")
+            }
+        };
+        let parameters = match patch.fixed {
+            Fixed::Wavelength(length_m) => ("wavelength_m", length_m),
+            Fixed::Frequency(frequency_hz) => ("frequency_Hz", frequency_hz),
+        };
+        // The bands' own width is what the place of a band is known to.
+        let estimate = Estimate { mean: parameters.1, sd: 0.06 * parameters.1 };
+        all.retain(|known| known.physics != UNKNOWN);
+        all.push(Hypothesis {
+            physics: UNKNOWN.to_owned(),
+            family: None,
+            family_probability: 1.0 - p_value,
+            probability: 1.0 - p_value,
+            accepted: true,
+            location: Some(self.location(&sleepers)),
+            port: Some(port.to_owned()),
+            behaviour: None,
+            parameters: BTreeMap::from([(parameters.0.to_owned(), estimate)]),
+            look_alikes: Vec::new(),
+            would_separate: would_separate.to_owned(),
+            detectability: patch.deviations,
+            log_evidence: 0.5 * patch.deviations.powi(2),
+        });
+    }
+}
+
 fn is_shape(physics: &str) -> bool {
     Kind::from_name(physics).is_some_and(|kind| kind.classes.contains(&Class::Wavelength))
 }
 
 /// Whether two places have a sleeper in common; none is everywhere.
-fn meet(one: Option<&Location>, other: Option<&Location>) -> bool {
+pub(super) fn meet(one: Option<&Location>, other: Option<&Location>) -> bool {
     let (Some(one), Some(other)) = (one, other) else { return true };
     one.sleepers.iter().any(|sleeper| other.sleepers.contains(sleeper))
 }

@@ -28,12 +28,12 @@ const ORDER: &str = "order";
 impl Evidence<'_> {
     /// What one search fitted, as hypotheses.
     pub(super) fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
-        let Probabilities { named, unknown, nothing } = round.probabilities();
+        let Probabilities { named, family, unknown, nothing } = round.probabilities();
         // What is left beside a named effect may be its model's error as well as something new.
         let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
         let alone = first && !round.accepted;
         let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
-        let others = named.iter().copied().fold(nothing, f64::max);
+        let others = family.max(nothing);
         let is_there = alone && !round.port_strays;
         let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
         // Something is there, but the names that come near failed on withheld speeds.
@@ -69,6 +69,8 @@ impl Evidence<'_> {
         let behaviour = port.behaviour.as_ref();
         Hypothesis {
             physics: UNKNOWN.to_owned(),
+            family: None,
+            family_probability: probability,
             probability,
             accepted: false,
             location: self.location_of_port(&port.place),
@@ -121,6 +123,8 @@ impl Evidence<'_> {
         let order = order.map(|&mean| (ORDER.to_owned(), Estimate { mean, sd: 0.0 }));
         Hypothesis {
             physics: candidate.kind.physics.to_owned(),
+            family: Some(candidate.kind.family.name().to_owned()),
+            family_probability: probability,
             probability,
             accepted,
             location: self.location_of(candidate),

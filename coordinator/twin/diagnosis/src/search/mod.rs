@@ -10,6 +10,7 @@ mod limits;
 mod probability;
 mod remainder;
 mod round;
+mod runs;
 #[cfg(test)]
 mod testing;
 
@@ -24,6 +25,7 @@ use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
+use crate::patch_scan::{Fixed, Patch};
 use crate::port_scan::{Port, PortPlace, PortScan};
 use crate::section::Section;
 use crate::subject::Subject;
@@ -116,6 +118,9 @@ pub struct Search {
     /// By how many nats the recording is explained better if each speed has a track and a surface of its
     /// own than by one track with all that was found; negative where all speeds passed the same track.
     pub apart: f64,
+    /// What the final model does not explain, though an eye would see it, and the probability to see as
+    /// much if nothing is left out.
+    pub patch: Option<(Patch, f64)>,
     /// Log density of each speed when it is held out, in nats a log power: baseline, extended.
     pub held_out: [f64; 2],
 }
@@ -170,8 +175,11 @@ pub fn search(
         observation,
         deviation: setting.covariance.diagonal().map(f64::sqrt),
         apart: f64::NEG_INFINITY,
+        patch: None,
         held_out: [0.0; 2],
     };
+    let waves = search.waves(&setting);
+    let all = &[all, &waves].concat();
     let before = setting.held_out(&[], &search.baseline.values)?;
     let mut densities = vec![before];
     while search.accepted.len() < EFFECTS_MAX
@@ -180,6 +188,12 @@ pub fn search(
     search.take_back(&subject.forward.section);
     search.hear(&setting)?;
     search.compare_apart(&setting)?;
+    let with = Problem {
+        forward: &subject.forward,
+        observation: &search.observation,
+        candidates: &search.accepted,
+    };
+    search.patch = setting.patch(&with, &search.last, |_| true);
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
     search.held_out = [mean(&densities[0]), mean(&densities[search.accepted.len()])];
     Ok(search)
@@ -195,6 +209,19 @@ impl Round {
 }
 
 impl Search {
+    /// Waves on the rail that the baseline's residual shows, as candidates.
+    fn waves(&self, setting: &Setting<'_>) -> Vec<Candidate> {
+        let forward = &setting.subject.forward;
+        let problem = Problem { forward, observation: &self.observation, candidates: &[] };
+        let is_wave = |fixed| matches!(fixed, Fixed::Wavelength(_));
+        let found = setting.patch(&problem, &self.baseline, is_wave);
+        let level = self.baseline.values[forward.unknowns.level().start].exp();
+        let wave = found
+            .filter(|(_, p_value)| *p_value <= FALSE_ALARM)
+            .and_then(|(patch, _)| patch.as_waves(&forward.section, level));
+        wave.filter(|wave| setting.subject.may_be_named(wave.kind)).into_iter().collect()
+    }
+
     /// Looks for one effect more; whether one was accepted. `densities` are those of each speed when
     /// it is held out, by the baseline and with one more effect each.
     fn goes_on(

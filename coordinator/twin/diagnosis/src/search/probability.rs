@@ -1,10 +1,10 @@
 //! How probable each explanation of a search is: evidence, tempered, times prior.
 
-use super::Round;
+use super::{Fitted, Round};
 use crate::port_scan::Port;
 use crate::screen::STRENGTHS;
 use std::collections::BTreeMap;
-use tracktwin_track::extension::Kind;
+use tracktwin_track::extension::{EffectFamily, Kind};
 
 /// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
 pub(super) const TEMPERATURE: f64 = 3.0;
@@ -12,6 +12,10 @@ pub(super) const TEMPERATURE: f64 = 3.0;
 /// By how much more it is tempered for each nat of the greatest evidence: what is not exact in the
 /// model of an effect grows with the effect.
 const INEXACT_SHARE: f64 = 1e-3;
+
+/// By how much more members of one family are tempered against each other for each nat of their
+/// evidence: another simulator's, or nature's, void or joint is not ours, and what both lack decides.
+const MEMBER_SHARE: f64 = 0.03;
 
 /// Probability of an unnamed alternative against a name of equal evidence: most of what goes wrong
 /// on a track is in the catalogue.
@@ -30,6 +34,8 @@ const NOTHING_PRIOR: f64 = 0.5;
 pub(crate) struct Probabilities {
     /// Of each candidate that was fitted.
     pub(crate) named: Vec<f64>,
+    /// Of the best candidate's family.
+    pub(crate) family: f64,
     /// Of an unknown dynamic stiffness.
     pub(crate) unknown: f64,
     /// Of nothing at all.
@@ -45,10 +51,11 @@ impl Round {
 
     /// The same with this as the unknown.
     pub(super) fn against(&self, unknown: Option<&Port>) -> Probabilities {
-        let named = self.fitted.iter().map(|fitted| fitted.log_evidence);
+        let of_fitted = |fitted: &Fitted| (fitted.log_evidence, fitted.candidate.kind.family);
+        let named: Vec<_> = self.fitted.iter().map(of_fitted).collect();
         let is_linear = self.fitted.first().is_some_and(|best| best.candidate.is_linear());
         let explained_share = if is_linear { 1.0 } else { EXPLAINED_SHARE };
-        of(named, unknown.map(|port| port.log_evidence), explained_share, self.unseen)
+        of(&named, unknown.map(|port| port.log_evidence), explained_share, self.unseen)
     }
 }
 
@@ -69,33 +76,49 @@ pub(super) fn unseen(trials: impl Iterator<Item = (&'static str, [f64; STRENGTHS
 
 /// Log evidences of names and of the unknown against nothing, in nats, the share of the unknown's from
 /// which the best name explains it, and the share of all names that would not be seen.
+///
+/// Names are weighed in two steps: families against each other and against nothing by their best
+/// member's evidence, then the members of each.
 fn of(
-    named: impl Iterator<Item = f64>,
+    named: &[(f64, EffectFamily)],
     unknown: Option<f64>,
     explained_share: f64,
     unseen: f64,
 ) -> Probabilities {
     let prior = (1.0 - NOTHING_PRIOR) / Kind::all().count() as f64;
-    let named: Vec<f64> = named.collect();
-    let best = named.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let best = named.iter().map(|(evidence, _)| *evidence).fold(f64::NEG_INFINITY, f64::max);
     let temperature = TEMPERATURE + INEXACT_SHARE * best.max(0.0);
-    let named: Vec<f64> =
-        named.into_iter().map(|evidence| prior.ln() + evidence / temperature).collect();
+    let logarithms: Vec<f64> = named
+        .iter()
+        .map(|&(evidence, family)| {
+            let members = || named.iter().filter(move |(_, other)| *other == family);
+            let most = members().map(|(evidence, _)| *evidence).fold(f64::NEG_INFINITY, f64::max);
+            let apart = TEMPERATURE + MEMBER_SHARE * most.max(0.0);
+            let share = |evidence: f64| ((evidence - most) / apart).exp();
+            let all: f64 = members().map(|(evidence, _)| share(*evidence)).sum();
+            prior.ln() + most / temperature + (share(evidence) / all).max(f64::MIN_POSITIVE).ln()
+        })
+        .collect();
     let unknown = unknown.map_or(f64::NEG_INFINITY, |evidence| {
         let is_explained = best >= explained_share * evidence;
         let evidence = if is_explained { evidence.min(best) } else { evidence };
         (UNKNOWN_PRIOR * prior).ln() + evidence / temperature
     });
     let nothing = NOTHING_PRIOR.ln();
-    let highest = named.iter().copied().fold(unknown.max(nothing), f64::max);
+    let highest = logarithms.iter().copied().fold(unknown.max(nothing), f64::max);
     let weight = |logarithm: f64| (logarithm - highest).exp();
     let too_weak = (1.0 - NOTHING_PRIOR) * unseen * (-highest).exp();
     let all = weight(nothing)
         + too_weak
         + weight(unknown)
-        + named.iter().copied().map(weight).sum::<f64>();
+        + logarithms.iter().copied().map(weight).sum::<f64>();
+    let named_share: Vec<f64> =
+        logarithms.iter().map(|&logarithm| weight(logarithm) / all).collect();
+    let leading = named.first().map(|(_, family)| *family);
+    let of_leading = named.iter().zip(&named_share).filter(|((_, it), _)| Some(*it) == leading);
     Probabilities {
-        named: named.iter().map(|&logarithm| weight(logarithm) / all).collect(),
+        family: of_leading.map(|(_, share)| share).sum(),
+        named: named_share,
         unknown: weight(unknown) / all,
         nothing: weight(nothing) / all,
     }
@@ -105,25 +128,42 @@ fn of(
 mod tests {
     use super::*;
 
+    /// Names of different families.
+    fn apart(evidences: &[f64]) -> Vec<(f64, EffectFamily)> {
+        let families = [EffectFamily::Support, EffectFamily::RailDefect, EffectFamily::Fastening];
+        evidences.iter().copied().zip(families).collect()
+    }
+
+    #[test]
+    fn members_of_a_family_are_less_sure_than_the_family() {
+        let alike = [(1000.0, EffectFamily::Support), (960.0, EffectFamily::Support)];
+        let both = of(&alike, None, 1.0, 0.0);
+        assert!(both.family > 0.999 && both.named[0] > both.named[1]);
+        // Forty nats in a thousand: nothing that another void could not turn.
+        assert!(both.named[1] > 0.15, "{both:?}");
+        let unlike = of(&apart(&[1000.0, 960.0]), None, 1.0, 0.0);
+        assert!(unlike.named[1] < 1e-3, "{unlike:?}");
+    }
+
     #[test]
     fn of_two_names_far_above_nothing_the_better_one_is_sure() {
         let Probabilities { named, unknown, .. } =
-            of([12_797.0, 1201.0].into_iter(), Some(600.0), 1.0, 0.3);
+            of(&apart(&[12_797.0, 1201.0]), Some(600.0), 1.0, 0.3);
         assert!((named[0] - 1.0).abs() < 1e-12);
         assert!(named[1] < 1e-12 && unknown < 1e-12);
     }
 
     #[test]
     fn look_alikes_a_thousandth_apart_are_both_possible() {
-        let strong = of([10_657.5, 10_647.6].into_iter(), None, 1.0, 0.0).named;
+        let strong = of(&apart(&[10_657.5, 10_647.6]), None, 1.0, 0.0).named;
         assert!(strong[1] > 0.25 && strong[1] < 0.5, "{strong:?}");
-        let weak = of([100.0, 90.1].into_iter(), None, 1.0, 0.0).named;
+        let weak = of(&apart(&[100.0, 90.1]), None, 1.0, 0.0).named;
         assert!(weak[1] < 0.05, "{weak:?}");
     }
 
     #[test]
     fn without_evidence_a_name_has_its_prior() {
-        let Probabilities { named, unknown, .. } = of([0.0].into_iter(), None, 1.0, 0.0);
+        let Probabilities { named, unknown, .. } = of(&apart(&[0.0]), None, 1.0, 0.0);
         let prior = 0.5 / Kind::all().count() as f64;
         assert!((named[0] - prior / (0.5 + prior)).abs() < 1e-12);
         assert_eq!(unknown, 0.0);
@@ -131,21 +171,21 @@ mod tests {
 
     #[test]
     fn the_unknown_needs_more_evidence_than_a_name() {
-        let equal = of([100.0].into_iter(), Some(100.0), 1.0, 0.0);
+        let equal = of(&apart(&[100.0]), Some(100.0), 1.0, 0.0);
         assert!((equal.unknown / equal.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
         // What a name explains for the most part is not unknown, if its model is not exact.
-        let more = |unknown| of([100.0].into_iter(), Some(unknown), EXPLAINED_SHARE, 0.0);
+        let more = |unknown| of(&apart(&[100.0]), Some(unknown), EXPLAINED_SHARE, 0.0);
         let [little, much] = [140.0, 160.0].map(more);
         assert!((little.unknown / little.named[0] - UNKNOWN_PRIOR).abs() < 1e-12);
         assert!(much.unknown > much.named[0]);
-        let exact = of([100.0].into_iter(), Some(140.0), 1.0, 0.0);
+        let exact = of(&apart(&[100.0]), Some(140.0), 1.0, 0.0);
         assert!(exact.unknown > exact.named[0]);
     }
 
     #[test]
     fn nothing_is_as_sure_as_what_is_hidden_would_show() {
-        let certain = of([].into_iter(), None, 1.0, 0.0).nothing;
-        let blind = of([].into_iter(), None, 1.0, 1.0).nothing;
+        let certain = of(&apart(&[]), None, 1.0, 0.0).nothing;
+        let blind = of(&apart(&[]), None, 1.0, 1.0).nothing;
         assert_eq!((certain, blind), (1.0, NOTHING_PRIOR));
     }
 

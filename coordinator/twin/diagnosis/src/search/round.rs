@@ -6,11 +6,13 @@ use super::imitated::Imitated;
 use super::least::{Least, is_local_shape};
 use super::limits::REFINED_PER_KIND;
 use super::probability::{Probabilities, unseen};
+use super::runs::runs;
 use super::{Fitted, Round, Stage};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
+use crate::patch_scan::{Fixed, Patch, PatchScan};
 use crate::port_scan::{Port, PortPlace, PortScan};
 use crate::screen::{Template, templates};
 use crate::subject::Subject;
@@ -18,6 +20,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_number::floored;
+
+/// Logarithm of power by which a patch must differ to be seen in a picture of the residual: 1.5 dB.
+const VISIBLE: f64 = 0.35;
 
 /// Candidates in all that are fitted together with the baseline.
 const REFINED_MAX: usize = 8;
@@ -98,6 +103,25 @@ impl<'a> Setting<'a> {
         })
     }
 
+    /// The patch of the residual that stands out most, with the probability to see as much if nothing is
+    /// left out; none where the passes show nothing that an eye would see.
+    pub(super) fn patch(
+        &self,
+        problem: &Problem<'_>,
+        current: &Calibration,
+        is_one: impl Fn(Fixed) -> bool + Sync,
+    ) -> Option<(Patch, f64)> {
+        let scan = PatchScan::new(problem, current);
+        let patch = scan.best(&current.residual, &current.gradient, &is_one)?;
+        let nulls = whitened(&self.nulls, problem.observation, current);
+        let excess = excess(current, &nulls, self.subject.forward.section.sleepers);
+        let p_value =
+            tail_probability(&nulls, patch.deviations / excess.sqrt(), |residual, felt| {
+                scan.best(residual, felt, &is_one).map(|patch| patch.deviations)
+            });
+        (patch.height.abs() >= VISIBLE).then_some((patch, floored(p_value)))
+    }
+
     /// What follows from each speed, all others held out.
     pub(super) fn at_each_speed<T: Send>(
         &self,
@@ -123,10 +147,16 @@ impl<'a> Setting<'a> {
     ) -> Result<(Round, PortScan), CalibrationError> {
         let trials: usize = all.iter().map(|candidate| candidate.trials.len()).sum();
         let done = AtomicUsize::new(0);
-        let templates = templates(problem, current, all, || {
+        let mut screened_with = templates(problem, current, all, || {
             let done = done.fetch_add(1, Ordering::Relaxed);
             progress(Stage::Screening, done as f64 / trials as f64);
         })?;
+        let runs = runs(&screened_with, all, current);
+        for mut template in templates(problem, current, &runs, || ())? {
+            template.candidate += all.len();
+            screened_with.push(template);
+        }
+        let (all, templates) = (&[all, &runs].concat()[..], screened_with);
         let screened: Vec<(f64, &Template)> = templates
             .iter()
             .map(|template| (template.log_evidence(&current.residual, &current.gradient), template))
@@ -196,11 +226,11 @@ pub(super) fn sure<'r>(
     subject: &Subject,
     least: Least<'_>,
 ) -> Option<&'r Fitted> {
-    let Probabilities { named, unknown, .. } = round.against(rival);
+    let Probabilities { family, unknown, .. } = round.against(rival);
     let best = round.fitted.first()?;
     let is_shape =
         || rival.is_some_and(|rival| is_shape_at(&rival.place, &best.candidate, subject));
-    let leads = named[0] > unknown || is_shape();
+    let leads = family > unknown || is_shape();
     (leads && best.log_evidence >= least.of(&best.candidate)).then_some(best)
 }
 

@@ -1,0 +1,215 @@
+//! What differs from the model without a name: patches of the residual that keep their wavelength or
+//! their frequency at all speeds.
+//!
+//! A patch is a band at neighbouring sleepers that is louder, or in frequency also quieter, than the
+//! re-tuned model predicts. Whoever looks at the residual as a picture sees the same.
+
+use crate::bands::{CENTRE_RAD, gain};
+use crate::calibration::{Calibration, Problem};
+use crate::candidate::{Candidate, parameter};
+use crate::section::Section;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+use tracktwin_track::extension::{CORRUGATION, ExtensionInstance};
+use tracktwin_track::model::Roughness;
+
+/// Patches an octave of wavelength or frequency.
+const PER_OCTAVE: f64 = 12.0;
+
+/// Sleepers of a patch; whole tracks are the surface's spectrum and the sensor's response.
+const LENGTHS: [usize; 8] = [1, 2, 3, 4, 6, 8, 11, 14];
+
+/// Largest part of the track that a patch covers.
+const SHARE_MAX: f64 = 0.6;
+
+/// Power of a line over its surroundings for which a patch has its shape: ten decibels.
+const RATIO: f64 = 10.0;
+
+/// Part of a patch that the baseline must leave.
+const LEFT_MIN: f64 = 0.05;
+
+/// What a patch keeps when the speed changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fixed {
+    /// Its wavelength in m: the surface of the rail.
+    Wavelength(f64),
+    /// Its frequency in Hz: track or vehicle.
+    Frequency(f64),
+}
+
+/// A patch that was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// What it keeps.
+    pub fixed: Fixed,
+    /// Its sleepers among those compared.
+    pub sleepers: Range<usize>,
+    /// Natural logarithm of its power over the model's in the middle of its band.
+    pub height: f64,
+    /// The same over its standard deviation.
+    pub deviations: f64,
+}
+
+/// Whitened shape of a patch at one sleeper, the same at all.
+struct Shape {
+    fixed: Fixed,
+    column: DVector<f64>,
+    /// Product of the derivatives at each sleeper with the shape.
+    felt: Vec<DVector<f64>>,
+}
+
+/// A patch as a matched filter.
+struct Filter {
+    shape: usize,
+    sleepers: Range<usize>,
+    imitation: DVector<f64>,
+    /// Square of its length after the baseline has taken what it can.
+    detectability: f64,
+}
+
+/// All patches of a calibrated track.
+pub(crate) struct PatchScan {
+    shapes: Vec<Shape>,
+    filters: Vec<Filter>,
+    sleepers: usize,
+}
+
+impl Patch {
+    /// The waves that a patch of one wavelength would be, as a candidate; none for a patch of one
+    /// frequency. `level` is the irregularity level that the waves add to.
+    pub(crate) fn as_waves(&self, section: &Section, level: f64) -> Option<Candidate> {
+        let Fixed::Wavelength(length_m) = self.fixed else { return None };
+        let half_m = 0.5 * section.design.sleeper.spacing_m;
+        let (first, last) = (self.sleepers.start, self.sleepers.end - 1);
+        let stretch_m = [section.x_m(first) - half_m, section.x_m(last) + half_m];
+        // Mean square of the waves: what they add to the band, whose width is 0.3 of its middle.
+        let wave_number = TAU / length_m;
+        let width = wave_number * PI.sqrt() / CENTRE_RAD;
+        let beside = Roughness::new(level).density(wave_number) * width;
+        let amplitude_m = (2.0 * self.height.exp_m1().max(0.0) * beside).sqrt();
+        let kind = CORRUGATION;
+        let free = kind.screening.suggested.iter().map(|name| parameter(kind, name)).collect();
+        let extension = ExtensionInstance::new(kind.physics).at(stretch_m);
+        Some(Candidate { kind, extension, free, trials: vec![vec![length_m, amplitude_m]] })
+    }
+}
+
+impl PatchScan {
+    /// Works out the filters on a calibrated track.
+    pub(crate) fn new(problem: &Problem<'_>, current: &Calibration) -> Self {
+        let sleepers = problem.forward.section.sleepers;
+        let shapes: Vec<Shape> =
+            kept(problem).into_par_iter().map(|fixed| shape(problem, current, fixed)).collect();
+        let filters = (0..shapes.len())
+            .into_par_iter()
+            .flat_map_iter(|number| filters(number, &shapes[number], current, sleepers))
+            .collect();
+        Self { shapes, filters, sleepers }
+    }
+
+    /// The patch that stands out most in a whitened residual, if any does; `felt` is the residual's
+    /// product with the baseline's derivatives.
+    pub(crate) fn best(
+        &self,
+        residual: &DVector<f64>,
+        felt: &DVector<f64>,
+        is_one: impl Fn(Fixed) -> bool + Sync,
+    ) -> Option<Patch> {
+        let each = residual.len() / self.sleepers;
+        let dots: Vec<Vec<f64>> = self
+            .shapes
+            .par_iter()
+            .map(|shape| {
+                let at = |sleeper| shape.column.dot(&residual.rows(sleeper * each, each));
+                (0..self.sleepers).map(at).collect()
+            })
+            .collect();
+        let score = |filter: &Filter| {
+            let dots = &dots[filter.shape][filter.sleepers.clone()];
+            let along = dots.iter().sum::<f64>() - filter.imitation.dot(felt);
+            let deviations = along / filter.detectability.sqrt();
+            // A surface adds power; it takes none away.
+            let is_surface = matches!(self.shapes[filter.shape].fixed, Fixed::Wavelength(_));
+            (if is_surface { deviations } else { deviations.abs() }, along)
+        };
+        let allowed = self.filters.par_iter().filter(|it| is_one(self.shapes[it.shape].fixed));
+        let scored = allowed.map(|filter| (score(filter), filter));
+        let ((deviations, along), filter) = scored.max_by(|a, b| a.0.0.total_cmp(&b.0.0))?;
+        let peak = RATIO.ln();
+        Some(Patch {
+            fixed: self.shapes[filter.shape].fixed,
+            sleepers: filter.sleepers.clone(),
+            height: peak * along / filter.detectability,
+            deviations,
+        })
+    }
+}
+
+/// Wavelengths that all of two speeds or more have in their bands, and the frequencies of all bands.
+fn kept(problem: &Problem<'_>) -> Vec<Fixed> {
+    let centres = problem.forward.bands.centres_hz();
+    let speeds = &problem.forward.speeds_m_s;
+    let (low_hz, high_hz) = (centres[0], centres[centres.len() - 1]);
+    let slowest = speeds.iter().copied().fold(f64::INFINITY, f64::min);
+    let fastest = speeds.iter().copied().fold(0.0, f64::max);
+    let steps = |[from, to]: [f64; 2]| {
+        let count = if to > from { (PER_OCTAVE * (to / from).log2()) as usize + 1 } else { 0 };
+        (0..count).map(move |step| from * (step as f64 / PER_OCTAVE).exp2())
+    };
+    let mut all: Vec<Fixed> = steps([low_hz, high_hz]).map(Fixed::Frequency).collect();
+    if fastest > slowest {
+        // Inside the bands of all speeds.
+        let lengths = [fastest / high_hz, slowest / low_hz];
+        all.extend(steps(lengths).map(Fixed::Wavelength));
+    }
+    all
+}
+
+fn shape(problem: &Problem<'_>, current: &Calibration, fixed: Fixed) -> Shape {
+    let forward = problem.forward;
+    let sleepers = forward.section.sleepers;
+    let centres = forward.bands.centres_hz();
+    let level = |row: usize| {
+        let (_, speed, band) = forward.place(row);
+        let frequency_hz = match fixed {
+            Fixed::Wavelength(length_m) => forward.speeds_m_s[speed] / length_m,
+            Fixed::Frequency(frequency_hz) => frequency_hz,
+        };
+        let gain = gain(centres[band], frequency_hz);
+        ((RATIO - 1.0) * gain * gain).ln_1p()
+    };
+    let levels = DMatrix::from_fn(forward.count(), 1, |row, _| level(row));
+    let observation = problem.observation;
+    let whitened = observation.fitted_rows(&observation.whiten_matrix(&levels));
+    let each = whitened.nrows() / sleepers;
+    let column = whitened.view((0, 0), (each, 1)).column(0).into_owned();
+    let felt = (0..sleepers)
+        .map(|sleeper| current.jacobian.rows(sleeper * each, each).tr_mul(&column))
+        .collect();
+    Shape { fixed, column, felt }
+}
+
+fn filters(number: usize, shape: &Shape, current: &Calibration, sleepers: usize) -> Vec<Filter> {
+    let square = shape.column.norm_squared();
+    let most = (SHARE_MAX * sleepers as f64) as usize;
+    let runs = LENGTHS
+        .into_iter()
+        .filter(|&length| length <= most)
+        .flat_map(|length| (0..=sleepers - length).map(move |first| first..first + length));
+    let filter = |run: Range<usize>| {
+        let count = run.len() as f64;
+        let mut felt = DVector::zeros(current.values.len());
+        shape.felt[run.clone()].iter().for_each(|part| felt += part);
+        let imitation = current.precision.solve(&felt);
+        let detectability = count * square - felt.dot(&imitation);
+        (detectability > LEFT_MIN * count * square).then_some(Filter {
+            shape: number,
+            sleepers: run,
+            imitation,
+            detectability,
+        })
+    };
+    runs.filter_map(filter).collect()
+}
