@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use tracktwin_diagnosis::{
-    Bands, Forward, NullModel, PortPlace, Search, Section, Subject, candidates, search,
+    Bands, Fixed, Forward, NullModel, PortPlace, Search, Section, Subject, candidates, search,
 };
 use tracktwin_parameters::TrackDesign;
 use tracktwin_track::extension::ExtensionInstance;
@@ -79,9 +79,16 @@ fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (Subject, NullMo
     let log_power = expected + random.scatter(&forward);
     let pass_variance = DVector::from_element(forward.per_sleeper(), 1e-3);
     let pass_numbers = vec![vec![0], vec![1]];
-    let heard_m = Vec::new();
-    let subject =
-        Subject { forward, log_power, pass_variance, first_sleeper: 0, pass_numbers, heard_m };
+    let (without, heard_m) = (Vec::new(), Vec::new());
+    let subject = Subject {
+        forward,
+        log_power,
+        pass_variance,
+        first_sleeper: 0,
+        pass_numbers,
+        without,
+        heard_m,
+    };
     (subject, null)
 }
 
@@ -181,4 +188,42 @@ fn an_axle_box_that_the_catalogue_lacks_is_something_unknown_at_the_wheel() {
     assert!(found.accepted.is_empty(), "{:?}", found.accepted);
     let port = found.rounds[0].port.as_ref().unwrap();
     assert_eq!(port.place, PortPlace::Wheel, "{}", port.log_evidence);
+}
+
+#[test]
+fn waves_of_one_length_that_no_pass_suggested_are_named_where_they_are() {
+    let waves = ExtensionInstance::new("corrugation").at([1.2, 1.6]);
+    let waves = waves.with("wavelength_m", 8e-3).with("amplitude_m", 4e-6);
+    let found = searched_for(4, Some(waves), |physics| physics == "sleeper_bolt");
+    let [named] = &found.accepted[..] else { panic!("{:?}", found.patch) };
+    assert_eq!(named.kind.physics, "corrugation");
+    let [from_m, to_m] = named.extension.x_m.unwrap();
+    assert!((0.9..1.35).contains(&from_m) && (1.5..1.85).contains(&to_m), "{from_m} {to_m}");
+    let length_m = found.last.values[found.last.values.len() - 2].exp();
+    assert!((length_m / 8e-3 - 1.0).abs() < 0.1, "{length_m}");
+}
+
+#[test]
+fn waves_that_may_not_be_named_are_a_patch_of_their_wavelength() {
+    let waves = ExtensionInstance::new("corrugation").at([1.2, 1.6]);
+    let waves = waves.with("wavelength_m", 8e-3).with("amplitude_m", 4e-6);
+    let (mut subject, null) = recorded(4, Some(waves));
+    subject.without = vec!["corrugation".to_owned()];
+    let found = search_for(&subject, &null, |physics| physics == "sleeper_bolt");
+    let (patch, p_value) = found.patch.unwrap();
+    assert!(p_value < 0.01 && patch.height > 0.5, "{patch:?} {p_value}");
+    let Fixed::Wavelength(length_m) = patch.fixed else { panic!("{patch:?}") };
+    assert!((length_m / 8e-3 - 1.0).abs() < 0.1, "{length_m}");
+}
+
+#[test]
+fn bolts_under_a_run_of_sleepers_are_named_under_that_run() {
+    let bolts = ExtensionInstance::new("sleeper_bolt").on([1, 2, 3, 4]);
+    let found = searched_for(6, Some(bolts.with("stiffness_N_per_m", 3e7)), |physics| {
+        ["sleeper_bolt", "subgrade_layer"].contains(&physics)
+    });
+    let named = &found.accepted[0];
+    assert_eq!(named.kind.physics, "sleeper_bolt");
+    let sleepers = named.extension.sleepers.clone().unwrap();
+    assert!(sleepers.len() >= 3 && sleepers.iter().all(|it| (1..=4).contains(it)), "{sleepers:?}");
 }

@@ -1,0 +1,84 @@
+//! A recording evaluated by the physics alone, as a user does it.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use system_tests::run;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+const SAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../coordinator/sample");
+
+/// What the program says of a recording without models.
+fn evaluated(recording: &Path, out: &Path) -> Value {
+    let answer = run(
+        PROGRAM,
+        &["evaluate", &recording.display().to_string(), "--out", &out.display().to_string()],
+    );
+    assert_eq!(answer.code, Some(0), "{}", answer.err);
+    serde_json::from_str(&fs::read_to_string(out.join("evaluation.json")).unwrap()).unwrap()
+}
+
+/// Means of a parameter at the sleepers whose numbers lie in a range.
+fn means(evaluation: &Value, parameter: &str, numbers: std::ops::RangeInclusive<u32>) -> Vec<f64> {
+    let sleepers = evaluation["sleepers"].as_array().unwrap().iter();
+    let number = |sleeper: &Value| sleeper["id"].as_str().unwrap()[2..].parse::<u32>().unwrap();
+    let inside = sleepers.filter(|sleeper| numbers.contains(&number(sleeper)));
+    inside.map(|sleeper| sleeper[parameter]["mean"].as_f64().unwrap()).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn the_sample_s_step_and_soft_railpads_are_found_without_library_or_models() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("result");
+    let evaluation = evaluated(Path::new(SAMPLE), &out);
+    assert_eq!(evaluation["format"], "tracktwin-evaluation/1");
+    assert_eq!(evaluation["method"], "inversion");
+    assert_eq!(evaluation["outside_library"]["share"], 0.0);
+    let ballast = |numbers| mean(&means(&evaluation, "ballast_stiffness_N_m", numbers));
+    // Truth: 14 and 8 MN/m with a step at SN13 (coordinator/sample/truth.json). One pass a speed.
+    assert!((ballast(8..=11) / 14e6 - 1.0).abs() < 0.25, "{}", ballast(8..=11));
+    assert!((ballast(14..=17) / 8e6 - 1.0).abs() < 0.25, "{}", ballast(14..=17));
+    let railpad = |numbers| mean(&means(&evaluation, "railpad_stiffness_N_m", numbers));
+    // Truth: 40 MN/m at SN9 and SN10, 120 elsewhere.
+    assert!(railpad(9..=10) < 0.6 * railpad(12..=17), "{}", railpad(9..=10));
+
+    let csv = fs::read_to_string(out.join("evaluation.csv")).unwrap();
+    assert!(
+        csv.starts_with("id,x_m,railpad_stiffness_N_m_mean,railpad_stiffness_N_m_sd,"),
+        "{csv}"
+    );
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("evaluated by inversion from 3 passes at 7, 10, 13 km/h"));
+    assert!(page.contains("Common to the sleepers in the middle"));
+}
+
+#[test]
+fn the_step_of_an_independent_recording_comes_out_within_a_tenth() {
+    let Some(shared) = test_needs::shared_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let evaluation = evaluated(&shared.join("recordings/dev-01"), &folder.path().join("result"));
+    let truth = fs::read_to_string(shared.join("recordings-truth/dev-01.json")).unwrap();
+    let truth: Value = serde_json::from_str(&truth).unwrap();
+    for (parameter, tolerance) in [("ballast_stiffness_N_m", 0.1), ("railpad_stiffness_N_m", 0.25)]
+    {
+        for numbers in [8..=18, 21..=31] {
+            let of = |number: u32| truth["sleepers"][format!("SN{number}")][parameter].as_f64();
+            let expected: Vec<f64> = numbers.clone().map(|number| of(number).unwrap()).collect();
+            let found = mean(&means(&evaluation, parameter, numbers));
+            assert!((found / mean(&expected) - 1.0).abs() < tolerance, "{parameter}: {found}");
+        }
+    }
+}
+
+#[test]
+fn gaussian_processes_without_models_are_refused_in_a_line() {
+    let answer = run(PROGRAM, &["evaluate", SAMPLE, "--method", "gp", "--out", "nowhere"]);
+    assert_eq!(answer.code, Some(2));
+    assert!(answer.err.contains("--models"), "{}", answer.err);
+}
