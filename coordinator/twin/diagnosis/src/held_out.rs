@@ -9,6 +9,8 @@ use std::f64::consts::TAU;
 pub struct Score {
     /// Logarithm of the probability density of all that was held out, given all that was fitted.
     pub log_density: f64,
+    /// Logarithm of the evidence of what was fitted, up to a constant of the observation alone.
+    pub log_evidence: f64,
     /// How many log powers were held out.
     pub count: usize,
 }
@@ -35,6 +37,6 @@ impl Problem<'_> {
         let count = residual.len();
         let log_density = -0.5 * (square + spread + count as f64 * TAU.ln())
             - self.observation.held_out_log_deviation();
-        Ok(Score { log_density, count })
+        Ok(Score { log_density, log_evidence: fit.log_evidence, count })
     }
 }

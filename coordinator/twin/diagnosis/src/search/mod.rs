@@ -23,6 +23,7 @@ use self::limits::FALSE_ALARM;
 use self::round::{Setting, is_predicted, stays, sure};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
+use crate::held_out::Score;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
 use crate::patch_scan::{Fixed, Patch};
@@ -33,6 +34,11 @@ use nalgebra::{DMatrix, DVector};
 
 /// Effects that are looked for one after the other.
 const EFFECTS_MAX: usize = 3;
+
+/// Share of the best candidate's log evidence from which another may predict a speed that is held out,
+/// and how many do.
+const NESTED_SHARE: f64 = 0.5;
+const NESTED_MAX: usize = 3;
 
 /// Log evidence in nats below which a kind that is everywhere is not tried again in the next search.
 const HOPELESS: f64 = -100.0;
@@ -181,7 +187,7 @@ pub fn search(
     let waves = search.waves(&setting);
     let all = &[all, &waves].concat();
     let before = setting.held_out(&[], &search.baseline.values)?;
-    let mut densities = vec![before];
+    let mut densities = vec![log_densities(&before)];
     while search.accepted.len() < EFFECTS_MAX
         && search.goes_on(&setting, all, &mut densities, progress)?
     {}
@@ -197,6 +203,10 @@ pub fn search(
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
     search.held_out = [mean(&densities[0]), mean(&densities[search.accepted.len()])];
     Ok(search)
+}
+
+fn log_densities(scores: &[Score]) -> Vec<f64> {
+    scores.iter().map(|score| score.log_density).collect()
 }
 
 impl Round {
@@ -246,7 +256,8 @@ impl Search {
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
             // The candidates found a better baseline on their way: the opponent gets it too.
             self.last = better;
-            densities[accepted.len()] = setting.held_out(&accepted, &self.last.values)?;
+            let held_out = setting.held_out(&accepted, &self.last.values)?;
+            densities[accepted.len()] = log_densities(&held_out);
             if accepted.is_empty() {
                 self.baseline = self.last.clone();
             }
@@ -257,7 +268,7 @@ impl Search {
         let rival = self.rival(&round, &ports, &forward.section);
         if let Some(best) = sure(&round, rival.as_ref(), setting.subject, least) {
             progress(Stage::HeldOut, 0.0);
-            round.held_out_gain = self.try_out(best, setting, densities)?;
+            round.held_out_gain = self.try_out(best, &round.fitted, setting, densities)?;
             round.accepted = self.accepted.len() > accepted.len();
             if round.accepted {
                 round.port = rival;
@@ -271,22 +282,43 @@ impl Search {
         Ok(goes_on)
     }
 
-    /// What a candidate more gains in log density at each speed when it is held out; it is accepted if
-    /// they are predicted better.
+    /// What one effect more gains in log density at each speed when it is held out; the best candidate is
+    /// accepted if they are predicted better.
+    ///
+    /// Which candidate predicts a speed is decided without that speed, among those that come near the
+    /// best: the gain tests the choice of kind and place as well as the values.
     fn try_out(
         &mut self,
         best: &Fitted,
+        fitted: &[Fitted],
         setting: &Setting<'_>,
         densities: &mut Vec<Vec<f64>>,
     ) -> Result<Vec<f64>, CalibrationError> {
-        let with = [&self.accepted[..], std::slice::from_ref(&best.candidate)].concat();
-        let scores = setting.held_out(&with, &best.calibration.values)?;
-        let pairs = scores.iter().zip(&densities[self.accepted.len()]);
-        let gains: Vec<f64> = pairs.map(|(with, without)| with - without).collect();
+        let with = |fitted: &Fitted| {
+            [&self.accepted[..], std::slice::from_ref(&fitted.candidate)].concat()
+        };
+        let comes_near = |rival: &&Fitted| rival.log_evidence >= NESTED_SHARE * best.log_evidence;
+        let scores = fitted
+            .iter()
+            .filter(comes_near)
+            .take(NESTED_MAX)
+            .map(|fitted| setting.held_out(&with(fitted), &fitted.calibration.values))
+            .collect::<Result<Vec<_>, _>>()?;
+        let without = &densities[self.accepted.len()];
+        let chosen = |speed: usize| {
+            let at_speed = scores.iter().map(|scores| scores[speed]);
+            at_speed.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+        };
+        let gains: Vec<f64> = without
+            .iter()
+            .enumerate()
+            .filter_map(|(speed, without)| Some(chosen(speed)?.log_density - without))
+            .collect();
         if is_predicted(&gains) {
+            self.accepted = with(best);
             self.last = best.calibration.clone();
-            self.accepted = with;
-            densities.push(scores);
+            // The best comes first.
+            densities.push(log_densities(&scores[0]));
         }
         Ok(gains)
     }

@@ -10,6 +10,7 @@ use super::runs::runs;
 use super::{Fitted, Round, Stage};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
+use crate::held_out::Score;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
 use crate::patch_scan::{Fixed, Patch, PatchScan};
@@ -65,12 +66,12 @@ impl<'a> Setting<'a> {
             .ok_or(CalibrationError::NotFinite)
     }
 
-    /// Log density of each speed, held out in turn; empty with a single speed.
+    /// Score of each speed, held out in turn; empty with a single speed.
     pub(super) fn held_out(
         &self,
         candidates: &[Candidate],
         start: &DVector<f64>,
-    ) -> Result<Vec<f64>, CalibrationError> {
+    ) -> Result<Vec<Score>, CalibrationError> {
         let forward = &self.subject.forward;
         let speeds = forward.speeds_m_s.len();
         if speeds < 2 {
@@ -81,7 +82,7 @@ impl<'a> Setting<'a> {
             .map(|speed| {
                 let observation = self.observe(|row| row / forward.bands.count() == speed)?;
                 let problem = Problem { forward, observation: &observation, candidates };
-                Ok(problem.held_out(start.clone())?.log_density)
+                problem.held_out(start.clone())
             })
             .collect()
     }
