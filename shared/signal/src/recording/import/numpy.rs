@@ -5,13 +5,20 @@ use super::column::{Column, matrix, other};
 use npyz::npz::array_name_from_file_name;
 use npyz::{DType, NpyFile, Order};
 use std::fs::File;
-use std::io::{BufReader, Error, Read};
+use std::io::{BufReader, Cursor, Error, ErrorKind, Read};
 use std::path::Path;
 use zip::ZipArchive;
 
+/// Longest head of an array: shape and kind take some hundred bytes.
+const HEAD_BYTES_MAX: u64 = 1 << 16;
+
 /// The columns of a `.npy` file, named `column` or `column-1`, `column-2` ...
 pub(super) fn read_array(path: &Path) -> Result<Vec<Column>, RecordingError> {
-    let read = || columns(NpyFile::new(BufReader::new(File::open(path)?))?, "column");
+    let read = || {
+        let file = File::open(path)?;
+        let bytes = file.metadata()?.len();
+        columns(array(BufReader::new(file), bytes)?, "column")
+    };
     read().map_err(|error| unreadable(path, &error))
 }
 
@@ -25,7 +32,8 @@ pub(super) fn read_archive(path: &Path) -> Result<Vec<Column>, RecordingError> {
             let Some(name) = array_name_from_file_name(&entry.name()?).map(str::to_owned) else {
                 continue;
             };
-            all.extend(columns(NpyFile::new(entry)?, &name)?);
+            let bytes = entry.size();
+            all.extend(columns(array(entry, bytes)?, &name)?);
         }
         Ok(all)
     };
@@ -34,6 +42,30 @@ pub(super) fn read_archive(path: &Path) -> Result<Vec<Column>, RecordingError> {
 
 fn unreadable(path: &Path, error: &Error) -> RecordingError {
     RecordingError::new(path, "file", Fault::Unreadable { reason: error.to_string() })
+}
+
+/// The array in so many bytes, once its head is known to promise no more numbers than these can hold:
+/// what reads it takes the head at its word.
+fn array<R: Read>(mut file: R, bytes: u64) -> Result<NpyFile<impl Read>, Error> {
+    let bad = |what: &str| Error::new(ErrorKind::InvalidData, what.to_owned());
+    // Magic, version, and the head's length in two bytes, from version 2 on in four.
+    let mut head = vec![0; 10];
+    file.read_exact(&mut head)?;
+    if head[6] > 1 {
+        head.resize(12, 0);
+        file.read_exact(&mut head[10..])?;
+    }
+    let length = head[8..].iter().rev().fold(0, |length, &byte| length << 8 | u64::from(byte));
+    (&mut file).take(length.min(HEAD_BYTES_MAX)).read_to_end(&mut head)?;
+    let text = String::from_utf8_lossy(&head);
+    let shape = text.split_once("'shape'").and_then(|(_, rest)| rest.split_once(')'));
+    let (shape, _) = shape.ok_or_else(|| bad("its head has no shape"))?;
+    let sizes = shape.split([':', '(', ',']).filter_map(|size| size.trim().parse::<u64>().ok());
+    let numbers = sizes.fold(Some(1), |all: Option<u64>, size| all?.checked_mul(size));
+    if numbers.is_none_or(|numbers| numbers > bytes) {
+        return Err(bad("its head promises more numbers than the file holds"));
+    }
+    NpyFile::new(Cursor::new(head).chain(file))
 }
 
 fn columns<R: Read>(array: NpyFile<R>, name: &str) -> Result<Vec<Column>, Error> {

@@ -185,3 +185,20 @@ fn numpy_arrays_of_any_order_and_precision_are_read_and_others_say_what_they_are
         assert!(text.contains(said), "{kind}: {text}");
     }
 }
+
+#[test]
+fn an_array_whose_head_promises_more_than_its_file_holds_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npy");
+    // The first overflows when it is multiplied, the second would take a terabyte.
+    for shape in ["9223372036854775808, 2", "1000000000, 125"] {
+        let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({shape}), }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend(u16::try_from(head.len()).unwrap().to_le_bytes());
+        bytes.extend(head.as_bytes());
+        bytes.extend([0; 64]);
+        std::fs::write(&path, bytes).unwrap();
+        let error = Table::read(&path).unwrap_err().to_string();
+        assert!(error.contains("more numbers than the file holds"), "{error}");
+    }
+}
