@@ -55,13 +55,13 @@ fn array<R: Read>(mut file: R, bytes: u64) -> Result<NpyFile<impl Read>, Error> 
         head.resize(12, 0);
         file.read_exact(&mut head[10..])?;
     }
-    let length = head[8..].iter().rev().fold(0, |length, &byte| length << 8 | u64::from(byte));
+    let length = head[8..].iter().rev().fold(0, |length, &byte| (length << 8) | u64::from(byte));
     (&mut file).take(length.min(HEAD_BYTES_MAX)).read_to_end(&mut head)?;
     let text = String::from_utf8_lossy(&head);
     let shape = text.split_once("'shape'").and_then(|(_, rest)| rest.split_once(')'));
     let (shape, _) = shape.ok_or_else(|| bad("its head has no shape"))?;
-    let sizes = shape.split([':', '(', ',']).filter_map(|size| size.trim().parse::<u64>().ok());
-    let numbers = sizes.fold(Some(1), |all: Option<u64>, size| all?.checked_mul(size));
+    let mut sizes = shape.split([':', '(', ',']).filter_map(|size| size.trim().parse::<u64>().ok());
+    let numbers = sizes.try_fold(1, u64::checked_mul);
     if numbers.is_none_or(|numbers| numbers > bytes) {
         return Err(bad("its head promises more numbers than the file holds"));
     }
