@@ -45,6 +45,8 @@ mod tests {
     fn a_right_name_at_a_wrong_place_is_wrong() {
         let hidden = Hidden::Squat { x_m: [2.5, 2.5], depth_m: 2e-5, length_m: 6e-3 };
         let squat_at = |x_m: Option<f64>| Hypothesis {
+            family: Some("rail_defect".to_owned()),
+            family_probability: 0.9,
             physics: "squat".to_owned(),
             probability: 0.5,
             accepted: false,

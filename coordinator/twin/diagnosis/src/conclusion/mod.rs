@@ -16,10 +16,11 @@ use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict};
 use crate::search::Search;
 use crate::sentence::sentence;
 use crate::subject::Subject;
+use std::collections::BTreeMap;
 use tracktwin_inspection::FirstLook;
 use tracktwin_inspection::chain::Trouble;
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::extension::Kind;
+use tracktwin_track::extension::{EffectFamily, Kind};
 
 /// Greatest probability where nothing could be tested on a speed that was not fitted: structure and
 /// geometry look alike at one speed.
@@ -30,6 +31,9 @@ const ONE_PASS_MAX: f64 = 0.9;
 
 /// Greatest probability of anything: the model that it rests on may be wrong.
 const MODEL_MAX: f64 = 0.97;
+
+/// Share of a family's probability that the name has which the passes alone suggest.
+const NAMED_SHARE: f64 = 0.65;
 
 /// What is left of a name's probability when it does not predict withheld speeds better, or a shape
 /// that it does not have shows.
@@ -62,6 +66,7 @@ impl Evidence<'_> {
         for hypothesis in &mut hypotheses {
             hypothesis.probability = hypothesis.probability.min(most);
         }
+        add_siblings(&mut hypotheses);
         add_families(&mut hypotheses, most);
         hypotheses.sort_by(|a, b| {
             b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
@@ -163,6 +168,43 @@ impl Evidence<'_> {
         all.retain(|hypothesis| hypothesis.accepted || hypothesis.probability >= PROBABILITY_MIN);
         all
     }
+}
+
+/// A shape of the rail that the passes alone show, and no fit of the model beside its siblings, tells its
+/// family more surely than its name: a joint may bend more easily, or be a dip alone.
+fn add_siblings(hypotheses: &mut Vec<Hypothesis>) {
+    let mut siblings = Vec::new();
+    for index in 0..hypotheses.len() {
+        let hypothesis = &hypotheses[index];
+        let kind = Kind::from_name(&hypothesis.physics);
+        let Some(kind) = kind.filter(|it| it.family == EffectFamily::RailDefect) else { continue };
+        let is_sibling = |other: &Hypothesis| {
+            other.physics != hypothesis.physics
+                && other.family == hypothesis.family
+                && meet(other.location.as_ref(), hypothesis.location.as_ref())
+        };
+        if !hypothesis.accepted || hypotheses.iter().any(is_sibling) {
+            continue;
+        }
+        let others = kind.look_alikes.iter().filter_map(|name| Kind::from_name(name));
+        let others: Vec<_> = others.filter(|other| other.family == kind.family).collect();
+        let whole = hypothesis.probability;
+        for other in &others {
+            siblings.push(Hypothesis {
+                physics: other.physics.to_owned(),
+                probability: (1.0 - NAMED_SHARE) * whole / others.len() as f64,
+                accepted: false,
+                parameters: BTreeMap::new(),
+                look_alikes: names(other),
+                would_separate: other.would_separate.to_owned(),
+                ..hypothesis.clone()
+            });
+        }
+        if !others.is_empty() {
+            hypotheses[index].probability *= NAMED_SHARE;
+        }
+    }
+    hypotheses.extend(siblings);
 }
 
 /// Probability of each hypothesis's family at its place: members exclude each other there.
