@@ -44,9 +44,14 @@ fn the_sample_s_step_and_soft_railpads_are_found_without_library_or_models() {
     // Truth: 14 and 8 MN/m with a step at SN13 (coordinator/sample/truth.json). One pass a speed.
     assert!((ballast(8..=11) / 14e6 - 1.0).abs() < 0.25, "{}", ballast(8..=11));
     assert!((ballast(14..=17) / 8e6 - 1.0).abs() < 0.25, "{}", ballast(14..=17));
-    let railpad = |numbers| mean(&means(&evaluation, "railpad_stiffness_N_m", numbers));
     // Truth: 40 MN/m at SN9 and SN10, 120 elsewhere.
-    assert!(railpad(9..=10) < 0.6 * railpad(12..=17), "{}", railpad(9..=10));
+    let sleepers = evaluation["sleepers"].as_array().unwrap();
+    let stiffness = |sleeper: &&Value| sleeper["railpad_stiffness_N_m"]["mean"].as_f64().unwrap();
+    let mut softest: Vec<&Value> = sleepers.iter().collect();
+    softest.sort_by(|a, b| stiffness(a).total_cmp(&stiffness(b)));
+    let mut ids = [0, 1].map(|rank| softest[rank]["id"].as_str().unwrap());
+    ids.sort_unstable();
+    assert_eq!(ids, ["SN10", "SN9"]);
 
     let csv = fs::read_to_string(out.join("evaluation.csv")).unwrap();
     assert!(

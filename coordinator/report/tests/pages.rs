@@ -165,7 +165,8 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
     let recording = recording();
     let extractor = Extractor::new(&FeatureDefinition::default()).expect("default features");
     let mut evaluation = evaluation(&recording, &extractor);
-    let page = evaluation_page(&evaluation, &recording, &extractor, "tracktwin evaluate ride");
+    let page =
+        evaluation_page(&evaluation, None, &recording, &extractor, "tracktwin evaluate ride");
     keep("report.html", &page);
     for sleeper in &evaluation.sleepers {
         assert!(page.contains(&format!("<td>{}</td>", sleeper.id)), "{}", sleeper.id);
@@ -186,7 +187,7 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
         page.contains("left out: pass 2") && page.contains("<pre>tracktwin evaluate ride</pre>")
     );
     evaluation.sleepers.iter_mut().for_each(|sleeper| sleeper.flags = vec![Flag::MissingSpeed]);
-    let page = evaluation_page(&evaluation, &recording, &extractor, "");
+    let page = evaluation_page(&evaluation, None, &recording, &extractor, "");
     assert!(!page.contains("km/h: ;") && page.contains("all are flagged"));
 }
 
@@ -196,7 +197,7 @@ fn estimates_outside_the_library_are_drawn_and_said_as_not_valid() {
     let extractor = Extractor::new(&FeatureDefinition::default()).expect("the usual features");
     let mut evaluation = evaluation(&recording, &extractor);
     let all = evaluation.sleepers.len();
-    let plain = evaluation_page(&evaluation, &recording, &extractor, "");
+    let plain = evaluation_page(&evaluation, None, &recording, &extractor, "");
     assert!(!plain.contains("class=\"banner\"") && !plain.contains("dot hollow"));
     let end = BeyondEnd {
         parameter: Parameter::BallastStiffness,
@@ -213,7 +214,7 @@ fn estimates_outside_the_library_are_drawn_and_said_as_not_valid() {
     evaluation.notes.extend(evaluation.outside_library.sentences());
     let flag = |sleeper: &mut SleeperEvaluation| sleeper.flags.push(Flag::OutsideLibrary);
     evaluation.sleepers.iter_mut().for_each(flag);
-    let page = evaluation_page(&evaluation, &recording, &extractor, "");
+    let page = evaluation_page(&evaluation, None, &recording, &extractor, "");
     keep("evaluation-outside.html", &page);
     assert!(page.contains("class=\"banner\"") && page.contains("not valid"));
     // Said once, though the notes hold it too.

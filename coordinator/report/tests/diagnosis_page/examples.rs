@@ -91,6 +91,8 @@ fn fit(before: f64, after: f64, gains: &[(&str, f64)]) -> Fit {
 
 pub(crate) fn hypothesis(physics: &str, probability: f64, would_separate: &str) -> Hypothesis {
     Hypothesis {
+        family: None,
+        family_probability: 0.0,
         physics: physics.to_owned(),
         probability,
         accepted: false,

@@ -277,7 +277,7 @@ fn overlapping(whole: Range<usize>, length: usize, overlap: usize) -> Vec<Range<
     let rest = whole.len().saturating_sub(length);
     let steps = rest.div_ceil(length - overlap);
     let length = length.min(whole.len());
-    let first = |step: usize| whole.start + if steps == 0 { 0 } else { step * rest / steps };
+    let first = |step: usize| whole.start + (step * rest).checked_div(steps).unwrap_or(0);
     (0..=steps).map(|step| first(step)..first(step) + length).collect()
 }
 

@@ -64,14 +64,11 @@ fn singles<'a>(templates: &'a [Template], all: &'a [Candidate]) -> Vec<Singles<'
                 && of(known.candidate) == of(candidate)
                 && known.candidate.free.len() == candidate.free.len()
         };
-        match found.iter_mut().find(|known| alike(known)) {
-            Some((_, known)) => {
-                known.templates.insert(*sleeper, template);
-            }
-            None => {
-                let templates = BTreeMap::from([(*sleeper, template)]);
-                found.push((template.trial, Singles { candidate, templates }));
-            }
+        if let Some((_, known)) = found.iter_mut().find(|known| alike(known)) {
+            known.templates.insert(*sleeper, template);
+        } else {
+            let templates = BTreeMap::from([(*sleeper, template)]);
+            found.push((template.trial, Singles { candidate, templates }));
         }
     }
     found.into_iter().map(|(_, singles)| singles).collect()
