@@ -82,7 +82,9 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Result<(), Stop> {
     let (recording, left_out) = usable(recording)?;
     let notes = [recording.doubts.clone(), left_out].concat();
-    notes.iter().for_each(|line| note(line));
+    for line in &notes {
+        note(line);
+    }
     make_folder(folder)?;
     let mut inversion =
         invert(&recording, &TrackDesign::v_track(), None).await.map_err(|error| match error {
@@ -99,7 +101,9 @@ async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Res
     output.commit()?;
     let (sleepers, report) = (inversion.sleepers.len(), folder.join("report.html"));
     say(&format!("{sleepers} sleepers evaluated by inversion; report: {}", report.display()));
-    said.iter().for_each(|sentence| say(sentence));
+    for sentence in &said {
+        say(sentence);
+    }
     if inversion.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
 
