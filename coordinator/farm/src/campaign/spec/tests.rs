@@ -57,7 +57,10 @@ fn an_extension_joins_the_experiment_or_is_refused_with_the_reason() {
     assert_ne!(campaign.id(), Campaign::built_in(None).unwrap().id());
     let missing = text.replace("gap_m", "gap");
     let message = Campaign::parse(&missing, "c.toml", None).unwrap_err().to_string();
-    assert_eq!(message, "c.toml: extension: hanging_sleeper: has no parameter `gap`; it has gap_m");
+    assert_eq!(
+        message,
+        "c.toml: extension: hanging_sleeper: has no parameter `gap`; it has gap_m, damping_share"
+    );
 }
 
 #[test]
