@@ -66,7 +66,9 @@ impl Evidence<'_> {
         for hypothesis in &mut hypotheses {
             hypothesis.probability = hypothesis.probability.min(most);
         }
-        add_siblings(&mut hypotheses);
+        let fitted: Vec<&str> =
+            self.search.accepted.iter().map(|candidate| candidate.kind.physics).collect();
+        add_siblings(&mut hypotheses, &fitted);
         add_families(&mut hypotheses, most);
         hypotheses.sort_by(|a, b| {
             b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
@@ -172,7 +174,7 @@ impl Evidence<'_> {
 
 /// A shape of the rail that the passes alone show, and no fit of the model beside its siblings, tells its
 /// family more surely than its name: a joint may bend more easily, or be a dip alone.
-fn add_siblings(hypotheses: &mut Vec<Hypothesis>) {
+fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
     let mut siblings = Vec::new();
     for index in 0..hypotheses.len() {
         let hypothesis = &hypotheses[index];
@@ -183,7 +185,8 @@ fn add_siblings(hypotheses: &mut Vec<Hypothesis>) {
                 && other.family == hypothesis.family
                 && meet(other.location.as_ref(), hypothesis.location.as_ref())
         };
-        if !hypothesis.accepted || hypotheses.iter().any(is_sibling) {
+        let is_fitted = fitted.contains(&kind.physics);
+        if !hypothesis.accepted || is_fitted || hypotheses.iter().any(is_sibling) {
             continue;
         }
         let others = kind.look_alikes.iter().filter_map(|name| Kind::from_name(name));
