@@ -5,8 +5,9 @@ use crate::snapshot::assert_kept;
 use crate::support::{CAMPAIGN, Home, failed, fill, finished, lease, message, report, request};
 use crate::workers::registration;
 use sqlx::{AssertSqlSafe, Connection, PgConnection, Row, SqliteConnection};
+use std::cell::RefCell;
 use std::fmt::Write as _;
-use std::sync::{Arc, Mutex};
+use std::sync::Once;
 use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Metadata, Subscriber};
@@ -15,16 +16,19 @@ use tracktwin_library::{AuditFinding, Held, LeaseRequest, Library, Report};
 /// The server whose plans are kept: another one may plan otherwise.
 const POSTGRES_VERSION: &str = "15";
 
-/// Keeps the statements of connections that write.
-#[derive(Clone, Default)]
-struct Listener(Arc<Mutex<Vec<String>>>);
-
-impl Listener {
-    /// What was said since it was asked last.
-    fn heard(&self) -> Vec<String> {
-        std::mem::take(&mut self.0.lock().unwrap())
-    }
+thread_local! {
+    /// Statements of connections that write, of this thread's test.
+    static STATEMENTS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
+
+/// Statements of this thread since they were taken last.
+fn taken() -> Vec<String> {
+    STATEMENTS.take()
+}
+
+/// Keeps the statements of all threads, each for its own. It is the subscriber of the whole process: whether
+/// an event is wanted is asked once, on whichever thread comes by first.
+struct Listener;
 
 impl Subscriber for Listener {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
@@ -40,7 +44,7 @@ impl Subscriber for Listener {
     fn record_follows_from(&self, _: &Id, _: &Id) {}
 
     fn event(&self, event: &Event<'_>) {
-        event.record(&mut Statements(&mut self.0.lock().unwrap()));
+        event.record(&mut Statements);
     }
 
     fn enter(&self, _: &Id) {}
@@ -48,13 +52,13 @@ impl Subscriber for Listener {
     fn exit(&self, _: &Id) {}
 }
 
-struct Statements<'a>(&'a mut Vec<String>);
+struct Statements;
 
-impl Visit for Statements<'_> {
+impl Visit for Statements {
     fn record_debug(&mut self, _: &Field, _: &dyn std::fmt::Debug) {}
 
     fn record_str(&mut self, _: &Field, text: &str) {
-        self.0.push(text.to_owned());
+        STATEMENTS.with_borrow_mut(|statements| statements.push(text.to_owned()));
     }
 }
 
@@ -67,13 +71,12 @@ struct Step {
 /// Does everything that the protocol has, one after the other.
 struct Scenario {
     library: Library,
-    listener: Listener,
     steps: Vec<Step>,
 }
 
 impl Scenario {
     /// A library in which some cases are finished, some given up, and most wait.
-    async fn new(home: &Home, listener: Listener) -> Self {
+    async fn new(home: &Home) -> Self {
         let library = home.library(2000).await;
         fill(&library, "other-000000000000", 100).await;
         for worker in ["a", "b", "c"] {
@@ -83,12 +86,12 @@ impl Scenario {
             let leased = lease(&library, "a", 100, 0).await;
             report(&library, "a", leased.iter().map(finished).collect()).await;
         }
-        listener.heard();
-        Self { library, listener, steps: Vec::new() }
+        taken();
+        Self { library, steps: Vec::new() }
     }
 
     fn done(&mut self, what: &'static str) {
-        self.steps.push(Step { what, statements: self.listener.heard() });
+        self.steps.push(Step { what, statements: taken() });
     }
 
     async fn play(&mut self) {
@@ -136,14 +139,14 @@ impl Scenario {
             library.lease(later).await.unwrap().unwrap().cases.remove(0)
         };
         assert_eq!(again.case, leased[0].case);
-        self.listener.heard();
+        taken();
         let audited = Report { audit_share: 1.0, ..message("a", Vec::new()) };
         let cases = vec![finished(&lease(&library, "a", 1, 3_000_000).await[0])];
-        self.listener.heard();
+        taken();
         library.report(Report { cases, ..audited }).await.unwrap();
         self.done("a report of a result, drawn for an audit");
         let broken = lease(&library, "a", 1, 3_000_000).await;
-        self.listener.heard();
+        taken();
         report(&library, "a", vec![failed(&broken[0])]).await;
         self.done("a report of a case that could not be simulated");
         report(&library, "c", vec![finished(&leased[0])]).await;
@@ -160,7 +163,7 @@ impl Scenario {
         library.release_audits(CAMPAIGN, "b", vec![index]).await.unwrap();
         self.done("an audit is handed back");
         library.audit_sample(CAMPAIGN, "b", 3, 1000).await.unwrap();
-        self.listener.heard();
+        taken();
         let differs = AuditFinding { agrees: false, difference_db: 3.0 };
         let wrong = Some(("a", "its results differ"));
         library.audited(CAMPAIGN, index, "b", differs, wrong).await.unwrap();
@@ -235,11 +238,11 @@ async fn account(steps: Vec<Step>, database: &mut impl Plan) -> String {
     account.trim_end().to_owned() + "\n"
 }
 
-/// The account on a database: what was heard while everything was done.
-async fn heard(home: &Home) -> Vec<Step> {
-    let listener = Listener::default();
-    let _listening = tracing::subscriber::set_default(listener.clone());
-    let mut scenario = Scenario::new(home, listener).await;
+/// Everything that the protocol has, done on a database.
+async fn played(home: &Home) -> Vec<Step> {
+    static LISTENING: Once = Once::new();
+    LISTENING.call_once(|| tracing::subscriber::set_global_default(Listener).unwrap());
+    let mut scenario = Scenario::new(home).await;
     scenario.play().await;
     scenario.library.close().await;
     scenario.steps
@@ -249,7 +252,7 @@ async fn heard(home: &Home) -> Vec<Step> {
 #[tokio::test]
 async fn the_protocol_s_statements_and_their_plans_in_a_file_are_those_that_are_kept() {
     let home = Home::sqlite();
-    let steps = heard(&home).await;
+    let steps = played(&home).await;
     let mut file = SqliteConnection::connect(&home.url).await.unwrap();
     assert_kept("protocol.sqlite.sql", &account(steps, &mut file).await);
 }
@@ -257,7 +260,7 @@ async fn the_protocol_s_statements_and_their_plans_in_a_file_are_those_that_are_
 #[tokio::test]
 async fn the_protocol_s_statements_and_their_plans_on_a_server_are_those_that_are_kept() {
     let Some(home) = Home::postgres() else { return };
-    let steps = heard(&home).await;
+    let steps = played(&home).await;
     let mut server = PgConnection::connect(&home.url).await.unwrap();
     let version: String =
         sqlx::query_scalar("show server_version").fetch_one(&mut server).await.unwrap();
