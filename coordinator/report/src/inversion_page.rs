@@ -1,10 +1,11 @@
 //! The page of a recording evaluated by the physics, and the same beside a library's models.
 
+use crate::capital;
 use crate::evaluation_page::maps_at;
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, significant};
 use tracktwin_evaluation::{Estimate, Estimates, Evaluation};
-use tracktwin_inversion::{Inversion, Sleeper, beside};
+use tracktwin_inversion::{COMMON, Inversion, PER_SLEEPER, Sleeper, beside};
 use tracktwin_number::rounded;
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
@@ -14,14 +15,6 @@ const SIZE: [f64; 2] = [1104.0, 240.0];
 
 /// Sleepers whose names fit under the charts.
 const NAMES: usize = 20;
-
-/// What differs from sleeper to sleeper.
-const ALONG: [Parameter; 3] =
-    [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::IrregularityLevel];
-
-/// What the sleepers of a section have in common.
-const COMMON: [Parameter; 3] =
-    [Parameter::SleeperBendingStiffness, Parameter::RailpadDamping, Parameter::BallastDamping];
 
 /// The report of an evaluation by the physics: one sentence, pictures, estimates, provenance.
 ///
@@ -42,7 +35,7 @@ pub fn inversion_page(
         h2 { "What was measured" }
         (figure(&maps_at(middle, recording, extractor), "Five sleeper bays in the middle of the recording (paper, Fig. 2); dashed lines are sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet transform (CWT), sharpened in frequency."))
         h2 { "Estimates" }
-        p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the residual over its expectation, about one where the track model holds." }
+        p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the residual over its expectation; above 2 the track model does not explain the recording there." }
         div.scroll { (table(inversion)) }
         h2 { "Provenance" }
         (provenance(inversion, command))
@@ -56,15 +49,10 @@ pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
         h2 { "Each sleeper for itself" }
         p { "Inversion fits the track model to all passes and speeds at once, each sleeper with a stiffness of its own, without the library." }
         @for compared in beside(inversion, models) { p { (capital(&compared.sentence())) } }
-        @for note in &inversion.notes { p { (note) } }
+        @for note in inversion.notes.iter().filter(|note| !models.notes.contains(note)) { p { (note) } }
         (figure(&charts(inversion, Some(models)), "Bold: inversion. Dashed grey: Gaussian processes of the library. Bands are two standard deviations."))
         (common(inversion))
     }
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn banner(inversion: &Inversion) -> Markup {
@@ -81,7 +69,7 @@ fn banner(inversion: &Inversion) -> Markup {
 fn summary(inversion: &Inversion, recording: &Recording) -> String {
     let speeds: Vec<String> =
         inversion.provenance.speeds_km_h.iter().map(|speed| rounded(*speed, 3)).collect();
-    let ranges: Vec<String> = ALONG.iter().filter_map(|&of| range(inversion, of)).collect();
+    let ranges: Vec<String> = PER_SLEEPER.iter().filter_map(|&of| range(inversion, of)).collect();
     let ranges = if ranges.is_empty() { "no valid estimate".to_owned() } else { ranges.join(", ") };
     let passes = recording.passes.len();
     format!(
@@ -102,66 +90,49 @@ fn range(inversion: &Inversion, parameter: Parameter) -> Option<String> {
     Some(format!("{} {low} to {high} {}", parameter.label(), shown.unit))
 }
 
-/// A mean with two standard deviations at a place, in the chart's unit.
-struct Point {
-    x_m: f64,
-    mean: f64,
-    two_sd: f64,
-}
-
 /// A chart a parameter; with the Gaussian processes' estimates behind where there are some.
 fn charts(inversion: &Inversion, models: Option<&Evaluation>) -> Vec<String> {
-    ALONG.into_iter().map(|parameter| chart(inversion, models, parameter)).collect()
+    PER_SLEEPER.into_iter().map(|parameter| chart(inversion, models, parameter)).collect()
 }
 
 fn chart(inversion: &Inversion, models: Option<&Evaluation>, parameter: Parameter) -> String {
     let shown = Shown::of(parameter);
     let point = |x_m: f64, estimates: &Estimates| {
         let Estimate { mean, sd } = *estimates.get(&parameter)?;
-        Some(Point { x_m, mean: mean / shown.divisor, two_sd: 2.0 * sd / shown.divisor })
+        Some((x_m, mean / shown.divisor, 2.0 * sd / shown.divisor))
     };
-    let own = |valid: bool| -> Vec<Point> {
+    let own = |valid: bool| -> Vec<(f64, f64, f64)> {
         let sleepers = inversion.sleepers.iter().filter(|sleeper| sleeper.is_valid() == valid);
         sleepers.filter_map(|sleeper| point(sleeper.x_m, &sleeper.estimates)).collect()
     };
     let (valid, invalid) = (own(true), own(false));
-    let behind: Vec<Point> = models
+    let is_evaluated = |id: &str| inversion.sleepers.iter().any(|sleeper| sleeper.id == id);
+    let behind: Vec<_> = models
         .iter()
         .flat_map(|models| &models.sleepers)
-        .filter(|sleeper| sleeper.is_valid())
+        .filter(|sleeper| sleeper.is_valid() && is_evaluated(&sleeper.id))
         .filter_map(|sleeper| point(sleeper.x_m, &sleeper.estimates))
         .collect();
     let drawn = || valid.iter().chain(&behind);
-    let ends = drawn().flat_map(|p| [p.mean - p.two_sd, p.mean + p.two_sd]);
-    let ends = ends.chain(invalid.iter().map(|p| p.mean)).map(|end| end.max(0.0));
+    let ends = drawn().flat_map(|&(_, mean, two)| [mean - two, mean + two]);
+    let ends = ends.chain(invalid.iter().map(|p| p.1)).map(|end| end.max(0.0));
     let y = Axis::around(&format!("in {}", shown.unit), ends);
     let x = Axis::around("sleeper", inversion.sleepers.iter().map(|sleeper| sleeper.x_m));
     let mut chart = Chart::new(&capital(parameter.label()), SIZE, x, y);
     if !behind.is_empty() {
-        curve(&mut chart, "was", &behind);
+        chart.curve("was", &behind);
         chart.explain("was", "Gaussian processes");
         chart.explain("a", "inversion");
     }
-    curve(&mut chart, "a", &valid);
+    chart.curve("a", &valid);
     if !invalid.is_empty() {
-        chart.dots("hollow", 2.6, &invalid.iter().map(|p| (p.x_m, p.mean)).collect::<Vec<_>>());
+        chart.dots("hollow", 2.6, &invalid.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>());
         chart.explain("hollow", "not valid");
     }
     let step = inversion.sleepers.len().div_ceil(NAMES).max(1);
     let names = inversion.sleepers.iter().step_by(step);
     chart.name_x(names.map(|sleeper| (sleeper.x_m, sleeper.id.clone())).collect());
     chart.into_svg()
-}
-
-fn curve(chart: &mut Chart, class: &str, points: &[Point]) {
-    let band: Vec<_> =
-        points.iter().map(|p| (p.x_m, p.mean - p.two_sd, p.mean + p.two_sd)).collect();
-    let means: Vec<_> = points.iter().map(|p| (p.x_m, p.mean)).collect();
-    chart.band(class, &band);
-    chart.line(class, means.iter().copied());
-    if class != "was" {
-        chart.dots(class, 2.6, &means);
-    }
 }
 
 /// What all sleepers have in common.
@@ -185,7 +156,7 @@ fn variation(inversion: &Inversion) -> Markup {
         let scatter = 100.0 * along.smooth.hypot(along.independent);
         Some(format!("{} by {} %", parameter.label(), significant(scatter)))
     };
-    let all: Vec<String> = ALONG.iter().filter_map(|&parameter| text(parameter)).collect();
+    let all: Vec<String> = PER_SLEEPER.iter().filter_map(|&parameter| text(parameter)).collect();
     html! { @if !all.is_empty() {
         p { "The recording tells that sleepers differ along the track (one standard deviation): " (all.join(", ")) "." }
     } }

@@ -21,3 +21,9 @@ pub use inversion_page::inversion_page;
 pub use models_page::models_page;
 pub use receptance::{ReceptanceCurve, receptance_chart};
 pub use reproduction_page::reproduction_page;
+
+/// With a capital first letter.
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}

@@ -1,5 +1,6 @@
 //! How good the models are (paper, Fig. 14).
 
+use crate::capital;
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, significant};
 use tracktwin_parameters::Parameter;
@@ -144,9 +145,4 @@ fn of(group: &ModelGroup, parameter: Parameter) -> Option<&ParameterModel> {
 
 fn speeds(key: &GroupKey) -> String {
     key.speeds_km_h.iter().map(ToString::to_string).collect::<Vec<_>>().join(" + ")
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }

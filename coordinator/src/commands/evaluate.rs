@@ -10,6 +10,7 @@ use crate::pipeline::{self, provenance};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use tracktwin_diagnosis::check_track;
 use tracktwin_evaluation::{Evaluation, Flag, check_recording};
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_inspection::chain::{self, LossOfContact};
@@ -85,12 +86,13 @@ async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Res
     for line in &notes {
         note(line);
     }
+    let design = TrackDesign::v_track();
+    check_track(&recording, &design).or_input()?;
     make_folder(folder)?;
-    let mut inversion =
-        invert(&recording, &TrackDesign::v_track(), None).await.map_err(|error| match error {
-            InvertingError::Recording(error) => Stop::Input(error.into()),
-            failed => Stop::Failure(failed.into()),
-        })?;
+    let mut inversion = invert(&recording, &design, None).await.map_err(|error| match error {
+        InvertingError::Recording(error) => Stop::Input(error.into()),
+        failed => Stop::Failure(failed.into()),
+    })?;
     let said = inversion.notes.clone();
     inversion.notes.splice(0..0, notes);
     let extractor = Extractor::new(&FeatureDefinition::default()).context("the usual features")?;
@@ -176,19 +178,18 @@ pub(super) async fn evaluate(
     if let Some(lost) = chain::loss_of_contact(&recording) {
         flag(&mut evaluation, &lost, recording.passes.len());
     }
-    let inversion = if beside {
+    let mut inversion = None;
+    if beside {
         match invert(&recording, evaluator.design(), Some(library)).await {
-            Ok(inversion) => Some(inversion),
+            Ok(inverted) => inversion = Some(inverted),
+            // The models' answer stands without it.
             Err(error) => {
                 let line = format!("not evaluated by inversion: {error}");
                 note(&line);
                 evaluation.notes.push(line);
-                None
             }
         }
-    } else {
-        None
-    };
+    }
     let page = tracktwin_report::evaluation_page(
         &evaluation,
         inversion.as_ref(),

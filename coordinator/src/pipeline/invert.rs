@@ -51,6 +51,8 @@ pub async fn invert(
     if let Some(lost) = chain::loss_of_contact(recording) {
         let there = inversion.sleepers.iter_mut().filter(|it| lost.sleepers.contains(&it.id));
         there.for_each(|sleeper| sleeper.flags.push(Flag::LossOfContact));
+        let line = lost.sentence(recording.passes.len());
+        inversion.notes.push(format!("loss_of_contact: {line}"));
     }
     Ok(inversion)
 }

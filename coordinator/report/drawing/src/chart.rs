@@ -54,6 +54,18 @@ impl Chart {
         let _ = write!(self.marks, r#"<polygon class="band {class}" points="{}"/>"#, join(&points));
     }
 
+    /// A line through means with a band around it; a point is place, mean and half width of the band. What
+    /// others are compared with (`was`) stands behind them, without dots.
+    pub fn curve(&mut self, class: &str, points: &[(f64, f64, f64)]) {
+        let band: Vec<_> = points.iter().map(|&(x, y, half)| (x, y - half, y + half)).collect();
+        let means: Vec<_> = points.iter().map(|&(x, y, _)| (x, y)).collect();
+        self.band(class, &band);
+        self.line(class, means.iter().copied());
+        if class != "was" {
+            self.dots(class, 2.6, &means);
+        }
+    }
+
     /// A dot a point, `radius` px.
     pub fn dots(&mut self, class: &str, radius: f64, points: &[(f64, f64)]) {
         for &(x, y) in points {

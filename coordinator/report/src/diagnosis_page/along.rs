@@ -57,25 +57,14 @@ fn chart(diagnosis: &Diagnosis, (parameter, pick): &Column) -> String {
     let mut chart = Chart::new(&title, SIZE, x, y);
     mark_places(&mut chart, diagnosis);
     if both {
-        curve(&mut chart, "was", &before);
+        chart.curve("was", &before);
         chart.explain("was", "before");
         chart.explain("a", "after");
     }
-    curve(&mut chart, "a", if both { &after } else { &before });
+    chart.curve("a", if both { &after } else { &before });
     let step = diagnosis.track.len().div_ceil(NAMES);
     chart.name_x(diagnosis.track.iter().step_by(step).map(|s| (s.x_m, s.id.clone())).collect());
     chart.into_svg()
-}
-
-/// A band of two standard deviations and the means.
-fn curve(chart: &mut Chart, class: &str, points: &[(f64, f64, f64)]) {
-    let band: Vec<_> = points.iter().map(|p| (p.0, p.1 - p.2, p.1 + p.2)).collect();
-    let means: Vec<_> = points.iter().map(|p| (p.0, p.1)).collect();
-    chart.band(class, &band);
-    chart.line(class, means.iter().copied());
-    if class != "was" {
-        chart.dots(class, 2.6, &means);
-    }
 }
 
 /// Thin lines where accepted physics have a place, and not nearly everywhere.

@@ -13,7 +13,7 @@ ul.notes{margin:.4rem 0;padding-left:1.1rem;color:var(--dim);font-size:.95rem;ma
 main p{max-width:60rem}
 .cell.more{fill:var(--b)}.cell.less{fill:var(--a)}
 .s1{opacity:.13}.s2{opacity:.28}.s3{opacity:.44}.s4{opacity:.62}.s5{opacity:.81}.s6{opacity:1}
-.line.box{stroke:var(--ink);stroke-width:1.6;stroke-linejoin:miter}.line.box.then{stroke-width:1;stroke-dasharray:3 2}.line.rule{stroke:var(--faint);stroke-width:1}.line.was{stroke:var(--dim);stroke-width:1.2;stroke-dasharray:5 3}.band.was{fill:var(--dim);opacity:.14}.dot.ink{fill:var(--ink)}.key.was{fill:var(--dim);opacity:.6}
+.line.box{stroke:var(--ink);stroke-width:1.6;stroke-linejoin:miter}.line.box.then{stroke-width:1;stroke-dasharray:3 2}.line.rule{stroke:var(--faint);stroke-width:1}.dot.ink{fill:var(--ink)}
 .scale{display:flex;align-items:center;gap:.6rem;font-size:.85rem;color:var(--dim);margin:.5rem 0 .2rem;flex-wrap:wrap}
 .scale .steps{display:flex;border:1px solid var(--dim)}.scale i{display:block;width:1.5rem;height:.9rem}.scale i.more{background:var(--b)}.scale i.less{background:var(--a)}
 .keys{display:flex;flex-wrap:wrap;gap:.2rem 1.4rem;font-size:.85rem;color:var(--dim);margin:.4rem 0 .2rem}.keys svg{vertical-align:middle;margin-right:.35rem}

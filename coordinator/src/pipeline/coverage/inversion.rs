@@ -1,5 +1,6 @@
 //! How well inversion tells the sleepers of uneven tracks that the reference simulator recorded.
 
+use super::score::WIDTH_90;
 use crate::pipeline::compute::compute;
 use crate::pipeline::invert::{InvertingError, invert};
 use serde::Serialize;
@@ -7,13 +8,16 @@ use std::collections::BTreeMap;
 use tracktwin_inversion::Inversion;
 use tracktwin_library::Library;
 use tracktwin_parameters::{Parameter, TrackDesign};
-use tracktwin_reference_simulator::{Scene, TruthError, simulate};
+use tracktwin_reference_simulator::{Scene, SleeperTruth, TruthError, simulate};
 
 /// Standard deviation of the logarithm from sleeper to sleeper.
 const SCATTER: [f64; 3] = [0.05, 0.15, 0.3];
 
-/// Standard deviations on either side that hold 90 % of a normal distribution.
-const WIDTH_90: f64 = 1.644_853_626_951_472_7;
+/// Parameters whose truth differs from sleeper to sleeper, and where a scene has them.
+const COMPARED: [(Parameter, fn(&SleeperTruth) -> f64); 2] = [
+    (Parameter::RailpadStiffness, |sleeper| sleeper.railpad_stiffness_n_m),
+    (Parameter::BallastStiffness, |sleeper| sleeper.ballast_stiffness_n_m),
+];
 
 /// Sleepers at either end of a recording that are not scored: the run-in is heard there.
 const ENDS: usize = 1;
@@ -101,11 +105,11 @@ impl Scores {
         let sleepers = &inversion.sleepers[inner];
         self.sleepers += sleepers.len();
         self.invalid += sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
-        for parameter in [Parameter::RailpadStiffness, Parameter::BallastStiffness] {
+        for (parameter, truth_of) in COMPARED {
             let mut pairs = Vec::new();
             for sleeper in sleepers {
                 let estimate = sleeper.estimates[&parameter];
-                let truth = truth(scene, &sleeper.id, parameter);
+                let truth = truth_of(&scene.sleepers[number(&sleeper.id)]);
                 let error = (estimate.mean / truth).ln();
                 self.errors.entry(parameter).or_default().push(error.abs());
                 let holds = (estimate.mean - truth).abs() <= WIDTH_90 * estimate.sd;
@@ -134,15 +138,9 @@ impl Scores {
     }
 }
 
-/// The true value at the sleeper of this name: `SN` and its number.
-fn truth(scene: &Scene, id: &str, parameter: Parameter) -> f64 {
-    let number: usize = id.trim_start_matches("SN").parse().expect("sleepers are numbered");
-    let sleeper = &scene.sleepers[number];
-    match parameter {
-        Parameter::RailpadStiffness => sleeper.railpad_stiffness_n_m,
-        Parameter::BallastStiffness => sleeper.ballast_stiffness_n_m,
-        other => unreachable!("{other} is not compared"),
-    }
+/// Number of the sleeper of this name: `SN` and its number.
+fn number(id: &str) -> usize {
+    id.trim_start_matches("SN").parse().expect("the reference simulator numbers its sleepers")
 }
 
 fn correlation(pairs: &[(f64, f64)]) -> f64 {

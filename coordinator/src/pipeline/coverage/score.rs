@@ -8,7 +8,7 @@ use tracktwin_evaluation::Evaluation;
 use tracktwin_parameters::Parameter;
 
 /// Standard deviations on either side that hold 90 % of a normal distribution.
-const WIDTH_90: f64 = 1.644_853_626_951_472_7;
+pub(super) const WIDTH_90: f64 = 1.644_853_626_951_472_7;
 
 /// What came of the tracks of one row.
 #[derive(Clone, Debug, Serialize)]

@@ -60,7 +60,7 @@ fn named(hypothesis: &Hypothesis, sleepers: usize) -> String {
     let family = Kind::from_name(physics).map(|kind| kind.family.words());
     match family.filter(|_| hypothesis.family_probability > probability + FAMILY_MORE) {
         Some(family) => format!(
-            "{place}{family} differs from the model ({:.0} %); most probably {summary} ({physics}, {:.0} %).",
+            "{place}{family} ({:.0} %); most probably {summary} ({physics}, {:.0} %).",
             100.0 * hypothesis.family_probability,
             100.0 * probability
         ),
@@ -76,7 +76,7 @@ fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     let Some(other) = hypotheses.iter().find(is_rival) else { return String::new() };
     let percent = 100.0 * other.probability;
     format!(
-        " It could also be {} ({percent:.0} %); {} would tell them apart.",
+        " It could also be {} ({percent:.0} %). To tell them apart: {}.",
         other.physics, first.would_separate
     )
 }
@@ -214,6 +214,30 @@ mod tests {
             "A flat of the wheel's tread, met once a turn (wheel_flat, 99 %). Also: at SN9, 1.12 m: a \
              railpad is missing or has lost most of its stiffness (missing_railpad, 99 %). With it, \
              speeds that nothing was fitted to are predicted better by 12 nats."
+        );
+    }
+
+    #[test]
+    fn a_family_is_said_before_its_member_and_what_else_it_could_be() {
+        let at = Location { x_m: [1.75, 1.75], sleepers: vec!["SN14".to_owned()] };
+        let first = Hypothesis {
+            probability: 0.8,
+            family_probability: 0.95,
+            would_separate: "passes with another wheel load".to_owned(),
+            ..hypothesis("hanging_sleeper", Some(at))
+        };
+        assert_eq!(
+            named(&first, 25),
+            "at SN14, 1.75 m: a support of sleepers that is lost, soft or layered (95 %); most \
+             probably a sleeper hangs on the rail over a gap and meets its ballast only when it closes \
+             (hanging_sleeper, 80 %)."
+        );
+        let mut second = hypothesis("subgrade_layer", None);
+        (second.accepted, second.probability) = (false, 0.15);
+        assert_eq!(
+            rival(&first, &[first.clone(), second]),
+            " It could also be subgrade_layer (15 %). To tell them apart: passes with another wheel \
+             load."
         );
     }
 

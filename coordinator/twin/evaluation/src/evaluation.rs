@@ -152,6 +152,9 @@ pub enum Flag {
     AtEdgeOfRange,
     /// It differs from its neighbours by more than the track varies elsewhere.
     UnlikeNeighbours,
+    /// The railpad is so stiff that stiffer ones hardly change the recording: its stiffness is a lower
+    /// bound.
+    RailpadAtLeast,
     /// The wheel is in the air in the sleeper's window: what was recorded there is hardly the track's.
     LossOfContact,
     /// The features are such as no track of the library has: the estimates are not valid.
@@ -185,6 +188,7 @@ impl Flag {
             Self::MissingSpeed => "missing speed",
             Self::AtEdgeOfRange => "at edge of range",
             Self::UnlikeNeighbours => "unlike its neighbours",
+            Self::RailpadAtLeast => "railpad: at least",
             Self::LossOfContact => "loss of contact",
             Self::OutsideLibrary => "outside library: not valid",
         }
@@ -198,6 +202,7 @@ impl Flag {
             Self::MissingSpeed => "missing_speed",
             Self::AtEdgeOfRange => "at_edge_of_range",
             Self::UnlikeNeighbours => "unlike_neighbours",
+            Self::RailpadAtLeast => "railpad_at_least",
             Self::LossOfContact => "loss_of_contact",
             Self::OutsideLibrary => "outside_library",
         }

@@ -1,7 +1,7 @@
 //! Sections that were fitted, put together to one track.
 
 use crate::fit::Fitted;
-use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
+use crate::record::{Along, COMMON, Inversion, Prior, Provenance, Sleeper, log_normal};
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{Subject, Unknowns};
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
@@ -11,13 +11,13 @@ use tracktwin_signal::recording::Recording;
 /// Mean square of a sleeper's residual over its expectation above which the model does not hold.
 const MISFIT_MAX: f64 = 2.0;
 
+/// Railpad stiffness in N/m above which a stiffer one hardly changes a recording of V-Track: one of
+/// 2 GN/m comes out as 0.26 (docs/inversion.md).
+const RAILPAD_TELLABLE: f64 = 2e8;
+
 /// What differs from sleeper to sleeper, in the order of [`Unknowns::variation`].
 const FIELDS: [Parameter; 3] =
     [Parameter::BallastStiffness, Parameter::RailpadStiffness, Parameter::IrregularityLevel];
-
-/// What is common to a section, in the order of [`Unknowns::global`].
-const COMMON: [Parameter; 3] =
-    [Parameter::SleeperBendingStiffness, Parameter::RailpadDamping, Parameter::BallastDamping];
 
 impl Inversion {
     /// The track of a recording from its sections, which lie in order. Of a sleeper in several
@@ -57,6 +57,9 @@ impl Fitted {
         let mut flags = Vec::new();
         if self.unknowns.exceptions.iter().any(|exception| exception.sleeper == index) {
             flags.push(Flag::UnlikeNeighbours);
+        }
+        if estimates[&Parameter::RailpadStiffness].mean > RAILPAD_TELLABLE {
+            flags.push(Flag::RailpadAtLeast);
         }
         if misfit > MISFIT_MAX {
             flags.push(Flag::OutsideLibrary);

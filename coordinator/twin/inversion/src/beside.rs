@@ -1,16 +1,12 @@
 //! An evaluation by the physics beside one by a library's models: where they contradict each other.
 
-use crate::record::Inversion;
+use crate::record::{Inversion, PER_SLEEPER};
 use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
 use tracktwin_parameters::Parameter;
 
 /// Standard deviations of their difference from which two estimates contradict each other: by chance
 /// one in 370 does.
 const BEYOND_CHANCE: f64 = 3.0;
-
-/// What is compared: what differs from sleeper to sleeper.
-const COMPARED: [Parameter; 3] =
-    [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::IrregularityLevel];
 
 /// How two evaluations of one parameter agree.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +38,7 @@ pub fn beside(inversion: &Inversion, models: &Evaluation) -> Vec<Beside> {
         }
         beside
     };
-    COMPARED.into_iter().filter(|parameter| known.contains(parameter)).map(of).collect()
+    PER_SLEEPER.into_iter().filter(|parameter| known.contains(parameter)).map(of).collect()
 }
 
 impl Beside {

@@ -18,4 +18,6 @@ mod variation;
 
 pub use beside::{Beside, beside};
 pub use fit::{Fitted, fit, sections};
-pub use record::{Along, Inversion, METHOD, Prior, Provenance, Sleeper, Unexplained};
+pub use record::{
+    Along, COMMON, Inversion, METHOD, PER_SLEEPER, Prior, Provenance, Sleeper, Unexplained,
+};

@@ -9,6 +9,14 @@ use tracktwin_parameters::Parameter;
 /// How the estimates were made, as `evaluation.json` has it.
 pub const METHOD: &str = "inversion";
 
+/// What differs from sleeper to sleeper, in the order of pages.
+pub const PER_SLEEPER: [Parameter; 3] =
+    [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::IrregularityLevel];
+
+/// What the sleepers of a section have in common, in the order of [`tracktwin_diagnosis::Unknowns::global`].
+pub const COMMON: [Parameter; 3] =
+    [Parameter::SleeperBendingStiffness, Parameter::RailpadDamping, Parameter::BallastDamping];
+
 /// The track's parameters along a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inversion {
@@ -159,6 +167,13 @@ impl Inversion {
                 "{} differ{} from the neighbouring sleepers by more than the track varies elsewhere.",
                 listed(&apart),
                 if apart.len() == 1 { "s" } else { "" }
+            ));
+        }
+        let stiff = self.with(Flag::RailpadAtLeast);
+        if !stiff.is_empty() {
+            sentences.push(format!(
+                "The railpad stiffness of {} is a lower bound: stiffer railpads hardly change the recording.",
+                listed(&stiff)
             ));
         }
         sentences

@@ -79,19 +79,19 @@ impl EffectFamily {
         }
     }
 
-    /// The same in a sentence, after "differs in".
+    /// What there is if one of them is left out, for a sentence.
     pub const fn words(self) -> &'static str {
         match self {
             Self::RailDefect => "a defect of the rail",
-            Self::RailSurface => "the surface of the rail",
-            Self::Rail => "the rail's cross section",
-            Self::Contact => "the contact of wheel and rail",
-            Self::Wheel => "the wheel's circumference",
-            Self::Vehicle => "the vehicle",
-            Self::Fastening => "the rail fastening",
-            Self::HoldDown => "what holds the sleepers down",
-            Self::Support => "the support of the sleepers",
-            Self::MeasuringChain => "the measuring chain",
+            Self::RailSurface => "a shape of the rail's surface",
+            Self::Rail => "another cross section of the rail",
+            Self::Contact => "another contact of wheel and rail",
+            Self::Wheel => "a wheel that is not round",
+            Self::Vehicle => "something on the vehicle",
+            Self::Fastening => "another rail fastening",
+            Self::HoldDown => "something that holds sleepers down",
+            Self::Support => "a support of sleepers that is lost, soft or layered",
+            Self::MeasuringChain => "a fault of the measuring chain",
         }
     }
 }

@@ -10,7 +10,7 @@ mod place;
 mod round;
 
 pub use self::alone::passes_alone;
-use self::nameless::meet;
+use self::place::meet;
 use crate::calibration::CalibrationError;
 use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict};
 use crate::search::Search;

@@ -1,9 +1,10 @@
 //! What shows in the passes themselves, but has no name in the catalogue.
 
 use super::finding::seen;
+use super::place::meet;
 use super::{Evidence, FAILED_SHARE};
 use crate::estimate::Estimate;
-use crate::outcome::{Hypothesis, Location, UNKNOWN};
+use crate::outcome::{Hypothesis, UNKNOWN};
 use crate::patch_scan::Fixed;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
@@ -94,10 +95,4 @@ impl Evidence<'_> {
 
 fn is_shape(physics: &str) -> bool {
     Kind::from_name(physics).is_some_and(|kind| kind.classes.contains(&Class::Wavelength))
-}
-
-/// Whether two places have a sleeper in common; none is everywhere.
-pub(super) fn meet(one: Option<&Location>, other: Option<&Location>) -> bool {
-    let (Some(one), Some(other)) = (one, other) else { return true };
-    one.sleepers.iter().any(|sleeper| other.sleepers.contains(sleeper))
 }
