@@ -1,5 +1,5 @@
-//! What the baseline imitates by the stiffness of single sleepers: effects under those that lie far
-//! from their neighbours, tried from the neighbours' values.
+//! What the baseline imitates by stiffness: effects under single sleepers that lie far from their
+//! neighbours and under a run of sleepers that lies far from all others, tried from the others' values.
 //!
 //! A sleeper that is bolted down is stiff, and so is one on a railpad of a tenth of the stiffness
 //! to a wheel that hardly feels what is below; beside such a railpad no trial of bolts gains
@@ -7,10 +7,11 @@
 
 use super::limits::REFINED_PER_KIND;
 use crate::baseline::Unknowns;
-use crate::calibration::{Calibration, CalibrationError, Problem};
+use crate::calibration::{CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::screen::{Template, templates};
 use nalgebra::DVector;
+use std::ops::Range;
 use tracktwin_inspection::median;
 
 /// Logarithm of a stiffness over its neighbours' from which it is far: three deviations of what
@@ -20,38 +21,124 @@ const FAR: f64 = 0.6;
 /// Sleepers on either side that a sleeper is compared with.
 const NEIGHBOURS: usize = 3;
 
-/// Trials of effects under sleepers that lie far from their neighbours.
-pub(super) struct Imitated {
-    /// The unknowns, with the neighbours' stiffness under those sleepers.
+/// Sleepers of the shortest run, and of the rest of the track beside it.
+const SHORTEST: usize = 3;
+
+/// Standard deviations inside a run and outside of it by which their means differ at least.
+const DEVIATIONS: f64 = 3.0;
+
+/// Sleepers whose stiffness lies far from the others'.
+pub(super) struct Far {
+    /// The unknowns, with the others' stiffness under them.
     values: DVector<f64>,
+    /// Those that lie far from their neighbours.
+    sleepers: Vec<usize>,
+    /// Runs that lie far from the rest of the track.
+    runs: Vec<Range<usize>>,
+}
+
+impl Far {
+    pub(super) fn new(unknowns: &Unknowns, values: &DVector<f64>) -> Self {
+        let mut far = Self { values: values.clone(), sleepers: Vec::new(), runs: Vec::new() };
+        for field in [unknowns.ballast(), unknowns.railpad()] {
+            let stiffness = &values.as_slice()[field.clone()];
+            for sleeper in 0..field.len() {
+                let near =
+                    sleeper.saturating_sub(NEIGHBOURS)..(sleeper + NEIGHBOURS + 1).min(field.len());
+                let others = near.filter(|other| *other != sleeper);
+                let usual = median(others.map(|other| stiffness[other]).collect());
+                if (stiffness[sleeper] - usual).abs() > FAR {
+                    far.values[field.start + sleeper] = usual;
+                    far.sleepers.push(sleeper);
+                }
+            }
+            if let Some(run) = run_apart(stiffness) {
+                let others = (0..field.len()).filter(|sleeper| !run.contains(sleeper));
+                let usual = median(others.map(|other| stiffness[other]).collect());
+                run.clone().for_each(|sleeper| far.values[field.start + sleeper] = usual);
+                far.runs.push(run);
+            }
+        }
+        far.runs.dedup();
+        far
+    }
+
+    /// Of each kind that may act at single sleepers, without a force law, the same at each run.
+    pub(super) fn on_runs(&self, all: &[Candidate]) -> Vec<Candidate> {
+        let at_first = |candidate: &&Candidate| {
+            let acts = candidate.extension.sleepers.as_deref() == Some(&[0]);
+            acts && (!candidate.is_under_load() || candidate.free.is_empty())
+        };
+        let on = |run: &Range<usize>, candidate: &Candidate| {
+            let mut candidate = candidate.clone();
+            candidate.extension.sleepers = Some(run.clone().collect());
+            candidate
+        };
+        let kinds = all.iter().filter(at_first);
+        kinds.flat_map(|kind| self.runs.iter().map(move |run| on(run, kind))).collect()
+    }
+
+    /// Whether a candidate acts at some of the single sleepers, or at one of the runs.
+    fn is_at(&self, candidate: &Candidate) -> bool {
+        let Some(under) = candidate.extension.sleepers.as_ref() else { return false };
+        let is_run = |run: &Range<usize>| under.iter().copied().eq(run.clone());
+        under.iter().all(|sleeper| self.sleepers.contains(sleeper)) || self.runs.iter().any(is_run)
+    }
+}
+
+/// The run of sleepers whose stiffness, as logarithms, differs most from that of all others; none where
+/// that may be their scatter.
+fn run_apart(stiffness: &[f64]) -> Option<Range<usize>> {
+    let count = stiffness.len();
+    let runs = (0..count).flat_map(|from| (from + SHORTEST..=count).map(move |to| from..to));
+    let apart = |run: Range<usize>| {
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (0..count).partition(|it| run.contains(it));
+        if outside.len() < SHORTEST {
+            return None;
+        }
+        let mean = |of: &[usize]| of.iter().map(|&it| stiffness[it]).sum::<f64>() / of.len() as f64;
+        let means = [mean(&inside), mean(&outside)];
+        let square = |it: usize| (stiffness[it] - means[usize::from(!run.contains(&it))]).powi(2);
+        let scatter = ((0..count).map(square).sum::<f64>() / count as f64).sqrt();
+        let step = (means[0] - means[1]).abs();
+        (step > FAR && step > DEVIATIONS * scatter).then_some((scatter, run))
+    };
+    let best = runs.filter_map(apart).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, run)| run)
+}
+
+/// Trials of effects under sleepers that lie far from the others.
+pub(super) struct Imitated {
+    far: Far,
     templates: Vec<Template>,
+    /// Typical values of the baseline's unknowns.
+    typical: DVector<f64>,
 }
 
 impl Imitated {
     /// What such sleepers may have instead, best of each kind.
     ///
     /// # Errors
-    /// [`CalibrationError`] when their neighbours' stiffness makes no track.
+    /// [`CalibrationError`] when the others' stiffness makes no track.
     pub(super) fn new(
         problem: &Problem<'_>,
-        current: &Calibration,
+        far: Far,
         all: &[Candidate],
     ) -> Result<Self, CalibrationError> {
-        let (values, sleepers) = evened(&problem.forward.unknowns, &current.values);
-        let is_there = |candidate: &&Candidate| {
-            let under = candidate.extension.sleepers.as_ref();
-            under.is_some_and(|under| under.iter().all(|sleeper| sleepers.contains(sleeper)))
-        };
+        let unknowns = &problem.forward.unknowns;
+        let mut typical = far.values.clone();
+        typical.rows_mut(0, unknowns.count()).copy_from(&unknowns.typical());
         let (numbers, there): (Vec<usize>, Vec<Candidate>) = all
             .iter()
             .enumerate()
-            .filter(|(_, candidate)| is_there(candidate))
+            .filter(|(_, candidate)| far.is_at(candidate))
             .map(|(number, candidate)| (number, candidate.clone()))
             .unzip();
         if there.is_empty() {
-            return Ok(Self { values, templates: Vec::new() });
+            return Ok(Self { far, templates: Vec::new(), typical });
         }
-        let even = problem.at(&values)?;
+        let even = problem.at(&far.values)?;
         let mut tried = templates(problem, &even, &there, || {})?;
         tried.sort_by(|a, b| b.along(&even.residual).total_cmp(&a.along(&even.residual)));
         let kind = |template: &Template| there[template.candidate].kind.physics;
@@ -66,39 +153,23 @@ impl Imitated {
         for template in &mut best {
             template.candidate = numbers[template.candidate];
         }
-        Ok(Self { values, templates: best })
+        Ok(Self { far, templates: best, typical })
     }
 
-    /// Trials to be fitted, each with the values that it is fitted from.
+    /// Trials to be fitted, each with the values that it is fitted from; where a run is far, also from
+    /// typical values: all along the track the baseline imitates it.
     pub(super) fn starts(&self) -> impl Iterator<Item = (&Template, DVector<f64>)> {
-        self.templates.iter().map(|template| (template, self.values.clone()))
+        let typical = (!self.far.runs.is_empty()).then_some(&self.typical);
+        let from = move || [Some(&self.far.values), typical].into_iter().flatten().cloned();
+        self.templates.iter().flat_map(move |template| from().map(move |values| (template, values)))
     }
-}
-
-/// Values in which each stiffness that is far from its neighbours' is their median instead, and the
-/// sleepers whose it is.
-fn evened(unknowns: &Unknowns, values: &DVector<f64>) -> (DVector<f64>, Vec<usize>) {
-    let mut even = values.clone();
-    let mut sleepers = Vec::new();
-    for field in [unknowns.ballast(), unknowns.railpad()] {
-        let count = field.len();
-        for sleeper in 0..count {
-            let near = sleeper.saturating_sub(NEIGHBOURS)..(sleeper + NEIGHBOURS + 1).min(count);
-            let others = near.filter(|other| *other != sleeper);
-            let usual = median(others.map(|other| values[field.start + other]).collect());
-            if (values[field.start + sleeper] - usual).abs() > FAR {
-                even[field.start + sleeper] = usual;
-                sleepers.push(sleeper);
-            }
-        }
-    }
-    (even, sleepers)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::bands::Bands;
+    use crate::calibration::Calibration;
     use crate::candidate::candidates;
     use crate::forward::Forward;
     use crate::observation::Observation;
@@ -116,7 +187,8 @@ mod tests {
     fn a_stiffness_far_from_its_neighbours_becomes_theirs_and_all_others_stay() {
         let unknowns = forward().unknowns;
         let mut values = unknowns.typical();
-        assert_eq!(evened(&unknowns, &values), (values.clone(), vec![]));
+        let far = Far::new(&unknowns, &values);
+        assert_eq!((far.values, far.sleepers, far.runs), (values.clone(), vec![], vec![]));
         let (ballast, railpad) = (unknowns.ballast().start, unknowns.railpad().start);
         // A track that changes along the way, and three sleepers that do not follow.
         for sleeper in 0..10 {
@@ -126,9 +198,31 @@ mod tests {
         values[railpad + 4] -= 1.5;
         values[railpad + 5] -= 1.4;
         values[ballast + 9] += 0.7;
-        let (even, sleepers) = evened(&unknowns, &values);
-        assert_eq!(sleepers, [9, 4, 5]);
-        assert!((even - usual).amax() < 0.2);
+        let far = Far::new(&unknowns, &values);
+        assert_eq!(far.sleepers, [9, 4, 5]);
+        assert!((far.values - usual).amax() < 0.2 && far.runs.is_empty());
+    }
+
+    #[test]
+    fn a_run_far_from_the_rest_becomes_the_rest_and_scatter_makes_none() {
+        let unknowns = forward().unknowns;
+        let mut values = unknowns.typical();
+        let railpad = unknowns.railpad().start;
+        for (sleeper, scatter) in
+            [0.1, -0.1, 0.05, 0.2, -0.15, 0.1, -0.05, 0.0, 0.1, -0.1].iter().enumerate()
+        {
+            values[railpad + sleeper] += scatter;
+        }
+        assert!(Far::new(&unknowns, &values).runs.is_empty());
+        let usual = values.clone();
+        (3..8).for_each(|sleeper| values[railpad + sleeper] -= 1.1);
+        let far = Far::new(&unknowns, &values);
+        assert_eq!(far.runs, [3..8]);
+        assert!((&far.values - usual).amax() < 0.3);
+        let section = forward().section;
+        let on_runs = far.on_runs(&candidates(&section));
+        assert!(on_runs.iter().any(|it| it.kind.physics == "sleeper_bolt"));
+        assert!(on_runs.iter().all(|it| it.extension.sleepers == Some(vec![3, 4, 5, 6, 7])));
     }
 
     #[test]
@@ -145,15 +239,19 @@ mod tests {
         let observation = Observation::new(log_power, &covariance, |_| false).unwrap();
         let problem = Problem { forward: &forward, observation: &observation, candidates: &[] };
 
+        let imitated = |current: &Calibration| {
+            let far = Far::new(&forward.unknowns, &current.values);
+            Imitated::new(&problem, far, &all).unwrap()
+        };
         let even = problem.at(&typical).unwrap();
-        assert_eq!(Imitated::new(&problem, &even, &all).unwrap().starts().count(), 0);
+        assert_eq!(imitated(&even).starts().count(), 0);
 
         let mut soft = typical.clone();
         for sleeper in [4, 5] {
             soft[forward.unknowns.railpad().start + sleeper] -= 1.5;
         }
         let soft = problem.at(&soft).unwrap();
-        let imitated = Imitated::new(&problem, &soft, &all).unwrap();
+        let imitated = imitated(&soft);
         let (best, values) = imitated.starts().next().unwrap();
         assert_eq!(all[best.candidate].kind.physics, "sleeper_bolt");
         assert_eq!(all[best.candidate].extension.sleepers, Some(vec![4, 5]));

@@ -2,7 +2,7 @@
 
 use super::chance::{excess, tail_probability, whitened};
 use super::fit::fit;
-use super::imitated::Imitated;
+use super::imitated::{Far, Imitated};
 use super::least::{Least, is_local_shape};
 use super::limits::REFINED_PER_KIND;
 use super::probability::{Probabilities, unseen};
@@ -157,7 +157,8 @@ impl<'a> Setting<'a> {
             template.candidate += all.len();
             screened_with.push(template);
         }
-        let (all, templates) = (&[all, &runs].concat()[..], screened_with);
+        let far = Far::new(&problem.forward.unknowns, &current.values);
+        let (all, templates) = (&[all, &runs, &far.on_runs(all)].concat()[..], screened_with);
         let screened: Vec<(f64, &Template)> = templates
             .iter()
             .map(|template| (template.log_evidence(&current.residual, &current.gradient), template))
@@ -169,7 +170,7 @@ impl<'a> Setting<'a> {
             (kind, template.at_strengths(&current.residual, &current.gradient))
         }));
         if round.is_significant() {
-            let imitated = Imitated::new(problem, current, all)?;
+            let imitated = Imitated::new(problem, far, all)?;
             let mut starts = starts(problem, current, all, &templates, screened, least, hopeless);
             starts.extend(imitated.starts());
             round.fitted = fit(problem, current, all, starts, progress);
