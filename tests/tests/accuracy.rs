@@ -4,8 +4,7 @@
 
 use serde_json::Value;
 use std::fmt::Write as _;
-use std::path::Path;
-use test_needs::shared_data;
+use test_needs::reference;
 use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
 use tracktwin_signal::{PowerSpectrum, Signal};
 use tracktwin_track::model::{Mesh, Support, Surface, TrackModel};
@@ -54,8 +53,8 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 impl Reference {
-    fn read(folder: &Path, name: &str) -> Self {
-        let path = folder.join(format!("reference/ensemble-{name}.json"));
+    fn read(name: &str) -> Self {
+        let path = reference().join(format!("levels/ensemble-{name}.json"));
         let file: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
         let mut set = ParameterSet::nominal();
         for (parameter, value) in file["parameters"].as_object().unwrap() {
@@ -143,8 +142,7 @@ impl Reference {
 }
 
 fn agrees(name: &str, surfaces: u32) {
-    let Some(folder) = shared_data() else { return };
-    let (table, misses) = Reference::read(&folder, name).compare(surfaces);
+    let (table, misses) = Reference::read(name).compare(surfaces);
     println!("{table}");
     assert!(misses.is_empty(), "too far from the reference:\n{}", misses.join("\n"));
 }

@@ -65,10 +65,10 @@ fn the_sample_s_step_and_soft_railpads_are_found_without_library_or_models() {
 
 #[test]
 fn the_step_of_an_independent_recording_comes_out_within_a_tenth() {
-    let Some(shared) = test_needs::shared_data() else { return };
+    let reference = test_needs::reference();
     let folder = tempfile::tempdir().unwrap();
-    let evaluation = evaluated(&shared.join("recordings/dev-01"), &folder.path().join("result"));
-    let truth = fs::read_to_string(shared.join("recordings-truth/dev-01.json")).unwrap();
+    let evaluation = evaluated(&reference.join("recordings/dev-01"), &folder.path().join("result"));
+    let truth = fs::read_to_string(reference.join("truth/dev-01.json")).unwrap();
     let truth: Value = serde_json::from_str(&truth).unwrap();
     for (parameter, tolerance) in [("ballast_stiffness_N_m", 0.1), ("railpad_stiffness_N_m", 0.25)]
     {

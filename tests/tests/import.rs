@@ -4,7 +4,6 @@
 
 use std::fmt::Write as _;
 use system_tests::run;
-use test_needs::shared_data;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
@@ -50,11 +49,11 @@ fn a_table_is_imported_and_inspected() {
 
 #[test]
 fn an_independent_recording_is_inspected() {
-    let Some(shared) = shared_data() else { return };
-    let recording = shared.join("recordings/dev-02").display().to_string();
-    let answer = run(PROGRAM, &["inspect", &recording, "--json"]);
-    assert_eq!(answer.code, Some(0), "{}", answer.err);
-    let root: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
-    assert_eq!(root["findings"][0]["physics"], "rail_joint", "{}", answer.out);
-    assert_eq!(root["findings"].as_array().unwrap().len(), 1, "{}", answer.out);
+    for recording in test_needs::recordings("dev-02") {
+        let answer = run(PROGRAM, &["inspect", &recording.display().to_string(), "--json"]);
+        assert_eq!(answer.code, Some(0), "{}", answer.err);
+        let root: serde_json::Value = serde_json::from_str(&answer.out).unwrap();
+        assert_eq!(root["findings"][0]["physics"], "rail_joint", "{}", answer.out);
+        assert_eq!(root["findings"].as_array().unwrap().len(), 1, "{}", answer.out);
+    }
 }

@@ -3,7 +3,7 @@
 
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use system_tests::run;
+use system_tests::{run, until};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
@@ -25,15 +25,15 @@ fn a_node_that_is_killed_loses_its_case_to_another_and_each_case_has_one_answer(
         let asked = ["library", "sql", "--library", &library, "--format", "csv", question];
         run(PROGRAM, &asked).out
     };
-    let leased = || ask("select count(*) from trial_lease").lines().nth(1) == Some("1");
+    let leased = || ask("select count(*) from trial_lease").lines().nth(1).map(str::to_owned);
 
     let mut first = begun("first");
-    while !leased() {
+    until("the first has a case", Duration::from_mins(1), || {
         assert!(first.try_wait().unwrap().is_none(), "it ended without a case");
-        std::thread::sleep(Duration::from_millis(200));
-    }
+        leased().as_deref() == Some("1")
+    });
     let mut second = begun("second");
-    std::thread::sleep(Duration::from_secs(2));
+    until("each has a case", Duration::from_mins(1), || leased().as_deref() == Some("2"));
     first.kill().unwrap();
     first.wait().unwrap();
     let ended = second.wait().unwrap();

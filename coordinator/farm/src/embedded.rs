@@ -7,7 +7,8 @@ use std::net::Ipv4Addr;
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
-use tokio_util::sync::CancellationToken;
+use tokio::task::{JoinError, JoinHandle};
+use tokio_util::sync::{CancellationToken, DropGuard};
 use tracktwin_experiment::{Prepare, prepare_simulation};
 use tracktwin_library::{Claim, Library, LibraryError, Status};
 use tracktwin_worker::agent::{self, AgentError};
@@ -104,64 +105,97 @@ pub async fn run_claimed(
 ) -> Result<Status, FarmError> {
     let own = agent::Config::new(String::new(), task.cores);
     let dispatch = dispatch(library, claim, &task, own.holdings.clone()).await?;
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
-    let coordinator = format!("http://{}", listener.local_addr()?);
-
-    let stop_working = shutdown.child_token();
-    let stop_serving = CancellationToken::new();
-    // However this ends, nothing goes on behind its back.
-    let _guards = [stop_working.clone().drop_guard(), stop_serving.clone().drop_guard()];
-    let stop = stop_serving.clone();
-    // Other users of the machine reach the port as well.
-    let token = random_token()?.to_string();
-    let credentials = Credentials {
-        token: Some(Token::new(&token).expect("hexadecimal digits are fit for a token")),
-        ..Credentials::default()
-    };
-    let security = Security { token: Some(token), ..Security::default() };
-    let server = tokio::spawn(async move { serve(listener, dispatch, &security, stop).await });
-    let config = agent::Config {
-        prepare: task.prepare,
-        credentials,
-        coordinators: vec![coordinator],
-        ..own
-    };
-    let mut worker = tokio::spawn(agent::run(config, stop_working.clone()));
-
-    let mut outage = Outage::default();
-    let ended = loop {
-        library.takes_writes()?;
-        match library.status_of(task.campaign, task.cases).await {
-            Ok(status) => {
-                outage = Outage::default();
-                progress(status);
-                if status.done() == status.total() {
-                    break None;
-                }
-            }
-            Err(error) => outage.goes_on(error)?,
-        }
-        if shutdown.is_cancelled() {
-            break None;
-        }
-        tokio::select! {
-            () = tokio::time::sleep(LOOK_EVERY) => {}
-            () = shutdown.cancelled() => {}
-            ended = &mut worker => break Some(ended),
-        }
-    };
-    // The worker hands in what it has begun, so it must end before the service.
-    stop_working.cancel();
-    let ended = match ended {
-        Some(ended) => ended,
-        None => worker.await,
-    };
-    stop_serving.cancel();
-    server.await.expect("the service does not panic")?;
-    ended.expect("a worker does not panic: what it computes is caught")?;
+    let config = agent::Config { prepare: task.prepare, ..own };
+    let mut farm = Running::begin(dispatch, config, &shutdown).await?;
+    let ended = farm.watch(library, &task, &shutdown, &mut progress).await?;
+    farm.end(ended).await?;
     let status = library.status_of(task.campaign, task.cases).await?;
     progress(status);
     Ok(status)
+}
+
+/// How a worker ended.
+type Ended = Result<Result<(), AgentError>, JoinError>;
+
+/// A service and the worker that it serves. However this ends, nothing goes on behind its back.
+struct Running {
+    worker: JoinHandle<Result<(), AgentError>>,
+    server: JoinHandle<Result<(), ServeError>>,
+    stop_working: DropGuard,
+    stop_serving: DropGuard,
+}
+
+impl Running {
+    /// Starts both on a port of their own.
+    async fn begin(
+        dispatch: Dispatch,
+        config: agent::Config,
+        shutdown: &CancellationToken,
+    ) -> Result<Self, FarmError> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
+        let coordinators = vec![format!("http://{}", listener.local_addr()?)];
+        // Other users of the machine reach the port as well.
+        let token = random_token()?.to_string();
+        let credentials = Credentials {
+            token: Some(Token::new(&token).expect("hexadecimal digits are fit for a token")),
+            ..Credentials::default()
+        };
+        let security = Security { token: Some(token), ..Security::default() };
+        let (stop_working, stop_serving) = (shutdown.child_token(), CancellationToken::new());
+        let stop = stop_serving.clone();
+        let server = tokio::spawn(async move { serve(listener, dispatch, &security, stop).await });
+        let config = agent::Config { credentials, coordinators, ..config };
+        let worker = tokio::spawn(agent::run(config, stop_working.clone()));
+        let (stop_working, stop_serving) = (stop_working.drop_guard(), stop_serving.drop_guard());
+        Ok(Self { worker, server, stop_working, stop_serving })
+    }
+
+    /// Looks at the counts until nothing is left to do or `shutdown`, or until the worker ends of itself;
+    /// then it says how.
+    async fn watch(
+        &mut self,
+        library: &Library,
+        task: &Task<'_>,
+        shutdown: &CancellationToken,
+        progress: &mut impl FnMut(Status),
+    ) -> Result<Option<Ended>, FarmError> {
+        let mut outage = Outage::default();
+        loop {
+            library.takes_writes()?;
+            match library.status_of(task.campaign, task.cases).await {
+                Ok(status) => {
+                    outage = Outage::default();
+                    progress(status);
+                    if status.done() == status.total() {
+                        return Ok(None);
+                    }
+                }
+                Err(error) => outage.goes_on(error)?,
+            }
+            if shutdown.is_cancelled() {
+                return Ok(None);
+            }
+            tokio::select! {
+                () = tokio::time::sleep(LOOK_EVERY) => {}
+                () = shutdown.cancelled() => {}
+                ended = &mut self.worker => return Ok(Some(ended)),
+            }
+        }
+    }
+
+    /// Ends the worker, unless it `ended`, and then the service.
+    async fn end(self, ended: Option<Ended>) -> Result<(), FarmError> {
+        // The worker hands in what it has begun, so it must end before the service.
+        drop(self.stop_working);
+        let ended = match ended {
+            Some(ended) => ended,
+            None => self.worker.await,
+        };
+        drop(self.stop_serving);
+        self.server.await.expect("the service does not panic")?;
+        ended.expect("a worker does not panic: what it computes is caught")?;
+        Ok(())
+    }
 }
 
 /// A library that does not answer, since when.

@@ -81,11 +81,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 
 /// Evaluates a recording by the physics alone.
 async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Result<(), Stop> {
-    let (recording, left_out) = usable(recording)?;
-    let notes = [recording.doubts.clone(), left_out].concat();
-    for line in &notes {
-        note(line);
-    }
+    let (recording, notes) = usable_with_notes(recording)?;
     let design = TrackDesign::v_track();
     check_track(&recording, &design).or_input()?;
     make_folder(folder)?;
@@ -166,11 +162,7 @@ pub(super) async fn evaluate(
     beside: bool,
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
-    let (recording, left_out) = usable(recording)?;
-    let notes = [recording.doubts.clone(), left_out].concat();
-    for line in &notes {
-        note(line);
-    }
+    let (recording, notes) = usable_with_notes(recording)?;
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     make_folder(folder)?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
@@ -180,15 +172,7 @@ pub(super) async fn evaluate(
     }
     let mut inversion = None;
     if beside {
-        match invert(&recording, evaluator.design(), Some(library)).await {
-            Ok(inverted) => inversion = Some(inverted),
-            // The models' answer stands without it.
-            Err(error) => {
-                let line = format!("not evaluated by inversion: {error}");
-                note(&line);
-                evaluation.notes.push(line);
-            }
-        }
+        inversion = invert_beside(&recording, &evaluator, library, &mut evaluation).await;
     }
     let page = tracktwin_report::evaluation_page(
         &evaluation,
@@ -197,18 +181,52 @@ pub(super) async fn evaluate(
         &evaluator.extractor,
         &command(),
     );
+    write(&page, &evaluation, inversion.as_ref(), folder, force)?;
+    keep(library, &evaluation).await;
+    Ok(evaluation)
+}
+
+/// The inversion of what models have evaluated, whose answer stands without it.
+async fn invert_beside(
+    recording: &Recording,
+    evaluator: &Evaluator,
+    library: &Library,
+    evaluation: &mut Evaluation,
+) -> Option<Inversion> {
+    match invert(recording, evaluator.design(), Some(library)).await {
+        Ok(inversion) => Some(inversion),
+        Err(error) => {
+            let line = format!("not evaluated by inversion: {error}");
+            note(&line);
+            evaluation.notes.push(line);
+            None
+        }
+    }
+}
+
+/// Writes report and files of an evaluation.
+fn write(
+    page: &str,
+    evaluation: &Evaluation,
+    inversion: Option<&Inversion>,
+    folder: &Path,
+    force: Force,
+) -> Result<(), FilesError> {
     let mut output = Output::begin(folder, Kind::Results, force.force)?;
     output.add(&FileName::new("report.html")?, page.as_bytes())?;
     evaluation.add_to(&mut output)?;
-    if let Some(inversion) = &inversion {
+    if let Some(inversion) = inversion {
         inversion.add_to(&mut output, "inversion")?;
     }
-    output.commit()?;
-    if let Err(error) = library.record_evaluation(provenance::evaluation(&evaluation)).await {
+    output.commit()
+}
+
+/// Has the library keep an evaluation.
+async fn keep(library: &Library, evaluation: &Evaluation) {
+    if let Err(error) = library.record_evaluation(provenance::evaluation(evaluation)).await {
         // The answer stands in the folder; somebody who may only read the library has it all the same.
         tracing::warn!("the library does not keep this evaluation: {error:?}");
     }
-    Ok(evaluation)
 }
 
 /// Says where the wheel is in the air, and flags the sleepers there.
@@ -219,6 +237,14 @@ fn flag(evaluation: &mut Evaluation, lost: &LossOfContact, passes: usize) {
     let line = format!("loss_of_contact: {}", lost.sentence(passes));
     note(&line);
     evaluation.notes.push(line);
+}
+
+/// The usable part of a recording, and what is doubtful of it, which is said at once.
+fn usable_with_notes(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
+    let (recording, left_out) = usable(recording)?;
+    let notes = [recording.doubts.clone(), left_out].concat();
+    notes.iter().for_each(|line| note(line));
+    Ok((recording, notes))
 }
 
 /// The recording without the passes that tell nothing of the track, and a note for what is wrong with

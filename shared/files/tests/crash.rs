@@ -69,6 +69,7 @@ fn whoever_is_killed_while_writing_leaves_a_whole_set_and_the_next_one_cleans_up
             .stdout(std::process::Stdio::null())
             .spawn()
             .unwrap();
+        // Moments spread over start and work.
         std::thread::sleep(Duration::from_millis(40 + 7 * kill));
         victim.kill().unwrap();
         victim.wait().unwrap();

@@ -1,13 +1,11 @@
 //! The literal transform against a reference in 80-bit arithmetic that shares no code with it.
 //!
-//! The reference lies beside the project in `../shared/reference/sswt`; `make_reference.py` there
-//! states every convention.
+//! `make_reference.py` beside the reference states every convention.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use serde_json::Value;
 use std::{f64::consts::TAU, ops::Range};
-use test_needs::shared_data;
 use tracktwin_signal::{Conventions, Cwt, Morlet, Normalisation, Padding, squeeze};
 
 const RATE_HZ: f64 = 100_000.0;
@@ -18,10 +16,9 @@ const VOICES: u32 = 48;
 /// the neighbouring bin, which would show as 1e-3 or more; none does.
 const TOLERANCE: f64 = 1e-8;
 
-/// The reference's numbers, or nothing where it is not there and need not be.
-fn reference() -> Option<Value> {
-    let file = shared_data()?.join("reference/sswt/reference_50_4000.json");
-    Some(serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap())
+fn reference() -> Value {
+    let file = test_needs::reference().join("transform/reference_50_4000.json");
+    serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
 }
 
 /// Two tones and a chirp from 400 to 3000 Hz (S1 of the reference).
@@ -64,7 +61,7 @@ fn compare(reference: &Value, key: &str, bins: Range<usize>, values: &[f64]) {
 
 #[test]
 fn the_literal_transform_equals_the_reference() {
-    let Some(reference) = reference() else { return };
+    let reference = reference();
     let wavelet = Morlet::new(6.0);
     let scales_s: Vec<_> =
         (0..=528).map(|j| 2.0 / RATE_HZ * (f64::from(j) / f64::from(VOICES)).exp2()).collect();

@@ -12,6 +12,25 @@ use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+/// The one recording that `tests/reference` keeps whole.
+const KEPT_WHOLE: &str = "dev-01";
+
+/// The reference data of the checkout; its README says what is there and where it is from.
+pub fn reference() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference")
+}
+
+/// Folders of a recording of a simulator that shares no code with this project: the passes of it
+/// that are in the checkout, if any, and the whole of it, if it lies beside.
+pub fn recordings(name: &str) -> Vec<PathBuf> {
+    let kept = reference().join("recordings").join(name);
+    if name == KEPT_WHOLE {
+        return vec![kept];
+    }
+    let whole = shared_data().map(|folder| folder.join("recordings").join(name));
+    kept.is_dir().then_some(kept).into_iter().chain(whole).collect()
+}
+
 /// The reference data that lies beside a checkout, if it is there.
 ///
 /// # Panics

@@ -16,6 +16,7 @@ fn a_postgres_server_stopped_and_started_in_the_middle_loses_nothing() {
     let workers = [farm.worker(), farm.worker()];
     farm.reach(8);
     server.stop();
+    // Everybody meets the absence several times.
     std::thread::sleep(Duration::from_secs(2));
     server.start_again();
     Farm::finish(&mut coordinator);
@@ -96,6 +97,7 @@ fn a_full_disk_under_a_postgres_server_loses_nothing_either() {
     let ballast = volume.path().join("ballast");
     let full = std::fs::write(&ballast, vec![0; 200 << 20]).unwrap_err();
     assert_eq!(full.kind(), std::io::ErrorKind::StorageFull);
+    // Long enough to have finished: nothing says that nothing will come.
     std::thread::sleep(Duration::from_secs(6));
     assert!(farm.finished() < 64, "the full disk stopped nobody");
     assert!(coordinator.runs(), "the coordinator waits for room");

@@ -13,7 +13,7 @@ pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 pub(crate) const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
 /// When a farm that is not done has failed.
-const PATIENCE: Duration = Duration::from_mins(2);
+pub(crate) const PATIENCE: Duration = Duration::from_mins(2);
 
 /// Which database holds the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

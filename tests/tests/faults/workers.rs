@@ -1,6 +1,6 @@
 //! Workers that are killed, stopped and told to end.
 
-use crate::farm::{Engine, Farm};
+use crate::farm::{Engine, Farm, PATIENCE};
 use std::time::{Duration, Instant};
 use system_tests::until;
 
@@ -51,9 +51,7 @@ fn worker_is_stopped_and_continued(engine: Engine) {
     farm.reach(4);
     sleeper.signal("STOP");
     let other = farm.worker();
-    // Two leases later everything it held is with the other.
-    std::thread::sleep(Duration::from_secs(3));
-    assert!(farm.leased_again() > 0, "the other has cases of it");
+    until("the other has cases of it", PATIENCE, || farm.leased_again() > 0);
     sleeper.signal("CONT");
     Farm::finish(&mut coordinator);
     drop((sleeper, other));

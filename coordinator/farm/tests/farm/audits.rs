@@ -111,7 +111,8 @@ async fn what_an_auditor_gives_back_goes_to_the_next_at_once() {
     let mut client = registered(&coordinator, "first").await;
     let leased = lease(&mut client, "first").await;
     client.report(report(&leased, "first")).await.unwrap();
-    // There was nothing to audit when the first one asked; for a while nobody looks again.
+    // There was nothing to audit when the first one asked; for two seconds nobody looks again, and
+    // the second may not be the one that finds this over.
     tokio::time::sleep(Duration::from_millis(2100)).await;
     for auditor in ["second", "third"] {
         client.register(registration(auditor, MODEL_HASH)).await.unwrap();

@@ -1,7 +1,6 @@
 //! Several campaigns at once, added and steered while they are served.
 
-use crate::support::{CORES, Coordinator, coordinator_with, lease, registered, stand_in};
-use std::time::Duration;
+use crate::support::{CORES, Coordinator, coordinator_with, lease, registered, stand_in, until};
 use tokio_util::sync::CancellationToken;
 use tracktwin_farm::campaign::{self, Campaign};
 use tracktwin_farm::dispatch::Settings;
@@ -22,17 +21,6 @@ async fn serving() -> Coordinator {
     coordinator_with(settings, Security::default(), 20).await
 }
 
-async fn work(coordinator: &Coordinator) {
-    let config = Config {
-        prepare: stand_in,
-        // Longer than a busy machine takes to add a campaign.
-        idle_exit: Some(Duration::from_secs(4)),
-        ..Config::new(coordinator.url.clone(), CORES)
-    };
-    let run = agent::run(config, CancellationToken::new());
-    tokio::time::timeout(Duration::from_secs(20), run).await.unwrap().unwrap();
-}
-
 async fn finished(coordinator: &Coordinator, id: &str) -> u32 {
     coordinator.library.status(id).await.unwrap().finished
 }
@@ -41,15 +29,16 @@ async fn finished(coordinator: &Coordinator, id: &str) -> u32 {
 async fn a_campaign_added_while_it_runs_is_served_with_the_others() {
     let coordinator = serving().await;
     let other = other(30);
-    let (library, id) = (coordinator.library.clone(), other.id());
-    let adds = tokio::spawn(async move {
-        tokio::time::sleep(Duration::from_millis(200)).await;
-        campaign::store_campaign(&library, &other).await.unwrap();
-    });
-    work(&coordinator).await;
-    adds.await.unwrap();
-    assert_eq!(finished(&coordinator, &coordinator.campaign.id()).await, 20);
-    assert_eq!(finished(&coordinator, &id).await, 30);
+    let (first, second) = (coordinator.campaign.id(), other.id());
+    let stop = CancellationToken::new();
+    let config = Config { prepare: stand_in, ..Config::new(coordinator.url.clone(), CORES) };
+    let worker = tokio::spawn(agent::run(config, stop.clone()));
+    until("work has begun", async || finished(&coordinator, &first).await > 0).await;
+    campaign::store_campaign(&coordinator.library, &other).await.unwrap();
+    until("all of the other is done", async || finished(&coordinator, &second).await == 30).await;
+    until("so is the first", async || finished(&coordinator, &first).await == 20).await;
+    stop.cancel();
+    worker.await.unwrap().unwrap();
 }
 
 #[tokio::test]
@@ -66,8 +55,15 @@ async fn the_most_urgent_campaign_goes_first_and_a_paused_one_waits() {
     assert_eq!(lease(&mut client, "w").await.campaign_id, first);
     coordinator.library.pause(&first).await.unwrap();
     assert!(lease(&mut client, "w").await.cases.is_empty());
-    // For a moment after it had nothing the library is not asked again.
-    tokio::time::sleep(Duration::from_millis(150)).await;
     coordinator.library.resume(&second).await.unwrap();
-    assert_eq!(lease(&mut client, "w").await.campaign_id, second);
+    // For a moment after it had nothing the library is not asked again.
+    let mut answer = lease(&mut client, "w").await;
+    until("there is work again", async || {
+        if answer.cases.is_empty() {
+            answer = lease(&mut client, "w").await;
+        }
+        !answer.cases.is_empty()
+    })
+    .await;
+    assert_eq!(answer.campaign_id, second);
 }

@@ -1,6 +1,6 @@
 //! Certificates, tokens, and what comes from strangers.
 
-use crate::support::{CORES, Coordinator, coordinator_with, stand_in};
+use crate::support::{CORES, Coordinator, coordinator, coordinator_with, stand_in};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -44,12 +44,16 @@ async fn guarded(folder: &Path) -> Coordinator {
 
 /// Works until there is no more work, or until the worker fails or gives up.
 async fn work(coordinator: &Coordinator, credentials: Credentials) -> Result<(), AgentError> {
+    work_at(coordinator.url.clone(), credentials).await
+}
+
+async fn work_at(url: String, credentials: Credentials) -> Result<(), AgentError> {
     let config = Config {
         prepare: stand_in,
         credentials,
         idle_exit: Some(Duration::from_millis(300)),
         give_up_after: Some(Duration::from_millis(600)),
-        ..Config::new(coordinator.url.clone(), CORES)
+        ..Config::new(url, CORES)
     };
     let run = agent::run(config, CancellationToken::new());
     tokio::time::timeout(Duration::from_secs(20), run).await.unwrap()
@@ -95,7 +99,7 @@ async fn a_coordinator_of_another_authority_or_with_an_expired_certificate_gets_
     let others = certificates(now);
     let expired = certificates(now - time::Duration::days(3));
     for (shown, trusted, fault) in
-        [(&others, &ours, "invalid peer certificate"), (&expired, &expired, "expired")]
+        [(&others, &ours, "another authority than --tls-ca"), (&expired, &expired, "expired")]
     {
         let coordinator = guarded(shown.path()).await;
         let credentials = Credentials {
@@ -125,13 +129,31 @@ async fn where_workers_need_a_certificate_only_those_of_the_authority_are_let_in
         identity_pem,
         ..Credentials::default()
     };
-    for stranger in [None, Some(pair(others.path(), "worker"))] {
+    for (stranger, hint) in [(None, "--tls-cert"), (Some(pair(others.path(), "worker")), "")] {
         let error = work(&coordinator, credentials(stranger)).await.unwrap_err();
-        assert!(matches!(error, AgentError::GaveUp { .. }), "{error}");
+        let gave_up = |reason: &str| reason.contains(hint);
+        assert!(matches!(&error, AgentError::GaveUp { reason, .. } if gave_up(reason)), "{error}");
     }
     assert_eq!(finished(&coordinator).await, 0);
     work(&coordinator, credentials(Some(pair(folder, "worker")))).await.unwrap();
     assert_eq!(finished(&coordinator).await, 20);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_worker_that_speaks_tls_to_plain_text_or_the_other_way_round_is_told_so() {
+    let certificates = certificates(OffsetDateTime::now_utc());
+    let folder = certificates.path();
+    let credentials =
+        || Credentials { ca_pem: Some(read(folder, "ca.pem")), ..Credentials::default() };
+    let (plain, guarded) = (coordinator().await, guarded(folder).await);
+    let as_tls = work_at(plain.url.replace("http:", "https:"), credentials()).await;
+    let as_plain = work_at(guarded.url.replace("https:", "http:"), Credentials::default()).await;
+    for (answer, hint) in
+        [(as_tls, "may speak plain text: http://"), (as_plain, "may speak TLS: https://")]
+    {
+        let error = answer.unwrap_err().to_string();
+        assert!(error.contains(hint), "{error}");
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::support::{
     CORES, coordinator, coordinator_with, lease, pass, registered, registration, report, stand_in,
-    verdicts, with_checksum,
+    until, verdicts, with_checksum,
 };
 use std::num::NonZeroUsize;
 use std::time::Duration;
@@ -230,6 +230,7 @@ async fn a_silent_worker_s_cases_go_to_another_and_its_late_results_change_nothi
     let coordinator = coordinator().await;
     let mut client = registered(&coordinator, "silent").await;
     let first = lease(&mut client, "silent").await;
+    // The lease must expire: who asks before gets other cases.
     tokio::time::sleep(Duration::from_millis(450)).await;
     client.register(registration("quick", MODEL_HASH)).await.unwrap();
     let second = lease(&mut client, "quick").await;
@@ -261,14 +262,13 @@ async fn a_worker_of_a_single_thread_keeps_its_leases_while_it_prepares() {
         runtime.block_on(agent::run(config, CancellationToken::new()))
     });
     let id = coordinator.campaign.id();
-    while holdings.of(&id).is_empty() {
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
+    until("it holds cases", async || !holdings.of(&id).is_empty()).await;
     // Another asks for work all the while, and so ends what has expired.
     let mut other = registered(&coordinator, "other").await;
-    while coordinator.library.status(&id).await.unwrap().finished < 8 {
+    until("all cases are done", async || {
         assert!(lease(&mut other, "other").await.cases.is_empty(), "a lease was lost");
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
+        coordinator.library.status(&id).await.unwrap().finished == 8
+    })
+    .await;
     tokio::task::spawn_blocking(move || worker.join().unwrap()).await.unwrap().unwrap();
 }

@@ -66,8 +66,13 @@ async fn a_server_stopped_and_started_again_loses_nothing() {
     let working = library.clone();
     let worker = tokio::spawn(async move { work(&working, CASES as usize).await });
     let server = std::sync::Arc::new(server);
-    for _ in 0..2 {
-        tokio::time::sleep(Duration::from_millis(100)).await;
+    for finished in [4, 12] {
+        let reached = async {
+            while library.status(CAMPAIGN).await.unwrap().finished < finished {
+                tokio::time::sleep(Duration::from_millis(5)).await;
+            }
+        };
+        tokio::time::timeout(Duration::from_secs(20), reached).await.expect("work goes on");
         let server = server.clone();
         let restart = move || {
             server.stop();

@@ -4,6 +4,7 @@
 //! every speed its own gain; the sensor is flat to two per cent, and nobody knows where the track
 //! ends and how the sleepers beyond are held. This is the honest opponent of every extension.
 
+use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
@@ -18,7 +19,7 @@ pub struct Unknowns {
     knots: Vec<f64>,
     /// Logarithms of the frequencies in Hz at which the sensor's response is free.
     response_knots: Vec<f64>,
-    /// How ballast stiffness, railpad stiffness and level vary along the track.
+    /// How each quantity of [`Own`] varies along the track.
     pub variation: [Variation; 3],
     /// Sleepers that differ from their neighbours by more than `variation` says.
     pub exceptions: Vec<Exception>,
@@ -40,8 +41,8 @@ pub struct Variation {
 /// A sleeper of which one quantity lies far from its neighbours'.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exception {
-    /// Place of the quantity in [`Unknowns::variation`].
-    pub field: usize,
+    /// The quantity.
+    pub field: Own,
     /// Number of the sleeper among those compared.
     pub sleeper: usize,
 }
@@ -51,7 +52,7 @@ const KNOT_DISTANCE: f64 = 0.35;
 
 /// Prior of logarithms: standard deviations, and lengths in sleepers or of `ln kappa`.
 mod prior {
-    /// Mean over all sleepers of ballast, railpad and level.
+    /// Mean over all sleepers of each quantity of [`Own`](super::Own).
     pub(super) const MEAN: [f64; 3] = [0.7, 0.9, 1.2];
     /// Variation along the track where it is not learned from the recording.
     pub(super) const VARIATION: [super::Variation; 3] = [
@@ -61,8 +62,8 @@ mod prior {
     ];
     /// Deviation of an exception from its neighbours.
     pub(super) const EXCEPTION: f64 = 1.0;
-    /// Bending stiffness of all sleepers, railpad and ballast damping.
-    pub(super) const GLOBAL: [f64; 3] = [0.3, 0.4, 0.6];
+    /// Each quantity of [`Common`](super::Common).
+    pub(super) const COMMON: [f64; 3] = [0.3, 0.4, 0.6];
     /// Spectrum of the surface about eq. B.6, and its length in `ln kappa`.
     pub(super) const SPECTRUM: f64 = 0.5;
     pub(super) const SPECTRUM_LENGTH: f64 = 0.7;
@@ -91,10 +92,6 @@ pub(crate) struct Outer {
     pub(crate) is_railpad: bool,
 }
 
-/// Typical values about which the logarithms lie: `k_b`, `k_p`, `A_irr`, `EI_s`, `c_p`, `c_b`
-/// (paper, Table D1).
-const TYPICAL: [f64; 6] = [1.0e7, 9.0e7, 2.5, 5.0e3, 6.0e3, 8.0e2];
-
 impl Unknowns {
     /// For a section, so many speeds, surfaces whose wave numbers lie in a range in rad/m, and
     /// bands whose centres lie in a range in Hz.
@@ -121,24 +118,49 @@ impl Unknowns {
         self.outer().end
     }
 
+    /// A quantity of all sleepers, one after the other.
+    pub fn own(&self, quantity: Own) -> Range<usize> {
+        let first = quantity as usize * self.sleepers;
+        first..first + self.sleepers
+    }
+
+    /// A quantity of one sleeper.
+    pub fn at(&self, quantity: Own, sleeper: usize) -> usize {
+        self.own(quantity).start + sleeper
+    }
+
     /// Ballast stiffness of each sleeper.
     pub fn ballast(&self) -> Range<usize> {
-        0..self.sleepers
+        self.own(Own::BallastStiffness)
     }
 
     /// Railpad stiffness of each sleeper.
     pub fn railpad(&self) -> Range<usize> {
-        self.sleepers..2 * self.sleepers
+        self.own(Own::RailpadStiffness)
     }
 
     /// Irregularity level at each sleeper.
     pub fn level(&self) -> Range<usize> {
-        2 * self.sleepers..3 * self.sleepers
+        self.own(Own::Level)
     }
 
-    /// Sleepers' bending stiffness, railpad and ballast damping, each common to all.
+    /// What is common to all sleepers.
     pub fn global(&self) -> Range<usize> {
-        3 * self.sleepers..3 * self.sleepers + 3
+        let first = Own::ALL.len() * self.sleepers;
+        first..first + Common::ALL.len()
+    }
+
+    /// A quantity that is common to all sleepers.
+    pub fn common(&self, quantity: Common) -> usize {
+        self.global().start + quantity as usize
+    }
+
+    /// A quantity of one sleeper, its own or that of all.
+    pub(crate) fn of(&self, quantity: Quantity, sleeper: usize) -> usize {
+        match quantity {
+            Quantity::Own(quantity) => self.at(quantity, sleeper),
+            Quantity::Common(quantity) => self.common(quantity),
+        }
     }
 
     /// The surface's spectrum against eq. B.6, at its knots.
@@ -149,6 +171,11 @@ impl Unknowns {
     /// The power gain of each speed's passes.
     pub fn gains(&self) -> Range<usize> {
         self.spectrum().end..self.spectrum().end + self.speeds
+    }
+
+    /// The power gain of one speed's passes.
+    pub fn gain(&self, speed: usize) -> usize {
+        self.gains().start + speed
     }
 
     /// What the sensor makes of power, at its knots.
@@ -187,12 +214,11 @@ impl Unknowns {
     /// The prior mean of all unknowns.
     pub fn typical(&self) -> DVector<f64> {
         let mut values = DVector::zeros(self.count());
-        let fields = [self.ballast(), self.railpad(), self.level()];
-        for (range, typical) in fields.into_iter().zip(TYPICAL) {
-            range.for_each(|index| values[index] = typical.ln());
+        for quantity in Own::ALL {
+            self.own(quantity).for_each(|index| values[index] = quantity.typical().ln());
         }
-        for (index, typical) in self.global().zip(&TYPICAL[3..]) {
-            values[index] = typical.ln();
+        for quantity in Common::ALL {
+            values[self.common(quantity)] = quantity.typical().ln();
         }
         values
     }
@@ -206,7 +232,7 @@ impl Unknowns {
     pub fn precision(&self) -> DMatrix<f64> {
         let mut covariance = self.covariance();
         for &Exception { field, sleeper } in &self.exceptions {
-            let index = field * self.sleepers + sleeper;
+            let index = self.at(field, sleeper);
             covariance[(index, index)] += prior::EXCEPTION.powi(2);
         }
         Cholesky::new(covariance).expect("a prior with a white part is positive definite").inverse()
@@ -215,16 +241,15 @@ impl Unknowns {
     /// Prior covariance of all unknowns, without exceptions.
     fn covariance(&self) -> DMatrix<f64> {
         let mut covariance = DMatrix::zeros(self.count(), self.count());
-        for (field, range) in [self.ballast(), self.railpad(), self.level()].into_iter().enumerate()
-        {
-            for (i, row) in (0..).zip(range.clone()) {
-                for (j, column) in (0..).zip(range.clone()) {
+        for field in Own::ALL {
+            for (i, row) in (0..).zip(self.own(field)) {
+                for (j, column) in (0..).zip(self.own(field)) {
                     covariance[(row, column)] = self.along(field, i, j);
                 }
             }
         }
         self.add_outer(&mut covariance);
-        for (index, deviation) in self.global().zip(prior::GLOBAL) {
+        for (index, deviation) in self.global().zip(prior::COMMON) {
             covariance[(index, index)] = deviation.powi(2);
         }
         for i in self.spectrum() {
@@ -254,12 +279,11 @@ impl Unknowns {
         let last = self.sleepers.cast_signed() - 1;
         let outer: Vec<(usize, Outer)> = self.outer().zip(self.outer_supports()).collect();
         for &(row, Outer { sleeper, is_railpad, .. }) in &outer {
-            let field = usize::from(is_railpad);
+            let field = if is_railpad { Own::RailpadStiffness } else { Own::BallastStiffness };
             let end = sleeper.clamp(0, last);
             let with =
                 |other: isize| self.along(field, sleeper, other) - self.along(field, end, other);
-            let compared = if is_railpad { self.railpad() } else { self.ballast() };
-            for (other, column) in (0..).zip(compared) {
+            for (other, column) in (0..).zip(self.own(field)) {
                 covariance[(row, column)] = with(other);
                 covariance[(column, row)] = with(other);
             }
@@ -277,13 +301,14 @@ impl Unknowns {
 
     /// Support of one of the compared sleepers.
     pub fn support(&self, values: &DVector<f64>, sleeper: usize) -> Support {
-        let global = self.global().start;
+        let own = |quantity| values[self.at(quantity, sleeper)].exp();
+        let common = |quantity| values[self.common(quantity)].exp();
         Support {
-            railpad_stiffness: values[self.railpad().start + sleeper].exp(),
-            railpad_damping: values[global + 1].exp(),
-            ballast_stiffness: values[self.ballast().start + sleeper].exp(),
-            ballast_damping: values[global + 2].exp(),
-            sleeper_bending_stiffness: values[global].exp(),
+            railpad_stiffness: own(Own::RailpadStiffness),
+            railpad_damping: common(Common::RailpadDamping),
+            ballast_stiffness: own(Own::BallastStiffness),
+            ballast_damping: common(Common::BallastDamping),
+            sleeper_bending_stiffness: common(Common::SleeperBendingStiffness),
         }
     }
 
@@ -297,13 +322,13 @@ impl Unknowns {
         shares(&self.response_knots, frequency_hz, self.response().start)
     }
 
-    /// Prior covariance of one of ballast, railpad and level between two sleepers.
-    fn along(&self, field: usize, i: isize, j: isize) -> f64 {
-        let Variation { smooth, length, independent } = self.variation[field];
+    /// Prior covariance of a quantity between two sleepers.
+    fn along(&self, field: Own, i: isize, j: isize) -> f64 {
+        let Variation { smooth, length, independent } = self.variation[field as usize];
         let distance = (i - j) as f64 / length;
         let together = smooth.powi(2) * (-0.5 * distance.powi(2)).exp();
         let own = if i == j { independent.powi(2) } else { 0.0 };
-        prior::MEAN[field].powi(2) + together + own
+        prior::MEAN[field as usize].powi(2) + together + own
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::candidate::Candidate;
 use crate::forward::{Forward, Linearised};
 use crate::observation::Observation;
+use crate::quantity::Own;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -314,8 +315,9 @@ impl Problem<'_> {
             .collect();
         near.sort_unstable();
         near.dedup();
-        let both =
-            |sleeper| [unknowns.ballast().start + sleeper, unknowns.railpad().start + sleeper];
+        let both = |sleeper| {
+            [Own::BallastStiffness, Own::RailpadStiffness].map(|it| unknowns.at(it, sleeper))
+        };
         near.into_iter().flat_map(both).collect()
     }
 

@@ -19,6 +19,7 @@ mod outcome;
 mod patch_scan;
 mod port_scan;
 mod profile;
+mod quantity;
 mod screen;
 mod search;
 mod section;
@@ -45,6 +46,7 @@ pub use outcome::{
 };
 pub use patch_scan::{Fixed, Patch};
 pub use port_scan::{Port, PortPlace, PortScan};
+pub use quantity::{Common, Own};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, Search, Stage, first_calibration, search};
 pub use section::Section;

@@ -165,8 +165,8 @@ mod tests {
 
     #[test]
     fn the_sleepers_of_an_independent_recording_are_clean_but_for_the_outer_ones() {
-        let Some(shared) = test_needs::shared_data() else { return };
-        let recording = Recording::open(shared.join("recordings/dev-01")).unwrap();
+        let folder = test_needs::reference().join("recordings/dev-01");
+        let recording = Recording::open(folder).unwrap();
         let extractor = Extractor::new(&tracktwin_signal::FeatureDefinition::default()).unwrap();
         let all = features(&recording, &extractor, &[7.0, 10.0, 13.0]).unwrap();
         let of = |id: &str| {

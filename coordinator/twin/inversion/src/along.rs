@@ -1,9 +1,9 @@
 //! Sections that were fitted, put together to one track.
 
 use crate::fit::Fitted;
-use crate::record::{Along, COMMON, Inversion, Prior, Provenance, Sleeper, log_normal};
+use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
 use std::collections::BTreeMap;
-use tracktwin_diagnosis::{Subject, Unknowns};
+use tracktwin_diagnosis::{Common, Own, Subject, Unknowns};
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::recording::Recording;
@@ -14,10 +14,6 @@ const MISFIT_MAX: f64 = 2.0;
 /// Railpad stiffness in N/m above which a stiffer one hardly changes a recording of V-Track: one of
 /// 2 GN/m comes out as 0.26 (docs/inversion.md).
 const RAILPAD_TELLABLE: f64 = 2e8;
-
-/// What differs from sleeper to sleeper, in the order of [`Unknowns::variation`].
-const FIELDS: [Parameter; 3] =
-    [Parameter::BallastStiffness, Parameter::RailpadStiffness, Parameter::IrregularityLevel];
 
 impl Inversion {
     /// The track of a recording from its sections, which lie in order. Of a sleeper in several
@@ -48,11 +44,9 @@ impl Inversion {
 
 impl Fitted {
     fn sleeper(&self, index: usize, id: &str, x_m: f64) -> Sleeper {
-        let fields = fields(&self.unknowns).map(|first| first + index);
-        let common = self.unknowns.global();
-        let places = FIELDS.into_iter().zip(fields).chain(COMMON.into_iter().zip(common));
-        let estimates: Estimates =
-            places.map(|(of, at)| (of, log_normal(self.values[at], self.deviations[at]))).collect();
+        let estimates: Estimates = places(&self.unknowns, index)
+            .map(|(of, at)| (of, log_normal(self.values[at], self.deviations[at])))
+            .collect();
         let misfit = self.misfit[index];
         let mut flags = Vec::new();
         if self.unknowns.exceptions.iter().any(|exception| exception.sleeper == index) {
@@ -68,9 +62,27 @@ impl Fitted {
     }
 }
 
-/// Where the values of each of [`FIELDS`] begin.
-fn fields(unknowns: &Unknowns) -> [usize; 3] {
-    [unknowns.ballast().start, unknowns.railpad().start, unknowns.level().start]
+/// Where the values of a sleeper stand.
+fn places(unknowns: &Unknowns, sleeper: usize) -> impl Iterator<Item = (Parameter, usize)> {
+    let own = Own::ALL.map(|it| (own(it), unknowns.at(it, sleeper)));
+    let common = Common::ALL.map(|it| (common(it), unknowns.common(it)));
+    own.into_iter().chain(common)
+}
+
+const fn own(quantity: Own) -> Parameter {
+    match quantity {
+        Own::BallastStiffness => Parameter::BallastStiffness,
+        Own::RailpadStiffness => Parameter::RailpadStiffness,
+        Own::Level => Parameter::IrregularityLevel,
+    }
+}
+
+const fn common(quantity: Common) -> Parameter {
+    match quantity {
+        Common::SleeperBendingStiffness => Parameter::SleeperBendingStiffness,
+        Common::RailpadDamping => Parameter::RailpadDamping,
+        Common::BallastDamping => Parameter::BallastDamping,
+    }
 }
 
 fn provenance(sections: &[(Subject, Fitted)]) -> Provenance {
@@ -83,14 +95,10 @@ fn provenance(sections: &[(Subject, Fitted)]) -> Provenance {
         let unknowns = &fitted.unknowns;
         let typical = unknowns.typical();
         let spread = unknowns.prior_deviations();
-        let places = FIELDS
-            .into_iter()
-            .zip(fields(unknowns))
-            .chain(COMMON.into_iter().zip(unknowns.global()));
-        for (of, at) in places {
+        for (of, at) in places(unknowns, 0) {
             prior.insert(of, Prior { median: typical[at].exp(), log_sd: spread[at] });
         }
-        let along = FIELDS.into_iter().zip(unknowns.variation);
+        let along = Own::ALL.map(own).into_iter().zip(unknowns.variation);
         variation.extend(along.map(|(of, variation)| (of, Along::from(variation))));
     }
     Provenance {

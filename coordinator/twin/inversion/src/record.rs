@@ -13,7 +13,7 @@ pub const METHOD: &str = "inversion";
 pub const PER_SLEEPER: [Parameter; 3] =
     [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::IrregularityLevel];
 
-/// What the sleepers of a section have in common, in the order of [`tracktwin_diagnosis::Unknowns::global`].
+/// What the sleepers of a section have in common, in the order of pages.
 pub const COMMON: [Parameter; 3] =
     [Parameter::SleeperBendingStiffness, Parameter::RailpadDamping, Parameter::BallastDamping];
 

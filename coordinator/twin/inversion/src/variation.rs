@@ -4,7 +4,7 @@
 //! any Gaussian prior has a closed form (Laplace), and no forward model is needed to compare two.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use tracktwin_diagnosis::{Calibration, Exception, Unknowns, Variation};
+use tracktwin_diagnosis::{Calibration, Exception, Own, Unknowns, Variation};
 
 /// Factors on a deviation or a length that are tried from where the search stands.
 const FACTORS: [f64; 4] = [0.5, 0.75, 1.35, 2.0];
@@ -88,11 +88,11 @@ fn vary(unknowns: &mut Unknowns, data: &Quadratic) {
     let mut best = data.log_evidence(unknowns);
     for _ in 0..ROUNDS {
         let before = best;
-        for field in 0..unknowns.variation.len() {
+        for field in Own::ALL {
             for which in 0..3 {
                 for factor in FACTORS {
                     let mut tried = unknowns.clone();
-                    scale(&mut tried.variation[field], which, factor);
+                    scale(&mut tried.variation[field as usize], which, factor);
                     let evidence = data.log_evidence(&tried);
                     if evidence > best {
                         best = evidence;
@@ -123,10 +123,10 @@ fn except(unknowns: &mut Unknowns, data: &Quadratic) -> bool {
     let most = (EXCEPTIONS_MAX * sleepers as f64).ceil() as usize;
     let mut current = data.log_evidence(unknowns);
     loop {
-        let room = |field: usize| {
+        let room = |field: Own| {
             unknowns.exceptions.iter().filter(|known| known.field == field).count() < most
         };
-        let fields = (0..unknowns.variation.len()).filter(|&field| room(field));
+        let fields = Own::ALL.into_iter().filter(|&field| room(field));
         let all = fields.flat_map(|field| (0..sleepers).map(move |it| (field, it)));
         let tried = all.map(|(field, sleeper)| Exception { field, sleeper });
         let new = tried.filter(|exception| !unknowns.exceptions.contains(exception));
@@ -196,7 +196,7 @@ mod tests {
         let mut unknowns = unknowns();
         let data = measured(&unknowns, 0.05, Some((9, 0.9)));
         learn(&mut unknowns, &data);
-        assert_eq!(unknowns.exceptions, [Exception { field: 0, sleeper: 9 }]);
+        assert_eq!(unknowns.exceptions, [Exception { field: Own::BallastStiffness, sleeper: 9 }]);
         assert!(unknowns.variation[0].independent < 0.12, "{:?}", unknowns.variation[0]);
         let best = data.best(&unknowns).unwrap() - &data.mean;
         assert!((best[9] + 0.9).abs() < 0.12, "{}", best[9]);

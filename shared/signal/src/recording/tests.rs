@@ -5,7 +5,7 @@ use crate::Signal;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use test_needs::shared_data;
+use test_needs::{reference, shared_data};
 
 const RATE_HZ: f64 = 1e4;
 
@@ -279,8 +279,7 @@ fn a_wrong_speed_a_short_pass_and_a_foreign_place_are_refused() {
 
 #[test]
 fn an_independent_recording_opens_with_a_window_for_every_sleeper() {
-    let Some(shared) = shared_data() else { return };
-    let recording = Recording::open(shared.join("recordings/dev-01")).unwrap();
+    let recording = Recording::open(reference().join("recordings/dev-01")).unwrap();
     assert_eq!(recording.name, "dev-01");
     assert_eq!((recording.passes.len(), recording.sleepers.len()), (6, 29));
     assert_eq!(recording.speeds_km_h(), [7.0, 10.0, 13.0]);
@@ -290,6 +289,29 @@ fn an_independent_recording_opens_with_a_window_for_every_sleeper() {
             let length = recording.window(pass, sleeper).unwrap().len() as f64;
             // The odometer's scale drifts by less than a per cent.
             assert!((length / expected - 1.0).abs() < 0.01, "{length} against {expected}");
+        }
+    }
+}
+
+#[test]
+fn recordings_of_the_checkout_are_passes_of_those_that_they_are_cut_from() {
+    let Some(shared) = shared_data() else { return };
+    for entry in std::fs::read_dir(reference().join("recordings")).unwrap() {
+        let kept = Recording::open(entry.unwrap().path()).unwrap();
+        let whole = Recording::open(shared.join("recordings").join(&kept.name)).unwrap();
+        assert_eq!((&kept.sleepers, &kept.nominal), (&whole.sleepers, &whole.nominal));
+        for pass in &kept.passes {
+            let same = |other: &&Pass| {
+                Path::new(&other.file).file_name() == Path::new(&pass.file).file_name()
+            };
+            let origin = whole.passes.iter().find(same).unwrap();
+            let single =
+                |pass: &Pass| pass.signal.samples().iter().map(|&a| a as f32).collect::<Vec<_>>();
+            assert!(single(pass) == single(origin), "{}: {}", kept.name, pass.file);
+            // Positions are kept to ten nanometres.
+            let mut pairs = pass.position_m.iter().zip(&origin.position_m);
+            assert_eq!(pass.position_m.len(), origin.position_m.len());
+            assert!(pairs.all(|(kept, x)| (kept - x).abs() < 6e-9), "{}: {}", kept.name, pass.file);
         }
     }
 }

@@ -5,10 +5,10 @@ use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::estimate::Estimate;
 use crate::outcome::{BeforeAfter, Fit, Hypothesis, Levels, Score, Scores, SleeperValues};
+use crate::quantity::{Common, Own};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 /// Decibels in a neper of power.
 const DECIBEL: f64 = 4.342_944_819_032_518;
@@ -98,22 +98,24 @@ impl Evidence<'_> {
         };
         let near: Vec<usize> = (0..section.sleepers).filter(at_place).collect();
         let unknowns = &self.subject.forward.unknowns;
-        let mean = |calibration: &Calibration, range: Range<usize>| {
-            let values = near.iter().map(|sleeper| calibration.values[range.start + sleeper].exp());
-            values.sum::<f64>() / near.len() as f64
+        let of = |value: &dyn Fn(&DVector<f64>) -> f64| BeforeAfter {
+            before: value(&self.search.baseline.values),
+            after: value(&self.search.last.values),
         };
-        let of = |value: &dyn Fn(&Calibration) -> f64| BeforeAfter {
-            before: value(&self.search.baseline),
-            after: value(&self.search.last),
+        let common = |quantity| of(&|values| values[unknowns.common(quantity)].exp());
+        let mean = |quantity| {
+            of(&|values| {
+                let near_by = near.iter().map(|&sleeper| unknowns.at(quantity, sleeper));
+                near_by.map(|index| values[index].exp()).sum::<f64>() / near.len() as f64
+            })
         };
-        let global = unknowns.global().start;
         BTreeMap::from([
-            ("sleeper_EI_N_m2".to_owned(), of(&|c| c.values[global].exp())),
-            ("railpad_damping_N_s_m".to_owned(), of(&|c| c.values[global + 1].exp())),
-            ("ballast_damping_N_s_m".to_owned(), of(&|c| c.values[global + 2].exp())),
-            ("ballast_stiffness_N_m".to_owned(), of(&|c| mean(c, unknowns.ballast()))),
-            ("railpad_stiffness_N_m".to_owned(), of(&|c| mean(c, unknowns.railpad()))),
-            ("irregularity_level".to_owned(), of(&|c| mean(c, unknowns.level()))),
+            ("sleeper_EI_N_m2".to_owned(), common(Common::SleeperBendingStiffness)),
+            ("railpad_damping_N_s_m".to_owned(), common(Common::RailpadDamping)),
+            ("ballast_damping_N_s_m".to_owned(), common(Common::BallastDamping)),
+            ("ballast_stiffness_N_m".to_owned(), mean(Own::BallastStiffness)),
+            ("railpad_stiffness_N_m".to_owned(), mean(Own::RailpadStiffness)),
+            ("irregularity_level".to_owned(), mean(Own::Level)),
         ])
     }
 
@@ -136,17 +138,20 @@ impl Evidence<'_> {
             let mean = calibration.values[index].exp();
             Estimate { mean, sd: mean * deviation[index] }
         };
-        let both = |index: usize| BeforeAfter {
-            before: estimate(before, &deviations[0], index),
-            after: estimate(after, &deviations[1], index),
+        let both = |quantity, sleeper| {
+            let index = unknowns.at(quantity, sleeper);
+            BeforeAfter {
+                before: estimate(before, &deviations[0], index),
+                after: estimate(after, &deviations[1], index),
+            }
         };
         (0..self.subject.forward.section.sleepers)
             .map(|sleeper| SleeperValues {
                 id: self.id(sleeper),
                 x_m: self.subject.forward.section.x_m(sleeper),
-                railpad_stiffness: both(unknowns.railpad().start + sleeper),
-                ballast_stiffness: both(unknowns.ballast().start + sleeper),
-                irregularity_level: both(unknowns.level().start + sleeper),
+                railpad_stiffness: both(Own::RailpadStiffness, sleeper),
+                ballast_stiffness: both(Own::BallastStiffness, sleeper),
+                irregularity_level: both(Own::Level, sleeper),
                 flags: self.flags(sleeper),
             })
             .collect()

@@ -3,6 +3,7 @@
 
 use super::supports::{NEIGHBOURS, SupportChanges, VARIED, Variation};
 use super::{Forward, mean};
+use crate::quantity::{Common, Own, Quantity};
 use crate::section::Window;
 use crate::transfer::Transfer;
 use nalgebra::{DMatrix, DVector};
@@ -16,6 +17,17 @@ use tracktwin_track::model::{ModelError, Support, TrackModel};
 
 /// Relative step by which stiffnesses are varied for derivatives.
 const STEP: f64 = 1e-4;
+
+/// What is varied of a support: which unknown it is, and its step.
+const VARIATIONS: [(Quantity, fn(&mut Support)); VARIED] = [
+    (Quantity::Own(Own::BallastStiffness), |it| it.ballast_stiffness *= 1.0 + STEP),
+    (Quantity::Own(Own::RailpadStiffness), |it| it.railpad_stiffness *= 1.0 + STEP),
+    (Quantity::Common(Common::SleeperBendingStiffness), |it| {
+        it.sleeper_bending_stiffness *= 1.0 + STEP;
+    }),
+    (Quantity::Common(Common::RailpadDamping), |it| it.railpad_damping *= 1.0 + STEP),
+    (Quantity::Common(Common::BallastDamping), |it| it.ballast_damping *= 1.0 + STEP),
+];
 
 /// A prediction and its derivatives by the baseline's unknowns.
 pub struct Linearised {
@@ -195,15 +207,8 @@ impl Forward {
             }
             Ok(changed)
         };
-        let vary: [fn(&mut Support); VARIED] = [
-            |support| support.ballast_stiffness *= 1.0 + STEP,
-            |support| support.railpad_stiffness *= 1.0 + STEP,
-            |support| support.sleeper_bending_stiffness *= 1.0 + STEP,
-            |support| support.railpad_damping *= 1.0 + STEP,
-            |support| support.ballast_damping *= 1.0 + STEP,
-        ];
         let mut varied = std::array::from_fn(|_| Variation::new());
-        for (variation, vary) in varied.iter_mut().zip(vary) {
+        for (variation, (_, vary)) in varied.iter_mut().zip(VARIATIONS) {
             *variation = derivative(vary)?;
         }
         Ok(varied)
@@ -240,19 +245,12 @@ impl Forward {
         let total = 1.0 / mean(shapes, |shape| (floor + shape).recip());
         let mut derivatives: Vec<_> =
             spectrum.into_iter().map(|(knot, sum)| (knot, sum / total)).collect();
-        derivatives.push((unknowns.level().start + sleeper, power / total));
-        derivatives.push((unknowns.gains().start + speed, power / total));
+        derivatives.push((unknowns.at(Own::Level, sleeper), power / total));
+        derivatives.push((unknowns.gain(speed), power / total));
         derivatives.extend(beyond);
         derivatives.extend(unknowns.response_shares(self.bands.centres_hz()[band]));
-        let global = unknowns.global().start;
         for (in_track, compared) in self.near(sleeper) {
-            let columns = [
-                unknowns.ballast().start + compared,
-                unknowns.railpad().start + compared,
-                global,
-                global + 1,
-                global + 2,
-            ];
+            let columns = VARIATIONS.map(|(quantity, _)| unknowns.of(quantity, compared));
             let changes = supports.at(in_track, sleeper, row % self.per_sleeper());
             derivatives.extend(columns.into_iter().zip(changes.map(|c| scale * c / total)));
         }
@@ -350,7 +348,8 @@ mod tests {
         // The outer sleepers stand for all beyond, of which only near ones are taken; so do those
         // that all sleepers share.
         let unknowns = &forward.unknowns;
-        let supports = [unknowns.ballast().start + 1, unknowns.railpad().start + 1];
+        let supports =
+            [Own::BallastStiffness, Own::RailpadStiffness].map(|quantity| unknowns.at(quantity, 1));
         let others = unknowns.level().chain(unknowns.spectrum().start..unknowns.count());
         for unknown in supports.into_iter().chain(others) {
             let [below, above] = [-step, step].map(|change| {

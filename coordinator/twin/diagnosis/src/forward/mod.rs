@@ -13,6 +13,7 @@ pub use derivatives::Linearised;
 use crate::bands::Bands;
 use crate::baseline::Unknowns;
 use crate::profile::Shape;
+use crate::quantity::Own;
 use crate::section::{Section, Window};
 use crate::transfer::Transfer;
 use nalgebra::{DMatrix, DVector};
@@ -258,7 +259,7 @@ impl Forward {
     /// Level at the sleeper and gain of the speed.
     fn scale(&self, values: &DVector<f64>, sleeper: usize, speed: usize) -> f64 {
         let unknowns = &self.unknowns;
-        (values[unknowns.level().start + sleeper] + values[unknowns.gains().start + speed]).exp()
+        (values[unknowns.at(Own::Level, sleeper)] + values[unknowns.gain(speed)]).exp()
     }
 }
 

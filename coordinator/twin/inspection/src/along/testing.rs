@@ -3,7 +3,6 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
-use test_needs::shared_data;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_track::model::Surface;
@@ -16,10 +15,9 @@ pub(crate) fn noise(seed: u64, count: usize) -> Vec<f64> {
     (0..count).map(|_| normal()).collect()
 }
 
-/// One of the shared recordings, unless they are absent.
-pub(crate) fn shared(name: &str) -> Option<Recording> {
-    let folder = shared_data()?.join("recordings").join(name);
-    Some(Recording::open(folder).unwrap())
+/// What there is of an independent recording: passes of it, and the whole of it.
+pub(crate) fn independent(name: &str) -> impl Iterator<Item = Recording> {
+    test_needs::recordings(name).into_iter().map(|folder| Recording::open(folder).unwrap())
 }
 
 /// What a chain does to a pass: its index, its samples, its positions.

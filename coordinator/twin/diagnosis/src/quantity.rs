@@ -1,0 +1,59 @@
+//! The quantities of a support, by which the baseline's unknowns are addressed.
+
+/// A quantity of which every sleeper has its own value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Own {
+    /// Stiffness of the ballast, `k_b`.
+    BallastStiffness,
+    /// Stiffness of the railpad, `k_p`.
+    RailpadStiffness,
+    /// Irregularity level of the surface, `A_irr`.
+    Level,
+}
+
+/// A quantity that all sleepers have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Common {
+    /// Bending stiffness of the sleeper, `EI_s`.
+    SleeperBendingStiffness,
+    /// Damping of the railpad, `c_p`.
+    RailpadDamping,
+    /// Damping of the ballast, `c_b`.
+    BallastDamping,
+}
+
+/// A quantity of a sleeper, its own or that of all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quantity {
+    Own(Own),
+    Common(Common),
+}
+
+impl Own {
+    /// All of them, in the order of the unknowns.
+    pub const ALL: [Self; 3] = [Self::BallastStiffness, Self::RailpadStiffness, Self::Level];
+
+    /// Typical value about which the logarithm lies (paper, Table D1).
+    pub(crate) const fn typical(self) -> f64 {
+        match self {
+            Self::BallastStiffness => 1.0e7,
+            Self::RailpadStiffness => 9.0e7,
+            Self::Level => 2.5,
+        }
+    }
+}
+
+impl Common {
+    /// All of them, in the order of the unknowns.
+    pub const ALL: [Self; 3] =
+        [Self::SleeperBendingStiffness, Self::RailpadDamping, Self::BallastDamping];
+
+    /// Typical value about which the logarithm lies (paper, Table D1).
+    pub(crate) const fn typical(self) -> f64 {
+        match self {
+            Self::SleeperBendingStiffness => 5.0e3,
+            Self::RailpadDamping => 6.0e3,
+            Self::BallastDamping => 8.0e2,
+        }
+    }
+}
