@@ -109,14 +109,14 @@ fn run_apart(stiffness: &[f64]) -> Option<Range<usize>> {
 }
 
 /// Trials of effects under sleepers that lie far from the others.
-pub(super) struct Imitated {
+pub(super) struct OutlierStarts {
     far: Far,
     templates: Vec<Template>,
     /// Typical values of the baseline's unknowns.
     typical: DVector<f64>,
 }
 
-impl Imitated {
+impl OutlierStarts {
     /// What such sleepers may have instead, best of each kind.
     ///
     /// # Errors
@@ -138,9 +138,9 @@ impl Imitated {
         if there.is_empty() {
             return Ok(Self { far, templates: Vec::new(), typical });
         }
-        let even = problem.at(&far.values)?;
-        let mut tried = templates(problem, &even, &there, || {})?;
-        tried.sort_by(|a, b| b.along(&even.residual).total_cmp(&a.along(&even.residual)));
+        let smoothed = problem.at(&far.values)?;
+        let mut tried = templates(problem, &smoothed, &there, || {})?;
+        tried.sort_by(|a, b| b.along(&smoothed.residual).total_cmp(&a.along(&smoothed.residual)));
         let kind = |template: &Template| there[template.candidate].kind.physics;
         let mut best: Vec<Template> = Vec::new();
         for template in tried {
@@ -239,20 +239,20 @@ mod tests {
         let observation = Observation::new(log_power, &covariance, |_| false).unwrap();
         let problem = Problem { forward: &forward, observation: &observation, candidates: &[] };
 
-        let imitated = |current: &Calibration| {
+        let outlier_starts = |current: &Calibration| {
             let far = Far::new(&forward.unknowns, &current.values);
-            Imitated::new(&problem, far, &all).unwrap()
+            OutlierStarts::new(&problem, far, &all).unwrap()
         };
-        let even = problem.at(&typical).unwrap();
-        assert_eq!(imitated(&even).starts().count(), 0);
+        let smoothed = problem.at(&typical).unwrap();
+        assert_eq!(outlier_starts(&smoothed).starts().count(), 0);
 
         let mut soft = typical.clone();
         for sleeper in [4, 5] {
             soft[forward.unknowns.railpad().start + sleeper] -= 1.5;
         }
         let soft = problem.at(&soft).unwrap();
-        let imitated = imitated(&soft);
-        let (best, values) = imitated.starts().next().unwrap();
+        let outlier_starts = outlier_starts(&soft);
+        let (best, values) = outlier_starts.starts().next().unwrap();
         assert_eq!(all[best.candidate].kind.physics, "sleeper_bolt");
         assert_eq!(all[best.candidate].extension.sleepers, Some(vec![4, 5]));
         assert_eq!(values, typical);
