@@ -147,14 +147,14 @@ fn config(arguments: &Arguments) -> anyhow::Result<Config> {
             insecure: arguments.insecure,
         },
         idle_exit: arguments.idle_exit.map(Duration::from_secs),
-        give_up_after: patience(arguments.idle_exit, arguments.give_up_after),
+        give_up_after: give_up_time(arguments.idle_exit, arguments.give_up_after),
         ..Config::new(String::new(), cores)
     })
 }
 
 /// How long no coordinator may answer, in s as it is told: a worker that is to end when there is no work
 /// doesn't wait for ever for somebody to give it some.
-fn patience(idle_exit: Option<u64>, give_up_after: Option<u64>) -> Option<Duration> {
+fn give_up_time(idle_exit: Option<u64>, give_up_after: Option<u64>) -> Option<Duration> {
     let idle = idle_exit.map(|idle| Duration::from_secs(idle).max(SILENCE));
     give_up_after.map(Duration::from_secs).or(idle)
 }
@@ -221,10 +221,10 @@ mod tests {
     #[test]
     fn a_worker_that_ends_when_idle_does_not_wait_for_ever_for_its_coordinator() {
         let seconds = |s| Some(Duration::from_secs(s));
-        assert_eq!(patience(None, None), None);
-        assert_eq!(patience(Some(30), None), seconds(600));
-        assert_eq!(patience(Some(900), None), seconds(900));
-        assert_eq!(patience(Some(900), Some(60)), seconds(60));
-        assert_eq!(patience(None, Some(0)), seconds(0));
+        assert_eq!(give_up_time(None, None), None);
+        assert_eq!(give_up_time(Some(30), None), seconds(600));
+        assert_eq!(give_up_time(Some(900), None), seconds(900));
+        assert_eq!(give_up_time(Some(900), Some(60)), seconds(60));
+        assert_eq!(give_up_time(None, Some(0)), seconds(0));
     }
 }

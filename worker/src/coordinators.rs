@@ -119,7 +119,7 @@ impl Coordinators {
                     Ordering::Relaxed,
                 );
             }
-            _ => self.heard(url),
+            _ => self.record_answer(url),
         }
         answer.map(Response::into_inner)
     }
@@ -129,7 +129,7 @@ impl Coordinators {
         self.contact.lock().answered.elapsed()
     }
 
-    fn heard(&self, url: &str) {
+    fn record_answer(&self, url: &str) {
         let mut contact = self.contact.lock();
         contact.answered = Instant::now();
         if contact.warned.take().is_some() {
@@ -179,7 +179,7 @@ fn reason(url: &str, status: &Status) -> String {
     let reason = chain(status);
     let tls = url.starts_with("https:");
     let says = |words: &[&str]| words.iter().any(|it| reason.contains(it));
-    let hint = if says(&["UnknownIssuer"]) {
+    let remedy = if says(&["UnknownIssuer"]) {
         "; it shows a certificate of another authority than --tls-ca"
     } else if tls && says(&["CertificateRequired", "connection closed", "broken pipe"]) {
         "; it may demand a certificate: --tls-cert and --tls-key"
@@ -192,7 +192,7 @@ fn reason(url: &str, status: &Status) -> String {
     } else {
         ""
     };
-    format!("{reason}{hint}")
+    format!("{reason}{remedy}")
 }
 
 /// What failed and why, in one line: a failed connection hides its reason in its sources.

@@ -1,7 +1,7 @@
 //! What a worker answers to those who watch over it: `/healthz` and `/metrics`.
 
+use crate::bounded_listener::BoundedListener;
 use crate::counters::Counters;
-use crate::port::Port;
 use crate::session::Session;
 use axum::Router;
 use axum::extract::State;
@@ -26,7 +26,7 @@ pub(crate) async fn answer(port: TcpListener, session: Arc<Session>, counters: A
         .route("/healthz", get(healthz))
         .route("/metrics", get(metrics))
         .with_state(Watched { session, counters });
-    if let Err(error) = axum::serve(Port::new(port), routes).await {
+    if let Err(error) = axum::serve(BoundedListener::new(port), routes).await {
         tracing::warn!("health is no longer answered: {error}");
     }
 }

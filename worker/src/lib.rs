@@ -5,6 +5,7 @@
 
 pub mod agent;
 mod backoff;
+mod bounded_listener;
 pub mod command;
 mod config;
 mod connection;
@@ -18,11 +19,10 @@ mod health;
 mod holdings;
 mod logging;
 mod outbox;
-mod port;
 mod session;
 
+pub use bounded_listener::BoundedListener;
 pub use counters::Counters;
 pub use credentials::{Credentials, CredentialsError, Token};
 pub use holdings::Holdings;
 pub use logging::{LogFormat, log_to_stderr};
-pub use port::Port;

@@ -17,7 +17,7 @@ use tracktwin_worker::{Credentials, Holdings, Token};
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// How long a library that does not answer is waited for; as long as a blind trial waits for one.
-const PATIENCE: Duration = Duration::from_mins(10);
+const OUTAGE_MAX: Duration = Duration::from_mins(10);
 
 /// Why the farm stops.
 #[derive(Debug, thiserror::Error)]
@@ -139,7 +139,7 @@ pub async fn run_claimed(
                     break None;
                 }
             }
-            Err(error) => outage.goes_on(error)?,
+            Err(error) => outage.waits_for_library(error)?,
         }
         if shutdown.is_cancelled() {
             break None;
@@ -172,16 +172,19 @@ impl Outage {
     /// Whether the library may answer later: what has begun meanwhile is not lost, for the workers keep it.
     ///
     /// # Errors
-    /// The library's error where no waiting helps, or after [`PATIENCE`].
-    fn goes_on(&mut self, error: LibraryError) -> Result<(), LibraryError> {
+    /// The library's error where no waiting helps, or after [`OUTAGE_MAX`].
+    fn waits_for_library(&mut self, error: LibraryError) -> Result<(), LibraryError> {
         if !error.is_temporary() {
             return Err(error);
         }
         let since = *self.0.get_or_insert_with(|| {
-            tracing::warn!("{error}; waiting for it for up to {} minutes", PATIENCE.as_secs() / 60);
+            tracing::warn!(
+                "{error}; waiting for it for up to {} minutes",
+                OUTAGE_MAX.as_secs() / 60
+            );
             Instant::now()
         });
-        if since.elapsed() < PATIENCE { Ok(()) } else { Err(error) }
+        if since.elapsed() < OUTAGE_MAX { Ok(()) } else { Err(error) }
     }
 }
 
@@ -202,7 +205,7 @@ async fn dispatch(
         timing: task.timing,
         scope: Some(Scope { campaign: task.campaign.to_owned(), cases: task.cases }),
         // There is no other machine to turn to.
-        put_aside: false,
+        suspends_failing: false,
         own: Some(own),
         ..Settings::default()
     };

@@ -184,7 +184,7 @@ impl Library {
         let now_unix_ms = self.now_unix_ms();
         let wrong = wrong
             .map(|(worker, reason)| Flag { worker: worker.to_owned(), reason: reason.to_owned() });
-        self.write(Found { campaign, index, auditor, finding, wrong, now_unix_ms }).await
+        self.write(RecordAudit { campaign, index, auditor, finding, wrong, now_unix_ms }).await
     }
 
     /// Takes back audits of these cases that their auditor will not do.
@@ -309,7 +309,7 @@ impl Sample {
     }
 }
 
-struct Found {
+struct RecordAudit {
     campaign: String,
     index: u32,
     auditor: String,
@@ -318,7 +318,7 @@ struct Found {
     now_unix_ms: i64,
 }
 
-impl Write for Found {
+impl Write for RecordAudit {
     type Answer = Option<String>;
 
     fn worker(&self) -> Option<&str> {

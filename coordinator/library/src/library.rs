@@ -2,7 +2,7 @@
 
 use crate::LibraryError;
 use crate::engine::{self, Connection, FileLock, Opened, Readers, Target, Write, iso_utc, sql};
-use crate::lease::Horizon;
+use crate::lease::QueueCursor;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub struct Library {
     opened: Arc<Opened>,
-    horizon: Arc<Horizon>,
+    cursor: Arc<QueueCursor>,
 }
 
 /// The right to hand out a library's cases, until it is dropped.
@@ -50,7 +50,7 @@ impl Library {
     }
 
     fn of(opened: Opened) -> Self {
-        Self { opened: Arc::new(opened), horizon: Arc::default() }
+        Self { opened: Arc::new(opened), cursor: Arc::default() }
     }
 
     /// Finishes what was ordered and closes the connections. Whoever still holds a clone is told
@@ -109,7 +109,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError::NotWritable`] when it may not, or when the library does not answer.
     pub async fn check_writable(&self) -> Result<(), LibraryError> {
-        self.write(Touch).await
+        self.write(CheckWritable).await
     }
 
     /// Finds out whether the database is whole, so that nothing is added to one that isn't: with `SQLite` by
@@ -129,8 +129,8 @@ impl Library {
         &self.opened.readers
     }
 
-    pub(crate) fn horizon(&self) -> Arc<Horizon> {
-        self.horizon.clone()
+    pub(crate) fn cursor(&self) -> Arc<QueueCursor> {
+        self.cursor.clone()
     }
 
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
@@ -157,9 +157,9 @@ pub(crate) struct Dated<T> {
 }
 
 /// Changes nothing.
-struct Touch;
+struct CheckWritable;
 
-impl Write for Touch {
+impl Write for CheckWritable {
     type Answer = ();
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {

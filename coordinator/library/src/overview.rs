@@ -1,7 +1,7 @@
 //! How all campaigns stand, at a glance.
 
 use crate::engine::{Row, sql};
-use crate::pace::Pace;
+use crate::throughput::Throughput;
 use crate::{CampaignState, Library, LibraryError, Status};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -52,12 +52,12 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
     pub async fn overview(&self) -> Result<Vec<CampaignOverview>, LibraryError> {
-        let paces = self.paces().await?;
+        let throughputs = self.throughputs().await?;
         let ask = "select * from campaign_status order by created_at, campaign_id";
         let mut overviews = Vec::new();
         for row in self.readers().rows(sql(ask)).await? {
             let id: String = row.get("campaign_id")?;
-            let mut overview = overview(&row, paces.get(&id).copied().unwrap_or_default())?;
+            let mut overview = overview(&row, throughputs.get(&id).copied().unwrap_or_default())?;
             if overview.status.failed > 0 {
                 overview.causes = self.causes(&id).await?;
             }
@@ -108,7 +108,7 @@ fn without_numbers(text: &str) -> String {
 }
 
 /// What a row says of a campaign that goes at this pace.
-fn overview(row: &Row, pace: Pace) -> Result<CampaignOverview, LibraryError> {
+fn overview(row: &Row, throughput: Throughput) -> Result<CampaignOverview, LibraryError> {
     let priority: i64 = row.get("priority")?;
     Ok(CampaignOverview {
         id: row.get("campaign_id")?,
@@ -123,8 +123,8 @@ fn overview(row: &Row, pace: Pace) -> Result<CampaignOverview, LibraryError> {
             finished: row.get_u32("finished")?,
             failed: row.get_u32("failed")?,
         },
-        per_second: pace.per_second,
-        mean_case_s: pace.mean_case_s,
+        per_second: throughput.per_second,
+        mean_case_s: throughput.mean_case_s,
         causes: Vec::new(),
     })
 }

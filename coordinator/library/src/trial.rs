@@ -154,7 +154,7 @@ impl Library {
         let now_unix_ms = self.now_unix_ms();
         let until_unix_ms = now_unix_ms.saturating_add(lease_ms);
         let (trial, worker) = (trial.to_owned(), worker.to_owned());
-        self.write(Take { trial, worker, of, now_unix_ms, until_unix_ms }).await
+        self.write(ClaimQuestion { trial, worker, of, now_unix_ms, until_unix_ms }).await
     }
 
     /// Lets a lease last for so long from now, if it is the worker's still.
@@ -170,7 +170,7 @@ impl Library {
     ) -> Result<(), LibraryError> {
         let until_unix_ms = Some(self.now_unix_ms().saturating_add(lease_ms));
         let (trial, worker) = (trial.to_owned(), worker.to_owned());
-        self.write(Keep { trial, worker, number, until_unix_ms }).await
+        self.write(RenewOrRelease { trial, worker, number, until_unix_ms }).await
     }
 
     /// Gives a case back.
@@ -184,7 +184,7 @@ impl Library {
         number: u32,
     ) -> Result<(), LibraryError> {
         let (trial, worker) = (trial.to_owned(), worker.to_owned());
-        self.write(Keep { trial, worker, number, until_unix_ms: None }).await
+        self.write(RenewOrRelease { trial, worker, number, until_unix_ms: None }).await
     }
 
     /// Keeps an answer, and the diagnosis that it is the score of; a question that is answered
@@ -200,7 +200,7 @@ impl Library {
         diagnosis: Option<DiagnosisRecord>,
     ) -> Result<(), LibraryError> {
         let (trial, worker) = (trial.to_owned(), worker.to_owned());
-        self.write_dated(Told { trial, worker, answer, diagnosis }).await
+        self.write_dated(RecordAnswer { trial, worker, answer, diagnosis }).await
     }
 }
 
@@ -263,7 +263,7 @@ impl Write for Dated<TrialRecord> {
     }
 }
 
-struct Take {
+struct ClaimQuestion {
     trial: String,
     worker: String,
     of: Vec<i64>,
@@ -271,7 +271,7 @@ struct Take {
     until_unix_ms: i64,
 }
 
-impl Write for Take {
+impl Write for ClaimQuestion {
     type Answer = Option<u32>;
 
     fn worker(&self) -> Option<&str> {
@@ -290,14 +290,14 @@ impl Write for Take {
 }
 
 /// Keeps a lease until then, or gives it back.
-struct Keep {
+struct RenewOrRelease {
     trial: String,
     worker: String,
     number: u32,
     until_unix_ms: Option<i64>,
 }
 
-impl Write for Keep {
+impl Write for RenewOrRelease {
     type Answer = ();
 
     fn worker(&self) -> Option<&str> {
@@ -314,14 +314,14 @@ impl Write for Keep {
     }
 }
 
-struct Told {
+struct RecordAnswer {
     trial: String,
     worker: String,
     answer: TrialAnswer,
     diagnosis: Option<DiagnosisRecord>,
 }
 
-impl Write for Dated<Told> {
+impl Write for Dated<RecordAnswer> {
     type Answer = ();
 
     fn worker(&self) -> Option<&str> {
@@ -329,7 +329,7 @@ impl Write for Dated<Told> {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<(), LibraryError> {
-        let Told { trial, worker, answer, diagnosis } = &self.it;
+        let RecordAnswer { trial, worker, answer, diagnosis } = &self.it;
         let diagnosis = match diagnosis {
             Some(diagnosis) => Some(diagnosis.store(connection, &self.at).await?),
             None => None,

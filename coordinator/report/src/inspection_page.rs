@@ -27,7 +27,7 @@ pub struct Inspected {
 }
 
 /// Everything that the page shows.
-pub struct Inspection {
+pub struct InspectionReport {
     /// The recording's name.
     pub name: String,
     /// One sentence that says it all.
@@ -39,7 +39,7 @@ pub struct Inspection {
     /// Where the wheel loses contact with the rail, in a sentence.
     pub loss_of_contact: Option<String>,
     /// What makes passes unusable.
-    pub troubles: Vec<String>,
+    pub pass_defects: Vec<String>,
     /// What was mended while it was read, or is doubtful.
     pub doubts: Vec<String>,
     /// What the recording can be used for, and for what not.
@@ -53,7 +53,7 @@ pub struct Inspection {
 }
 
 /// The page of a recording that was inspected.
-pub fn inspection_page(inspection: &Inspection) -> String {
+pub fn inspection_page(inspection: &InspectionReport) -> String {
     let unit = &inspection.unit;
     let spectra = chart(
         "Power spectral density",
@@ -83,15 +83,15 @@ pub fn inspection_page(inspection: &Inspection) -> String {
     page(&format!("Recording {}", inspection.name), &inspection.summary, &body)
 }
 
-fn found(inspection: &Inspection) -> Markup {
+fn found(inspection: &InspectionReport) -> Markup {
     html! {
         @if let Some(lost) = &inspection.loss_of_contact {
             p { strong { code { "loss_of_contact" } } ": " (lost) }
         }
-        @if inspection.found.is_empty() && inspection.troubles.is_empty() && inspection.loss_of_contact.is_none() {
+        @if inspection.found.is_empty() && inspection.pass_defects.is_empty() && inspection.loss_of_contact.is_none() {
             p { "Nothing that a faultless chain, a round wheel and a rail without defects wouldn't show (2 % false alarms)." }
         }
-        @for trouble in &inspection.troubles { p { strong { "Not usable: " } (trouble) } }
+        @for defect in &inspection.pass_defects { p { strong { "Not usable: " } (defect) } }
         @if !inspection.found.is_empty() {
             div.scroll { table {
                 tr { th { "what" } th.words { "where" } th { "by chance" } th.words { "seen" } }
@@ -151,7 +151,7 @@ mod tests {
             name: name.to_owned(),
             points: vec![(10.0, -20.0), (1000.0, 3.0)],
         };
-        let page = inspection_page(&Inspection {
+        let page = inspection_page(&InspectionReport {
             name: "a < b".to_owned(),
             summary: "One pass.".to_owned(),
             passes: vec![vec!["pass".to_owned()], vec!["one.csv".to_owned()]],
@@ -162,7 +162,7 @@ mod tests {
                 evidence: "loud".to_owned(),
             }],
             loss_of_contact: Some("the wheel loses contact".to_owned()),
-            troubles: vec![],
+            pass_defects: vec![],
             doubts: vec!["positions in steps".to_owned()],
             uses: vec!["nothing".to_owned()],
             spectra: vec![curve("one.csv")],

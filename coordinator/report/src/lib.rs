@@ -16,7 +16,7 @@ mod track_picture;
 
 pub use diagnosis_page::{Origin, diagnosis_page};
 pub use evaluation_page::evaluation_page;
-pub use inspection_page::{Inspected, InspectedCurve, Inspection, inspection_page};
+pub use inspection_page::{Inspected, InspectedCurve, InspectionReport, inspection_page};
 pub use inversion_page::inversion_page;
 pub use models_page::models_page;
 pub use receptance::{ReceptanceCurve, receptance_chart};

@@ -41,7 +41,7 @@ fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
     let y = Axis::around(&label, range);
     let mut label = parameter.label().to_owned();
     label[..1].make_ascii_uppercase();
-    if !known.is_told() {
+    if !known.beats_constant() {
         label += " (not told)";
     }
     let mut chart = Chart::new(&label, SIZE, x, y);

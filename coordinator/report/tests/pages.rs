@@ -81,7 +81,10 @@ fn evaluation(recording: &Recording, extractor: &Extractor) -> Evaluation {
             id,
             x_m,
             estimates: estimates(x_m, 0.0),
-            sd_if_even: estimates(x_m, 0.0).iter().map(|(&of, it)| (of, it.sd)).collect(),
+            sd_without_unevenness: estimates(x_m, 0.0)
+                .iter()
+                .map(|(&of, it)| (of, it.sd))
+                .collect(),
             selector: Selected {
                 estimates: estimates(x_m, 0.7),
                 entries: (0..10).collect(),

@@ -5,7 +5,7 @@ use super::library_url::LibraryUrl;
 use super::numbers::count;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
-use super::{OrInput, Stop, continuity, note, say};
+use super::{OrInput, Stop, continuity, println_stderr, println_stdout};
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -132,8 +132,8 @@ async fn add(
     let campaign = Campaign::read(&file, cases).or_input()?;
     let library = url.open_or_create().await?;
     let id = campaign.id();
-    continuity::check(&library, &campaign, note).await?;
-    continuity::tell_what_training_lacks(&campaign, note);
+    continuity::check(&library, &campaign, println_stderr).await?;
+    continuity::tell_what_training_lacks(&campaign, println_stderr);
     tracktwin_farm::campaign::insert_campaign(&library, &campaign).await?;
     // Before there is anything to hand out.
     if let Some(priority) = priority {
@@ -204,6 +204,6 @@ async fn refuse_others(library: &Library, id: &str, indices: &[u32]) -> Result<(
 
 async fn done(library: Library, line: &str) -> Result<(), Stop> {
     library.close().await;
-    say(line);
+    println_stdout(line);
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `tracktwin certs`: what a farm needs to trust its own.
 
 use super::files::Force;
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, println_stdout};
 use clap::Args;
 use std::path::PathBuf;
 use time::OffsetDateTime;
@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let Arguments { folder, force, hosts, days } = arguments;
     issue(folder, hosts, *days, OffsetDateTime::now_utc(), force.force).or_input()?;
     let dir = folder.display();
-    say(&format!(
+    println_stdout(&format!(
         "{dir}: certificates for {}, valid for {days} days\n\
          keep {dir}/ca-key.pem; hand ca.pem, token and, for mutual TLS, worker*.pem to workers\n\
          coordinator: --tls-cert {dir}/coordinator.pem --tls-key {dir}/coordinator-key.pem \

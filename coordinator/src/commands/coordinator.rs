@@ -165,8 +165,8 @@ async fn bind(argument: &str, address: SocketAddr) -> anyhow::Result<TcpListener
 }
 
 fn address(text: &str) -> Result<SocketAddr, String> {
-    let mend = "write IP:PORT, such as 127.0.0.1:7700, or 0.0.0.0:7700 for all of this machine's";
-    text.parse().map_err(|_| mend.to_owned())
+    let remedy = "write IP:PORT, such as 127.0.0.1:7700, or 0.0.0.0:7700 for all of this machine's";
+    text.parse().map_err(|_| remedy.to_owned())
 }
 
 /// A share: `1%` or `0.01`.

@@ -4,7 +4,7 @@ use super::evaluate::{Method, stop};
 use super::library_url::open_or_create;
 use super::progress::Progress;
 use super::simulate::Setting;
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, println_stdout};
 use crate::pipeline::compute::compute;
 use crate::pipeline::coverage::{Counts, Coverage, Kind, Row, inversion_rows};
 use crate::pipeline::evaluate::Evaluator;
@@ -76,9 +76,9 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let counts = Counts { tracks: tracks as usize, sleepers: sleepers as usize, seed };
     let rows = compute(|| rows(&evaluator, settings, counts))?;
     if json {
-        say(&serde_json::to_string_pretty(&rows)?);
+        println_stdout(&serde_json::to_string_pretty(&rows)?);
     } else {
-        say(&tables(&rows));
+        println_stdout(&tables(&rows));
     }
     let even =
         rows.iter().find(|row| matches!(row.kind, Kind::Inside { scatter } if scatter <= 0.0));
@@ -98,15 +98,15 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
     let rows = rows.await.context("inversion can't be scored")?;
     bar.into_inner().end();
     if arguments.json {
-        say(&serde_json::to_string_pretty(&rows)?);
+        println_stdout(&serde_json::to_string_pretty(&rows)?);
         return Ok(());
     }
-    say(
+    println_stdout(
         "scatter  parameter          sleepers  median |ln error|  in the 90 % interval  correlation  not valid",
     );
     for row in &rows {
         for (parameter, score) in &row.estimates {
-            say(&format!(
+            println_stdout(&format!(
                 "{:>5.0} %  {:18} {:>8}  {:>17.3}  {:>18.0} %  {:>11.2}  {:>7.1} %",
                 100.0 * row.scatter,
                 parameter.label(),

@@ -3,7 +3,7 @@
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::Stages;
-use super::{OrInput, Stop, note, say};
+use super::{OrInput, Stop, println_stderr, println_stdout};
 use crate::pipeline;
 use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
 use crate::pipeline::provenance;
@@ -57,7 +57,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, models, library, out, force, without } = arguments;
     let recording = Recording::open(&recording).or_input()?;
     check(&out, Kind::Results, force, &["report.html", "diagnosis.json"])?;
-    recording.doubts.iter().for_each(|doubt| note(doubt));
+    recording.doubts.iter().for_each(|doubt| println_stderr(doubt));
     let library = match library {
         // Models belong to a library that is there already.
         Some(url) if models.is_some() => Some(open_whole(&url).await?),
@@ -87,8 +87,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
             tracing::warn!("the library does not keep this diagnosis: {error:?}");
         }
     }
-    say(&diagnosis.sentence);
-    say(&format!("report: {}", out.join("report.html").display()));
+    println_stdout(&diagnosis.sentence);
+    println_stdout(&format!("report: {}", out.join("report.html").display()));
     match diagnosis.verdict {
         Verdict::Consistent => Ok(()),
         _ => Err(Stop::Negative),

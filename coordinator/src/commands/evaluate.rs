@@ -3,7 +3,7 @@
 use super::files::{Force, check, make_folder};
 use super::library_url::open_whole;
 use super::progress::Stages;
-use super::{OrInput, Stop, note, say};
+use super::{OrInput, Stop, println_stderr, println_stdout};
 use crate::pipeline::evaluate::{Evaluator, EvaluatorError};
 use crate::pipeline::invert::InvertingError;
 use crate::pipeline::{self, provenance};
@@ -75,7 +75,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let beside = method.is_none();
     let evaluation = evaluate(&recording, &library, models, &out, force, beside).await?;
     let sleepers = evaluation.sleepers.len();
-    say(&format!("{sleepers} sleepers evaluated; report: {}", out.join("report.html").display()));
+    println_stdout(&format!(
+        "{sleepers} sleepers evaluated; report: {}",
+        out.join("report.html").display()
+    ));
     conclude(&evaluation)
 }
 
@@ -84,7 +87,7 @@ async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Res
     let (recording, left_out) = usable(recording)?;
     let notes = [recording.doubts.clone(), left_out].concat();
     for line in &notes {
-        note(line);
+        println_stderr(line);
     }
     let design = TrackDesign::v_track();
     check_track(&recording, &design).or_input()?;
@@ -102,9 +105,12 @@ async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Res
     inversion.add_to(&mut output, "evaluation")?;
     output.commit()?;
     let (sleepers, report) = (inversion.sleepers.len(), folder.join("report.html"));
-    say(&format!("{sleepers} sleepers evaluated by inversion; report: {}", report.display()));
+    println_stdout(&format!(
+        "{sleepers} sleepers evaluated by inversion; report: {}",
+        report.display()
+    ));
     for sentence in &said {
-        say(sentence);
+        println_stdout(sentence);
     }
     if inversion.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
@@ -131,7 +137,7 @@ fn command() -> String {
 /// Says what lies outside the library; if that is most of the track, the answer is negative.
 pub(super) fn conclude(evaluation: &Evaluation) -> Result<(), Stop> {
     let outside = &evaluation.outside_library;
-    outside.sentences().iter().for_each(|sentence| say(sentence));
+    outside.sentences().iter().for_each(|sentence| println_stdout(sentence));
     if outside.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
 
@@ -169,7 +175,7 @@ pub(super) async fn evaluate(
     let (recording, left_out) = usable(recording)?;
     let notes = [recording.doubts.clone(), left_out].concat();
     for line in &notes {
-        note(line);
+        println_stderr(line);
     }
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     make_folder(folder)?;
@@ -185,7 +191,7 @@ pub(super) async fn evaluate(
             // The models' answer stands without it.
             Err(error) => {
                 let line = format!("not evaluated by inversion: {error}");
-                note(&line);
+                println_stderr(&line);
                 evaluation.notes.push(line);
             }
         }
@@ -217,18 +223,18 @@ fn flag(evaluation: &mut Evaluation, lost: &LossOfContact, passes: usize) {
         sleeper.flags.push(Flag::LossOfContact);
     }
     let line = format!("loss_of_contact: {}", lost.sentence(passes));
-    note(&line);
+    println_stderr(&line);
     evaluation.notes.push(line);
 }
 
 /// The recording without the passes that tell nothing of the track, and a note for what is wrong with
 /// them.
 fn usable(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
-    let (kept, troubles) = chain::usable(recording);
-    if let (true, Some(first)) = (kept.passes.is_empty(), troubles.first()) {
+    let (kept, pass_defects) = chain::usable(recording);
+    if let (true, Some(first)) = (kept.passes.is_empty(), pass_defects.first()) {
         return Err(Stop::Input(anyhow!("{}: no pass can be used: {first}", recording.name)));
     }
-    Ok((kept, troubles.iter().map(|why| format!("left out: {why}")).collect()))
+    Ok((kept, pass_defects.iter().map(|why| format!("left out: {why}")).collect()))
 }
 
 /// A library that can't be read is a failure; models that don't fit are mended by who gave them.

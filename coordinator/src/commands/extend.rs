@@ -1,7 +1,7 @@
 //! `tracktwin extend`: a campaign whose parameter space has what a diagnosis found.
 
 use super::files::{Force, read, read_text, write_file};
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, println_stdout};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use std::fmt::Write as _;
@@ -71,7 +71,7 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     write_file(&out, FileKind::Campaign, force, extended.as_bytes())?;
     let names: Vec<_> =
         accepted.iter().map(|(hypothesis, _)| hypothesis.physics.as_str()).collect();
-    say(&format!("{}: half of the cases have {}", out.display(), names.join(" and ")));
+    println_stdout(&format!("{}: half of the cases have {}", out.display(), names.join(" and ")));
     Ok(())
 }
 

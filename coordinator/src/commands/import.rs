@@ -2,7 +2,7 @@
 
 use super::files::{Force, read_text};
 use super::numbers::number;
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, println_stdout};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -172,9 +172,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     for ((one, folder), output) in imported.iter().zip(&folders).zip(outputs) {
         output.commit()?;
         for note in &one.notes {
-            say(note);
+            println_stdout(note);
         }
-        say(&format!("recording: {}; look at it: tracktwin inspect {0}", folder.display()));
+        println_stdout(&format!(
+            "recording: {}; look at it: tracktwin inspect {0}",
+            folder.display()
+        ));
     }
     Ok(())
 }

@@ -1,14 +1,14 @@
 //! `tracktwin inspect`: what is in a recording, and what it can be used for.
 
 use super::files::{Force, check_file, write_file};
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, println_stdout};
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_files::Kind;
-use tracktwin_inspection::{FirstLook, Place, first_look, tells_waves};
+use tracktwin_inspection::{Inspection, Place, inspect, separates_wavelengths};
 use tracktwin_number::{chance, rounded, significant};
 use tracktwin_parameters::TrackDesign;
-use tracktwin_report::{Inspected, InspectedCurve, Inspection, inspection_page};
+use tracktwin_report::{Inspected, InspectedCurve, InspectionReport, inspection_page};
 use tracktwin_signal::SAMPLES_A_PERIOD;
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_signal::{PowerSpectrum, Signal};
@@ -40,36 +40,36 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     if let Some(path) = &arguments.out {
         check_file(path, Kind::Results, arguments.force)?;
     }
-    let look = first_look(&recording);
-    let inspection = inspection(&recording, &look);
+    let inspection = inspect(&recording);
+    let report = report(&recording, &inspection);
     if arguments.json {
-        say(&format!("{:#}", json(&recording, &look, &inspection)));
+        println_stdout(&format!("{:#}", json(&recording, &inspection, &report)));
     } else {
-        print(&inspection);
+        print(&report);
     }
     if let Some(path) = &arguments.out {
-        write_file(path, Kind::Results, arguments.force, inspection_page(&inspection).as_bytes())?;
+        write_file(path, Kind::Results, arguments.force, inspection_page(&report).as_bytes())?;
         if !arguments.json {
-            say(&format!("page: {}", path.display()));
+            println_stdout(&format!("page: {}", path.display()));
         }
     }
     Ok(())
 }
 
-fn print(inspection: &Inspection) {
-    say(&inspection.summary);
-    for row in &inspection.passes {
+fn print(report: &InspectionReport) {
+    println_stdout(&report.summary);
+    for row in &report.passes {
         let cells: Vec<String> = row.iter().map(|cell| format!("{cell:<14}")).collect();
-        say(&cells.concat());
+        println_stdout(&cells.concat());
     }
-    for trouble in &inspection.troubles {
-        say(&format!("not usable: {trouble}"));
+    for defect in &report.pass_defects {
+        println_stdout(&format!("not usable: {defect}"));
     }
-    if let Some(lost) = &inspection.loss_of_contact {
-        say(&format!("loss_of_contact: {lost}"));
+    if let Some(lost) = &report.loss_of_contact {
+        println_stdout(&format!("loss_of_contact: {lost}"));
     }
-    for found in &inspection.found {
-        say(&format!(
+    for found in &report.found {
+        println_stdout(&format!(
             "{} ({}; by chance {}): {}",
             found.physics,
             found.place,
@@ -77,12 +77,16 @@ fn print(inspection: &Inspection) {
             found.evidence
         ));
     }
-    for text in inspection.doubts.iter().chain(&inspection.uses) {
-        say(text);
+    for text in report.doubts.iter().chain(&report.uses) {
+        println_stdout(text);
     }
 }
 
-fn json(recording: &Recording, look: &FirstLook, inspection: &Inspection) -> serde_json::Value {
+fn json(
+    recording: &Recording,
+    inspection: &Inspection,
+    report: &InspectionReport,
+) -> serde_json::Value {
     let finding = |finding: &tracktwin_inspection::Finding| {
         let parameters: serde_json::Map<String, serde_json::Value> = finding
             .parameters
@@ -108,49 +112,49 @@ fn json(recording: &Recording, look: &FirstLook, inspection: &Inspection) -> ser
         "passes": recording.passes.len(),
         "speeds_km_h": recording.speeds_km_h(),
         "sleepers": recording.sleepers.len(),
-        "findings": look.findings.iter().map(finding).collect::<Vec<_>>(),
-        "loss_of_contact": look.loss_of_contact,
-        "not_usable": inspection.troubles,
-        "doubts": inspection.doubts,
-        "uses": inspection.uses,
+        "findings": inspection.findings.iter().map(finding).collect::<Vec<_>>(),
+        "loss_of_contact": inspection.loss_of_contact,
+        "not_usable": report.pass_defects,
+        "doubts": report.doubts,
+        "uses": report.uses,
     })
 }
 
-fn inspection(recording: &Recording, look: &FirstLook) -> Inspection {
+fn report(recording: &Recording, inspection: &Inspection) -> InspectionReport {
     let speeds: Vec<String> =
         recording.speeds_km_h().iter().map(|speed| rounded(*speed, 3)).collect();
     let unit = if recording.gain_known() { "m/s²" } else { "unit" };
     let seconds: f64 = recording.passes.iter().map(|pass| pass.signal.duration_s()).sum();
-    Inspection {
+    InspectionReport {
         name: recording.name.clone(),
         summary: format!(
             "{} at {} km/h, {seconds:.1} s at {} Hz in all, {}, {}.",
-            counted(recording.passes.len(), "pass", "passes"),
+            pluralize(recording.passes.len(), "pass", "passes"),
             speeds.join(", "),
             rounded(recording.sample_rate_hz, 8),
-            counted(recording.sleepers.len(), "sleeper", "sleepers"),
-            counted(
-                look.findings.len() + usize::from(look.loss_of_contact.is_some()),
+            pluralize(recording.sleepers.len(), "sleeper", "sleepers"),
+            pluralize(
+                inspection.findings.len() + usize::from(inspection.loss_of_contact.is_some()),
                 "finding",
                 "findings"
             )
         ),
-        passes: passes(recording, look),
-        found: look.findings.iter().map(found).collect(),
-        loss_of_contact: look
+        passes: passes(recording, inspection),
+        found: inspection.findings.iter().map(found).collect(),
+        loss_of_contact: inspection
             .loss_of_contact
             .as_ref()
             .map(|lost| lost.sentence(recording.passes.len())),
-        troubles: look.troubles.iter().map(ToString::to_string).collect(),
+        pass_defects: inspection.pass_defects.iter().map(ToString::to_string).collect(),
         doubts: recording.doubts.clone(),
-        uses: uses(recording, look),
+        uses: uses(recording, inspection),
         spectra: curves(recording, |pass| spectrum(&pass.signal)),
         levels: curves(recording, levels),
         unit: unit.to_owned(),
     }
 }
 
-fn counted(count: usize, one: &str, many: &str) -> String {
+fn pluralize(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 
@@ -163,7 +167,7 @@ fn found(finding: &tracktwin_inspection::Finding) -> Inspected {
     Inspected { physics, place, p_value: finding.p_value, evidence }
 }
 
-fn passes(recording: &Recording, look: &FirstLook) -> Vec<Vec<String>> {
+fn passes(recording: &Recording, inspection: &Inspection) -> Vec<Vec<String>> {
     let heads = ["pass", "km/h", "from m", "to m", "s", "rms", "peak", "noise rms", "gain dB"];
     let mut rows = vec![heads.map(str::to_owned).to_vec()];
     for (index, pass) in recording.passes.iter().enumerate() {
@@ -171,11 +175,11 @@ fn passes(recording: &Recording, look: &FirstLook) -> Vec<Vec<String>> {
         let square = samples.iter().map(|value| value * value).sum::<f64>();
         let peak = samples.iter().map(|value| value.abs()).fold(0.0, f64::max);
         // White noise of this density up to half the sample rate.
-        let noise = look.noise_floors[index].map_or_else(
+        let noise = inspection.noise_floors[index].map_or_else(
             || "–".to_owned(),
             |d| significant((d * 0.5 * recording.sample_rate_hz).sqrt(), 2),
         );
-        let gain = look.gains.iter().find(|gain| gain.pass == index);
+        let gain = inspection.gains.iter().find(|gain| gain.pass == index);
         rows.push(vec![
             (index + 1).to_string(),
             format!("{:.2}", pass.speed_km_h),
@@ -191,7 +195,7 @@ fn passes(recording: &Recording, look: &FirstLook) -> Vec<Vec<String>> {
     rows
 }
 
-fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
+fn uses(recording: &Recording, inspection: &Inspection) -> Vec<String> {
     let mut uses = Vec::new();
     let rate = recording.sample_rate_hz;
     if recording.sleepers.is_empty() {
@@ -204,14 +208,14 @@ fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
             rate / SAMPLES_A_PERIOD
         ));
     }
-    if !tells_waves(&recording.passes) {
+    if !separates_wavelengths(&recording.passes) {
         let fastest = recording.speeds_km_h().into_iter().fold(0.0, f64::max);
         uses.push(format!(
             "one speed only: what is fixed in frequency (structure) and in wavelength (surface) can't be told apart, so neither corrugation nor orders of a known wheel are looked for; add a pass {:.0} km/h slower",
             0.25 * fastest
         ));
     }
-    if look.offsets.is_empty() {
+    if inspection.offsets.is_empty() {
         uses.push("no speed has two passes: what repeats can't be told from noise".to_owned());
     }
     if let Err(other) = recording.check_track(&TrackDesign::v_track()) {
@@ -222,7 +226,7 @@ fn uses(recording: &Recording, look: &FirstLook) -> Vec<String> {
             other.known()
         ));
     }
-    if uses.is_empty() && look.troubles.is_empty() && recording.doubts.is_empty() {
+    if uses.is_empty() && inspection.pass_defects.is_empty() && recording.doubts.is_empty() {
         uses.push("fit for `evaluate` and `diagnose` with models of its speeds".to_owned());
     }
     uses

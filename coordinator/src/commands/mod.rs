@@ -109,7 +109,7 @@ pub fn main() -> ExitCode {
     log_to_stderr(program.log_format, filter(&program));
     let ended = run(program.command);
     if let Some(error) = UNWRITTEN.get() {
-        note(&format!("tracktwin: standard output: {error}"));
+        println_stderr(&format!("tracktwin: standard output: {error}"));
         return ExitCode::from(3);
     }
     match ended {
@@ -123,7 +123,7 @@ pub fn main() -> ExitCode {
 /// One line that says what is wrong.
 fn report(error: &anyhow::Error, code: u8) -> ExitCode {
     let line = chain(error).replace('\n', " ");
-    note(&format!("tracktwin: {line}"));
+    println_stderr(&format!("tracktwin: {line}"));
     ExitCode::from(code)
 }
 
@@ -183,12 +183,12 @@ fn asynchronously(work: impl Future<Output = Result<(), Stop>>) -> Result<(), St
 fn completions(shell: clap_complete::Shell) {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Program::command(), "tracktwin", &mut script);
-    answer(&script);
+    write_stdout(&script);
 }
 
 /// Says a line of the command's answer on standard output.
-fn say(line: &str) {
-    answer(format!("{line}\n").as_bytes());
+fn println_stdout(line: &str) {
+    write_stdout(format!("{line}\n").as_bytes());
 }
 
 /// What kept an answer from being written; the program ends with it, once all else is wound up.
@@ -196,7 +196,7 @@ static UNWRITTEN: OnceLock<std::io::Error> = OnceLock::new();
 
 /// Whether anybody reads: who did may have gone, as `head` does once it has its lines, and then nothing
 /// is amiss.
-fn answer(text: &[u8]) -> bool {
+fn write_stdout(text: &[u8]) -> bool {
     let mut out = std::io::stdout().lock();
     match out.write_all(text).and_then(|()| out.flush()) {
         Ok(()) => true,
@@ -210,7 +210,7 @@ fn answer(text: &[u8]) -> bool {
 }
 
 /// Says a line beside the answer on standard error, if anybody reads that.
-fn note(line: &str) {
+fn println_stderr(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 

@@ -1,6 +1,6 @@
 //! How far long work has come: a bar in a terminal, a line now and then elsewhere.
 
-use super::note;
+use super::println_stderr;
 use crate::pipeline::models::group_name;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use parking_lot::Mutex;
@@ -56,7 +56,7 @@ impl Progress {
         self.bar.finish_and_clear();
         if self.last_line.is_some() {
             let seconds = self.begun.elapsed().as_secs_f64();
-            note(&format!("{}: done in {seconds:.1} s", self.stage));
+            println_stderr(&format!("{}: done in {seconds:.1} s", self.stage));
         }
     }
 
@@ -70,7 +70,7 @@ impl Progress {
                 format!("{:.0} s", a_step * total.saturating_sub(done) as f64)
             }
         };
-        note(&format!("{}: {done} of {total}, {left} left {remark}", self.stage));
+        println_stderr(&format!("{}: {done} of {total}, {left} left {remark}", self.stage));
     }
 }
 

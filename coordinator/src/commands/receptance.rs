@@ -3,7 +3,7 @@
 use super::files::{Force, check, is_stream, write_file};
 use super::numbers::{count, number};
 use super::simulate::Track;
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, println_stdout};
 use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -50,7 +50,7 @@ pub(super) struct Arguments {
 
 /// A place on the rail, as it is written.
 #[derive(Clone, Copy, Debug)]
-enum Spot {
+enum TestPoint {
     Sleeper,
     Midspan,
     At(f64),
@@ -59,8 +59,8 @@ enum Spot {
 /// Where is struck, where is measured, and how that was written.
 #[derive(Clone, Debug)]
 struct Test {
-    struck: Spot,
-    measured: Spot,
+    struck: TestPoint,
+    measured: TestPoint,
     name: String,
 }
 
@@ -69,17 +69,21 @@ impl FromStr for Test {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (struck, measured) = text.split_once(':').unwrap_or((text, text));
-        Ok(Self { struck: spot(struck)?, measured: spot(measured)?, name: text.to_owned() })
+        Ok(Self {
+            struck: test_point(struck)?,
+            measured: test_point(measured)?,
+            name: text.to_owned(),
+        })
     }
 }
 
-fn spot(text: &str) -> Result<Spot, String> {
+fn test_point(text: &str) -> Result<TestPoint, String> {
     match text {
-        "sleeper" => Ok(Spot::Sleeper),
-        "midspan" => Ok(Spot::Midspan),
+        "sleeper" => Ok(TestPoint::Sleeper),
+        "midspan" => Ok(TestPoint::Midspan),
         _ => PLACE
             .parse(text)
-            .map(Spot::At)
+            .map(TestPoint::At)
             .map_err(|error| format!("{error}; write sleeper, midspan or a position in m")),
     }
 }
@@ -93,10 +97,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let model = model(arguments.spans, preset, &set)?;
     let middle = arguments.spans / 2;
     let spacing = preset.design().sleeper.spacing_m;
-    let place = |spot| match spot {
-        Spot::Sleeper => Place::Rail(middle as f64 * spacing),
-        Spot::Midspan => Place::Rail((middle as f64 + 0.5) * spacing),
-        Spot::At(x_m) => Place::Rail(x_m),
+    let place = |test_point| match test_point {
+        TestPoint::Sleeper => Place::Rail(middle as f64 * spacing),
+        TestPoint::Midspan => Place::Rail((middle as f64 + 0.5) * spacing),
+        TestPoint::At(x_m) => Place::Rail(x_m),
     };
     let mut curves = Vec::new();
     for test in &arguments.at {
@@ -122,7 +126,7 @@ fn write(arguments: &Arguments, table: &[u8], picture: &str) -> Result<(), Stop>
     output.add(&table_name, table)?;
     output.commit()?;
     let picture = picture_name.within(&folder);
-    say(&format!("receptance: {}; picture: {}", out.display(), picture.display()));
+    println_stdout(&format!("receptance: {}; picture: {}", out.display(), picture.display()));
     Ok(())
 }
 

@@ -1,10 +1,10 @@
 //! `tracktwin reproduce`: the paper's results beside this program's.
 
 use super::files::{Force, check, make_folder};
-use super::library::{MEND, choose};
+use super::library::{CHOOSE_REMEDY, choose};
 use super::library_url::LibraryUrl;
 use super::progress::{Progress, TrainingBar};
-use super::{OrInput, Stop, evaluate, say};
+use super::{OrInput, Stop, evaluate, println_stdout};
 use crate::pipeline;
 use crate::pipeline::compute::compute;
 use crate::pipeline::evaluate::Evaluator;
@@ -86,7 +86,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     };
     let material = Material::read(&library, &campaign, models).await?;
     let reproduction = compute(|| compare(&figures, &experiment, &material)).or_input()?;
-    answer(&reproduction, out, arguments.force)
+    write_and_print(&reproduction, out, arguments.force)
 }
 
 /// Models of the campaign, where none were given.
@@ -123,7 +123,7 @@ async fn campaign(
     id: Option<&str>,
     models: Option<&Trained>,
 ) -> Result<CampaignRecord, Stop> {
-    let campaign = choose(library, id.or(models.map(Trained::campaign)), MEND).await?;
+    let campaign = choose(library, id.or(models.map(Trained::campaign)), CHOOSE_REMEDY).await?;
     match models {
         Some(models) if models.campaign() != campaign.id => {
             let (of, id) = (models.campaign(), &campaign.id);
@@ -210,7 +210,7 @@ fn compare(
 }
 
 /// Writes the files, says every row, and is negative if one differs.
-fn answer(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), Stop> {
+fn write_and_print(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), Stop> {
     let page = tracktwin_report::reproduction_page(reproduction);
     let mut output = Output::begin(out, Kind::Results, force.force)?;
     output.add(&FileName::new(PAGE)?, page.as_bytes())?;
@@ -218,10 +218,13 @@ fn answer(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), S
     output.commit()?;
     for row in &reproduction.rows {
         let (figure, verdict) = (row.figure.name(), row.verdict.label());
-        say(&format!("{figure:6} {verdict:12} {}: {} (paper: {})", row.claim, row.ours, row.paper));
+        println_stdout(&format!(
+            "{figure:6} {verdict:12} {}: {} (paper: {})",
+            row.claim, row.ours, row.paper
+        ));
     }
     let count = |verdict| reproduction.count(verdict);
-    say(&format!(
+    println_stdout(&format!(
         "{} reproduced, {} differ, {} cannot be told; page: {}",
         count(Verdict::Reproduced),
         count(Verdict::Differs),

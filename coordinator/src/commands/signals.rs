@@ -1,6 +1,6 @@
 //! What ends long work from outside.
 
-use super::note;
+use super::println_stderr;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 
@@ -22,7 +22,7 @@ pub(super) fn stop_on_signal(notice: &'static str) -> std::io::Result<Cancellati
             if stop.is_cancelled() {
                 std::process::exit(128 + kind.as_raw_value());
             }
-            note(notice);
+            println_stderr(notice);
             stop.cancel();
         }
     });

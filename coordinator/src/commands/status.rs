@@ -1,7 +1,7 @@
 //! `tracktwin status`: how far a farm is, once or all the time.
 
 use super::library_url::LibraryUrl;
-use super::{Stop, answer};
+use super::{Stop, write_stdout};
 use crate::commands::contact::contact_sentence;
 use clap::Args;
 use serde_json::{Value, json};
@@ -52,7 +52,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         } else {
             format!("{}\n", text(&farm))
         };
-        let is_read = answer(text.as_bytes());
+        let is_read = write_stdout(text.as_bytes());
         if !(arguments.watch && is_read) {
             library.close().await;
             return Ok(());

@@ -1,10 +1,10 @@
 //! `tracktwin train`: Gaussian-process models from a library.
 
 use super::files::{Force, make_folder};
-use super::library::{MEND, choose};
+use super::library::{CHOOSE_REMEDY, choose};
 use super::library_url::LibraryUrl;
 use super::progress::TrainingBar;
-use super::{Stop, say};
+use super::{Stop, println_stdout};
 use crate::pipeline::models::{check_files, group_name, train_into};
 use clap::Args;
 use std::path::PathBuf;
@@ -36,14 +36,14 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { library, out, force: Force { force }, campaign, seed } = arguments;
     check_files(&out, force)?;
     let library = library.open_whole().await?;
-    let campaign = choose(&library, campaign.as_deref(), MEND).await?;
+    let campaign = choose(&library, campaign.as_deref(), CHOOSE_REMEDY).await?;
     // Before hours of training.
     make_folder(&out)?;
     let bar = TrainingBar::default();
     let trained = train_into(&out, force, &library, &campaign, seed, &|at| bar.at(&at)).await?;
     bar.end();
-    say(&table(&trained));
-    say(&format!("models: {}", out.display()));
+    println_stdout(&table(&trained));
+    println_stdout(&format!("models: {}", out.display()));
     Ok(())
 }
 

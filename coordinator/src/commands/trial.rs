@@ -3,7 +3,7 @@
 use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::progress::Progress;
-use super::{OrInput, Stop, say};
+use super::{OrInput, Stop, println_stdout};
 use crate::pipeline::evaluate::Evaluator;
 use crate::pipeline::trial::{Trial, TrialError, check_folder};
 use anyhow::anyhow;
@@ -95,9 +95,13 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         force: force.force,
     };
     let digest = trial.begin().await.map_err(stop)?;
-    say(&format!("sealed: {cases} truths, SHA-256 of seals.sha256 {digest}"));
+    println_stdout(&format!("sealed: {cases} truths, SHA-256 of seals.sha256 {digest}"));
     let done = trial.answered().await.map_err(stop)?;
-    say(&format!("trial {} in {}: {done} of {cases} answered", trial.id(), trial.library.name()));
+    println_stdout(&format!(
+        "trial {} in {}: {done} of {cases} answered",
+        trial.id(),
+        trial.library.name()
+    ));
 
     let mut progress = Progress::begin("diagnosing", done, u64::from(cases));
     let answered = trial.answer(|done, remark| progress.at(done, remark)).await;
@@ -106,8 +110,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     summary
         .rows
         .iter()
-        .for_each(|row| say(&format!("{}: {} ({})", row.measure, row.value, row.goal)));
-    say(&format!("tables: {}", trial.folder.join("trial.md").display()));
+        .for_each(|row| println_stdout(&format!("{}: {} ({})", row.measure, row.value, row.goal)));
+    println_stdout(&format!("tables: {}", trial.folder.join("trial.md").display()));
     let missed = summary.rows.iter().any(|row| row.reached == Some(false));
     if missed { Err(Stop::Negative) } else { Ok(()) }
 }

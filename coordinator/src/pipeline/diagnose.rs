@@ -7,10 +7,10 @@ use crate::pipeline::compute::compute;
 use crate::pipeline::null_models::{self, NullModelError};
 use nalgebra::DVector;
 use tracktwin_diagnosis::{
-    CalibrationError, Candidate, Diagnosis, Evidence, Search, Stage, Subject, SubjectError,
-    check_track, first_calibration, passes_alone, search,
+    CalibrationError, Candidate, Diagnosis, Evidence, PreparationError, PreparedRecording, Search,
+    Stage, check_track, first_calibration, passes_alone, search,
 };
-use tracktwin_inspection::{FirstLook, first_look};
+use tracktwin_inspection::{Inspection, inspect};
 use tracktwin_library::Library;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
@@ -45,7 +45,7 @@ pub struct Diagnosed {
 #[derive(Debug)]
 pub struct Compared {
     /// What was compared.
-    pub subject: Subject,
+    pub prepared: PreparedRecording,
     /// What the search found.
     pub search: Search,
 }
@@ -55,7 +55,7 @@ pub struct Compared {
 pub enum DiagnosingError {
     /// The recording cannot be diagnosed.
     #[error(transparent)]
-    Recording(#[from] SubjectError),
+    Recording(#[from] PreparationError),
     /// The model of the track cannot be fitted without anything left out.
     #[error("no baseline fits: {0}")]
     Baseline(#[source] CalibrationError),
@@ -83,56 +83,56 @@ pub async fn diagnose(
     let allowed = |physics: &str| !without.iter().any(|other| other == physics);
     check_track(recording, design)?;
     watch("first look", 0.0);
-    let mut look = compute(|| first_look(recording));
-    let mut subject = match compute(|| Subject::new(recording, design)) {
-        Ok(subject) => subject,
+    let mut inspection = compute(|| inspect(recording));
+    let mut prepared = match compute(|| PreparedRecording::new(recording, design)) {
+        Ok(prepared) => prepared,
         Err(reason) => {
-            look.forget(allowed);
-            let diagnosis = passes_alone(recording, &look, &reason).ok_or(reason)?;
+            inspection.forget(allowed);
+            let diagnosis = passes_alone(recording, &inspection, &reason).ok_or(reason)?;
             return Ok(Diagnosed { diagnosis, compared: None });
         }
     };
-    if let Some(trouble) = look.refusal() {
-        return Err(SubjectError::Unusable(trouble.clone()).into());
+    if let Some(defect) = inspection.refusal() {
+        return Err(PreparationError::Unusable(defect.clone()).into());
     }
-    look.forget(allowed);
+    inspection.forget(allowed);
     if let Some(orders) = shuffle {
-        look.ignore();
-        let (speeds, sleepers) = (subject.pass_numbers.len(), subject.forward.section.sleepers);
-        subject.shuffle(&orders(speeds, sleepers));
+        inspection.ignore();
+        let (speeds, sleepers) = (prepared.pass_numbers.len(), prepared.forward.section.sleepers);
+        prepared.shuffle(&orders(speeds, sleepers));
     }
-    let suggested = subject.suggested(&look);
-    subject.without = without.to_vec();
+    let suggested = prepared.suggested(&inspection);
+    prepared.without = without.to_vec();
     watch("baseline", 0.0);
-    let start = compute(|| baseline(&mut subject)).map_err(DiagnosingError::Baseline)?;
+    let start = compute(|| baseline(&mut prepared)).map_err(DiagnosingError::Baseline)?;
     watch("null model", 0.0);
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
-    let null = null_models::of(&subject, &start, library, share).await?;
-    let mut all = tracktwin_diagnosis::candidates(&subject.forward.section);
+    let null = null_models::of(&prepared, &start, library, share).await?;
+    let mut all = tracktwin_diagnosis::candidates(&prepared.forward.section);
     all.extend(suggested);
     all.retain(|candidate: &Candidate| allowed(candidate.kind.physics));
     let progress = |stage, share| watch(name(stage), share);
-    let found = compute(|| search(&subject, &null, start, &all, &progress));
+    let found = compute(|| search(&prepared, &null, start, &all, &progress));
     let search = found.map_err(DiagnosingError::Search)?;
-    let diagnosis = compute(|| conclude(recording, &subject, &look, &search))?;
-    Ok(Diagnosed { diagnosis, compared: Some(Compared { subject, search }) })
+    let diagnosis = compute(|| conclude(recording, &prepared, &inspection, &search))?;
+    Ok(Diagnosed { diagnosis, compared: Some(Compared { prepared, search }) })
 }
 
 /// The track re-tuned with nothing left out, and what may differ beyond the section.
-fn baseline(subject: &mut Subject) -> Result<DVector<f64>, CalibrationError> {
-    let start = first_calibration(subject)?;
-    subject.forward.allow_beyond(&start)?;
+fn baseline(prepared: &mut PreparedRecording) -> Result<DVector<f64>, CalibrationError> {
+    let start = first_calibration(prepared)?;
+    prepared.forward.allow_beyond(&start)?;
     Ok(start)
 }
 
 fn conclude(
     recording: &Recording,
-    subject: &Subject,
-    look: &FirstLook,
+    prepared: &PreparedRecording,
+    inspection: &Inspection,
     search: &Search,
 ) -> Result<Diagnosis, DiagnosingError> {
-    let evidence = Evidence { recording, subject, look, search };
+    let evidence = Evidence { recording, prepared, inspection, search };
     evidence.conclude().map_err(DiagnosingError::Conclusion)
 }
 

@@ -5,7 +5,9 @@ use crate::pipeline::null_models::{self, NullModelError};
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use tracktwin_diagnosis::{CalibrationError, NullModel, Subject, SubjectError, first_calibration};
+use tracktwin_diagnosis::{
+    CalibrationError, NullModel, PreparationError, PreparedRecording, first_calibration,
+};
 use tracktwin_evaluation::Flag;
 use tracktwin_inspection::chain;
 use tracktwin_inversion::{Fitted, Inversion, fit, sections};
@@ -18,7 +20,7 @@ use tracktwin_signal::recording::Recording;
 pub enum InvertingError {
     /// The recording cannot be compared with the track model.
     #[error(transparent)]
-    Recording(#[from] SubjectError),
+    Recording(#[from] PreparationError),
     /// No track fits.
     #[error("no track fits the recording: {0}")]
     Fit(#[from] CalibrationError),
@@ -39,13 +41,13 @@ pub async fn invert(
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Inversion, InvertingError> {
     watch("spectra", 0.0);
-    let subjects = compute(|| sections(recording, design))?;
-    let started = compute(|| start(subjects, watch))?;
-    let (subject, values) = &started[started.len() / 2];
+    let prepared = compute(|| sections(recording, design))?;
+    let started = compute(|| start(prepared, watch))?;
+    let (prepared, values) = &started[started.len() / 2];
     watch("null model", 0.0);
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
-    let null = null_models::of(subject, values, library, share).await?;
+    let null = null_models::of(prepared, values, library, share).await?;
     let fitted = compute(|| fit_all(started, &null, watch))?;
     let mut inversion = Inversion::of(recording, &fitted);
     if let Some(lost) = chain::loss_of_contact(recording) {
@@ -59,29 +61,29 @@ pub async fn invert(
 
 /// A first fit of every section, and what lies beyond it.
 fn start(
-    subjects: Vec<Subject>,
+    prepared: Vec<PreparedRecording>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
-) -> Result<Vec<(Subject, DVector<f64>)>, CalibrationError> {
-    let (done, all) = (AtomicUsize::new(0), subjects.len() as f64);
-    let one = |mut subject: Subject| {
-        let values = first_calibration(&subject)?;
-        subject.forward.allow_beyond(&values)?;
+) -> Result<Vec<(PreparedRecording, DVector<f64>)>, CalibrationError> {
+    let (done, all) = (AtomicUsize::new(0), prepared.len() as f64);
+    let one = |mut prepared: PreparedRecording| {
+        let values = first_calibration(&prepared)?;
+        prepared.forward.allow_beyond(&values)?;
         watch("first fit", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
-        Ok((subject, values))
+        Ok((prepared, values))
     };
-    subjects.into_par_iter().map(one).collect()
+    prepared.into_par_iter().map(one).collect()
 }
 
 fn fit_all(
-    started: Vec<(Subject, DVector<f64>)>,
+    started: Vec<(PreparedRecording, DVector<f64>)>,
     null: &NullModel,
     watch: &(dyn Fn(&'static str, f64) + Sync),
-) -> Result<Vec<(Subject, Fitted)>, CalibrationError> {
+) -> Result<Vec<(PreparedRecording, Fitted)>, CalibrationError> {
     let (done, all) = (AtomicUsize::new(0), started.len() as f64);
-    let one = |(subject, values): (Subject, DVector<f64>)| {
-        let fitted = fit(&subject, null, values)?;
+    let one = |(prepared, values): (PreparedRecording, DVector<f64>)| {
+        let fitted = fit(&prepared, null, values)?;
         watch("fit", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
-        Ok((subject, fitted))
+        Ok((prepared, fitted))
     };
     started.into_par_iter().map(one).collect()
 }

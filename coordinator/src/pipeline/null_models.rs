@@ -3,7 +3,7 @@
 use super::compute::compute;
 use nalgebra::DVector;
 use serde::Serialize;
-use tracktwin_diagnosis::{NullError, NullModel, Subject};
+use tracktwin_diagnosis::{NullError, NullModel, PreparedRecording};
 use tracktwin_experiment::MODEL_HASH;
 use tracktwin_library::{Library, LibraryError, StoredArray};
 use tracktwin_parameters::TrackDesign;
@@ -45,12 +45,12 @@ struct Key<'a> {
 /// # Errors
 /// [`NullModelError`].
 pub async fn of(
-    subject: &Subject,
+    prepared: &PreparedRecording,
     values: &DVector<f64>,
     library: Option<&Library>,
     progress: impl Fn(u64) + Sync,
 ) -> Result<NullModel, NullModelError> {
-    let forward = &subject.forward;
+    let forward = &prepared.forward;
     let grid = NullModel::grid_values(forward, values);
     let key = Key {
         model_hash: MODEL_HASH,

@@ -5,7 +5,9 @@ use crate::pipeline::train;
 use std::collections::BTreeMap;
 use tracktwin_experiment::Experiment;
 use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
-use tracktwin_reproduction::{Compared, Error, Example, Figure, Results, SPEED_KM_H, Source, Told};
+use tracktwin_reproduction::{
+    Compared, Error, EvaluatedExample, Example, Figure, Results, SPEED_KM_H, Source,
+};
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_signal::{FeatureSet, Signal};
 use tracktwin_surrogate::{Trained, TrainingSet};
@@ -101,8 +103,10 @@ fn test_errors(set: &TrainingSet, models: &Trained) -> Result<Compared, Reproduc
 fn evaluated(
     evaluator: &Evaluator,
     recordings: Vec<(Example, Recording)>,
-) -> Result<Vec<Told>, ReproducingError> {
-    let told = |(example, recording)| Ok(Told::new(example, &evaluator.evaluate(&recording)?)?);
+) -> Result<Vec<EvaluatedExample>, ReproducingError> {
+    let told = |(example, recording)| {
+        Ok(EvaluatedExample::new(example, &evaluator.evaluate(&recording)?)?)
+    };
     recordings.into_iter().map(told).collect()
 }
 
@@ -120,19 +124,19 @@ pub fn recordings(
     let all = Figure::ALL.iter().flat_map(|&figure| tracktwin_reproduction::examples(figure));
     let wanted = |(_, example): &(u64, Example)| figures.contains(&example.figure);
     let examples: Vec<(u64, Example)> = (SEED..).zip(all).filter(wanted).collect();
-    let section = Section::new(experiment);
+    let example_track = ExampleTrack::new(experiment);
     let tracks = examples
         .iter()
-        .map(|(_, example)| section.track(example).map_err(Error::from))
+        .map(|(_, example)| example_track.track(example).map_err(Error::from))
         .collect::<Result<Vec<_>, _>>()?;
     let surfaces: Vec<Surface> = tracks
         .iter()
         .zip(&examples)
-        .map(|(track, (seed, example))| section.surface(track, example, *seed))
+        .map(|(track, (seed, example))| example_track.surface(track, example, *seed))
         .collect();
     let mut passes = vec![Vec::new(); examples.len()];
     for (done, &speed_km_h) in experiment.speeds_km_h.iter().enumerate() {
-        let records = time::passes(&tracks, &section.pass(speed_km_h), &surfaces)?;
+        let records = time::passes(&tracks, &example_track.pass(speed_km_h), &surfaces)?;
         for (passes, record) in passes.iter_mut().zip(records) {
             passes.push(recorded(record, speed_km_h)?);
         }
@@ -140,20 +144,20 @@ pub fn recordings(
     }
     let mut out: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for ((_, example), passes) in examples.into_iter().zip(passes) {
-        let recording = section.recording(&example.name, passes);
+        let recording = example_track.recording(&example.name, passes);
         out.entry(example.figure).or_default().push((example, recording));
     }
     Ok(out)
 }
 
 /// Nine sleepers in the middle of the campaign's own track.
-struct Section<'a> {
+struct ExampleTrack<'a> {
     experiment: &'a Experiment,
     /// Span at whose end the first of the nine stands, counted from 1.
     first: usize,
 }
 
-impl<'a> Section<'a> {
+impl<'a> ExampleTrack<'a> {
     fn new(experiment: &'a Experiment) -> Self {
         Self { experiment, first: (experiment.spans - SECTION_SPANS) / 2 }
     }
@@ -248,16 +252,16 @@ mod tests {
     #[test]
     fn the_section_lies_in_the_middle_with_its_own_mesh_and_its_own_stiffness() {
         let experiment = Experiment::new(TrackDesign::v_track());
-        let section = Section::new(&experiment);
-        assert!((section.x_m(5) - 2.5).abs() < 1e-12, "the fifth of nine is in the middle");
-        let elements = section.rail_elements();
+        let example_track = ExampleTrack::new(&experiment);
+        assert!((example_track.x_m(5) - 2.5).abs() < 1e-12, "the fifth of nine is in the middle");
+        let elements = example_track.rail_elements();
         assert_eq!(elements.len(), 40);
         assert_eq!(elements[15..=24], [4, 417, 417, 417, 417, 20, 20, 20, 20, 4]);
         for speed_km_h in [7.0, 13.0] {
-            let pass = section.pass(speed_km_h);
+            let pass = example_track.pass(speed_km_h);
             assert!(pass.start_m > 0.0 && pass.end_m < 5.0);
             let margin_m = experiment.features.margin_s * speed_km_h / 3.6;
-            assert!(pass.end_m - section.x_m(9) > margin_m + 0.5 * section.spacing_m());
+            assert!(pass.end_m - example_track.x_m(9) > margin_m + 0.5 * example_track.spacing_m());
         }
     }
 

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 ///
 /// They are written into a hidden folder beside their places and get their names when all are
 /// whole ([`Output::commit`]). A set with a manifest, a file that names the others, never replaces
-/// one of the others ([`Output::settle`]): until the manifest is replaced, which is one step, the
+/// one of the others ([`Output::unique_name`]): until the manifest is replaced, which is one step, the
 /// old set is whole, and afterwards the new one. What the new set leaves over of the old one is then
 /// removed. A file that the program did not make is replaced with `force` only.
 #[derive(Debug)]
@@ -116,7 +116,7 @@ impl Output {
     ///
     /// # Errors
     /// [`FilesError::System`] when the file can't be read.
-    pub fn settle(&mut self, name: &FileName) -> Result<FileName, FilesError> {
+    pub fn unique_name(&mut self, name: &FileName) -> Result<FileName, FilesError> {
         let content = hash(&self.staged(name))?;
         if self.stands(name, &content)? {
             return Ok(name.clone());

@@ -23,7 +23,7 @@ fn write(folder: &Path, round: u8) -> Result<(), FilesError> {
     for part in 0..PARTS {
         let plain = FileName::new(&format!("part-{part}.bin"))?;
         output.add(&plain, &vec![round; BYTES])?;
-        writeln!(manifest, "{round} {}", output.settle(&plain)?).unwrap();
+        writeln!(manifest, "{round} {}", output.unique_name(&plain)?).unwrap();
     }
     output.add_manifest(&FileName::new("manifest")?, manifest.as_bytes())?;
     output.commit()

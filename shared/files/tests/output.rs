@@ -27,7 +27,7 @@ fn write_set(folder: &Path, parts: &[&str]) -> Result<(), FilesError> {
     for (number, part) in parts.iter().enumerate() {
         let plain = name(&format!("part-{number}.bin"));
         output.add(&plain, part.as_bytes())?;
-        writeln!(manifest, "{} {part}", output.settle(&plain)?).unwrap();
+        writeln!(manifest, "{} {part}", output.unique_name(&plain)?).unwrap();
     }
     output.add_manifest(&name("manifest"), manifest.as_bytes())?;
     output.commit()
@@ -128,7 +128,7 @@ fn a_new_set_takes_the_place_of_the_old_one_in_one_step() {
     // The old set's parts stand until the new manifest is there.
     let mut output = Output::begin(out, Kind::Models, false).unwrap();
     output.add(&name("part-0.bin"), b"x").unwrap();
-    let part = output.settle(&name("part-0.bin")).unwrap();
+    let part = output.unique_name(&name("part-0.bin")).unwrap();
     assert_ne!(part, name("part-0.bin"));
     drop(output);
     assert_eq!(read_set(out), ["a", "b", "c"]);

@@ -123,7 +123,7 @@ impl Farm {
         &self,
         cut: impl FnOnce(),
         near: impl FnOnce() -> Process,
-        mend: impl FnOnce(),
+        repair: impl FnOnce(),
     ) {
         self.reach(4);
         cut();
@@ -134,7 +134,7 @@ impl Farm {
         until("the near worker does what the far one held", PATIENCE, done_again);
         near.kill();
         assert!(!self.is_done(), "nothing is left for the far worker");
-        mend();
+        repair();
     }
 
     /// Waits until a coordinator says that everything is done.

@@ -8,7 +8,7 @@ fn network_is_cut(engine: Engine) {
     let mut coordinator = farm.coordinator(0);
     let cable = Proxy::to(farm.port(0));
     let far = Farm::worker_of(&format!("http://127.0.0.1:{}", cable.port));
-    farm.outlives_a_cut(|| cable.cut(), || farm.worker(), || cable.mend());
+    farm.outlives_a_cut(|| cable.cut(), || farm.worker(), || cable.repair());
     Farm::finish(&mut coordinator);
     drop(far);
     farm.assert_undisturbed();

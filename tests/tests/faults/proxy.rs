@@ -41,7 +41,7 @@ impl Proxy {
     }
 
     /// Everything gets through again, what was held up first.
-    pub(crate) fn mend(&self) {
+    pub(crate) fn repair(&self) {
         self.cut.store(false, Ordering::Relaxed);
     }
 }

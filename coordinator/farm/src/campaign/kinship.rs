@@ -5,7 +5,7 @@ use serde_json::Value;
 use tracktwin_parameters::{OWEN_POINTS_MAX, Sequence};
 
 /// Differences that are told; the rest is counted.
-const TOLD_MAX: usize = 4;
+const LISTED_MAX: usize = 4;
 
 /// How a campaign stands to one that a library holds already.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,12 +35,12 @@ impl Campaign {
                 Kinship::OtherSequence { remedy: self.other_sequence(id) }
             }
             _ => {
-                let told = paths.iter().take(TOLD_MAX).map(String::as_str).collect::<Vec<_>>();
-                let rest = match paths.len().saturating_sub(TOLD_MAX) {
+                let listed = paths.iter().take(LISTED_MAX).map(String::as_str).collect::<Vec<_>>();
+                let rest = match paths.len().saturating_sub(LISTED_MAX) {
                     0 => String::new(),
                     more => format!(" and {more} more"),
                 };
-                Kinship::Other { differences: format!("{}{rest}", told.join(", ")) }
+                Kinship::Other { differences: format!("{}{rest}", listed.join(", ")) }
             }
         }
     }
@@ -105,14 +105,14 @@ mod tests {
     #[test]
     fn a_sequence_that_the_number_of_cases_changed_is_told_with_the_way_to_go_on() {
         let (few, many) = (built_in(100), built_in(OWEN_POINTS_MAX + 1));
-        for (own, other, mend) in
+        for (own, other, remedy_part) in
             [(&many, &few, "--cases 65536"), (&few, &many, "sequence = \"rotated\"")]
         {
             let Kinship::OtherSequence { remedy } = own.kinship("x", &other.definition_json())
             else {
                 panic!("{:?}", own.kinship("x", &other.definition_json()))
             };
-            assert!(remedy.contains(mend) && !remedy.contains('\n'), "{remedy}");
+            assert!(remedy.contains(remedy_part) && !remedy.contains('\n'), "{remedy}");
         }
         let asked = format!("sequence = \"rotated\"\n{DEFAULT}");
         let asked = Campaign::parse(&asked, "c.toml", None).unwrap();

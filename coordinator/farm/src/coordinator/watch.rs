@@ -26,20 +26,20 @@ pub(super) async fn watch(
     exit_when_done: bool,
     stop: CancellationToken,
 ) -> Result<(), LibraryError> {
-    let mut said = Said::default();
+    let mut logged = Logged::default();
     while !stop.is_cancelled() {
         if let Err(error) = library.takes_writes() {
             stop.cancel();
             return Err(error);
         }
         match look(&library).await {
-            Ok((campaigns, left)) => {
+            Ok((campaigns, remaining)) => {
                 for campaign in &campaigns {
-                    said.campaign(campaign);
+                    logged.campaign(campaign);
                 }
-                said.left(&left);
-                if left.is_done() && exit_when_done {
-                    left.say_the_end();
+                logged.remaining(&remaining);
+                if remaining.is_done() && exit_when_done {
+                    remaining.log_end();
                     stop.cancel();
                 }
             }
@@ -57,13 +57,13 @@ pub(super) async fn watch(
 
 /// What was said last, so that it is said once.
 #[derive(Default)]
-struct Said {
+struct Logged {
     /// Of each campaign: cases given up, and whether it is done.
     campaigns: HashMap<String, (u32, bool)>,
-    left: Option<(u64, Instant)>,
+    remaining: Option<(u64, Instant)>,
 }
 
-impl Said {
+impl Logged {
     fn campaign(&mut self, campaign: &CampaignOverview) {
         let CampaignOverview { id, status, causes, .. } = campaign;
         let now = (status.failed, status.done() == status.total());
@@ -79,20 +79,20 @@ impl Said {
         }
     }
 
-    fn left(&mut self, left: &Left) {
+    fn remaining(&mut self, remaining: &Remaining) {
         let is_news = |&(cases, at): &(u64, Instant)| {
-            cases != left.cases && (at.elapsed() >= TELL_EVERY || left.cases == 0)
+            cases != remaining.cases && (at.elapsed() >= TELL_EVERY || remaining.cases == 0)
         };
-        if self.left.as_ref().is_none_or(is_news) {
-            self.left = Some((left.cases, Instant::now()));
-            tracing::info!(cases = left.cases, "left to be simulated");
+        if self.remaining.as_ref().is_none_or(is_news) {
+            self.remaining = Some((remaining.cases, Instant::now()));
+            tracing::info!(cases = remaining.cases, "left to be simulated");
         }
     }
 }
 
 /// What is left to be simulated.
 #[derive(Default)]
-struct Left {
+struct Remaining {
     /// In campaigns that run.
     cases: u64,
     /// In paused ones.
@@ -103,12 +103,12 @@ struct Left {
     audits_to_do: u64,
 }
 
-impl Left {
+impl Remaining {
     const fn is_done(&self) -> bool {
         self.cases + self.audits_to_do == 0
     }
 
-    fn say_the_end(&self) {
+    fn log_end(&self) {
         let Self { paused, audits, .. } = *self;
         if paused > 0 {
             tracing::warn!(cases = paused, "done but for paused campaigns");
@@ -120,22 +120,22 @@ impl Left {
     }
 }
 
-async fn look(library: &Library) -> Result<(Vec<CampaignOverview>, Left), LibraryError> {
-    let mut left = Left::default();
+async fn look(library: &Library) -> Result<(Vec<CampaignOverview>, Remaining), LibraryError> {
+    let mut remaining = Remaining::default();
     let since_unix_ms = library.now_unix_ms() - PRESENT_MS;
     let campaigns = library.overview().await?;
     for campaign in &campaigns {
         let cases = u64::from(campaign.status.total() - campaign.status.done());
         match campaign.state {
             CampaignState::Running => {
-                left.cases += cases;
-                left.audits += u64::from(library.audits(&campaign.id).await?.open);
+                remaining.cases += cases;
+                remaining.audits += u64::from(library.audits(&campaign.id).await?.open);
                 let to_do = library.audits_to_do(&campaign.id, since_unix_ms).await?;
-                left.audits_to_do += u64::from(to_do);
+                remaining.audits_to_do += u64::from(to_do);
             }
-            CampaignState::Paused => left.paused += cases,
+            CampaignState::Paused => remaining.paused += cases,
             CampaignState::Cancelled => {}
         }
     }
-    Ok((campaigns, left))
+    Ok((campaigns, remaining))
 }

@@ -77,7 +77,7 @@ fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
     let pictures = pictures(campaign);
     html! {
         section {
-            h2 { (campaign.id) " " span.state { (campaign.standing()) } }
+            h2 { (campaign.id) " " span.state { (campaign.state_text()) } }
             (progress(campaign))
             p {
                 (finished) " of " (campaign.cases()) " cases finished, " (leased) " in work, "

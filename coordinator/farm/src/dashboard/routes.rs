@@ -17,7 +17,7 @@ use std::sync::Arc;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tracktwin_library::{Library, LibraryError, Retry};
-use tracktwin_worker::Port;
+use tracktwin_worker::BoundedListener;
 
 /// The cookie of those who have shown the token.
 const COOKIE: &str = "tracktwin";
@@ -81,8 +81,8 @@ pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: Cancellati
         .route("/healthz", get(healthz))
         .layer(middleware::from_fn_with_state(dashboard.clone(), same_origin))
         .with_state(dashboard);
-    let served =
-        axum::serve(Port::new(listener), routes).with_graceful_shutdown(stop.cancelled_owned());
+    let served = axum::serve(BoundedListener::new(listener), routes)
+        .with_graceful_shutdown(stop.cancelled_owned());
     if let Err(error) = served.await {
         tracing::error!("the dashboard is no longer served: {error}");
     }

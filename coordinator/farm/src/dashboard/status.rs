@@ -93,7 +93,7 @@ impl FarmCampaign {
     }
 
     /// How it stands, for people: its state, or that it is done.
-    pub fn standing(&self) -> &str {
+    pub fn state_text(&self) -> &str {
         if self.is_done() { "done" } else { &self.state }
     }
 
@@ -152,7 +152,7 @@ mod tests {
         assert_eq!((paused.eta_s(), paused.left().as_str()), (None, "nothing is handed out"));
         let done = FarmCampaign { waiting: 0, leased: 0, failed: 1, ..paused };
         assert_eq!(
-            (done.standing(), done.left().as_str()),
+            (done.state_text(), done.left().as_str()),
             ("done", "done but for what was given up")
         );
     }

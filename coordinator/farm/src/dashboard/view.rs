@@ -38,20 +38,20 @@ pub async fn farm(library: &Library, detail: Detail) -> Result<Farm, LibraryErro
     let mut campaigns = Vec::with_capacity(overview.len());
     for overview in overview {
         let lost = library.contact_loss(&overview.id).await?;
-        let counted = counted(&overview, lost);
+        let campaign = with_counts(&overview, lost);
         campaigns.push(match detail {
-            Detail::Counts => counted,
-            Detail::Pictures => pictured(library, counted).await?,
+            Detail::Counts => campaign,
+            Detail::Pictures => with_charts(library, campaign).await?,
         });
     }
     let workers = library.workers(now_unix_ms - HISTORY_MS).await?;
     let mut workers: Vec<_> = workers.into_iter().map(|it| worker(it, now_unix_ms)).collect();
     workers.sort_by(|a, b| a.silent_s.total_cmp(&b.silent_s).then_with(|| a.id.cmp(&b.id)));
-    let at = said(now_unix_ms);
+    let at = format_utc(now_unix_ms);
     Ok(Farm { library: library.name(), at, campaigns, workers, may_control: false })
 }
 
-fn counted(overview: &CampaignOverview, lost: ContactLoss) -> FarmCampaign {
+fn with_counts(overview: &CampaignOverview, lost: ContactLoss) -> FarmCampaign {
     let CampaignOverview { status, causes, .. } = overview;
     FarmCampaign {
         id: overview.id.clone(),
@@ -69,7 +69,10 @@ fn counted(overview: &CampaignOverview, lost: ContactLoss) -> FarmCampaign {
     }
 }
 
-async fn pictured(library: &Library, campaign: FarmCampaign) -> Result<FarmCampaign, LibraryError> {
+async fn with_charts(
+    library: &Library,
+    campaign: FarmCampaign,
+) -> Result<FarmCampaign, LibraryError> {
     let id = &campaign.id;
     let record = library.campaign(id).await?;
     let frequencies_hz = Experiment::from_json(&record.experiment_json)
@@ -104,7 +107,7 @@ fn worker(record: WorkerRecord, now_unix_ms: i64) -> FarmWorker {
 }
 
 /// An instant, in UTC to the second.
-fn said(unix_ms: i64) -> String {
+fn format_utc(unix_ms: i64) -> String {
     let instant = OffsetDateTime::from_unix_timestamp(unix_ms.div_euclid(1000));
     let instant = instant.unwrap_or(OffsetDateTime::UNIX_EPOCH);
     let (date, (hour, minute, second)) = (instant.date(), instant.to_hms());
@@ -113,10 +116,10 @@ fn said(unix_ms: i64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::said;
+    use super::format_utc;
 
     #[test]
     fn instants_are_said_in_utc() {
-        assert_eq!(said(1_000_000_000_000), "2001-09-09 01:46:40 UTC");
+        assert_eq!(format_utc(1_000_000_000_000), "2001-09-09 01:46:40 UTC");
     }
 }

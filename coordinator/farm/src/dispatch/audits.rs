@@ -147,7 +147,7 @@ impl Audits {
         worker: &str,
         served: &Arc<Served>,
         report: CaseReport,
-    ) -> Result<Option<Found>, LibraryError> {
+    ) -> Result<Option<AuditOutcome>, LibraryError> {
         let Some(audit) = self.take(worker, &served.record.id, report.index) else {
             return Ok(None);
         };
@@ -169,7 +169,7 @@ impl Audits {
         served: Arc<Served>,
         audit: &Audit,
         outcome: &Outcome,
-    ) -> Result<Option<Found>, LibraryError> {
+    ) -> Result<Option<AuditOutcome>, LibraryError> {
         let (campaign, index) = (&audit.campaign, audit.case.index);
         let Some(entry) = self.library.entry(campaign, index).await? else { return Ok(None) };
         let difference_db = difference(&entry.features, outcome);
@@ -191,14 +191,14 @@ impl Audits {
         let blame = wrong.map(|wrong| (wrong, reason.as_str()));
         let kept = self.library.audited(campaign, index, worker, finding, blame).await?;
         if agrees || kept.is_none() {
-            return Ok(Some(Found::Agreement));
+            return Ok(Some(AuditOutcome::Agreement));
         }
         let Some(wrong) = wrong else {
             tracing::error!("{reason}; this machine could not simulate it, so nobody is blamed");
-            return Ok(Some(Found::Unjudged));
+            return Ok(Some(AuditOutcome::Unjudged));
         };
         tracing::error!(worker = wrong, "quarantined: {reason}");
-        Ok(Some(Found::Wrong { worker: wrong.to_owned(), reason }))
+        Ok(Some(AuditOutcome::Wrong { worker: wrong.to_owned(), reason }))
     }
 
     /// What this machine makes of a case, if it can simulate it.
@@ -213,7 +213,7 @@ impl Audits {
 }
 
 /// What came of an audit.
-pub(crate) enum Found {
+pub(crate) enum AuditOutcome {
     /// Both agree, or it is known already.
     Agreement,
     /// They differ, and nobody knows who is wrong.

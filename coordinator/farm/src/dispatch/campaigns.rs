@@ -1,6 +1,6 @@
 //! The campaigns whose cases are handed out, as messages need them.
 
-use super::Pace;
+use super::LeaseSizer;
 use parking_lot::Mutex;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub(crate) struct Served {
     pub(crate) record: CampaignRecord,
     pub(crate) experiment: Experiment,
     pub(crate) shape: Shape,
-    pace: Mutex<Pace>,
+    lease_sizer: Mutex<LeaseSizer>,
 }
 
 impl Served {
@@ -40,18 +40,18 @@ impl Served {
             bins: experiment.features.frequencies_hz().len(),
             speeds_km_h: experiment.speeds_km_h.clone(),
         };
-        Ok(Self { record, experiment, shape, pace: Mutex::default() })
+        Ok(Self { record, experiment, shape, lease_sizer: Mutex::default() })
     }
 
     /// Takes measured computing times of cases, in s.
     pub(crate) fn measured(&self, durations_s: impl IntoIterator<Item = f64>) {
-        let mut pace = self.pace.lock();
-        durations_s.into_iter().for_each(|case_s| pace.measured(case_s));
+        let mut lease_sizer = self.lease_sizer.lock();
+        durations_s.into_iter().for_each(|case_s| lease_sizer.measured(case_s));
     }
 
     /// Cases of a lease where so many cores are at work.
     fn cases_per_lease(&self, cores: u32) -> u32 {
-        self.pace.lock().cases_per_lease(cores)
+        self.lease_sizer.lock().cases_per_lease(cores)
     }
 }
 
@@ -86,7 +86,7 @@ impl Campaigns {
     /// Cases of the next lease, as far as one can know before.
     pub(crate) fn cases_per_lease(&self, cores: u32) -> u32 {
         let latest = self.latest.lock();
-        let unknown = || Pace::default().cases_per_lease(cores);
+        let unknown = || LeaseSizer::default().cases_per_lease(cores);
         latest.as_ref().map_or_else(unknown, |it| it.cases_per_lease(cores))
     }
 }

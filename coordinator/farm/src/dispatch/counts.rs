@@ -13,9 +13,9 @@ pub struct Counts {
     pub(crate) late: Counter,
     pub(crate) refused: Counter,
     pub(crate) registered: Counter,
-    pub(crate) unfit: Counter,
+    pub(crate) incompatible: Counter,
     pub(crate) malformed: Counter,
-    pub(crate) put_aside: Counter,
+    pub(crate) suspended: Counter,
     pub(crate) audited: Counter,
     pub(crate) differed: Counter,
     pub(crate) lease_s: Histogram,
@@ -33,9 +33,9 @@ impl Default for Counts {
             late: Counter::default(),
             refused: Counter::default(),
             registered: Counter::default(),
-            unfit: Counter::default(),
+            incompatible: Counter::default(),
             malformed: Counter::default(),
-            put_aside: Counter::default(),
+            suspended: Counter::default(),
             audited: Counter::default(),
             differed: Counter::default(),
             lease_s: times(),
@@ -53,9 +53,9 @@ impl Counts {
         to.register("reports_late", "Failures of ended leases", self.late.clone());
         to.register("reports_refused", "Reports of unknown cases", self.refused.clone());
         to.register("workers_registered", "Registrations", self.registered.clone());
-        to.register("workers_unfit", "Registrations refused", self.unfit.clone());
+        to.register("workers_unfit", "Registrations refused", self.incompatible.clone());
         to.register("messages_malformed", "Messages refused", self.malformed.clone());
-        to.register("workers_put_aside", "Workers put aside for failing", self.put_aside.clone());
+        to.register("workers_put_aside", "Workers put aside for failing", self.suspended.clone());
         to.register("cases_audited", "Cases simulated a second time", self.audited.clone());
         to.register("cases_differed", "Audited cases that differed", self.differed.clone());
         to.register("lease_seconds", "Time to answer a lease", self.lease_s.clone());

@@ -7,17 +7,17 @@ use tracktwin_library::{Held, LibraryError, Verdict};
 use tracktwin_protocol::{BadMessage, PROTOCOL_VERSION, Registration, farm, held_from_messages};
 
 /// Why a worker is of no use here, if so, and what mends it.
-pub(crate) fn unfit(registration: &Registration) -> Option<String> {
+pub(crate) fn incompatibility(registration: &Registration) -> Option<String> {
     let Registration { worker, code_version, model_hash, protocol_version, .. } = registration;
     if *protocol_version != PROTOCOL_VERSION {
-        let mend = if *protocol_version < PROTOCOL_VERSION {
+        let remedy = if *protocol_version < PROTOCOL_VERSION {
             "update the worker to the coordinator's version"
         } else {
             "install the coordinator's version on the worker, or update the coordinator"
         };
         return Some(format!(
             "worker {worker} (version {code_version}) speaks protocol {protocol_version}, this \
-             coordinator (version {CODE_VERSION}) speaks {PROTOCOL_VERSION}: {mend}"
+             coordinator (version {CODE_VERSION}) speaks {PROTOCOL_VERSION}: {remedy}"
         ));
     }
     (model_hash != MODEL_HASH).then(|| {

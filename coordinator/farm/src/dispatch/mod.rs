@@ -4,20 +4,20 @@
 //! it is lost with this process, and so that several coordinators may serve one library.
 
 mod audits;
-mod batch;
 mod breaker;
 mod campaigns;
 mod counts;
+mod lease_sizer;
 mod messages;
 mod policy;
 mod roster;
 mod service;
 mod settings;
 
-pub use batch::Pace;
 pub use breaker::Breaker;
 pub use campaigns::DispatchError;
 pub use counts::Counts;
+pub use lease_sizer::LeaseSizer;
 pub use policy::{ATTEMPTS_MAX, FAILURES_MAX, LOSSES_MAX, SUSPECT_AFTER};
 pub use service::Dispatch;
 pub use settings::{Clock, Scope, Settings, Timing};

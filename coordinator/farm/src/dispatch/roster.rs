@@ -35,13 +35,13 @@ struct Worker {
 
 /// What speaks for or against giving a worker cases.
 #[derive(Clone, Debug)]
-pub(crate) struct Standing {
+pub(crate) struct WorkerEligibility {
     /// Version of its program.
     pub(crate) code_version: String,
     /// Hash of its physics.
     pub(crate) model_hash: String,
     /// Why it gets none, and for how long.
-    pub(crate) aside: Option<(Duration, String)>,
+    pub(crate) exclusion: Option<(Duration, String)>,
     /// Whether it gets one only, to show that it works again.
     pub(crate) on_trial: bool,
     /// Whether the library is to be told that it is alive.
@@ -70,7 +70,7 @@ impl Roster {
     }
 
     /// How a worker stands; nothing if it has not registered.
-    pub(crate) fn standing(&self, worker: &str) -> Option<Standing> {
+    pub(crate) fn eligibility(&self, worker: &str) -> Option<WorkerEligibility> {
         let mut workers = self.0.lock();
         let worker = workers.get_mut(worker)?;
         let now = Instant::now();
@@ -80,15 +80,15 @@ impl Roster {
             worker.noted = now;
         }
         let quarantine = worker.quarantine.clone();
-        let aside = quarantine.map(|reason| (PRESENT, format!("in quarantine: {reason}")));
+        let exclusion = quarantine.map(|reason| (PRESENT, format!("in quarantine: {reason}")));
         let failing = || {
             let left = worker.breaker.open_for(now)?;
             Some((left, "put aside: it fails where other workers don't".to_owned()))
         };
-        Some(Standing {
+        Some(WorkerEligibility {
             code_version: worker.registration.code_version.clone(),
             model_hash: worker.registration.model_hash.clone(),
-            aside: aside.or_else(failing),
+            exclusion: exclusion.or_else(failing),
             on_trial: worker.breaker.is_on_trial(),
             to_be_noted,
         })
@@ -112,11 +112,11 @@ impl Roster {
         let failing = it.breaker.is_failing();
         let others = workers.iter().filter(|(name, it)| *name != worker && present(it));
         let mut sound = others.filter(|(_, it)| !it.breaker.is_failing());
-        let put_aside = failing && sound.next().is_some();
-        if put_aside && let Some(it) = workers.get_mut(worker) {
+        let suspended = failing && sound.next().is_some();
+        if suspended && let Some(it) = workers.get_mut(worker) {
             it.breaker.open(Instant::now());
         }
-        put_aside
+        suspended
     }
 
     /// How many workers are present, and their cores.
@@ -152,9 +152,9 @@ mod tests {
     fn a_worker_that_fails_where_others_do_not_is_put_aside_and_then_on_trial() {
         let roster = roster(&["bad", "good"]);
         assert!(roster.reported("bad", &[true; 8]));
-        let standing = roster.standing("bad").unwrap();
-        assert!(standing.aside.is_some() && standing.on_trial);
-        assert!(roster.standing("good").unwrap().aside.is_none());
+        let eligibility = roster.eligibility("bad").unwrap();
+        assert!(eligibility.exclusion.is_some() && eligibility.on_trial);
+        assert!(roster.eligibility("good").unwrap().exclusion.is_none());
     }
 
     #[test]
@@ -164,16 +164,16 @@ mod tests {
         assert!(!roster.reported("b", &[true; 7]));
         let alone = self::roster(&["alone"]);
         assert!(!alone.reported("alone", &[true; 100]));
-        assert!(alone.standing("alone").unwrap().aside.is_none());
+        assert!(alone.eligibility("alone").unwrap().exclusion.is_none());
     }
 
     #[test]
     fn quarantine_is_told_with_its_reason() {
         let roster = roster(&["w"]);
         roster.set_quarantine("w", Some("it differs".to_owned()));
-        let (_, reason) = roster.standing("w").unwrap().aside.unwrap();
+        let (_, reason) = roster.eligibility("w").unwrap().exclusion.unwrap();
         assert_eq!(reason, "in quarantine: it differs");
         roster.set_quarantine("w", None);
-        assert!(roster.standing("w").unwrap().aside.is_none());
+        assert!(roster.eligibility("w").unwrap().exclusion.is_none());
     }
 }

@@ -52,7 +52,7 @@ pub struct Settings {
     /// Share of the cases that are simulated again by another worker, 0 to 1.
     pub audit_share: f64,
     /// Whether a worker is put aside that fails where others don't.
-    pub put_aside: bool,
+    pub suspends_failing: bool,
     /// What decides between two workers that differ.
     pub prepare: Prepare,
     /// The clock that leases go by; the library's if none.
@@ -68,7 +68,7 @@ impl Default for Settings {
             timing: Timing::default(),
             scope: None,
             audit_share: 0.0,
-            put_aside: true,
+            suspends_failing: true,
             prepare: prepare_simulation,
             clock: None,
             own: None,

@@ -19,7 +19,7 @@ const CONNECTIONS_MAX: usize = 4096;
 const WAITING_MAX: usize = 64;
 
 /// How long a caller may take to say what it wants; TLS over a slow line takes a second.
-const GREETING: Duration = Duration::from_secs(10);
+const PREFACE_TIME: Duration = Duration::from_secs(10);
 
 /// Pause after the system had no connection for us: descriptors come back within moments.
 const SYSTEM_PAUSE: Duration = Duration::from_millis(100);
@@ -30,10 +30,10 @@ const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 /// Why a caller is turned away.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
-    #[error("said nothing for {} s", GREETING.as_secs())]
+    #[error("said nothing for {} s", PREFACE_TIME.as_secs())]
     Silent,
     #[error("spoke neither gRPC nor anything else that is served here")]
-    Stranger,
+    UnknownProtocol,
     #[error("TLS: {0}")]
     Tls(std::io::Error),
     #[error("TLS without HTTP/2")]
@@ -66,21 +66,21 @@ pub fn accept(
                 },
                 () = peers.closed() => break,
             };
-            tokio::spawn(let_in(stream, address, tls.clone(), share, peers.clone()));
+            tokio::spawn(accept_connection(stream, address, tls.clone(), share, peers.clone()));
         }
     });
     ReceiverStream::new(waiting)
 }
 
-async fn let_in(
+async fn accept_connection(
     stream: TcpStream,
     address: SocketAddr,
     tls: Option<TlsAcceptor>,
     share: OwnedSemaphorePermit,
     peers: mpsc::Sender<std::io::Result<Peer>>,
 ) {
-    let greeted = tokio::time::timeout(GREETING, greet(stream, tls)).await;
-    match greeted.unwrap_or(Err(Refusal::Silent)) {
+    let preface = tokio::time::timeout(PREFACE_TIME, read_preface(stream, tls)).await;
+    match preface.unwrap_or(Err(Refusal::Silent)) {
         // Who would take it may be stopping.
         Ok(stream) => drop(peers.send(Ok(Peer::new(stream, PREFACE, address, share))).await),
         Err(refusal) => tracing::warn!(peer = %address, "connection refused: {refusal}"),
@@ -88,7 +88,7 @@ async fn let_in(
 }
 
 /// Takes the beginning of a connection, up to the end of [`PREFACE`].
-async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>) -> Result<Stream, Refusal> {
+async fn read_preface(stream: TcpStream, tls: Option<TlsAcceptor>) -> Result<Stream, Refusal> {
     stream.set_nodelay(true)?;
     let mut stream = match tls {
         None => Either::Left(stream),
@@ -106,7 +106,7 @@ async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>) -> Result<Stream, Re
         let more = stream.read(&mut begin[length..]).await?;
         length += more;
         if more == 0 || !PREFACE.starts_with(&begin[..length]) {
-            return Err(Refusal::Stranger);
+            return Err(Refusal::UnknownProtocol);
         }
     }
     Ok(stream)

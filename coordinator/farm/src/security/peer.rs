@@ -15,7 +15,7 @@ use tokio_util::either::Either;
 use tonic::transport::server::Connected;
 
 /// How long a connection may last without a call that was admitted.
-const PATIENCE: Duration = Duration::from_secs(30);
+const ADMISSION_TIME: Duration = Duration::from_secs(30);
 
 /// Plain text or TLS.
 pub(crate) type Stream = Either<TcpStream, Box<TlsStream<TcpStream>>>;
@@ -42,7 +42,7 @@ pub struct Peer {
     /// What was read of it already.
     begin: &'static [u8],
     /// Runs until a call was admitted.
-    patience: Option<Pin<Box<Sleep>>>,
+    deadline: Option<Pin<Box<Sleep>>>,
     _share: OwnedSemaphorePermit,
 }
 
@@ -55,17 +55,17 @@ impl Peer {
         share: OwnedSemaphorePermit,
     ) -> Self {
         let caller = Caller { address, admitted: Arc::default() };
-        let patience = Some(Box::pin(tokio::time::sleep(PATIENCE)));
-        Self { stream, caller, begin, patience, _share: share }
+        let deadline = Some(Box::pin(tokio::time::sleep(ADMISSION_TIME)));
+        Self { stream, caller, begin, deadline, _share: share }
     }
 
     /// Ends the connection of a caller that has shown nothing.
-    fn check_patience(&mut self, context: &mut Context<'_>) -> std::io::Result<()> {
-        let Some(patience) = &mut self.patience else { return Ok(()) };
+    fn check_deadline(&mut self, context: &mut Context<'_>) -> std::io::Result<()> {
+        let Some(deadline) = &mut self.deadline else { return Ok(()) };
         if self.caller.admitted.load(Ordering::Relaxed) {
-            self.patience = None;
-        } else if patience.as_mut().poll(context).is_ready() {
-            let reason = format!("no call was admitted for {} s", PATIENCE.as_secs());
+            self.deadline = None;
+        } else if deadline.as_mut().poll(context).is_ready() {
+            let reason = format!("no call was admitted for {} s", ADMISSION_TIME.as_secs());
             tracing::warn!(peer = %self.caller.address, "connection ended: {reason}");
             return Err(std::io::Error::new(std::io::ErrorKind::TimedOut, reason));
         }
@@ -93,7 +93,7 @@ impl AsyncRead for Peer {
             self.begin = later;
             return Poll::Ready(Ok(()));
         }
-        self.check_patience(context)?;
+        self.check_deadline(context)?;
         Pin::new(&mut self.stream).poll_read(context, buffer)
     }
 }

@@ -263,20 +263,20 @@ fn dial(endpoint: &Endpoint) -> Channel {
 }
 
 /// Cuts, delays, mends or crashes something, now and then.
-fn trouble(sim: &mut turmoil::Sim<'_>, chance: &Chance) {
+fn inject_fault(sim: &mut turmoil::Sim<'_>, chance: &Chance) {
     let worker = WORKERS[chance.below(3) as usize];
     match chance.below(12) {
         0 | 1 => sim.partition(worker, "coordinator"),
         2 => sim.partition_oneway("coordinator", worker),
         3 | 4 => sim.hold(worker, "coordinator"),
-        5..=7 => mend(sim),
+        5..=7 => repair(sim),
         8 => sim.bounce(worker),
         9 if chance.below(3) == 0 => sim.bounce("coordinator"),
         _ => {}
     }
 }
 
-fn mend(sim: &turmoil::Sim<'_>) {
+fn repair(sim: &turmoil::Sim<'_>) {
     for worker in WORKERS {
         sim.repair(worker, "coordinator");
         sim.release(worker, "coordinator");
@@ -318,8 +318,8 @@ fn misbehaving(real: &Runtime, library: &str, seed: u64) -> (String, Duration) {
         }
         assert!(elapsed < PATIENCE, "seed {seed}: {status:?} after {elapsed:?}");
         match elapsed.cmp(&TROUBLE) {
-            std::cmp::Ordering::Less => trouble(&mut sim, &chance),
-            std::cmp::Ordering::Equal => mend(&sim),
+            std::cmp::Ordering::Less => inject_fault(&mut sim, &chance),
+            std::cmp::Ordering::Equal => repair(&sim),
             std::cmp::Ordering::Greater => {}
         }
     }

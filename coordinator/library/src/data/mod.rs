@@ -18,4 +18,4 @@ pub use cell::Cell;
 pub use query::Answer;
 pub use salvage::Lost;
 pub use schema::{Column, ColumnKind, Table};
-pub use verify::{Finding, Verified};
+pub use verify::{IntegrityFault, Verified};

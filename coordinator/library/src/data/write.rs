@@ -12,7 +12,7 @@ use std::collections::HashSet;
 const ROWS_A_STATEMENT: usize = 250;
 
 /// Says that cases which have a result at each speed are finished.
-const SETTLE: Text = Text::Each {
+const FINISH_ALL_CASES: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
         where state <> 'finished'
@@ -29,7 +29,7 @@ const SETTLE: Text = Text::Each {
 };
 
 /// The same of a campaign's ($1) cases ($2).
-const SETTLE_CASES: Text = Text::Each {
+const FINISH_THESE_CASES: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
         where campaign_id = $1 and sobol_index in (select value from json_each($2)) and state <> 'finished'
@@ -113,7 +113,7 @@ impl Library {
         table: &'static Table,
         rows: Vec<Vec<Cell>>,
     ) -> Result<u64, LibraryError> {
-        let rows: Vec<_> = rows.into_iter().map(|row| at_rest(table, row)).collect();
+        let rows: Vec<_> = rows.into_iter().map(|row| without_lease(table, row)).collect();
         self.refuse_other_campaigns(table, &rows).await?;
         refuse_other_parameters(table, &rows)?;
         let rows = self.without_those_here(table, rows).await?;
@@ -181,8 +181,8 @@ impl Library {
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
-    pub async fn settle(&self) -> Result<u64, LibraryError> {
-        self.write(Settle).await
+    pub async fn finish_complete_cases(&self) -> Result<u64, LibraryError> {
+        self.write(FinishCompleteCases).await
     }
 }
 
@@ -218,7 +218,7 @@ fn integer(cell: &Cell) -> Option<i64> {
 }
 
 /// A row as it stands where nobody works on it; a case is finished when its results are there as well.
-fn at_rest(table: &Table, mut row: Vec<Cell>) -> Vec<Cell> {
+fn without_lease(table: &Table, mut row: Vec<Cell>) -> Vec<Cell> {
     let state = table.column("state");
     let expires = table.column("lease_expires_unix_ms");
     if let (Some(state), Some(expires)) = (state, expires)
@@ -248,7 +248,7 @@ impl Write for Rows {
             self.lock_cases(connection).await?;
             let rows = connection.rows(gather).await?;
             self.refuse_altered(connection).await?;
-            self.settle(connection).await?;
+            self.finish_complete_cases(connection).await?;
             return rows.first().map_or(Ok(0), |row| row.get_u32("added").map(u64::from));
         }
         let (table, key) = (self.table.name, self.table.key.join(", "));
@@ -257,7 +257,7 @@ impl Write for Rows {
         let added = connection.execute(self.bound(insert)?).await?;
         if table == "result" {
             self.refuse_altered(connection).await?;
-            self.settle(connection).await?;
+            self.finish_complete_cases(connection).await?;
         }
         Ok(added)
     }
@@ -265,13 +265,13 @@ impl Write for Rows {
 
 impl Rows {
     /// Says of these rows' cases that they are finished, where all their passes are here.
-    async fn settle(&self, connection: &mut Connection) -> Result<(), LibraryError> {
+    async fn finish_complete_cases(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let mut campaigns = self.texts("campaign_id");
         campaigns.dedup();
         let indices = self.integers("sobol_index");
         for campaign in campaigns {
-            let settle = sql(SETTLE_CASES).bind(campaign).bind(indices.clone());
-            connection.execute(settle).await?;
+            let finish = sql(FINISH_THESE_CASES).bind(campaign).bind(indices.clone());
+            connection.execute(finish).await?;
         }
         Ok(())
     }
@@ -353,12 +353,12 @@ impl Rows {
     }
 }
 
-struct Settle;
+struct FinishCompleteCases;
 
-impl Write for Settle {
+impl Write for FinishCompleteCases {
     type Answer = u64;
 
     async fn apply(&self, connection: &mut Connection) -> Result<u64, LibraryError> {
-        connection.execute(sql(SETTLE)).await
+        connection.execute(sql(FINISH_ALL_CASES)).await
     }
 }

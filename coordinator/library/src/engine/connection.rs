@@ -1,6 +1,6 @@
 //! The connection that writes, and the connections that read.
 
-use super::patience::Patience;
+use super::retry_budget::RetryBudget;
 use super::sqlite::OpenFile;
 use super::writer::SERVER_TIMEOUT;
 use super::{Dialect, Row, Statement, sql};
@@ -118,12 +118,12 @@ impl Readers {
 
     /// All rows at once, waiting for a database that is away.
     pub(crate) async fn rows(&self, statement: Statement) -> Result<Vec<Row>, LibraryError> {
-        let mut patience = Patience::new(true);
+        let mut budget = RetryBudget::new(true);
         loop {
             let asked = self.stream(statement.clone()).collect::<Result<Vec<_>, _>>();
             match self.within_bounds(asked).await {
                 Err(error) if error.is_unavailable() => {
-                    if patience.wait().await.is_err() {
+                    if budget.wait().await.is_err() {
                         return Err(error);
                     }
                 }

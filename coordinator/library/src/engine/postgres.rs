@@ -30,7 +30,7 @@ pub(super) async fn open(
 ) -> Result<(Readers, Clock), LibraryError> {
     let connected = within_bounds(options).await;
     let mut connection = connected.map_err(|error| unreachable(error, name))?;
-    let is_there = refuse_strangers(&mut connection, name).await?;
+    let is_there = refuse_foreign_database(&mut connection, name).await?;
     if !is_there && !create {
         return Err(LibraryError::Empty { library: name.to_owned() });
     }
@@ -81,7 +81,10 @@ fn unreachable(error: sqlx::Error, name: &str) -> LibraryError {
 }
 
 /// Whether the library's tables are there; refuses a database that holds other things.
-async fn refuse_strangers(connection: &mut PgConnection, name: &str) -> Result<bool, LibraryError> {
+async fn refuse_foreign_database(
+    connection: &mut PgConnection,
+    name: &str,
+) -> Result<bool, LibraryError> {
     let (ours, tables): (i64, i64) = sqlx::query_as(
         "select count(*) filter (where table_name in ('campaign', 'campaign_case', 'result')),
             count(*) filter (where table_name <> '_sqlx_migrations')

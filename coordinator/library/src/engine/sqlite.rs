@@ -2,7 +2,7 @@
 
 use super::file_lock::{Identity, identity};
 use super::file_system::shared_between_hosts;
-use super::patience::Patience;
+use super::retry_budget::RetryBudget;
 use super::sqlite_schema::bring_up_to_date;
 use super::{Connection, Readers};
 use crate::LibraryError;
@@ -47,7 +47,7 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connecti
         .busy_timeout(BUSY_TIMEOUT)
         .foreign_keys(true);
     let mut connection = options.connect().await.map_err(|error| closed_to_us(error, path))?;
-    let is_empty = refuse_strangers(&mut connection, path).await?;
+    let is_empty = refuse_foreign_database(&mut connection, path).await?;
     connection.close().await?;
     if is_empty && !create {
         return Err(LibraryError::Empty { library: path.display().to_string() });
@@ -58,11 +58,11 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connecti
         .journal_mode(SqliteJournalMode::Wal)
         .synchronous(SqliteSynchronous::Full)
         .pragma("wal_autocheckpoint", LOG_PAGES);
-    let mut patience = Patience::new(true);
+    let mut budget = RetryBudget::new(true);
     let mut connection = loop {
         match options.connect().await.map_err(|error| closed_to_us(error, path)) {
             // A log begins only where nobody else looks, and doesn't wait for that itself.
-            Err(error) if error.is_temporary() && patience.wait().await.is_ok() => {}
+            Err(error) if error.is_temporary() && budget.wait().await.is_ok() => {}
             opened => break opened?,
         }
     };
@@ -206,7 +206,7 @@ fn begin_of_log(log: &OsStr) -> bool {
 }
 
 /// Refuses a database of somebody else, before anything is written to it; answers whether it is empty.
-async fn refuse_strangers(
+async fn refuse_foreign_database(
     connection: &mut SqliteConnection,
     path: &Path,
 ) -> Result<bool, LibraryError> {

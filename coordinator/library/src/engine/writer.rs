@@ -6,8 +6,8 @@
 //! is waited for, within a bound.
 
 use super::clock::Clock;
-use super::lanes::{Lanes, Place};
-use super::patience::Patience;
+use super::retry_budget::RetryBudget;
+use super::writer_shards::{Slot, WriterShards};
 use super::{Connection, Target, postgres};
 use crate::LibraryError;
 use std::pin::Pin;
@@ -29,7 +29,7 @@ const QUEUE_MAX: usize = 1024;
 pub(super) const SERVER_TIMEOUT: Duration = Duration::from_mins(1);
 
 /// Connections that write to a server.
-const SERVER_LANES: usize = 2;
+const SERVER_SHARDS: usize = 2;
 
 /// A change to the library, made inside a transaction that others share.
 pub(crate) trait Write: Send + Sync + 'static {
@@ -53,11 +53,11 @@ pub(crate) trait Write: Send + Sync + 'static {
 /// A handle on the writing tasks.
 pub(crate) struct Writer {
     tasks: Vec<Task>,
-    lanes: Lanes,
+    shards: WriterShards,
 }
 
 struct Task {
-    orders: mpsc::Sender<Box<dyn Order>>,
+    requests: mpsc::Sender<Box<dyn WriteRequest>>,
     closing: Arc<Notify>,
     handle: Mutex<Option<JoinHandle<()>>>,
     /// What broke the connection of a file, if that is why the task has ended.
@@ -73,27 +73,27 @@ impl Writer {
     ) -> Self {
         let count = match target {
             Target::Sqlite(_) => 1,
-            Target::Postgres { .. } => SERVER_LANES,
+            Target::Postgres { .. } => SERVER_SHARDS,
         };
         let connections = std::iter::once(connection).chain(std::iter::repeat_with(|| None));
         let session = |connection| Session {
             target: target.clone(),
             connection,
             clock: clock.clone(),
-            patient: true,
+            retries: true,
             lost: Arc::default(),
         };
         let tasks = connections.take(count).map(|it| Task::start(session(it))).collect();
-        Self { tasks, lanes: Lanes::new(count) }
+        Self { tasks, shards: WriterShards::new(count) }
     }
 
     /// Makes a change and waits until it is on the disk.
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
-        let (reply, answer) = oneshot::channel();
-        let place = self.lanes.enter(write.worker().unwrap_or_default());
-        let task = &self.tasks[place.number()];
-        let order = Pending { write, answer: None, reply, _place: place };
-        task.orders.send(Box::new(order)).await.map_err(|_| task.end())?;
+        let (responder, answer) = oneshot::channel();
+        let slot = self.shards.enter(write.worker().unwrap_or_default());
+        let task = &self.tasks[slot.number()];
+        let request = Pending { write, answer: None, responder, _slot: slot };
+        task.requests.send(Box::new(request)).await.map_err(|_| task.end())?;
         answer.await.map_err(|_| task.end())?
     }
 
@@ -123,11 +123,11 @@ impl Writer {
 
 impl Task {
     fn start(session: Session) -> Self {
-        let (orders, receiver) = mpsc::channel(QUEUE_MAX);
+        let (requests, receiver) = mpsc::channel(QUEUE_MAX);
         let closing = Arc::new(Notify::new());
         let lost = session.lost.clone();
         let handle = tokio::spawn(write_all(session, receiver, closing.clone()));
-        Self { orders, closing, handle: Mutex::new(Some(handle)), lost }
+        Self { requests, closing, handle: Mutex::new(Some(handle)), lost }
     }
 
     /// Why it writes no more.
@@ -145,24 +145,24 @@ impl Task {
 }
 
 /// An ordered write of any kind.
-trait Order: Send {
+trait WriteRequest: Send {
     fn apply<'a>(
         &'a mut self,
         connection: &'a mut Connection,
     ) -> Pin<Box<dyn Future<Output = Result<(), LibraryError>> + Send + 'a>>;
 
-    fn reply(self: Box<Self>, committed: Result<(), LibraryError>);
+    fn respond(self: Box<Self>, committed: Result<(), LibraryError>);
 }
 
 struct Pending<W: Write> {
     write: W,
     answer: Option<W::Answer>,
-    reply: oneshot::Sender<Result<W::Answer, LibraryError>>,
+    responder: oneshot::Sender<Result<W::Answer, LibraryError>>,
     /// Kept until the write is done, whether who asked still waits or not.
-    _place: Place,
+    _slot: Slot,
 }
 
-impl<W: Write> Order for Pending<W> {
+impl<W: Write> WriteRequest for Pending<W> {
     fn apply<'a>(
         &'a mut self,
         connection: &'a mut Connection,
@@ -173,29 +173,29 @@ impl<W: Write> Order for Pending<W> {
         })
     }
 
-    fn reply(self: Box<Self>, committed: Result<(), LibraryError>) {
-        let Self { answer, reply, .. } = *self;
+    fn respond(self: Box<Self>, committed: Result<(), LibraryError>) {
+        let Self { answer, responder, .. } = *self;
         let answer = committed.map(|()| answer.expect("what is committed was applied"));
         // Who asked may have gone; the write stands all the same.
-        let _ = reply.send(answer);
+        let _ = responder.send(answer);
     }
 }
 
 async fn write_all(
     mut session: Session,
-    mut orders: mpsc::Receiver<Box<dyn Order>>,
+    mut requests: mpsc::Receiver<Box<dyn WriteRequest>>,
     closing: Arc<Notify>,
 ) {
     let mut group = Vec::new();
     loop {
         tokio::select! {
             biased;
-            count = orders.recv_many(&mut group, GROUP_MAX) => if count == 0 { break },
-            () = closing.notified() => orders.close(),
+            count = requests.recv_many(&mut group, GROUP_MAX) => if count == 0 { break },
+            () = closing.notified() => requests.close(),
         }
         // Closing is no change, and begins no transaction.
         if !group.is_empty() {
-            session.commit_and_reply(&mut group).await;
+            session.commit_and_respond(&mut group).await;
         }
         if session.lost.get().is_some() {
             break;
@@ -213,7 +213,7 @@ struct Session {
     /// Kept right from here, where there is a connection anyway.
     clock: Arc<Clock>,
     /// Whether to wait for the database: not after having waited in vain, until it is back.
-    patient: bool,
+    retries: bool,
     /// What broke the connection of a file. It is not opened again, for nobody knows what became of it:
     /// nothing can be written from here any more, and who supervises the program is to start it anew.
     lost: Arc<OnceLock<String>>,
@@ -233,23 +233,23 @@ impl Session {
     }
 
     /// Commits a group, or each of it alone where one spoils it for the others.
-    async fn commit_and_reply(&mut self, group: &mut Vec<Box<dyn Order>>) {
+    async fn commit_and_respond(&mut self, group: &mut Vec<Box<dyn WriteRequest>>) {
         match self.commit(group).await {
-            Ok(()) => group.drain(..).for_each(|order| order.reply(Ok(()))),
+            Ok(()) => group.drain(..).for_each(|request| request.respond(Ok(()))),
             Err(LibraryError::Unavailable { reason }) => {
                 let away = || LibraryError::Unavailable { reason: reason.clone() };
-                group.drain(..).for_each(|order| order.reply(Err(away())));
+                group.drain(..).for_each(|request| request.respond(Err(away())));
             }
             Err(LibraryError::Lost { reason }) => {
                 let lost = || LibraryError::Lost { reason: reason.clone() };
-                group.drain(..).for_each(|order| order.reply(Err(lost())));
+                group.drain(..).for_each(|request| request.respond(Err(lost())));
             }
             Err(error) => match group.pop() {
-                Some(order) if group.is_empty() => order.reply(Err(error)),
+                Some(request) if group.is_empty() => request.respond(Err(error)),
                 last => {
-                    for mut order in group.drain(..).chain(last) {
-                        let alone = self.commit(std::slice::from_mut(&mut order)).await;
-                        order.reply(alone);
+                    for mut request in group.drain(..).chain(last) {
+                        let alone = self.commit(std::slice::from_mut(&mut request)).await;
+                        request.respond(alone);
                     }
                 }
             },
@@ -257,26 +257,29 @@ impl Session {
     }
 
     /// Commits these orders together, waiting for a database that is away.
-    async fn commit(&mut self, orders: &mut [Box<dyn Order>]) -> Result<(), LibraryError> {
-        let mut patience = Patience::new(self.patient);
+    async fn commit(&mut self, requests: &mut [Box<dyn WriteRequest>]) -> Result<(), LibraryError> {
+        let mut budget = RetryBudget::new(self.retries);
         loop {
-            match self.try_to_commit(orders).await {
+            match self.try_to_commit(requests).await {
                 Err(error) if error.is_unavailable() => {
                     self.disconnect(&error)?;
-                    if patience.wait().await.is_err() {
-                        self.patient = false;
+                    if budget.wait().await.is_err() {
+                        self.retries = false;
                         return Err(error);
                     }
                 }
                 done => {
-                    self.patient = true;
+                    self.retries = true;
                     return done;
                 }
             }
         }
     }
 
-    async fn try_to_commit(&mut self, orders: &mut [Box<dyn Order>]) -> Result<(), LibraryError> {
+    async fn try_to_commit(
+        &mut self,
+        requests: &mut [Box<dyn WriteRequest>],
+    ) -> Result<(), LibraryError> {
         let connection = match (&mut self.connection, &self.target) {
             (Some(connection), _) => connection,
             (none, Target::Postgres { options, .. }) => {
@@ -291,7 +294,7 @@ impl Session {
             {
                 clock.set(postgres::unix_ms(server).await?);
             }
-            transaction(connection, orders).await
+            transaction(connection, requests).await
         };
         match &self.target {
             Target::Sqlite(_) => transaction.await,
@@ -304,12 +307,12 @@ impl Session {
 
 async fn transaction(
     connection: &mut Connection,
-    orders: &mut [Box<dyn Order>],
+    requests: &mut [Box<dyn WriteRequest>],
 ) -> Result<(), LibraryError> {
     connection.begin().await?;
     let mut done = Ok(());
-    for order in orders {
-        done = order.apply(connection).await;
+    for request in requests {
+        done = request.apply(connection).await;
         if done.is_err() {
             break;
         }

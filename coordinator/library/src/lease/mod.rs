@@ -1,14 +1,14 @@
 //! Leases: handing cases out, keeping them, taking them back.
 
 mod hold;
-mod horizon;
-mod take;
+mod lease_cases;
+mod queue_cursor;
 
-pub(crate) use horizon::Horizon;
+pub(crate) use queue_cursor::QueueCursor;
 
 use crate::{AttemptsMax, Library, LibraryError};
 use hold::{Release, ReleaseAll, Renew};
-use take::Take;
+use lease_cases::LeaseCases;
 use tracktwin_parameters::Case;
 
 /// A worker's wish for cases.
@@ -74,7 +74,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
     pub async fn lease(&self, request: LeaseRequest) -> Result<Option<Lease>, LibraryError> {
-        self.write(Take { request, horizon: self.horizon() }).await
+        self.write(LeaseCases { request, cursor: self.cursor() }).await
     }
 
     /// Lets leases last until `until_unix_ms`; answers those that were taken from the worker: they

@@ -50,26 +50,27 @@ impl Write for Report {
     }
 
     async fn apply(&self, connection: &mut Connection) -> Result<Vec<Verdict>, LibraryError> {
-        let mut standings = self.standings(connection).await?;
-        let earlier = self.earlier_leases(connection, &standings).await?;
+        let mut case_states = self.case_states(connection).await?;
+        let earlier = self.earlier_leases(connection, &case_states).await?;
         let mut finished = Vec::new();
         let mut verdicts = Vec::with_capacity(self.cases.len());
         for case in &self.cases {
-            let standing = standings.get_mut(&case.index);
-            let verdict =
-                standing.as_deref().map_or(Verdict::Refused, |it| self.verdict(case, it, &earlier));
+            let case_state = case_states.get_mut(&case.index);
+            let verdict = case_state
+                .as_deref()
+                .map_or(Verdict::Refused, |it| self.verdict(case, it, &earlier));
             verdicts.push(verdict);
-            let (Verdict::Stored, Some(standing)) = (verdict, standing) else { continue };
+            let (Verdict::Stored, Some(case_state)) = (verdict, case_state) else { continue };
             match &case.outcome {
                 Outcome::Finished(passes) => {
-                    if self.overtakes(case, standing) {
+                    if self.overtakes(case, case_state) {
                         attempt::overtake(connection, self, case.index).await?;
                     }
                     finished.push((case, &**passes));
-                    standing.state = State::Finished;
+                    case_state.state = State::Finished;
                 }
                 Outcome::Failed { reason } => {
-                    standing.state = self.fail(connection, case, standing, reason).await?;
+                    case_state.state = self.fail(connection, case, case_state, reason).await?;
                 }
             }
         }
@@ -81,7 +82,7 @@ impl Write for Report {
 }
 
 /// Where a case stands before a report of it.
-struct Standing {
+struct CaseState {
     state: State,
     epoch: u32,
     attempts: u32,
@@ -91,32 +92,32 @@ struct Standing {
 
 impl Report {
     /// Where the reported cases stand, locked against others.
-    async fn standings(
+    async fn case_states(
         &self,
         connection: &mut Connection,
-    ) -> Result<HashMap<u32, Standing>, LibraryError> {
+    ) -> Result<HashMap<u32, CaseState>, LibraryError> {
         let ask = sql(STANDINGS).bind(&self.campaign).bind(self.indices(|_| true));
-        let standing = |row: &Row| {
-            let standing = Standing {
+        let case_state = |row: &Row| {
+            let case_state = CaseState {
                 state: State::from_name(&row.get::<String>("state")?)?,
                 epoch: row.get_u32("epoch")?,
                 attempts: row.get_u32("attempts")?,
                 worker: row.get("worker")?,
                 parameter_hash: row.get("parameter_hash")?,
             };
-            Ok((row.get_u32("sobol_index")?, standing))
+            Ok((row.get_u32("sobol_index")?, case_state))
         };
-        connection.rows(ask).await?.iter().map(standing).collect()
+        connection.rows(ask).await?.iter().map(case_state).collect()
     }
 
     /// Leases of these cases that the worker had, and that have ended.
     async fn earlier_leases(
         &self,
         connection: &mut Connection,
-        standings: &HashMap<u32, Standing>,
+        case_states: &HashMap<u32, CaseState>,
     ) -> Result<HashSet<Held>, LibraryError> {
         let present = |case: &CaseReport| {
-            standings.get(&case.index).is_none_or(|standing| self.is_present(case, standing))
+            case_states.get(&case.index).is_none_or(|case_state| self.is_present(case, case_state))
         };
         let late = self.indices(|case| !present(case));
         if late.is_empty() {
@@ -134,22 +135,27 @@ impl Report {
     }
 
     /// Whether the report is of the case's last lease.
-    fn is_present(&self, case: &CaseReport, standing: &Standing) -> bool {
-        case.epoch == standing.epoch && standing.worker.as_ref() == Some(&self.worker)
+    fn is_present(&self, case: &CaseReport, case_state: &CaseState) -> bool {
+        case.epoch == case_state.epoch && case_state.worker.as_ref() == Some(&self.worker)
     }
 
     /// Whether an earlier lease brings the result that a later one is working on.
-    fn overtakes(&self, case: &CaseReport, standing: &Standing) -> bool {
-        standing.state == State::Leased && !self.is_present(case, standing)
+    fn overtakes(&self, case: &CaseReport, case_state: &CaseState) -> bool {
+        case_state.state == State::Leased && !self.is_present(case, case_state)
     }
 
-    fn verdict(&self, case: &CaseReport, standing: &Standing, earlier: &HashSet<Held>) -> Verdict {
-        let present = self.is_present(case, standing);
+    fn verdict(
+        &self,
+        case: &CaseReport,
+        case_state: &CaseState,
+        earlier: &HashSet<Held>,
+    ) -> Verdict {
+        let present = self.is_present(case, case_state);
         let held = present || earlier.contains(&Held { index: case.index, epoch: case.epoch });
-        if !held || case.epoch == 0 || case.parameter_hash != standing.parameter_hash {
+        if !held || case.epoch == 0 || case.parameter_hash != case_state.parameter_hash {
             return Verdict::Refused;
         }
-        match (&case.outcome, standing.state) {
+        match (&case.outcome, case_state.state) {
             (_, State::Finished) => Verdict::Duplicate,
             (Outcome::Finished(_), _) => Verdict::Stored,
             (Outcome::Failed { .. }, State::Leased) if present => Verdict::Stored,
@@ -161,16 +167,16 @@ impl Report {
         &self,
         connection: &mut Connection,
         case: &CaseReport,
-        standing: &Standing,
+        case_state: &CaseState,
         reason: &str,
     ) -> Result<State, LibraryError> {
         let failures =
-            attempt::failures(connection, self, case.index, standing.attempts).await? + 1;
+            attempt::failures(connection, self, case.index, case_state.attempts).await? + 1;
         let state = self.attempts_max.after(Ending::Failed, failures);
         let ended = Ended {
             campaign: &self.campaign,
             indices: vec![case.index.into()],
-            attempts: standing.attempts + 1,
+            attempts: case_state.attempts + 1,
             state,
             ending: "failed",
             error: reason,

@@ -272,7 +272,7 @@ pub(crate) async fn salvage(from: &Library, to: &Library) -> Vec<String> {
         let lost = from.read_what_is_whole(table, 50, take).await.unwrap();
         left_out.extend(lost.map(|lost| format!("{}: {lost:?}", table.name)));
     }
-    to.settle().await.unwrap();
+    to.finish_complete_cases().await.unwrap();
     to.discard_incomplete().await.unwrap();
     left_out
 }

@@ -57,7 +57,7 @@ pub(crate) async fn copy(from: &Library, to: &Library) -> u64 {
         };
         from.read_table(table, 3, take).await.unwrap();
     }
-    to.settle().await.unwrap();
+    to.finish_complete_cases().await.unwrap();
     added
 }
 
@@ -252,7 +252,7 @@ on_both_databases! {
         };
         there.read_table(results, 9, keep).await.unwrap();
         assert_eq!(found, passes);
-        there.settle().await.unwrap();
+        there.finish_complete_cases().await.unwrap();
         assert_eq!(there.status(CAMPAIGN).await.unwrap().finished, 1);
         assert_ne!(there.digest(CAMPAIGN).await.unwrap(), before);
     }

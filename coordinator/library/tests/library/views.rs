@@ -2,7 +2,7 @@
 
 use crate::data::{Kept, ask, sql};
 use crate::support::{CAMPAIGN, Home, on_both_databases};
-use tracktwin_library::{Finding, Library};
+use tracktwin_library::{IntegrityFault, Library};
 use tracktwin_parameters::Parameter;
 
 /// Takes a view away and says that the views are of this version.
@@ -26,7 +26,7 @@ on_both_databases! {
         of_version(home, "0").await;
         let library = home.open().await;
         assert!(is_there(&library).await);
-        let named = |it: &&Finding| it.what.contains("failed_case");
+        let named = |it: &&IntegrityFault| it.what.contains("failed_case");
         assert_eq!(library.verify(|| ()).await.unwrap().findings.iter().find(named), None);
     }
 

@@ -1,6 +1,6 @@
 //! Measured and predicted levels by frequency where it matters.
 
-use super::levels::{Side, measured, predicted, scatter, strangeness};
+use super::levels::{Side, measured, mismatch_norm, predicted, scatter};
 use super::words::{accepted, addition, numbers, sleepers, speeds};
 use maud::{Markup, PreEscaped, html};
 use tracktwin_diagnosis::{Diagnosis, Levels, Location};
@@ -47,7 +47,7 @@ impl Site {
             let name = format!("mean over {}", sleepers(diagnosis, &location.sleepers));
             return Self { sleepers: named, name };
         }
-        match strangest_of(diagnosis, &named) {
+        match largest_mismatch_of(diagnosis, &named) {
             Some(sleeper) => Self::one(diagnosis, sleeper),
             None => nearest(diagnosis, location.x_m)
                 .map_or_else(|| Self::everywhere(diagnosis), |s| Self::one(diagnosis, s)),
@@ -56,7 +56,7 @@ impl Site {
 
     fn strangest(diagnosis: &Diagnosis) -> Self {
         let all: Vec<usize> = (0..diagnosis.track.len()).collect();
-        strangest_of(diagnosis, &all)
+        largest_mismatch_of(diagnosis, &all)
             .map_or_else(|| Self::everywhere(diagnosis), |s| Self::one(diagnosis, s))
     }
 
@@ -109,9 +109,9 @@ impl Site {
     }
 }
 
-fn strangest_of(diagnosis: &Diagnosis, sleepers: &[usize]) -> Option<usize> {
-    let strange = sleepers.iter().map(|&sleeper| (strangeness(diagnosis, sleeper), sleeper));
-    strange.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, sleeper)| sleeper)
+fn largest_mismatch_of(diagnosis: &Diagnosis, sleepers: &[usize]) -> Option<usize> {
+    let mismatches = sleepers.iter().map(|&sleeper| (mismatch_norm(diagnosis, sleeper), sleeper));
+    mismatches.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, sleeper)| sleeper)
 }
 
 fn nearest(diagnosis: &Diagnosis, [from, to]: [f64; 2]) -> Option<usize> {

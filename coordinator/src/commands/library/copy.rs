@@ -2,8 +2,8 @@
 
 use super::{OrInput, Stop};
 use crate::commands::library_url::open_or_create;
+use crate::commands::println_stdout;
 use crate::commands::progress::Progress;
-use crate::commands::say;
 use anyhow::anyhow;
 use clap::Args;
 use std::error::Error;
@@ -45,16 +45,19 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let from = Library::open(&arguments.from).await?;
     let to = open_or_create(&arguments.to).await?;
     let mut copied = copy(&from, &to).await?;
-    to.settle().await?;
+    to.finish_complete_cases().await?;
     if !copied.left_out.is_empty() {
         let incomplete = to.discard_incomplete().await?;
         if incomplete > 0 {
             copied.left_out.push(format!("{incomplete} cases have only some of their results"));
         }
     }
-    say(&format!("{} of {} rows copied; the others were there", copied.added, copied.done));
+    println_stdout(&format!(
+        "{} of {} rows copied; the others were there",
+        copied.added, copied.done
+    ));
     for what in &copied.left_out {
-        say(&format!("left out: {what}"));
+        println_stdout(&format!("left out: {what}"));
     }
     let same = compare(&from, &to).await;
     to.close().await;
@@ -111,14 +114,16 @@ async fn compare(from: &Library, to: &Library) -> Result<(), Stop> {
     for campaign in from.campaigns().await.unwrap_or_default() {
         let there = to.digest(&campaign.id).await?;
         match from.digest(&campaign.id).await {
-            Ok(here) if here == there => say(&format!("{here}  {}: the same in both", campaign.id)),
+            Ok(here) if here == there => {
+                println_stdout(&format!("{here}  {}: the same in both", campaign.id))
+            }
             Ok(here) => {
                 differ = true;
-                say(&format!("{}: differs: {here} and {there}", campaign.id));
+                println_stdout(&format!("{}: differs: {here} and {there}", campaign.id));
             }
             Err(error) => {
                 differ = true;
-                say(&format!("{}: cannot be compared: {error}", campaign.id));
+                println_stdout(&format!("{}: cannot be compared: {error}", campaign.id));
             }
         }
     }

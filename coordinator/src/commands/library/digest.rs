@@ -1,6 +1,6 @@
 //! `tracktwin library digest`: one hash a campaign.
 
-use super::{Stop, Which, answer, open};
+use super::{Stop, Which, open, print_answers};
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -16,6 +16,8 @@ pub(super) async fn run(which: &Which) -> Result<(), Stop> {
         let digest = library.digest(&campaign.id).await?;
         answers.push(Digest { campaign: campaign.id, digest });
     }
-    answer(which.json, &answers, |Digest { campaign, digest }| format!("{digest}  {campaign}"));
+    print_answers(which.json, &answers, |Digest { campaign, digest }| {
+        format!("{digest}  {campaign}")
+    });
     Ok(())
 }

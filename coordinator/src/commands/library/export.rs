@@ -5,7 +5,7 @@ use super::files::parquet_file::ParquetFile;
 use super::{OrInput, Stop};
 use crate::commands::files::{Force, check};
 use crate::commands::library_url::LibraryUrl;
-use crate::commands::say;
+use crate::commands::println_stdout;
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     }
     output.commit()?;
     for line in &said {
-        say(line);
+        println_stdout(line);
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use super::files::parquet_file;
 use super::{OrInput, Stop};
 use crate::commands::library_url::LibraryUrl;
-use crate::commands::say;
+use crate::commands::println_stdout;
 use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -36,9 +36,9 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let library = arguments.library.open_or_create().await?;
     for (table, file) in Table::ALL.into_iter().zip(&files) {
         let (read, added) = import(&library, table, file).await?;
-        say(&format!("{}: {added} of {read} rows added", table.name));
+        println_stdout(&format!("{}: {added} of {read} rows added", table.name));
     }
-    library.settle().await?;
+    library.finish_complete_cases().await?;
     library.close().await;
     Ok(())
 }

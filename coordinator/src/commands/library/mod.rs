@@ -9,7 +9,7 @@ mod sql;
 mod status;
 mod verify;
 
-use super::{OrInput, Stop, note, say};
+use super::{OrInput, Stop, println_stderr, println_stdout};
 use crate::commands::library_url::LibraryUrl;
 use anyhow::anyhow;
 use clap::{Args, Subcommand};
@@ -65,14 +65,14 @@ async fn open(url: &LibraryUrl) -> Result<(Library, Vec<CampaignRecord>), Stop> 
 }
 
 /// How one of several campaigns is named with most commands.
-pub(super) const MEND: &str = "choose one with --campaign";
+pub(super) const CHOOSE_REMEDY: &str = "choose one with --campaign";
 
-/// One campaign of a library: the one with this id or this name, or the only one; `mend` says how
+/// One campaign of a library: the one with this id or this name, or the only one; `remedy` says how
 /// to name one of several.
 pub(super) async fn choose(
     library: &Library,
     named: Option<&str>,
-    mend: &str,
+    remedy: &str,
 ) -> Result<CampaignRecord, Stop> {
     let all = library.campaigns().await?;
     let ids =
@@ -89,7 +89,7 @@ pub(super) async fn choose(
             let all: Vec<_> = all.iter().collect();
             format!("it has no campaign {}; it has {}", named.unwrap_or_default(), ids(&all))
         }
-        (several, None) => format!("it holds several campaigns; {mend}: {}", ids(several)),
+        (several, None) => format!("it holds several campaigns; {remedy}: {}", ids(several)),
         (several, Some(named)) => {
             format!("several campaigns are called {named}; give the id: {}", ids(several))
         }
@@ -97,16 +97,16 @@ pub(super) async fn choose(
     Err(Stop::Input(anyhow!("library {}: {wrong}", library.name())))
 }
 
-fn answer<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> String) {
+fn print_answers<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> String) {
     if json {
         let json = serde_json::to_string_pretty(answers).expect("counts and names become JSON");
-        say(&json);
+        println_stdout(&json);
     } else {
         if answers.is_empty() {
-            note("it holds no campaign yet; `tracktwin campaign add FILE` adds one");
+            println_stderr("it holds no campaign yet; `tracktwin campaign add FILE` adds one");
         }
         for answer in answers {
-            say(&text(answer));
+            println_stdout(&text(answer));
         }
     }
 }

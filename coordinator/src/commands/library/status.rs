@@ -1,6 +1,6 @@
 //! `tracktwin library status`: how many cases stand where.
 
-use super::{Stop, Which, answer, open};
+use super::{Stop, Which, open, print_answers};
 use crate::commands::contact::contact_sentence;
 use serde::Serialize;
 use tracktwin_library::{CampaignRecord, ContactLoss, Library};
@@ -34,7 +34,7 @@ pub(super) async fn run(which: &Which) -> Result<(), Stop> {
     for campaign in campaigns {
         answers.push(counts(&library, campaign).await?);
     }
-    answer(which.json, &answers, Counts::text);
+    print_answers(which.json, &answers, Counts::text);
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Stop, Which};
 use crate::commands::progress::Progress;
-use crate::commands::{note, say};
+use crate::commands::{println_stderr, println_stdout};
 use tracktwin_library::{Finding, Library, LibraryError, Verified};
 
 /// What no checksum is made of, and no hash.
@@ -58,23 +58,25 @@ fn tell(json: bool, name: &str, verified: &Verified) {
     let Verified { findings, attested, unattested, notes } = verified;
     if json {
         let findings: Vec<_> = findings.iter().map(self::json).collect();
-        say(&format!("{:#}", serde_json::Value::from(findings)));
+        println_stdout(&format!("{:#}", serde_json::Value::from(findings)));
     } else {
         for finding in findings {
-            say(&text(finding));
+            println_stdout(&text(finding));
         }
         if findings.is_empty() {
-            say(&format!("nothing is wrong with {name} ({attested} cases have their checksums)"));
+            println_stdout(&format!(
+                "nothing is wrong with {name} ({attested} cases have their checksums)"
+            ));
         }
     }
     if *unattested > 0 {
-        note(&format!(
+        println_stderr(&format!(
             "{unattested} cases have results without checksum, of before schema 8: nothing tells whether they \
              were altered"
         ));
     }
     for note in notes.iter().map(String::as_str).chain([UNCHECKED]) {
-        self::note(note);
+        self::println_stderr(note);
     }
 }
 

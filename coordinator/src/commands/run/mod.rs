@@ -8,7 +8,7 @@ use super::library_url::open_or_create;
 use super::numbers::{cores, count};
 use super::progress::{Progress, TrainingBar};
 use super::signals::stop_on_signal;
-use super::{OrInput, Stop, continuity, evaluate, note, say};
+use super::{OrInput, Stop, continuity, evaluate, println_stderr, println_stdout};
 use crate::commands::contact::contact_sentence;
 use crate::pipeline::lack::check_for_training;
 use crate::pipeline::models;
@@ -59,7 +59,7 @@ pub(super) struct Arguments {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if arguments.print_campaign {
-        say(DEFAULT.trim_end());
+        println_stdout(DEFAULT.trim_end());
         return Ok(());
     }
     let campaign = match &arguments.campaign {
@@ -97,7 +97,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     // What the library holds is then in one file, fit to be copied.
     library.close().await;
     let (line, evaluation) = said?;
-    say(&line);
+    println_stdout(&line);
     evaluation.map_or(Ok(()), |evaluation| evaluate::conclude(&evaluation))
 }
 
@@ -135,7 +135,7 @@ fn sample_for(campaign: &Campaign, out: &Path, force: Force) -> Result<Option<Re
     match check(&recording, campaign) {
         Ok(()) => Ok(Some(recording)),
         Err(other) => {
-            note(&format!(
+            println_stderr(&format!(
                 "models will be trained and nothing evaluated, for the sample recording is of another kind \
                  ({other}); `--recording DIR` evaluates one of your own"
             ));
@@ -160,7 +160,7 @@ fn all_cores() -> NonZeroUsize {
 
 /// Simulates what the library lacks of a campaign; Ctrl-C leaves it to be gone on with.
 async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -> Result<(), Stop> {
-    continuity::check(library, campaign, note).await?;
+    continuity::check(library, campaign, println_stderr).await?;
     // Whoever is refused has added nothing.
     let claim = tracktwin_farm::embedded::claim(library).await?;
     room::check(library, campaign).await?;
@@ -187,9 +187,9 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
         let left = status.total() - status.done();
         return Err(anyhow!("interrupted with {left} cases left; the same command goes on").into());
     }
-    note(&contact_sentence(library.contact_loss(&id).await?, status.finished));
+    println_stderr(&contact_sentence(library.contact_loss(&id).await?, status.finished));
     if status.failed > 0 {
-        note(&format!(
+        println_stderr(&format!(
             "{} cases were given up; `tracktwin library status` says why; going on without them",
             status.failed
         ));

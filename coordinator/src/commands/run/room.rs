@@ -1,7 +1,7 @@
 //! Whether there is room for what a campaign will make.
 
 use super::super::files::free_bytes;
-use super::super::{Stop, note};
+use super::super::{Stop, println_stderr};
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_library::Library;
 use tracktwin_signal::ThirdOctave;
@@ -18,7 +18,7 @@ pub(super) async fn check(library: &Library, campaign: &Campaign) -> Result<(), 
     let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
     let free = free_bytes(folder.unwrap_or(std::path::Path::new(".")));
     if let Some(free) = free.filter(|free| *free < needed) {
-        note(&format!(
+        println_stderr(&format!(
             "{}: the disk has {:.1} GB left, and the cases to be simulated will take about {:.1} GB; make room, \
              or give another --library",
             library.name(),

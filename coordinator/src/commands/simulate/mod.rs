@@ -104,7 +104,7 @@ impl From<Track> for Preset {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     if arguments.extensions.asks_for_list() {
-        super::say(&extensions::list());
+        super::println_stdout(&extensions::list());
         return Ok(());
     }
     let Some(out) = &arguments.out else {
@@ -128,8 +128,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     output.add(&FileName::new(TRUTH)?, track.truth_json(&drives).as_bytes())?;
     recording.add_to(&mut output)?;
     output.commit()?;
-    super::say(&contact_sentence(&recording.passes));
-    super::say(&format!("recording: {}", out.display()));
+    super::println_stdout(&contact_sentence(&recording.passes));
+    super::println_stdout(&format!("recording: {}", out.display()));
     Ok(())
 }
 

@@ -96,7 +96,7 @@ struct Sums {
     sd: f64,
     error: f64,
     held: f64,
-    held_if_even: f64,
+    held_without_unevenness: f64,
     /// Own deviation times itself, and times what the estimate lacks of it.
     own: f64,
     lacking: f64,
@@ -116,7 +116,7 @@ fn compare(parameter: Parameter, answers: &[Answer], all: bool) -> Compared {
         relative_sd: share(sums.sd),
         relative_error: share(sums.error),
         holds_90: share(sums.held),
-        holds_90_if_even: share(sums.held_if_even),
+        holds_90_if_even: share(sums.held_without_unevenness),
         missed: (sums.own > 1e-9).then(|| sums.lacking / sums.own),
         along: (sums.along / sums.tracks.max(1.0)).sqrt(),
     }
@@ -130,7 +130,8 @@ impl Sums {
         let pairs = evaluation.sleepers.iter().zip(&truths);
         for (sleeper, &truth) in pairs.filter(|(sleeper, _)| all || sleeper.is_valid()) {
             let Some(estimate) = sleeper.estimates.get(&parameter) else { continue };
-            let even = sleeper.sd_if_even.get(&parameter).copied().unwrap_or(estimate.sd);
+            let even =
+                sleeper.sd_without_unevenness.get(&parameter).copied().unwrap_or(estimate.sd);
             let error = (estimate.mean - truth).abs();
             let held = |sd: f64| f64::from(u8::from(error <= WIDTH_90 * sd));
             self.sleepers += 1.0;
@@ -138,7 +139,7 @@ impl Sums {
             self.sd += estimate.sd / truth;
             self.error += error / truth;
             self.held += held(estimate.sd);
-            self.held_if_even += held(even);
+            self.held_without_unevenness += held(even);
             let own = truth.ln() - middle;
             self.own += own * own;
             self.lacking += own * (truth / estimate.mean).ln();

@@ -54,13 +54,13 @@ impl Trial {
         setting: Setting<'_>,
     ) -> Result<(), TrialError> {
         let before = cpu_s();
-        let (diagnosis, Compared { subject, search }) =
+        let (diagnosis, Compared { prepared, search }) =
             diagnose(number, recording, setting).await?;
         let cpu_s = cpu_s() - before;
         let record = self.written(number, "", &diagnosis)?;
         let plan = self.opened(number)?;
         let scene = &plan.scene;
-        let length = |hidden| detectability(recording, &subject, &search, scene, hidden);
+        let length = |hidden| detectability(recording, &prepared, &search, scene, hidden);
         let lengths: Vec<Option<f64>> =
             compute(|| scene.left_out.iter().map(length).collect::<Result<_, _>>())?;
         let score = score(&plan, &diagnosis, &lengths, cpu_s);

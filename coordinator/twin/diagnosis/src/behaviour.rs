@@ -51,7 +51,7 @@ pub struct Behaviour {
 
 /// What is known of a port: the slope of the log likelihood with its traces' heights and the square
 /// of those, and the receptance in m/N that they are in parts of, at the centres in Hz.
-pub(crate) struct Seen<'a> {
+pub(crate) struct PortEvidence<'a> {
     pub(crate) along: &'a DVector<f64>,
     pub(crate) square: &'a DMatrix<f64>,
     pub(crate) receptance: &'a [Complex64],
@@ -64,7 +64,7 @@ struct Fit {
     nats: f64,
 }
 
-impl Seen<'_> {
+impl PortEvidence<'_> {
     /// What it behaves like, if that explains most of what anything would, `free` in nats.
     pub(crate) fn behaviour(&self, free: f64) -> Option<Behaviour> {
         let spring = self.linear(Element::Spring, "stiffness_N_per_m", |_| Complex64::ONE);
@@ -181,7 +181,7 @@ mod tests {
 
     /// What a stiffness in N/m at a port looks like whose traces are as loud at all frequencies, `loud`
     /// for each part of its own stiffness; the centres are those of a scan from 100 to 3,300 Hz.
-    fn seen(stiffness: impl Fn(f64) -> Complex64, loud: f64) -> Option<Behaviour> {
+    fn evidence(stiffness: impl Fn(f64) -> Complex64, loud: f64) -> Option<Behaviour> {
         let centres_hz: Vec<f64> =
             (0..14).map(|bump| 100.0 * 33_f64.powf(f64::from(bump) / 13.0)).collect();
         // A beam's receptance falls with the frequency.
@@ -193,13 +193,13 @@ mod tests {
         let heights = DVector::from_iterator(28, heights);
         let square = DMatrix::identity(28, 28) * (loud * loud);
         let along = &square * &heights;
-        let seen = Seen {
+        let evidence = PortEvidence {
             along: &along,
             square: &square,
             receptance: &receptance,
             centres_hz: &centres_hz,
         };
-        seen.behaviour(0.5 * along.dot(&heights))
+        evidence.behaviour(0.5 * along.dot(&heights))
     }
 
     fn value(behaviour: &Behaviour, name: &str) -> f64 {
@@ -208,18 +208,18 @@ mod tests {
 
     #[test]
     fn each_element_is_known_again_with_its_size() {
-        let spring = seen(|_| (-3e7).into(), 1e4).unwrap();
+        let spring = evidence(|_| (-3e7).into(), 1e4).unwrap();
         assert_eq!(spring.element, Element::Spring);
         assert!((value(&spring, "stiffness_N_per_m") / -3e7 - 1.0).abs() < 1e-9);
-        let damper = seen(|hz| Complex64::I * TAU * hz * 5e3, 1e4).unwrap();
+        let damper = evidence(|hz| Complex64::I * TAU * hz * 5e3, 1e4).unwrap();
         assert_eq!(damper.element, Element::Damper);
         // The mean over a bump is not the value at its middle.
         assert!((value(&damper, "damping_N_s_per_m") / 5e3 - 1.0).abs() < 0.05);
-        let mass = seen(|hz| (-(TAU * hz).powi(2) * 0.7).into(), 1e4).unwrap();
+        let mass = evidence(|hz| (-(TAU * hz).powi(2) * 0.7).into(), 1e4).unwrap();
         assert_eq!(mass.element, Element::Mass);
         assert!((value(&mass, "mass_kg") / 0.7 - 1.0).abs() < 0.1);
         let absorber =
-            seen(|hz| resonator(hz / 900.0, 0.1) * (TAU * hz).powi(2) * 0.4, 1e4).unwrap();
+            evidence(|hz| resonator(hz / 900.0, 0.1) * (TAU * hz).powi(2) * 0.4, 1e4).unwrap();
         assert_eq!(absorber.element, Element::MassOnSpring, "{absorber:?}");
         assert!((value(&absorber, "frequency_Hz") / 900.0 - 1.0).abs() < 0.1);
         assert!((value(&absorber, "mass_kg") / 0.4 - 1.0).abs() < 0.3, "{absorber:?}");
@@ -229,7 +229,7 @@ mod tests {
     fn what_jumps_with_the_frequency_is_like_none() {
         let jumps =
             |hz: f64| Complex64::from(if (hz.ln() * 4.0) as i64 % 2 == 0 { 3e7 } else { -3e7 });
-        assert_eq!(seen(jumps, 1e4), None);
+        assert_eq!(evidence(jumps, 1e4), None);
     }
 
     #[test]

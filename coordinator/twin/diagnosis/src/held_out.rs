@@ -28,11 +28,12 @@ impl Problem<'_> {
         let (residual, jacobian) = self.whitened(&fit.values)?;
         let (residual, jacobian) =
             (self.observation.held_out(&residual), self.observation.held_out_rows(&jacobian));
-        let felt = jacobian.tr_mul(&residual);
+        let projected_gradient = jacobian.tr_mul(&residual);
         let precision =
             fit.precision.l() * fit.precision.l().transpose() + jacobian.tr_mul(&jacobian);
         let precision = Cholesky::new(precision).ok_or(CalibrationError::NotFinite)?;
-        let square = residual.norm_squared() - felt.dot(&precision.solve(&felt));
+        let square =
+            residual.norm_squared() - projected_gradient.dot(&precision.solve(&projected_gradient));
         let spread = precision.ln_determinant() - fit.precision.ln_determinant();
         let count = residual.len();
         let log_density = -0.5 * (square + spread + count as f64 * TAU.ln())

@@ -18,6 +18,7 @@ mod observation;
 mod outcome;
 mod patch_scan;
 mod port_scan;
+mod prepared_recording;
 mod profile;
 mod screen;
 mod search;
@@ -25,7 +26,6 @@ mod section;
 mod sentence;
 mod signature;
 mod spectra;
-mod subject;
 mod suggestion;
 mod transfer;
 
@@ -44,10 +44,10 @@ pub use outcome::{
     SleeperValues, UNKNOWN, Verdict,
 };
 pub use patch_scan::{Fixed, Patch};
-pub use port_scan::{Port, PortPlace, PortScan};
+pub use port_scan::{PortPlace, PortScan, UnknownElement};
+pub use prepared_recording::{PreparationError, PreparedRecording, check_track};
 pub use screen::{Template, templates};
 pub use search::{Fitted, Round, Search, Stage, first_calibration, search};
 pub use section::Section;
 pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra};
-pub use subject::{Subject, SubjectError, check_track};

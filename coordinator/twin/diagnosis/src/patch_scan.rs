@@ -57,7 +57,7 @@ struct Shape {
     fixed: Fixed,
     column: DVector<f64>,
     /// Product of the derivatives at each sleeper with the shape.
-    felt: Vec<DVector<f64>>,
+    projected_gradient: Vec<DVector<f64>>,
 }
 
 /// A patch as a matched filter.
@@ -109,12 +109,12 @@ impl PatchScan {
         Self { shapes, filters, sleepers }
     }
 
-    /// The patch that stands out most in a whitened residual, if any does; `felt` is the residual's
+    /// The patch that stands out most in a whitened residual, if any does; `projected_gradient` is the residual's
     /// product with the baseline's derivatives.
     pub(crate) fn best(
         &self,
         residual: &DVector<f64>,
-        felt: &DVector<f64>,
+        projected_gradient: &DVector<f64>,
         is_one: impl Fn(Fixed) -> bool + Sync,
     ) -> Option<Patch> {
         let each = residual.len() / self.sleepers;
@@ -128,7 +128,7 @@ impl PatchScan {
             .collect();
         let score = |filter: &Filter| {
             let dots = &dots[filter.shape][filter.sleepers.clone()];
-            let along = dots.iter().sum::<f64>() - filter.imitation.dot(felt);
+            let along = dots.iter().sum::<f64>() - filter.imitation.dot(projected_gradient);
             let deviations = along / filter.detectability.sqrt();
             // A surface adds power; it takes none away.
             let is_surface = matches!(self.shapes[filter.shape].fixed, Fixed::Wavelength(_));
@@ -185,10 +185,10 @@ fn shape(problem: &Problem<'_>, current: &Calibration, fixed: Fixed) -> Shape {
     let whitened = observation.fitted_rows(&observation.whiten_matrix(&levels));
     let each = whitened.nrows() / sleepers;
     let column = whitened.view((0, 0), (each, 1)).column(0).into_owned();
-    let felt = (0..sleepers)
+    let projected_gradient = (0..sleepers)
         .map(|sleeper| current.jacobian.rows(sleeper * each, each).tr_mul(&column))
         .collect();
-    Shape { fixed, column, felt }
+    Shape { fixed, column, projected_gradient }
 }
 
 fn filters(number: usize, shape: &Shape, current: &Calibration, sleepers: usize) -> Vec<Filter> {
@@ -200,10 +200,10 @@ fn filters(number: usize, shape: &Shape, current: &Calibration, sleepers: usize)
         .flat_map(|length| (0..=sleepers - length).map(move |first| first..first + length));
     let filter = |run: Range<usize>| {
         let count = run.len() as f64;
-        let mut felt = DVector::zeros(current.values.len());
-        shape.felt[run.clone()].iter().for_each(|part| felt += part);
-        let imitation = current.precision.solve(&felt);
-        let detectability = count * square - felt.dot(&imitation);
+        let mut projected_gradient = DVector::zeros(current.values.len());
+        shape.projected_gradient[run.clone()].iter().for_each(|part| projected_gradient += part);
+        let imitation = current.precision.solve(&projected_gradient);
+        let detectability = count * square - projected_gradient.dot(&imitation);
         (detectability > LEFT_MIN * count * square).then_some(Filter {
             shape: number,
             sleepers: run,

@@ -59,9 +59,9 @@ pub fn templates(
             let transfer = forward.transfer_beside(&known, &calibration.values, &extensions);
             let changed = forward.levels(&transfer.ok()?, &calibration.values);
             let change = observation.fitted(&observation.whiten(&(changed - &plain)));
-            let felt = calibration.jacobian.tr_mul(&change);
-            let imitation = calibration.precision.solve(&felt);
-            let detectability = change.norm_squared() - felt.dot(&imitation);
+            let projected_gradient = calibration.jacobian.tr_mul(&change);
+            let imitation = calibration.precision.solve(&projected_gradient);
+            let detectability = change.norm_squared() - projected_gradient.dot(&imitation);
             Some(Template { candidate: number, trial, change, imitation, detectability })
         })
         .collect();
@@ -80,19 +80,19 @@ impl Template {
     pub(crate) fn at_strengths(
         &self,
         residual: &DVector<f64>,
-        felt: &DVector<f64>,
+        projected_gradient: &DVector<f64>,
     ) -> [f64; STRENGTHS.len()] {
-        let along = self.change.dot(residual) - self.imitation.dot(felt);
+        let along = self.change.dot(residual) - self.imitation.dot(projected_gradient);
         STRENGTHS.map(|part| part * along - 0.5 * part * part * self.detectability)
     }
 
     /// Logarithm of the evidence for the effect in a whitened residual, against the baseline alone:
     /// with strength `N(1, 0.3^2)` times the trial's (docs/diagnosis.md, eq. 12).
     ///
-    /// `felt` is the residual's product with the baseline's derivatives; for the residual of a
+    /// `projected_gradient` is the residual's product with the baseline's derivatives; for the residual of a
     /// calibration its gradient, which is zero where it came to its end.
-    pub fn log_evidence(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> f64 {
-        let along = self.change.dot(residual) - self.imitation.dot(felt);
+    pub fn log_evidence(&self, residual: &DVector<f64>, projected_gradient: &DVector<f64>) -> f64 {
+        let along = self.change.dot(residual) - self.imitation.dot(projected_gradient);
         let square = self.detectability;
         let variance = STRENGTH_DEVIATION.powi(2);
         let spread = 1.0 + variance * square;

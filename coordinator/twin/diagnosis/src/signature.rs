@@ -3,8 +3,8 @@
 use crate::calibration::{CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::observation::Observation;
+use crate::prepared_recording::PreparedRecording;
 use crate::screen::templates;
-use crate::subject::Subject;
 use nalgebra::DVector;
 use tracktwin_track::extension::ExtensionInstance;
 
@@ -17,13 +17,13 @@ use tracktwin_track::extension::ExtensionInstance;
 /// # Errors
 /// [`CalibrationError`] when values or extension make no track.
 pub fn signature(
-    subject: &Subject,
+    prepared: &PreparedRecording,
     observation: &Observation,
     values: &DVector<f64>,
     extension: ExtensionInstance,
 ) -> Result<f64, CalibrationError> {
-    let problem = Problem { forward: &subject.forward, observation, candidates: &[] };
-    let section = &subject.forward.section;
+    let problem = Problem { forward: &prepared.forward, observation, candidates: &[] };
+    let section = &prepared.forward.section;
     // Screening leaves out what makes no track: here the reason is wanted.
     section.in_model(&extension).build(&section.design, section.spans())?;
     let (kind, trials) = (extension.kind()?, vec![Vec::new()]);

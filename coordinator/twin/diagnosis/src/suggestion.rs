@@ -1,28 +1,33 @@
 //! What the passes alone suggest, as candidates for the model.
 
 use crate::candidate::{Candidate, parameter};
-use crate::subject::Subject;
-use tracktwin_inspection::{Finding, FirstLook, Place};
+use crate::prepared_recording::PreparedRecording;
+use tracktwin_inspection::{Finding, Inspection, Place};
 use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter, PlaceKind};
 
-impl Subject {
+impl PreparedRecording {
     /// Tells the model where the wheel begins its turns, if its blows say so, and where the rail's shape
     /// was heard; makes candidates of what a first look found.
-    pub fn suggested(&mut self, look: &FirstLook) -> Vec<Candidate> {
+    pub fn suggested(&mut self, inspection: &Inspection) -> Vec<Candidate> {
         let section = &self.forward.section;
         let turn_start_m = |pass: &usize| {
-            let blows = look.flat.as_ref().and_then(|flat| flat.blows_m.get(*pass));
+            let blows = inspection.flat.as_ref().and_then(|flat| flat.blows_m.get(*pass));
             blows.and_then(|blows| blows.first()).map_or(0.0, |&x_m| section.model_x_m(x_m))
         };
         let starts = |passes: &Vec<usize>| passes.iter().map(turn_start_m).collect();
         self.forward.wheel_starts_m = self.pass_numbers.iter().map(starts).collect();
-        self.heard_m = look.findings.iter().chain(&look.nameless).filter_map(heard_m).collect();
-        look.findings.iter().filter_map(candidate).collect()
+        self.detected_shapes_m = inspection
+            .findings
+            .iter()
+            .chain(&inspection.nameless)
+            .filter_map(detected_shape_m)
+            .collect();
+        inspection.findings.iter().filter_map(candidate).collect()
     }
 }
 
 /// Where a finding heard the rail's shape.
-fn heard_m(finding: &Finding) -> Option<[f64; 2]> {
+fn detected_shape_m(finding: &Finding) -> Option<[f64; 2]> {
     match finding.place {
         Place::Stretch { from_m, to_m } => Some([from_m, to_m]),
         Place::Everywhere => None,

@@ -77,8 +77,9 @@ impl Transfer {
         let stiffness: Vec<Vec<Complex64>> =
             wheel_receptance.iter().zip(direct.iter()).map(of_line).collect();
         let power_of_line = |(&hz, line): (&f64, &Vec<Complex64>)| {
-            let felt = model.vehicle().acceleration_per_force(TAU * hz) * model.sensor_transfer(hz);
-            line.iter().map(|k| k.norm_sqr() * felt.norm_sqr()).collect()
+            let sensitivity =
+                model.vehicle().acceleration_per_force(TAU * hz) * model.sensor_transfer(hz);
+            line.iter().map(|k| k.norm_sqr() * sensitivity.norm_sqr()).collect()
         };
         let mut power: Vec<Vec<f64>> = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
         for &distance_m in &model.vehicle().further_wheels_m {
@@ -117,13 +118,13 @@ impl Transfer {
 
     /// By what a change of the dynamic stiffness under a sleeper's rail seat changes a window's mean
     /// power: its product's real part.
-    pub(crate) fn felt(&self, window: &Window, line: usize, sleeper: usize) -> Complex64 {
+    pub(crate) fn sensitivity(&self, window: &Window, line: usize, sleeper: usize) -> Complex64 {
         let by_seat = &self.by_seats[line][sleeper][window.nodes()];
         window.shares.iter().zip(by_seat).map(|(share, root)| share * root * root).sum()
     }
 
     /// The same for a dynamic stiffness between two sleepers' rail seats.
-    pub(crate) fn felt_between(
+    pub(crate) fn sensitivity_between(
         &self,
         window: &Window,
         line: usize,
@@ -149,7 +150,7 @@ impl Transfer {
     ///
     /// `d alpha_w = -alpha_w^2 dZ` changes the series stiffness `k` and what the sensor feels of a
     /// force, hence `d |H|^2 = -2 |H|^2 Re((1 - k alpha_w) alpha_w dZ)`.
-    pub(crate) fn felt_at_wheel(&self, window: &Window, line: usize) -> Complex64 {
+    pub(crate) fn sensitivity_at_wheel(&self, window: &Window, line: usize) -> Complex64 {
         let (power, stiffness) = (&self.power[line], &self.stiffness[line]);
         let wheel = self.wheel_receptance[line];
         let at = |(node, share): (usize, &f64)| {

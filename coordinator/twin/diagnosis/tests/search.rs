@@ -7,7 +7,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use tracktwin_diagnosis::{
-    Bands, Fixed, Forward, NullModel, PortPlace, Search, Section, Subject, candidates, search,
+    Bands, Fixed, Forward, NullModel, PortPlace, PreparedRecording, Search, Section, candidates,
+    search,
 };
 use tracktwin_parameters::TrackDesign;
 use tracktwin_track::extension::ExtensionInstance;
@@ -59,12 +60,12 @@ fn searched_for(
     extension: Option<ExtensionInstance>,
     is_known: impl Fn(&str) -> bool,
 ) -> Search {
-    let (subject, null) = recorded(seed, extension);
-    search_for(&subject, &null, is_known)
+    let (prepared, null) = recorded(seed, extension);
+    search_for(&prepared, &null, is_known)
 }
 
 /// What was recorded of this track, with its null model.
-fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (Subject, NullModel) {
+fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (PreparedRecording, NullModel) {
     let forward = forward();
     let mut random = Normal(ChaCha8Rng::seed_from_u64(seed));
     let numbers: Vec<f64> =
@@ -79,27 +80,31 @@ fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (Subject, NullMo
     let log_power = expected + random.scatter(&forward);
     let pass_variance = DVector::from_element(forward.per_sleeper(), 1e-3);
     let pass_numbers = vec![vec![0], vec![1]];
-    let (without, heard_m) = (Vec::new(), Vec::new());
-    let subject = Subject {
+    let (without, detected_shapes_m) = (Vec::new(), Vec::new());
+    let prepared = PreparedRecording {
         forward,
         log_power,
         pass_variance,
         first_sleeper: 0,
         pass_numbers,
         without,
-        heard_m,
+        detected_shapes_m,
     };
-    (subject, null)
+    (prepared, null)
 }
 
-fn search_for(subject: &Subject, null: &NullModel, is_known: impl Fn(&str) -> bool) -> Search {
-    let mut all = candidates(&subject.forward.section);
+fn search_for(
+    prepared: &PreparedRecording,
+    null: &NullModel,
+    is_known: impl Fn(&str) -> bool,
+) -> Search {
+    let mut all = candidates(&prepared.forward.section);
     all.retain(|candidate| is_known(candidate.kind.physics));
-    let mut subject = subject.clone();
+    let mut prepared = prepared.clone();
     if !is_known("corrugation") {
-        subject.without.push("corrugation".to_owned());
+        prepared.without.push("corrugation".to_owned());
     }
-    search(&subject, null, subject.forward.unknowns.typical(), &all, &|_, _| ()).unwrap()
+    search(&prepared, null, prepared.forward.unknowns.typical(), &all, &|_, _| ()).unwrap()
 }
 
 fn layer() -> ExtensionInstance {
@@ -141,30 +146,30 @@ fn a_layer_that_the_catalogue_lacks_is_something_unknown_under_its_sleeper() {
     assert!(found.accepted.is_empty(), "{:?}", found.accepted);
     let port = found.rounds[0].port.as_ref().unwrap();
     assert_eq!(port.place, PortPlace::Seats(vec![3]), "{}", port.log_evidence);
-    assert!(!found.rounds[0].port_strays);
+    assert!(!found.rounds[0].port_differs_between_speeds);
 }
 
 #[test]
 fn something_unknown_that_only_one_speed_hears_strays() {
-    let ((mut subject, null), (plain, _)) = (recorded(1, Some(layer())), recorded(1, None));
-    let bands = subject.forward.bands.count();
-    for row in (0..subject.forward.count()).filter(|row| row / bands % 2 == 1) {
-        subject.log_power[row] = plain.log_power[row];
+    let ((mut prepared, null), (plain, _)) = (recorded(1, Some(layer())), recorded(1, None));
+    let bands = prepared.forward.bands.count();
+    for row in (0..prepared.forward.count()).filter(|row| row / bands % 2 == 1) {
+        prepared.log_power[row] = plain.log_power[row];
     }
-    let found = search_for(&subject, &null, is_everywhere);
+    let found = search_for(&prepared, &null, is_everywhere);
     assert!(found.accepted.is_empty(), "{:?}", found.accepted);
     let first = &found.rounds[0];
     assert!(first.p_value < 1e-3, "{}", first.p_value);
-    assert!(first.port_strays, "{:?}", first.port.as_ref().map(|port| &port.place));
+    assert!(first.port_differs_between_speeds, "{:?}", first.port.as_ref().map(|port| &port.place));
 }
 
 #[test]
 fn speeds_that_passed_other_tracks_are_told_and_nothing_is_named_on_them() {
-    let (mut subject, null) = recorded(1, None);
-    let together = search_for(&subject, &null, is_everywhere);
-    assert!(!together.is_apart(), "{}", together.apart);
+    let (mut prepared, null) = recorded(1, None);
+    let together = search_for(&prepared, &null, is_everywhere);
+    assert!(!together.speeds_disagree(), "{}", together.speed_disagreement);
 
-    let forward = &subject.forward;
+    let forward = &prepared.forward;
     let (typical, bands) = (forward.unknowns.typical(), forward.bands.count());
     let mut random = Normal(ChaCha8Rng::seed_from_u64(9));
     let mut other = typical.clone();
@@ -173,11 +178,11 @@ fn speeds_that_passed_other_tracks_are_told_and_nothing_is_named_on_them() {
     }
     let plain = forward.log_power(&typical, &[]).unwrap();
     let change = forward.log_power(&other, &[]).unwrap() - plain;
-    for row in (0..subject.forward.count()).filter(|row| row / bands % 2 == 1) {
-        subject.log_power[row] += change[row];
+    for row in (0..prepared.forward.count()).filter(|row| row / bands % 2 == 1) {
+        prepared.log_power[row] += change[row];
     }
-    let apart = search_for(&subject, &null, is_everywhere);
-    assert!(apart.is_apart(), "{}", apart.apart);
+    let apart = search_for(&prepared, &null, is_everywhere);
+    assert!(apart.speeds_disagree(), "{}", apart.speed_disagreement);
     assert!(apart.accepted.is_empty(), "{:?}", apart.accepted);
 }
 
@@ -212,8 +217,8 @@ fn waves_of_one_length_that_no_pass_suggested_are_named_where_they_are() {
 fn waves_that_may_not_be_named_are_a_patch_of_their_wavelength() {
     let waves = ExtensionInstance::new("corrugation").at([1.2, 1.6]);
     let waves = waves.with("wavelength_m", 8e-3).with("amplitude_m", 4e-6);
-    let (subject, null) = recorded(4, Some(waves));
-    let found = search_for(&subject, &null, |physics| physics == "sleeper_bolt");
+    let (prepared, null) = recorded(4, Some(waves));
+    let found = search_for(&prepared, &null, |physics| physics == "sleeper_bolt");
     let (patch, p_value) = found.patch.unwrap();
     assert!(p_value < 0.01 && patch.height > 0.5, "{patch:?} {p_value}");
     let Fixed::Wavelength(length_m) = patch.fixed else { panic!("{patch:?}") };

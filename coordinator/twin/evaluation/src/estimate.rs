@@ -54,9 +54,9 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
         return Err(Error::NothingToEvaluate { recording: recording.name.clone() });
     }
     let mut estimates = estimates(&seen, twin.models)?;
-    let verdicts = outside::judge(&seen, twin.library, twin.domains)?;
-    let outside_library = OutsideLibrary::of(&verdicts, twin.library);
-    let told = estimates.iter().zip(&verdicts).filter(|(_, verdict)| !verdict.outside);
+    let tests = outside::judge(&seen, twin.library, twin.domains)?;
+    let outside_library = OutsideLibrary::of(&tests, twin.library);
+    let told = estimates.iter().zip(&tests).filter(|(_, test)| !test.outside);
     let unevenness = Unevenness::of(&told.map(|(estimates, _)| estimates).collect::<Vec<_>>());
     let even: Vec<_> = estimates.iter_mut().map(|of| unevenness.widen(of)).collect();
     let mut matcher = Matcher::new(twin.library);
@@ -65,7 +65,7 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
         .zip(estimates.into_iter().zip(even))
         .map(|(sleeper, estimates)| evaluated(recording, twin, &mut matcher, sleeper, estimates))
         .collect::<Result<Vec<_>, _>>()?;
-    let outside = sleepers.iter_mut().zip(&verdicts).filter(|(_, verdict)| verdict.outside);
+    let outside = sleepers.iter_mut().zip(&tests).filter(|(_, test)| test.outside);
     outside.for_each(|(sleeper, _)| sleeper.flags.push(Flag::OutsideLibrary));
     Ok(Evaluation {
         format: FORMAT,
@@ -154,7 +154,7 @@ fn evaluated(
     twin: &Twin<'_>,
     matcher: &mut Matcher<'_>,
     sleeper: SleeperFeatures,
-    (estimates, sd_if_even): (Estimates, BTreeMap<Parameter, f64>),
+    (estimates, sd_without_unevenness): (Estimates, BTreeMap<Parameter, f64>),
 ) -> Result<SleeperEvaluation, Error> {
     let selector = matcher.select(&sleeper.speeds)?;
     let place = &recording.sleepers[sleeper.sleeper];
@@ -176,7 +176,7 @@ fn evaluated(
         id: place.id.clone(),
         x_m: place.x_m,
         estimates,
-        sd_if_even,
+        sd_without_unevenness,
         selector,
         flags,
         measured,
@@ -266,7 +266,10 @@ mod tests {
                 assert!((level.mean - truth).abs() < 3.0 * level.sd, "{truth}: {level:?}");
                 assert!(level.sd > 0.0 && level.sd < 1.0, "{level:?}");
                 let known = evaluation.provenance.parameters[&Parameter::IrregularityLevel];
-                assert!(known.is_told() && (known.mase_constant - 0.25).abs() < 0.02, "{known:?}");
+                assert!(
+                    known.beats_constant() && (known.mase_constant - 0.25).abs() < 0.02,
+                    "{known:?}"
+                );
                 let missing = evaluation.sleepers[3].flags.contains(&Flag::MissingSpeed);
                 assert_eq!(missing, speeds.len() == 1);
             }

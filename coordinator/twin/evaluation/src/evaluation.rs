@@ -86,7 +86,7 @@ impl Known {
     const HARDLY: f64 = 0.9;
 
     /// Whether the models tell the parameter noticeably better than a constant does.
-    pub fn is_told(&self) -> bool {
+    pub fn beats_constant(&self) -> bool {
         self.mase_test < Self::HARDLY * self.mase_constant
     }
 }
@@ -102,7 +102,8 @@ pub struct SleeperEvaluation {
     #[serde(flatten)]
     pub estimates: Estimates,
     /// Standard deviations as they would be if all sleepers were alike.
-    pub sd_if_even: BTreeMap<Parameter, f64>,
+    #[serde(rename = "sd_if_even")]
+    pub sd_without_unevenness: BTreeMap<Parameter, f64>,
     /// The model selector's answer.
     pub selector: Selected,
     /// What to keep in mind about it.

@@ -63,14 +63,14 @@ impl Domains {
 
 /// Whether a sleeper is outside, and beyond what.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Verdict {
+pub(crate) struct DomainTest {
     pub(crate) outside: bool,
     beyond: Option<Beyond>,
     /// Sleepers in the window that said so.
     window: usize,
 }
 
-impl Verdict {
+impl DomainTest {
     /// Takes a window's judgement; larger windows know better what a track is beyond.
     fn take(&mut self, judgement: &Judgement, window: usize) {
         if !judgement.is_outside() {
@@ -94,19 +94,19 @@ pub(crate) fn judge(
     sleepers: &[SleeperFeatures],
     library: &TrainingSet,
     domains: &Domains,
-) -> Result<Vec<Verdict>, Error> {
+) -> Result<Vec<DomainTest>, Error> {
     let mut by_speeds: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
     for (index, sleeper) in sleepers.iter().enumerate() {
         let key = sleeper.speeds.iter().map(|known| known.speed).collect();
         by_speeds.entry(key).or_default().push(index);
     }
-    let mut verdicts = vec![Verdict::default(); sleepers.len()];
+    let mut tests = vec![DomainTest::default(); sleepers.len()];
     let groups = by_speeds.len();
     for (speeds, members) in by_speeds {
         let domain = domains.of(library, &speeds)?;
-        judge_alike(sleepers, &members, &domain, groups, &mut verdicts)?;
+        judge_alike(sleepers, &members, &domain, groups, &mut tests)?;
     }
-    Ok(verdicts)
+    Ok(tests)
 }
 
 /// Judges the sleepers that have the same speeds.
@@ -115,7 +115,7 @@ fn judge_alike(
     members: &[usize],
     domain: &Domain,
     groups: usize,
-    verdicts: &mut [Verdict],
+    tests: &mut [DomainTest],
 ) -> Result<(), Error> {
     let whole: Vec<usize> =
         members.iter().copied().filter(|&index| is_whole(&sleepers[index])).collect();
@@ -140,7 +140,7 @@ fn judge_alike(
             let all = size == whole.len();
             let held = if all { members } else { &whole[first..first + size] };
             for &index in held {
-                verdicts[index].take(&judgement, size);
+                tests[index].take(&judgement, size);
             }
         }
     }
@@ -162,10 +162,10 @@ fn mean(rows: &[Vec<f64>]) -> Vec<f64> {
 
 impl OutsideLibrary {
     /// The verdicts on a recording, taken together.
-    pub(crate) fn of(verdicts: &[Verdict], library: &TrainingSet) -> Self {
-        let outside: Vec<&Verdict> = verdicts.iter().filter(|verdict| verdict.outside).collect();
+    pub(crate) fn of(tests: &[DomainTest], library: &TrainingSet) -> Self {
+        let outside: Vec<&DomainTest> = tests.iter().filter(|test| test.outside).collect();
         let mut counts: BTreeMap<Beyond, usize> = BTreeMap::new();
-        for beyond in outside.iter().filter_map(|verdict| verdict.beyond) {
+        for beyond in outside.iter().filter_map(|test| test.beyond) {
             *counts.entry(beyond).or_default() += 1;
         }
         let least = (NAMED_FROM * outside.len() as f64).ceil() as usize;
@@ -184,8 +184,8 @@ impl OutsideLibrary {
                 widen.push(end.parameter);
             }
         }
-        let unexplained = outside.iter().filter(|verdict| verdict.beyond.is_none()).count();
-        let share = outside.len() as f64 / verdicts.len().max(1) as f64;
+        let unexplained = outside.iter().filter(|test| test.beyond.is_none()).count();
+        let share = outside.len() as f64 / tests.len().max(1) as f64;
         Self { share, widen, ends, unexplained }
     }
 

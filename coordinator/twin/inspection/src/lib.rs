@@ -7,10 +7,10 @@
 mod along;
 pub mod chain;
 mod finding;
-mod first_look;
 pub mod impact;
+mod inspect;
 pub mod wheel;
 
-pub use along::{median, tells_waves};
+pub use along::{median, separates_wavelengths};
 pub use finding::{Finding, Place};
-pub use first_look::{FALSE_ALARMS, FirstLook, first_look};
+pub use inspect::{FALSE_ALARMS, Inspection, inspect};

@@ -3,7 +3,7 @@
 use crate::fit::Fitted;
 use crate::record::{Along, COMMON, Inversion, Prior, Provenance, Sleeper, log_normal};
 use std::collections::BTreeMap;
-use tracktwin_diagnosis::{Subject, Unknowns};
+use tracktwin_diagnosis::{PreparedRecording, Unknowns};
 use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::recording::Recording;
@@ -22,25 +22,26 @@ const FIELDS: [Parameter; 3] =
 impl Inversion {
     /// The track of a recording from its sections, which lie in order. Of a sleeper in several
     /// sections the one speaks in which it lies farthest from an end.
-    pub fn of(recording: &Recording, sections: &[(Subject, Fitted)]) -> Self {
-        let covered = |(subject, _): &(Subject, Fitted)| {
-            subject.first_sleeper..subject.first_sleeper + subject.forward.section.sleepers
+    pub fn of(recording: &Recording, sections: &[(PreparedRecording, Fitted)]) -> Self {
+        let covered = |(prepared, _): &(PreparedRecording, Fitted)| {
+            prepared.first_sleeper..prepared.first_sleeper + prepared.forward.section.sleepers
         };
         let mut sleepers = Vec::new();
         let mut unevaluated = Vec::new();
         for (number, place) in recording.sleepers.iter().enumerate() {
-            let inside = |section: &&(Subject, Fitted)| covered(section).contains(&number);
-            let from_end = |section: &&(Subject, Fitted)| {
+            let inside =
+                |section: &&(PreparedRecording, Fitted)| covered(section).contains(&number);
+            let from_end = |section: &&(PreparedRecording, Fitted)| {
                 let range = covered(section);
                 (number - range.start).min(range.end - 1 - number)
             };
-            let Some((subject, fitted)) = sections.iter().filter(inside).max_by_key(from_end)
+            let Some((prepared, fitted)) = sections.iter().filter(inside).max_by_key(from_end)
             else {
                 let reason = "not every pass covers its window with a margin";
                 unevaluated.push(Unevaluated { id: place.id.clone(), x_m: place.x_m, reason });
                 continue;
             };
-            sleepers.push(fitted.sleeper(number - subject.first_sleeper, &place.id, place.x_m));
+            sleepers.push(fitted.sleeper(number - prepared.first_sleeper, &place.id, place.x_m));
         }
         Self::new(recording.name.clone(), provenance(sections), sleepers, unevaluated)
     }
@@ -73,10 +74,10 @@ fn fields(unknowns: &Unknowns) -> [usize; 3] {
     [unknowns.ballast().start, unknowns.railpad().start, unknowns.level().start]
 }
 
-fn provenance(sections: &[(Subject, Fitted)]) -> Provenance {
+fn provenance(sections: &[(PreparedRecording, Fitted)]) -> Provenance {
     let middle = sections.get(sections.len() / 2);
-    let speeds = middle.map_or(&[][..], |(subject, _)| &subject.forward.speeds_m_s);
-    let passes = middle.map_or(&[][..], |(subject, _)| &subject.pass_numbers);
+    let speeds = middle.map_or(&[][..], |(prepared, _)| &prepared.forward.speeds_m_s);
+    let passes = middle.map_or(&[][..], |(prepared, _)| &prepared.pass_numbers);
     let mut prior = BTreeMap::new();
     let mut variation = BTreeMap::new();
     if let Some((_, fitted)) = middle {

@@ -3,8 +3,8 @@
 use crate::variation::{Quadratic, learn};
 use nalgebra::DVector;
 use tracktwin_diagnosis::{
-    Calibration, CalibrationError, NullModel, Observation, Problem, Subject, SubjectError,
-    Unknowns, Variation,
+    Calibration, CalibrationError, NullModel, Observation, PreparationError, PreparedRecording,
+    Problem, Unknowns, Variation,
 };
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
@@ -46,9 +46,12 @@ pub struct Fitted {
 /// A recording in sections that are fitted one by one.
 ///
 /// # Errors
-/// [`SubjectError`] says what the recording lacks.
-pub fn sections(recording: &Recording, design: &TrackDesign) -> Result<Vec<Subject>, SubjectError> {
-    Subject::sections(recording, design, LENGTH, OVERLAP)
+/// [`PreparationError`] says what the recording lacks.
+pub fn sections(
+    recording: &Recording,
+    design: &TrackDesign,
+) -> Result<Vec<PreparedRecording>, PreparationError> {
+    PreparedRecording::sections(recording, design, LENGTH, OVERLAP)
 }
 
 /// Fits a section; `start` is [`tracktwin_diagnosis::first_calibration`]'s answer, and the subject's
@@ -57,14 +60,14 @@ pub fn sections(recording: &Recording, design: &TrackDesign) -> Result<Vec<Subje
 /// # Errors
 /// [`CalibrationError`] when the model breaks down on the way.
 pub fn fit(
-    subject: &Subject,
+    prepared: &PreparedRecording,
     null: &NullModel,
     start: DVector<f64>,
 ) -> Result<Fitted, CalibrationError> {
     let plain =
-        Observation::new(subject.expected_log_power(null), &subject.covariance(null), |_| false)
+        Observation::new(prepared.expected_log_power(null), &prepared.covariance(null), |_| false)
             .ok_or(CalibrationError::NotFinite)?;
-    let mut forward = subject.forward.clone();
+    let mut forward = prepared.forward.clone();
     forward.unknowns.response_deviation = RESPONSE;
     let mut factors = vec![1.0; forward.section.sleepers];
     let fit = |forward: &_, factors: &[f64], start| {

@@ -233,7 +233,7 @@ fn add_group(
     let serialized = safetensors::serialize(views, None);
     let bytes = serialized.map_err(|error| malformed(Path::new(file.as_str()), &error))?;
     output.add(&file, &bytes).map_err(Error::Files)?;
-    let file = output.settle(&file).map_err(Error::Files)?.to_string();
+    let file = output.unique_name(&file).map_err(Error::Files)?.to_string();
     Ok(GroupRow {
         key: group.key.clone(),
         file,

@@ -18,7 +18,7 @@ const TERMS: usize = 30;
 
 /// Stiffness and inertia of the rail's section.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Section {
+pub(crate) struct CrossSection {
     /// `E I` in N m2.
     pub(crate) bending: f64,
     /// `kappa G A` in N.
@@ -30,8 +30,8 @@ pub(crate) struct Section {
 }
 
 /// The rail S7.
-pub(crate) const fn section() -> Section {
-    Section {
+pub(crate) const fn cross_section() -> CrossSection {
+    CrossSection {
         bending: YOUNG_PA * RAIL_SECOND_MOMENT_M4,
         shear: RAIL_SHEAR_COEFFICIENT * shear_modulus_pa() * RAIL_AREA_M2,
         mass: DENSITY_KG_M3 * RAIL_AREA_M2,
@@ -64,7 +64,7 @@ impl RailModes {
         let wave_numbers: Vec<f64> = (1..=count).map(|n| n as f64 * PI / length_m).collect();
         let (mut frequencies, mut masses, mut rotations) = (vec![], vec![], vec![]);
         for &k in &wave_numbers {
-            let Section { shear, mass, rotary, .. } = section();
+            let CrossSection { shear, mass, rotary, .. } = cross_section();
             let square = frequency_squared(k);
             let rotation = (shear * k * k - mass * square) / (shear * k);
             frequencies.push(square.sqrt());
@@ -143,7 +143,7 @@ impl RailModes {
     ///
     /// With it `g(x - y) - g(x + y)` is the exact static flexibility less that of the modes.
     fn residual_table(&self) -> Vec<f64> {
-        let Section { bending, shear, .. } = section();
+        let CrossSection { bending, shear, .. } = cross_section();
         let terms: Vec<(f64, f64)> = (1..=TERMS * self.count())
             .map(|n| {
                 let k = n as f64 * PI / self.length_m;
@@ -167,7 +167,7 @@ impl RailModes {
 /// Smaller root `omega²` of the wave number's two frequencies:
 /// `rho A rho I w⁴ - (rho A (E I k² + kappa G A) + rho I kappa G A k²) w² + kappa G A E I k⁴ = 0`.
 fn frequency_squared(k: f64) -> f64 {
-    let Section { bending, shear, mass, rotary } = section();
+    let CrossSection { bending, shear, mass, rotary } = cross_section();
     let linear = mass * (bending * k * k + shear) + rotary * shear * k * k;
     let constant = shear * bending * k.powi(4);
     // The form that doesn't lose digits where the roots are far apart.
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn long_waves_are_those_of_a_slender_beam() {
-        let Section { bending, mass, .. } = section();
+        let CrossSection { bending, mass, .. } = cross_section();
         let k: f64 = 0.3;
         let slender = bending / mass * k.powi(4);
         // Shear and rotary inertia take (E I / kappa G A + I / A) k² = 0.5 per mille.
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn modes_and_residual_give_the_static_deflection_at_midspan_and_beside() {
         let length: f64 = 5.0;
-        let Section { bending, shear, .. } = section();
+        let CrossSection { bending, shear, .. } = cross_section();
         let midspan = length.powi(3) / (48.0 * bending) + length / (4.0 * shear);
         for count in [80, 240] {
             let modes = RailModes::new(length, count);
@@ -232,7 +232,7 @@ mod tests {
     /// Point receptance of an infinite Timoshenko rail below its second cut-on, its modulus: from
     /// the roots of the dispersion relation, one wave that runs and one that decays.
     fn infinite_receptance(omega: f64) -> f64 {
-        let Section { bending, shear, mass, rotary } = section();
+        let CrossSection { bending, shear, mass, rotary } = cross_section();
         let square = omega * omega;
         // E I kGA k⁴ - (rho A E I + rho I kGA) w² k² + rho A w² (rho I w² - kGA) = 0, times -1.
         let (a, b) = (bending * shear, -(mass * bending + rotary * shear) * square);

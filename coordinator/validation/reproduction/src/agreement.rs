@@ -2,7 +2,7 @@
 
 use crate::average::DEVIATIONS;
 use crate::picture::{Picture, Scale, Style};
-use crate::{Compared, Told, Verdict};
+use crate::{Compared, EvaluatedExample, Verdict};
 use tracktwin_parameters::Parameter;
 
 /// Share of a normal distribution beyond [`DEVIATIONS`] standard deviations.
@@ -32,7 +32,7 @@ pub(crate) struct Agreement {
 
 impl Agreement {
     /// Of a parameter at these sleepers, counted from 1, of all examples.
-    pub(crate) fn new(told: &[Told], sleepers: &[usize], parameter: Parameter) -> Self {
+    pub(crate) fn new(told: &[EvaluatedExample], sleepers: &[usize], parameter: Parameter) -> Self {
         let [low, high] = parameter.range();
         let pairs = told.iter().flat_map(|of| sleepers.iter().map(move |&at| (of, at)));
         let pairs: Vec<_> =
@@ -94,7 +94,7 @@ fn allowed(total: usize) -> usize {
 }
 
 /// Truth and estimates of a parameter along an example.
-pub(crate) fn picture(told: &Told, parameter: Parameter) -> Picture {
+pub(crate) fn picture(told: &EvaluatedExample, parameter: Parameter) -> Picture {
     let divisor = if parameter.range()[1] >= 1e6 { 1e6 } else { 1.0 };
     let unit = if divisor > 1.0 { "MN/m".to_owned() } else { parameter.unit().to_owned() };
     let unit = unit.replace("1e-4", "10⁻⁴").replace("m2", "m²");

@@ -49,14 +49,14 @@ impl Average {
     }
 
     /// Whether it is told from zero.
-    pub(crate) fn is_told(self) -> bool {
+    pub(crate) fn differs_from_zero(self) -> bool {
         self.mean.abs() > DEVIATIONS * self.error
     }
 
     /// What becomes of the claim that it is no more than chance, where `matters` would matter: one
     /// that is known less surely than that cannot tell.
     pub(crate) fn is_nothing(self, matters: f64) -> Verdict {
-        if self.is_told() {
+        if self.differs_from_zero() {
             Verdict::Differs
         } else if DEVIATIONS * self.error < matters {
             Verdict::Reproduced
@@ -67,7 +67,7 @@ impl Average {
 
     /// What becomes of the claim that it is above zero.
     pub(crate) fn is_positive(self) -> Verdict {
-        if self.is_told() { Verdict::of(self.mean > 0.0) } else { Verdict::CannotTell }
+        if self.differs_from_zero() { Verdict::of(self.mean > 0.0) } else { Verdict::CannotTell }
     }
 }
 

@@ -51,7 +51,7 @@ pub enum Error {
     },
     /// An example's recording was not told at all of its sleepers.
     #[error("{figure}: sleeper {sleeper} of an example has no estimate of {symbol}")]
-    NotTold {
+    NotEstimated {
         /// The figure.
         figure: Figure,
         /// Number of the sleeper, from 1.

@@ -100,18 +100,18 @@ impl Example {
 
 /// What was told of an example.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Told {
+pub struct EvaluatedExample {
     /// The truth.
     pub example: Example,
     /// Estimates, a sleeper each.
     pub sleepers: Vec<tracktwin_evaluation::Estimates>,
 }
 
-impl Told {
+impl EvaluatedExample {
     /// What an evaluation of the example's recording says.
     ///
     /// # Errors
-    /// [`Error::NotTold`] names a sleeper or a parameter that it lacks.
+    /// [`Error::NotEstimated`] names a sleeper or a parameter that it lacks.
     pub fn new(example: Example, evaluation: &Evaluation) -> Result<Self, Error> {
         let figure = example.figure;
         let of = |number: usize| {
@@ -122,7 +122,7 @@ impl Told {
                 [RailpadStiffness, BallastStiffness, SleeperBendingStiffness, IrregularityLevel];
             match varied.iter().find(|parameter| !estimates.contains_key(parameter)) {
                 Some(missing) => {
-                    Err(Error::NotTold { figure, sleeper: number, symbol: missing.symbol() })
+                    Err(Error::NotEstimated { figure, sleeper: number, symbol: missing.symbol() })
                 }
                 None => Ok(estimates),
             }

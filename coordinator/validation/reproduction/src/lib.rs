@@ -25,7 +25,7 @@ mod test_errors;
 mod testing;
 
 pub use error::Error;
-pub use example::{Example, Told, examples};
+pub use example::{EvaluatedExample, Example, examples};
 pub use figure::Figure;
 pub use picture::{Curve, Picture, Scale, Style};
 pub use row::{Compared, FORMAT, Provenance, Reproduction, Row, Verdict};

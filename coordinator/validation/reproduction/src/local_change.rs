@@ -3,14 +3,14 @@
 use crate::agreement::picture;
 use crate::average::Average;
 use crate::example::REDUCED;
-use crate::{Compared, Figure, Told};
+use crate::{Compared, EvaluatedExample, Figure};
 use tracktwin_parameters::Parameter::{self, BallastStiffness, RailpadStiffness};
 
 /// What the extracted text of the paper leaves open.
 const TAKEN: &str = "the text does not say from which set to which; A2 to A3 was taken";
 
 /// What was told of the three reductions beside the paper's Fig. 19.
-pub(crate) fn local_change(told: &[Told]) -> Compared {
+pub(crate) fn local_change(told: &[EvaluatedExample]) -> Compared {
     let caption = "Truth and estimates where railpads and ballast are reduced from parameter set \
                    A2 to A3 at sleeper 4, at 4 to 6 and at 5 to 9.";
     let mut compared = Compared::new(Figure::Fig19, caption);
@@ -27,7 +27,7 @@ pub(crate) fn local_change(told: &[Told]) -> Compared {
 }
 
 /// A single reduced sleeper is heard against those two and more away.
-fn one(compared: &mut Compared, told: &[Told], parameter: Parameter) {
+fn one(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parameter) {
     let Some(single) = told.first() else { return };
     let at = Average::of_estimates(&single.estimates(REDUCED[0].clone(), parameter));
     let others = single.estimates([1, 2, 6, 7, 8, 9], parameter);
@@ -48,14 +48,18 @@ fn one(compared: &mut Compared, told: &[Told], parameter: Parameter) {
 }
 
 /// Share of the true reduction that is missing at the reduced sleepers.
-fn missing(told: &Told, reduced: std::ops::RangeInclusive<usize>, parameter: Parameter) -> Average {
+fn missing(
+    told: &EvaluatedExample,
+    reduced: std::ops::RangeInclusive<usize>,
+    parameter: Parameter,
+) -> Average {
     let truth = told.truth(*reduced.start(), parameter);
     let whole = if *reduced.start() > 1 { told.truth(1, parameter) - truth } else { f64::NAN };
     let mean = Average::of_estimates(&told.estimates(reduced, parameter));
     mean.plus(-truth).times(1.0 / whole)
 }
 
-fn closer(compared: &mut Compared, told: &[Told], parameter: Parameter) {
+fn closer(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parameter) {
     let shares: Vec<Average> =
         told.iter().zip(REDUCED).map(|(of, reduced)| missing(of, reduced, parameter)).collect();
     let [first, .., last] = &shares[..] else { return };
@@ -80,7 +84,7 @@ mod tests {
     use crate::Verdict::{CannotTell, Differs, Reproduced};
     use crate::testing::{told, verdicts};
 
-    fn smoothed(share: f64, sd: f64) -> Vec<Told> {
+    fn smoothed(share: f64, sd: f64) -> Vec<EvaluatedExample> {
         told(Figure::Fig19, sd, |example, at, parameter| {
             let truth = |at: usize| example.sleepers[at.clamp(1, 9) - 1][parameter];
             (1.0 - 2.0 * share) * truth(at) + share * (truth(at - 1) + truth(at + 1))

@@ -3,7 +3,7 @@
 use crate::agreement::{Agreement, picture};
 use crate::average::{Average, all};
 use crate::example::{SLEEPERS, smallest_step};
-use crate::{Compared, Figure, Told};
+use crate::{Compared, EvaluatedExample, Figure};
 use tracktwin_parameters::Parameter::{
     self, BallastStiffness, IrregularityLevel, RailpadStiffness, SleeperBendingStiffness,
 };
@@ -16,7 +16,7 @@ const FINE: std::ops::RangeInclusive<usize> = 1..=4;
 const COARSE: std::ops::RangeInclusive<usize> = 6..=9;
 
 /// What was told of three levels of irregularity beside the paper's Fig. 17.
-pub(crate) fn irregularity(told: &[Told]) -> Compared {
+pub(crate) fn irregularity(told: &[EvaluatedExample]) -> Compared {
     let caption = "Truth and estimates at irregularity levels 2, 3 and 4; parameter set A2.";
     let mut compared = one_parameter(Figure::Fig17, caption, told, IrregularityLevel);
     for parameter in SAME {
@@ -26,7 +26,7 @@ pub(crate) fn irregularity(told: &[Told]) -> Compared {
 }
 
 /// What was told of three bending stiffnesses of the sleepers beside the paper's Fig. 18.
-pub(crate) fn bending_stiffness(told: &[Told]) -> Compared {
+pub(crate) fn bending_stiffness(told: &[EvaluatedExample]) -> Compared {
     let caption = "Truth and estimates at three bending stiffnesses of the sleepers, 4000, 5000 \
                    and 6000 N m²; parameter set A2.";
     let mut compared = one_parameter(Figure::Fig18, caption, told, SleeperBendingStiffness);
@@ -36,7 +36,12 @@ pub(crate) fn bending_stiffness(told: &[Told]) -> Compared {
     compared
 }
 
-fn one_parameter(figure: Figure, caption: &str, told: &[Told], changed: Parameter) -> Compared {
+fn one_parameter(
+    figure: Figure,
+    caption: &str,
+    told: &[EvaluatedExample],
+    changed: Parameter,
+) -> Compared {
     let mut compared = Compared::new(figure, caption);
     let sleepers: Vec<usize> = (1..=SLEEPERS).collect();
     let symbol = changed.symbol();
@@ -56,11 +61,11 @@ fn one_parameter(figure: Figure, caption: &str, told: &[Told], changed: Paramete
     compared
 }
 
-fn mean(of: &Told, parameter: Parameter) -> Average {
+fn mean(of: &EvaluatedExample, parameter: Parameter) -> Average {
     Average::of_estimates(&of.estimates(1..=SLEEPERS, parameter))
 }
 
-fn apart(compared: &mut Compared, told: &[Told], changed: Parameter) {
+fn apart(compared: &mut Compared, told: &[EvaluatedExample], changed: Parameter) {
     let means: Vec<Average> = told.iter().map(|of| mean(of, changed)).collect();
     let steps = means.windows(2).map(|pair| pair[1].less(pair[0]).is_positive());
     let decimals = if means.iter().any(|of| of.mean > 100.0) { 0 } else { 2 };
@@ -76,7 +81,12 @@ fn apart(compared: &mut Compared, told: &[Told], changed: Parameter) {
     );
 }
 
-fn unbiased(compared: &mut Compared, told: &[Told], parameter: Parameter, changed: Parameter) {
+fn unbiased(
+    compared: &mut Compared,
+    told: &[EvaluatedExample],
+    parameter: Parameter,
+    changed: Parameter,
+) {
     let (Some(first), Some(last)) = (told.first(), told.last()) else { return };
     let shift = mean(last, parameter).less(mean(first, parameter)).times(1e-6);
     compared.row(
@@ -91,7 +101,7 @@ fn unbiased(compared: &mut Compared, told: &[Told], parameter: Parameter, change
     );
 }
 
-fn mesh(compared: &mut Compared, told: &[Told], parameter: Parameter) {
+fn mesh(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parameter) {
     let of = |sleepers: std::ops::RangeInclusive<usize>| {
         let estimates: Vec<_> =
             told.iter().flat_map(|of| of.estimates(sleepers.clone(), parameter)).collect();

@@ -1,7 +1,7 @@
 //! What each figure is drawn from, and by what.
 
 use crate::error::Error;
-use crate::example::Told;
+use crate::example::EvaluatedExample;
 use crate::figure::Figure;
 use crate::local_change::local_change;
 use crate::one_parameter::{bending_stiffness, irregularity};
@@ -22,7 +22,7 @@ pub enum Source {
     /// Trained models and the results that none of them has seen.
     Models,
     /// What trained models say of simulated passes.
-    Examples(fn(&[Told]) -> Compared),
+    Examples(fn(&[EvaluatedExample]) -> Compared),
 }
 
 /// A library's results, and how they were made.

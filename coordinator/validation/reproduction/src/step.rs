@@ -2,7 +2,7 @@
 
 use crate::agreement::{Agreement, picture};
 use crate::average::{Average, all};
-use crate::{Compared, Figure, Told};
+use crate::{Compared, EvaluatedExample, Figure};
 use tracktwin_parameters::Parameter::{self, BallastStiffness, RailpadStiffness};
 
 /// Sleepers away from the step between 4 and 5, on either side.
@@ -10,7 +10,7 @@ const BEFORE: [usize; 3] = [1, 2, 3];
 const BEHIND: [usize; 4] = [6, 7, 8, 9];
 
 /// What was told of the three steps beside the paper's Fig. 16.
-pub(crate) fn step(told: &[Told]) -> Compared {
+pub(crate) fn step(told: &[EvaluatedExample]) -> Compared {
     let caption = "Truth and estimates, mean with two standard deviations, sleeper by sleeper: \
                    parameter set A0 up to sleeper 4, A1, A2 and A3 from sleeper 5 on.";
     let mut compared = Compared::new(Figure::Fig16, caption);
@@ -29,14 +29,14 @@ pub(crate) fn step(told: &[Told]) -> Compared {
     compared
 }
 
-fn gradual(compared: &mut Compared, told: &[Told], parameter: Parameter) {
-    let side = |of: &Told, at: &[usize]| {
+fn gradual(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parameter) {
+    let side = |of: &EvaluatedExample, at: &[usize]| {
         Average::of_estimates(&of.estimates(at.iter().copied(), parameter))
     };
-    let whole = |of: &Told| side(of, &BEFORE).less(side(of, &BEHIND));
-    let between = |of: &Told| side(of, &[4]).less(side(of, &[5]));
-    let sum = |of: &dyn Fn(&Told) -> f64| told.iter().map(of).sum::<f64>();
-    let total = |of: &dyn Fn(&Told) -> Average| Average {
+    let whole = |of: &EvaluatedExample| side(of, &BEFORE).less(side(of, &BEHIND));
+    let between = |of: &EvaluatedExample| side(of, &[4]).less(side(of, &[5]));
+    let sum = |of: &dyn Fn(&EvaluatedExample) -> f64| told.iter().map(of).sum::<f64>();
+    let total = |of: &dyn Fn(&EvaluatedExample) -> Average| Average {
         mean: sum(&|told| of(told).mean),
         error: sum(&|told| of(told).error.powi(2)).sqrt(),
     };
@@ -62,7 +62,7 @@ mod tests {
     use crate::testing::{told, verdicts};
 
     /// Estimates that see this share of either neighbour.
-    fn smoothed(share: f64, bias: f64) -> Vec<Told> {
+    fn smoothed(share: f64, bias: f64) -> Vec<EvaluatedExample> {
         told(Figure::Fig16, 0.02, |example, at, parameter| {
             let truth = |at: usize| example.sleepers[at.clamp(1, 9) - 1][parameter];
             let mean = (1.0 - 2.0 * share) * truth(at) + share * (truth(at - 1) + truth(at + 1));

@@ -1,6 +1,6 @@
 //! Made-up libraries whose answers are known, for tests.
 
-use crate::{Compared, Example, Figure, Told, Verdict, examples};
+use crate::{Compared, EvaluatedExample, Example, Figure, Verdict, examples};
 use tracktwin_evaluation::Estimate;
 use tracktwin_parameters::{Parameter, ParameterSet};
 use tracktwin_surrogate::TrainingSet;
@@ -75,7 +75,7 @@ pub(crate) fn told(
     figure: Figure,
     sd: f64,
     mean: impl Fn(&Example, usize, Parameter) -> f64,
-) -> Vec<Told> {
+) -> Vec<EvaluatedExample> {
     let estimate = |example: &Example, at: usize, parameter: Parameter| {
         let [low, high] = parameter.range();
         Estimate { mean: mean(example, at, parameter), sd: sd * (high - low) }
@@ -86,7 +86,7 @@ pub(crate) fn told(
             all.map(|&parameter| (parameter, estimate(&example, at, parameter))).collect()
         };
         let sleepers = (1..=example.sleepers.len()).map(sleeper).collect();
-        Told { example, sleepers }
+        EvaluatedExample { example, sleepers }
     };
     examples(figure).into_iter().map(of).collect()
 }

@@ -76,25 +76,25 @@ pub(crate) struct Draw<'a> {
 
 impl Draw<'_> {
     /// Evenly between two values, the second one out.
-    fn even<T: SampleUniform + PartialOrd>(&mut self, from: T, to: T) -> T {
+    fn uniform<T: SampleUniform + PartialOrd>(&mut self, from: T, to: T) -> T {
         Uniform::new(from, to).expect("ranges here are not empty").sample(self.rng)
     }
 
     /// Evenly in the logarithm.
-    fn strong(&mut self, from: f64, to: f64) -> f64 {
-        self.even(from.ln(), to.ln()).exp()
+    fn log_uniform(&mut self, from: f64, to: f64) -> f64 {
+        self.uniform(from.ln(), to.ln()).exp()
     }
 
     /// A point of the rail.
     fn point(&mut self) -> [f64; 2] {
         let x_m = |sleeper: usize| (sleeper + 1) as f64 * SPACING_M;
-        [self.even(x_m(SLEEPERS[0]), x_m(SLEEPERS[1])); 2]
+        [self.uniform(x_m(SLEEPERS[0]), x_m(SLEEPERS[1])); 2]
     }
 
     /// Up to so many neighbouring sleepers.
     fn some(&mut self, most: usize) -> Vec<usize> {
-        let count = self.even(1, most + 1);
-        let first = self.even(SLEEPERS[0], SLEEPERS[1] + 2 - count);
+        let count = self.uniform(1, most + 1);
+        let first = self.uniform(SLEEPERS[0], SLEEPERS[1] + 2 - count);
         (first..first + count).collect()
     }
 }
@@ -107,153 +107,156 @@ fn all() -> Vec<usize> {
 fn rail_joint(draw: &mut Draw<'_>) -> Hidden {
     Hidden::RailJoint {
         x_m: draw.point(),
-        dip_m: draw.strong(2e-5, 2e-4),
-        length_m: draw.strong(1e-2, 3e-2),
-        bending_factor: draw.even(0.15, 0.6),
-        bending_length_m: draw.strong(2e-2, 5e-2),
+        dip_m: draw.log_uniform(2e-5, 2e-4),
+        length_m: draw.log_uniform(1e-2, 3e-2),
+        bending_factor: draw.uniform(0.15, 0.6),
+        bending_length_m: draw.log_uniform(2e-2, 5e-2),
     }
 }
 
 fn squat(draw: &mut Draw<'_>) -> Hidden {
     Hidden::Squat {
         x_m: draw.point(),
-        depth_m: draw.strong(5e-6, 6e-5),
-        length_m: draw.strong(3e-3, 1e-2),
+        depth_m: draw.log_uniform(5e-6, 6e-5),
+        length_m: draw.log_uniform(3e-3, 1e-2),
     }
 }
 
 fn corrugation(draw: &mut Draw<'_>) -> Hidden {
-    let from_m = draw.even(1.0, 2.5);
+    let from_m = draw.uniform(1.0, 2.5);
     Hidden::Corrugation {
-        x_m: [from_m, from_m + draw.even(0.5, 1.5)],
-        wavelength_m: draw.strong(4e-3, 1.2e-2),
-        amplitude_m: draw.strong(2e-7, 2e-6),
+        x_m: [from_m, from_m + draw.uniform(0.5, 1.5)],
+        wavelength_m: draw.log_uniform(4e-3, 1.2e-2),
+        amplitude_m: draw.log_uniform(2e-7, 2e-6),
     }
 }
 
 fn wheel_flat(draw: &mut Draw<'_>) -> Hidden {
-    Hidden::WheelFlat { length_m: draw.strong(1.5e-3, 6e-3) }
+    Hidden::WheelFlat { length_m: draw.log_uniform(1.5e-3, 6e-3) }
 }
 
 fn wheel_out_of_round(draw: &mut Draw<'_>) -> Hidden {
-    Hidden::WheelOutOfRound { order: draw.even(5, 41), amplitude_m: draw.strong(2e-7, 5e-6) }
+    Hidden::WheelOutOfRound {
+        order: draw.uniform(5, 41),
+        amplitude_m: draw.log_uniform(2e-7, 5e-6),
+    }
 }
 
 fn fastening_clamp(draw: &mut Draw<'_>) -> Hidden {
-    let every = draw.even(3, 5);
-    let first = draw.even(SLEEPERS[0], SLEEPERS[0] + every);
+    let every = draw.uniform(3, 5);
+    let first = draw.uniform(SLEEPERS[0], SLEEPERS[0] + every);
     Hidden::FasteningClamp {
         sleepers: (first..=SLEEPERS[1]).step_by(every).collect(),
-        vertical_n_per_m: draw.strong(3e7, 1.5e8),
-        rotational_n_m_per_rad: draw.strong(3e4, 3e5),
+        vertical_n_per_m: draw.log_uniform(3e7, 1.5e8),
+        rotational_n_m_per_rad: draw.log_uniform(3e4, 3e5),
     }
 }
 
 fn missing_railpad(draw: &mut Draw<'_>) -> Hidden {
-    Hidden::MissingRailpad { sleepers: draw.some(1), stiffness_n_per_m: draw.strong(5e6, 2e7) }
+    Hidden::MissingRailpad { sleepers: draw.some(1), stiffness_n_per_m: draw.log_uniform(5e6, 2e7) }
 }
 
 fn sleeper_bolt(draw: &mut Draw<'_>) -> Hidden {
-    let sleepers = if draw.even(0, 2) == 0 { all() } else { draw.some(3) };
-    Hidden::SleeperBolt { sleepers, stiffness_n_per_m: draw.strong(5e6, 5e7) }
+    let sleepers = if draw.uniform(0, 2) == 0 { all() } else { draw.some(3) };
+    Hidden::SleeperBolt { sleepers, stiffness_n_per_m: draw.log_uniform(5e6, 5e7) }
 }
 
 fn hanging_sleeper(draw: &mut Draw<'_>) -> Hidden {
-    Hidden::HangingSleeper { sleepers: draw.some(2), gap_m: draw.strong(5e-5, 4e-4) }
+    Hidden::HangingSleeper { sleepers: draw.some(2), gap_m: draw.log_uniform(5e-5, 4e-4) }
 }
 
 fn subgrade_layer(draw: &mut Draw<'_>) -> Hidden {
     Hidden::SubgradeLayer {
-        sleepers: (draw.even(0, 2) == 0).then(|| draw.some(3)),
-        mass_kg: draw.strong(0.5, 4.0),
-        stiffness_n_per_m: draw.strong(1e7, 1e8),
-        damping_n_s_per_m: draw.strong(5e2, 2e3),
+        sleepers: (draw.uniform(0, 2) == 0).then(|| draw.some(3)),
+        mass_kg: draw.log_uniform(0.5, 4.0),
+        stiffness_n_per_m: draw.log_uniform(1e7, 1e8),
+        damping_n_s_per_m: draw.log_uniform(5e2, 2e3),
     }
 }
 
 fn flexible_axle_box(draw: &mut Draw<'_>) -> Hidden {
     Hidden::FlexibleAxleBox {
-        mass_kg: draw.strong(2.0, 1.5e1),
-        stiffness_n_per_m: draw.strong(5e7, 8e8),
-        damping_n_s_per_m: draw.strong(1e3, 4e3),
+        mass_kg: draw.log_uniform(2.0, 1.5e1),
+        stiffness_n_per_m: draw.log_uniform(5e7, 8e8),
+        damping_n_s_per_m: draw.log_uniform(1e3, 4e3),
     }
 }
 
 fn frequency_dependent_railpad(draw: &mut Draw<'_>) -> Hidden {
     Hidden::FrequencyDependentRailpad {
-        stiffness_ratio: draw.strong(0.3, 3.0),
-        relaxation_time_s: draw.strong(3e-5, 1e-3),
+        stiffness_ratio: draw.log_uniform(0.3, 3.0),
+        relaxation_time_s: draw.log_uniform(3e-5, 1e-3),
     }
 }
 
 fn rail_cross_section(draw: &mut Draw<'_>) -> Hidden {
     Hidden::RailCrossSection {
-        frequency_hz: draw.strong(6e3, 1.4e4),
-        stiffness_n_per_m: draw.strong(5e8, 3e9),
-        loss_factor: draw.strong(5e-2, 2e-1),
+        frequency_hz: draw.log_uniform(6e3, 1.4e4),
+        stiffness_n_per_m: draw.log_uniform(5e8, 3e9),
+        loss_factor: draw.log_uniform(5e-2, 2e-1),
     }
 }
 
 fn sensor_mount_resonance(draw: &mut Draw<'_>) -> Hidden {
     Hidden::SensorMountResonance {
-        frequency_hz: draw.strong(2e3, 7e3),
-        damping_ratio: draw.strong(2e-2, 1e-1),
+        frequency_hz: draw.log_uniform(2e3, 7e3),
+        damping_ratio: draw.log_uniform(2e-2, 1e-1),
     }
 }
 
 fn clipping(draw: &mut Draw<'_>) -> Hidden {
     // Crests at 13 km/h reach 8 m/s2 on a surface of level one.
-    Hidden::Clipping { limit_m_s2: draw.level * draw.strong(1.5, 6.0) }
+    Hidden::Clipping { limit_m_s2: draw.level * draw.log_uniform(1.5, 6.0) }
 }
 
 fn gain_error(draw: &mut Draw<'_>) -> Hidden {
     Hidden::GainError {
-        factor: if draw.even(0, 2) == 0 { 1.0 / 1.3 } else { 1.3 },
-        pass: Some(draw.even(0, 6)),
+        factor: if draw.uniform(0, 2) == 0 { 1.0 / 1.3 } else { 1.3 },
+        pass: Some(draw.uniform(0, 6)),
     }
 }
 
 fn position_error(draw: &mut Draw<'_>) -> Hidden {
     Hidden::PositionError {
-        offset_m: draw.strong(2e-2, 6e-2),
-        scale: draw.even(-0.01, 0.01),
-        pass: Some(draw.even(0, 6)),
+        offset_m: draw.log_uniform(2e-2, 6e-2),
+        scale: draw.uniform(-0.01, 0.01),
+        pass: Some(draw.uniform(0, 6)),
     }
 }
 
 fn electrical_hum(draw: &mut Draw<'_>) -> Hidden {
     Hidden::ElectricalHum {
-        frequency_hz: 50.0 * draw.even(1.0, 4.0_f64).floor(),
-        amplitude_m_s2: draw.strong(0.2, 3.0),
+        frequency_hz: 50.0 * draw.uniform(1.0, 4.0_f64).floor(),
+        amplitude_m_s2: draw.log_uniform(0.2, 3.0),
     }
 }
 
 fn rail_absorber(draw: &mut Draw<'_>) -> Hidden {
     Hidden::RailAbsorber {
         x_m: draw.point(),
-        mass_kg: draw.strong(0.2, 1.5),
-        frequency_hz: draw.strong(3e2, 2.5e3),
-        damping_ratio: draw.strong(2e-2, 1e-1),
+        mass_kg: draw.log_uniform(0.2, 1.5),
+        frequency_hz: draw.log_uniform(3e2, 2.5e3),
+        damping_ratio: draw.log_uniform(2e-2, 1e-1),
     }
 }
 
 fn cracked_sleeper(draw: &mut Draw<'_>) -> Hidden {
-    Hidden::CrackedSleeper { sleepers: draw.some(2), bending_factor: draw.strong(1e-2, 0.2) }
+    Hidden::CrackedSleeper { sleepers: draw.some(2), bending_factor: draw.log_uniform(1e-2, 0.2) }
 }
 
 fn linked_sleepers(draw: &mut Draw<'_>) -> Hidden {
-    let first = draw.even(SLEEPERS[0], SLEEPERS[1]);
+    let first = draw.uniform(SLEEPERS[0], SLEEPERS[1]);
     Hidden::LinkedSleepers {
         sleepers: [first, first + 1],
-        stiffness_n_per_m: draw.strong(1e7, 2e8),
+        stiffness_n_per_m: draw.log_uniform(1e7, 2e8),
     }
 }
 
 fn wheel_mode(draw: &mut Draw<'_>) -> Hidden {
     Hidden::WheelMode {
-        frequency_hz: draw.strong(1.5e3, 4.5e3),
-        mass_kg: draw.strong(1.0, 4.0),
-        damping_ratio: draw.strong(5e-3, 5e-2),
+        frequency_hz: draw.log_uniform(1.5e3, 4.5e3),
+        mass_kg: draw.log_uniform(1.0, 4.0),
+        damping_ratio: draw.log_uniform(5e-3, 5e-2),
     }
 }
 

@@ -4,7 +4,7 @@
 
 use crate::known::kind;
 use nalgebra::DVector;
-use tracktwin_diagnosis::{CalibrationError, Search, Subject, signature};
+use tracktwin_diagnosis::{CalibrationError, PreparedRecording, Search, signature};
 use tracktwin_reference_simulator::{Hidden, Scene};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::ExtensionInstance;
@@ -15,21 +15,21 @@ use tracktwin_track::extension::ExtensionInstance;
 /// [`CalibrationError`] when the true values make no track.
 pub fn detectability(
     recording: &Recording,
-    subject: &Subject,
+    prepared: &PreparedRecording,
     search: &Search,
     scene: &Scene,
     hidden: &Hidden,
 ) -> Result<Option<f64>, CalibrationError> {
-    let Some(extension) = in_recording(recording, subject, hidden) else { return Ok(None) };
-    let values = values(recording, subject, scene);
-    let length = signature(subject, &search.observation, &values, extension)?;
+    let Some(extension) = in_recording(recording, prepared, hidden) else { return Ok(None) };
+    let values = values(recording, prepared, scene);
+    let length = signature(prepared, &search.observation, &values, extension)?;
     Ok((length > 0.0).then_some(length))
 }
 
 /// The effect in terms of the recording: compared sleepers count from 0.
 fn in_recording(
     recording: &Recording,
-    subject: &Subject,
+    prepared: &PreparedRecording,
     hidden: &Hidden,
 ) -> Option<ExtensionInstance> {
     // Faults of the measuring chain are in the model where it is searched for them.
@@ -37,7 +37,7 @@ fn in_recording(
     let json = serde_json::to_value(hidden).ok()?;
     let mut extension: ExtensionInstance = serde_json::from_value(json).ok()?;
     let compared: Vec<Option<usize>> =
-        (0..subject.forward.section.sleepers).map(|s| number(recording, subject, s)).collect();
+        (0..prepared.forward.section.sleepers).map(|s| number(recording, prepared, s)).collect();
     if let Some(sleepers) = &mut extension.sleepers {
         let place = |number: &usize| compared.iter().position(|other| *other == Some(*number));
         *sleepers = sleepers.iter().filter_map(place).collect();
@@ -49,16 +49,20 @@ fn in_recording(
 }
 
 /// Number in the scene of a compared sleeper: its name holds it.
-pub(crate) fn number(recording: &Recording, subject: &Subject, sleeper: usize) -> Option<usize> {
-    recording.sleepers[subject.first_sleeper + sleeper].id.strip_prefix("SN")?.parse().ok()
+pub(crate) fn number(
+    recording: &Recording,
+    prepared: &PreparedRecording,
+    sleeper: usize,
+) -> Option<usize> {
+    recording.sleepers[prepared.first_sleeper + sleeper].id.strip_prefix("SN")?.parse().ok()
 }
 
 /// The unknowns as they truly are.
-fn values(recording: &Recording, subject: &Subject, scene: &Scene) -> DVector<f64> {
-    let unknowns = &subject.forward.unknowns;
+fn values(recording: &Recording, prepared: &PreparedRecording, scene: &Scene) -> DVector<f64> {
+    let unknowns = &prepared.forward.unknowns;
     let mut values = unknowns.typical();
-    for sleeper in 0..subject.forward.section.sleepers {
-        let truth = number(recording, subject, sleeper).and_then(|n| scene.sleepers.get(n));
+    for sleeper in 0..prepared.forward.section.sleepers {
+        let truth = number(recording, prepared, sleeper).and_then(|n| scene.sleepers.get(n));
         let Some(truth) = truth else { continue };
         values[unknowns.ballast().start + sleeper] = truth.ballast_stiffness_n_m.ln();
         values[unknowns.railpad().start + sleeper] = truth.railpad_stiffness_n_m.ln();

@@ -1,6 +1,6 @@
 //! Do a pass's times, positions, rate and speed agree with one another?
 
-use super::clock::Pace;
+use super::clock::SampleClock;
 use super::columns::Columns;
 use super::copies;
 use super::error::{Fault, RecordingError};
@@ -25,15 +25,15 @@ pub(super) fn times(
     path: &Path,
     columns: &Columns,
     declared: f64,
-) -> Result<Pace, RecordingError> {
-    let pace = Pace::of(&columns.time_s)
+) -> Result<SampleClock, RecordingError> {
+    let clock = SampleClock::of(&columns.time_s)
         .map_err(|fault| RecordingError::new(path, "time_s", known_rate(fault, declared)))?;
-    let observed = pace.rate_hz;
-    if (observed / declared - 1.0).abs() > RATE_TOLERANCE.max(pace.uncertainty) {
+    let observed = clock.rate_hz;
+    if (observed / declared - 1.0).abs() > RATE_TOLERANCE.max(clock.uncertainty) {
         let fault = Fault::WrongSampleRate { declared, observed, file: file_name(path) };
         return Err(RecordingError::new(manifest, "sample_rate_Hz", fault));
     }
-    Ok(pace)
+    Ok(clock)
 }
 
 /// The step that is expected is what the declared rate says, unless that is wrong too.
@@ -70,11 +70,11 @@ pub(super) fn speed(
     field: &str,
     path: &Path,
     position_m: &[f64],
-    pace: Pace,
+    clock: SampleClock,
     declared: f64,
 ) -> Result<(), RecordingError> {
     let last = position_m.len() - 1;
-    let observed = (position_m[last] - position_m[0]) / last as f64 * pace.rate_hz / KM_PER_H;
+    let observed = (position_m[last] - position_m[0]) / last as f64 * clock.rate_hz / KM_PER_H;
     if (observed / declared - 1.0).abs() <= SPEED_TOLERANCE {
         return Ok(());
     }

@@ -13,7 +13,7 @@ const ACCURACY: f64 = 1e-6;
 
 /// How the samples of a pass follow each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pace {
+pub(super) struct SampleClock {
     /// Samples per second in Hz.
     pub rate_hz: f64,
     /// Relative uncertainty of that rate.
@@ -33,7 +33,7 @@ pub(super) enum Stamps {
     Jitter(f64),
 }
 
-impl Pace {
+impl SampleClock {
     /// The pace of `times` in s, of which there are two at least.
     ///
     /// # Errors
@@ -60,7 +60,7 @@ impl Pace {
 }
 
 /// Times that stand still and then advance by whole steps of a clock.
-fn coarse(times: &[f64], mean: f64) -> Option<Pace> {
+fn coarse(times: &[f64], mean: f64) -> Option<SampleClock> {
     let changes: Vec<usize> = (1..times.len()).filter(|&i| times[i] != times[i - 1]).collect();
     let steps = || changes.iter().map(|&i| times[i] - times[i - 1]);
     let step_s = steps().fold(f64::INFINITY, f64::min);
@@ -75,15 +75,15 @@ fn coarse(times: &[f64], mean: f64) -> Option<Pace> {
         return None;
     }
     let uncertainty = 1.0 / (last - first) as f64;
-    Some(Pace { rate_hz: 1.0 / interval, uncertainty, stamps: Stamps::Coarse(step_s) })
+    Some(SampleClock { rate_hz: 1.0 / interval, uncertainty, stamps: Stamps::Coarse(step_s) })
 }
 
 /// Stamps that tremble about even times.
-fn jitter(times: &[f64], mean: f64) -> Option<Pace> {
+fn jitter(times: &[f64], mean: f64) -> Option<SampleClock> {
     let off = farthest(times, 0, mean);
     let advances = times.windows(2).all(|pair| pair[1] > pair[0]);
     let uncertainty = 2.0 * off / (mean * (times.len() - 1) as f64);
-    (advances && off <= JITTER_MAX * mean).then_some(Pace {
+    (advances && off <= JITTER_MAX * mean).then_some(SampleClock {
         rate_hz: 1.0 / mean,
         uncertainty: uncertainty.max(ACCURACY),
         stamps: Stamps::Jitter(off),
@@ -123,8 +123,8 @@ mod tests {
     #[test]
     fn even_times_from_any_instant_have_their_rate() {
         for begin in [0.0, 3.7, 1.7e9] {
-            let pace = Pace::of(&times(|time| begin + time)).unwrap();
-            assert_eq!((pace.stamps, pace.round_rate_hz()), (Stamps::Even, RATE_HZ), "{begin}");
+            let clock = SampleClock::of(&times(|time| begin + time)).unwrap();
+            assert_eq!((clock.stamps, clock.round_rate_hz()), (Stamps::Even, RATE_HZ), "{begin}");
         }
     }
 
@@ -132,19 +132,19 @@ mod tests {
     fn a_clock_in_coarse_steps_has_the_rate_of_its_samples() {
         for step in [1e-3, 1e-2, 5e-5] {
             let rounded = times(|time| (time / step).round() * step);
-            let pace = Pace::of(&rounded).unwrap();
-            let Stamps::Coarse(found) = pace.stamps else { panic!("{step}: {pace:?}") };
+            let clock = SampleClock::of(&rounded).unwrap();
+            let Stamps::Coarse(found) = clock.stamps else { panic!("{step}: {clock:?}") };
             assert!((found / step - 1.0).abs() < 1e-6, "{found} for {step}");
-            assert_eq!(pace.round_rate_hz(), RATE_HZ, "{pace:?}");
+            assert_eq!(clock.round_rate_hz(), RATE_HZ, "{clock:?}");
         }
     }
 
     #[test]
     fn stamps_that_tremble_by_less_than_a_sample_are_even_underneath() {
         let tremble = |time: f64| time + 0.45 / RATE_HZ * (1e5 * time).sin();
-        let pace = Pace::of(&times(tremble)).unwrap();
-        assert!(matches!(pace.stamps, Stamps::Jitter(_)), "{pace:?}");
-        assert!((pace.round_rate_hz() / RATE_HZ - 1.0).abs() < 1e-4);
+        let clock = SampleClock::of(&times(tremble)).unwrap();
+        assert!(matches!(clock.stamps, Stamps::Jitter(_)), "{clock:?}");
+        assert!((clock.round_rate_hz() / RATE_HZ - 1.0).abs() < 1e-4);
     }
 
     #[test]
@@ -156,7 +156,10 @@ mod tests {
         cases[2].drain(700..720);
         cases[3].drain(700..900);
         for (index, times) in cases.iter().enumerate() {
-            assert!(matches!(Pace::of(times), Err(Fault::UnevenTime { .. })), "case {index}");
+            assert!(
+                matches!(SampleClock::of(times), Err(Fault::UnevenTime { .. })),
+                "case {index}"
+            );
         }
     }
 }

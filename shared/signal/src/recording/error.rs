@@ -4,7 +4,7 @@ use std::path::Path;
 use tracktwin_number::{rounded, significant};
 use tracktwin_parameters::QuantityError;
 
-/// A recording that cannot be used, in one line: `FILE: FIELD: what; how to mend`.
+/// A recording that cannot be used, in one line: `FILE: FIELD: what; how to remedy`.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {field}: {fault}")]
 pub struct RecordingError {
@@ -103,12 +103,12 @@ pub enum Fault {
     )]
     UnknownTable,
     /// The file is of a known kind that is not read.
-    #[error("is {kind}, which is not read here; {mend}")]
+    #[error("is {kind}, which is not read here; {remedy}")]
     Foreign {
         /// What it is.
         kind: &'static str,
         /// How it becomes something that is read.
-        mend: &'static str,
+        remedy: &'static str,
     },
     /// A text table holds bytes that no text has.
     #[error("is no text (byte {byte} is {value:#04x}); export it from its program as CSV")]
@@ -147,14 +147,14 @@ pub enum Fault {
         places: Vec<usize>,
     },
     /// The name or the file says a unit that is not known for such a column.
-    #[error("its unit is \"{unit}\", which is none of {known}; {mend}")]
+    #[error("its unit is \"{unit}\", which is none of {known}; {remedy}")]
     UnknownUnit {
         /// What the file says.
         unit: String,
         /// The units that are known.
         known: String,
         /// How to say which it is.
-        mend: &'static str,
+        remedy: &'static str,
     },
     /// A column that is needed is absent.
     #[error("there is no such column; name it so (the file has {})", present.join(", "))]
@@ -359,7 +359,7 @@ pub enum Fault {
     },
     /// The positions advance at a speed that no train has.
     #[error(
-        "advances at {} km/h in {unit}, which no pass does; {mend}",
+        "advances at {} km/h in {unit}, which no pass does; {remedy}",
         rounded(*observed, 3)
     )]
     Impossible {
@@ -368,11 +368,11 @@ pub enum Fault {
         /// The unit that they were taken for.
         unit: &'static str,
         /// What to do.
-        mend: String,
+        remedy: String,
     },
     /// The times advance at a rate at which no acceleration is recorded.
     #[error(
-        "advances at {} Hz in {unit}, at which no acceleration is recorded; {mend}",
+        "advances at {} Hz in {unit}, at which no acceleration is recorded; {remedy}",
         rounded(*observed, 3)
     )]
     ImpossibleRate {
@@ -381,7 +381,7 @@ pub enum Fault {
         /// The unit that they were taken for.
         unit: &'static str,
         /// What to do.
-        mend: String,
+        remedy: String,
     },
     /// The pass is shorter than a sleeper's window.
     #[error(

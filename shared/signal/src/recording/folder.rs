@@ -121,7 +121,7 @@ impl Recording {
         let mut files = Vec::with_capacity(self.passes.len());
         for (pass, name) in self.passes.iter().zip(self.file_names()) {
             output.fill(&name, |path| write_pass(path, pass))?;
-            files.push(output.settle(&name)?.to_string());
+            files.push(output.unique_name(&name)?.to_string());
         }
         let text = self.manifest(files).to_json();
         output.add_manifest(&FileName::new(FILE_NAME)?, text.as_bytes())
@@ -249,7 +249,7 @@ fn read_pass(
 ) -> Result<(Pass, Option<f64>), RecordingError> {
     let (entry, sample_rate_hz) = (&manifest.passes[index], manifest.sample_rate_hz);
     let columns = Columns::read(path)?;
-    let pace = check::times(manifest_path, path, &columns, sample_rate_hz)?;
+    let clock = check::times(manifest_path, path, &columns, sample_rate_hz)?;
     let of_position = |fault| RecordingError::new(path, "position_m", fault);
     let odometer =
         Odometer::straightened(columns.position_m, sample_rate_hz).map_err(of_position)?;
@@ -258,7 +258,7 @@ fn read_pass(
     }
     let field = format!("passes[{index}].speed_km_h");
     let Odometer { position_m, step_m } = odometer;
-    check::speed(manifest_path, &field, path, &position_m, pace, entry.speed_km_h)?;
+    check::speed(manifest_path, &field, path, &position_m, clock, entry.speed_km_h)?;
     check::length(path, &position_m, spacing_m)?;
     let signal = Signal::new(sample_rate_hz, columns.acceleration_m_s2)
         .expect("columns are finite and the rate is positive");

@@ -2,7 +2,7 @@
 
 use super::receptances::RailReceptances;
 use crate::model::{ForceLaw, TrackModel};
-use crate::time::Standing;
+use crate::time::StaticSolution;
 use rustfft::num_complex::Complex64;
 
 /// Halvings of the way between two nodes by which it is found where a law takes hold: a place is
@@ -32,9 +32,9 @@ impl States {
         if model.force_laws().is_empty() {
             return None;
         }
-        let standing = Standing::new(model)?;
+        let solution = StaticSolution::new(model)?;
         let hold_at = |x_m: f64| -> Option<Hold> {
-            Some(standing.tangents(x_m)?.iter().map(|tangent| tangent.stiffness > 0.0).collect())
+            Some(solution.tangents(x_m)?.iter().map(|tangent| tangent.stiffness > 0.0).collect())
         };
         let nodes_m = model.layout().rail_nodes_m();
         let at_nodes = at_nodes(model, &hold_at)?;
@@ -43,7 +43,7 @@ impl States {
             return None;
         }
         let (holds, stretches) = stretches(nodes_m, &at_nodes, &hold_at);
-        let tracks = holds.iter().map(|hold| in_state(model, hold, &standing, nodes_m, &at_nodes));
+        let tracks = holds.iter().map(|hold| in_state(model, hold, &solution, nodes_m, &at_nodes));
         let tracks = tracks.collect::<Option<Vec<_>>>()?;
         let shares = shares(nodes_m, &stretches, tracks.len());
         Some(Self { tracks, shares })
@@ -125,12 +125,12 @@ fn holds_above(law: &ForceLaw) -> bool {
 fn in_state(
     model: &TrackModel,
     hold: &Hold,
-    standing: &Standing<'_>,
+    solution: &StaticSolution<'_>,
     nodes_m: &[f64],
     at_nodes: &[Hold],
 ) -> Option<TrackModel> {
     let node = at_nodes.iter().position(|at_node| at_node == hold)?;
-    let mut tangents = standing.tangents(nodes_m[node])?;
+    let mut tangents = solution.tangents(nodes_m[node])?;
     for ((tangent, law), &holds) in tangents.iter_mut().zip(model.force_laws()).zip(hold) {
         if holds == holds_above(law) {
             *tangent = law.linear;

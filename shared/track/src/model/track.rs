@@ -95,7 +95,8 @@ impl TrackModel {
         if self.force_laws.is_empty() {
             return self;
         }
-        let tangents = time::Standing::new(&self).and_then(|standing| standing.tangents_above());
+        let tangents =
+            time::StaticSolution::new(&self).and_then(|solution| solution.tangents_above());
         match tangents {
             Some(tangents) => self.with_tangents(&tangents),
             None => self,

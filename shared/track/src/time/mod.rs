@@ -17,7 +17,7 @@ mod statics;
 pub use newmark::pass;
 pub use passes::passes;
 pub use run::{Pass, PassError, PassRecord};
-pub(crate) use statics::Standing;
+pub(crate) use statics::StaticSolution;
 
 /// Where the contact point of the standing wheel is on a smooth rail, in m.
 #[cfg(test)]

@@ -61,7 +61,7 @@ struct Motion<'a> {
 }
 
 /// What stands on the rail in one step, and what it would do there alone.
-struct Standing {
+struct FreeMotion {
     points: Vec<RailPoint>,
     /// Displacements of the track per unit contact force of each wheel.
     units: Vec<Vec<f64>>,
@@ -105,20 +105,20 @@ impl<'a> Motion<'a> {
 
     /// One time step, at whose end the first wheel stands at `x_m` and each over its height.
     fn advance(&mut self, x_m: f64, heights_m: &[f64]) -> Result<(), PassError> {
-        let standing = self.stand(x_m, heights_m);
-        let forces = match self.forces_of_one_contact(&standing) {
+        let free_motion = self.free_motion(x_m, heights_m);
+        let forces = match self.forces_of_one_contact(&free_motion) {
             Some(force_n) => vec![force_n],
-            None => self.forces_of_all(&standing).unwrap_or(vec![f64::NAN]),
+            None => self.forces_of_all(&free_motion).unwrap_or(vec![f64::NAN]),
         };
         self.force_n = forces[0];
         if !self.force_n.is_finite() {
             return Err(PassError::NotFinite { position_m: x_m });
         }
-        self.push(standing, &forces);
+        self.push(free_motion, &forces);
         Ok(())
     }
 
-    fn stand(&mut self, x_m: f64, heights_m: &[f64]) -> Standing {
+    fn free_motion(&mut self, x_m: f64, heights_m: &[f64]) -> FreeMotion {
         let free = self.track_without_contact();
         let layout = self.model.layout();
         let points: Vec<_> =
@@ -128,47 +128,47 @@ impl<'a> Motion<'a> {
             wheel.lift_off(self.dt) - point.deflection(&free) - height_m
         };
         let overlaps = self.wheels.iter_mut().zip(&points).zip(heights_m).map(overlap).collect();
-        Standing { points, units, overlaps, free }
+        FreeMotion { points, units, overlaps, free }
     }
 
     /// The contact force if there is one wheel and all laws are at rest; not a number if the
     /// input is not.
-    fn forces_of_one_contact(&self, standing: &Standing) -> Option<f64> {
-        let ([overlap], [unit]) = (&standing.overlaps[..], &standing.units[..]) else {
+    fn forces_of_one_contact(&self, free_motion: &FreeMotion) -> Option<f64> {
+        let ([overlap], [unit]) = (&free_motion.overlaps[..], &free_motion.units[..]) else {
             return None;
         };
-        let force = self.contact.solve(*overlap, self.compliance(standing, 0));
+        let force = self.contact.solve(*overlap, self.compliance(free_motion, 0));
         let force = force.unwrap_or(f64::NAN);
         let at_rest = |law: &Resisting| {
-            let motion = law.law.port.motion(&standing.free) + force * law.law.port.motion(unit);
+            let motion = law.law.port.motion(&free_motion.free) + force * law.law.port.motion(unit);
             Resistance::Law(law.law, law.motion, Some(self.dt)).rests_at(motion)
         };
         self.laws.iter().all(at_rest).then_some(force)
     }
 
     /// How far one wheel and the track below it give way to each other's unit force.
-    fn compliance(&self, standing: &Standing, wheel: usize) -> f64 {
-        let point = &standing.points[wheel];
+    fn compliance(&self, free_motion: &FreeMotion, wheel: usize) -> f64 {
+        let point = &free_motion.points[wheel];
         let local = if self.local_flexibility { point.local_flexibility } else { 0.0 };
-        point.deflection(&standing.units[wheel]) + self.wheels[wheel].compliance() + local
+        point.deflection(&free_motion.units[wheel]) + self.wheels[wheel].compliance() + local
     }
 
     /// Forces of all contacts, then of all laws.
-    fn forces_of_all(&mut self, standing: &Standing) -> Option<Vec<f64>> {
+    fn forces_of_all(&mut self, free_motion: &FreeMotion) -> Option<Vec<f64>> {
         let wheels = self.wheels.len();
         let count = wheels + self.laws.len();
         let port = |index: usize, displacement: &[f64]| match index.checked_sub(wheels) {
-            None => -standing.points[index].deflection(displacement),
+            None => -free_motion.points[index].deflection(displacement),
             Some(law) => self.laws[law].law.port.motion(displacement),
         };
         let compliance =
             DMatrix::from_fn(count, count, |row, column| match column.checked_sub(wheels) {
-                None if row == column => self.compliance(standing, row),
-                None => -port(row, &standing.units[column]),
+                None if row == column => self.compliance(free_motion, row),
+                None => -port(row, &free_motion.units[column]),
                 Some(law) => port(row, &self.laws[law].unit),
             });
-        let law_motions = self.laws.iter().map(|law| law.law.port.motion(&standing.free));
-        let free = standing.overlaps.iter().copied().chain(law_motions);
+        let law_motions = self.laws.iter().map(|law| law.law.port.motion(&free_motion.free));
+        let free = free_motion.overlaps.iter().copied().chain(law_motions);
         let free = DVector::from_vec(free.collect());
         let contacts = (0..wheels).map(|_| Resistance::Contact(self.contact));
         let laws = self.laws.iter();
@@ -181,12 +181,12 @@ impl<'a> Motion<'a> {
     }
 
     /// Moves everything on under contact forces and, behind them, forces of laws.
-    fn push(&mut self, standing: Standing, forces: &[f64]) {
-        let mut displacement = standing.free;
+    fn push(&mut self, free_motion: FreeMotion, forces: &[f64]) {
+        let mut displacement = free_motion.free;
         let mut add = |factor: f64, unit: &[f64]| {
             displacement.iter_mut().zip(unit).for_each(|(sum, unit)| *sum += factor * unit);
         };
-        for (unit, force) in standing.units.iter().zip(forces) {
+        for (unit, force) in free_motion.units.iter().zip(forces) {
             add(*force, unit);
         }
         for (law, force) in self.laws.iter().zip(&forces[self.wheels.len()..]) {

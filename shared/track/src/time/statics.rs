@@ -62,9 +62,9 @@ impl<'a> Statics<'a> {
 }
 
 /// A track under a standing wheel.
-pub(crate) struct Standing<'a>(Statics<'a>);
+pub(crate) struct StaticSolution<'a>(Statics<'a>);
 
-impl<'a> Standing<'a> {
+impl<'a> StaticSolution<'a> {
     /// `None` where the track cannot carry a wheel.
     pub(crate) fn new(model: &'a TrackModel) -> Option<Self> {
         Statics::new(model).ok().map(Self)
@@ -85,15 +85,15 @@ impl<'a> Standing<'a> {
     /// The same for each law while the wheel stands above it.
     pub(crate) fn tangents_above(&self) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
-        let mut standing: Option<(f64, Vec<SpringDamper>)> = None;
+        let mut latest: Option<(f64, Vec<SpringDamper>)> = None;
         let mut tangents = Vec::with_capacity(statics.model.force_laws().len());
         for (index, law) in statics.model.force_laws().iter().enumerate() {
-            let all = match standing.take() {
+            let all = match latest.take() {
                 Some((place_m, all)) if place_m == law.place_m => all,
                 _ => self.tangents(law.place_m)?,
             };
             tangents.push(all[index]);
-            standing = Some((law.place_m, all));
+            latest = Some((law.place_m, all));
         }
         Some(tangents)
     }

@@ -6,8 +6,8 @@ mod take_in;
 use super::Counts;
 use super::audits::{Audits, LeaseKind};
 use super::campaigns::{Campaigns, DispatchError};
-use super::messages::{held, malformed, unavailable, unfit};
-use super::roster::{Roster, Standing};
+use super::messages::{held, incompatibility, malformed, unavailable};
+use super::roster::{Roster, WorkerEligibility};
 use super::settings::Settings;
 use parking_lot::Mutex;
 use std::sync::Arc;
@@ -60,14 +60,14 @@ impl Dispatch {
     }
 
     /// How a worker stands; one that has not registered is told to.
-    async fn standing(&self, worker: &str) -> Result<Standing, Status> {
-        let stranger = || Status::unauthenticated("register first");
-        let standing = self.roster.standing(worker).ok_or_else(stranger)?;
-        if !standing.to_be_noted {
-            return Ok(standing);
+    async fn eligibility(&self, worker: &str) -> Result<WorkerEligibility, Status> {
+        let not_registered = || Status::unauthenticated("register first");
+        let eligibility = self.roster.eligibility(worker).ok_or_else(not_registered)?;
+        if !eligibility.to_be_noted {
+            return Ok(eligibility);
         }
         self.note(worker).await?;
-        self.roster.standing(worker).ok_or_else(stranger)
+        self.roster.eligibility(worker).ok_or_else(not_registered)
     }
 
     /// Tells the library that a worker is alive, and hears whether it is in quarantine.
@@ -88,9 +88,9 @@ impl Farm for Dispatch {
     ) -> Result<Response<farm::RegisterResponse>, Status> {
         let registration =
             Registration::try_from(request.into_inner()).map_err(|error| malformed(&error))?;
-        if let Some(reason) = unfit(&registration) {
+        if let Some(reason) = incompatibility(&registration) {
             tracing::warn!("refused: {reason}");
-            self.counts.unfit.inc();
+            self.counts.incompatible.inc();
             return Err(Status::failed_precondition(reason));
         }
         let Registration { worker, code_version, model_hash, cores, .. } = registration.clone();
@@ -125,12 +125,12 @@ impl Farm for Dispatch {
         if cases_max == 0 {
             return Err(malformed(&BadMessage::Missing { field: "cases_max" }));
         }
-        let standing = self.standing(&worker).await?;
-        let mut lease = match standing.aside {
+        let eligibility = self.eligibility(&worker).await?;
+        let mut lease = match eligibility.exclusion {
             Some((wait, reason)) => {
                 Lease::NoneNow { retry_after_s: wait.as_secs_f64(), reason: Some(reason) }
             }
-            None if standing.on_trial => self.hand_out(&worker, cases_max.min(1)).await?,
+            None if eligibility.on_trial => self.hand_out(&worker, cases_max.min(1)).await?,
             None => self.hand_out(&worker, cases_max).await?,
         };
         if let Lease::Cases(lease) = &mut lease {
@@ -158,7 +158,7 @@ impl Farm for Dispatch {
         let held = held(cases)?.into_iter().filter(is_case).collect();
         let lost = self.library.renew(&campaign_id, &worker, held, until).await;
         let lost = lost.map_err(|error| unavailable(&error))?;
-        if self.roster.standing(&worker).is_some_and(|standing| standing.to_be_noted) {
+        if self.roster.eligibility(&worker).is_some_and(|eligibility| eligibility.to_be_noted) {
             self.note(&worker).await?;
         }
         let lost = held_to_messages(lost.into_iter().map(|held| (held.index, held.epoch)));
@@ -174,7 +174,7 @@ impl Farm for Dispatch {
             request.into_inner();
         let [worker, campaign_id] = names(worker, campaign_id)?;
         let step = Step::after("report", [&traceparent]);
-        let standing = self.standing(&worker).await?;
+        let eligibility = self.eligibility(&worker).await?;
         let indices: Vec<u32> = cases.iter().map(|case| case.sobol_index).collect();
         let served = match self.campaigns.of(&campaign_id).await {
             Ok(served) => Some(served).filter(|it| it.record.experiment_hash == experiment_hash),
@@ -187,7 +187,7 @@ impl Farm for Dispatch {
                 self.counts.malformed.inc();
                 malformed(&error)
             })?;
-            self.take_in(&worker, standing, &served, reports, &step).await?
+            self.take_in(&worker, eligibility, &served, reports, &step).await?
         } else {
             self.counts.refused.inc_by(indices.len() as u64);
             vec![farm::Verdict::Refused; indices.len()]

@@ -2,10 +2,10 @@
 
 use super::Dispatch;
 use crate::dispatch::ATTEMPTS_MAX;
-use crate::dispatch::audits::{Found, LeaseKind};
+use crate::dispatch::audits::{AuditOutcome, LeaseKind};
 use crate::dispatch::campaigns::Served;
 use crate::dispatch::messages::{unavailable, verdict_message};
-use crate::dispatch::roster::Standing;
+use crate::dispatch::roster::WorkerEligibility;
 use std::sync::Arc;
 use tonic::Status;
 use tracktwin_experiment::Outcome;
@@ -19,7 +19,7 @@ impl Dispatch {
     pub(super) async fn take_in(
         &self,
         worker: &str,
-        standing: Standing,
+        eligibility: WorkerEligibility,
         served: &Arc<Served>,
         reports: Vec<Option<CaseReport>>,
         step: &Step,
@@ -43,7 +43,7 @@ impl Dispatch {
             }
         }
         if !ordinary.is_empty() {
-            let stored = self.store(worker, standing, served, ordinary, step).await?;
+            let stored = self.store(worker, eligibility, served, ordinary, step).await?;
             self.count(&stored);
             for (place, verdict) in places.into_iter().zip(stored) {
                 verdicts[place] = verdict_message(verdict);
@@ -55,7 +55,7 @@ impl Dispatch {
     async fn store(
         &self,
         worker: &str,
-        standing: Standing,
+        eligibility: WorkerEligibility,
         served: &Served,
         reports: Vec<CaseReport>,
         step: &Step,
@@ -66,8 +66,8 @@ impl Dispatch {
         let report = Report {
             campaign: served.record.id.clone(),
             worker: worker.to_owned(),
-            code_version: standing.code_version,
-            model_hash: standing.model_hash,
+            code_version: eligibility.code_version,
+            model_hash: eligibility.model_hash,
             experiment_hash: served.record.experiment_hash.clone(),
             speeds_km_h: served.shape.speeds_km_h.clone(),
             cases: reports,
@@ -85,9 +85,9 @@ impl Dispatch {
         step.count("cases_stored", failed.len());
         drop(step);
         served.measured(durations_s);
-        if self.settings.put_aside && self.roster.reported(worker, &failed) {
+        if self.settings.suspends_failing && self.roster.reported(worker, &failed) {
             tracing::warn!(worker, "put aside: it fails where other workers don't");
-            self.counts.put_aside.inc();
+            self.counts.suspended.inc();
         }
         Ok(verdicts)
     }
@@ -104,16 +104,16 @@ impl Dispatch {
                 self.counts.refused.inc();
                 Verdict::Refused
             }
-            Some(Found::Agreement) => {
+            Some(AuditOutcome::Agreement) => {
                 self.counts.audited.inc();
                 Verdict::Duplicate
             }
-            Some(Found::Unjudged) => {
+            Some(AuditOutcome::Unjudged) => {
                 self.counts.audited.inc();
                 self.counts.differed.inc();
                 Verdict::Duplicate
             }
-            Some(Found::Wrong { worker, reason }) => {
+            Some(AuditOutcome::Wrong { worker, reason }) => {
                 self.counts.audited.inc();
                 self.counts.differed.inc();
                 self.roster.set_quarantine(&worker, Some(reason));

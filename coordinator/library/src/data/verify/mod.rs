@@ -14,7 +14,7 @@ use tokio_stream::StreamExt;
 
 /// Something that is wrong, and how often.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
+pub struct IntegrityFault {
     /// Where: a campaign, or the library.
     pub place: String,
     /// What.
@@ -29,7 +29,7 @@ pub struct Finding {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Verified {
     /// What is wrong; nothing in a sound library.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<IntegrityFault>,
     /// Cases whose results have the checksum that came with them.
     pub attested: u64,
     /// Cases whose results came without one, so that nothing tells whether they were altered.
@@ -73,7 +73,7 @@ struct Survey<'a, F> {
 impl<F: FnMut()> Survey<'_, F> {
     fn add(&mut self, place: &str, what: impl Into<String>, count: u64, first_index: Option<u32>) {
         let (place, what) = (place.to_owned(), what.into());
-        self.found.findings.push(Finding { place, what, count, first_index });
+        self.found.findings.push(IntegrityFault { place, what, count, first_index });
     }
 
     /// Takes a failure to read for a finding, unless the library is only away.

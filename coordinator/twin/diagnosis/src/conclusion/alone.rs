@@ -4,9 +4,9 @@ use super::finding::{probability, seen};
 use super::notes::{lost, one_speed, shown};
 use super::{ONE_PASS_MAX, ONE_SPEED_MAX, verdict};
 use crate::outcome::{Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Score, Scores};
-use crate::subject::SubjectError;
+use crate::prepared_recording::PreparationError;
 use std::collections::BTreeMap;
-use tracktwin_inspection::FirstLook;
+use tracktwin_inspection::Inspection;
 use tracktwin_inspection::wheel::{Comb, CombBlock};
 use tracktwin_inspection::{Finding, Place};
 use tracktwin_signal::recording::Recording;
@@ -19,16 +19,16 @@ use tracktwin_track::extension::{Kind, WHEEL_OUT_OF_ROUND};
 /// all else is a possibility.
 pub fn passes_alone(
     recording: &Recording,
-    look: &FirstLook,
-    reason: &SubjectError,
+    inspection: &Inspection,
+    reason: &PreparationError,
 ) -> Option<Diagnosis> {
-    let mut found: Vec<(&Finding, Hypothesis)> = look
+    let mut found: Vec<(&Finding, Hypothesis)> = inspection
         .findings
         .iter()
-        .filter_map(|finding| Some((finding, hypothesis(recording, look, finding)?)))
+        .filter_map(|finding| Some((finding, hypothesis(recording, inspection, finding)?)))
         .collect();
     found.sort_by(|(_, a), (_, b)| {
-        let tested = |it: &Hypothesis| is_comb(&it.physics, look);
+        let tested = |it: &Hypothesis| is_comb(&it.physics, inspection);
         tested(b).cmp(&tested(a)).then(b.probability.total_cmp(&a.probability))
     });
     let (first, best) = found.iter().find(|(_, it)| it.accepted)?;
@@ -47,9 +47,9 @@ pub fn passes_alone(
     if !recording.gain_known() {
         notes.push("The unit of the signal is not known: amplitudes are relative.".to_owned());
     }
-    notes.extend(look.troubles.iter().map(ToString::to_string));
-    notes.extend(lost(look, recording));
-    notes.extend(look.findings.iter().map(shown));
+    notes.extend(inspection.pass_defects.iter().map(ToString::to_string));
+    notes.extend(lost(inspection, recording));
+    notes.extend(inspection.findings.iter().map(shown));
     Some(Diagnosis {
         format: FORMAT.to_owned(),
         recording: recording.name.clone(),
@@ -58,23 +58,30 @@ pub fn passes_alone(
         nothing_left_out: None,
         mismatches: Vec::new(),
         hypotheses,
-        fit: fit(recording, look.comb.as_ref().filter(|_| is_comb(&best.physics, look))),
+        fit: fit(
+            recording,
+            inspection.comb.as_ref().filter(|_| is_comb(&best.physics, inspection)),
+        ),
         bias_removed: BTreeMap::new(),
         track: Vec::new(),
         levels: Levels::default(),
-        loss_of_contact: look.loss_of_contact.clone(),
+        loss_of_contact: inspection.loss_of_contact.clone(),
         notes,
     })
 }
 
 /// Whether a name stands for the comb of a wheel, which is tested on blocks that were held out.
-fn is_comb(physics: &str, look: &FirstLook) -> bool {
-    physics == WHEEL_OUT_OF_ROUND.physics && look.comb.is_some()
+fn is_comb(physics: &str, inspection: &Inspection) -> bool {
+    physics == WHEEL_OUT_OF_ROUND.physics && inspection.comb.is_some()
 }
 
-fn hypothesis(recording: &Recording, look: &FirstLook, finding: &Finding) -> Option<Hypothesis> {
+fn hypothesis(
+    recording: &Recording,
+    inspection: &Inspection,
+    finding: &Finding,
+) -> Option<Hypothesis> {
     let kind = Kind::from_name(finding.physics)?;
-    let is_tested = is_comb(finding.physics, look);
+    let is_tested = is_comb(finding.physics, inspection);
     let most = match (is_tested || kind.measuring_chain, recording.speeds_km_h().len()) {
         (true, _) => 1.0,
         (false, 1) => ONE_SPEED_MAX,

@@ -15,12 +15,12 @@ const DECIBEL: f64 = 4.342_944_819_032_518;
 
 impl Evidence<'_> {
     pub(super) fn problem<'p>(&'p self, candidates: &'p [Candidate]) -> Problem<'p> {
-        let (forward, observation) = (&self.subject.forward, &self.search.observation);
+        let (forward, observation) = (&self.prepared.forward, &self.search.observation);
         Problem { forward, observation, candidates }
     }
 
     pub(super) fn levels(&self) -> Result<Levels, CalibrationError> {
-        let forward = &self.subject.forward;
+        let forward = &self.prepared.forward;
         let predicted = |candidates: &[Candidate], calibration: &Calibration| {
             let extensions = self.problem(candidates).extensions(&calibration.values)?;
             Ok::<_, CalibrationError>(forward.log_power(&calibration.values, &extensions)?)
@@ -60,10 +60,10 @@ impl Evidence<'_> {
             Score { score: -0.5 * (square + TAU.ln()) - search.observation.log_deviation() / count }
         };
         let held_out = |index: usize| {
-            let known = self.subject.forward.speeds_m_s.len() > 1;
+            let known = self.prepared.forward.speeds_m_s.len() > 1;
             known.then(|| Score { score: search.held_out[index] })
         };
-        let speeds = &self.subject.forward.speeds_m_s;
+        let speeds = &self.prepared.forward.speeds_m_s;
         let mut gains = BTreeMap::new();
         for round in search.rounds.iter().filter(|round| round.accepted) {
             for (speed, gain) in speeds.iter().zip(&round.held_out_gain) {
@@ -88,7 +88,7 @@ impl Evidence<'_> {
             return BTreeMap::new();
         }
         let place = accepted.and_then(|hypothesis| hypothesis.location.as_ref());
-        let section = &self.subject.forward.section;
+        let section = &self.prepared.forward.section;
         let half_m = section.design.sleeper.spacing_m;
         let at_place = |sleeper: &usize| {
             place.is_none_or(|place| {
@@ -97,7 +97,7 @@ impl Evidence<'_> {
             })
         };
         let near: Vec<usize> = (0..section.sleepers).filter(at_place).collect();
-        let unknowns = &self.subject.forward.unknowns;
+        let unknowns = &self.prepared.forward.unknowns;
         let mean = |calibration: &Calibration, range: Range<usize>| {
             let values = near.iter().map(|sleeper| calibration.values[range.start + sleeper].exp());
             values.sum::<f64>() / near.len() as f64
@@ -120,13 +120,13 @@ impl Evidence<'_> {
     /// What to keep in mind about a sleeper's estimates.
     fn flags(&self, sleeper: usize) -> Vec<String> {
         let id = self.id(sleeper);
-        let lost = self.look.loss_of_contact.as_ref();
+        let lost = self.inspection.loss_of_contact.as_ref();
         let flies = lost.is_some_and(|lost| lost.sleepers.contains(&id));
         flies.then(|| "loss_of_contact".to_owned()).into_iter().collect()
     }
 
     pub(super) fn track(&self) -> Vec<SleeperValues> {
-        let unknowns = &self.subject.forward.unknowns;
+        let unknowns = &self.prepared.forward.unknowns;
         let (before, after) = (&self.search.baseline, &self.search.last);
         let deviations = [before, after].map(|calibration| {
             let covariance = calibration.precision.inverse();
@@ -140,10 +140,10 @@ impl Evidence<'_> {
             before: estimate(before, &deviations[0], index),
             after: estimate(after, &deviations[1], index),
         };
-        (0..self.subject.forward.section.sleepers)
+        (0..self.prepared.forward.section.sleepers)
             .map(|sleeper| SleeperValues {
                 id: self.id(sleeper),
-                x_m: self.subject.forward.section.x_m(sleeper),
+                x_m: self.prepared.forward.section.x_m(sleeper),
                 railpad_stiffness: both(unknowns.railpad().start + sleeper),
                 ballast_stiffness: both(unknowns.ballast().start + sleeper),
                 irregularity_level: both(unknowns.level().start + sleeper),

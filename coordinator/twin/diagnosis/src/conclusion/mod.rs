@@ -1,24 +1,24 @@
 //! From a search to the diagnosis that is written down.
 
 mod alone;
-mod apart;
 mod finding;
 mod fit;
 mod nameless;
 mod notes;
 mod place;
 mod round;
+mod speed_disagreement;
 
 pub use self::alone::passes_alone;
 use self::place::meet;
 use crate::calibration::CalibrationError;
 use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict};
+use crate::prepared_recording::PreparedRecording;
 use crate::search::Search;
 use crate::sentence::sentence;
-use crate::subject::Subject;
 use std::collections::BTreeMap;
-use tracktwin_inspection::FirstLook;
-use tracktwin_inspection::chain::Trouble;
+use tracktwin_inspection::Inspection;
+use tracktwin_inspection::chain::PassDefect;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{EffectFamily, Kind};
 
@@ -47,9 +47,9 @@ pub struct Evidence<'a> {
     /// The recording.
     pub recording: &'a Recording,
     /// What was compared.
-    pub subject: &'a Subject,
+    pub prepared: &'a PreparedRecording,
     /// What the passes tell alone.
-    pub look: &'a FirstLook,
+    pub inspection: &'a Inspection,
     /// What the model tells.
     pub search: &'a Search,
 }
@@ -80,10 +80,10 @@ impl Evidence<'_> {
         let levels = self.levels()?;
         let fit = self.fit();
         let bias_removed = self.bias_removed(&hypotheses);
-        let sleepers = self.subject.forward.section.sleepers;
+        let sleepers = self.prepared.forward.section.sleepers;
         let nothing_left_out = self.nothing(&hypotheses).min(most);
         let said = sentence(verdict, &hypotheses, nothing_left_out, sleepers, &fit, &bias_removed);
-        let sentence = said + &airborne(self.look);
+        let sentence = said + &airborne(self.inspection);
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
             recording: self.recording.name.clone(),
@@ -96,7 +96,7 @@ impl Evidence<'_> {
             bias_removed,
             track: self.track(),
             levels,
-            loss_of_contact: self.look.loss_of_contact.clone(),
+            loss_of_contact: self.inspection.loss_of_contact.clone(),
             notes: self.notes(),
         })
     }
@@ -120,12 +120,12 @@ impl Evidence<'_> {
     }
 
     fn speeds(&self) -> usize {
-        self.subject.forward.speeds_m_s.len()
+        self.prepared.forward.speeds_m_s.len()
     }
 
     /// Whether some pass repeats another at its speed.
     fn repeats(&self) -> bool {
-        self.subject.pass_numbers.iter().any(|passes| passes.len() > 1)
+        self.prepared.pass_numbers.iter().any(|passes| passes.len() > 1)
     }
 
     fn hypotheses(&self) -> Vec<Hypothesis> {
@@ -144,11 +144,11 @@ impl Evidence<'_> {
                 }
             }
         }
-        self.add_apart(&mut all);
-        for finding in &self.look.findings {
+        self.add_speed_disagreement(&mut all);
+        for finding in &self.inspection.findings {
             self.add_finding(finding, &mut all);
         }
-        for finding in &self.look.nameless {
+        for finding in &self.inspection.nameless {
             self.add_nameless(finding, &mut all);
         }
         // What a faulty chain makes of the recording is not unknown physics, and what is left of a
@@ -157,8 +157,8 @@ impl Evidence<'_> {
             Kind::from_name(&known.physics).is_some_and(|kind| kind.measuring_chain)
         };
         if all.iter().any(|known| known.accepted && is_chain(known)) {
-            let saturated = |trouble: &Trouble| matches!(trouble, Trouble::Saturated { .. });
-            let is_saturated = self.look.troubles.iter().any(saturated);
+            let saturated = |defect: &PassDefect| matches!(defect, PassDefect::Saturated { .. });
+            let is_saturated = self.inspection.pass_defects.iter().any(saturated);
             let made_by_chain = |known: &&mut Hypothesis| {
                 !is_chain(known) && (known.physics == UNKNOWN || is_saturated)
             };
@@ -239,8 +239,8 @@ fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
 }
 
 /// That the wheel is in the air somewhere, which no fit knows.
-fn airborne(look: &FirstLook) -> String {
-    let Some(lost) = &look.loss_of_contact else { return String::new() };
+fn airborne(inspection: &Inspection) -> String {
+    let Some(lost) = &inspection.loss_of_contact else { return String::new() };
     let [from_m, to_m] = lost.reach_m();
     format!(
         " The wheel loses contact with the rail from {from_m:.2} to {to_m:.2} m, where no linear fit holds."

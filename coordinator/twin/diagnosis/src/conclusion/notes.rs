@@ -2,7 +2,7 @@
 
 use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
 use crate::port_scan::PortPlace;
-use tracktwin_inspection::{Finding, FirstLook};
+use tracktwin_inspection::{Finding, Inspection};
 use tracktwin_number::chance;
 use tracktwin_signal::recording::Recording;
 
@@ -11,9 +11,10 @@ const SPEED_RATIO: f64 = 1.35;
 
 impl Evidence<'_> {
     pub(super) fn notes(&self) -> Vec<String> {
-        let mut notes: Vec<String> = self.look.troubles.iter().map(ToString::to_string).collect();
+        let mut notes: Vec<String> =
+            self.inspection.pass_defects.iter().map(ToString::to_string).collect();
         if self.speeds() == 1 {
-            notes.push(one_speed(3.6 * self.subject.forward.speeds_m_s[0]));
+            notes.push(one_speed(3.6 * self.prepared.forward.speeds_m_s[0]));
         }
         if !self.repeats() {
             notes.push(format!(
@@ -22,9 +23,9 @@ impl Evidence<'_> {
                 100.0 * ONE_PASS_MAX
             ));
         }
-        notes.extend(lost(self.look, self.recording));
-        notes.extend(self.apart().or_else(|| self.remainder()));
-        notes.extend(self.look.findings.iter().map(shown));
+        notes.extend(lost(self.inspection, self.recording));
+        notes.extend(self.speed_disagreement().or_else(|| self.remainder()));
+        notes.extend(self.inspection.findings.iter().map(shown));
         notes
     }
 
@@ -46,7 +47,7 @@ impl Evidence<'_> {
                 best.candidate.kind.physics
             ));
         }
-        if round.port_strays {
+        if round.port_differs_between_speeds {
             return Some(format!(
                 "Something is left{place} that chance does not explain (probability {}), but no two speeds \
                  hear it there: what stays where it is, all of them pass.",
@@ -64,8 +65,8 @@ impl Evidence<'_> {
 }
 
 /// Where the wheel is in the air.
-pub(super) fn lost(look: &FirstLook, recording: &Recording) -> Option<String> {
-    let lost = look.loss_of_contact.as_ref()?;
+pub(super) fn lost(inspection: &Inspection, recording: &Recording) -> Option<String> {
+    let lost = inspection.loss_of_contact.as_ref()?;
     Some(format!(
         "loss_of_contact: {}: what was fitted near there says little.",
         lost.sentence(recording.passes.len())

@@ -23,7 +23,7 @@ pub(super) fn meet(one: Option<&Location>, other: Option<&Location>) -> bool {
 
 impl Evidence<'_> {
     pub(super) fn location_of(&self, candidate: &Candidate) -> Option<Location> {
-        let section = &self.subject.forward.section;
+        let section = &self.prepared.forward.section;
         match (candidate.kind.place, candidate.extension.x_m, &candidate.extension.sleepers) {
             (PlaceKind::Nowhere, _, _) => None,
             (_, Some([from_m, to_m]), _) => Some(self.location_between(from_m, to_m)),
@@ -34,7 +34,7 @@ impl Evidence<'_> {
 
     /// None at the wheel or where it is everywhere.
     pub(super) fn location_of_port(&self, place: &PortPlace) -> Option<Location> {
-        let everywhere = self.subject.forward.section.sleepers;
+        let everywhere = self.prepared.forward.section.sleepers;
         match place {
             PortPlace::Seats(seats) if seats.len() < everywhere => Some(self.location(seats)),
             PortPlace::Between(pair) => Some(self.location(pair)),
@@ -44,7 +44,7 @@ impl Evidence<'_> {
 
     /// From the first of some sleepers, of which there is one at least, to the last.
     pub(super) fn location(&self, sleepers: &[usize]) -> Location {
-        let section = &self.subject.forward.section;
+        let section = &self.prepared.forward.section;
         let [first, last] = [sleepers[0], sleepers[sleepers.len() - 1]];
         Location {
             x_m: [section.x_m(first), section.x_m(last)],
@@ -54,7 +54,7 @@ impl Evidence<'_> {
 
     /// A stretch with the sleepers whose half bays it touches.
     pub(super) fn location_between(&self, from_m: f64, to_m: f64) -> Location {
-        let section = &self.subject.forward.section;
+        let section = &self.prepared.forward.section;
         let half_m = (0.5 + PLACE_ERROR) * section.design.sleeper.spacing_m;
         let near = |sleeper: &usize| {
             let x_m = section.x_m(*sleeper);
@@ -72,7 +72,7 @@ impl Evidence<'_> {
     }
 
     pub(super) fn id(&self, sleeper: usize) -> String {
-        self.recording.sleepers[self.subject.first_sleeper + sleeper].id.clone()
+        self.recording.sleepers[self.prepared.first_sleeper + sleeper].id.clone()
     }
 
     pub(super) fn mismatches(&self, verdict: Verdict, levels: &Levels) -> Vec<Mismatch> {
@@ -91,7 +91,7 @@ impl Evidence<'_> {
 
     /// Sleepers and bands where a whitened change of the prediction is greatest.
     fn mismatch(&self, change: &DVector<f64>, p_value: f64, levels: &Levels) -> Mismatch {
-        let forward = &self.subject.forward;
+        let forward = &self.prepared.forward;
         let square = |row: usize| change[row].powi(2);
         let (mut by_sleeper, mut by_band) =
             (vec![0.0; forward.section.sleepers], vec![0.0; forward.bands.count()]);

@@ -4,7 +4,7 @@ use super::{Evidence, FAILED_SHARE, names};
 use crate::behaviour::Behaviour;
 use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, UNKNOWN};
-use crate::port_scan::Port;
+use crate::port_scan::UnknownElement;
 use crate::search::{Fitted, Probabilities, Round};
 use std::collections::BTreeMap;
 
@@ -34,7 +34,7 @@ impl Evidence<'_> {
         let alone = first && !round.accepted;
         let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
         let others = family.max(nothing);
-        let is_there = alone && !round.port_strays;
+        let is_there = alone && !round.port_differs_between_speeds;
         let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
         // Something is there, but the names that come near failed on withheld speeds.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
@@ -65,7 +65,7 @@ impl Evidence<'_> {
     }
 
     /// Something unknown.
-    fn without_name(&self, port: &Port, probability: f64) -> Hypothesis {
+    fn without_name(&self, port: &UnknownElement, probability: f64) -> Hypothesis {
         let behaviour = port.behaviour.as_ref();
         Hypothesis {
             physics: UNKNOWN.to_owned(),
@@ -101,7 +101,7 @@ impl Evidence<'_> {
         let is_fit = known.accepted && !other.accepted;
         let are_beside = match (&known.location, &other.location) {
             (Some(one), Some(another)) => {
-                self.subject.forward.section.are_beside(one.x_m, another.x_m)
+                self.prepared.forward.section.are_beside(one.x_m, another.x_m)
             }
             // Everywhere is beside all.
             _ => true,

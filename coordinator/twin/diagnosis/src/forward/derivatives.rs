@@ -99,9 +99,9 @@ impl Forward {
             let seat_node = self.section.node_above(in_track);
             self.columns(&shares, &excitation, shapes, |seen_from, window, line| {
                 let seen_from = self.section.in_track(seen_from);
-                let felt = || transfer.felt(window, line, in_track);
+                let sensitivity = || transfer.sensitivity(window, line, in_track);
                 (seen_from.abs_diff(in_track) <= NEIGHBOURS)
-                    .then(|| felt() / transfer.receptance(line, seat_node))
+                    .then(|| sensitivity() / transfer.receptance(line, seat_node))
             })
         };
         let between = |sleeper: usize| {
@@ -110,14 +110,14 @@ impl Forward {
             let seat_node = self.section.seat_node(sleeper);
             self.columns(&shares, &excitation, shapes, |seen_from, window, line| {
                 let is_near = pair.iter().any(|sleeper| seen_from.abs_diff(*sleeper) <= NEIGHBOURS);
-                let felt = || transfer.felt_between(window, line, in_track);
-                is_near.then(|| felt() / transfer.receptance(line, seat_node))
+                let sensitivity = || transfer.sensitivity_between(window, line, in_track);
+                is_near.then(|| sensitivity() / transfer.receptance(line, seat_node))
             })
         };
         let seats = (0..self.section.spans() - 1).into_par_iter().map(seat).collect();
         let between = (1..self.section.sleepers).into_par_iter().map(between).collect();
         let wheel = self.columns(&shares, &excitation, shapes, |_, window, line| {
-            Some(transfer.felt_at_wheel(window, line))
+            Some(transfer.sensitivity_at_wheel(window, line))
         });
         let lines = 0..self.bands.lines_hz().len();
         let receptances = |in_track: usize| {
@@ -129,24 +129,24 @@ impl Forward {
         Ok(PortColumns { seats, between, wheel, seat_receptances, wheel_receptance })
     }
 
-    /// Changes of the log powers by a stiffness of the given shapes; `felt` says by what one of its
+    /// Changes of the log powers by a stiffness of the given shapes; `sensitivity` says by what one of its
     /// own size changes the mean power over a sleeper's window at a line, if it is felt there.
     fn columns(
         &self,
         shares: &[f64],
         excitation: &[Vec<f64>],
         shapes: &[Vec<Complex64>],
-        felt: impl Fn(usize, &Window, usize) -> Option<Complex64>,
+        sensitivity: impl Fn(usize, &Window, usize) -> Option<Complex64>,
     ) -> DMatrix<f64> {
         let mut columns = DMatrix::zeros(self.count(), shapes.len());
         for (row, share) in shares.iter().enumerate() {
             let (sleeper, speed, band) = self.place(row);
             let window = &self.windows[speed][sleeper][band];
             for &(line, weight) in self.bands.weights(band) {
-                let Some(felt) = felt(sleeper, window, line) else { break };
-                let felt = share * weight * excitation[speed][line] * felt;
+                let Some(sensitivity) = sensitivity(sleeper, window, line) else { break };
+                let sensitivity = share * weight * excitation[speed][line] * sensitivity;
                 for (shape, lines) in shapes.iter().enumerate() {
-                    columns[(row, shape)] += (felt * lines[line]).re;
+                    columns[(row, shape)] += (sensitivity * lines[line]).re;
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! How the power over every window changes with the support under every sleeper near it.
 //!
 //! The sum over a window's nodes and a band's lines is taken lines first, on stretches of the rail:
-//! node by node, as [`Transfer::felt`] has it, it takes several times as long.
+//! node by node, as [`Transfer::sensitivity`] has it, it takes several times as long.
 
 use super::Forward;
 use crate::section::Window;
@@ -171,8 +171,10 @@ mod tests {
         for in_track in [middle - NEIGHBOURS, middle, middle + NEIGHBOURS] {
             let plain: [f64; VARIED] = std::array::from_fn(|value| {
                 let of_line = |&(line, weight): &(usize, f64)| {
-                    let felt = transfer.felt(window, line, in_track);
-                    weight * excitation[speed][line] * (felt * variations[value][line][in_track]).re
+                    let sensitivity = transfer.sensitivity(window, line, in_track);
+                    weight
+                        * excitation[speed][line]
+                        * (sensitivity * variations[value][line][in_track]).re
                 };
                 forward.bands.weights(band).iter().map(of_line).sum()
             });

@@ -2,7 +2,7 @@
 
 use super::place::PortPlace;
 use super::prior::Prior;
-use crate::behaviour::{Behaviour, Seen};
+use crate::behaviour::{Behaviour, PortEvidence};
 use crate::calibration::Calibration;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rustfft::num_complex::Complex64;
@@ -48,27 +48,27 @@ impl Filter {
     pub(super) fn behaviour(
         &self,
         residual: &DVector<f64>,
-        felt: &DVector<f64>,
+        projected_gradient: &DVector<f64>,
         heights: &DVector<f64>,
         centres_hz: &[f64],
     ) -> Option<Behaviour> {
-        let along = &self.along(residual, felt);
+        let along = &self.along(residual, projected_gradient);
         let Self { trace: Trace { receptance, .. }, square, .. } = self;
-        Seen { along, square, receptance, centres_hz }.behaviour(0.5 * along.dot(heights))
+        PortEvidence { along, square, receptance, centres_hz }.behaviour(0.5 * along.dot(heights))
     }
 
     /// Slope of the log likelihood with the bumps' heights.
-    fn along(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> DVector<f64> {
-        self.trace.columns.tr_mul(residual) - self.imitated.tr_mul(felt)
+    fn along(&self, residual: &DVector<f64>, projected_gradient: &DVector<f64>) -> DVector<f64> {
+        self.trace.columns.tr_mul(residual) - self.imitated.tr_mul(projected_gradient)
     }
 
     /// Log evidence averaged over the priors, and the bumps' most probable heights.
     pub(super) fn evidence(
         &self,
         residual: &DVector<f64>,
-        felt: &DVector<f64>,
+        projected_gradient: &DVector<f64>,
     ) -> (f64, DVector<f64>) {
-        let along = self.along(residual, felt);
+        let along = self.along(residual, projected_gradient);
         let of_prior = |(prior, precision): &(Prior, Cholesky<f64, Dyn>)| {
             let heights = precision.solve(&along);
             let log_evidence = 0.5 * along.dot(&heights) - 0.5 * precision.ln_determinant()

@@ -23,7 +23,7 @@ use rustfft::num_complex::Complex64;
 
 /// Evidence for an unknown dynamic stiffness.
 #[derive(Clone, Debug)]
-pub struct Port {
+pub struct UnknownElement {
     /// Where it acts.
     pub place: PortPlace,
     /// Logarithm of the evidence against the model without it, in nats.
@@ -74,28 +74,32 @@ impl PortScan {
         Ok(Self { filters, centres_hz: bumps.centres_hz })
     }
 
-    /// The best port for a whitened residual; `felt` is its product with the baseline's
+    /// The best port for a whitened residual; `projected_gradient` is its product with the baseline's
     /// derivatives.
-    pub fn best(&self, residual: &DVector<f64>, felt: &DVector<f64>) -> Option<Port> {
-        self.best_where(residual, felt, |_| true)
+    pub fn best(
+        &self,
+        residual: &DVector<f64>,
+        projected_gradient: &DVector<f64>,
+    ) -> Option<UnknownElement> {
+        self.best_where(residual, projected_gradient, |_| true)
     }
 
     /// The best of some places.
     pub fn best_where(
         &self,
         residual: &DVector<f64>,
-        felt: &DVector<f64>,
+        projected_gradient: &DVector<f64>,
         is_one: impl Fn(&PortPlace) -> bool + Sync,
-    ) -> Option<Port> {
+    ) -> Option<UnknownElement> {
         let filters = self.filters.par_iter().filter(|filter| is_one(&filter.trace.place));
         let found: Vec<_> =
-            filters.map(|filter| (filter, filter.evidence(residual, felt))).collect();
+            filters.map(|filter| (filter, filter.evidence(residual, projected_gradient))).collect();
         let best = found.into_iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let (filter, (log_evidence, heights)) = best?;
-        Some(Port {
+        Some(UnknownElement {
             place: filter.trace.place.clone(),
             log_evidence,
-            behaviour: filter.behaviour(residual, felt, &heights, &self.centres_hz),
+            behaviour: filter.behaviour(residual, projected_gradient, &heights, &self.centres_hz),
             change: &filter.trace.columns * heights,
         })
     }

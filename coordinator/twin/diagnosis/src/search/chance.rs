@@ -11,7 +11,7 @@ pub(super) struct Null {
     /// Whitened difference from the prediction.
     pub(super) residual: DVector<f64>,
     /// Its product with the derivatives.
-    pub(super) felt: DVector<f64>,
+    pub(super) projected_gradient: DVector<f64>,
 }
 
 /// Null differences as a calibration sees them, whitened.
@@ -22,8 +22,8 @@ pub(super) fn whitened(
 ) -> Vec<Null> {
     let of = |null: &DVector<f64>| {
         let residual = observation.fitted(&observation.whiten(null));
-        let felt = current.jacobian.tr_mul(&residual);
-        Null { residual, felt }
+        let projected_gradient = current.jacobian.tr_mul(&residual);
+        Null { residual, projected_gradient }
     };
     nulls.par_iter().map(of).collect()
 }
@@ -33,7 +33,10 @@ pub(super) fn whitened(
 pub(super) fn excess(current: &Calibration, nulls: &[Null], sleepers: usize) -> f64 {
     let square = |residual: &DVector<f64>| median(squares(residual, sleepers));
     let fitted = |null: &Null| {
-        square(&(&null.residual - &current.jacobian * current.precision.solve(&null.felt)))
+        square(
+            &(&null.residual
+                - &current.jacobian * current.precision.solve(&null.projected_gradient)),
+        )
     };
     let usual = median(nulls.par_iter().map(fitted).collect());
     (square(&current.residual) / usual).max(1.0)
@@ -46,8 +49,10 @@ pub(super) fn tail_probability(
     found: f64,
     greatest: impl Fn(&DVector<f64>, &DVector<f64>) -> Option<f64> + Sync,
 ) -> f64 {
-    let maxima: Vec<f64> =
-        nulls.par_iter().filter_map(|null| greatest(&null.residual, &null.felt)).collect();
+    let maxima: Vec<f64> = nulls
+        .par_iter()
+        .filter_map(|null| greatest(&null.residual, &null.projected_gradient))
+        .collect();
     gumbel_tail(&maxima, found)
 }
 

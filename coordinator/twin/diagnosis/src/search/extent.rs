@@ -5,7 +5,7 @@ use crate::port_scan::PortPlace;
 use crate::section::Section;
 
 /// Spans on either side in which an effect at a place is felt.
-const FELT_SPANS: f64 = 2.0;
+const REACH_SPANS: f64 = 2.0;
 
 /// From where to where, in spacings from the first sleeper compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,8 +49,8 @@ impl Extent {
     }
 
     /// Where it is felt.
-    pub(super) fn felt(self) -> Self {
-        Self { from: self.from - FELT_SPANS, to: self.to + FELT_SPANS }
+    pub(super) fn with_reach(self) -> Self {
+        Self { from: self.from - REACH_SPANS, to: self.to + REACH_SPANS }
     }
 
     pub(super) fn length(self) -> f64 {
@@ -83,9 +83,9 @@ mod tests {
             Extent::of(all.iter().find(is_it).unwrap(), &section)
         };
         let between = Extent::of_port(&PortPlace::Between([3, 4]), &section);
-        assert!([2, 3, 4, 5].iter().all(|&sleeper| on(sleeper).felt().meets(between)));
+        assert!([2, 3, 4, 5].iter().all(|&sleeper| on(sleeper).with_reach().meets(between)));
         assert!(on(3).is_about(between) && on(4).is_about(between) && !on(5).is_about(between));
-        assert!(!on(7).felt().meets(between) && on(6).felt().meets(between));
+        assert!(!on(7).with_reach().meets(between) && on(6).with_reach().meets(between));
         let wheel = Extent::of_port(&PortPlace::Wheel, &section);
         let all_seats = Extent::of_port(&PortPlace::Seats((0..24).collect()), &section);
         assert!(wheel == all_seats && wheel.meets(between) && !wheel.is_about(between));

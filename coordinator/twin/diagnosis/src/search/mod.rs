@@ -1,35 +1,35 @@
 //! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
 
-mod apart;
 mod chance;
 mod extent;
 mod fit;
-mod imitated;
-mod least;
 mod limits;
+mod outlier_starts;
 mod probability;
 mod remainder;
 mod round;
 mod runs;
+mod speed_disagreement;
 #[cfg(test)]
 mod testing;
+mod threshold;
 
 pub(crate) use probability::Probabilities;
 
 use self::extent::Extent;
 use self::fit::retuned;
-use self::least::Least;
 use self::limits::FALSE_ALARM;
-use self::round::{Setting, is_predicted, stays, sure};
+use self::round::{Setting, accepted_candidate, is_consistent_across_speeds, is_predicted};
+use self::threshold::EvidenceThreshold;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::held_out::Score;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
 use crate::patch_scan::{Fixed, Patch};
-use crate::port_scan::{Port, PortPlace, PortScan};
+use crate::port_scan::{PortPlace, PortScan, UnknownElement};
+use crate::prepared_recording::PreparedRecording;
 use crate::section::Section;
-use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
 
 /// Effects that are looked for one after the other.
@@ -81,15 +81,15 @@ pub struct Round {
     /// What was fitted, best first.
     pub fitted: Vec<Fitted>,
     /// What an unknown dynamic stiffness under a rail seat would explain.
-    pub port: Option<Port>,
+    pub port: Option<UnknownElement>,
     /// Probability to see as much evidence for one if nothing is left out.
     pub port_p_value: f64,
     /// What an unknown dynamic stiffness at the place of the last name before explains, where no more
     /// is accepted.
-    pub left: Option<Port>,
+    pub unknown_residual: Option<UnknownElement>,
     /// Whether no two speeds have evidence for it, each alone, nor all together more than one of them;
     /// asked where nothing is named.
-    pub port_strays: bool,
+    pub port_differs_between_speeds: bool,
     /// Gain of the best on each speed held out, in nats.
     pub held_out_gain: Vec<f64>,
     /// Whether the best was accepted.
@@ -123,7 +123,7 @@ pub struct Search {
     pub deviation: DVector<f64>,
     /// By how many nats the recording is explained better if each speed has a track and a surface of its
     /// own than by one track with all that was found; negative where all speeds passed the same track.
-    pub apart: f64,
+    pub speed_disagreement: f64,
     /// What the final model does not explain, though an eye would see it, and the probability to see as
     /// much if nothing is left out.
     pub patch: Option<(Patch, f64)>,
@@ -132,8 +132,8 @@ pub struct Search {
 }
 
 /// A rough covariance for the first calibration, before null simulations of that track.
-fn rough_covariance(subject: &Subject) -> DMatrix<f64> {
-    let (size, bands) = (subject.forward.per_sleeper(), subject.forward.bands.count());
+fn rough_covariance(prepared: &PreparedRecording) -> DMatrix<f64> {
+    let (size, bands) = (prepared.forward.per_sleeper(), prepared.forward.bands.count());
     DMatrix::from_fn(size, size, |i, j| {
         let distance = (i as f64 - j as f64) / 1.5;
         let together =
@@ -146,12 +146,13 @@ fn rough_covariance(subject: &Subject) -> DMatrix<f64> {
 ///
 /// # Errors
 /// [`CalibrationError`] when no baseline is found.
-pub fn first_calibration(subject: &Subject) -> Result<DVector<f64>, CalibrationError> {
-    let covariance = rough_covariance(subject);
-    let observation = Observation::new(subject.log_power.clone(), &covariance, |_| false)
+pub fn first_calibration(prepared: &PreparedRecording) -> Result<DVector<f64>, CalibrationError> {
+    let covariance = rough_covariance(prepared);
+    let observation = Observation::new(prepared.log_power.clone(), &covariance, |_| false)
         .ok_or(CalibrationError::NotFinite)?;
-    let problem = Problem { forward: &subject.forward, observation: &observation, candidates: &[] };
-    Ok(problem.calibrate(subject.forward.unknowns.typical())?.values)
+    let problem =
+        Problem { forward: &prepared.forward, observation: &observation, candidates: &[] };
+    Ok(problem.calibrate(prepared.forward.unknowns.typical())?.values)
 }
 
 /// Looks for physics that was left out.
@@ -162,16 +163,16 @@ pub fn first_calibration(subject: &Subject) -> Result<DVector<f64>, CalibrationE
 /// # Errors
 /// [`CalibrationError`] when the model breaks down on the way.
 pub fn search(
-    subject: &Subject,
+    prepared: &PreparedRecording,
     null: &NullModel,
     start: DVector<f64>,
     all: &[Candidate],
     progress: &(impl Fn(Stage, f64) + Sync),
 ) -> Result<Search, CalibrationError> {
     progress(Stage::Baseline, 0.0);
-    let setting = Setting::new(subject, null);
+    let setting = Setting::new(prepared, null);
     let observation = setting.observe(|_| false)?;
-    let plain = Problem { forward: &subject.forward, observation: &observation, candidates: &[] };
+    let plain = Problem { forward: &prepared.forward, observation: &observation, candidates: &[] };
     let baseline = plain.calibrate(start)?;
     let mut search = Search {
         last: baseline.clone(),
@@ -180,7 +181,7 @@ pub fn search(
         rounds: Vec::new(),
         observation,
         deviation: setting.covariance.diagonal().map(f64::sqrt),
-        apart: f64::NEG_INFINITY,
+        speed_disagreement: f64::NEG_INFINITY,
         patch: None,
         held_out: [0.0; 2],
     };
@@ -189,18 +190,18 @@ pub fn search(
     let before = setting.held_out(&[], &search.baseline.values)?;
     let mut densities = vec![log_densities(&before)];
     while search.accepted.len() < EFFECTS_MAX
-        && search.goes_on(&setting, all, &mut densities, progress)?
+        && search.search_round(&setting, all, &mut densities, progress)?
     {}
-    search.take_back(&subject.forward.section);
-    search.hear(&setting)?;
-    search.compare_apart(&setting)?;
+    search.retract_names(&prepared.forward.section);
+    search.test_each_speed(&setting)?;
+    search.compare_speeds(&setting)?;
     let with = Problem {
-        forward: &subject.forward,
+        forward: &prepared.forward,
         observation: &search.observation,
         candidates: &search.accepted,
     };
     search.patch = setting.patch(&with, &search.last, |_| true);
-    let mean = |scores: &[f64]| scores.iter().sum::<f64>() / subject.forward.count() as f64;
+    let mean = |scores: &[f64]| scores.iter().sum::<f64>() / prepared.forward.count() as f64;
     search.held_out = [mean(&densities[0]), mean(&densities[search.accepted.len()])];
     Ok(search)
 }
@@ -221,7 +222,7 @@ impl Round {
 impl Search {
     /// Waves on the rail that the baseline's residual shows, as candidates.
     fn waves(&self, setting: &Setting<'_>) -> Vec<Candidate> {
-        let forward = &setting.subject.forward;
+        let forward = &setting.prepared.forward;
         let problem = Problem { forward, observation: &self.observation, candidates: &[] };
         let is_wave = |fixed| matches!(fixed, Fixed::Wavelength(_));
         let found = setting.patch(&problem, &self.baseline, is_wave);
@@ -229,12 +230,12 @@ impl Search {
         let wave = found
             .filter(|(_, p_value)| *p_value <= FALSE_ALARM)
             .and_then(|(patch, _)| patch.as_waves(&forward.section, level));
-        wave.filter(|wave| setting.subject.may_be_named(wave.kind)).into_iter().collect()
+        wave.filter(|wave| setting.prepared.may_be_named(wave.kind)).into_iter().collect()
     }
 
     /// Looks for one effect more; whether one was accepted. `densities` are those of each speed when
     /// it is held out, by the baseline and with one more effect each.
-    fn goes_on(
+    fn search_round(
         &mut self,
         setting: &Setting<'_>,
         all: &[Candidate],
@@ -242,17 +243,18 @@ impl Search {
         progress: &(impl Fn(Stage, f64) + Sync),
     ) -> Result<bool, CalibrationError> {
         let (accepted, observation) = (self.accepted.clone(), self.observation.clone());
-        let forward = &setting.subject.forward;
+        let forward = &setting.prepared.forward;
         let problem = Problem { forward, observation: &observation, candidates: &accepted };
         // The rounds so far are those whose best was accepted.
         let best = self.rounds.iter().filter_map(|round| round.fitted.first());
         let known: Vec<(Candidate, f64)> =
             best.map(|fitted| (fitted.candidate.clone(), fitted.log_evidence)).collect();
-        let heard_m = &setting.subject.heard_m;
-        let least = Least { accepted: &known, section: &forward.section, heard_m };
+        let detected_shapes_m = &setting.prepared.detected_shapes_m;
+        let threshold =
+            EvidenceThreshold { accepted: &known, section: &forward.section, detected_shapes_m };
         let hopeless = self.rounds.last().map_or(Vec::new(), Round::hopeless);
         let (mut round, mut ports) =
-            setting.round(&problem, &self.last, all, least, &hopeless, progress)?;
+            setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
             // The candidates found a better baseline on their way: the opponent gets it too.
             self.last = better;
@@ -263,23 +265,26 @@ impl Search {
             }
             let hopeless = round.hopeless();
             (round, ports) =
-                setting.round(&problem, &self.last, all, least, &hopeless, progress)?;
+                setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         }
-        let rival = self.rival(&round, &ports, &forward.section);
-        if let Some(best) = sure(&round, rival.as_ref(), setting.subject, least) {
+        let competitor = self.competing_unknown(&round, &ports, &forward.section);
+        if let Some(best) =
+            accepted_candidate(&round, competitor.as_ref(), setting.prepared, threshold)
+        {
             progress(Stage::HeldOut, 0.0);
-            round.held_out_gain = self.try_out(best, &round.fitted, setting, densities)?;
+            round.held_out_gain =
+                self.accept_if_predictive(best, &round.fitted, setting, densities)?;
             round.accepted = self.accepted.len() > accepted.len();
             if round.accepted {
-                round.port = rival;
+                round.port = competitor;
             }
         }
-        let goes_on = round.accepted;
-        if !goes_on {
-            round.left = self.left(&ports, &forward.section);
+        let found_another = round.accepted;
+        if !found_another {
+            round.unknown_residual = self.unknown_residual(&ports, &forward.section);
         }
         self.rounds.push(round);
-        Ok(goes_on)
+        Ok(found_another)
     }
 
     /// What one effect more gains in log density at each speed when it is held out; the best candidate is
@@ -287,7 +292,7 @@ impl Search {
     ///
     /// Which candidate predicts a speed is decided without that speed, among those that come near the
     /// best: the gain tests the choice of kind and place as well as the values.
-    fn try_out(
+    fn accept_if_predictive(
         &mut self,
         best: &Fitted,
         fitted: &[Fitted],
@@ -297,7 +302,7 @@ impl Search {
         let with = |fitted: &Fitted| {
             [&self.accepted[..], std::slice::from_ref(&fitted.candidate)].concat()
         };
-        let comes_near = |rival: &&Fitted| rival.log_evidence >= NESTED_SHARE * best.log_evidence;
+        let comes_near = |other: &&Fitted| other.log_evidence >= NESTED_SHARE * best.log_evidence;
         let scores = fitted
             .iter()
             .filter(comes_near)
@@ -324,25 +329,31 @@ impl Search {
     }
 
     /// Asks every speed alone for what has no name.
-    fn hear(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
+    fn test_each_speed(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
         let Some(first) = self.rounds.first_mut().filter(|first| !first.accepted) else {
             return Ok(());
         };
         if let Some(port) = first.port.as_ref().filter(|_| first.is_significant()) {
             let alone = setting.unknown_alone(&port.place, &self.baseline.values)?;
-            first.port_strays = !stays(port.log_evidence, &alone);
+            first.port_differs_between_speeds =
+                !is_consistent_across_speeds(port.log_evidence, &alone);
         }
         Ok(())
     }
 
     /// The unknown that the best candidate of a search is compared with. Beside what is accepted it is
     /// the best where the candidate is felt: elsewhere it is another effect, not another name.
-    fn rival(&self, round: &Round, ports: &PortScan, section: &Section) -> Option<Port> {
+    fn competing_unknown(
+        &self,
+        round: &Round,
+        ports: &PortScan,
+        section: &Section,
+    ) -> Option<UnknownElement> {
         let Some(best) = round.fitted.first().filter(|_| !self.accepted.is_empty()) else {
             return round.port.clone();
         };
-        let felt = Extent::of(&best.candidate, section).felt();
-        let is_felt = |place: &PortPlace| felt.meets(Extent::of_port(place, section));
-        ports.best_where(&self.last.residual, &self.last.gradient, is_felt)
+        let reach = Extent::of(&best.candidate, section).with_reach();
+        let is_within_reach = |place: &PortPlace| reach.meets(Extent::of_port(place, section));
+        ports.best_where(&self.last.residual, &self.last.gradient, is_within_reach)
     }
 }

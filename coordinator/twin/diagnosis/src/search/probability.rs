@@ -1,13 +1,13 @@
 //! How probable each explanation of a search is: evidence, tempered, times prior.
 
 use super::{Fitted, Round};
-use crate::port_scan::Port;
+use crate::port_scan::UnknownElement;
 use crate::screen::STRENGTHS;
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{EffectFamily, Kind};
 
 /// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
-pub(super) const TEMPERATURE: f64 = 3.0;
+pub(super) const EVIDENCE_TEMPERING: f64 = 3.0;
 
 /// By how much more it is tempered for each nat of the greatest evidence: what is not exact in the
 /// model of an effect grows with the effect.
@@ -50,7 +50,7 @@ impl Round {
     }
 
     /// The same with this as the unknown.
-    pub(super) fn against(&self, unknown: Option<&Port>) -> Probabilities {
+    pub(super) fn against(&self, unknown: Option<&UnknownElement>) -> Probabilities {
         let of_fitted = |fitted: &Fitted| (fitted.log_evidence, fitted.candidate.kind.family);
         let named: Vec<_> = self.fitted.iter().map(of_fitted).collect();
         let is_linear = self.fitted.first().is_some_and(|best| best.candidate.is_linear());
@@ -67,8 +67,10 @@ pub(super) fn unseen(trials: impl Iterator<Item = (&'static str, [f64; STRENGTHS
     let mut kinds: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
     for (kind, evidences) in trials {
         let (sum, count) = kinds.entry(kind).or_default();
-        *sum +=
-            evidences.map(|evidence| (evidence.min(0.0) / TEMPERATURE).exp()).iter().sum::<f64>();
+        *sum += evidences
+            .map(|evidence| (evidence.min(0.0) / EVIDENCE_TEMPERING).exp())
+            .iter()
+            .sum::<f64>();
         *count += evidences.len() as f64;
     }
     kinds.values().map(|(sum, count)| sum / count).sum::<f64>() / kinds.len().max(1) as f64
@@ -87,13 +89,13 @@ fn of(
 ) -> Probabilities {
     let prior = (1.0 - NOTHING_PRIOR) / Kind::all().count() as f64;
     let best = named.iter().map(|(evidence, _)| *evidence).fold(f64::NEG_INFINITY, f64::max);
-    let temperature = TEMPERATURE + INEXACT_SHARE * best.max(0.0);
+    let temperature = EVIDENCE_TEMPERING + INEXACT_SHARE * best.max(0.0);
     let logarithms: Vec<f64> = named
         .iter()
         .map(|&(evidence, family)| {
             let members = || named.iter().filter(move |(_, other)| *other == family);
             let most = members().map(|(evidence, _)| *evidence).fold(f64::NEG_INFINITY, f64::max);
-            let apart = TEMPERATURE + MEMBER_SHARE * most.max(0.0);
+            let apart = EVIDENCE_TEMPERING + MEMBER_SHARE * most.max(0.0);
             let share = |evidence: f64| ((evidence - most) / apart).exp();
             let all: f64 = members().map(|(evidence, _)| share(*evidence)).sum();
             prior.ln() + most / temperature + (share(evidence) / all).max(f64::MIN_POSITIVE).ln()

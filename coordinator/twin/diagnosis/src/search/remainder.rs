@@ -1,11 +1,11 @@
 //! Names that leave too much unexplained at their own place are taken back.
 
 use super::extent::Extent;
-use super::least::is_local_shape;
 use super::limits::FALSE_ALARM;
+use super::threshold::is_local_shape;
 use super::{Round, Search};
 use crate::candidate::Candidate;
-use crate::port_scan::{Port, PortPlace, PortScan};
+use crate::port_scan::{PortPlace, PortScan, UnknownElement};
 use crate::section::Section;
 
 /// Share of the evidence for a name from which something unknown that is left at its place speaks
@@ -18,16 +18,18 @@ const LEFT_UNDER_LOAD: f64 = 1.0 / 3.0;
 
 impl Search {
     /// Takes the last names back as long as what is left at their place speaks against them.
-    pub(super) fn take_back(&mut self, section: &Section) {
+    pub(super) fn retract_names(&mut self, section: &Section) {
         let Some(last) = self.rounds.last().filter(|last| !last.accepted) else { return };
-        let Some(port) = last.left.as_ref().filter(|_| last.port_p_value <= FALSE_ALARM) else {
+        let Some(port) =
+            last.unknown_residual.as_ref().filter(|_| last.port_p_value <= FALSE_ALARM)
+        else {
             return;
         };
         let place = Extent::of_port(&port.place, section);
         let mut left = port.log_evidence;
         while let Some(number) = self.accepted.len().checked_sub(1) {
-            let least = least_left(&self.explained(section, place));
-            if least.is_none_or(|least| left < least) {
+            let threshold = retraction_threshold(&self.explained(section, place));
+            if threshold.is_none_or(|threshold| left < threshold) {
                 return;
             }
             let round = &mut self.rounds[number];
@@ -44,7 +46,11 @@ impl Search {
     }
 
     /// What something unknown at the last name's place explains beside all names.
-    pub(super) fn left(&self, ports: &PortScan, section: &Section) -> Option<Port> {
+    pub(super) fn unknown_residual(
+        &self,
+        ports: &PortScan,
+        section: &Section,
+    ) -> Option<UnknownElement> {
         let there = Extent::of(self.accepted.last()?, section);
         let is_there = |place: &PortPlace| Extent::of_port(place, section).is_about(there);
         ports.best_where(&self.last.residual, &self.last.gradient, is_there)
@@ -63,7 +69,7 @@ impl Search {
 /// Least evidence in nats for something unknown that speaks against the first of these names, which
 /// are at its place: what others of its kind explain beside it counts as well. None speaks against a
 /// shape, whose phase to the surface the model does not know.
-fn least_left(explained: &[(&Candidate, f64)]) -> Option<f64> {
+fn retraction_threshold(explained: &[(&Candidate, f64)]) -> Option<f64> {
     let &(last, _) = explained.first()?;
     let is_kind = |(known, _): &&(&Candidate, f64)| known.kind.physics == last.kind.physics;
     let evidence: f64 = explained.iter().take_while(is_kind).map(|(_, evidence)| evidence).sum();
@@ -84,11 +90,11 @@ mod tests {
             all.iter().find(is_it).unwrap()
         };
         let (gap, pad, dip) = (of("hanging_sleeper"), of("missing_railpad"), of("rail_joint"));
-        assert_eq!(least_left(&[(gap, 300.0)]), Some(100.0));
-        assert_eq!(least_left(&[(gap, 60.0), (gap, 300.0), (pad, 900.0)]), Some(120.0));
-        assert_eq!(least_left(&[(pad, 300.0)]), Some(30.0));
-        assert_eq!(least_left(&[(of("sensor_mount_resonance"), 900.0)]), Some(90.0));
-        assert_eq!(least_left(&[(dip, 300.0)]), None);
-        assert_eq!(least_left(&[]), None);
+        assert_eq!(retraction_threshold(&[(gap, 300.0)]), Some(100.0));
+        assert_eq!(retraction_threshold(&[(gap, 60.0), (gap, 300.0), (pad, 900.0)]), Some(120.0));
+        assert_eq!(retraction_threshold(&[(pad, 300.0)]), Some(30.0));
+        assert_eq!(retraction_threshold(&[(of("sensor_mount_resonance"), 900.0)]), Some(90.0));
+        assert_eq!(retraction_threshold(&[(dip, 300.0)]), None);
+        assert_eq!(retraction_threshold(&[]), None);
     }
 }

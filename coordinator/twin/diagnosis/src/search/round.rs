@@ -2,11 +2,11 @@
 
 use super::chance::{excess, tail_probability, whitened};
 use super::fit::fit;
-use super::imitated::Imitated;
-use super::least::{Least, is_local_shape};
 use super::limits::REFINED_PER_KIND;
+use super::outlier_starts::OutlierStarts;
 use super::probability::{Probabilities, unseen};
 use super::runs::runs;
+use super::threshold::{EvidenceThreshold, is_local_shape};
 use super::{Fitted, Round, Stage};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
@@ -14,9 +14,9 @@ use crate::held_out::Score;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
 use crate::patch_scan::{Fixed, Patch, PatchScan};
-use crate::port_scan::{Port, PortPlace, PortScan};
+use crate::port_scan::{PortPlace, PortScan, UnknownElement};
+use crate::prepared_recording::PreparedRecording;
 use crate::screen::{Template, templates};
-use crate::subject::Subject;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -39,7 +39,7 @@ const HELD_OUT_MIN: f64 = 4.0;
 
 /// What stays the same through all searches.
 pub(super) struct Setting<'a> {
-    pub(super) subject: &'a Subject,
+    pub(super) prepared: &'a PreparedRecording,
     pub(super) log_power: DVector<f64>,
     pub(super) covariance: DMatrix<f64>,
     /// Differences of null simulations, less their offset.
@@ -47,15 +47,16 @@ pub(super) struct Setting<'a> {
 }
 
 impl<'a> Setting<'a> {
-    pub(super) fn new(subject: &'a Subject, null: &NullModel) -> Self {
-        let offset = null.offset_of(subject.forward.section.sleepers);
+    pub(super) fn new(prepared: &'a PreparedRecording, null: &NullModel) -> Self {
+        let offset = null.offset_of(prepared.forward.section.sleepers);
         let nulls = null
             .differences
             .iter()
             .map(|difference| DVector::from_column_slice(difference) - &offset)
             .collect();
-        let (log_power, covariance) = (subject.expected_log_power(null), subject.covariance(null));
-        Self { subject, log_power, covariance, nulls }
+        let (log_power, covariance) =
+            (prepared.expected_log_power(null), prepared.covariance(null));
+        Self { prepared, log_power, covariance, nulls }
     }
 
     pub(super) fn observe(
@@ -72,7 +73,7 @@ impl<'a> Setting<'a> {
         candidates: &[Candidate],
         start: &DVector<f64>,
     ) -> Result<Vec<Score>, CalibrationError> {
-        let forward = &self.subject.forward;
+        let forward = &self.prepared.forward;
         let speeds = forward.speeds_m_s.len();
         if speeds < 2 {
             return Ok(Vec::new());
@@ -95,7 +96,7 @@ impl<'a> Setting<'a> {
         values: &DVector<f64>,
     ) -> Result<Vec<f64>, CalibrationError> {
         self.at_each_speed(|observation| {
-            let forward = &self.subject.forward;
+            let forward = &self.prepared.forward;
             let problem = Problem { forward, observation, candidates: &[] };
             let current = problem.at(values)?;
             let port =
@@ -115,11 +116,14 @@ impl<'a> Setting<'a> {
         let scan = PatchScan::new(problem, current);
         let patch = scan.best(&current.residual, &current.gradient, &is_one)?;
         let nulls = whitened(&self.nulls, problem.observation, current);
-        let excess = excess(current, &nulls, self.subject.forward.section.sleepers);
-        let p_value =
-            tail_probability(&nulls, patch.deviations / excess.sqrt(), |residual, felt| {
-                scan.best(residual, felt, &is_one).map(|patch| patch.deviations)
-            });
+        let excess = excess(current, &nulls, self.prepared.forward.section.sleepers);
+        let p_value = tail_probability(
+            &nulls,
+            patch.deviations / excess.sqrt(),
+            |residual, projected_gradient| {
+                scan.best(residual, projected_gradient, &is_one).map(|patch| patch.deviations)
+            },
+        );
         (patch.height.abs() >= VISIBLE).then_some((patch, floored(p_value)))
     }
 
@@ -128,7 +132,7 @@ impl<'a> Setting<'a> {
         &self,
         of: impl Fn(&Observation) -> Result<T, CalibrationError> + Sync,
     ) -> Result<Vec<T>, CalibrationError> {
-        let forward = &self.subject.forward;
+        let forward = &self.prepared.forward;
         (0..forward.speeds_m_s.len())
             .into_par_iter()
             .map(|speed| of(&self.observe(|row| row / forward.bands.count() != speed)?))
@@ -142,7 +146,7 @@ impl<'a> Setting<'a> {
         problem: &Problem<'_>,
         current: &Calibration,
         all: &[Candidate],
-        least: Least<'_>,
+        threshold: EvidenceThreshold<'_>,
         hopeless: &[&str],
         progress: &(impl Fn(Stage, f64) + Sync),
     ) -> Result<(Round, PortScan), CalibrationError> {
@@ -169,9 +173,10 @@ impl<'a> Setting<'a> {
             (kind, template.at_strengths(&current.residual, &current.gradient))
         }));
         if round.is_significant() {
-            let imitated = Imitated::new(problem, current, all)?;
-            let mut starts = starts(problem, current, all, &templates, screened, least, hopeless);
-            starts.extend(imitated.starts());
+            let outlier_starts = OutlierStarts::new(problem, current, all)?;
+            let mut starts =
+                starts(problem, current, all, &templates, screened, threshold, hopeless);
+            starts.extend(outlier_starts.starts());
             round.fitted = fit(problem, current, all, starts, progress);
         }
         Ok((round, ports))
@@ -187,15 +192,16 @@ impl<'a> Setting<'a> {
     ) -> Round {
         let highest = screened.iter().map(|(evidence, _)| *evidence).fold(f64::MIN, f64::max);
         let nulls = whitened(&self.nulls, problem.observation, current);
-        let excess = excess(current, &nulls, self.subject.forward.section.sleepers);
-        let p_value = tail_probability(&nulls, highest / excess, |residual, felt| {
-            let evidence = screened.iter().map(|(_, t)| t.log_evidence(residual, felt));
+        let excess = excess(current, &nulls, self.prepared.forward.section.sleepers);
+        let p_value = tail_probability(&nulls, highest / excess, |residual, projected_gradient| {
+            let evidence =
+                screened.iter().map(|(_, t)| t.log_evidence(residual, projected_gradient));
             Some(evidence.fold(f64::MIN, f64::max))
         });
         let port = ports.best(&current.residual, &current.gradient);
         let port_p_value = port.as_ref().map_or(1.0, |port| {
-            tail_probability(&nulls, port.log_evidence / excess, |residual, felt| {
-                ports.best(residual, felt).map(|port| port.log_evidence)
+            tail_probability(&nulls, port.log_evidence / excess, |residual, projected_gradient| {
+                ports.best(residual, projected_gradient).map(|port| port.log_evidence)
             })
         });
         // The better of two tests.
@@ -214,32 +220,34 @@ pub(super) fn is_predicted(gains: &[f64]) -> bool {
 /// Whether something unknown with so much evidence at all speeds together is where it is at all of
 /// them: two speeds hear it, each `alone`, or all together hear it better than any of them. Nothing
 /// speaks against one speed.
-pub(super) fn stays(together: f64, alone: &[f64]) -> bool {
-    let hear = alone.iter().filter(|evidence| **evidence > 0.0).count();
-    alone.len() < 2 || hear >= 2 || alone.iter().all(|evidence| *evidence < together)
+pub(super) fn is_consistent_across_speeds(together: f64, alone: &[f64]) -> bool {
+    let detecting = alone.iter().filter(|evidence| **evidence > 0.0).count();
+    alone.len() < 2 || detecting >= 2 || alone.iter().all(|evidence| *evidence < together)
 }
 
 /// The best candidate, if its unknown rival does not speak against it and it is sure enough beside
 /// earlier effects.
-pub(super) fn sure<'r>(
+pub(super) fn accepted_candidate<'r>(
     round: &'r Round,
-    rival: Option<&Port>,
-    subject: &Subject,
-    least: Least<'_>,
+    competitor: Option<&UnknownElement>,
+    prepared: &PreparedRecording,
+    threshold: EvidenceThreshold<'_>,
 ) -> Option<&'r Fitted> {
-    let Probabilities { family, unknown, .. } = round.against(rival);
+    let Probabilities { family, unknown, .. } = round.against(competitor);
     let best = round.fitted.first()?;
-    let is_shape =
-        || rival.is_some_and(|rival| is_shape_at(&rival.place, &best.candidate, subject));
+    let is_shape = || {
+        competitor
+            .is_some_and(|competitor| is_shape_at(&competitor.place, &best.candidate, prepared))
+    };
     let leads = family > unknown || is_shape();
-    (leads && best.log_evidence >= least.of(&best.candidate)).then_some(best)
+    (leads && best.log_evidence >= threshold.of(&best.candidate)).then_some(best)
 }
 
 /// Whether a candidate is a shape of the rail that the passes alone show as well, where the unknown
 /// is: the force of a shape adds to the surface's with a phase that mean powers leave out, so that an
 /// unknown fits better beside it.
-fn is_shape_at(port: &PortPlace, candidate: &Candidate, subject: &Subject) -> bool {
-    let section = &subject.forward.section;
+fn is_shape_at(port: &PortPlace, candidate: &Candidate, prepared: &PreparedRecording) -> bool {
+    let section = &prepared.forward.section;
     let is_shape = is_local_shape(candidate);
     let seats = match port {
         PortPlace::Seats(seats) => &seats[..],
@@ -250,12 +258,12 @@ fn is_shape_at(port: &PortPlace, candidate: &Candidate, subject: &Subject) -> bo
     let spacing_m = section.design.sleeper.spacing_m;
     let [first, last] = [seats[0], seats[seats.len() - 1]];
     let seats_m = [section.x_m(first) - spacing_m, section.x_m(last) + spacing_m];
-    let is_heard = |heard_m: &[f64; 2]| section.are_beside([from_m, to_m], *heard_m);
+    let is_detected = |shape_m: &[f64; 2]| section.are_beside([from_m, to_m], *shape_m);
     is_shape
         && seats.len() <= 2
         && seats_m[0] <= from_m
         && to_m <= seats_m[1]
-        && subject.heard_m.iter().any(is_heard)
+        && prepared.detected_shapes_m.iter().any(is_detected)
 }
 
 /// The best trials: of each candidate one, of each kind a few; then of each kind without any the
@@ -278,8 +286,10 @@ fn choose<'t>(
     let mut along: Vec<(f64, &Template)> =
         screened.iter().map(|(_, template)| (template.along(residual), *template)).collect();
     along.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let least = along.first().map_or(f64::INFINITY, |(most, _)| ALONG_SHARE_MIN * most);
-    for (_, template) in along.into_iter().take_while(|(gain, _)| *gain > least.max(SCREENED_MIN)) {
+    let threshold = along.first().map_or(f64::INFINITY, |(most, _)| ALONG_SHARE_MIN * most);
+    for (_, template) in
+        along.into_iter().take_while(|(gain, _)| *gain > threshold.max(SCREENED_MIN))
+    {
         if chosen.iter().all(|known| kind(known) != kind(template)) && chosen.len() < REFINED_MAX {
             chosen.push(template);
         }
@@ -294,12 +304,12 @@ fn starts<'t>(
     all: &[Candidate],
     templates: &'t [Template],
     screened: Vec<(f64, &'t Template)>,
-    least: Least<'_>,
+    threshold: EvidenceThreshold<'_>,
     hopeless: &[&str],
 ) -> Vec<(&'t Template, DVector<f64>)> {
     let mut chosen = choose(screened, all, &current.residual);
     chosen.retain(|template| {
-        least.may_be_reached(&all[template.candidate], template.along(&current.residual))
+        threshold.may_be_reached(&all[template.candidate], template.along(&current.residual))
     });
     let mut starts: Vec<(&Template, DVector<f64>)> =
         chosen.into_iter().map(|template| (template, current.values.clone())).collect();

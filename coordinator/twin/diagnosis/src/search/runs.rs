@@ -101,8 +101,9 @@ impl Singles<'_> {
 
 /// Nats that a trace of free size gains in the residual, as [`Template::along`].
 fn gain(change: &DVector<f64>, current: &Calibration) -> f64 {
-    let felt = current.jacobian.tr_mul(change);
-    let square = change.norm_squared() - felt.dot(&current.precision.solve(&felt));
+    let projected_gradient = current.jacobian.tr_mul(change);
+    let square = change.norm_squared()
+        - projected_gradient.dot(&current.precision.solve(&projected_gradient));
     let along = change.dot(&current.residual).max(0.0);
     0.5 * along.powi(2) / square.max(f64::MIN_POSITIVE)
 }

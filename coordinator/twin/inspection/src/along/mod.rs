@@ -12,9 +12,10 @@ pub(crate) mod testing;
 
 pub use background::median;
 pub(crate) use background::{Background, hann, whitened};
-pub use energy::tells_waves;
+pub use energy::separates_wavelengths;
 pub(crate) use energy::{Energy, by_speed, speed_m_s};
 pub(crate) use line::{Line, Ruler, Spectrum, amplitude, on_even_places};
 pub(crate) use tail::{
-    combined, ln_binomial_tail, ln_gamma_tail, ln_normal_bound, ln_student_tail, of_best,
+    bonferroni, combine_dependent_p_values, ln_binomial_tail, ln_gamma_tail, ln_normal_bound,
+    ln_student_tail,
 };

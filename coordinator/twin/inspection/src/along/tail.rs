@@ -109,7 +109,7 @@ pub(crate) fn ln_normal_bound(z: f64) -> f64 {
 ///
 /// `e` times the geometric mean. Source: Vovk & Wang 2020, *Combining p-values via averaging*,
 /// Biometrika 107, proposition 4.
-pub(crate) fn combined(ln_probabilities: &[f64]) -> f64 {
+pub(crate) fn combine_dependent_p_values(ln_probabilities: &[f64]) -> f64 {
     if ln_probabilities.len() == 1 {
         return ln_probabilities[0];
     }
@@ -118,7 +118,7 @@ pub(crate) fn combined(ln_probabilities: &[f64]) -> f64 {
 }
 
 /// The probability that the best of `tries` is as good as that, in logarithms (Bonferroni).
-pub(crate) fn of_best(ln_probability: f64, tries: usize) -> f64 {
+pub(crate) fn bonferroni(ln_probability: f64, tries: usize) -> f64 {
     (ln_probability + (tries as f64).ln()).min(0.0)
 }
 
@@ -174,8 +174,8 @@ mod tests {
     #[test]
     fn combining_equal_probabilities_costs_a_factor_of_e() {
         let p: f64 = 1e-4;
-        assert!((combined(&[p.ln(), p.ln()]) - (p.ln() + 1.0)).abs() < 1e-12);
-        assert_eq!(combined(&[p.ln()]), p.ln());
-        assert!((of_best(p.ln(), 10).exp() - 1e-3).abs() < 1e-15);
+        assert!((combine_dependent_p_values(&[p.ln(), p.ln()]) - (p.ln() + 1.0)).abs() < 1e-12);
+        assert_eq!(combine_dependent_p_values(&[p.ln()]), p.ln());
+        assert!((bonferroni(p.ln(), 10).exp() - 1e-3).abs() < 1e-15);
     }
 }

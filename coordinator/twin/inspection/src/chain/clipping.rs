@@ -2,8 +2,8 @@
 
 use super::contact::{airborne, is_at_flight_level};
 use super::plateau::Plateaus;
-use super::still::Still;
-use crate::along::{ln_binomial_tail, of_best};
+use super::standstill::Standstill;
+use crate::along::{bonferroni, ln_binomial_tail};
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Thickness of the layer below the greatest value, as a share of it.
@@ -48,7 +48,7 @@ pub fn clipping(recording: &Recording, alpha: f64) -> Vec<Clipping> {
     });
     // Two sides, three tests.
     let tries = 6 * recording.passes.len();
-    let cut = sides.map(|side| Clipping { ln_p: of_best(side.ln_p, tries), ..side });
+    let cut = sides.map(|side| Clipping { ln_p: bonferroni(side.ln_p, tries), ..side });
     let mut all: Vec<Clipping> = cut.filter(|side| side.ln_p <= alpha.ln()).collect();
     // One entry a pass: the side that is cut more surely.
     all.sort_by(|a, b| a.pass.cmp(&b.pass).then(a.ln_p.total_cmp(&b.ln_p)));
@@ -97,6 +97,6 @@ fn ln_flat(values: &[f64], greatest: f64) -> f64 {
 
 /// `ln P` of an even crest as long as the longest at the greatest value; certain without one.
 fn ln_even(samples: &[f64], sign: f64) -> f64 {
-    let still = Still::longest(samples);
-    if still.is_at_limit(samples, sign) { still.ln_p.min(0.0) } else { 0.0 }
+    let standstill = Standstill::longest(samples);
+    if standstill.is_at_limit(samples, sign) { standstill.ln_p.min(0.0) } else { 0.0 }
 }

@@ -5,7 +5,7 @@
 //! that reach further the other way.
 
 use super::plateau::Plateaus;
-use super::still::Still;
+use super::standstill::Standstill;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -226,8 +226,8 @@ fn known(samples: &[f64], level: f64, sign: f64) -> Option<Plateaus> {
 fn by_shape(pass: &Pass, expected: Option<f64>, least: f64) -> Option<Plateaus> {
     let samples = pass.signal.samples();
     let found = Plateaus::at_top(samples)?;
-    let still = Still::longest(samples);
-    let is_even = still.is_at_limit(samples, 1.0) && still.ln_p < EVEN_LN_P;
+    let standstill = Standstill::longest(samples);
+    let is_even = standstill.is_at_limit(samples, 1.0) && standstill.ln_p < EVEN_LN_P;
     let may_be = |level: f64| (1.0 / OFF_MAX..=OFF_MAX).contains(&(found.level / level));
     let is_flight = (found.crests.len() >= CRESTS_MIN || is_even)
         && expected.is_none_or(may_be)

@@ -3,7 +3,7 @@
 use super::*;
 use crate::along::testing::noise;
 use crate::finding::Place;
-use crate::first_look::first_look;
+use crate::inspect::inspect;
 use serde_json::json;
 use std::sync::LazyLock;
 use tracktwin_parameters::{ParameterSet, TrackDesign};
@@ -109,8 +109,8 @@ fn assert_found(recording: &Recording) {
         assert!((share - truth).abs() < 0.25 * truth + 4e-3, "pass {index}: {share}, not {truth}");
     }
     assert!(clipping(recording, ALPHA).is_empty(), "{:?}", clipping(recording, ALPHA));
-    let troubles = troubles(recording, &offsets(recording));
-    assert!(troubles.is_empty(), "{troubles:?}");
+    let pass_defects = pass_defects(recording, &offsets(recording));
+    assert!(pass_defects.is_empty(), "{pass_defects:?}");
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn a_wheel_in_the_air_is_found_at_every_speed_and_is_no_clipped_recorder() {
 
 #[test]
 fn a_landing_is_no_finding_of_its_own() {
-    let places: Vec<Place> = first_look(&DEEP).findings.into_iter().map(|it| it.place).collect();
+    let places: Vec<Place> = inspect(&DEEP).findings.into_iter().map(|it| it.place).collect();
     let [Place::Stretch { from_m, to_m }] = places[..] else { panic!("{places:?}") };
     assert!(from_m < JOINT_M + 0.01 && to_m > JOINT_M - 0.01, "{places:?}");
 }
@@ -217,6 +217,6 @@ fn a_wheel_that_is_hardly_on_the_rail_leaves_nothing_to_use() {
     let sample = |index| if index % 120 < 96 { FLIGHT_M_S2 } else { -4.0 * FLIGHT_M_S2 };
     let samples = (0..pass.signal.len()).map(sample).collect();
     pass.signal = Signal::new(1.0 / TIME_STEP_S, samples).unwrap();
-    let troubles = troubles(&recording, &[]);
-    assert!(matches!(troubles[..], [Trouble::Airborne { pass: 1, .. }]), "{troubles:?}");
+    let pass_defects = pass_defects(&recording, &[]);
+    assert!(matches!(pass_defects[..], [PassDefect::Airborne { pass: 1, .. }]), "{pass_defects:?}");
 }

@@ -1,6 +1,6 @@
 //! Passes at one speed that differ by a constant factor.
 
-use crate::along::{Background, Energy, by_speed, ln_student_tail, median, of_best, whitened};
+use crate::along::{Background, Energy, bonferroni, by_speed, ln_student_tail, median, whitened};
 use tracktwin_signal::recording::{Pass, Recording};
 
 /// Bands in Hz whose power is compared; a gain is the same in all.
@@ -43,7 +43,7 @@ pub fn gains(recording: &Recording) -> Vec<Gain> {
     let tries = recording.passes.len();
     let mut gains: Vec<Gain> = groups.iter().flat_map(|group| of_speed(recording, group)).collect();
     for gain in &mut gains {
-        gain.ln_p = of_best(gain.ln_p, tries);
+        gain.ln_p = bonferroni(gain.ln_p, tries);
     }
     gains.sort_by_key(|gain| gain.pass);
     gains

@@ -1,6 +1,6 @@
 //! Lines of the mains: at a fixed frequency whatever the speed, narrower than any structure.
 
-use crate::along::{Line, Spectrum, by_speed, ln_gamma_tail, of_best, speed_m_s};
+use crate::along::{Line, Spectrum, bonferroni, by_speed, ln_gamma_tail, speed_m_s};
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
 
@@ -14,7 +14,7 @@ const DRIFT_HZ: f64 = 0.1;
 /// Probability of one speed's line without hum above which it isn't heard at that speed.
 const EACH_SPEED: f64 = 0.05;
 /// Speeds that must hear it, if there are so many; at others it may be drowned.
-const HEARD_MIN: usize = 2;
+const SPEEDS_MIN: usize = 2;
 /// Greatest ratio of a line's amplitudes at two speeds: the mains do not know the train's.
 const APART_MAX: f64 = 2.0;
 /// Segments from which their mean follows a gamma distribution well enough.
@@ -46,10 +46,11 @@ pub struct Hum {
 /// blows have lines of their own.
 pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
     let lengths_m: Vec<f64> = turn_m.into_iter().chain([recording.spacing_m]).collect();
-    let heard = |group: Vec<usize>| {
-        group.into_iter().map(|index| Heard::of(&recording.passes[index])).collect()
+    let spectra_of = |group: Vec<usize>| {
+        group.into_iter().map(|index| PassSpectra::of(&recording.passes[index])).collect()
     };
-    let speeds: Vec<Vec<Heard>> = by_speed(&recording.passes).into_iter().map(heard).collect();
+    let speeds: Vec<Vec<PassSpectra>> =
+        by_speed(&recording.passes).into_iter().map(spectra_of).collect();
     let mut found = Vec::new();
     let mut tries = 0;
     for (mains, harmonics) in MAINS_HZ {
@@ -60,7 +61,7 @@ pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
         }
     }
     for line in &mut found {
-        line.ln_p = of_best(line.ln_p, tries);
+        line.ln_p = bonferroni(line.ln_p, tries);
     }
     found.retain(|line: &Hum| line.ln_p <= alpha.ln());
     found.sort_by(|a, b| a.ln_p.total_cmp(&b.ln_p));
@@ -68,7 +69,7 @@ pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
 }
 
 /// The line nearest to a mains frequency, and how many bins were looked at.
-fn line(speeds: &[Vec<Heard>], lengths_m: &[f64], frequency: f64) -> (Option<Hum>, usize) {
+fn line(speeds: &[Vec<PassSpectra>], lengths_m: &[f64], frequency: f64) -> (Option<Hum>, usize) {
     let mut tries = 0;
     let (mut each, mut ratios) = (Vec::new(), Vec::new());
     let (mut amplitudes, mut by_speed) = (Vec::new(), Vec::new());
@@ -87,8 +88,8 @@ fn line(speeds: &[Vec<Heard>], lengths_m: &[f64], frequency: f64) -> (Option<Hum
             by_speed.push(mean(|line| line.amplitude));
         }
     }
-    let heard = each.iter().filter(|ln_p| **ln_p <= EACH_SPEED.ln()).count();
-    if each.is_empty() || heard < HEARD_MIN.min(each.len()) || !are_alike(&by_speed) {
+    let detected = each.iter().filter(|ln_p| **ln_p <= EACH_SPEED.ln()).count();
+    if each.is_empty() || detected < SPEEDS_MIN.min(each.len()) || !are_alike(&by_speed) {
         return (None, tries);
     }
     let count = amplitudes.len() as f64;
@@ -118,7 +119,7 @@ fn are_alike(amplitudes: &[f64]) -> bool {
 }
 
 /// The spectra of a pass's segments.
-struct Heard {
+struct PassSpectra {
     spectra: Vec<Spectrum>,
     duration_s: f64,
     speed_m_s: f64,
@@ -133,7 +134,7 @@ struct Tone {
     tries: usize,
 }
 
-impl Heard {
+impl PassSpectra {
     fn of(pass: &Pass) -> Self {
         let (samples, rate_hz) = (pass.signal.samples(), pass.signal.sample_rate_hz());
         let segments = ((pass.signal.duration_s() / SEGMENT_S) as usize).max(1);

@@ -9,11 +9,11 @@ mod contact;
 mod gain;
 mod hum;
 mod offset;
+mod pass_defect;
 mod plateau;
 mod scale;
-mod still;
-mod stranger;
-mod trouble;
+mod speed_coherence;
+mod standstill;
 mod usable;
 
 pub use clipping::{Clipping, clipping};
@@ -22,8 +22,8 @@ pub use contact::{LossOfContact, PassLoss, loss_of_contact};
 pub use gain::{Gain, gains};
 pub use hum::{Hum, hum};
 pub use offset::{Offset, Offsets, offsets};
+pub use pass_defect::{PassDefect, pass_defects};
 pub use scale::{Scale, scale};
-pub use trouble::{Trouble, troubles};
 pub use usable::usable;
 
 use crate::along::Background;

@@ -1,7 +1,7 @@
 //! Where one pass's odometer stands against another's, by the surface that both ran over.
 
 use crate::along::{
-    Background, Ruler, by_speed, ln_normal_bound, median, of_best, on_even_places, speed_m_s,
+    Background, Ruler, bonferroni, by_speed, ln_normal_bound, median, on_even_places, speed_m_s,
     whitened,
 };
 use rustfft::num_complex::Complex64;
@@ -129,7 +129,7 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
         // Squares of correlations by chance are exponential, with the mean of one over the freedom:
         // a stretch whose sound is of few frequencies has less than its bandwidth promises.
         let freedom = freedom.min(LN_2 / elsewhere.powi(2));
-        let ln_p = of_best(-freedom * correlation.powi(2), 2 * reach);
+        let ln_p = bonferroni(-freedom * correlation.powi(2), 2 * reach);
         all.stretches += 1;
         correlations.push(correlation);
         if ln_p < MATCHED {

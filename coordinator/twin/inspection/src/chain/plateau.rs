@@ -1,6 +1,6 @@
 //! Crests of a pass that stay at one level: cut off by a recorder, or of a wheel in the air.
 
-use crate::along::{ln_binomial_tail, of_best};
+use crate::along::{bonferroni, ln_binomial_tail};
 use std::ops::Range;
 
 /// Half the thickness of the layer about a level in which a crest counts as staying there, as a share of the
@@ -67,7 +67,7 @@ impl Plateaus {
     /// logarithm.
     pub(super) fn ln_p(&self) -> f64 {
         let of_one = ln_binomial_tail(self.crests.len(), self.reaching, FLAT_BY_CHANCE);
-        of_best(of_one, CELLS)
+        bonferroni(of_one, CELLS)
     }
 
     /// Those at the level where the highest values gather, if they do.

@@ -38,9 +38,9 @@ fn a_limit_that_few_long_crests_reach_is_found_and_is_no_drop_out() {
     });
     let found = clipping(&recording, ALPHA);
     assert_eq!(found.iter().map(|found| found.pass).collect::<Vec<_>>(), [1], "{found:?}");
-    let drop_out = |trouble: &Trouble| matches!(trouble, Trouble::DropOut { .. });
-    let troubles = troubles(&recording, &[]);
-    assert!(!troubles.iter().any(drop_out), "{troubles:?}");
+    let drop_out = |defect: &PassDefect| matches!(defect, PassDefect::DropOut { .. });
+    let pass_defects = pass_defects(&recording, &[]);
+    assert!(!pass_defects.iter().any(drop_out), "{pass_defects:?}");
 }
 
 #[test]
@@ -212,27 +212,27 @@ fn passes_that_share_a_few_tones_are_not_matched_by_chance() {
 fn passes_that_cannot_be_used_are_named_with_the_reason() {
     let broken = |chain: &Chain<'_>| {
         let recording = measured(6, chain);
-        troubles(&recording, &offsets(&recording))
+        pass_defects(&recording, &offsets(&recording))
     };
     assert_eq!(broken(&|_, _, _| ()), []);
-    let still = broken(&|pass, samples, _| {
+    let standstill = broken(&|pass, samples, _| {
         if pass == 0 {
             samples[10_000..10_200].fill(0.25);
         }
     });
-    assert!(matches!(still[..], [Trouble::DropOut { pass: 0, .. }]), "{still:?}");
+    assert!(matches!(standstill[..], [PassDefect::DropOut { pass: 0, .. }]), "{standstill:?}");
     let dead = broken(&|pass, samples, _| {
         if pass == 1 {
             samples.fill(0.0);
         }
     });
-    assert_eq!(dead, [Trouble::Dead { pass: 1 }]);
+    assert_eq!(dead, [PassDefect::Dead { pass: 1 }]);
     let noisy = broken(&|pass, samples, _| {
         if pass == 2 {
             samples.copy_from_slice(&noise(7, samples.len()));
         }
     });
-    assert!(matches!(noisy[..], [Trouble::Unlike { passes: [2, 3], .. }]), "{noisy:?}");
+    assert!(matches!(noisy[..], [PassDefect::UnrelatedPasses { passes: [2, 3], .. }]), "{noisy:?}");
     let full = broken(&|pass, samples, _| {
         if pass == 3 {
             for sample in samples {
@@ -240,14 +240,14 @@ fn passes_that_cannot_be_used_are_named_with_the_reason() {
             }
         }
     });
-    assert!(matches!(full[..], [Trouble::Saturated { pass: 3, .. }]), "{full:?}");
+    assert!(matches!(full[..], [PassDefect::Saturated { pass: 3, .. }]), "{full:?}");
 }
 
 #[test]
 fn passes_without_the_others_surface_are_named() {
     let mut lone = measured(6, &|_, samples, _| samples.copy_from_slice(&noise(7, samples.len())));
     lone.passes.truncate(1);
-    assert_eq!(troubles(&lone, &offsets(&lone)), [Trouble::Noise { pass: 0 }]);
+    assert_eq!(pass_defects(&lone, &offsets(&lone)), [PassDefect::Noise { pass: 0 }]);
     let elsewhere = measured(7, &|_, _, _| ());
     let other_rail = |pass: usize, samples: &mut [f64]| {
         samples.copy_from_slice(elsewhere.passes[pass].signal.samples());
@@ -258,13 +258,16 @@ fn passes_without_the_others_surface_are_named() {
                 other_rail(pass, samples);
             }
         });
-        troubles(&recording, &offsets(&recording))
+        pass_defects(&recording, &offsets(&recording))
     };
     let unlike = on_other_rail(|pass| pass == 2);
-    assert!(matches!(unlike[..], [Trouble::Unlike { passes: [2, 3], .. }]), "{unlike:?}");
+    assert!(
+        matches!(unlike[..], [PassDefect::UnrelatedPasses { passes: [2, 3], .. }]),
+        "{unlike:?}"
+    );
     let strange = on_other_rail(|pass| pass > 1);
-    let speeds = strange.iter().map(|trouble| match trouble {
-        Trouble::Stranger { speed_km_h, .. } => Some(*speed_km_h),
+    let speeds = strange.iter().map(|defect| match defect {
+        PassDefect::UnrelatedSpeed { speed_km_h, .. } => Some(*speed_km_h),
         _ => None,
     });
     assert_eq!(speeds.collect::<Vec<_>>(), [Some(13.0), Some(8.0)], "{strange:?}");

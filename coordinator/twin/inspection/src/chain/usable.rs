@@ -1,22 +1,22 @@
 //! The passes of a recording from which something can be said of the track.
 
 use super::offset::offsets;
-use super::trouble::{Trouble, between_passes, of_passes};
+use super::pass_defect::{PassDefect, between_passes, of_passes};
 use crate::along::by_speed;
 use tracktwin_signal::recording::Recording;
 
 /// A recording without the passes that tell nothing of the track, and what is wrong with those. A
 /// short pass tells what it covers.
-pub fn usable(recording: &Recording) -> (Recording, Vec<Trouble>) {
+pub fn usable(recording: &Recording) -> (Recording, Vec<PassDefect>) {
     let mut own = of_passes(recording);
-    own.retain(|trouble| !matches!(trouble, Trouble::Short { .. }));
+    own.retain(|defect| !matches!(defect, PassDefect::Short { .. }));
     let all: Vec<usize> = (0..recording.passes.len()).collect();
     let sound = without(recording, all, &own);
     // A pass without a signal is no company for the others.
     let rest = only(recording, &sound);
     let mut between = between_passes(&rest, &offsets(&rest));
-    for trouble in &mut between {
-        if let Trouble::Unlike { passes, .. } = trouble {
+    for defect in &mut between {
+        if let PassDefect::UnrelatedPasses { passes, .. } = defect {
             *passes = passes.map(|pass| sound[pass]);
         }
     }
@@ -31,25 +31,29 @@ fn only(recording: &Recording, passes: &[usize]) -> Recording {
 }
 
 /// Those of the passes that no trouble is about.
-fn without(recording: &Recording, mut passes: Vec<usize>, troubles: &[Trouble]) -> Vec<usize> {
-    for trouble in troubles {
-        let named = about(trouble, recording);
+fn without(
+    recording: &Recording,
+    mut passes: Vec<usize>,
+    pass_defects: &[PassDefect],
+) -> Vec<usize> {
+    for defect in pass_defects {
+        let named = about(defect, recording);
         passes.retain(|pass| !named.contains(pass));
     }
     passes
 }
 
 /// Indices of the passes that a trouble is about.
-fn about(trouble: &Trouble, recording: &Recording) -> Vec<usize> {
-    match *trouble {
-        Trouble::DropOut { pass, .. }
-        | Trouble::Dead { pass }
-        | Trouble::Noise { pass }
-        | Trouble::Saturated { pass, .. }
-        | Trouble::Airborne { pass, .. }
-        | Trouble::Short { pass, .. } => vec![pass],
-        Trouble::Unlike { passes, .. } => passes.to_vec(),
-        Trouble::Stranger { speed_km_h, .. } => {
+fn about(defect: &PassDefect, recording: &Recording) -> Vec<usize> {
+    match *defect {
+        PassDefect::DropOut { pass, .. }
+        | PassDefect::Dead { pass }
+        | PassDefect::Noise { pass }
+        | PassDefect::Saturated { pass, .. }
+        | PassDefect::Airborne { pass, .. }
+        | PassDefect::Short { pass, .. } => vec![pass],
+        PassDefect::UnrelatedPasses { passes, .. } => passes.to_vec(),
+        PassDefect::UnrelatedSpeed { speed_km_h, .. } => {
             let at_speed = |passes: &Vec<usize>| {
                 passes
                     .iter()
@@ -67,19 +71,22 @@ mod tests {
 
     #[test]
     fn a_dead_pass_is_left_out_and_the_others_are_no_strangers_for_it() {
-        let still = |pass: usize, samples: &mut [f64], _: &mut [f64]| {
+        let standstill = |pass: usize, samples: &mut [f64], _: &mut [f64]| {
             if pass == 1 {
                 samples.fill(0.0);
             }
         };
-        let mut recording = Rolled { chain: &still, ..Rolled::faultless(6) }.recording();
+        let mut recording = Rolled { chain: &standstill, ..Rolled::faultless(6) }.recording();
         recording.passes.drain(2..3);
-        let (kept, troubles) = usable(&recording);
-        assert_eq!(troubles, [Trouble::Dead { pass: 1 }]);
+        let (kept, pass_defects) = usable(&recording);
+        assert_eq!(pass_defects, [PassDefect::Dead { pass: 1 }]);
         assert_eq!(kept.speeds_km_h(), [8.0, 13.0]);
         recording.passes.remove(0);
-        let (kept, troubles) = usable(&recording);
-        assert_eq!((kept.speeds_km_h(), troubles), (vec![8.0], vec![Trouble::Dead { pass: 0 }]));
+        let (kept, pass_defects) = usable(&recording);
+        assert_eq!(
+            (kept.speeds_km_h(), pass_defects),
+            (vec![8.0], vec![PassDefect::Dead { pass: 0 }])
+        );
     }
 
     #[test]
@@ -88,7 +95,7 @@ mod tests {
         let elsewhere = Rolled::faultless(7).recording().passes.split_off(2);
         assert_eq!(usable(&recording).0.passes.len(), 4);
         recording.passes.splice(2.., elsewhere);
-        let (kept, troubles) = usable(&recording);
-        assert!(kept.passes.is_empty() && troubles.len() == 2, "{troubles:?}");
+        let (kept, pass_defects) = usable(&recording);
+        assert!(kept.passes.is_empty() && pass_defects.len() == 2, "{pass_defects:?}");
     }
 }

@@ -1,8 +1,8 @@
 //! A wave of one length in a stretch of rail: a line that stays in wavelength at every speed.
 
 use crate::along::{
-    Background, Line, Ruler, Spectrum, amplitude, by_speed, combined, median, of_best,
-    on_even_places, speed_m_s, tells_waves, whitened,
+    Background, Line, Ruler, Spectrum, amplitude, bonferroni, by_speed, combine_dependent_p_values,
+    median, on_even_places, separates_wavelengths, speed_m_s, whitened,
 };
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -59,14 +59,14 @@ struct Candidate {
 
 /// The most certain corrugation that is less likely than `alpha` on a rail without.
 ///
-/// None where speeds are too much alike ([`tells_waves`]): a resonance is a line too. `orders_m` is the
+/// None where speeds are too much alike ([`separates_wavelengths`]): a resonance is a line too. `orders_m` is the
 /// circumference of a wheel whose orders are not to be called corrugation.
 pub fn corrugation(
     recording: &Recording,
     alpha: f64,
     orders_m: Option<f64>,
 ) -> Option<Corrugation> {
-    if !tells_waves(&recording.passes) {
+    if !separates_wavelengths(&recording.passes) {
         return None;
     }
     let [shortest, longest] = WAVELENGTHS.map(|share| share * recording.spacing_m);
@@ -86,7 +86,7 @@ pub fn corrugation(
         }
     }
     let best = candidates.into_iter().min_by(|a, b| a.ln_p.total_cmp(&b.ln_p))?;
-    let ln_p = of_best(best.ln_p, tries);
+    let ln_p = bonferroni(best.ln_p, tries);
     (ln_p <= alpha.ln()).then(|| search.describe(&best, ln_p))
 }
 
@@ -200,7 +200,7 @@ impl Search<'_> {
             if each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) {
                 continue;
             }
-            let ln_p = combined(&each);
+            let ln_p = combine_dependent_p_values(&each);
             if best.as_ref().is_none_or(|best| ln_p < best.ln_p) {
                 let ratio = lines.iter().map(|line| line.ratio).sum::<f64>() / lines.len() as f64;
                 best = Some(Candidate { stretch_m, wave_number, ln_p, ratio, ruler });

@@ -1,8 +1,8 @@
 //! Impacts that come at the same place of the track in every pass and at every speed.
 
-use super::repeated::{Cells, Listen, cells};
+use super::repeated::{Cells, ImpactKind, cells};
 use super::shape::{Form, Observed, Shape, fit};
-use crate::along::{combined, of_best};
+use crate::along::{bonferroni, combine_dependent_p_values};
 use tracktwin_signal::recording::Recording;
 
 /// Probability of one speed's power without an impact above which it doesn't repeat there.
@@ -33,12 +33,12 @@ pub struct Impact {
 /// Places in `except` (`[from, to]` in m) are passed over.
 pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Impact> {
     let allowed = |x: f64| !except.iter().any(|[from, to]| (*from..=*to).contains(&x));
-    let heard = Listen::BOTH.map(|listen| cells(recording, listen, false));
-    let tries: usize = heard.iter().filter_map(|cells| Some(cells.first()?.ratio.len())).sum();
+    let by_kind = ImpactKind::BOTH.map(|kind| cells(recording, kind, false));
+    let tries: usize = by_kind.iter().filter_map(|cells| Some(cells.first()?.ratio.len())).sum();
     let mut candidates = Vec::new();
-    for speeds in heard.iter().filter(|speeds| !speeds.is_empty()) {
+    for speeds in by_kind.iter().filter(|speeds| !speeds.is_empty()) {
         let places = (0..speeds[0].ratio.len()).filter(|&cell| allowed(speeds[0].place_m(cell)));
-        let certain = places.map(|cell| (speeds, cell, of_best(ln_p(speeds, cell), tries)));
+        let certain = places.map(|cell| (speeds, cell, bonferroni(ln_p(speeds, cell), tries)));
         candidates.extend(certain.filter(|(_, _, ln_p)| *ln_p <= alpha.ln()));
     }
     candidates.sort_by(|a, b| a.2.total_cmp(&b.2));
@@ -67,10 +67,14 @@ fn ln_p(speeds: &[Cells], cell: usize) -> f64 {
         let around =
             cell.saturating_sub(NEIGHBOURS)..(cell + NEIGHBOURS + 1).min(cells.ratio.len());
         let tries = around.len();
-        of_best(around.map(|other| cells.ln_tail(other)).fold(0.0, f64::min), tries)
+        bonferroni(around.map(|other| cells.ln_tail(other)).fold(0.0, f64::min), tries)
     };
     let each: Vec<f64> = speeds.iter().map(best).collect();
-    if each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) { 0.0 } else { combined(&each) }
+    if each.iter().any(|&ln_p| ln_p > EACH_SPEED.ln()) {
+        0.0
+    } else {
+        combine_dependent_p_values(&each)
+    }
 }
 
 fn impact(recording: &Recording, speeds: &[Cells], cell: usize, ln_p: f64) -> Impact {

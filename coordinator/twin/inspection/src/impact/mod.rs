@@ -10,7 +10,7 @@ mod shape;
 
 pub use corrugation::{Corrugation, corrugation};
 pub use local::{Impact, impacts};
-pub(crate) use repeated::{Cells, Listen, cells};
+pub(crate) use repeated::{Cells, ImpactKind, cells};
 pub use shape::{Form, Shape};
 pub(crate) use shape::{Observed, fit};
 

@@ -29,14 +29,14 @@ const QUARTILES: f64 = 1.349;
 
 /// What is listened to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Listen {
+pub(crate) enum ImpactKind {
     /// The same frequencies at all speeds: kinks, edges, everything that rings.
     Blows,
     /// The same wavelengths at all speeds: hollows that a slow wheel rolls through quietly.
     Hollows,
 }
 
-impl Listen {
+impl ImpactKind {
     pub(crate) const BOTH: [Self; 2] = [Self::Blows, Self::Hollows];
 
     /// The band in Hz in a pass; none where it is empty.
@@ -87,11 +87,11 @@ impl Cells {
 /// The cells of every speed (of every pass if `each`) on one grid of places.
 ///
 /// Empty where no pass has sound enough above the impacts' lowest frequency.
-pub(crate) fn cells(recording: &Recording, listen: Listen, each: bool) -> Vec<Cells> {
+pub(crate) fn cells(recording: &Recording, kind: ImpactKind, each: bool) -> Vec<Cells> {
     let passes = &recording.passes;
     let groups =
         if each { (0..passes.len()).map(|index| vec![index]).collect() } else { by_speed(passes) };
-    let Some(width_m) = width(recording, listen) else { return Vec::new() };
+    let Some(width_m) = width(recording, kind) else { return Vec::new() };
     let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
     let ends = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
     // The fading ends of a pass and half a cell stay out.
@@ -102,15 +102,15 @@ pub(crate) fn cells(recording: &Recording, listen: Listen, each: bool) -> Vec<Ce
         return Vec::new();
     }
     let count = ((last_m - first_m) / step_m) as usize + 1;
-    let grid = Grid { listen, first_m, step_m, width_m, count, near: near(recording, step_m) };
+    let grid = Grid { kind, first_m, step_m, width_m, count, near: near(recording, step_m) };
     groups.into_iter().filter_map(|group| grid.cells(passes, group)).collect()
 }
 
 /// The width of a cell in m, wide enough for the fastest pass; none if nothing can be heard.
-fn width(recording: &Recording, listen: Listen) -> Option<f64> {
+fn width(recording: &Recording, kind: ImpactKind) -> Option<f64> {
     let mut width = CELL_SHARE * recording.spacing_m;
     for pass in &recording.passes {
-        let [low, high] = listen.band(pass, &Background::of(&pass.signal)?)?;
+        let [low, high] = kind.band(pass, &Background::of(&pass.signal)?)?;
         width = width.max(PRODUCT_MIN * speed_m_s(pass) / (high - low));
     }
     (width < 0.5 * recording.spacing_m).then_some(width)
@@ -121,7 +121,7 @@ fn near(recording: &Recording, step_m: f64) -> usize {
 }
 
 struct Grid {
-    listen: Listen,
+    kind: ImpactKind,
     first_m: f64,
     step_m: f64,
     width_m: f64,
@@ -151,7 +151,7 @@ impl Grid {
 
     fn powers(&self, pass: &Pass) -> Option<Vec<f64>> {
         let background = Background::of(&pass.signal)?;
-        let white = whitened(&pass.signal, &background, self.listen.band(pass, &background)?);
+        let white = whitened(&pass.signal, &background, self.kind.band(pass, &background)?);
         let energy = Energy::new(pass, &white);
         let power = |cell: usize| {
             let middle = self.first_m + cell as f64 * self.step_m;

@@ -4,7 +4,7 @@
 //! spectra is that of their surfaces, `q(f) = |Z(k)|^2 / (pi v S(2 pi k))` with `k = f/v`,
 //! whatever the track is. `S` is eq. B.6; its level scales the depth, not the length.
 
-use super::repeated::Listen;
+use super::repeated::ImpactKind;
 use crate::along::{Background, hann, speed_m_s};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
@@ -68,7 +68,7 @@ impl Observed {
     /// The blow nearest to `x_m`, within `reach_m`; none where the pass ends too close.
     pub(crate) fn at(pass: &Pass, x_m: f64, reach_m: f64) -> Option<Self> {
         let background = Background::of(&pass.signal)?;
-        let [_, high] = Listen::Blows.band(pass, &background)?;
+        let [_, high] = ImpactKind::Blows.band(pass, &background)?;
         let rate = pass.signal.sample_rate_hz();
         let samples = pass.signal.samples();
         let blow = loudest(pass, samples, x_m, reach_m);

@@ -1,6 +1,6 @@
 //! A flat: one blow a turn of the wheel.
 
-use crate::along::{combined, ln_gamma_tail, of_best};
+use crate::along::{bonferroni, combine_dependent_p_values, ln_gamma_tail};
 use crate::impact::{Cells, Listen, Observed, Shape, cells, fit};
 use tracktwin_signal::recording::Recording;
 
@@ -45,11 +45,11 @@ pub fn flat(recording: &Recording, circumference_m: f64, alpha: f64) -> Option<F
         let folds: Vec<Fold> = passes.iter().map(|cells| Fold::best(cells, period)).collect();
         let each: Vec<f64> = folds.iter().map(|fold| fold.ln_p).collect();
         let loudness = folds.iter().map(|fold| fold.loudness).sum::<f64>() / folds.len() as f64;
-        (combined(&each), loudness, folds)
+        (combine_dependent_p_values(&each), loudness, folds)
     };
     let rank = |(ln_p, loudness, _): &(f64, f64, Vec<Fold>)| ln_p - LOUDNESS * loudness;
     let (ln_p, _, folds) = trials.iter().map(at).min_by(|a, b| rank(a).total_cmp(&rank(b)))?;
-    let ln_p = of_best(ln_p, trials.len());
+    let ln_p = bonferroni(ln_p, trials.len());
     if ln_p > alpha.ln() {
         return None;
     }
@@ -91,7 +91,7 @@ impl Fold {
         let rank = |fold: &Self| fold.ln_p - LOUDNESS * fold.loudness;
         let best = (0..phases).map(at).min_by(|a, b| rank(a).total_cmp(&rank(b)));
         let best = best.expect("a period has phases");
-        Self { ln_p: of_best(best.ln_p, phases), ..best }
+        Self { ln_p: bonferroni(best.ln_p, phases), ..best }
     }
 }
 

@@ -5,8 +5,8 @@
 //! same is heard in the passes themselves.
 
 use crate::along::{
-    Line, Ruler, Spectrum, amplitude, by_speed, combined, of_best, on_even_places, speed_m_s,
-    tells_waves,
+    Line, Ruler, Spectrum, amplitude, bonferroni, by_speed, combine_dependent_p_values,
+    on_even_places, separates_wavelengths, speed_m_s,
 };
 use rustfft::num_complex::Complex64;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
@@ -70,10 +70,10 @@ pub struct Order {
 
 /// Where an order is listened for.
 #[derive(Clone, Copy)]
-enum Heard {
-    InPasses,
+enum SpectrumSource {
+    Passes,
     /// In what neighbouring passes at one speed differ by.
-    Apart,
+    Differences,
 }
 
 /// Spectra along a stretch of the track at one speed.
@@ -81,27 +81,27 @@ struct AtSpeed {
     /// Of each pass.
     passes: Vec<Spectrum>,
     /// Of what neighbouring passes differ by, as loud as in one of them; none of a single pass.
-    apart: Vec<Spectrum>,
+    differences: Vec<Spectrum>,
 }
 
 impl AtSpeed {
-    fn heard(&self, heard: Heard) -> &[Spectrum] {
-        match heard {
-            Heard::InPasses => &self.passes,
-            Heard::Apart => &self.apart,
+    fn source(&self, source: SpectrumSource) -> &[Spectrum] {
+        match source {
+            SpectrumSource::Passes => &self.passes,
+            SpectrumSource::Differences => &self.differences,
         }
     }
 }
 
 /// The orders that are less likely than `alpha` on a round wheel, lowest first.
 ///
-/// None where speeds are too much alike ([`tells_waves`]): a resonance is a line too.
+/// None where speeds are too much alike ([`separates_wavelengths`]): a resonance is a line too.
 pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> Vec<Order> {
     let passes = &recording.passes;
     let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
     let ends = passes.iter().map(|pass| pass.position_m[pass.position_m.len() - 1]);
     let to = ends.fold(f64::MAX, f64::min);
-    if !tells_waves(passes) || to - from < TURNS_MIN * circumference_m {
+    if !separates_wavelengths(passes) || to - from < TURNS_MIN * circumference_m {
         return Vec::new();
     }
     let search = Search { recording, circumference_m, stretch_m: [from, to] };
@@ -110,12 +110,16 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
     for ruler in Ruler::BOTH {
         let speeds = search.spectra(search.stretch_m, ruler);
         let parts = search.parts().map(|part| search.spectra(part, ruler));
-        let repeated = speeds.iter().all(|speed| !speed.apart.is_empty());
-        let heard = [Some(Heard::InPasses), repeated.then_some(Heard::Apart)].into_iter().flatten();
-        for (heard, number) in heard.flat_map(|heard| (1..=ORDER_MAX).map(move |n| (heard, n))) {
-            let (order, bins) = search.order(&speeds, heard, number);
+        let repeated = speeds.iter().all(|speed| !speed.differences.is_empty());
+        let source =
+            [Some(SpectrumSource::Passes), repeated.then_some(SpectrumSource::Differences)]
+                .into_iter()
+                .flatten();
+        for (source, number) in source.flat_map(|source| (1..=ORDER_MAX).map(move |n| (source, n)))
+        {
+            let (order, bins) = search.order(&speeds, source, number);
             tries += bins;
-            if !parts.iter().all(|part| order.is_heard(part, heard, circumference_m)) {
+            if !parts.iter().all(|part| order.is_detected(part, source, circumference_m)) {
                 continue;
             }
             match found.iter_mut().find(|other| other.number == number) {
@@ -126,7 +130,7 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
         }
     }
     for order in &mut found {
-        order.ln_p = of_best(order.ln_p, tries);
+        order.ln_p = bonferroni(order.ln_p, tries);
     }
     found.retain(|order| order.ln_p <= alpha.ln());
     let all = found.clone();
@@ -137,10 +141,10 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
 impl Order {
     /// Whether a part of the way has its share of the line's power, mean of all speeds: a steady line's
     /// power grows with the square of the way.
-    fn is_heard(&self, part: &[AtSpeed], heard: Heard, circumference_m: f64) -> bool {
+    fn is_detected(&self, part: &[AtSpeed], source: SpectrumSource, circumference_m: f64) -> bool {
         let wave_number = self.number as f64 / circumference_m;
         let share = |(speed, power): (&AtSpeed, &f64)| {
-            let each = speed.heard(heard).iter();
+            let each = speed.source(source).iter();
             let lines = each.filter_map(|s| s.line(s.bin(wave_number), |_| false));
             let lines: Vec<Line> = lines.collect();
             Line::mean(&lines).map_or(0.0, |line| line.power() / power)
@@ -191,9 +195,9 @@ impl Search<'_> {
         let speed = |group: Vec<usize>| {
             let values: Vec<Vec<Complex64>> = group.into_iter().map(values).collect();
             let passes: Vec<Spectrum> = values.iter().map(spectrum).collect();
-            let apart: Vec<Spectrum> =
+            let differences: Vec<Spectrum> =
                 values.windows(2).map(|pair| spectrum(&difference(&pair[0], &pair[1]))).collect();
-            AtSpeed { passes, apart }
+            AtSpeed { passes, differences }
         };
         by_speed(passes).into_iter().map(speed).collect()
     }
@@ -205,7 +209,7 @@ impl Search<'_> {
     }
 
     /// The order's least likely line, and how many bins were looked at.
-    fn order(&self, speeds: &[AtSpeed], heard: Heard, number: usize) -> (Order, usize) {
+    fn order(&self, speeds: &[AtSpeed], source: SpectrumSource, number: usize) -> (Order, usize) {
         let middle = number as f64 / self.circumference_m;
         let (amplitude_m, powers) = ((0.0, 0.0), Vec::new());
         let mut best = Order { number, amplitude_m, ln_p: 0.0, ratio: 1.0, powers };
@@ -218,18 +222,20 @@ impl Search<'_> {
         let bins = first.bin(middle * (1.0 - TOLERANCE))..=first.bin(middle * (1.0 + TOLERANCE));
         let tries = bins.clone().count();
         for bin in bins {
-            let Some(lines) = self.lines(speeds, heard, number, bin) else { continue };
+            let Some(lines) = self.lines(speeds, source, number, bin) else { continue };
             let each: Vec<f64> = lines.iter().map(|line| line.ln_tail()).collect();
             let repeats = each.iter().filter(|&&ln_p| ln_p <= EACH_SPEED.ln()).count();
-            let (least, uneven) = match heard {
-                Heard::InPasses => (each.len(), 0.0),
-                Heard::Apart => (each.len().min(SPEEDS_APART_MIN), UNEVEN.ln()),
+            let (least, uneven) = match source {
+                SpectrumSource::Passes => (each.len(), 0.0),
+                SpectrumSource::Differences => (each.len().min(SPEEDS_APART_MIN), UNEVEN.ln()),
             };
-            let ln_p = combined(&each) + uneven;
+            let ln_p = combine_dependent_p_values(&each) + uneven;
             if repeats < least || ln_p >= best.ln_p {
                 continue;
             }
-            let Some(passes) = self.lines(speeds, Heard::InPasses, number, bin) else { continue };
+            let Some(passes) = self.lines(speeds, SpectrumSource::Passes, number, bin) else {
+                continue;
+            };
             best = Order {
                 number,
                 amplitude_m: self.amplitude_m(middle, &lines, &passes),
@@ -246,7 +252,7 @@ impl Search<'_> {
     fn lines(
         &self,
         speeds: &[AtSpeed],
-        heard: Heard,
+        source: SpectrumSource,
         number: usize,
         bin: usize,
     ) -> Option<Vec<Line>> {
@@ -256,7 +262,7 @@ impl Search<'_> {
                 || self.is_multiple(wave_number, self.recording.spacing_m)
         };
         let of_speed = |speed: &AtSpeed| {
-            let each = speed.heard(heard).iter().map(|spectrum| spectrum.line(bin, skip));
+            let each = speed.source(source).iter().map(|spectrum| spectrum.line(bin, skip));
             Line::mean(&each.collect::<Option<Vec<Line>>>()?)
         };
         speeds.iter().map(of_speed).collect()

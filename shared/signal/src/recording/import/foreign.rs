@@ -7,7 +7,7 @@ struct Kind {
     begins: &'static [&'static [u8]],
     endings: &'static [&'static str],
     name: &'static str,
-    mend: &'static str,
+    remedy: &'static str,
 }
 
 const KINDS: [Kind; 15] = [
@@ -15,92 +15,92 @@ const KINDS: [Kind; 15] = [
         begins: &[b"MATLAB 7.3"],
         endings: &[],
         name: "a MATLAB file of version 7.3 (HDF5)",
-        mend: "save it anew in MATLAB with `save(file, names, '-v7')`, or read it with Python's h5py",
+        remedy: "save it anew in MATLAB with `save(file, names, '-v7')`, or read it with Python's h5py",
     },
     Kind {
         begins: &[b"\x89HDF\r\n"],
         endings: &["h5", "hdf5", "hdf", "nc"],
         name: "an HDF5 file",
-        mend: "read its data sets with Python's h5py and save them with `numpy.savez`",
+        remedy: "read its data sets with Python's h5py and save them with `numpy.savez`",
     },
     Kind {
         begins: &[b"|CF,"],
         endings: &["raw"],
         name: "a file of imc FAMOS or imc STUDIO",
-        mend: "export it there as CSV, or convert it with IMCtermite",
+        remedy: "export it there as CSV, or convert it with IMCtermite",
     },
     Kind {
         begins: &[b"    -1\n", b"    -1\r\n", b"    -1  "],
         endings: &["uff", "unv", "uf", "bunv"],
         name: "a universal file (UFF)",
-        mend: "read it with Python's pyuff and save its data with `numpy.savez`",
+        remedy: "read it with Python's pyuff and save its data with `numpy.savez`",
     },
     Kind {
         // The number of a catman file's version, 5011 to 5013.
         begins: &[b"\x93\x13", b"\x94\x13", b"\x95\x13"],
         endings: &["bin"],
         name: "a catman file of HBM",
-        mend: "export it in catman as ASCII or MATLAB, or convert it with Python's apread",
+        remedy: "export it in catman as ASCII or MATLAB, or convert it with Python's apread",
     },
     Kind {
         begins: &[b"TDSm"],
         endings: &["tdms"],
         name: "a TDMS file of LabVIEW or DIAdem",
-        mend: "convert it with Python's npTDMS: `TdmsFile.read(file).as_dataframe().to_parquet(...)`",
+        remedy: "convert it with Python's npTDMS: `TdmsFile.read(file).as_dataframe().to_parquet(...)`",
     },
     Kind {
         begins: &[b"MDF ", b"UnFinMF "],
         endings: &["mf4", "mdf"],
         name: "an MDF file",
-        mend: "convert it with Python's asammdf: `MDF(file).to_dataframe().to_parquet(...)`",
+        remedy: "convert it with Python's asammdf: `MDF(file).to_dataframe().to_parquet(...)`",
     },
     Kind {
         begins: &[],
         endings: &["xlsx", "xls", "ods"],
         name: "a spreadsheet",
-        mend: "save its sheet as CSV",
+        remedy: "save its sheet as CSV",
     },
     Kind {
         begins: &[b"RIFF", b"RF64"],
         endings: &["wav"],
         name: "a WAV file",
-        mend: "read it with Python's scipy.io.wavfile and save it with `numpy.save`; say --unit unknown",
+        remedy: "read it with Python's scipy.io.wavfile and save it with `numpy.save`; say --unit unknown",
     },
     Kind {
         begins: &[b"ARROW1", b"FEA1"],
         endings: &["feather", "arrow"],
         name: "a Feather or Arrow file",
-        mend: "convert it with pandas: `read_feather(file).to_parquet(...)`",
+        remedy: "convert it with pandas: `read_feather(file).to_parquet(...)`",
     },
     Kind {
         begins: &[],
         endings: &["pkl", "pickle", "rds", "rda", "rdata"],
         name: "a file of Python's or R's own objects",
-        mend: "save its table as CSV or Parquet",
+        remedy: "save its table as CSV or Parquet",
     },
     Kind {
         begins: &[],
         endings: &["dxd", "d7d", "dat3", "lvm", "tdm", "sie", "rsp", "asc3"],
         name: "a file of a measuring program's own kind",
-        mend: "export it there as CSV or MATLAB (v7)",
+        remedy: "export it there as CSV or MATLAB (v7)",
     },
     Kind {
         begins: &[b"\x1f\x8b"],
         endings: &["gz"],
         name: "a file compressed with gzip",
-        mend: "unpack it first: `gunzip FILE`",
+        remedy: "unpack it first: `gunzip FILE`",
     },
     Kind {
         begins: &[b"BZh", b"\xfd7zXZ\0", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf\x27\x1c"],
         endings: &["bz2", "xz", "zst", "7z"],
         name: "a compressed file",
-        mend: "unpack it first",
+        remedy: "unpack it first",
     },
     Kind {
         begins: &[b"PK\x03\x04", b"\xd0\xcf\x11\xe0"],
         endings: &["zip"],
         name: "an archive or a spreadsheet",
-        mend: "unpack it, or save its sheet as CSV",
+        remedy: "unpack it, or save its sheet as CSV",
     },
 ];
 
@@ -117,5 +117,5 @@ pub(super) fn fault(begin: &[u8], ending: &str, holds_zip: bool) -> Option<Fault
         (Some(content), Some(name)) if content.begins.contains(&&b"PK\x03\x04"[..]) => Some(name),
         (content, name) => content.or(name),
     };
-    found.map(|kind| Fault::Foreign { kind: kind.name, mend: kind.mend })
+    found.map(|kind| Fault::Foreign { kind: kind.name, remedy: kind.remedy })
 }

@@ -89,8 +89,8 @@ impl Places {
         let [slowest, fastest] = PLAUSIBLE_KM_H;
         let slowest = if is_told { 0.0 } else { slowest };
         if !(speed_km_h > slowest && speed_km_h <= fastest) {
-            let mend = self.other_unit(speed_km_h);
-            return Err(Fault::Impossible { observed: speed_km_h, unit, mend });
+            let remedy = self.other_unit(speed_km_h);
+            return Err(Fault::Impossible { observed: speed_km_h, unit, remedy });
         }
         let stated = layout.speed_km_h.filter(|_| self.name != "speed_km_h");
         let others = [("the stated speed", stated), ("the column of speeds", self.other_km_h)];
@@ -108,10 +108,10 @@ impl Places {
     /// In which unit the speed would be one that trains have.
     fn other_unit(&self, speed_km_h: f64) -> String {
         let (unit, _) = self.unit;
-        let (factors, mend): (Vec<(&str, f64)>, &str) = if self.name == "position" {
-            (factors::<PositionUnit>(), PositionUnit::MEND)
+        let (factors, remedy): (Vec<(&str, f64)>, &str) = if self.name == "position" {
+            (factors::<PositionUnit>(), PositionUnit::REMEDY)
         } else {
-            (factors::<SpeedUnit>(), SpeedUnit::MEND)
+            (factors::<SpeedUnit>(), SpeedUnit::REMEDY)
         };
         let own = factors.iter().find(|(name, _)| *name == unit).map_or(1.0, |(_, factor)| *factor);
         let range = PLAUSIBLE_KM_H[0]..=PLAUSIBLE_KM_H[1];
@@ -124,7 +124,7 @@ impl Places {
         if fits.is_empty() {
             "check the column, its unit and the sample rate".to_owned()
         } else {
-            format!("{}: {mend}", fits.join(", "))
+            format!("{}: {remedy}", fits.join(", "))
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The sample rate of a file, from what was stated and from its times.
 
-use super::super::clock::{Pace, Stamps};
+use super::super::clock::{SampleClock, Stamps};
 use super::super::error::{Fault, RecordingError};
 use super::column::Column;
 use super::unit::{TimeUnit, Unit, bare_name, of_column};
@@ -32,14 +32,14 @@ pub(super) fn of(
             Ok(stated)
         }
         (Some(name), stated) => {
-            let pace = pace(table, name, layout.time_unit, notes)?;
-            let Some(stated) = stated else { return Ok(pace.round_rate_hz()) };
-            if (pace.rate_hz / stated - 1.0).abs() <= ALIKE.max(pace.uncertainty) {
+            let clock = clock(table, name, layout.time_unit, notes)?;
+            let Some(stated) = stated else { return Ok(clock.round_rate_hz()) };
+            if (clock.rate_hz / stated - 1.0).abs() <= ALIKE.max(clock.uncertainty) {
                 return Ok(stated);
             }
             let fault = Fault::Contradiction {
                 says: format!("is {} Hz", rounded(stated, 8)),
-                but: format!("column {name} advances at {} Hz", rounded(pace.rate_hz, 6)),
+                but: format!("column {name} advances at {} Hz", rounded(clock.rate_hz, 6)),
             };
             Err(RecordingError::new(&table.path, "sample_rate_Hz", fault))
         }
@@ -47,24 +47,24 @@ pub(super) fn of(
 }
 
 /// How the column of times advances.
-fn pace(
+fn clock(
     table: &Table,
     name: &str,
     told: Option<TimeUnit>,
     notes: &mut Vec<String>,
-) -> Result<Pace, RecordingError> {
+) -> Result<SampleClock, RecordingError> {
     let column = table.column(name)?;
     let fault = |fault| RecordingError::new(&table.path, name, fault);
     let unit = of_column(column, told, notes).map_err(fault)?;
-    let pace = in_unit(column, unit).map_err(fault)?;
-    let observed = pace.rate_hz;
+    let clock = in_unit(column, unit).map_err(fault)?;
+    let observed = clock.rate_hz;
     let is_sure = told.is_some() || column.unit.is_some();
     if !is_sure && !(PLAUSIBLE_HZ[0]..=PLAUSIBLE_HZ[1]).contains(&observed) {
-        let mend = other_unit(observed * unit.in_si());
-        return Err(fault(Fault::ImpossibleRate { observed, unit: unit.name(), mend }));
+        let remedy = other_unit(observed * unit.in_si());
+        return Err(fault(Fault::ImpossibleRate { observed, unit: unit.name(), remedy }));
     }
     let (interval, shown) = (1.0 / observed, |seconds: f64| significant(1e3 * seconds, 2));
-    match pace.stamps {
+    match clock.stamps {
         Stamps::Even => {}
         Stamps::Coarse(step_s) => notes.push(format!(
             "column {name} advances in steps of {} ms, a sample takes {} ms: the samples were taken as evenly spaced",
@@ -77,14 +77,14 @@ fn pace(
             shown(interval)
         )),
     }
-    Ok(pace)
+    Ok(clock)
 }
 
-fn in_unit(column: &Column, unit: TimeUnit) -> Result<Pace, Fault> {
+fn in_unit(column: &Column, unit: TimeUnit) -> Result<SampleClock, Fault> {
     let begin = column.values[0];
     // From the first on: a time since 1970 leaves no digits for the steps.
     let times: Vec<f64> = column.values.iter().map(|time| unit.in_si() * (time - begin)).collect();
-    Pace::of(&times)
+    SampleClock::of(&times)
 }
 
 /// The unit in which the times would make sense; `per_unit` is how many samples one has.
@@ -98,7 +98,7 @@ fn other_unit(per_unit: f64) -> String {
     if fits.is_empty() {
         "give another column, or the sample rate".to_owned()
     } else {
-        format!("{}: {}", fits.join(", "), TimeUnit::MEND)
+        format!("{}: {}", fits.join(", "), TimeUnit::REMEDY)
     }
 }
 

@@ -9,7 +9,7 @@ pub(super) trait Unit: Copy + PartialEq + Default + 'static {
     /// All of them with their spellings, in lower case and without blanks; the first one is shown.
     const ALL: &'static [(Self, &'static [&'static str])];
     /// How a user says which unit it is.
-    const MEND: &'static str;
+    const REMEDY: &'static str;
 
     /// One of it in SI units.
     fn in_si(self) -> f64;
@@ -87,7 +87,7 @@ impl Unit for AccelerationUnit {
         (Self::G, &["g", "gn", "g0"]),
         (Self::Unknown, &["unknown"]),
     ];
-    const MEND: &'static str = "say --unit m/s2, g or unknown";
+    const REMEDY: &'static str = "say --unit m/s2, g or unknown";
 
     fn in_si(self) -> f64 {
         match self {
@@ -104,7 +104,7 @@ impl Unit for TimeUnit {
         (Self::Microsecond, &["us", "\u{b5}s", "\u{3bc}s"]),
         (Self::Nanosecond, &["ns"]),
     ];
-    const MEND: &'static str = "say --time-unit s, ms, us or ns";
+    const REMEDY: &'static str = "say --time-unit s, ms, us or ns";
 
     fn in_si(self) -> f64 {
         match self {
@@ -119,7 +119,7 @@ impl Unit for TimeUnit {
 impl Unit for PositionUnit {
     const ALL: &'static [(Self, &'static [&'static str])] =
         &[(Self::Metre, &["m"]), (Self::Kilometre, &["km"]), (Self::Millimetre, &["mm"])];
-    const MEND: &'static str = "say --position-unit m, km or mm";
+    const REMEDY: &'static str = "say --position-unit m, km or mm";
 
     fn in_si(self) -> f64 {
         match self {
@@ -135,7 +135,7 @@ impl Unit for SpeedUnit {
         (Self::KilometrePerHour, &["km/h", "kmh", "kmph", "kph"]),
         (Self::MetrePerSecond, &["m/s", "mps", "ms-1"]),
     ];
-    const MEND: &'static str = "say --speed-unit km/h or m/s";
+    const REMEDY: &'static str = "say --speed-unit km/h or m/s";
 
     fn in_si(self) -> f64 {
         match self {
@@ -176,14 +176,14 @@ pub(super) fn of_column<U: Unit>(
         (None, None, Some(unit)) => {
             let names: Vec<&str> = U::ALL.iter().map(|(unit, _)| unit.name()).collect();
             let known = names.join(", ");
-            Err(Fault::UnknownUnit { unit: unit.to_owned(), known, mend: U::MEND })
+            Err(Fault::UnknownUnit { unit: unit.to_owned(), known, remedy: U::REMEDY })
         }
         (None, None, None) => {
             let unit = U::default();
             notes.push(format!(
                 "{name} is taken in {}; if that is wrong, {}",
                 unit.name(),
-                U::MEND
+                U::REMEDY
             ));
             Ok(unit)
         }

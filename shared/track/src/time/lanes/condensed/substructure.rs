@@ -26,7 +26,7 @@ const CHECKED_AT: f64 = 30.0;
 /// Its states follow `v ← keep v - pull w + u`, `w ← w + v`; its force is `velocity v +
 /// displacement w`, before the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Section {
+pub(super) struct SecondOrderSection {
     pub(super) keep: f64,
     pub(super) pull: f64,
     pub(super) velocity: f64,
@@ -42,7 +42,7 @@ pub(in crate::time::lanes) struct Substructure {
     pub(super) static_relief: f64,
     /// What the stiffness in a time step is lessened by, in N/m.
     pub(super) step_relief: f64,
-    pub(super) sections: Vec<Section>,
+    pub(super) sections: Vec<SecondOrderSection>,
 }
 
 impl Substructure {
@@ -244,21 +244,22 @@ impl Pole {
 }
 
 /// Poles two by two: conjugates, then the real ones in their order.
-fn sections(poles: Vec<Pole>) -> Option<Vec<Section>> {
+fn sections(poles: Vec<Pole>) -> Option<Vec<SecondOrderSection>> {
     let (mut real, complex): (Vec<Pole>, Vec<Pole>) =
         poles.into_iter().partition(|pole| pole.mu.im == 0.0);
     real.sort_by(|a, b| a.mu.re.total_cmp(&b.mu.re));
     let upper = complex.iter().filter(|pole| pole.mu.im > 0.0);
     let conjugate = |pole: &Pole| Pole { mu: pole.mu.conj(), residue: pole.residue.conj() };
-    let mut sections: Vec<_> = upper.map(|pole| section(*pole, conjugate(pole))).collect();
+    let mut sections: Vec<_> =
+        upper.map(|pole| second_order_section(*pole, conjugate(pole))).collect();
     let (pairs, rest) = real.as_chunks::<2>();
-    sections.extend(pairs.iter().map(|[a, b]| section(*a, *b)));
+    sections.extend(pairs.iter().map(|[a, b]| second_order_section(*a, *b)));
     (rest.is_empty() && 2 * sections.len() == complex.len() + real.len()).then_some(sections)
 }
 
-fn section(a: Pole, b: Pole) -> Section {
+fn second_order_section(a: Pole, b: Pole) -> SecondOrderSection {
     let (sum, product) = ((a.delta() + b.delta()).re, (a.delta() * b.delta()).re);
-    Section {
+    SecondOrderSection {
         keep: 1.0 + sum,
         pull: product,
         velocity: (a.gain() + b.gain()).re,

@@ -1,12 +1,12 @@
 //! All substructures on their way, in all lanes.
 
 use super::rail::Node;
-use super::substructure::{Hanging, Section};
+use super::substructure::{Hanging, SecondOrderSection};
 use super::table::{Bits, Table};
 use crate::time::lanes::block::{Block, LANES};
 use std::array;
 
-/// A [`Section`] a lane.
+/// A [`SecondOrderSection`] a lane.
 #[derive(Clone, Copy, Debug)]
 struct Sections {
     keep: Block,
@@ -79,9 +79,10 @@ impl Supports {
 }
 
 impl Sections {
-    fn new(lane: impl Fn(usize) -> Section) -> Self {
-        let sections: [Section; LANES] = array::from_fn(lane);
-        let of = |pick: fn(&Section) -> f64| Block::from_fn(|lane| pick(&sections[lane]));
+    fn new(lane: impl Fn(usize) -> SecondOrderSection) -> Self {
+        let sections: [SecondOrderSection; LANES] = array::from_fn(lane);
+        let of =
+            |pick: fn(&SecondOrderSection) -> f64| Block::from_fn(|lane| pick(&sections[lane]));
         Self {
             keep: of(|section| section.keep),
             pull: of(|section| section.pull),

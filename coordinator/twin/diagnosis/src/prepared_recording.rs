@@ -7,7 +7,7 @@ use crate::section::Section;
 use crate::spectra::{Spectra, SpeedSpectra};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
-use tracktwin_inspection::chain::Trouble;
+use tracktwin_inspection::chain::PassDefect;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::{OtherTrack, Recording, compare_designs};
 use tracktwin_track::extension::Kind;
@@ -34,7 +34,7 @@ const UNEVEN: f64 = 0.1;
 
 /// Why a recording cannot be diagnosed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SubjectError {
+pub enum PreparationError {
     /// The track that it would be compared with is not V-Track.
     #[error(
         "the models are of another track than V-Track ({} {}, V-Track's {}); diagnoses compare with \
@@ -88,12 +88,12 @@ pub enum SubjectError {
     SampleRate(f64),
     /// Passes without a track in them.
     #[error("passes: nothing can be said of the track from {0}")]
-    Unusable(Trouble),
+    Unusable(PassDefect),
 }
 
 /// A recording in the terms of the forward model.
 #[derive(Clone, Debug)]
-pub struct Subject {
+pub struct PreparedRecording {
     /// Predicts it.
     pub forward: Forward,
     /// Its log powers in the order of [`Forward`], means over the passes of a speed.
@@ -107,11 +107,11 @@ pub struct Subject {
     /// Kinds of physics that may not be named.
     pub without: Vec<String>,
     /// Where the passes alone show the rail's own shape, from and to in m; nowhere until
-    /// [`Subject::suggested`].
-    pub heard_m: Vec<[f64; 2]>,
+    /// [`PreparedRecording::suggested`].
+    pub detected_shapes_m: Vec<[f64; 2]>,
 }
 
-impl SubjectError {
+impl PreparationError {
     /// Whether the recording or the models are of a track that no diagnosis knows.
     pub const fn is_of_the_track(&self) -> bool {
         matches!(self, Self::OtherDesign(_) | Self::OtherTrack(_) | Self::Uneven { .. })
@@ -124,13 +124,13 @@ impl SubjectError {
 /// A recording whose sleepers are not known is compared with no track.
 ///
 /// # Errors
-/// [`SubjectError::OtherDesign`], [`SubjectError::OtherTrack`] and [`SubjectError::Uneven`].
-pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), SubjectError> {
-    compare_designs(design, &TrackDesign::v_track()).map_err(SubjectError::OtherDesign)?;
+/// [`PreparationError::OtherDesign`], [`PreparationError::OtherTrack`] and [`PreparationError::Uneven`].
+pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), PreparationError> {
+    compare_designs(design, &TrackDesign::v_track()).map_err(PreparationError::OtherDesign)?;
     if recording.sleepers.is_empty() {
         return Ok(());
     }
-    recording.check_track(design).map_err(SubjectError::OtherTrack)?;
+    recording.check_track(design).map_err(PreparationError::OtherTrack)?;
     let spacing_m = design.sleeper.spacing_m;
     let uneven = recording.sleepers.windows(2).find_map(|pair| {
         let distance_m = pair[1].x_m - pair[0].x_m;
@@ -138,7 +138,9 @@ pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Su
         (!is_even).then(|| ([0, 1].map(|end| pair[end].id.clone()), distance_m))
     });
     match uneven {
-        Some((between, distance_m)) => Err(SubjectError::Uneven { between, distance_m, spacing_m }),
+        Some((between, distance_m)) => {
+            Err(PreparationError::Uneven { between, distance_m, spacing_m })
+        }
         None => Ok(()),
     }
 }
@@ -151,35 +153,35 @@ struct Measured {
 }
 
 impl Measured {
-    fn of(recording: &Recording, design: &TrackDesign) -> Result<Self, SubjectError> {
+    fn of(recording: &Recording, design: &TrackDesign) -> Result<Self, PreparationError> {
         check_track(recording, design)?;
         let highest_hz = BANDS_HZ[1].min(SAMPLE_RATE_SHARE * recording.sample_rate_hz);
         let bands = Bands::new(BANDS_HZ[0], highest_hz.max(BANDS_HZ[0]));
         if bands.count() < BANDS_MIN {
-            return Err(SubjectError::SampleRate(recording.sample_rate_hz));
+            return Err(PreparationError::SampleRate(recording.sample_rate_hz));
         }
         if recording.sleepers.is_empty() {
-            return Err(SubjectError::NoSleepers);
+            return Err(PreparationError::NoSleepers);
         }
         if !recording.gain_known() {
-            return Err(SubjectError::GainUnknown);
+            return Err(PreparationError::GainUnknown);
         }
         let sleepers = covered(recording);
         if sleepers.len() < SLEEPERS_MIN {
             let margin_m = MARGIN_SPANS * recording.spacing_m;
-            return Err(SubjectError::TooShort { sleepers: sleepers.len(), margin_m });
+            return Err(PreparationError::TooShort { sleepers: sleepers.len(), margin_m });
         }
         let spectra = Spectra::new(recording, &bands);
         Ok(Self { bands, spectra, sleepers })
     }
 
     /// Some of the sleepers.
-    fn subject(
+    fn prepared(
         &self,
         recording: &Recording,
         design: &TrackDesign,
         sleepers: Range<usize>,
-    ) -> Subject {
+    ) -> PreparedRecording {
         let Self { bands, spectra, .. } = self;
         let first_x_m = recording.sleepers[sleepers.start].x_m;
         let section = Section::new(design.clone(), sleepers.len(), first_x_m);
@@ -189,35 +191,43 @@ impl Measured {
         let log_power = log_power(&forward, spectra, sleepers.start);
         let pass_variance = pass_variance(&forward, spectra);
         let pass_numbers = spectra.speeds.iter().map(|speed| speed.passes.clone()).collect();
-        let (first_sleeper, without, heard_m) = (sleepers.start, Vec::new(), Vec::new());
-        Subject { forward, log_power, pass_variance, first_sleeper, pass_numbers, without, heard_m }
+        let (first_sleeper, without, detected_shapes_m) = (sleepers.start, Vec::new(), Vec::new());
+        PreparedRecording {
+            forward,
+            log_power,
+            pass_variance,
+            first_sleeper,
+            pass_numbers,
+            without,
+            detected_shapes_m,
+        }
     }
 }
 
-impl Subject {
+impl PreparedRecording {
     /// Takes from a recording what is compared.
     ///
     /// # Errors
-    /// [`SubjectError`] says what is missing.
-    pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, SubjectError> {
+    /// [`PreparationError`] says what is missing.
+    pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, PreparationError> {
         let measured = Measured::of(recording, design)?;
-        Ok(measured.subject(recording, design, measured.sleepers.clone()))
+        Ok(measured.prepared(recording, design, measured.sleepers.clone()))
     }
 
     /// The same in sections of at most `length` sleepers, each of which shares at least `overlap` with
     /// the next: a long track need not be fitted as a whole.
     ///
     /// # Errors
-    /// As [`Subject::new`].
+    /// As [`PreparedRecording::new`].
     pub fn sections(
         recording: &Recording,
         design: &TrackDesign,
         length: usize,
         overlap: usize,
-    ) -> Result<Vec<Self>, SubjectError> {
+    ) -> Result<Vec<Self>, PreparationError> {
         let measured = Measured::of(recording, design)?;
         let ranges = overlapping(measured.sleepers.clone(), length, overlap);
-        Ok(ranges.into_iter().map(|range| measured.subject(recording, design, range)).collect())
+        Ok(ranges.into_iter().map(|range| measured.prepared(recording, design, range)).collect())
     }
 
     /// Whether physics of a kind may be named.

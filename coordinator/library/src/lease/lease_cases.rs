@@ -1,7 +1,7 @@
 //! A lease: whose turn it is, and which cases.
 
 use super::hold::renew;
-use super::{Horizon, Lease, LeaseRequest, Leased};
+use super::{Lease, LeaseRequest, Leased, QueueCursor};
 use crate::attempt::{self, Ended};
 use crate::case::case_of;
 use crate::engine::{Connection, Row, Text, Write, sql};
@@ -74,12 +74,12 @@ const TAKE: Text = Text::Each {
         where campaign_id = $1 and sobol_index = any($2)",
 };
 
-pub(super) struct Take {
+pub(super) struct LeaseCases {
     pub(super) request: LeaseRequest,
-    pub(super) horizon: Arc<Horizon>,
+    pub(super) cursor: Arc<QueueCursor>,
 }
 
-impl Write for Take {
+impl Write for LeaseCases {
     type Answer = Option<Lease>;
 
     fn worker(&self) -> Option<&str> {
@@ -88,7 +88,7 @@ impl Write for Take {
 
     async fn apply(&self, connection: &mut Connection) -> Result<Option<Lease>, LibraryError> {
         let LeaseRequest { now_unix_ms, lease_ms, .. } = self.request;
-        let looks_at_all = self.horizon.is_due(now_unix_ms, lease_ms);
+        let looks_at_all = self.cursor.is_due(now_unix_ms, lease_ms);
         if looks_at_all {
             self.end_expired(connection).await?;
         }
@@ -96,13 +96,13 @@ impl Write for Take {
         if lease.is_some() || looks_at_all {
             return Ok(lease);
         }
-        self.horizon.forget();
+        self.cursor.forget();
         self.end_expired(connection).await?;
         self.first(connection).await
     }
 }
 
-impl Take {
+impl LeaseCases {
     /// Ends leases that have expired, but for those that are known to be held.
     async fn end_expired(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let LeaseRequest { campaign, worker, held, now_unix_ms, lease_ms, attempts_max, .. } =
@@ -141,14 +141,14 @@ impl Take {
         connection: &mut Connection,
         campaign: &str,
     ) -> Result<Vec<Leased>, LibraryError> {
-        let from = self.horizon.first_waiting(campaign);
+        let from = self.cursor.first_waiting(campaign);
         let waiting = self.waiting(connection, campaign, from).await?;
         let Some(last) = waiting.last() else { return Ok(Vec::new()) };
         let next = last.index() + 1;
         let (taken, passed_over) = share(waiting, self.request.alone_after);
         // What was passed over waits on.
         let first = passed_over.first().map_or(next, Waiting::index);
-        self.horizon.advance(campaign, from, first);
+        self.cursor.advance(campaign, from, first);
 
         let LeaseRequest { worker, now_unix_ms, lease_ms, .. } = &self.request;
         let take = sql(TAKE)

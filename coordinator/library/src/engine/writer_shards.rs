@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 /// Those of one worker are in one lane, for they change the same rows; whoever has none under way
 /// takes the emptiest.
 #[derive(Clone)]
-pub(super) struct Lanes(Arc<Mutex<UnderWay>>);
+pub(super) struct WriterShards(Arc<Mutex<UnderWay>>);
 
 struct UnderWay {
     /// Writes in each lane.
@@ -18,13 +18,13 @@ struct UnderWay {
 }
 
 /// A write's place in a lane, until it is dropped.
-pub(super) struct Place {
-    lanes: Lanes,
+pub(super) struct Slot {
+    shards: WriterShards,
     number: usize,
     worker: String,
 }
 
-impl Lanes {
+impl WriterShards {
     /// So many empty ones, at least one.
     pub(super) fn new(count: usize) -> Self {
         let under_way = UnderWay { counts: vec![0; count], workers: HashMap::new() };
@@ -32,14 +32,14 @@ impl Lanes {
     }
 
     /// A place for a write of a worker.
-    pub(super) fn enter(&self, worker: &str) -> Place {
+    pub(super) fn enter(&self, worker: &str) -> Slot {
         let mut under_way = self.lock();
         let UnderWay { counts, workers } = &mut *under_way;
-        let emptiest = (0..counts.len()).min_by_key(|&lane| counts[lane]).unwrap_or(0);
+        let emptiest = (0..counts.len()).min_by_key(|&shard| counts[shard]).unwrap_or(0);
         let (number, of_worker) = workers.entry(worker.to_owned()).or_insert((emptiest, 0));
         *of_worker += 1;
         counts[*number] += 1;
-        Place { lanes: self.clone(), number: *number, worker: worker.to_owned() }
+        Slot { shards: self.clone(), number: *number, worker: worker.to_owned() }
     }
 
     fn lock(&self) -> MutexGuard<'_, UnderWay> {
@@ -47,16 +47,16 @@ impl Lanes {
     }
 }
 
-impl Place {
+impl Slot {
     /// The lane, from 0.
     pub(super) const fn number(&self) -> usize {
         self.number
     }
 }
 
-impl Drop for Place {
+impl Drop for Slot {
     fn drop(&mut self) {
-        let mut under_way = self.lanes.lock();
+        let mut under_way = self.shards.lock();
         under_way.counts[self.number] -= 1;
         if let Some((_, of_worker)) = under_way.workers.get_mut(&self.worker) {
             *of_worker -= 1;
@@ -69,24 +69,24 @@ impl Drop for Place {
 
 #[cfg(test)]
 mod tests {
-    use super::Lanes;
+    use super::WriterShards;
 
     #[test]
     fn workers_take_the_emptiest_lane_and_stay_in_it_while_they_write() {
-        let lanes = Lanes::new(2);
-        let places = ["a", "b", "a", "a", "c"].map(|worker| lanes.enter(worker));
-        assert_eq!(places.each_ref().map(super::Place::number), [0, 1, 0, 0, 1]);
-        drop(places);
-        let [b, a] = ["b", "a"].map(|worker| lanes.enter(worker));
+        let shards = WriterShards::new(2);
+        let slots = ["a", "b", "a", "a", "c"].map(|worker| shards.enter(worker));
+        assert_eq!(slots.each_ref().map(super::Slot::number), [0, 1, 0, 0, 1]);
+        drop(slots);
+        let [b, a] = ["b", "a"].map(|worker| shards.enter(worker));
         assert_eq!([b.number(), a.number()], [0, 1], "nobody keeps a lane");
     }
 
     #[test]
     fn of_one_lane_everybody_takes_it_and_nobody_is_remembered() {
-        let lanes = Lanes::new(1);
+        let shards = WriterShards::new(1);
         for worker in ["a", "b"] {
-            assert_eq!(lanes.enter(worker).number(), 0);
+            assert_eq!(shards.enter(worker).number(), 0);
         }
-        assert!(lanes.lock().workers.is_empty() && lanes.lock().counts == [0]);
+        assert!(shards.lock().workers.is_empty() && shards.lock().counts == [0]);
     }
 }

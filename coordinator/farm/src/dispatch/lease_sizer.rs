@@ -24,11 +24,11 @@ const NEWEST: f64 = 0.1;
 
 /// Running mean of a case's computing time, and the size of leases that follows from it.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pace {
+pub struct LeaseSizer {
     case_s: Option<f64>,
 }
 
-impl Pace {
+impl LeaseSizer {
     /// Takes a measured computing time of a case, in s.
     pub fn measured(&mut self, case_s: f64) {
         let mean = self.case_s.unwrap_or(case_s);
@@ -49,14 +49,14 @@ mod tests {
     use super::*;
 
     fn lease_at(case_s: f64) -> u32 {
-        let mut pace = Pace::default();
-        pace.measured(case_s);
-        pace.cases_per_lease(2)
+        let mut lease_sizer = LeaseSizer::default();
+        lease_sizer.measured(case_s);
+        lease_sizer.cases_per_lease(2)
     }
 
     #[test]
     fn a_lease_is_one_or_two_seconds_of_work_in_whole_groups() {
-        assert_eq!(Pace::default().cases_per_lease(2), 8);
+        assert_eq!(LeaseSizer::default().cases_per_lease(2), 8);
         assert_eq!(lease_at(10.0), 8);
         assert_eq!(lease_at(0.02), 72);
         assert_eq!(lease_at(0.0), 512);
@@ -64,18 +64,18 @@ mod tests {
 
     #[test]
     fn the_more_cores_there_are_the_longer_leases_become_up_to_a_bound() {
-        let mut pace = Pace::default();
-        pace.measured(0.125);
-        let leases = [16, 160, 1600, 16_000].map(|cores| pace.cases_per_lease(cores));
+        let mut lease_sizer = LeaseSizer::default();
+        lease_sizer.measured(0.125);
+        let leases = [16, 160, 1600, 16_000].map(|cores| lease_sizer.cases_per_lease(cores));
         // 1.5 s, 1.6 s, 16 s and 30 s of work in groups of a second.
         assert_eq!(leases, [16, 16, 128, 240]);
     }
 
     #[test]
     fn the_pace_follows_a_slower_machine() {
-        let mut pace = Pace::default();
-        pace.measured(0.02);
-        (0..100).for_each(|_| pace.measured(0.1));
-        assert_eq!(pace.cases_per_lease(2), 16);
+        let mut lease_sizer = LeaseSizer::default();
+        lease_sizer.measured(0.02);
+        (0..100).for_each(|_| lease_sizer.measured(0.1));
+        assert_eq!(lease_sizer.cases_per_lease(2), 16);
     }
 }

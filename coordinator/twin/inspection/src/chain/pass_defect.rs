@@ -2,8 +2,8 @@
 
 use super::contact::{Airborne, airborne};
 use super::offset::Offsets;
-use super::still::Still;
-use super::stranger::companies;
+use super::speed_coherence::speed_coherences;
+use super::standstill::Standstill;
 use crate::along::{Background, by_speed};
 use std::fmt;
 use tracktwin_number::rounded;
@@ -23,14 +23,14 @@ const UNLIKE: f64 = 0.3;
 const STRANGE: f64 = 0.1;
 /// Times the density of its noise floor above which a pass is heard, and up to what frequency times the
 /// sleeper spacing in m/s it must be, 80 Hz on V-Track: lower there is no track to hear, only a vehicle.
-const HEARD: f64 = 4.0;
-const HEARD_M_S: f64 = 10.0;
+const AUDIBLE: f64 = 4.0;
+const AUDIBLE_M_S: f64 = 10.0;
 /// Sleeper spacings that a pass must cover to be compared with itself elsewhere.
 const SPANS_MIN: f64 = 4.0;
 
 /// Why a pass can't be used.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Trouble {
+pub enum PassDefect {
     /// The signal doesn't change for a while.
     DropOut {
         /// Index of the pass.
@@ -66,7 +66,7 @@ pub enum Trouble {
     },
     /// Two passes over the same track at one speed have nothing in common: noise, another track, or
     /// positions that are off by more than half a sleeper spacing.
-    Unlike {
+    UnrelatedPasses {
         /// Indices of the passes.
         passes: [usize; 2],
         /// Their median correlation.
@@ -76,7 +76,7 @@ pub enum Trouble {
     },
     /// The passes at one speed share no surface with those at any other: noise, another track, or
     /// positions that are off by more than a sleeper spacing.
-    Stranger {
+    UnrelatedSpeed {
         /// Nominal speed in km/h.
         speed_km_h: f64,
         /// Their greatest coherence with a pass at another speed.
@@ -91,7 +91,7 @@ pub enum Trouble {
     },
 }
 
-impl fmt::Display for Trouble {
+impl fmt::Display for PassDefect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::DropOut { pass, from_m, duration_s } => write!(
@@ -120,13 +120,13 @@ impl fmt::Display for Trouble {
                 pass + 1,
                 1e2 * share
             ),
-            Self::Unlike { passes: [first, second], correlation, low_hz } => write!(
+            Self::UnrelatedPasses { passes: [first, second], correlation, low_hz } => write!(
                 f,
                 "passes {} and {}, at one speed: their correlation above {low_hz:.0} Hz is {correlation:.2}; noise, another track, or positions off by more than half a sleeper spacing",
                 first + 1,
                 second + 1
             ),
-            Self::Stranger { speed_km_h, coherence } => write!(
+            Self::UnrelatedSpeed { speed_km_h, coherence } => write!(
                 f,
                 "the passes at {} km/h: their coherence with those at other speeds, in waves of a tenth of a sleeper spacing to one, is {coherence:.2}; noise, another track, or positions off by more than a sleeper spacing",
                 rounded(*speed_km_h, 4)
@@ -141,69 +141,75 @@ impl fmt::Display for Trouble {
 }
 
 /// Everything that makes passes unusable; `offsets` are those of the same recording.
-pub fn troubles(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
+pub fn pass_defects(recording: &Recording, offsets: &[Offsets]) -> Vec<PassDefect> {
     let mut all = of_passes(recording);
     all.extend(between_passes(recording, offsets));
     all
 }
 
 /// What each pass suffers from by itself.
-pub(super) fn of_passes(recording: &Recording) -> Vec<Trouble> {
+pub(super) fn of_passes(recording: &Recording) -> Vec<PassDefect> {
     let passes = recording.passes.iter().enumerate();
     let flying = airborne(recording);
-    let mut all: Vec<Trouble> = passes
+    let mut all: Vec<PassDefect> = passes
         .flat_map(|(index, pass)| of_pass(index, pass, recording.spacing_m, flying[index].as_ref()))
         .collect();
     let speeds = by_speed(&recording.passes);
     let alone = speeds.iter().filter(|passes| passes.len() == 1).map(|passes| passes[0]);
-    let heard_hz = HEARD_M_S / recording.spacing_m;
-    let noise = alone.filter(|&pass| is_noise(&recording.passes[pass], heard_hz));
-    all.extend(noise.map(|pass| Trouble::Noise { pass }));
+    let audible_hz = AUDIBLE_M_S / recording.spacing_m;
+    let noise = alone.filter(|&pass| is_noise(&recording.passes[pass], audible_hz));
+    all.extend(noise.map(|pass| PassDefect::Noise { pass }));
     all
 }
 
 /// Passes that have no track in common.
-pub(super) fn between_passes(recording: &Recording, offsets: &[Offsets]) -> Vec<Trouble> {
+pub(super) fn between_passes(recording: &Recording, offsets: &[Offsets]) -> Vec<PassDefect> {
     let unlike = |offsets: &&Offsets| {
         // Where half of the stretches match, the rest is noise or a worn clock, not another track.
         2 * offsets.matched.len() < offsets.stretches && offsets.correlation < UNLIKE
     };
-    let mut all: Vec<Trouble> = offsets
+    let mut all: Vec<PassDefect> = offsets
         .iter()
         .filter(unlike)
-        .map(|offsets| Trouble::Unlike {
+        .map(|offsets| PassDefect::UnrelatedPasses {
             passes: offsets.passes,
             correlation: offsets.correlation,
             low_hz: offsets.low_hz,
         })
         .collect();
-    let companies = companies(recording);
-    let strangers = companies.iter().filter(|company| company.coherence < STRANGE);
-    all.extend(strangers.map(|company| Trouble::Stranger {
-        speed_km_h: company.speed_km_h,
-        coherence: company.coherence,
+    let speed_coherences = speed_coherences(recording);
+    let unrelated =
+        speed_coherences.iter().filter(|speed_coherence| speed_coherence.coherence < STRANGE);
+    all.extend(unrelated.map(|speed_coherence| PassDefect::UnrelatedSpeed {
+        speed_km_h: speed_coherence.speed_km_h,
+        coherence: speed_coherence.coherence,
     }));
     all
 }
 
-fn of_pass(index: usize, pass: &Pass, spacing_m: f64, flying: Option<&Airborne>) -> Vec<Trouble> {
+fn of_pass(
+    index: usize,
+    pass: &Pass,
+    spacing_m: f64,
+    flying: Option<&Airborne>,
+) -> Vec<PassDefect> {
     let samples = pass.signal.samples();
     let length_m = pass.position_m[samples.len() - 1] - pass.position_m[0];
     let mut all = Vec::new();
     if length_m < SPANS_MIN * spacing_m {
-        all.push(Trouble::Short { pass: index, length_m });
+        all.push(PassDefect::Short { pass: index, length_m });
     }
     if Background::of(&pass.signal).is_none() && samples.windows(2).all(|pair| pair[0] == pair[1]) {
-        all.push(Trouble::Dead { pass: index });
+        all.push(PassDefect::Dead { pass: index });
         return all;
     }
     if let Some(share) = flying.map(Airborne::share).filter(|share| *share > AIRBORNE) {
-        all.push(Trouble::Airborne { pass: index, share });
+        all.push(PassDefect::Airborne { pass: index, share });
         return all;
     }
     let share = share_at_limits(samples, flying.map(|found| found.sign));
     if share > SATURATED {
-        all.push(Trouble::Saturated { pass: index, share });
+        all.push(PassDefect::Saturated { pass: index, share });
         return all;
     }
     all.extend(drop_out(index, pass));
@@ -212,9 +218,9 @@ fn of_pass(index: usize, pass: &Pass, spacing_m: f64, flying: Option<&Airborne>)
 
 /// Whether nothing stands out of the noise floor. Of a pass that another repeats, that other tells
 /// better.
-fn is_noise(pass: &Pass, heard_hz: f64) -> bool {
+fn is_noise(pass: &Pass, audible_hz: f64) -> bool {
     let background = Background::of(&pass.signal);
-    background.is_some_and(|background| background.audible_hz(HEARD) < heard_hz)
+    background.is_some_and(|background| background.audible_hz(AUDIBLE) < audible_hz)
 }
 
 /// Share of samples that have exactly the greatest or the least value; a side on which the wheel is in the
@@ -230,16 +236,16 @@ fn share_at_limits(samples: &[f64], airborne_sign: Option<f64>) -> f64 {
 }
 
 /// The longest stretch without a change, if chance doesn't make it.
-fn drop_out(index: usize, pass: &Pass) -> Option<Trouble> {
+fn drop_out(index: usize, pass: &Pass) -> Option<PassDefect> {
     let samples = pass.signal.samples();
-    let still = Still::longest(samples);
-    let duration_s = still.samples as f64 / pass.signal.sample_rate_hz();
+    let standstill = Standstill::longest(samples);
+    let duration_s = standstill.samples as f64 / pass.signal.sample_rate_hz();
     // At the recorder's limit it is a crest that is cut off.
-    let is_cut = [1.0, -1.0].iter().any(|&sign| still.is_at_limit(samples, sign));
-    let is_drop_out = duration_s >= STILL_S && still.ln_p < STILL_LN_P && !is_cut;
-    is_drop_out.then(|| Trouble::DropOut {
+    let is_cut = [1.0, -1.0].iter().any(|&sign| standstill.is_at_limit(samples, sign));
+    let is_drop_out = duration_s >= STILL_S && standstill.ln_p < STILL_LN_P && !is_cut;
+    is_drop_out.then(|| PassDefect::DropOut {
         pass: index,
-        from_m: pass.position_m[still.from],
+        from_m: pass.position_m[standstill.from],
         duration_s,
     })
 }

@@ -1,7 +1,7 @@
 //! How much evidence a name needs, alone and beside what is accepted already.
 
 use super::extent::Extent;
-use super::probability::TEMPERATURE;
+use super::probability::EVIDENCE_TEMPERING;
 use crate::candidate::Candidate;
 use crate::section::Section;
 use tracktwin_track::extension::Class;
@@ -17,20 +17,20 @@ const FITTED_GAIN: f64 = 3.0;
 
 /// The least log evidence for a name, beside what is accepted already with its own log evidence.
 #[derive(Clone, Copy)]
-pub(super) struct Least<'a> {
+pub(super) struct EvidenceThreshold<'a> {
     pub(super) accepted: &'a [(Candidate, f64)],
     pub(super) section: &'a Section,
     /// Where the passes alone show the rail's own shape, from and to in m.
-    pub(super) heard_m: &'a [[f64; 2]],
+    pub(super) detected_shapes_m: &'a [[f64; 2]],
 }
 
-impl Least<'_> {
+impl EvidenceThreshold<'_> {
     /// The least log evidence for this candidate in nats.
     ///
     /// A shape that the passes alone show beside no accepted one is no small rest of another effect.
     pub(super) fn of(self, candidate: &Candidate) -> f64 {
-        let alone = TEMPERATURE * 20_f64.ln();
-        if is_local_shape(candidate) && self.is_heard(candidate) {
+        let alone = EVIDENCE_TEMPERING * 20_f64.ln();
+        if is_local_shape(candidate) && self.is_detected_by_passes(candidate) {
             return alone;
         }
         let known = self.accepted.iter();
@@ -38,12 +38,12 @@ impl Least<'_> {
         beside.fold(alone, f64::max)
     }
 
-    fn is_heard(self, candidate: &Candidate) -> bool {
+    fn is_detected_by_passes(self, candidate: &Candidate) -> bool {
         let Some(x_m) = candidate.extension.x_m else { return false };
         let places = self.accepted.iter().filter_map(|(known, _)| known.extension.x_m);
         let are_beside = |one, other| self.section.are_beside(one, other);
-        self.heard_m.iter().any(|&heard_m| {
-            are_beside(heard_m, x_m) && !places.clone().any(|known_m| are_beside(heard_m, known_m))
+        self.detected_shapes_m.iter().any(|&shape_m| {
+            are_beside(shape_m, x_m) && !places.clone().any(|known_m| are_beside(shape_m, known_m))
         })
     }
 
@@ -53,7 +53,7 @@ impl Least<'_> {
             return 0.0;
         }
         let [one, other] =
-            [known, candidate].map(|candidate| Extent::of(candidate, self.section).felt());
+            [known, candidate].map(|candidate| Extent::of(candidate, self.section).with_reach());
         if one.meets(other) {
             FURTHER_SHARE_MIN * (other.length() / one.length()).min(1.0)
         } else {
@@ -99,17 +99,18 @@ mod tests {
             };
             all.iter().find(is_it).unwrap()
         };
-        let least = Least { accepted: &[], section: &section, heard_m: &[] };
+        let threshold =
+            EvidenceThreshold { accepted: &[], section: &section, detected_shapes_m: &[] };
         let (bolts, axle_box) = (of("sleeper_bolt", None), of("flexible_axle_box", None));
         let (gap, far) = (of("hanging_sleeper", Some(&[3])), of("sleeper_bolt", Some(&[20])));
         let near = of("missing_railpad", Some(&[4]));
-        assert_eq!(least.share(gap, near), 0.25);
-        assert_eq!(least.share(gap, far), 0.0);
+        assert_eq!(threshold.share(gap, near), 0.25);
+        assert_eq!(threshold.share(gap, far), 0.0);
         // Two spans on either side of one sleeper, and of twenty-four.
-        assert_eq!(least.share(axle_box, gap), 0.25 * 4.0 / 27.0);
-        assert_eq!(least.share(axle_box, bolts), 0.25);
-        assert_eq!(least.share(gap, bolts), 0.25);
-        assert_eq!(least.share(joint_at(10.0), bolts), 0.0);
-        assert_eq!(least.share(joint_at(10.0), joint_at(10.5)), 0.25);
+        assert_eq!(threshold.share(axle_box, gap), 0.25 * 4.0 / 27.0);
+        assert_eq!(threshold.share(axle_box, bolts), 0.25);
+        assert_eq!(threshold.share(gap, bolts), 0.25);
+        assert_eq!(threshold.share(joint_at(10.0), bolts), 0.0);
+        assert_eq!(threshold.share(joint_at(10.0), joint_at(10.5)), 0.25);
     }
 }

@@ -20,7 +20,7 @@ type Segments = Vec<Vec<Complex64>>;
 
 /// What the passes at one speed have in common with those at others.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Company {
+pub(super) struct SpeedCoherence {
     /// Nominal speed in km/h.
     pub(super) speed_km_h: f64,
     /// Greatest coherence of one of its passes with one at another speed: zero as by chance, one
@@ -30,22 +30,22 @@ pub(super) struct Company {
 
 /// The company of every speed; none where there is one speed only, or where all passes together
 /// cover too little.
-pub(super) fn companies(recording: &Recording) -> Vec<Company> {
+pub(super) fn speed_coherences(recording: &Recording) -> Vec<SpeedCoherence> {
     let speeds = by_speed(&recording.passes);
     if speeds.len() < 2 {
         return Vec::new();
     }
     let Some(segments) = segments(recording) else { return Vec::new() };
-    let company = |own: &Vec<usize>| {
+    let speed_coherence = |own: &Vec<usize>| {
         let others = || (0..recording.passes.len()).filter(|other| !own.contains(other));
         let pairs = own.iter().flat_map(|&pass| others().map(move |other| [pass, other]));
         let coherences = pairs.map(|[pass, other]| coherence(&segments[pass], &segments[other]));
-        Company {
+        SpeedCoherence {
             speed_km_h: recording.passes[own[0]].speed_km_h,
             coherence: coherences.fold(f64::NEG_INFINITY, f64::max),
         }
     };
-    speeds.iter().map(company).collect()
+    speeds.iter().map(speed_coherence).collect()
 }
 
 /// Segments of all passes at the same places.

@@ -8,7 +8,7 @@ use self::findings::{
     clipping_finding, comb_finding, corrugation_finding, flat_finding, gain_finding, hum_finding,
     impact_finding, offset_finding, order_finding, scale_finding,
 };
-use crate::chain::{Gain, LossOfContact, Offsets, Trouble};
+use crate::chain::{Gain, LossOfContact, Offsets, PassDefect};
 use crate::finding::{Finding, Place};
 use crate::wheel::{Comb, Flat, Order};
 use crate::{chain, impact, wheel};
@@ -27,10 +27,10 @@ const AROUND_BLOW: f64 = 0.4;
 
 /// What the passes tell by themselves.
 #[derive(Clone, Debug)]
-pub struct FirstLook {
+pub struct Inspection {
     /// What was found: chain first, then wheel, then the rail's surface.
     pub findings: Vec<Finding>,
-    /// What was found too, but has a name that the catalogue lacks; see [`FirstLook::forget`].
+    /// What was found too, but has a name that the catalogue lacks; see [`Inspection::forget`].
     pub nameless: Vec<Finding>,
     /// The wheel's flat with the places of its blows, if it has one.
     pub flat: Option<Flat>,
@@ -38,7 +38,7 @@ pub struct FirstLook {
     /// no linear model holds there.
     pub loss_of_contact: Option<LossOfContact>,
     /// Passes that can't be used, and why.
-    pub troubles: Vec<Trouble>,
+    pub pass_defects: Vec<PassDefect>,
     /// Noise floor of each pass in (m/s2)2/Hz.
     pub noise_floors: Vec<Option<f64>>,
     /// Gains between passes at one speed.
@@ -49,7 +49,7 @@ pub struct FirstLook {
     pub comb: Option<Comb>,
 }
 
-impl FirstLook {
+impl Inspection {
     /// Takes from the findings the names that are not known.
     pub fn forget(&mut self, is_known: impl Fn(&str) -> bool) {
         let forgotten = self.findings.extract_if(.., |finding| !is_known(finding.physics));
@@ -64,25 +64,30 @@ impl FirstLook {
 
     /// What keeps everybody from saying anything of the track: a pass without a signal, or passes
     /// that nowhere repeat each other or those at other speeds, unless their odometers are to blame.
-    pub fn refusal(&self) -> Option<&Trouble> {
-        let silent =
-            |trouble: &&Trouble| matches!(trouble, Trouble::Dead { .. } | Trouble::Noise { .. });
-        let unlike = |trouble: &&Trouble| matches!(trouble, Trouble::Unlike { .. });
-        let stranger = |trouble: &&Trouble| matches!(trouble, Trouble::Stranger { .. });
+    pub fn refusal(&self) -> Option<&PassDefect> {
+        let silent = |defect: &&PassDefect| {
+            matches!(defect, PassDefect::Dead { .. } | PassDefect::Noise { .. })
+        };
+        let unrelated_passes =
+            |defect: &&PassDefect| matches!(defect, PassDefect::UnrelatedPasses { .. });
+        let unrelated_speed =
+            |defect: &&PassDefect| matches!(defect, PassDefect::UnrelatedSpeed { .. });
         let is_misplaced =
             self.findings.iter().any(|found| found.physics == POSITION_ERROR.physics);
-        let is_noise = self.troubles.iter().filter(unlike).count() == self.offsets.len();
-        let troubles = || self.troubles.iter();
-        let noise = troubles().find(unlike).filter(|_| is_noise);
-        let apart = noise.or_else(|| troubles().find(stranger)).filter(|_| !is_misplaced);
-        troubles().find(silent).or(apart)
+        let is_noise =
+            self.pass_defects.iter().filter(unrelated_passes).count() == self.offsets.len();
+        let pass_defects = || self.pass_defects.iter();
+        let noise = pass_defects().find(unrelated_passes).filter(|_| is_noise);
+        let unrelated =
+            noise.or_else(|| pass_defects().find(unrelated_speed)).filter(|_| !is_misplaced);
+        pass_defects().find(silent).or(unrelated)
     }
 }
 
 /// Tests a recording for everything that its passes show without a model of the track.
 ///
 /// On a recording without defects a finding comes up at most with probability [`FALSE_ALARMS`].
-pub fn first_look(recording: &Recording) -> FirstLook {
+pub fn inspect(recording: &Recording) -> Inspection {
     let unit = unit(recording);
     let gains = chain::gains(recording);
     let offsets = chain::offsets(recording);
@@ -101,20 +106,20 @@ pub fn first_look(recording: &Recording) -> FirstLook {
     // Blows of a flat lie elsewhere in every pass: passes with them are not to be laid on each other.
     if flat.is_none() {
         let alarm = EACH_TEST.ln() - (offsets.len().max(1) as f64).ln();
-        let apart = offsets.iter().filter(|pair| pair.ln_p() <= alarm);
-        findings.extend(apart.map(offset_finding));
+        let unrelated = offsets.iter().filter(|pair| pair.ln_p() <= alarm);
+        findings.extend(unrelated.map(offset_finding));
     }
     findings.extend(on_surface);
     let loss_of_contact = chain::loss_of_contact(recording);
     if let Some(lost) = &loss_of_contact {
         findings.retain(|finding| !is_landing(finding, lost));
     }
-    FirstLook {
+    Inspection {
         findings,
         nameless: Vec::new(),
         flat,
         loss_of_contact,
-        troubles: chain::troubles(recording, &offsets),
+        pass_defects: chain::pass_defects(recording, &offsets),
         noise_floors: chain::noise_floors(recording),
         gains,
         offsets,
@@ -193,9 +198,9 @@ mod tests {
 
     /// Names that the passes of a shared recording give.
     fn names(recording: &str) -> Option<Vec<&'static str>> {
-        let look = first_look(&shared(recording)?);
-        assert!(look.troubles.is_empty(), "{:?}", look.troubles);
-        Some(look.findings.iter().map(|finding| finding.physics).collect())
+        let inspection = inspect(&shared(recording)?);
+        assert!(inspection.pass_defects.is_empty(), "{:?}", inspection.pass_defects);
+        Some(inspection.findings.iter().map(|finding| finding.physics).collect())
     }
 
     #[test]
@@ -213,7 +218,7 @@ mod tests {
         for (recording, speed_km_h) in [("dev-01", 7.0), ("dev-10", 13.0)] {
             let Some(mut recording) = shared(recording) else { return };
             recording.passes.retain(|pass| pass.speed_km_h.total_cmp(&speed_km_h).is_eq());
-            assert_eq!(first_look(&recording).findings, [], "{}", recording.name);
+            assert_eq!(inspect(&recording).findings, [], "{}", recording.name);
         }
     }
 
@@ -230,11 +235,15 @@ mod tests {
     #[test]
     fn speeds_that_share_no_surface_are_refused() {
         let mut recording = Rolled::faultless(6).recording();
-        assert_eq!(first_look(&recording).refusal(), None);
+        assert_eq!(inspect(&recording).refusal(), None);
         let elsewhere = Rolled::faultless(7).recording().passes.split_off(2);
         recording.passes.splice(2.., elsewhere);
-        let look = first_look(&recording);
-        assert!(matches!(look.refusal(), Some(Trouble::Stranger { .. })), "{:?}", look.troubles);
+        let inspection = inspect(&recording);
+        assert!(
+            matches!(inspection.refusal(), Some(PassDefect::UnrelatedSpeed { .. })),
+            "{:?}",
+            inspection.pass_defects
+        );
     }
 
     #[test]
@@ -245,7 +254,7 @@ mod tests {
             let radius = Rolled::CIRCUMFERENCE_M / std::f64::consts::TAU;
             let wheel = serde_json::json!({"radius_m": radius});
             recording.nominal.insert("wheel".to_owned(), wheel);
-            let found = first_look(&recording).findings;
+            let found = inspect(&recording).findings;
             for finding in &found {
                 println!("seed {seed}: {} {:e}", finding.physics, finding.p_value);
             }

@@ -14,38 +14,39 @@ const LOOKS_PER_LEASE: i64 = 24;
 /// seen when all is looked at. Several coordinators may serve a library, and none knows what
 /// the others have put back.
 #[derive(Debug, Default)]
-pub(crate) struct Horizon(Mutex<Seen>);
+pub(crate) struct QueueCursor(Mutex<CursorState>);
 
 #[derive(Debug, Default)]
-struct Seen {
+struct CursorState {
     looked_unix_ms: Option<i64>,
     first_waiting: HashMap<String, u32>,
 }
 
-impl Horizon {
+impl QueueCursor {
     /// Whether it is time to look at everything; whoever is told so does it.
     pub(super) fn is_due(&self, now_unix_ms: i64, lease_ms: i64) -> bool {
-        let mut seen = self.0.lock().expect("nobody panics while holding it");
-        let since_ms = seen.looked_unix_ms.map(|looked| now_unix_ms.saturating_sub(looked));
+        let mut state = self.0.lock().expect("nobody panics while holding it");
+        let since_ms = state.looked_unix_ms.map(|looked| now_unix_ms.saturating_sub(looked));
         // A clock that was put back says nothing.
         let is_due = since_ms.is_none_or(|since| since < 0 || since >= lease_ms / LOOKS_PER_LEASE);
         if is_due {
-            *seen = Seen { looked_unix_ms: Some(now_unix_ms), first_waiting: HashMap::new() };
+            *state =
+                CursorState { looked_unix_ms: Some(now_unix_ms), first_waiting: HashMap::new() };
         }
         is_due
     }
 
     /// No case waits before it, as far as was seen.
     pub(super) fn first_waiting(&self, campaign: &str) -> u32 {
-        let seen = self.0.lock().expect("nobody panics while holding it");
-        seen.first_waiting.get(campaign).copied().unwrap_or(0)
+        let state = self.0.lock().expect("nobody panics while holding it");
+        state.first_waiting.get(campaign).copied().unwrap_or(0)
     }
 
     /// Whoever began to look `from` a place has found none waiting before another. Others may have
     /// moved it meanwhile; then theirs stands.
     pub(super) fn advance(&self, campaign: &str, from: u32, to: u32) {
-        let mut seen = self.0.lock().expect("nobody panics while holding it");
-        let first = seen.first_waiting.entry(campaign.to_owned()).or_insert(0);
+        let mut state = self.0.lock().expect("nobody panics while holding it");
+        let first = state.first_waiting.entry(campaign.to_owned()).or_insert(0);
         if *first == from {
             *first = to;
         }
@@ -53,7 +54,7 @@ impl Horizon {
 
     /// Everything is looked at with the next lease.
     pub(super) fn forget(&self) {
-        *self.0.lock().expect("nobody panics while holding it") = Seen::default();
+        *self.0.lock().expect("nobody panics while holding it") = CursorState::default();
     }
 }
 
@@ -63,25 +64,25 @@ mod tests {
 
     #[test]
     fn all_is_looked_at_from_time_to_time_and_when_the_clock_was_put_back() {
-        let horizon = Horizon::default();
-        assert!(horizon.is_due(1000, 240));
-        assert!(!horizon.is_due(1009, 240));
-        horizon.advance("a", 0, 7);
-        assert_eq!((horizon.first_waiting("a"), horizon.first_waiting("b")), (7, 0));
-        assert!(horizon.is_due(1010, 240));
-        assert_eq!(horizon.first_waiting("a"), 0);
-        assert!(horizon.is_due(900, 240));
-        horizon.forget();
-        assert!(horizon.is_due(901, 240));
+        let cursor = QueueCursor::default();
+        assert!(cursor.is_due(1000, 240));
+        assert!(!cursor.is_due(1009, 240));
+        cursor.advance("a", 0, 7);
+        assert_eq!((cursor.first_waiting("a"), cursor.first_waiting("b")), (7, 0));
+        assert!(cursor.is_due(1010, 240));
+        assert_eq!(cursor.first_waiting("a"), 0);
+        assert!(cursor.is_due(900, 240));
+        cursor.forget();
+        assert!(cursor.is_due(901, 240));
     }
 
     #[test]
     fn whoever_began_elsewhere_moves_nothing() {
-        let horizon = Horizon::default();
-        horizon.advance("a", 0, 50);
-        horizon.advance("a", 0, 100);
-        assert_eq!(horizon.first_waiting("a"), 50);
-        horizon.advance("a", 50, 60);
-        assert_eq!(horizon.first_waiting("a"), 60);
+        let cursor = QueueCursor::default();
+        cursor.advance("a", 0, 50);
+        cursor.advance("a", 0, 100);
+        assert_eq!(cursor.first_waiting("a"), 50);
+        cursor.advance("a", 50, 60);
+        assert_eq!(cursor.first_waiting("a"), 60);
     }
 }

@@ -19,7 +19,7 @@ const CASES_IN_A_PAUSE: f64 = 16.0;
 
 /// How fast a campaign goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Pace {
+pub(crate) struct Throughput {
     /// Cases finished a second.
     pub(crate) per_second: f64,
     /// Mean computing time of a case, in s.
@@ -36,7 +36,7 @@ struct Interval {
 
 impl Library {
     /// The paces of campaigns that have finished something lately.
-    pub(crate) async fn paces(&self) -> Result<HashMap<String, Pace>, LibraryError> {
+    pub(crate) async fn throughputs(&self) -> Result<HashMap<String, Throughput>, LibraryError> {
         let now_unix_ms = self.now_unix_ms();
         let since_unix_s = interval(now_unix_ms) - OVER_S;
         let ask = "select campaign.id, from_unix_s, cast(sum(finished) as bigint) as finished,
@@ -57,13 +57,14 @@ impl Library {
             });
         }
         let now_unix_s = now_unix_ms as f64 / 1000.0;
-        let pace = |(begun, intervals): (i64, Vec<Interval>)| pace(&intervals, begun, now_unix_s);
-        Ok(campaigns.into_iter().map(|(id, campaign)| (id, pace(campaign))).collect())
+        let throughput =
+            |(begun, intervals): (i64, Vec<Interval>)| throughput(&intervals, begun, now_unix_s);
+        Ok(campaigns.into_iter().map(|(id, campaign)| (id, throughput(campaign))).collect())
     }
 }
 
 /// The pace of these intervals, ascending: since `begun_unix_s`, or since the last pause.
-fn pace(intervals: &[Interval], begun_unix_s: i64, now_unix_s: f64) -> Pace {
+fn throughput(intervals: &[Interval], begun_unix_s: i64, now_unix_s: f64) -> Throughput {
     let all: f64 = intervals.iter().map(|it| it.finished).sum();
     let busy_s: f64 = intervals.iter().map(|it| it.busy_s).sum();
     let mean_case_s = (all > 0.0).then(|| busy_s / all);
@@ -79,10 +80,10 @@ fn pace(intervals: &[Interval], begun_unix_s: i64, now_unix_s: f64) -> Pace {
         if still_s * per_second > MISSING_IN_A_PAUSE
             && still_s > CASES_IN_A_PAUSE * mean_case_s.unwrap_or(0.0)
         {
-            return Pace { per_second, mean_case_s };
+            return Throughput { per_second, mean_case_s };
         }
     }
-    Pace { per_second: rate(all, begun_unix_s), mean_case_s }
+    Throughput { per_second: rate(all, begun_unix_s), mean_case_s }
 }
 
 #[cfg(test)]
@@ -102,23 +103,26 @@ mod tests {
     #[test]
     fn after_a_pause_the_rate_is_that_since_then() {
         let paused = intervals(&[(0, 250.0), (50, 240.0), (60, 60.0)], 0.1);
-        assert_eq!(pace(&paused, 0, 62.0).per_second, 25.0);
+        assert_eq!(throughput(&paused, 0, 62.0).per_second, 25.0);
         // A campaign that stood still for longer than is looked at.
         let resumed = intervals(&[(50, 250.0), (60, 50.0)], 0.1);
-        assert_eq!(pace(&resumed, 0, 62.0).per_second, 25.0);
+        assert_eq!(throughput(&resumed, 0, 62.0).per_second, 25.0);
     }
 
     #[test]
     fn results_that_come_seldom_or_many_at_a_time_are_no_pauses() {
         let seldom = intervals(&[(0, 1.0), (30, 1.0), (60, 1.0)], 20.0);
-        assert_eq!(pace(&seldom, 0, 66.0).per_second, 3.0 / 66.0);
+        assert_eq!(throughput(&seldom, 0, 66.0).per_second, 3.0 / 66.0);
         let many_at_a_time = intervals(&[(0, 128.0), (30, 128.0), (60, 128.0)], 2.0);
-        assert_eq!(pace(&many_at_a_time, 0, 64.0).per_second, 6.0);
+        assert_eq!(throughput(&many_at_a_time, 0, 64.0).per_second, 6.0);
     }
 
     #[test]
     fn the_mean_of_a_case_is_that_of_the_last_minute() {
-        assert_eq!(pace(&intervals(&[(0, 3.0), (50, 1.0)], 0.5), 0, 60.0).mean_case_s, Some(0.5));
-        assert_eq!(pace(&intervals(&[(0, 0.0)], 0.5), 0, 60.0), Pace::default());
+        assert_eq!(
+            throughput(&intervals(&[(0, 3.0), (50, 1.0)], 0.5), 0, 60.0).mean_case_s,
+            Some(0.5)
+        );
+        assert_eq!(throughput(&intervals(&[(0, 0.0)], 0.5), 0, 60.0), Throughput::default());
     }
 }

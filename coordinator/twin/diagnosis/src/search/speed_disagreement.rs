@@ -2,7 +2,7 @@
 
 use super::chance::squares;
 use super::limits::FALSE_ALARM;
-use super::probability::TEMPERATURE;
+use super::probability::EVIDENCE_TEMPERING;
 use super::round::Setting;
 use super::{Round, Search};
 use crate::calibration::{CalibrationError, Problem};
@@ -12,8 +12,8 @@ use tracktwin_number::probability;
 impl Search {
     /// Compares what was found with a track of its own for each speed, and takes it back if that is
     /// surely better: what stays where it is, all speeds pass.
-    pub(super) fn compare_apart(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
-        let forward = &setting.subject.forward;
+    pub(super) fn compare_speeds(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
+        let forward = &setting.prepared.forward;
         if forward.speeds_m_s.len() < 2 {
             return Ok(());
         }
@@ -36,8 +36,8 @@ impl Search {
         }
         // What is wrong at one place is wrong with the track there, not with where the passes were.
         let all: f64 = gains.iter().sum();
-        self.apart = alone - together + 0.5 * (sleepers as f64 * median(gains) - all);
-        if self.is_apart() {
+        self.speed_disagreement = alone - together + 0.5 * (sleepers as f64 * median(gains) - all);
+        if self.speeds_disagree() {
             self.accepted.clear();
             self.last = self.baseline.clone();
             self.rounds.truncate(1);
@@ -47,13 +47,13 @@ impl Search {
     }
 
     /// Probability of such a difference if all speeds passed the same track.
-    pub fn apart_p_value(&self) -> f64 {
-        probability(-self.apart.max(0.0) / TEMPERATURE)
+    pub fn speed_disagreement_p_value(&self) -> f64 {
+        probability(-self.speed_disagreement.max(0.0) / EVIDENCE_TEMPERING)
     }
 
     /// Whether the speeds did surely not pass the same track.
-    pub fn is_apart(&self) -> bool {
-        self.apart_p_value() <= FALSE_ALARM
+    pub fn speeds_disagree(&self) -> bool {
+        self.speed_disagreement_p_value() <= FALSE_ALARM
     }
 }
 

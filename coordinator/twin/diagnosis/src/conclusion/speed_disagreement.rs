@@ -9,18 +9,18 @@ use tracktwin_track::extension::{CLIPPING, POSITION_ERROR};
 impl Evidence<'_> {
     /// Nothing is named on a track that the speeds do not agree about: their positions are wrong, if
     /// no other fault of the measuring chain makes them differ.
-    pub(super) fn add_apart(&self, all: &mut Vec<Hypothesis>) {
-        if !self.search.is_apart() {
+    pub(super) fn add_speed_disagreement(&self, all: &mut Vec<Hypothesis>) {
+        if !self.search.speeds_disagree() {
             return;
         }
         for known in all.iter_mut() {
             known.accepted = false;
             known.probability *= FAILED_SHARE;
         }
-        let Some(evidence) = self.apart() else { return };
+        let Some(evidence) = self.speed_disagreement() else { return };
         let finding = Finding {
             physics: POSITION_ERROR.physics,
-            p_value: self.search.apart_p_value(),
+            p_value: self.search.speed_disagreement_p_value(),
             place: Place::Everywhere,
             parameters: BTreeMap::new(),
             evidence,
@@ -30,14 +30,15 @@ impl Evidence<'_> {
 
     /// What a reader should know of it, if it is so. Passes that are cut off differ wherever they were:
     /// the faster they are, the more is missing.
-    pub(super) fn apart(&self) -> Option<String> {
-        let are_cut = self.look.findings.iter().any(|finding| finding.physics == CLIPPING.physics);
-        (self.search.is_apart() && !are_cut).then(|| {
+    pub(super) fn speed_disagreement(&self) -> Option<String> {
+        let are_cut =
+            self.inspection.findings.iter().any(|finding| finding.physics == CLIPPING.physics);
+        (self.search.speeds_disagree() && !are_cut).then(|| {
             format!(
                 "The speeds do not agree about the track: one for each explains the recording better \
                  than one for all, by {:.0} nats. Positions of some pass belong to another place, or to \
                  the other rail.",
-                self.search.apart
+                self.search.speed_disagreement
             )
         })
     }

@@ -19,19 +19,19 @@ const SILENCE: Duration = Duration::from_secs(30);
 
 /// A port with bounds.
 #[derive(Debug)]
-pub struct Port {
+pub struct BoundedListener {
     listener: TcpListener,
     shares: Arc<Semaphore>,
 }
 
-impl Port {
+impl BoundedListener {
     /// Puts bounds on a port.
     pub fn new(listener: TcpListener) -> Self {
         Self { listener, shares: Arc::new(Semaphore::new(CONNECTIONS_MAX)) }
     }
 }
 
-impl Listener for Port {
+impl Listener for BoundedListener {
     type Io = Connection;
     type Addr = SocketAddr;
 
@@ -98,7 +98,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn who_says_nothing_is_not_waited_for() {
-        let mut port = Port::new(TcpListener::bind("127.0.0.1:0").await.unwrap());
+        let mut port = BoundedListener::new(TcpListener::bind("127.0.0.1:0").await.unwrap());
         let mut client = TcpStream::connect(port.local_addr().unwrap()).await.unwrap();
         let (mut connection, _) = port.accept().await;
         client.write_all(b"GET").await.unwrap();

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// Long enough for a server that is restarted, short enough for those who wait for an answer.
-const PATIENCE: Duration = Duration::from_secs(10);
+const RETRY_BUDGET: Duration = Duration::from_secs(10);
 
 /// The first pause; each later one is twice as long.
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
@@ -15,16 +15,16 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 pub(crate) struct Exhausted;
 
 /// Pauses between attempts, until it is enough.
-pub(crate) struct Patience {
+pub(crate) struct RetryBudget {
     until: Instant,
     pause: Duration,
 }
 
-impl Patience {
+impl RetryBudget {
     /// None at all unless `some`.
     pub(crate) fn new(some: bool) -> Self {
-        let patience = if some { PATIENCE } else { Duration::ZERO };
-        Self { until: Instant::now() + patience, pause: FIRST_PAUSE }
+        let budget = if some { RETRY_BUDGET } else { Duration::ZERO };
+        Self { until: Instant::now() + budget, pause: FIRST_PAUSE }
     }
 
     /// Pauses before another attempt.

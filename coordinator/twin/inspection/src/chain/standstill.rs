@@ -1,7 +1,7 @@
 //! The longest stretch of a pass without a change.
 
 /// Neighbouring samples that are all alike.
-pub(super) struct Still {
+pub(super) struct Standstill {
     /// The first of them.
     pub(super) from: usize,
     /// How many follow it.
@@ -11,7 +11,7 @@ pub(super) struct Still {
     pub(super) ln_p: f64,
 }
 
-impl Still {
+impl Standstill {
     /// The longest of a pass; of a signal that doesn't change, all of it.
     pub(super) fn longest(samples: &[f64]) -> Self {
         let equal = samples.windows(2).filter(|pair| pair[0] == pair[1]).count();

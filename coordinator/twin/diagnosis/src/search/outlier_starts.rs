@@ -21,13 +21,13 @@ const FAR: f64 = 0.6;
 const NEIGHBOURS: usize = 3;
 
 /// Trials of effects under sleepers that lie far from their neighbours.
-pub(super) struct Imitated {
+pub(super) struct OutlierStarts {
     /// The unknowns, with the neighbours' stiffness under those sleepers.
     values: DVector<f64>,
     templates: Vec<Template>,
 }
 
-impl Imitated {
+impl OutlierStarts {
     /// What such sleepers may have instead, best of each kind.
     ///
     /// # Errors
@@ -37,7 +37,7 @@ impl Imitated {
         current: &Calibration,
         all: &[Candidate],
     ) -> Result<Self, CalibrationError> {
-        let (values, sleepers) = evened(&problem.forward.unknowns, &current.values);
+        let (values, sleepers) = smoothed_outliers(&problem.forward.unknowns, &current.values);
         let is_there = |candidate: &&Candidate| {
             let under = candidate.extension.sleepers.as_ref();
             under.is_some_and(|under| under.iter().all(|sleeper| sleepers.contains(sleeper)))
@@ -51,9 +51,9 @@ impl Imitated {
         if there.is_empty() {
             return Ok(Self { values, templates: Vec::new() });
         }
-        let even = problem.at(&values)?;
-        let mut tried = templates(problem, &even, &there, || {})?;
-        tried.sort_by(|a, b| b.along(&even.residual).total_cmp(&a.along(&even.residual)));
+        let smoothed = problem.at(&values)?;
+        let mut tried = templates(problem, &smoothed, &there, || {})?;
+        tried.sort_by(|a, b| b.along(&smoothed.residual).total_cmp(&a.along(&smoothed.residual)));
         let kind = |template: &Template| there[template.candidate].kind.physics;
         let mut best: Vec<Template> = Vec::new();
         for template in tried {
@@ -77,8 +77,8 @@ impl Imitated {
 
 /// Values in which each stiffness that is far from its neighbours' is their median instead, and the
 /// sleepers whose it is.
-fn evened(unknowns: &Unknowns, values: &DVector<f64>) -> (DVector<f64>, Vec<usize>) {
-    let mut even = values.clone();
+fn smoothed_outliers(unknowns: &Unknowns, values: &DVector<f64>) -> (DVector<f64>, Vec<usize>) {
+    let mut smoothed = values.clone();
     let mut sleepers = Vec::new();
     for field in [unknowns.ballast(), unknowns.railpad()] {
         let count = field.len();
@@ -87,12 +87,12 @@ fn evened(unknowns: &Unknowns, values: &DVector<f64>) -> (DVector<f64>, Vec<usiz
             let others = near.filter(|other| *other != sleeper);
             let usual = median(others.map(|other| values[field.start + other]).collect());
             if (values[field.start + sleeper] - usual).abs() > FAR {
-                even[field.start + sleeper] = usual;
+                smoothed[field.start + sleeper] = usual;
                 sleepers.push(sleeper);
             }
         }
     }
-    (even, sleepers)
+    (smoothed, sleepers)
 }
 
 #[cfg(test)]
@@ -116,7 +116,7 @@ mod tests {
     fn a_stiffness_far_from_its_neighbours_becomes_theirs_and_all_others_stay() {
         let unknowns = forward().unknowns;
         let mut values = unknowns.typical();
-        assert_eq!(evened(&unknowns, &values), (values.clone(), vec![]));
+        assert_eq!(smoothed_outliers(&unknowns, &values), (values.clone(), vec![]));
         let (ballast, railpad) = (unknowns.ballast().start, unknowns.railpad().start);
         // A track that changes along the way, and three sleepers that do not follow.
         for sleeper in 0..10 {
@@ -126,9 +126,9 @@ mod tests {
         values[railpad + 4] -= 1.5;
         values[railpad + 5] -= 1.4;
         values[ballast + 9] += 0.7;
-        let (even, sleepers) = evened(&unknowns, &values);
+        let (smoothed, sleepers) = smoothed_outliers(&unknowns, &values);
         assert_eq!(sleepers, [9, 4, 5]);
-        assert!((even - usual).amax() < 0.2);
+        assert!((smoothed - usual).amax() < 0.2);
     }
 
     #[test]
@@ -145,16 +145,16 @@ mod tests {
         let observation = Observation::new(log_power, &covariance, |_| false).unwrap();
         let problem = Problem { forward: &forward, observation: &observation, candidates: &[] };
 
-        let even = problem.at(&typical).unwrap();
-        assert_eq!(Imitated::new(&problem, &even, &all).unwrap().starts().count(), 0);
+        let smoothed = problem.at(&typical).unwrap();
+        assert_eq!(OutlierStarts::new(&problem, &smoothed, &all).unwrap().starts().count(), 0);
 
         let mut soft = typical.clone();
         for sleeper in [4, 5] {
             soft[forward.unknowns.railpad().start + sleeper] -= 1.5;
         }
         let soft = problem.at(&soft).unwrap();
-        let imitated = Imitated::new(&problem, &soft, &all).unwrap();
-        let (best, values) = imitated.starts().next().unwrap();
+        let outlier_starts = OutlierStarts::new(&problem, &soft, &all).unwrap();
+        let (best, values) = outlier_starts.starts().next().unwrap();
         assert_eq!(all[best.candidate].kind.physics, "sleeper_bolt");
         assert_eq!(all[best.candidate].extension.sleepers, Some(vec![4, 5]));
         assert_eq!(values, typical);
