@@ -133,7 +133,7 @@ impl Line {
         let waves: Vec<(f64, f64)> = (kept + 1..TERMS * kept)
             .map(|n| {
                 let k = n as f64 * first;
-                (k, 2.0 / length_m * load(k) / (rail::section().bending * k.powi(3)))
+                (k, 2.0 / length_m * load(k) / (rail::cross_section().bending * k.powi(3)))
             })
             .collect();
         let from_m = x_m - REACH_M;
@@ -179,7 +179,7 @@ impl Extra {
         factor: f64,
     ) -> Self {
         let shape = rail.curvatures(x_m, softened_m);
-        let bending = rail::section().bending;
+        let bending = rail::cross_section().bending;
         // A pair of moments of unit size acts on the mean curvature times the length.
         let shown = bending * softened_m * rail.flexibility(&shape, &shape);
         let loss = 1.0 / factor - 1.0;
@@ -253,7 +253,7 @@ mod tests {
         // A long simply supported beam, force at midspan, joint there: the sag grows by
         // (1/beta - 1) / (E I) times the integral of the squared moment of a unit force.
         let (length, softened, factor) = (2.0, 0.025, 0.2);
-        let bending = rail::section().bending;
+        let bending = rail::cross_section().bending;
         let rail = RailModes::new(length, 400);
         let joint = Extra::joint(&rail, length, 1.0, softened, factor);
         let middle = rail.deflections(1.0);

@@ -1,7 +1,7 @@
 //! A flat: one blow a turn of the wheel.
 
 use crate::along::{bonferroni, combine_dependent_p_values, ln_gamma_tail};
-use crate::impact::{Cells, Listen, Observed, Shape, cells, fit};
+use crate::impact::{Cells, ImpactKind, Observed, Shape, cells, fit};
 use tracktwin_signal::recording::Recording;
 
 /// How far wear and an odometer's scale may take the circumference from its nominal value.
@@ -35,7 +35,7 @@ pub struct Flat {
 /// Each pass may meet the flat at its own phase. The circumference is searched around the given
 /// one.
 pub fn flat(recording: &Recording, circumference_m: f64, alpha: f64) -> Option<Flat> {
-    let passes = cells(recording, Listen::Blows, true);
+    let passes = cells(recording, ImpactKind::Blows, true);
     let length = passes.first().map(|cells| cells.ratio.len() as f64 * cells.step_m)?;
     if length < TURNS_MIN * circumference_m {
         return None;
