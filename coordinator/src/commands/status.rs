@@ -92,7 +92,7 @@ fn campaign_text(text: &mut String, campaign: &FarmCampaign) {
         text,
         "\n{id}  ({}{priority})\n{bar} {:5.1} %  {rate}{}\n\
          {cases} cases: {finished} finished, {leased} in work, {waiting} waiting, {failed} given up\n",
-        campaign.standing(),
+        campaign.state_text(),
         100.0 * share,
         campaign.left(),
     );

@@ -3,7 +3,7 @@
 use super::{Stop, Which};
 use crate::commands::progress::Progress;
 use crate::commands::{println_stderr, println_stdout};
-use tracktwin_library::{Finding, Library, LibraryError, Verified};
+use tracktwin_library::{IntegrityFault, Library, LibraryError, Verified};
 
 /// What no checksum is made of, and no hash.
 const UNCHECKED: &str = "not checked: who computed a case, when and for how long; attempts, audits, workers, \
@@ -14,7 +14,7 @@ pub(super) async fn run(which: &Which) -> Result<(), Stop> {
         Ok(library) => (library.name(), verify(&library).await?),
         Err(Stop::Input(error) | Stop::Failure(error)) if says_what_is_there(&error) => {
             let (place, what) = (which.library.name(), format!("{error:#}"));
-            let finding = Finding { place, what, count: 1, first_index: None };
+            let finding = IntegrityFault { place, what, count: 1, first_index: None };
             (String::new(), Verified { findings: vec![finding], ..Verified::default() })
         }
         Err(stop) => return Err(stop),
@@ -80,13 +80,13 @@ fn tell(json: bool, name: &str, verified: &Verified) {
     }
 }
 
-fn text(finding: &Finding) -> String {
-    let Finding { place, what, count, first_index } = finding;
+fn text(finding: &IntegrityFault) -> String {
+    let IntegrityFault { place, what, count, first_index } = finding;
     let first = first_index.map(|index| format!(" (the first is case {index})"));
     format!("{place}: {count} x {what}{}", first.unwrap_or_default())
 }
 
-fn json(finding: &Finding) -> serde_json::Value {
-    let Finding { place, what, count, first_index } = finding;
+fn json(finding: &IntegrityFault) -> serde_json::Value {
+    let IntegrityFault { place, what, count, first_index } = finding;
     serde_json::json!({ "place": place, "what": what, "count": count, "first_index": first_index })
 }
