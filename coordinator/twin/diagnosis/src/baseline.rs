@@ -19,12 +19,23 @@ pub struct Unknowns {
     knots: Vec<f64>,
     /// Logarithms of the frequencies in Hz at which the sensor's response is free.
     response_knots: Vec<f64>,
+    /// Mean over all sleepers of each quantity of [`Own`].
+    pub mean: [Mean; 3],
     /// How each quantity of [`Own`] varies along the track.
     pub variation: [Variation; 3],
     /// Sleepers that differ from their neighbours by more than `variation` says.
     pub exceptions: Vec<Exception>,
     /// Standard deviation of the sensor's response to power, in nats at each knot.
     pub response_deviation: f64,
+}
+
+/// What is known of the mean over all sleepers of a quantity's logarithm before anything is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mean {
+    /// Expected value of the logarithm.
+    pub log: f64,
+    /// Its standard deviation.
+    pub deviation: f64,
 }
 
 /// How the logarithm of a quantity varies along the track, about its mean.
@@ -107,6 +118,10 @@ impl Unknowns {
             speeds,
             knots,
             response_knots,
+            mean: Own::ALL.map(|quantity| Mean {
+                log: quantity.typical().ln(),
+                deviation: prior::MEAN[quantity as usize],
+            }),
             variation: prior::VARIATION,
             exceptions: Vec::new(),
             response_deviation: prior::RESPONSE,
@@ -215,7 +230,8 @@ impl Unknowns {
     pub fn typical(&self) -> DVector<f64> {
         let mut values = DVector::zeros(self.count());
         for quantity in Own::ALL {
-            self.own(quantity).for_each(|index| values[index] = quantity.typical().ln());
+            let Mean { log, .. } = self.mean[quantity as usize];
+            values.rows_mut(self.own(quantity).start, self.sleepers).fill(log);
         }
         for quantity in Common::ALL {
             values[self.common(quantity)] = quantity.typical().ln();
@@ -328,7 +344,7 @@ impl Unknowns {
         let distance = (i - j) as f64 / length;
         let together = smooth.powi(2) * (-0.5 * distance.powi(2)).exp();
         let own = if i == j { independent.powi(2) } else { 0.0 };
-        prior::MEAN[field as usize].powi(2) + together + own
+        self.mean[field as usize].deviation.powi(2) + together + own
     }
 }
 

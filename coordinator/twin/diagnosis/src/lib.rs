@@ -31,7 +31,7 @@ mod suggestion;
 mod transfer;
 
 pub use bands::Bands;
-pub use baseline::{Exception, Unknowns, Variation};
+pub use baseline::{Exception, Mean, Unknowns, Variation};
 pub use behaviour::{Behaviour, Element};
 pub use calibration::{Calibration, CalibrationError, Problem};
 pub use candidate::{Candidate, candidates};

@@ -1,10 +1,10 @@
 //! The fit of one section of track.
 
 use crate::variation::{Quadratic, learn};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use tracktwin_diagnosis::{
-    Calibration, CalibrationError, NullModel, Observation, PreparationError, PreparedRecording,
-    Problem, Unknowns, Variation,
+    Calibration, CalibrationError, Forward, Mean, NullModel, Observation, Own, PreparationError,
+    PreparedRecording, Problem, Unknowns, Variation,
 };
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
@@ -23,6 +23,15 @@ const RESPONSE: f64 = 0.09;
 /// Part of the variation along the track that a sleeper's estimate misplaces beside its posterior, for
 /// the model is not nature's; measured with `tracktwin coverage --method inversion`.
 const MISPLACED: f64 = 0.35;
+
+/// Step of the logarithm of the mean railpad stiffness along the posterior's valley, most steps on either
+/// side, and the log weight in nats below the highest that is negligible.
+const STEP: f64 = 0.15;
+const STEPS_MAX: u32 = 6;
+const NEGLIGIBLE: f64 = 4.0;
+
+/// Standard deviation of the logarithm of a mean that is held.
+const HELD: f64 = 0.02;
 
 /// Sleepers of a section, and sleepers that two neighbouring sections share.
 const LENGTH: usize = 24;
@@ -83,7 +92,89 @@ pub fn fit(
         let start = data.best(&forward.unknowns).ok_or(CalibrationError::NotFinite)?;
         calibration = fit(&forward, &factors, start)?;
     }
-    Ok(Fitted::of(forward.unknowns, calibration, &factors))
+    let valley =
+        along_valley(|forward, start| fit(forward, &factors, start), &forward, &calibration)?;
+    let posterior = Posterior::mixture(&valley);
+    let misfit = misfit(&calibration, &factors);
+    Ok(Fitted::of(forward.unknowns, posterior, misfit))
+}
+
+/// A fit with the mean railpad stiffness held, and the logarithm of its weight.
+struct Held {
+    log_weight: f64,
+    calibration: Calibration,
+}
+
+/// Fits with the mean railpad stiffness held at values on either side of the best fit's, as far as they
+/// have weight.
+///
+/// Stiffer railpads with more damping on softer sleepers leave nearly the same levels: the posterior is a
+/// long valley, often with several bottoms, and a normal distribution about one of them is too narrow. So
+/// the posterior is integrated over the mean by its values on a grid; all else is normal given the mean
+/// (a nested Laplace approximation).
+fn along_valley(
+    fit: impl Fn(&Forward, DVector<f64>) -> Result<Calibration, CalibrationError> + Sync,
+    forward: &Forward,
+    best: &Calibration,
+) -> Result<Vec<Held>, CalibrationError> {
+    let railpad = forward.unknowns.railpad();
+    let prior = forward.unknowns.mean[Own::RailpadStiffness as usize];
+    let middle = best.values.rows(railpad.start, railpad.len()).mean();
+    let at = |log: f64, mut start: DVector<f64>| -> Result<Held, CalibrationError> {
+        let mut held = forward.clone();
+        held.unknowns.mean[Own::RailpadStiffness as usize] = Mean { log, deviation: HELD };
+        let shift = log - start.rows(railpad.start, railpad.len()).mean();
+        railpad.clone().for_each(|index| start[index] += shift);
+        let calibration = fit(&held, start)?;
+        let from_prior = (log - prior.log) / prior.deviation;
+        let log_weight = calibration.log_evidence - 0.5 * from_prior.powi(2);
+        Ok(Held { log_weight, calibration })
+    };
+    let side = |step: f64| {
+        let mut walked: Vec<Held> = Vec::new();
+        let mut highest = f64::NEG_INFINITY;
+        for number in 1..=STEPS_MAX {
+            let start = walked.last().map_or(&best.values, |held| &held.calibration.values);
+            // At the edge of what makes a track the valley ends.
+            let Ok(held) = at(middle + f64::from(number) * step, start.clone()) else { break };
+            highest = highest.max(held.log_weight);
+            let is_negligible = held.log_weight < highest - NEGLIGIBLE;
+            walked.push(held);
+            if is_negligible {
+                break;
+            }
+        }
+        walked
+    };
+    let centre = at(middle, best.values.clone())?;
+    let (softer, stiffer) = rayon::join(|| side(-STEP), || side(STEP));
+    Ok(softer.into_iter().chain([centre]).chain(stiffer).collect())
+}
+
+/// Mean and covariance of the unknowns.
+struct Posterior {
+    values: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl Posterior {
+    fn mixture(all: &[Held]) -> Self {
+        let highest = all.iter().map(|held| held.log_weight).fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = all.iter().map(|held| (held.log_weight - highest).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        let shares = || weights.iter().map(|weight| weight / sum).zip(all);
+        let count = all[0].calibration.values.len();
+        let values = shares().fold(DVector::zeros(count), |mean, (share, held)| {
+            mean + share * &held.calibration.values
+        });
+        let covariance =
+            shares().fold(DMatrix::zeros(count, count), |covariance, (share, held)| {
+                let apart = &held.calibration.values - &values;
+                covariance
+                    + share * (held.calibration.precision.inverse() + &apart * apart.transpose())
+            });
+        Self { values, covariance }
+    }
 }
 
 /// Sum of squares of each sleeper's residual over the number of its log powers, with the covariance as it
@@ -103,10 +194,9 @@ fn factor(misfit: f64) -> f64 {
 }
 
 impl Fitted {
-    fn of(unknowns: Unknowns, calibration: Calibration, factors: &[f64]) -> Self {
-        let misfit = misfit(&calibration, factors);
-        let covariance = calibration.precision.inverse();
-        let (mut values, mut deviations) = (calibration.values, covariance.diagonal());
+    fn of(unknowns: Unknowns, posterior: Posterior, misfit: Vec<f64>) -> Self {
+        let Posterior { mut values, covariance } = posterior;
+        let mut deviations = covariance.diagonal();
         // The spectrum's mean and the level are one quantity: the surface's power.
         let spectrum = unknowns.spectrum();
         let share = 1.0 / spectrum.len() as f64;
