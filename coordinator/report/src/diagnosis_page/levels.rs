@@ -73,7 +73,7 @@ pub(super) fn share_within_two_sd(diagnosis: &Diagnosis, side: Side) -> Option<f
 }
 
 /// Mean square of difference over scatter at a sleeper, over speeds and bands.
-pub(super) fn strangeness(diagnosis: &Diagnosis, sleeper: usize) -> f64 {
+pub(super) fn mismatch_norm(diagnosis: &Diagnosis, sleeper: usize) -> f64 {
     let levels = &diagnosis.levels;
     let (mut sum, mut count) = (0.0, 0u32);
     for speed in 0..levels.speeds_km_h.len() {
