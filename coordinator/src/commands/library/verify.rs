@@ -1,20 +1,20 @@
-//! `tracktwin library verify`: whether the library is what it says it is.
+//! `tracktwin library verify`: integrity of a library.
 
 use super::{Stop, Which};
 use crate::commands::progress::Progress;
 use crate::commands::{println_stderr, println_stdout};
-use tracktwin_library::{Finding, Library, LibraryError, Verified};
+use tracktwin_library::{IntegrityFault, Library, LibraryError, Verified};
 
-/// What no checksum is made of, and no hash.
-const UNCHECKED: &str = "not checked: who computed a case, when and for how long; attempts, audits, workers, \
-                         progress; scores of trainings; what estimates, findings and trials say";
+/// Data that no checksum or hash covers.
+const UNCHECKED: &str = "not checked: worker, time and duration of a case; attempts, audits, workers, progress; \
+                         scores of trainings; contents of estimates, findings and trials";
 
 pub(super) async fn run(which: &Which) -> Result<(), Stop> {
     let (name, verified) = match which.library.open().await {
         Ok(library) => (library.name(), verify(&library).await?),
         Err(Stop::Input(error) | Stop::Failure(error)) if says_what_is_there(&error) => {
             let (place, what) = (which.library.name(), format!("{error:#}"));
-            let finding = Finding { place, what, count: 1, first_index: None };
+            let finding = IntegrityFault { place, what, count: 1, first_index: None };
             (String::new(), Verified { findings: vec![finding], ..Verified::default() })
         }
         Err(stop) => return Err(stop),
@@ -24,7 +24,7 @@ pub(super) async fn run(which: &Which) -> Result<(), Stop> {
 }
 
 async fn verify(library: &Library) -> Result<Verified, Stop> {
-    // What the counts are worth is found out in between.
+    // The counts may be wrong; the verification checks them.
     let mut cases = 0;
     for campaign in library.campaigns().await.unwrap_or_default() {
         cases += library.status(&campaign.id).await.map_or(0, |it| u64::from(it.finished));
@@ -40,7 +40,8 @@ async fn verify(library: &Library) -> Result<Verified, Stop> {
     Ok(verified)
 }
 
-/// Whether a library can't be opened for what is there, rather than because nothing is or answers.
+/// Whether a library cannot be opened because of its content, not because it is missing or does not
+/// respond.
 fn says_what_is_there(error: &anyhow::Error) -> bool {
     error.downcast_ref().is_some_and(|error| {
         matches!(
@@ -65,14 +66,14 @@ fn tell(json: bool, name: &str, verified: &Verified) {
         }
         if findings.is_empty() {
             println_stdout(&format!(
-                "nothing is wrong with {name} ({attested} cases have their checksums)"
+                "{name}: no faults found ({attested} cases match their checksums)"
             ));
         }
     }
     if *unattested > 0 {
         println_stderr(&format!(
-            "{unattested} cases have results without checksum, of before schema 8: nothing tells whether they \
-             were altered"
+            "{unattested} cases have results without a checksum (stored before schema 8): no \
+                 test shows whether they were altered"
         ));
     }
     for note in notes.iter().map(String::as_str).chain([UNCHECKED]) {
@@ -80,13 +81,13 @@ fn tell(json: bool, name: &str, verified: &Verified) {
     }
 }
 
-fn text(finding: &Finding) -> String {
-    let Finding { place, what, count, first_index } = finding;
+fn text(finding: &IntegrityFault) -> String {
+    let IntegrityFault { place, what, count, first_index } = finding;
     let first = first_index.map(|index| format!(" (the first is case {index})"));
     format!("{place}: {count} x {what}{}", first.unwrap_or_default())
 }
 
-fn json(finding: &Finding) -> serde_json::Value {
-    let Finding { place, what, count, first_index } = finding;
+fn json(finding: &IntegrityFault) -> serde_json::Value {
+    let IntegrityFault { place, what, count, first_index } = finding;
     serde_json::json!({ "place": place, "what": what, "count": count, "first_index": first_index })
 }
