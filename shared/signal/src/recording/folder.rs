@@ -270,7 +270,8 @@ fn read_pass(
 pub(super) fn straightened(file: &str, step_m: f64) -> String {
     let step = significant(step_m, 2);
     format!(
-        "{file}: the positions advance in steps of {step} m; between them the speed was taken as constant, and the zero of the positions is known to one step"
+        "{file}: the positions advance in steps of {step} m; a constant speed is assumed \
+             between steps, and the origin of the positions is known to one step"
     )
 }
 
