@@ -133,7 +133,7 @@ impl Coordinators {
         let mut contact = self.contact.lock();
         contact.answered = Instant::now();
         if contact.warned.take().is_some() {
-            tracing::warn!(coordinator = url, "the coordinator answers again");
+            tracing::warn!(coordinator = url, "the coordinator responds again");
         }
         self.counters.answered_calls.inc();
     }
@@ -143,7 +143,7 @@ impl Coordinators {
         if contact.warned.is_none_or(|warned| warned.elapsed() >= WARN_EVERY) {
             contact.warned = Some(Instant::now());
             let reason = reason(url, status);
-            tracing::warn!(coordinator = url, "the coordinator does not answer: {reason}");
+            tracing::warn!(coordinator = url, "the coordinator does not respond: {reason}");
         }
     }
 
@@ -180,15 +180,15 @@ fn reason(url: &str, status: &Status) -> String {
     let tls = url.starts_with("https:");
     let says = |words: &[&str]| words.iter().any(|it| reason.contains(it));
     let remedy = if says(&["UnknownIssuer"]) {
-        "; it shows a certificate of another authority than --tls-ca"
+        "; its certificate is not signed by the authority of --tls-ca"
     } else if tls && says(&["CertificateRequired", "connection closed", "broken pipe"]) {
-        "; it may demand a certificate: --tls-cert and --tls-key"
+        "; it may require a certificate: use --tls-cert and --tls-key"
     } else if tls && says(&["InvalidContentType"]) {
-        "; it may speak plain text: http://"
+        "; it may use plain text: try http://"
     } else if says(&["frame with invalid size", "broken pipe"]) {
-        "; it may speak TLS: https://"
+        "; it may use TLS: try https://"
     } else if says(&["compression flag"]) {
-        "; this port may be its dashboard's"
+        "; this may be the port of its dashboard"
     } else {
         ""
     };

@@ -54,7 +54,7 @@ impl Core {
         if let Some(limit) = self.idle_exit {
             let idle = self.session.idle_for();
             if idle >= limit {
-                tracing::info!("no work for {} s: done", idle.as_secs());
+                tracing::info!("no work for {} s: exiting", idle.as_secs());
                 self.session.shutdown.cancel();
             }
             wait = wait.min(limit.saturating_sub(idle));
@@ -176,7 +176,8 @@ fn guarded(simulation: &dyn Simulate, cases: &[Case]) -> Vec<Outcome> {
         Err(panic) => {
             let message = panic.downcast_ref::<String>().map(String::as_str);
             let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
-            let reason = format!("the program panicked: {}", message.unwrap_or("without words"));
+            let reason =
+                format!("the program panicked: {}", message.unwrap_or("without a message"));
             vec![Outcome::Failed { reason }; cases.len()]
         }
     }

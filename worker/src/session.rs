@@ -140,7 +140,7 @@ impl Session {
                         }
                         Err(error) => {
                             self.release(&campaign, held).await;
-                            let what = format!("a lease arrived damaged ({error})");
+                            let what = format!("a lease was damaged in transmission ({error})");
                             if !goes_again(&mut damaged, &what).await {
                                 return Err(error.into());
                             }
@@ -190,8 +190,8 @@ impl Session {
                     return Err(error);
                 }
                 Ok(None) => {
-                    step.fail("nobody answered");
-                    tracing::warn!("{} results could not be handed in", held.len());
+                    step.fail("no response");
+                    tracing::warn!("{} results could not be reported", held.len());
                     break;
                 }
                 Ok(Some(answer)) => {
@@ -200,7 +200,8 @@ impl Session {
                     if request.cases.is_empty() {
                         break;
                     }
-                    let what = format!("{} results arrived damaged", request.cases.len());
+                    let what =
+                        format!("{} results were damaged in transmission", request.cases.len());
                     if !goes_again(&mut damaged, &what).await {
                         step.fail(&what);
                         break;
@@ -219,7 +220,10 @@ impl Session {
         let settled = answer.receipts.iter().filter(|it| is_settled(**it));
         let (refused, taken): (Vec<&farm::Receipt>, Vec<_>) = settled.partition(refused);
         if !refused.is_empty() {
-            tracing::warn!("{} results refused: not cases of this coordinator", refused.len());
+            tracing::warn!(
+                "{} results refused: the coordinator does not know these cases",
+                refused.len()
+            );
         }
         let of_failures = taken.iter().filter(|it| failed.contains(&it.sobol_index)).count();
         self.counters.failed.inc_by(of_failures as u64);
@@ -242,9 +246,9 @@ impl Session {
         let failed = match &released {
             Ok(Ok(_)) => return,
             Ok(Err(status)) => status.message(),
-            Err(_) => "no answer",
+            Err(_) => "no response",
         };
-        tracing::warn!("cases not given back, their lease expires: {failed}");
+        tracing::warn!("cases not returned; their leases will expire: {failed}");
     }
 
     /// Renews what is held, for as long as the worker lives: a task of its own, so that no
@@ -264,7 +268,7 @@ impl Session {
                 match self.coordinators.once(renew).await {
                     Ok(answer) => {
                         let (after_s, lost) = (sent.elapsed().as_secs_f64(), answer.lost.len());
-                        tracing::debug!(campaign, cases, lost, after_s, "heartbeat answered");
+                        tracing::debug!(campaign, cases, lost, after_s, "heartbeat acknowledged");
                         self.lose(&campaign, &answer.lost);
                     }
                     // A coordinator that knows nobody is told who this is at the next lease.
@@ -280,9 +284,7 @@ impl Session {
         // What was handed in or given back while the heartbeat was under way is not lost.
         let lost = self.holdings.let_go(campaign, lost.iter().map(|it| (it.sobol_index, it.epoch)));
         if lost > 0 {
-            tracing::warn!(
-                "{lost} leases were taken back: they expired, or the campaign was cancelled"
-            );
+            tracing::warn!("{lost} leases have ended: they expired, or the campaign was cancelled");
             self.counters.lost.inc_by(lost as u64);
         }
     }
