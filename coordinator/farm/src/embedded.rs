@@ -35,7 +35,7 @@ pub enum FarmError {
     #[error(transparent)]
     Service(#[from] ServeError),
     /// There is no port to be had.
-    #[error("the farm's service has no port")]
+    #[error("the farm's service cannot bind a port")]
     Port(#[from] std::io::Error),
 }
 
@@ -178,10 +178,7 @@ impl Outage {
             return Err(error);
         }
         let since = *self.0.get_or_insert_with(|| {
-            tracing::warn!(
-                "{error}; waiting for it for up to {} minutes",
-                OUTAGE_MAX.as_secs() / 60
-            );
+            tracing::warn!("{error}; waiting for up to {} minutes", OUTAGE_MAX.as_secs() / 60);
             Instant::now()
         });
         if since.elapsed() < OUTAGE_MAX { Ok(()) } else { Err(error) }

@@ -16,7 +16,7 @@ pub(crate) fn named<T: Copy, const N: usize>(
     spelled: impl Fn(T) -> &'static str,
 ) -> Result<T, LibraryError> {
     let unknown = || LibraryError::Damaged {
-        what: format!("{of} is `{name}`, which this version of the program does not know"),
+        what: format!("{of} is `{name}`, which is unknown to this version of the program"),
     };
     all.into_iter().find(|&it| spelled(it) == name).ok_or_else(unknown)
 }

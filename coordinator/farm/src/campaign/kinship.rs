@@ -51,21 +51,22 @@ impl Campaign {
             Sequence::Rotated => (
                 "rotated",
                 format!(
-                    "the points of {id} in the library end at case {OWEN_POINTS_MAX}: `--cases \
-                     {OWEN_POINTS_MAX}` goes on with it to its end"
+                    "the points of {id} in the library end at case {OWEN_POINTS_MAX}: to continue it, \
+                         use `--cases {OWEN_POINTS_MAX}`"
                 ),
             ),
             Sequence::OwenScrambled => (
                 "owen_scrambled",
                 format!(
-                    "{id} in the library has the sequence `rotated`: write `sequence = \"rotated\"` into the campaign file to go on with it"
+                    "{id} in the library has the sequence `rotated`: to continue it, write `sequence = \
+                         \"rotated\"` into the campaign file"
                 ),
             ),
         };
         format!(
-            "cases: {cases} cases take their points from the sequence `{name}`, and would begin another campaign \
-             from case 0; {go_on}. To begin anew all the same, write `sequence = \"{name}\"` into the campaign \
-             file (`tracktwin run --print-campaign` prints the built-in one)"
+            "cases: {cases} cases use the sequence `{name}` and would start another campaign \
+                 from case 0; {go_on}. To start a new campaign, write `sequence = \"{name}\"` into \
+                 the campaign file (`tracktwin run --print-campaign` prints the built-in one)"
         )
     }
 }

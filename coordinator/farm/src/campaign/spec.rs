@@ -91,8 +91,8 @@ pub enum SpecError {
     },
     /// A name that terminals, pages and commands can't take.
     #[error(
-        "{path}: name: {name:?} must begin with a letter or digit and have up to {NAME_CHARACTERS_MAX} \
-         letters, digits, spaces, and . _ - +"
+        "{path}: name: {name:?} must start with a letter or digit and have up to \
+             {NAME_CHARACTERS_MAX} letters, digits, spaces, and . _ - +"
     )]
     Name {
         /// The file.
@@ -134,8 +134,8 @@ pub enum SpecError {
     },
     /// More cases than the sequence has points.
     #[error(
-        "{path}: cases: the owen_scrambled sequence repeats beyond {OWEN_POINTS_MAX} points and \
-         {cases} are asked for; write `sequence = \"rotated\"`"
+        "{path}: cases: {cases} exceeds the {OWEN_POINTS_MAX} points of the owen_scrambled \
+             sequence; write `sequence = \"rotated\"`"
     )]
     SequenceExhausted {
         /// The file.

@@ -30,7 +30,7 @@ pub struct Coordinator {
     pub exit_when_done: bool,
 }
 
-/// Why a coordinator ends before it is told to.
+/// Why a coordinator stopped before it is told to.
 #[derive(Debug, thiserror::Error)]
 pub enum CoordinatorError {
     /// The library fails or refuses.
@@ -43,7 +43,7 @@ pub enum CoordinatorError {
     #[error(transparent)]
     Security(#[from] SecurityError),
     /// A port has no address.
-    #[error("a port was lost")]
+    #[error("a listening port failed")]
     Port(#[from] std::io::Error),
 }
 
@@ -70,12 +70,12 @@ impl Coordinator {
             tracing::info!(%dashboard_address, "the dashboard is at http://{dashboard_address}/");
             tokio::spawn(dashboard::serve(listener, dashboard, stop.clone()));
         }
-        tracing::info!(%address, library = self.library.name(), "coordinator serves");
+        tracing::info!(%address, library = self.library.name(), "coordinator started");
         let watch = tokio::spawn(watch(self.library, self.exit_when_done, stop.clone()));
         let served = serve(self.listener, dispatch, &self.security, stop.clone()).await;
         stop.cancel();
         let watched = watch.await.expect("watching does not panic");
-        tracing::info!("coordinator ends");
+        tracing::info!("coordinator stopped");
         served?;
         Ok(watched?)
     }
@@ -86,6 +86,6 @@ impl Coordinator {
 fn raise_descriptors() {
     let Rlimit { maximum, .. } = getrlimit(Resource::Nofile);
     if let Err(error) = setrlimit(Resource::Nofile, Rlimit { current: maximum, maximum }) {
-        tracing::warn!("the number of open files stays bounded as it is: {error}");
+        tracing::warn!("the limit of open files cannot be raised: {error}");
     }
 }

@@ -1,4 +1,4 @@
-//! What a coordinator says of its campaigns, and when everything is done.
+//! What a coordinator says of its campaigns, and when all campaigns are done.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -44,7 +44,7 @@ pub(super) async fn watch(
                 }
             }
             Err(error) => {
-                tracing::error!(error = &error as &dyn Error, "the library does not answer");
+                tracing::error!(error = &error as &dyn Error, "the library does not respond");
             }
         }
         tokio::select! {
@@ -85,12 +85,12 @@ impl Logged {
         };
         if self.remaining.as_ref().is_none_or(is_news) {
             self.remaining = Some((remaining.cases, Instant::now()));
-            tracing::info!(cases = remaining.cases, "left to be simulated");
+            tracing::info!(cases = remaining.cases, "cases left to simulate");
         }
     }
 }
 
-/// What is left to be simulated.
+/// What is cases left to simulate.
 #[derive(Default)]
 struct Remaining {
     /// In campaigns that run.
@@ -111,11 +111,11 @@ impl Remaining {
     fn log_end(&self) {
         let Self { paused, audits, .. } = *self;
         if paused > 0 {
-            tracing::warn!(cases = paused, "done but for paused campaigns");
+            tracing::warn!(cases = paused, "done, except for paused campaigns");
         } else if audits > 0 {
-            tracing::warn!(audits, "done but for audits that no other worker is there for");
+            tracing::warn!(audits, "waiting: audits need a second worker");
         } else {
-            tracing::info!("everything is done");
+            tracing::info!("all campaigns are done");
         }
     }
 }

@@ -84,7 +84,7 @@ pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: Cancellati
     let served = axum::serve(BoundedListener::new(listener), routes)
         .with_graceful_shutdown(stop.cancelled_owned());
     if let Err(error) = served.await {
-        tracing::error!("the dashboard is no longer served: {error}");
+        tracing::error!("the dashboard has stopped: {error}");
     }
 }
 
@@ -111,7 +111,7 @@ async fn same_origin(
         name == "localhost" || name.trim_matches(['[', ']']).parse::<std::net::IpAddr>().is_ok()
     };
     if dashboard.0.loopback && !local(host) {
-        return (StatusCode::FORBIDDEN, "not this machine's name\n").into_response();
+        return (StatusCode::FORBIDDEN, "not a name of this machine\n").into_response();
     }
     let may_control = MayControl(dashboard.admits(headers));
     request.extensions_mut().insert(may_control);
@@ -153,7 +153,7 @@ async fn login(State(dashboard): State<Dashboard>, Form(login): Form<Login>) -> 
     let key =
         dashboard.0.key.as_ref().filter(|_| dashboard.0.guard.admits(Some(header.as_bytes())));
     let Some(key) = key else {
-        tracing::warn!("a wrong token was shown to the dashboard");
+        tracing::warn!("the dashboard was given a wrong token");
         return (StatusCode::FORBIDDEN, "the token is wrong\n").into_response();
     };
     let cookie = format!("{COOKIE}={key}; HttpOnly; SameSite=Strict; Path=/");
@@ -172,16 +172,16 @@ async fn control(
     Form(Chosen { campaign }): Form<Chosen>,
 ) -> Result<Response, Failed> {
     if !may_control {
-        return Ok((StatusCode::FORBIDDEN, "show the token first\n").into_response());
+        return Ok((StatusCode::FORBIDDEN, "enter the token first\n").into_response());
     }
     let library = &dashboard.0.library;
     match action.as_str() {
         "pause" => library.pause(&campaign).await?,
         "resume" => library.resume(&campaign).await?,
         "retry" => library.retry(&campaign, Retry::Failed).await.map(drop)?,
-        _ => return Ok((StatusCode::NOT_FOUND, "no such action\n").into_response()),
+        _ => return Ok((StatusCode::NOT_FOUND, "unknown action\n").into_response()),
     }
-    tracing::info!(campaign, action, "asked for at the dashboard");
+    tracing::info!(campaign, action, "requested on the dashboard");
     Ok(Redirect::to("/").into_response())
 }
 

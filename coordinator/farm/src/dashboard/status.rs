@@ -102,7 +102,7 @@ impl FarmCampaign {
         self.state == "running" && !self.is_done()
     }
 
-    /// How long the rest takes at the present rate, in s; none where nothing is handed out.
+    /// How long the rest takes at the present rate, in s; none where no cases are leased.
     pub fn eta_s(&self) -> Option<f64> {
         let left = f64::from(self.waiting + self.leased);
         (self.is_at_work() && self.per_second > 0.0).then(|| left / self.per_second)
@@ -113,11 +113,11 @@ impl FarmCampaign {
         match self.eta_s() {
             Some(eta_s) => format!("{} left", duration(eta_s)),
             None if self.is_done() && self.failed > 0 => {
-                "done but for what was given up".to_owned()
+                "done, except for given-up cases".to_owned()
             }
             None if self.is_done() => "nothing left to do".to_owned(),
-            None if !self.is_at_work() => "nothing is handed out".to_owned(),
-            None => "rate not known yet".to_owned(),
+            None if !self.is_at_work() => "no cases are leased".to_owned(),
+            None => "rate unknown".to_owned(),
         }
     }
 }
@@ -149,11 +149,11 @@ mod tests {
         };
         assert_eq!(running.left(), "35 s left");
         let paused = FarmCampaign { state: "paused".to_owned(), ..running };
-        assert_eq!((paused.eta_s(), paused.left().as_str()), (None, "nothing is handed out"));
+        assert_eq!((paused.eta_s(), paused.left().as_str()), (None, "no cases are leased"));
         let done = FarmCampaign { waiting: 0, leased: 0, failed: 1, ..paused };
         assert_eq!(
             (done.state_text(), done.left().as_str()),
-            ("done", "done but for what was given up")
+            ("done", "done, except for given-up cases")
         );
     }
 

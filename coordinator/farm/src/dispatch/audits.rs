@@ -194,7 +194,9 @@ impl Audits {
             return Ok(Some(AuditOutcome::Agreement));
         }
         let Some(wrong) = wrong else {
-            tracing::error!("{reason}; this machine could not simulate it, so nobody is blamed");
+            tracing::error!(
+                "{reason}; this machine could not simulate the case, so no worker is quarantined"
+            );
             return Ok(Some(AuditOutcome::Unjudged));
         };
         tracing::error!(worker = wrong, "quarantined: {reason}");

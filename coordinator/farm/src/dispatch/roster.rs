@@ -83,7 +83,7 @@ impl Roster {
         let exclusion = quarantine.map(|reason| (PRESENT, format!("in quarantine: {reason}")));
         let failing = || {
             let left = worker.breaker.open_for(now)?;
-            Some((left, "put aside: it fails where other workers don't".to_owned()))
+            Some((left, "suspended: its cases fail, those of other workers do not".to_owned()))
         };
         Some(WorkerEligibility {
             code_version: worker.registration.code_version.clone(),

@@ -28,7 +28,7 @@ const TOKEN_BYTES: usize = 32;
 #[derive(Debug, thiserror::Error)]
 pub enum CertificatesError {
     /// The folder, or a file in it, can't be read.
-    #[error("{path}: cannot be read: {source}")]
+    #[error("cannot read {path}: {source}")]
     File {
         /// The file.
         path: PathBuf,
@@ -40,14 +40,15 @@ pub enum CertificatesError {
     Files(#[from] FilesError),
     /// A host that workers can't call.
     #[error(
-        "{host:?} is no host; write a name such as head.cluster or an address such as 10.0.0.1"
+        "{host:?} is not a host; write a name such as head.cluster or an address such as \
+             10.0.0.1"
     )]
     Host {
         /// What was given.
         host: String,
     },
     /// A name that certificates can't hold, or a key that is none.
-    #[error("no certificate can be made of it: {0}")]
+    #[error("cannot create a certificate: {0}")]
     Certificate(#[from] rcgen::Error),
 }
 

@@ -30,15 +30,15 @@ const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 /// Why a caller is turned away.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
-    #[error("said nothing for {} s", PREFACE_TIME.as_secs())]
+    #[error("no data for {} s", PREFACE_TIME.as_secs())]
     Silent,
-    #[error("spoke neither gRPC nor anything else that is served here")]
+    #[error("unknown protocol; gRPC is expected")]
     UnknownProtocol,
     #[error("TLS: {0}")]
     Tls(std::io::Error),
     #[error("TLS without HTTP/2")]
     NoHttp2,
-    #[error("went away: {0}")]
+    #[error("connection lost: {0}")]
     Gone(#[from] std::io::Error),
 }
 
@@ -59,7 +59,7 @@ pub fn accept(
                 accepted = listener.accept() => match accepted {
                     Ok(accepted) => accepted,
                     Err(error) => {
-                        tracing::warn!("a connection could not be taken: {error}");
+                        tracing::warn!("cannot accept a connection: {error}");
                         tokio::time::sleep(SYSTEM_PAUSE).await;
                         continue;
                     }

@@ -30,9 +30,9 @@ pub struct Security {
 pub enum SecurityError {
     /// A port that others can reach, in plain text.
     #[error(
-        "{address} can be reached by other machines and would speak plain text; give it a \
-         certificate (`tracktwin certs` makes one; --tls-cert, --tls-key), or --insecure where the \
-         network itself is trusted"
+        "{address} is reachable from other machines, but has no certificate; create one \
+             with `tracktwin certs` and use --tls-cert and --tls-key, or use --insecure on a \
+             trusted network"
     )]
     PlainText {
         /// The address.
@@ -40,16 +40,16 @@ pub enum SecurityError {
     },
     /// A port that others can reach, and nothing that they must show.
     #[error(
-        "{address} can be reached by other machines and would serve anybody; demand a token \
-         (--token-file) or workers' certificates (--tls-client-ca), or --insecure where the \
-         network itself is trusted"
+        "{address} is reachable from other machines, but requires no token; use \
+             --token-file or worker certificates (--tls-client-ca), or --insecure on a trusted \
+             network"
     )]
     Anybody {
         /// The address.
         address: SocketAddr,
     },
     /// A PEM file that holds something else.
-    #[error("{what}: not the PEM file that it should be: {source}")]
+    #[error("{what}: not a valid PEM file: {source}")]
     Pem {
         /// What it should be.
         what: &'static str,

@@ -21,11 +21,11 @@ pub(super) fn check(text: &str, dialect: Dialect) -> Result<(), LibraryError> {
     let refused = |reason: &str| LibraryError::BadQuery { reason: reason.to_owned() };
     // PostgreSQL takes one only, and has texts between dollars that are not understood here.
     if bare.contains(';') && matches!(dialect, Dialect::Sqlite) {
-        return Err(refused("one statement at a time"));
+        return Err(refused("more than one statement; give one"));
     }
     let bare = bare.trim_start_matches(|it: char| it == '(' || it.is_whitespace());
     if bare.is_empty() {
-        return Err(refused("there is no statement"));
+        return Err(refused("the statement is empty"));
     }
     let word: String = bare.chars().take_while(char::is_ascii_alphabetic).collect();
     let more: &[&str] = match dialect {

@@ -198,7 +198,7 @@ fn refuse_other_parameters(table: &Table, rows: &[Vec<Cell>]) -> Result<(), Libr
             continue;
         };
         if row.get(hash) != Some(&Cell::Text(case.parameter_hash())) {
-            let what = format!("case {} does not have the hash of its parameters", case.index);
+            let what = format!("case {} does not match its parameter hash", case.index);
             return Err(LibraryError::BadRow { table: table.name, what });
         }
     }
@@ -297,8 +297,8 @@ impl Rows {
             if let Some(altered) = altered {
                 let index = altered.case.index;
                 let what = format!(
-                    "the results of case {index} of {campaign} do not have their checksum: a number was \
-                     altered"
+                    "the results of case {index} of {campaign} do not match their checksum: a number \
+                         was altered"
                 );
                 return Err(LibraryError::BadRow { table: self.table.name, what });
             }
@@ -314,7 +314,7 @@ impl Rows {
         if found == expected {
             return Ok(());
         }
-        let what = format!("{} of {expected} cases are not in campaign_case", expected - found);
+        let what = format!("{} of {expected} cases are missing in campaign_case", expected - found);
         Err(LibraryError::BadRow { table: self.table.name, what })
     }
 

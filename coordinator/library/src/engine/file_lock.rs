@@ -70,7 +70,7 @@ impl Drop for FileLock {
         if let Some(locked) = files().get_mut(&identity) {
             locked.held = false;
             if let Err(error) = locked.file.unlock() {
-                tracing::warn!("the library's file stays locked until this program ends: {error}");
+                tracing::warn!("the library's file stays locked until this program exits: {error}");
             }
         }
     }

@@ -57,7 +57,7 @@ pub(super) async fn connect(options: &PgConnectOptions) -> Result<Connection, Li
 /// would be waited for for minutes, and a port that takes connections but never answers for ever.
 async fn within_bounds(options: &PgConnectOptions) -> Result<PgConnection, sqlx::Error> {
     let silent = || {
-        let reason = format!("no answer within {} s", CONNECT_TIMEOUT.as_secs());
+        let reason = format!("no response within {} s", CONNECT_TIMEOUT.as_secs());
         sqlx::Error::Io(std::io::Error::new(std::io::ErrorKind::TimedOut, reason))
     };
     let connecting = tokio::time::timeout(CONNECT_TIMEOUT, options.connect());

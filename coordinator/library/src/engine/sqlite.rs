@@ -117,10 +117,10 @@ fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
     };
     match error.into() {
         LibraryError::NotOpened { .. } => {
-            not_let_in("the file can't be opened or made; look at the rights of its folder")
+            not_let_in("the file cannot be opened or created; check the permissions of its folder")
         }
         LibraryError::NotWritable { .. } => not_let_in(
-            "its folder can't be written, which SQLite needs even to read; copy the library",
+            "its folder is not writable, which SQLite needs even to read; copy the library",
         ),
         LibraryError::NoLocks { reason, .. } => {
             LibraryError::NoLocks { library: place(path), reason }
@@ -155,16 +155,18 @@ fn place(path: &Path) -> String {
 fn warn_of_the_place(path: &Path) {
     if let Some(name) = shared_between_hosts(path) {
         tracing::warn!(
-            "library {}: it lies on {name}, which several hosts may share; only programs of one host at a time \
-             may use it there: a disk of this machine is safer, and for several hosts there is PostgreSQL",
+            "library {}: it is on {name}, which several machines may share; only programs of \
+                 one machine at a time may use it there: a local disk is safer, and several \
+                 machines need PostgreSQL",
             path.display()
         );
     }
     let links = std::fs::metadata(path).map_or(1, |file| file.nlink());
     if links > 1 {
         tracing::warn!(
-            "library {}: the file has {links} names (hard links), and SQLite keeps what it wrote last beside the \
-             name that it was opened by: always use the same one, or make the others symbolic links",
+            "library {}: the file has {links} hard links, but SQLite stores its write-ahead log \
+                 beside the name that was opened: always use the same name, or replace the others \
+                 by symbolic links",
             path.display()
         );
     }
@@ -183,13 +185,13 @@ fn refuse_what_seems_empty(path: &Path) -> Result<(), LibraryError> {
     let lost = |reason: &str| Err(LibraryError::Malformed { reason: reason.to_owned() });
     match begin.len() {
         0 if begin_of_log(&log) => {
-            lost("the file is empty, its log is not: what was in it is lost")
+            lost("the file is empty, but its write-ahead log is not: its content is lost")
         }
         0 | BYTES_MIN.. => Ok(()),
         length if begin[..length.min(HEAD.len())] != HEAD[..length.min(HEAD.len())] => {
             Err(LibraryError::NotALibrary { library: path.display().to_string() })
         }
-        length => lost(&format!("the file is cut off after {length} bytes")),
+        length => lost(&format!("the file is truncated after {length} bytes")),
     }
 }
 

@@ -20,7 +20,7 @@ pub(super) fn made(done: Result<(), LibraryError>, library: &str) -> Result<(), 
     match done {
         Err(error @ (Busy | DiskFull | Malformed { .. } | NotWritable { .. })) => {
             tracing::warn!(
-                "library {library}: its views are an earlier program's, and stay so: {error}"
+                "library {library}: its views are of an earlier version and cannot be updated: {error}"
             );
             Ok(())
         }

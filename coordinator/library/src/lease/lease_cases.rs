@@ -234,7 +234,7 @@ async fn end_expired(
             attempts,
             state: attempts_max.after(Ending::Lost, attempts),
             ending: "lost",
-            error: "the lease expired: its worker fell silent",
+            error: "the lease expired: no heartbeat from its worker",
             now_unix_ms,
         };
         attempt::end(connection, ended).await?;

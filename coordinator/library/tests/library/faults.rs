@@ -179,7 +179,7 @@ async fn a_full_disk_is_said_and_survived() {
     assert!(verdicts.iter().all(|it| matches!(it, Verdict::Stored | Verdict::Duplicate)));
     assert_eq!(library.digest(CAMPAIGN).await.unwrap(), undisturbed(CASES).await);
     let findings = library.verify(|| ()).await.unwrap().findings;
-    assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+    assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     library.close().await;
 }
 
@@ -215,7 +215,7 @@ async fn kill_writers(home: &Home) {
     }
     let library = home.open().await;
     let findings = library.verify(|| ()).await.unwrap().findings;
-    assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+    assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     // The victims' leases have long expired.
     let later = library.now_unix_ms() + 3_600_000;
     loop {

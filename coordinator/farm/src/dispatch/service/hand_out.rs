@@ -23,7 +23,7 @@ impl Dispatch {
     /// Cases for a worker that is to have some.
     pub(super) async fn hand_out(&self, worker: &str, cases_max: u32) -> Result<Lease, Status> {
         let failed = |error: &DispatchError| {
-            tracing::error!("no cases can be handed out: {error:?}");
+            tracing::error!("cannot lease cases: {error:?}");
             Status::unavailable(error.to_string())
         };
         let audit = self.audits.lease(worker, cases_max, &self.campaigns).await;

@@ -87,7 +87,7 @@ impl<F: FnMut()> Survey<'_, F> {
             return Err(error);
         }
         let reason = reason(&error);
-        self.add(place, format!("{what} cannot be read: {reason}"), 1, None);
+        self.add(place, format!("{what}: unreadable: {reason}"), 1, None);
         Ok(())
     }
 
@@ -106,7 +106,7 @@ impl<F: FnMut()> Survey<'_, F> {
         ];
         for (what, json, hash) in hashes {
             if blake3::hash(json.as_bytes()).to_hex().as_str() != hash {
-                self.add(&campaign.id, format!("the {what} does not have its hash"), 1, None);
+                self.add(&campaign.id, format!("the {what} does not match its hash"), 1, None);
             }
         }
     }
