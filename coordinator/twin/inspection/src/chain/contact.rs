@@ -113,9 +113,13 @@ impl LossOfContact {
         let known = format!(", where load over unsprung mass is {expected:.1} m/s2");
         if off.abs() > NEAR {
             let percent = 1e2 * off;
-            return known + &format!(" as stated: load, mass or gain are off by {percent:+.0} %");
+            return known + &format!(" as stated: load, mass or gain deviate by {percent:+.0} %");
         }
-        if self.level_m_s2 < 0.0 { known + ", upwards: the sensor's sign is turned" } else { known }
+        if self.level_m_s2 < 0.0 {
+            known + ", upwards: the sign of the sensor is reversed"
+        } else {
+            known
+        }
     }
 }
 
