@@ -21,7 +21,7 @@ pub enum LibraryError {
     /// A PostgreSQL URL that cannot be read.
     #[error("library {url}: {reason}; write postgres://USER:PASSWORD@HOST:PORT/DATABASE")]
     BadPostgresUrl {
-        /// The URL, without what stands before its host.
+        /// The URL without user and password.
         url: String,
         /// What is wrong with it.
         reason: String,
@@ -50,7 +50,7 @@ pub enum LibraryError {
         /// The library.
         library: String,
     },
-    /// The folder that should hold the library is not there.
+    /// The folder of the library does not exist.
     #[error("library {library}: the folder {folder} does not exist; create it first")]
     NoFolder {
         /// The library.
@@ -69,7 +69,7 @@ pub enum LibraryError {
     NotLetIn {
         /// The library.
         library: String,
-        /// What the server said.
+        /// Error of the server.
         reason: String,
     },
     /// There is no server.
@@ -169,7 +169,7 @@ pub enum LibraryError {
     /// Whoever asks may not write.
     #[error("the library is read-only here: {reason}")]
     NotWritable {
-        /// What the database said.
+        /// Error of the database.
         reason: String,
     },
     /// A statement that the database does not understand.
@@ -203,7 +203,7 @@ pub enum LibraryError {
     Lock {
         /// The library.
         library: String,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// The file system has no locks, or no memory that processes share, which `SQLite` needs.
@@ -297,7 +297,7 @@ impl LibraryError {
         )
     }
 
-    /// Whether the same may succeed later, when somebody has mended the machine.
+    /// Whether the operation may succeed later, after a repair of the machine.
     pub const fn is_temporary(&self) -> bool {
         matches!(
             self,
@@ -330,7 +330,7 @@ impl LibraryError {
         }
     }
 
-    /// A database that has said nothing for so long.
+    /// A database without a response for this time.
     pub(crate) fn silent(for_so_long: Duration) -> Self {
         Self::Unavailable { reason: format!("no response within {} s", for_so_long.as_secs()) }
     }
