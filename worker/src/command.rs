@@ -138,7 +138,7 @@ fn config(arguments: &Arguments) -> anyhow::Result<Config> {
         _ => None,
     };
     Ok(Config {
-        // A comma at the end names nobody.
+        // A trailing comma gives an empty entry.
         coordinators: arguments.coordinators.iter().filter(|it| !it.is_empty()).cloned().collect(),
         credentials: Credentials {
             token,
@@ -152,8 +152,8 @@ fn config(arguments: &Arguments) -> anyhow::Result<Config> {
     })
 }
 
-/// How long no coordinator may answer, in s as it is told: a worker that is to end when there is no work
-/// doesn't wait for ever for somebody to give it some.
+/// Time without a response from a coordinator after which the worker gives up: with `--idle-exit`
+/// it must not wait for ever.
 fn give_up_time(idle_exit: Option<u64>, give_up_after: Option<u64>) -> Option<Duration> {
     let idle = idle_exit.map(|idle| Duration::from_secs(idle).max(SILENCE));
     give_up_after.map(Duration::from_secs).or(idle)
@@ -184,7 +184,7 @@ fn serve(config: Config, health: Option<SocketAddr>) -> anyhow::Result<()> {
         tracing::info!(worker = config.worker, cores = config.cores, "worker started");
         Ok(agent::run_with_health(config, port, shutdown).await?)
     });
-    // A group given back at the end may still be computing; nobody waits for it.
+    // A returned group may still be computing; it is not waited for.
     runtime.shutdown_timeout(END);
     served
 }

@@ -23,7 +23,7 @@ pub(crate) struct Coordinators {
     /// The one that answered last, or is to be tried next.
     current: AtomicUsize,
     contact: Mutex<Contact>,
-    /// How long to try in vain; for ever if none.
+    /// Time limit of retrying; unlimited if `None`.
     patience: Option<Duration>,
     backoff: Backoff,
     /// No more tries from here on.
@@ -31,7 +31,7 @@ pub(crate) struct Coordinators {
     counters: Arc<Counters>,
 }
 
-/// When coordinators were heard of.
+/// Times of the last responses and warnings.
 struct Contact {
     answered: Instant,
     warned: Option<Instant>,
@@ -160,7 +160,7 @@ impl Coordinators {
     }
 }
 
-/// Whether a call failed because nobody answered, rather than because of what was answered.
+/// Whether a call failed without a response.
 const fn is_silence(code: Code) -> bool {
     matches!(
         code,
@@ -174,7 +174,7 @@ const fn is_silence(code: Code) -> bool {
     )
 }
 
-/// What failed, and what may be amiss: where a line breaks before anything is said, TLS tells little.
+/// The failure with a possible remedy: TLS reports little if a connection breaks early.
 fn reason(url: &str, status: &Status) -> String {
     let reason = chain(status);
     let tls = url.starts_with("https:");

@@ -16,7 +16,7 @@ use tracktwin_traces::{Step, Value};
 /// Cases simulated side by side on one core: the lanes of the track model's fast solver.
 pub const GROUP: usize = 8;
 
-/// The longest wait for work, whatever a coordinator says: as long as one that was put aside waits.
+/// Upper limit of the waiting time for work: that of a suspended worker.
 const WAIT_MAX: Duration = Duration::from_mins(10);
 
 /// One core's share of a worker.
@@ -30,7 +30,7 @@ pub(crate) struct Core {
 }
 
 impl Core {
-    /// Leases and works until the worker is told to stop, or was idle for too long.
+    /// Leases and simulates until the worker is stopped, or was idle for too long.
     pub(crate) async fn run(self) -> Result<(), AgentError> {
         let mut told = None;
         while let Some(lease) = self.session.lease().await? {

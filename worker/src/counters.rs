@@ -23,7 +23,7 @@ pub struct Counters {
     pub(crate) lost: Counter,
     /// Calls that a coordinator answered.
     pub(crate) answered_calls: Counter,
-    /// Calls that nobody answered.
+    /// Calls without a response.
     pub(crate) silent_calls: Counter,
 }
 

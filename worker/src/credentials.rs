@@ -23,7 +23,7 @@ pub struct Credentials {
 #[derive(Clone)]
 pub struct Token(MetadataValue<Ascii>);
 
-/// Why an address or a token can't be used; each says how to mend it.
+/// Errors of an address or a token, each with the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CredentialsError {
     /// A token with characters that headers can't hold.

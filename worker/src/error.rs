@@ -1,10 +1,10 @@
-//! Why a worker ends before it is told to.
+//! Errors that end a worker.
 
 use crate::credentials::CredentialsError;
 use tracktwin_experiment::ExperimentError;
 use tracktwin_protocol::BadMessage;
 
-/// Why a worker ends before it is told to.
+/// Errors that end a worker.
 #[derive(Debug, thiserror::Error)]
 pub enum AgentError {
     /// No address at all.
@@ -21,16 +21,16 @@ pub enum AgentError {
     /// Address and credentials don't go together.
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
-    /// The coordinator refuses the worker, or what it says.
+    /// The coordinator refuses the worker or its message.
     #[error("refused by the coordinator: {reason}")]
     Refused {
         /// Why.
         reason: String,
     },
-    /// The coordinator can't make sense of what the worker says.
+    /// The coordinator rejects the messages of the worker.
     #[error("the coordinator rejects the messages of this worker: {reason}")]
     NotUnderstood {
-        /// What it says.
+        /// Its reason.
         reason: String,
     },
     /// No coordinator has answered for longer than was asked for.
@@ -44,7 +44,7 @@ pub enum AgentError {
     /// The coordinator does not know the worker (any more).
     #[error("the coordinator does not know this worker")]
     Unknown,
-    /// The coordinator says what this worker does not understand.
+    /// The coordinator sends an invalid message.
     #[error("invalid message from the coordinator: {0}")]
     BadMessage(#[from] BadMessage),
     /// The experiment can't be done here.

@@ -31,7 +31,7 @@ pub(crate) async fn answer(port: TcpListener, session: Arc<Session>, counters: A
     }
 }
 
-/// A worker that waits for its coordinator is well: starting it anew would not help.
+/// A worker that waits for its coordinator is healthy: a restart would not help.
 async fn healthz(State(watched): State<Watched>) -> String {
     let silent = watched.session.coordinators.silent_for();
     if watched.session.shutdown.is_cancelled() {

@@ -40,7 +40,7 @@ pub struct InspectionReport {
     pub loss_of_contact: Option<String>,
     /// What makes passes unusable.
     pub pass_defects: Vec<String>,
-    /// What was mended while it was read, or is doubtful.
+    /// Corrections made while reading, and doubts.
     pub doubts: Vec<String>,
     /// What the recording can be used for, and for what not.
     pub uses: Vec<String>,

@@ -3,7 +3,7 @@
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_surrogate::ENTRIES_MIN;
 
-/// What a campaign lacks to be trained on; one line each, with what mends it.
+/// Why models cannot be trained on a campaign; one line each, with the remedy.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Lack {
     /// Too few cases to fit and to test.

@@ -1,4 +1,4 @@
-//! What may go wrong with files, and who is to mend it.
+//! Errors of files.
 
 use crate::{Kind, NameError};
 use std::io::ErrorKind;
@@ -76,8 +76,8 @@ impl FilesError {
         move |source| Self::System { path, action, source }
     }
 
-    /// Whether whoever named the file can mend it, as with any file that is to be read; all else is
-    /// the machine's.
+    /// Whether the user who named the file can correct it, as with any file to be read; everything
+    /// else is the machine's.
     pub fn is_wrong_input(&self) -> bool {
         match self {
             Self::System { action: "read", .. } => true,

@@ -4,16 +4,16 @@ use super::Campaign;
 use serde_json::Value;
 use tracktwin_parameters::{OWEN_POINTS_MAX, Sequence};
 
-/// Differences that are told; the rest is counted.
+/// Number of differences listed; the others are counted.
 const LISTED_MAX: usize = 4;
 
-/// How a campaign stands to one that a library holds already.
+/// Relation of a campaign to one in the library.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kinship {
-    /// All that differs is the sequence of the points, and nobody asked for that: it follows from the
-    /// number of cases.
+    /// Only the sampling sequence differs, because of the number of cases, without a request in the
+    /// file.
     OtherSequence {
-        /// What is wrong, and how to go on.
+        /// What is wrong, and how to continue.
         remedy: String,
     },
     /// It is another campaign.
@@ -24,7 +24,7 @@ pub enum Kinship {
 }
 
 impl Campaign {
-    /// How it stands to a campaign `id` that is defined by this JSON.
+    /// Relation to the campaign `id` with this definition in JSON.
     pub fn kinship(&self, id: &str, definition_json: &str) -> Kinship {
         let own = serde_json::from_str(&self.definition_json()).unwrap_or(Value::Null);
         let other = serde_json::from_str(definition_json).unwrap_or(Value::Null);

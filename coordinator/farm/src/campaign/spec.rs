@@ -47,7 +47,7 @@ pub struct Definition {
     pub space: ParameterSpace,
     /// The values of the parameters that don't vary, in catalogue order.
     pub fixed: [f64; Parameter::COUNT],
-    /// Whether every case has an irregularity of its own.
+    /// Whether every case has a separate irregularity.
     #[serde(skip_serializing_if = "Surfaces::is_default")]
     pub surfaces: Surfaces,
     /// What is simulated and measured in each case.
@@ -86,7 +86,7 @@ pub enum SpecError {
         path: String,
         /// The line, from 1.
         line: usize,
-        /// What the parser said.
+        /// Error of the parser.
         message: String,
     },
     /// A name that terminals, pages and commands can't take.
@@ -204,7 +204,7 @@ impl Campaign {
     /// Reads a campaign file; `cases`, if given, takes the place of the file's own number.
     ///
     /// # Errors
-    /// [`SpecError`] says in one line what is wrong, where, and how to mend it.
+    /// [`SpecError`] states in one line what is wrong, where, and what to do.
     pub fn read(path: &Path, cases: Option<u32>) -> Result<Self, SpecError> {
         let shown = path.display().to_string();
         let text = tracktwin_files::read_text(path)?;

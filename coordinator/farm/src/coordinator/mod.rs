@@ -30,7 +30,7 @@ pub struct Coordinator {
     pub exit_when_done: bool,
 }
 
-/// Why a coordinator stopped before it is told to.
+/// Errors that stop a coordinator.
 #[derive(Debug, thiserror::Error)]
 pub enum CoordinatorError {
     /// The library fails or refuses.
@@ -48,8 +48,8 @@ pub enum CoordinatorError {
 }
 
 impl Coordinator {
-    /// Serves until told to stop, or until everything is done where that was asked for. Leases stay
-    /// with their workers: whoever serves the library next goes on where this ended.
+    /// Serves until it is stopped, or until everything is done if requested. Leases stay with their
+    /// workers: the next coordinator of the library continues from here.
     ///
     /// # Errors
     /// [`CoordinatorError`].
@@ -59,7 +59,7 @@ impl Coordinator {
         self.security.check(address)?;
         let _claim = self.claim;
         let stop = stop.child_token();
-        // However this ends, nothing goes on behind its back.
+        // All tasks end with this function.
         let _guard = stop.clone().drop_guard();
         let counts = Counts::default();
         let dispatch = Dispatch::new(self.library.clone(), self.settings, counts.clone());

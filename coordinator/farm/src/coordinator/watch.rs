@@ -1,4 +1,4 @@
-//! What a coordinator says of its campaigns, and when all campaigns are done.
+//! Log of a coordinator's campaigns, and the end when all are done.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -7,20 +7,20 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tracktwin_library::{CampaignOverview, CampaignState, Library, LibraryError};
 
-/// How often the campaigns are looked at.
+/// Interval of checking the campaigns.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// Between two lines of the log about how far it is.
+/// Interval of the progress lines in the log.
 const TELL_EVERY: Duration = Duration::from_mins(1);
 
-/// A worker heard of within this many ms is there.
+/// A worker with a message in this time, in ms, is present.
 const PRESENT_MS: i64 = 60_000;
 
-/// Looks at the campaigns until told to stop, or until there is nothing left to do.
+/// Checks the campaigns until it is stopped, or until nothing is left to do.
 ///
 /// # Errors
-/// [`LibraryError::Closed`] or [`LibraryError::Lost`] when nothing can be written any more, which only a
-/// new start mends.
+/// [`LibraryError::Closed`] or [`LibraryError::Lost`] when nothing can be written any more; a
+/// restart is required.
 pub(super) async fn watch(
     library: Library,
     exit_when_done: bool,
@@ -55,7 +55,7 @@ pub(super) async fn watch(
     Ok(())
 }
 
-/// What was said last, so that it is said once.
+/// What was logged last, to avoid repetition.
 #[derive(Default)]
 struct Logged {
     /// Of each campaign: cases given up, and whether it is done.

@@ -22,7 +22,7 @@ const STYLE: &str = "
 form{display:inline}button,input{font:inherit;font-size:.88rem;padding:.15rem .6rem}.state{font-weight:600}.bad{color:var(--b);font-weight:600}
 ";
 
-/// Asks for the page's middle every other second; without it the page says how it was.
+/// Updates the main part of the page every two seconds; without the script the page is static.
 const SCRIPT: &str = "
 setInterval(async()=>{try{const answer=await fetch('view');if(answer.ok)document.querySelector('main').innerHTML=await answer.text();
 document.querySelector('footer').style.opacity=1}catch{document.querySelector('footer').style.opacity=.3}},2000)

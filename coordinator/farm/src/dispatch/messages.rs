@@ -6,7 +6,7 @@ use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
 use tracktwin_library::{Held, LibraryError, Verdict};
 use tracktwin_protocol::{BadMessage, PROTOCOL_VERSION, Registration, farm, held_from_messages};
 
-/// Why a worker is of no use here, if so, and what mends it.
+/// Why a worker is incompatible with this coordinator, if so, with the remedy.
 pub(crate) fn incompatibility(registration: &Registration) -> Option<String> {
     let Registration { worker, code_version, model_hash, protocol_version, .. } = registration;
     if *protocol_version != PROTOCOL_VERSION {

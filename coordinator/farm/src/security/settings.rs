@@ -25,7 +25,7 @@ pub struct Security {
     pub insecure: bool,
 }
 
-/// Why a port is not opened; each says how to mend it.
+/// Reasons of not opening a port, each with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum SecurityError {
     /// A port that others can reach, in plain text.
@@ -68,7 +68,7 @@ impl Security {
     /// Whether a port at this address is safe.
     ///
     /// # Errors
-    /// [`SecurityError`] says what is missing.
+    /// [`SecurityError`] states what is missing.
     pub fn check(&self, address: SocketAddr) -> Result<(), SecurityError> {
         if address.ip().is_loopback() || self.insecure {
             return Ok(());

@@ -81,10 +81,7 @@ fn a_consistent_recording_reads_well_and_has_no_empty_tables() {
     );
     assert_reads(
         &page,
-        &[
-            "No difference is better explained by left-out physics",
-            "does not exclude",
-        ],
+        &["No difference is better explained by left-out physics", "does not exclude"],
     );
     assert_reads(
         &page,

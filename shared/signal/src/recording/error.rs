@@ -1,4 +1,4 @@
-//! What may be wrong with a recording: file, field, what, and how to mend it, on one line.
+//! Errors of a recording: file, field, fault and remedy, on one line.
 
 use std::path::Path;
 use tracktwin_number::{rounded, significant};
@@ -22,7 +22,7 @@ impl RecordingError {
     }
 }
 
-/// What is wrong with a field of a recording, and how to mend it.
+/// Faults of a field of a recording, with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
     /// Nothing lies where a file should.

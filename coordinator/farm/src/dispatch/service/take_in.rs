@@ -82,7 +82,7 @@ impl Dispatch {
             step.fail(&error.to_string());
             unavailable(&error)
         })?;
-        // What is said again counts once.
+        // Repeated reports count once.
         let stored = ended.iter().zip(&verdicts).filter(|(_, it)| matches!(it, Verdict::Stored));
         let (failed, durations_s): (Vec<bool>, Vec<f64>) = stored.map(|(ended, _)| *ended).unzip();
         step.count("cases_stored", failed.len());

@@ -22,7 +22,7 @@ pub(super) fn clipping_finding(
     unit: &str,
     is_flight_known: bool,
 ) -> Option<Finding> {
-    // On the side towards the rail alone, a wheel in the air may do the same.
+    // On the side towards the rail alone, loss of contact has the same effect.
     let may_fly = !is_flight_known && passes.iter().all(|pass| pass.level_m_s2 > 0.0);
     let or = if may_fly {
         "; or the wheel lost contact there: give nominal.wheel.load_N and mass_kg to \

@@ -1,4 +1,4 @@
-//! Kinds of files that loggers and programs write and that are not read here, and their mend.
+//! Unsupported file formats of loggers and programs, with the remedy.
 
 use super::super::error::Fault;
 
