@@ -1,4 +1,4 @@
-//! Bad input gets one line that says what, where and how to mend it, exit code 2, and changes
+//! Wrong input gives one line with fault, place and remedy, exit code 2, and changes
 //! nothing.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]

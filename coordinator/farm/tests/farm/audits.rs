@@ -1,4 +1,4 @@
-//! A worker that computes wrongly is found out, and one that fails is put aside.
+//! A worker that computes wrong results is quarantined; one that fails is suspended.
 
 use crate::support::{
     CORES, Coordinator, StandIn, coordinator_with, lease, library, registered, registration,

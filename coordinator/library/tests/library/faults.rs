@@ -91,7 +91,7 @@ async fn a_server_that_stays_away_is_told_as_such_within_a_bound() {
     let error = library.pause(CAMPAIGN).await.unwrap_err();
     assert!(matches!(error, LibraryError::Unavailable { .. }), "{error:?}");
     assert!(error.is_temporary() && !error.is_wrong_input());
-    // Ten seconds of patience, and room for a slow machine.
+    // The retry budget of ten seconds, and room for a slow machine.
     assert!(begin.elapsed() < Duration::from_secs(30), "{:?}", begin.elapsed());
     // Whoever comes now need not wait as long again.
     let begin = Instant::now();
