@@ -1,9 +1,10 @@
 //! The command line of tracktwin.
 //!
-//! - [`commands`]: what `tracktwin` can be told to do: arguments, printing, exit codes.
-//! - [`pipeline`]: what commands have in common: train, evaluate, diagnose, reproduce, blind trials.
+//! - [`commands`]: the subcommands: arguments, printing, exit codes.
+//! - [`pipeline`]: computations that commands share: train, evaluate, diagnose, reproduce, blind trials.
 //!
-//! All else is crates beside `src`: `farm`, `library`, `twin`, `validation`, `report`.
+//! Everything else is in the crates beside `src`: `farm`, `library`, `twin`, `validation`,
+//! `report`.
 
 pub mod commands;
 pub mod pipeline;

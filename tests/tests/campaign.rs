@@ -106,8 +106,8 @@ fn a_campaign_is_found_by_its_name_and_by_its_id_where_several_have_it() {
 fn only_what_was_given_up_is_tried_again() {
     let home = Home::new();
     home.add().succeeded();
-    assert_refused(&home.tell(&["retry", "--case", "500"]), &["case 500 is not there"]);
-    assert_refused(&home.tell(&["retry", "--case", "5"]), &["case 5 waits already"]);
+    assert_refused(&home.tell(&["retry", "--case", "500"]), &["case 500 does not exist"]);
+    assert_refused(&home.tell(&["retry", "--case", "5"]), &["case 5 is waiting"]);
     assert!(home.tell(&["retry"]).succeeded().contains("0 cases"));
 }
 
@@ -132,5 +132,5 @@ fn a_coordinator_that_ends_says_what_paused_campaigns_have_left() {
     let arguments = ["coordinator", "--exit-when-done", "--listen", &listen, "--library"];
     let answer = run(PROGRAM, &[&arguments[..], &[&home.library()]].concat());
     assert_eq!(answer.code, Some(0), "{}", answer.err);
-    assert!(answer.err.contains("done but for paused campaigns cases=60"), "{}", answer.err);
+    assert!(answer.err.contains("done, except for paused campaigns cases=60"), "{}", answer.err);
 }

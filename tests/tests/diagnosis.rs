@@ -174,5 +174,5 @@ fn a_running_train_without_known_sleepers_is_diagnosed_by_its_wheel() {
     let held_out = |side: &str| diagnosis["fit"][side]["held_out"]["score"].as_f64().unwrap();
     assert!(held_out("after") > 0.5 && held_out("before") < 0.1);
     let notes = diagnosis["notes"].to_string();
-    assert!(notes.contains("sleepers: their places are not known"), "{notes}");
+    assert!(notes.contains("sleepers: their positions are unknown"), "{notes}");
 }

@@ -28,7 +28,7 @@ fn a_table_is_imported_and_inspected() {
 
     let answer = run(PROGRAM, &["import", &file, "--out", &out]);
     assert_eq!(answer.code, Some(2));
-    assert!(answer.err.contains("the file has t_s, acc"), "{}", answer.err);
+    assert!(answer.err.contains("the columns of the file are t_s, acc"), "{}", answer.err);
     assert_eq!(answer.err.lines().count(), 1, "{}", answer.err);
 
     let columns = ["--column", "acceleration=acc", "--column", "time=t_s", "--speed", "36"];

@@ -108,7 +108,7 @@ fn numbers_that_no_track_or_machine_has_are_refused_with_what_can_be() {
         (&["simulate", "--extend=wheel_flat:length_m=1e9"], &["length_m", "can be"]),
         (&["simulate", "--extend=second_wheel:distance_m=1e9"], &["distance_m", "can be"]),
         (&["import", "f.csv", "--spacing=1e-6"], &["0.05 to 2 m"]),
-        (&["import", "f.csv", "--spacing=600"], &["600 m is no", "did you mean 0.6?"]),
+        (&["import", "f.csv", "--spacing=600"], &["600 m is not a valid", "did you mean 0.6?"]),
         (&["import", "f.csv", "--speed=9999"], &["0.5 to 500 km/h"]),
         (&["run", "--cases=4000000000"], &["1 to 1e7"]),
         (&["run", "--cores=1000000000"], &["1 to 4096"]),
@@ -224,5 +224,5 @@ fn no_recording_takes_a_number_that_is_none() {
     let many = text.replace(r#"{"id": "SN1", "x_m": 0.25}"#, &sleepers.join(","));
     fs::write(home.path().join("recording.json"), many).unwrap();
     let error = refused(PROGRAM, &["inspect", &home.path().display().to_string()]);
-    assert!(error.contains("sleepers: 200000 is no number of sleepers"), "{error}");
+    assert!(error.contains("sleepers: 200000 is not a valid number of sleepers"), "{error}");
 }

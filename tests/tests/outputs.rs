@@ -115,12 +115,12 @@ fn a_recording_is_read_from_its_own_folder_only() {
     fs::copy(recording.join(pass), home.path().join(pass)).unwrap();
     for name in [format!("../{pass}"), text(&home.path().join(pass)), "/etc/passwd".to_owned()] {
         fs::write(&manifest, told.replace(pass, &name)).unwrap();
-        refused(&inspect(), &["passes[0].file", "lies outside", "copy the file"]);
+        refused(&inspect(), &["passes[0].file", "is outside", "copy the file"]);
     }
     fs::write(&manifest, &told).unwrap();
     fs::remove_file(recording.join(pass)).unwrap();
     std::os::unix::fs::symlink(home.path().join(pass), recording.join(pass)).unwrap();
-    refused(&inspect(), &["passes[0].file", "lies outside"]);
+    refused(&inspect(), &["passes[0].file", "is outside"]);
 }
 
 #[test]
@@ -142,7 +142,10 @@ fn a_simulation_does_not_replace_a_measured_recording_and_its_own_it_does() {
     fs::create_dir(&handmade).unwrap();
     fs::write(handmade.join("recording.json"), THEIRS).unwrap();
     fs::write(handmade.join("pass-13kmh-1.parquet"), THEIRS).unwrap();
-    refused(&simulate(&handmade, &[]), &["recording.json", "did not write", "--force"]);
+    refused(
+        &simulate(&handmade, &[]),
+        &["recording.json", "was not written by tracktwin", "--force"],
+    );
     assert_eq!(files(&handmade).len(), 2);
 
     simulate(&simulated, &[]).succeeded();
@@ -214,7 +217,7 @@ fn what_has_been_written_is_written_again_and_into_a_device_too() {
     }
     refused(
         &run(PROGRAM, &["receptance", "--at", "sleeper", "--out", &path("r.svg")]),
-        &["the picture's name", "r.csv"],
+        &["the name of the plot", "r.csv"],
     );
 }
 

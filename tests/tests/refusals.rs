@@ -1,4 +1,4 @@
-//! Bad input gets one line that says what, where and how to mend it, exit code 2, and changes
+//! Wrong input gives one line with fault, place and remedy, exit code 2, and changes
 //! nothing.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
@@ -74,7 +74,7 @@ fn what_training_would_lack_is_found_out_before_anything_is_simulated() {
     let head = "name = \"c\"\nseed = 1\n";
     refused_campaign(
         &format!("{head}cases = 400\n{HELD}"),
-        &["parameters", "held at one value", "--no-train"],
+        &["parameters", "no parameter varies", "--no-train"],
     );
     refused_campaign(&format!("{head}cases = 199\n"), &["199", "--cases 200", "--no-train"]);
 }
@@ -87,7 +87,7 @@ fn a_library_that_cannot_be_trained_on_is_refused_before_it_is_read() {
     fs::write(&file, "name = \"c\"\nseed = 1\ncases = 300\n").unwrap();
     run(PROGRAM, &["campaign", "add", &file, "--library", &url]).succeeded();
     let answer = run(PROGRAM, &["train", "--library", &url, "--out", &path("models")]);
-    assert_refused(&answer, &["0 of its cases are finished", "200"]);
+    assert_refused(&answer, &["0 cases are finished", "200"]);
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn cases_that_would_begin_another_campaign_are_refused_with_the_way_to_go_on() {
     fs::write(&file, "name = \"c\"\nseed = 1\ncases = 300\nsequence = \"rotated\"\n").unwrap();
     let anew = run(PROGRAM, &["campaign", "add", &file, "--library", &url]);
     assert!(
-        anew.err.contains("begins from case 0") && anew.err.contains("sequence"),
+        anew.err.contains("starts from case 0") && anew.err.contains("sequence"),
         "{}",
         anew.err
     );
@@ -137,7 +137,7 @@ fn a_trial_s_seals_that_cannot_be_read_are_left_as_they_are() {
         assert!(answer.err.contains(file), "{}", answer.err);
     };
     let seals = out.join("seals.sha256");
-    let unreadable = b"\xff\xfe is no text";
+    let unreadable = b"\xff\xfe is not text";
     // Without a trial beside them they are somebody else's.
     fs::write(&seals, unreadable).unwrap();
     assert_stopped(2, "seals.sha256");
@@ -168,7 +168,7 @@ fn a_library_that_is_not_there_or_something_else_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let url = |name: &str| format!("sqlite:{}", folder.path().join(name).display());
     let status = |url: &str| run(PROGRAM, &["library", "status", "--library", url]);
-    assert_refused(&status(&url("missing.sqlite")), &["missing.sqlite", "no such file"]);
+    assert_refused(&status(&url("missing.sqlite")), &["missing.sqlite", "does not exist"]);
     fs::write(folder.path().join("text.sqlite"), "not a database, but long enough to be one")
         .unwrap();
     assert_refused(&status(&url("text.sqlite")), &["text.sqlite", "not a tracktwin library"]);
@@ -246,7 +246,7 @@ fn a_recording_with_a_number_that_is_none_is_refused() {
 fn a_recording_without_a_column_is_refused() {
     refused_recording(
         |folder| rewrite(folder, "pass.csv", "acceleration_m_s2", "acc"),
-        &["pass.csv", "acceleration_m_s2", "no such column", "acc"],
+        &["pass.csv", "acceleration_m_s2", "column is missing", "acc"],
     );
 }
 
@@ -262,7 +262,7 @@ fn a_recording_with_a_wrong_sample_rate_is_refused() {
 fn a_recording_too_short_for_a_sleeper_is_refused() {
     refused_recording(
         |folder| fs::write(folder.join("pass.csv"), pass_csv(100)).unwrap(),
-        &["pass.csv", "position_m", "record more"],
+        &["pass.csv", "position_m", "record a longer stretch"],
     );
 }
 
@@ -270,13 +270,13 @@ fn a_recording_too_short_for_a_sleeper_is_refused() {
 fn a_recording_that_is_not_json_is_refused() {
     refused_recording(
         |folder| fs::write(folder.join("recording.json"), "sleepers: []").unwrap(),
-        &["recording.json", "not JSON"],
+        &["recording.json", "not valid JSON"],
     );
 }
 
 #[test]
 fn a_good_recording_is_followed_by_the_library_s_refusal() {
-    refused_recording(|_| {}, &["nowhere.sqlite", "no such file"]);
+    refused_recording(|_| {}, &["nowhere.sqlite", "does not exist"]);
 }
 
 /// `diagnose` of a small recording whose `nominal` has been given this.

@@ -46,7 +46,7 @@ fn figures_of_a_small_library_come_as_rows_and_a_page() {
     assert!(page.contains("Fig. 12") && page.contains("<svg") && !page.contains("<script"));
 
     refused(&reproduce(&["fig11"], &path("none")), &["`fig11`", "fig9, fig10"]);
-    refused(&reproduce(&["fig16"], &path("none")), &["24 spans", "leave out fig16"]);
+    refused(&reproduce(&["fig16"], &path("none")), &["24 spans", "omit fig16"]);
     refused(&reproduce(&["fig14"], &path("few")), &["60", "200"]);
     assert!(!folder.path().join("none").exists());
 }

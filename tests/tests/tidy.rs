@@ -216,3 +216,60 @@ fn paths_that_pages_name_are_there() {
     }
     assert!(count > 40, "only {count} paths were found");
 }
+
+/// Words in bold in the last column of the glossary's tables: those that appear nowhere.
+fn banned_words(glossary: &str) -> Vec<&str> {
+    let last_columns = glossary.lines().filter_map(|line| {
+        let mut cells = line.strip_prefix('|')?.strip_suffix('|')?.split('|');
+        cells.nth(3)
+    });
+    last_columns.flat_map(|column| column.split("**").skip(1).step_by(2)).collect()
+}
+
+/// Comments of a source file, one after the other.
+fn comments(source: &str) -> String {
+    let lines = source.lines().filter_map(|line| line.trim_start().strip_prefix("//"));
+    lines.map(|line| line.trim_start_matches(['/', '!'])).collect::<Vec<_>>().join(" ")
+}
+
+/// Whether a text has a word, or its plural; both are in lower case.
+fn has_word(text: &str, word: &str) -> bool {
+    let is_part = |neighbour: char| neighbour.is_alphanumeric() || "-_".contains(neighbour);
+    text.match_indices(word).any(|(at, _)| {
+        let rest = &text[at + word.len()..];
+        let rest = rest.strip_prefix('s').unwrap_or(rest);
+        !text[..at].ends_with(is_part) && !rest.starts_with(is_part)
+    })
+}
+
+#[test]
+fn words_of_the_glossary_that_are_banned_appear_nowhere() {
+    let root = root();
+    let read = |path: &Path| fs::read_to_string(path).unwrap();
+    let glossary = read(&root.join("docs/glossary.md"));
+    let banned = banned_words(&glossary);
+    assert!(banned.len() > 40, "only {} words are banned", banned.len());
+    let mut pages = files(&root.join("docs"), "md");
+    pages.retain(|page| !page.ends_with("glossary.md"));
+    let others = ["README.md", "CONTRIBUTING.md", "SECURITY.md"];
+    pages.extend(others.map(|page| root.join(page)));
+    // Help is kept as it is printed.
+    pages.extend(["help.txt", "worker-help.txt"].map(|it| root.join("tests/snapshots").join(it)));
+    let pages = pages.into_iter().map(|page| (read(&page), page));
+    let sources = files(&root, "rs").into_iter().map(|file| (comments(&read(&file)), file));
+    for (text, file) in pages.chain(sources) {
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
+        for word in &banned {
+            let is_there = has_word(&text, &word.to_lowercase());
+            assert!(!is_there, "{}: \"{word}\"; see docs/glossary.md", file.display());
+        }
+    }
+}
+
+#[test]
+fn a_word_is_found_in_its_plural_and_not_inside_others() {
+    assert!(has_word("two exams, one exam", "exam") && has_word("spots", "spot"));
+    assert!(!has_word("for example", "exam") && !has_word("spot_m and hot-spot", "spot"));
+    assert_eq!(banned_words("| a | b | c | **d e**, f, **g** |\n| x |"), ["d e", "g"]);
+    assert_eq!(comments("/// One\nlet two = 2; // three\n    // four"), " One  four");
+}

@@ -70,7 +70,7 @@ fn a_case_whose_diagnosis_breaks_down_is_named_at_the_end_and_stops_no_other() {
     let out_text = out.display().to_string();
     let answer = run(PROGRAM, &["trial", "--cases", "2", "--out", &out_text, "--force"]);
     assert_eq!(answer.code, Some(3), "{}", answer.err);
-    assert!(answer.err.contains("2 of 2 diagnoses broke down"), "{}", answer.err);
+    assert!(answer.err.contains("2 of 2 diagnoses failed"), "{}", answer.err);
     assert!(answer.err.contains("case 0: ") && answer.err.contains("case 1: "), "{}", answer.err);
     let table = std::fs::read_to_string(out.join("trial.md")).unwrap();
     assert!(table.contains("| diagnoses that broke down | 2 of 2: 100 %"), "{table}");

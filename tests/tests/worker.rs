@@ -35,7 +35,7 @@ fn a_worker_without_coordinator_may_be_started_again() {
     let nobody = format!("http://127.0.0.1:{}", free_port());
     let answer = worker(&["--coordinator", &nobody, "--give-up-after", "1"]);
     assert_eq!(answer.code, Some(3), "{}", answer.err);
-    assert!(answer.err.contains("does not answer"), "it logs: {}", answer.err);
+    assert!(answer.err.contains("does not respond"), "it logs: {}", answer.err);
     assert!(!answer.err.contains('\u{1b}'), "colours are for terminals: {}", answer.err);
 }
 
@@ -84,5 +84,5 @@ fn a_run_on_one_machine_takes_results_of_nobody_else_there() {
     let address = format!("http://127.0.0.1:{}", running.port().unwrap());
     let answer = worker(&["--coordinator", &address, "--give-up-after", "5"]);
     assert_eq!(answer.code, Some(2), "{}", answer.err);
-    assert!(answer.err.contains("no token was shown"), "{}", answer.err);
+    assert!(answer.err.contains("the token is missing"), "{}", answer.err);
 }

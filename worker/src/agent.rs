@@ -1,4 +1,4 @@
-//! A worker's life: register, lease, simulate, report, until told to stop.
+//! The worker's main loop: register, lease, simulate, report, until it is stopped.
 
 pub use crate::config::{Config, Dial, Seams, unique_name};
 pub use crate::core::GROUP;
@@ -14,17 +14,17 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
-/// How long a worker that is told to stop goes on with what it has begun.
+/// Time limit of the cases in progress after a worker is stopped.
 ///
 /// Batch systems kill ten seconds after they ask; giving back takes what remains.
 const GRACE: Duration = Duration::from_secs(8);
 
-/// Works for a coordinator until `shutdown`; then what has begun is finished and handed in within
-/// a grace of eight seconds, and the rest is given back. `health` answers how it is, if given.
+/// Works for a coordinator until `shutdown`; then cases in progress are finished and reported
+/// within eight seconds, and the others are returned. `health` serves its state, if given.
 ///
 /// # Errors
-/// [`AgentError`] when the coordinator refuses the worker or can't be understood. An unreachable
-/// coordinator is tried again until `shutdown`, or for as long as the worker was told to.
+/// [`AgentError`] when the coordinator refuses the worker or sends invalid messages. An unreachable
+/// coordinator is retried until `shutdown`, or for the configured time.
 pub async fn run(config: Config, shutdown: CancellationToken) -> Result<(), AgentError> {
     run_with_health(config, None, shutdown).await
 }

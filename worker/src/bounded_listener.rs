@@ -1,4 +1,4 @@
-//! A port for people and for those who watch: few connections, and none that is silent for long.
+//! A TCP listener for dashboards and probes: few connections, each with a read and write timeout.
 
 use axum::serve::Listener;
 use std::net::SocketAddr;
@@ -14,10 +14,10 @@ use tokio_io_timeout::TimeoutStream;
 /// Connections at a time; browsers hold six each.
 const CONNECTIONS_MAX: usize = 128;
 
-/// A connection on which nobody speaks or listens for so long is ended.
+/// A connection without traffic for this time is closed.
 const SILENCE: Duration = Duration::from_secs(30);
 
-/// A port with bounds.
+/// A listener with limits.
 #[derive(Debug)]
 pub struct BoundedListener {
     listener: TcpListener,
@@ -25,7 +25,7 @@ pub struct BoundedListener {
 }
 
 impl BoundedListener {
-    /// Puts bounds on a port.
+    /// Sets the limits of a listener.
     pub fn new(listener: TcpListener) -> Self {
         Self { listener, shares: Arc::new(Semaphore::new(CONNECTIONS_MAX)) }
     }
@@ -50,7 +50,7 @@ impl Listener for BoundedListener {
     }
 }
 
-/// A connection, and its share of those there may be.
+/// A connection with its permit.
 #[derive(Debug)]
 pub struct Connection {
     stream: Pin<Box<TimeoutStream<TcpStream>>>,

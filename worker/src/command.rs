@@ -18,24 +18,24 @@ use tracktwin_parameters::QuantityError;
 use tracktwin_parameters::quantity::{CORES, SECONDS};
 use tracktwin_traces::{Export, ExportError};
 
-/// Exit code for wrong arguments, and for a worker that is of no use to its coordinator.
+/// Exit code for wrong arguments, and for a worker that its coordinator refuses.
 const REFUSED: u8 = 2;
 
-/// Exit code when something failed that may pass.
+/// Exit code for a failure that may be temporary.
 const FAILED: u8 = 3;
 
-/// How long a worker that is to end without work waits for a coordinator to answer: longer than one
-/// takes to be started again.
+/// Time after which a worker with `--idle-exit` gives up a silent coordinator: longer than a
+/// restart of a coordinator.
 const SILENCE: Duration = Duration::from_mins(10);
 
-/// How long a computation that no longer matters may hold up the end.
+/// Longest time that an obsolete computation may delay the exit.
 const END: Duration = Duration::from_millis(100);
 
-/// Worker of a tracktwin campaign: leases cases from a coordinator, simulates them and hands in
-/// their features, until it is stopped (Ctrl-C or SIGTERM).
+/// Worker of a tracktwin farm: leases cases from a coordinator, simulates them and reports their
+/// features, until it is stopped (Ctrl-C or SIGTERM).
 ///
-/// It may come and go at any time: what it has handed in stays, what it has not is given to others.
-/// Told to stop, it finishes or hands back what it has within ten seconds.
+/// A worker can be started and stopped at any time: reported results are kept, and other cases go
+/// to other workers. When stopped, it finishes or returns its cases within ten seconds.
 #[derive(Parser)]
 #[command(name = "tracktwin-worker", version, max_term_width = 100)]
 #[command(after_help = "On one machine:
@@ -44,15 +44,15 @@ On a cluster:
   tracktwin-worker --coordinator https://head:7700 --tls-ca certs/ca.pem \\
       --token-file certs/token --idle-exit 300 --give-up-after 3600
 
-OpenTelemetry traces go where OTEL_EXPORTER_OTLP_ENDPOINT says.
+OpenTelemetry traces are sent to OTEL_EXPORTER_OTLP_ENDPOINT.
 
 Exit codes, for batch systems:
-  0  stopped as asked, or no work for --idle-exit seconds: don't start it again
-  2  wrong arguments, or refused by the coordinator (token, version, physics): mend it first
-  3  failure, or no coordinator for --give-up-after seconds: starting it again may help")]
+  0  stopped by a signal, or no work for --idle-exit seconds: do not restart it
+  2  wrong arguments, or refused by the coordinator (token, version, physics): correct this first
+  3  failure, or no coordinator for --give-up-after seconds: a restart may help")]
 struct Arguments {
-    /// Address of a coordinator, http://HOST:PORT or https://HOST:PORT; several, separated by
-    /// commas, where several coordinators serve one library.
+    /// Address of the coordinator, http://HOST:PORT or https://HOST:PORT; separate several
+    /// coordinators of one library by commas.
     #[arg(
         long = "coordinator",
         value_name = "URL",
@@ -61,35 +61,35 @@ struct Arguments {
         value_delimiter = ','
     )]
     coordinators: Vec<String>,
-    /// Cores to use [default: all].
+    /// Number of cores [default: all].
     #[arg(long, value_name = "N", env = "TRACKTWIN_CORES", value_parser = cores)]
     cores: Option<NonZeroUsize>,
-    /// End, with exit code 0, when there was no work for so long.
+    /// Exit with code 0 after this time without work.
     #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_IDLE_EXIT", value_parser = seconds)]
     idle_exit: Option<u64>,
-    /// End, with exit code 3, when no coordinator has answered for so long [default: never; with
-    /// --idle-exit after ten minutes, or as many seconds as that says if they are more].
+    /// Exit with code 3 after this time without a response from a coordinator [default: never; with
+    /// --idle-exit: 600 or the value of --idle-exit, whichever is larger].
     #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_GIVE_UP_AFTER", value_parser = seconds)]
     give_up_after: Option<u64>,
-    /// File with the farm's token.
+    /// File with the token of the farm.
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TOKEN_FILE")]
     token_file: Option<PathBuf>,
-    /// Certificate of the farm's authority (ca.pem), for https.
+    /// Certificate of the farm's certificate authority (ca.pem), for https.
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CA")]
     tls_ca: Option<PathBuf>,
-    /// The worker's own certificate, where the coordinator demands one.
+    /// Certificate of the worker (PEM), if the coordinator requires one.
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CERT", requires = "tls_key")]
     tls_cert: Option<PathBuf>,
-    /// Key of that certificate.
+    /// Private key of the certificate (PEM).
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_KEY", requires = "tls_cert")]
     tls_key: Option<PathBuf>,
-    /// Allow plain text over a network, which is to be trusted itself then.
+    /// Allow plain text over a network; only for a trusted network.
     #[arg(long, env = "TRACKTWIN_INSECURE")]
     insecure: bool,
-    /// Answer /healthz and /metrics (Prometheus) on this address, such as 127.0.0.1:7701.
+    /// Serve /healthz and /metrics (Prometheus) on this address, e.g. 127.0.0.1:7701.
     #[arg(long, value_name = "ADDR", env = "TRACKTWIN_HEALTH")]
     health: Option<SocketAddr>,
-    /// How log lines look; which ones appear, `RUST_LOG` says.
+    /// Format of the log; set its level with `RUST_LOG`.
     #[arg(long, value_enum, default_value_t = LogFormat::Text, env = "TRACKTWIN_LOG_FORMAT")]
     log_format: LogFormat,
 }
@@ -103,7 +103,7 @@ fn seconds(text: &str) -> Result<u64, QuantityError> {
     SECONDS.parse_count(text)
 }
 
-/// Reads the command line, works, and turns the end into an exit code.
+/// Reads the command line, runs the worker and returns the exit code.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     log_to_stderr(arguments.log_format, filter());
@@ -138,7 +138,7 @@ fn config(arguments: &Arguments) -> anyhow::Result<Config> {
         _ => None,
     };
     Ok(Config {
-        // A comma at the end names nobody.
+        // A trailing comma gives an empty entry.
         coordinators: arguments.coordinators.iter().filter(|it| !it.is_empty()).cloned().collect(),
         credentials: Credentials {
             token,
@@ -152,8 +152,8 @@ fn config(arguments: &Arguments) -> anyhow::Result<Config> {
     })
 }
 
-/// How long no coordinator may answer, in s as it is told: a worker that is to end when there is no work
-/// doesn't wait for ever for somebody to give it some.
+/// Time without a response from a coordinator after which the worker gives up: with `--idle-exit`
+/// it must not wait for ever.
 fn give_up_time(idle_exit: Option<u64>, give_up_after: Option<u64>) -> Option<Duration> {
     let idle = idle_exit.map(|idle| Duration::from_secs(idle).max(SILENCE));
     give_up_after.map(Duration::from_secs).or(idle)
@@ -177,14 +177,14 @@ fn serve(config: Config, health: Option<SocketAddr>) -> anyhow::Result<()> {
         let port = match health {
             Some(address) => {
                 let port = TcpListener::bind(address).await;
-                Some(port.with_context(|| format!("--health {address}: no port to be had"))?)
+                Some(port.with_context(|| format!("--health: cannot bind {address}"))?)
             }
             None => None,
         };
-        tracing::info!(worker = config.worker, cores = config.cores, "worker starts");
+        tracing::info!(worker = config.worker, cores = config.cores, "worker started");
         Ok(agent::run_with_health(config, port, shutdown).await?)
     });
-    // A group given back at the end may still be computing; nobody waits for it.
+    // A returned group may still be computing; it is not waited for.
     runtime.shutdown_timeout(END);
     served
 }
@@ -202,7 +202,7 @@ fn stop_on_signals(shutdown: CancellationToken) -> anyhow::Result<()> {
             if shutdown.is_cancelled() {
                 std::process::exit(128 + kind.as_raw_value());
             }
-            tracing::info!("stopping: what has begun is finished, the rest given back");
+            tracing::info!("stopping: cases in progress are finished, the others are returned");
             shutdown.cancel();
         }
     });

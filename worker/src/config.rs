@@ -1,4 +1,4 @@
-//! What a worker is told at its start.
+//! Configuration of a worker.
 
 use crate::counters::Counters;
 use crate::credentials::Credentials;
@@ -12,7 +12,7 @@ use tracktwin_experiment::{MODEL_HASH, Prepare, prepare_simulation};
 /// How a line to a coordinator is made.
 pub type Dial = fn(&Endpoint) -> Channel;
 
-/// What a worker is told at its start.
+/// Configuration of a worker.
 #[derive(Clone, Debug)]
 pub struct Config {
     /// Addresses of coordinators that serve one library; `http://HOST:PORT` or `https://HOST:PORT`.
@@ -28,7 +28,7 @@ pub struct Config {
     pub give_up_after: Option<Duration>,
     /// How long to wait for work before it ends; for ever if none.
     pub idle_exit: Option<Duration>,
-    /// What simulates: [`prepare_simulation`], or a stand-in where the farm is tested.
+    /// What simulates: [`prepare_simulation`], or a stand-in in tests of the farm.
     pub prepare: Prepare,
     /// What it counts.
     pub counters: Arc<Counters>,
@@ -47,8 +47,8 @@ pub struct Seams {
     pub model_hash: String,
     /// [`Endpoint::connect_lazy`], or a simulated network's.
     pub dial: Dial,
-    /// Whether to simulate on the task that leases, rather than on a thread of its own: where
-    /// network and time are simulated, nothing may run beside them.
+    /// Whether to simulate on the leasing task instead of a separate thread: with simulated network
+    /// and time, nothing may run in parallel.
     pub inline: bool,
 }
 

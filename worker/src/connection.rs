@@ -9,7 +9,7 @@ use tonic::transport::{Channel, Endpoint};
 use tracktwin_protocol::farm::farm_client::FarmClient;
 use tracktwin_protocol::{MESSAGE_BYTES_MAX, WINDOW_BYTES};
 
-/// A connection that does not come about within this is tried anew.
+/// Time limit of connecting; then it is tried again.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// An answer that takes longer is not waited for: a commit takes milliseconds, and a coordinator

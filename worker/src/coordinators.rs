@@ -23,7 +23,7 @@ pub(crate) struct Coordinators {
     /// The one that answered last, or is to be tried next.
     current: AtomicUsize,
     contact: Mutex<Contact>,
-    /// How long to try in vain; for ever if none.
+    /// Time limit of retrying; unlimited if `None`.
     patience: Option<Duration>,
     backoff: Backoff,
     /// No more tries from here on.
@@ -31,7 +31,7 @@ pub(crate) struct Coordinators {
     counters: Arc<Counters>,
 }
 
-/// When coordinators were heard of.
+/// Times of the last responses and warnings.
 struct Contact {
     answered: Instant,
     warned: Option<Instant>,
@@ -133,7 +133,7 @@ impl Coordinators {
         let mut contact = self.contact.lock();
         contact.answered = Instant::now();
         if contact.warned.take().is_some() {
-            tracing::warn!(coordinator = url, "the coordinator answers again");
+            tracing::warn!(coordinator = url, "the coordinator responds again");
         }
         self.counters.answered_calls.inc();
     }
@@ -143,7 +143,7 @@ impl Coordinators {
         if contact.warned.is_none_or(|warned| warned.elapsed() >= WARN_EVERY) {
             contact.warned = Some(Instant::now());
             let reason = reason(url, status);
-            tracing::warn!(coordinator = url, "the coordinator does not answer: {reason}");
+            tracing::warn!(coordinator = url, "the coordinator does not respond: {reason}");
         }
     }
 
@@ -160,7 +160,7 @@ impl Coordinators {
     }
 }
 
-/// Whether a call failed because nobody answered, rather than because of what was answered.
+/// Whether a call failed without a response.
 const fn is_silence(code: Code) -> bool {
     matches!(
         code,
@@ -174,21 +174,21 @@ const fn is_silence(code: Code) -> bool {
     )
 }
 
-/// What failed, and what may be amiss: where a line breaks before anything is said, TLS tells little.
+/// The failure with a possible remedy: TLS reports little if a connection breaks early.
 fn reason(url: &str, status: &Status) -> String {
     let reason = chain(status);
     let tls = url.starts_with("https:");
     let says = |words: &[&str]| words.iter().any(|it| reason.contains(it));
     let remedy = if says(&["UnknownIssuer"]) {
-        "; it shows a certificate of another authority than --tls-ca"
+        "; its certificate is not signed by the authority of --tls-ca"
     } else if tls && says(&["CertificateRequired", "connection closed", "broken pipe"]) {
-        "; it may demand a certificate: --tls-cert and --tls-key"
+        "; it may require a certificate: use --tls-cert and --tls-key"
     } else if tls && says(&["InvalidContentType"]) {
-        "; it may speak plain text: http://"
+        "; it may use plain text: try http://"
     } else if says(&["frame with invalid size", "broken pipe"]) {
-        "; it may speak TLS: https://"
+        "; it may use TLS: try https://"
     } else if says(&["compression flag"]) {
-        "; this port may be its dashboard's"
+        "; this may be the port of its dashboard"
     } else {
         ""
     };

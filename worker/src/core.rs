@@ -16,7 +16,7 @@ use tracktwin_traces::{Step, Value};
 /// Cases simulated side by side on one core: the lanes of the track model's fast solver.
 pub const GROUP: usize = 8;
 
-/// The longest wait for work, whatever a coordinator says: as long as one that was put aside waits.
+/// Upper limit of the waiting time for work: that of a suspended worker.
 const WAIT_MAX: Duration = Duration::from_mins(10);
 
 /// One core's share of a worker.
@@ -30,7 +30,7 @@ pub(crate) struct Core {
 }
 
 impl Core {
-    /// Leases and works until the worker is told to stop, or was idle for too long.
+    /// Leases and simulates until the worker is stopped, or was idle for too long.
     pub(crate) async fn run(self) -> Result<(), AgentError> {
         let mut told = None;
         while let Some(lease) = self.session.lease().await? {
@@ -54,7 +54,7 @@ impl Core {
         if let Some(limit) = self.idle_exit {
             let idle = self.session.idle_for();
             if idle >= limit {
-                tracing::info!("no work for {} s: done", idle.as_secs());
+                tracing::info!("no work for {} s: exiting", idle.as_secs());
                 self.session.shutdown.cancel();
             }
             wait = wait.min(limit.saturating_sub(idle));
@@ -176,7 +176,8 @@ fn guarded(simulation: &dyn Simulate, cases: &[Case]) -> Vec<Outcome> {
         Err(panic) => {
             let message = panic.downcast_ref::<String>().map(String::as_str);
             let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
-            let reason = format!("the program panicked: {}", message.unwrap_or("without words"));
+            let reason =
+                format!("the program panicked: {}", message.unwrap_or("without a message"));
             vec![Outcome::Failed { reason }; cases.len()]
         }
     }

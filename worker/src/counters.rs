@@ -23,7 +23,7 @@ pub struct Counters {
     pub(crate) lost: Counter,
     /// Calls that a coordinator answered.
     pub(crate) answered_calls: Counter,
-    /// Calls that nobody answered.
+    /// Calls without a response.
     pub(crate) silent_calls: Counter,
 }
 
@@ -36,10 +36,10 @@ impl Counters {
         all.register("cases_failed", "Cases that could not be simulated", self.failed.clone());
         all.register("computing_seconds", "Computing time of cases", self.computing_s.clone());
         all.register("cases_held", "Cases held under a lease", self.held.clone());
-        all.register("cases_unsent", "Cases whose results wait to be sent", self.unsent.clone());
-        all.register("leases_lost", "Leases that went to others", self.lost.clone());
-        all.register("calls_answered", "Calls answered", self.answered_calls.clone());
-        all.register("calls_unanswered", "Calls nobody answered", self.silent_calls.clone());
+        all.register("cases_unsent", "Cases whose results are not sent yet", self.unsent.clone());
+        all.register("leases_lost", "Leases lost to other workers", self.lost.clone());
+        all.register("calls_answered", "Calls with a response", self.answered_calls.clone());
+        all.register("calls_unanswered", "Calls without a response", self.silent_calls.clone());
         let mut text = String::new();
         encode(&mut text, &registry).expect("a string takes everything that is written to it");
         text

@@ -23,33 +23,32 @@ pub struct Credentials {
 #[derive(Clone)]
 pub struct Token(MetadataValue<Ascii>);
 
-/// Why an address or a token can't be used; each says how to mend it.
+/// Errors of an address or a token, each with the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CredentialsError {
     /// A token with characters that headers can't hold.
     #[error(
-        "the token has characters other than visible ASCII; `tracktwin certs` makes a good one"
+        "the token contains characters other than visible ASCII; create one with `tracktwin \
+             certs`"
     )]
     Token,
     /// Plain text over a network.
     #[error(
-        "coordinator {url}: plain text would cross the network; write https:// and --tls-ca, or \
-         --insecure where the network itself is trusted"
+        "coordinator {url}: plain text over a network is not allowed; use https:// and \
+             --tls-ca, or --insecure on a trusted network"
     )]
     PlainText {
         /// The address.
         url: String,
     },
     /// Nothing to check the coordinator's certificate by.
-    #[error("coordinator {url}: https needs --tls-ca, the ca.pem that `tracktwin certs` made")]
+    #[error("coordinator {url}: https needs --tls-ca with the ca.pem made by `tracktwin certs`")]
     NoAuthority {
         /// The address.
         url: String,
     },
     /// A file for the authority that holds something else.
-    #[error(
-        "--tls-ca: there is no certificate in it; it is the ca.pem that `tracktwin certs` made"
-    )]
+    #[error("--tls-ca: the file contains no certificate; use the ca.pem made by `tracktwin certs`")]
     NoCertificate,
     /// Neither `http` nor `https`.
     #[error("coordinator {url}: not an address; write http://HOST:PORT or https://HOST:PORT")]

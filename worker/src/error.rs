@@ -1,17 +1,17 @@
-//! Why a worker ends before it is told to.
+//! Errors that end a worker.
 
 use crate::credentials::CredentialsError;
 use tracktwin_experiment::ExperimentError;
 use tracktwin_protocol::BadMessage;
 
-/// Why a worker ends before it is told to.
+/// Errors that end a worker.
 #[derive(Debug, thiserror::Error)]
 pub enum AgentError {
     /// No address at all.
-    #[error("no coordinator is named; write --coordinator URL")]
+    #[error("no coordinator; use --coordinator URL")]
     NoCoordinator,
     /// The address or the certificates can't be used.
-    #[error("coordinator {url}: cannot be called")]
+    #[error("coordinator {url}: cannot connect")]
     Address {
         /// The address.
         url: String,
@@ -21,20 +21,20 @@ pub enum AgentError {
     /// Address and credentials don't go together.
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
-    /// The coordinator refuses the worker, or what it says.
+    /// The coordinator refuses the worker or its message.
     #[error("refused by the coordinator: {reason}")]
     Refused {
         /// Why.
         reason: String,
     },
-    /// The coordinator can't make sense of what the worker says.
-    #[error("the coordinator does not understand this worker: {reason}")]
+    /// The coordinator rejects the messages of the worker.
+    #[error("the coordinator rejects the messages of this worker: {reason}")]
     NotUnderstood {
-        /// What it says.
+        /// Its reason.
         reason: String,
     },
     /// No coordinator has answered for longer than was asked for.
-    #[error("no coordinator answered for {silent_s} s: {reason}")]
+    #[error("no response from a coordinator for {silent_s} s: {reason}")]
     GaveUp {
         /// For how long, in s.
         silent_s: u64,
@@ -44,14 +44,14 @@ pub enum AgentError {
     /// The coordinator does not know the worker (any more).
     #[error("the coordinator does not know this worker")]
     Unknown,
-    /// The coordinator says what this worker does not understand.
-    #[error("the coordinator's message makes no sense here: {0}")]
+    /// The coordinator sends an invalid message.
+    #[error("invalid message from the coordinator: {0}")]
     BadMessage(#[from] BadMessage),
     /// The experiment can't be done here.
-    #[error("the campaign's experiment cannot be done: {0}")]
+    #[error("cannot simulate the campaign's experiment: {0}")]
     Experiment(#[from] ExperimentError),
     /// The experiment is not the one whose hash came with it.
-    #[error("the campaign's experiment does not have the hash that came with it")]
+    #[error("the campaign's experiment does not match its hash")]
     ExperimentHash,
 }
 

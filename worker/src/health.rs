@@ -27,17 +27,17 @@ pub(crate) async fn answer(port: TcpListener, session: Arc<Session>, counters: A
         .route("/metrics", get(metrics))
         .with_state(Watched { session, counters });
     if let Err(error) = axum::serve(BoundedListener::new(port), routes).await {
-        tracing::warn!("health is no longer answered: {error}");
+        tracing::warn!("the health endpoint has stopped: {error}");
     }
 }
 
-/// A worker that waits for its coordinator is well: starting it anew would not help.
+/// A worker that waits for its coordinator is healthy: a restart would not help.
 async fn healthz(State(watched): State<Watched>) -> String {
     let silent = watched.session.coordinators.silent_for();
     if watched.session.shutdown.is_cancelled() {
         "stopping\n".to_owned()
     } else if silent >= SILENCE {
-        format!("waiting: no coordinator has answered for {} s\n", silent.as_secs())
+        format!("waiting: no response from a coordinator for {} s\n", silent.as_secs())
     } else if watched.session.holdings.is_empty() {
         "idle\n".to_owned()
     } else {

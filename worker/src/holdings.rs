@@ -10,8 +10,8 @@ use tracktwin_protocol::{CASES_MAX, CaseLease, farm};
 /// A case this worker holds: campaign, index, epoch.
 type Held = (String, u32, u32);
 
-/// What a worker has leased and not yet handed in or given back. Clones are of the same worker: a
-/// coordinator in the same process sees through one what its worker holds.
+/// Cases that a worker holds: leased, not yet reported or returned. Clones share the state: a
+/// coordinator in the same process reads through one what its worker holds.
 #[derive(Clone, Debug)]
 pub struct Holdings {
     held: Arc<Mutex<BTreeSet<Held>>>,
@@ -37,7 +37,7 @@ impl Holdings {
         self.change(|all| all.extend(held));
     }
 
-    /// Lets go of cases, whatever became of them; answers how many of them were held.
+    /// Removes cases; returns how many of them were held.
     pub(crate) fn let_go(
         &self,
         campaign: &str,

@@ -1,8 +1,7 @@
 //! Finished results on their way to a coordinator.
 //!
-//! Computing goes on while a report is under way, and while no coordinator answers: what is
-//! finished waits here and is sent when one is back. The room is bounded; when it is full, the
-//! cores wait.
+//! The simulation continues during a report, and while no coordinator responds: finished cases wait
+//! here and are sent later. The capacity is bounded; when it is full, the cores wait.
 
 use crate::error::AgentError;
 use crate::finished::Finished;

@@ -21,20 +21,20 @@ use tracktwin_traces::Step;
 /// Cases asked for at a time; the coordinator, who knows how long they take, gives fewer.
 const CASES_ASKED: u32 = 1024;
 
-/// Heartbeat until the coordinator has said how often it wants one.
+/// Heartbeat interval until the coordinator states one.
 const FIRST_HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Heartbeats lie between a twentieth of a second and a minute, whatever a coordinator says.
+/// Limits of the heartbeat interval that a coordinator may request.
 const HEARTBEATS_S: [f64; 2] = [0.05, 60.0];
 
-/// How often something is said or asked whose message arrives damaged. Then results are let go, and their leases
-/// expire; and who says what makes no sense is taken for another version.
+/// Number of attempts for a message that is damaged in transmission. After that, results are
+/// dropped and their leases expire; a sender of invalid messages is treated as another version.
 const DAMAGED_MAX: u32 = 5;
 
 /// Between two such times, growing with their number.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
-/// Whoever is told to stop does not wait for longer: a scheduler gives ten seconds in all.
+/// Time limit of a call after a stop: a scheduler allows ten seconds in all.
 const RELEASE_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// What the tasks of a worker share.
@@ -140,14 +140,14 @@ impl Session {
                         }
                         Err(error) => {
                             self.release(&campaign, held).await;
-                            let what = format!("a lease arrived damaged ({error})");
+                            let what = format!("a lease was damaged in transmission ({error})");
                             if !goes_again(&mut damaged, &what).await {
                                 return Err(error.into());
                             }
                         }
                     }
                 }
-                // It has been restarted since, or it is another; it knows nobody.
+                // The coordinator was restarted, or is another one; it knows no worker.
                 Err(AgentError::Unknown) => self.register(seen, &self.shutdown).await?,
                 Err(error) => return Err(error),
             }
@@ -190,8 +190,8 @@ impl Session {
                     return Err(error);
                 }
                 Ok(None) => {
-                    step.fail("nobody answered");
-                    tracing::warn!("{} results could not be handed in", held.len());
+                    step.fail("no response");
+                    tracing::warn!("{} results could not be reported", held.len());
                     break;
                 }
                 Ok(Some(answer)) => {
@@ -200,7 +200,8 @@ impl Session {
                     if request.cases.is_empty() {
                         break;
                     }
-                    let what = format!("{} results arrived damaged", request.cases.len());
+                    let what =
+                        format!("{} results were damaged in transmission", request.cases.len());
                     if !goes_again(&mut damaged, &what).await {
                         step.fail(&what);
                         break;
@@ -219,7 +220,10 @@ impl Session {
         let settled = answer.receipts.iter().filter(|it| is_settled(**it));
         let (refused, taken): (Vec<&farm::Receipt>, Vec<_>) = settled.partition(refused);
         if !refused.is_empty() {
-            tracing::warn!("{} results refused: not cases of this coordinator", refused.len());
+            tracing::warn!(
+                "{} results refused: the coordinator does not know these cases",
+                refused.len()
+            );
         }
         let of_failures = taken.iter().filter(|it| failed.contains(&it.sobol_index)).count();
         self.counters.failed.inc_by(of_failures as u64);
@@ -242,13 +246,13 @@ impl Session {
         let failed = match &released {
             Ok(Ok(_)) => return,
             Ok(Err(status)) => status.message(),
-            Err(_) => "no answer",
+            Err(_) => "no response",
         };
-        tracing::warn!("cases not given back, their lease expires: {failed}");
+        tracing::warn!("cases not returned; their leases will expire: {failed}");
     }
 
-    /// Renews what is held, for as long as the worker lives: a task of its own, so that no
-    /// computation and no slow report makes a live worker look dead.
+    /// Renews the leases in a separate task, so that no computation and no slow report makes a live
+    /// worker look dead.
     pub(crate) async fn keep_alive(&self) {
         loop {
             let heartbeat = *self.heartbeat.lock();
@@ -264,10 +268,10 @@ impl Session {
                 match self.coordinators.once(renew).await {
                     Ok(answer) => {
                         let (after_s, lost) = (sent.elapsed().as_secs_f64(), answer.lost.len());
-                        tracing::debug!(campaign, cases, lost, after_s, "heartbeat answered");
+                        tracing::debug!(campaign, cases, lost, after_s, "heartbeat acknowledged");
                         self.lose(&campaign, &answer.lost);
                     }
-                    // A coordinator that knows nobody is told who this is at the next lease.
+                    // The worker registers again with the next lease request.
                     Err(status) if status.code() == Code::Unauthenticated => {}
                     Err(status) => tracing::info!("heartbeat failed: {}", status.message()),
                 }
@@ -275,14 +279,12 @@ impl Session {
         }
     }
 
-    /// These cases were taken back; what is not begun need not be.
+    /// These leases have ended; cases not yet started are skipped.
     fn lose(&self, campaign: &str, lost: &[farm::HeldCase]) {
-        // What was handed in or given back while the heartbeat was under way is not lost.
+        // Cases reported or returned during the heartbeat are not counted as lost.
         let lost = self.holdings.let_go(campaign, lost.iter().map(|it| (it.sobol_index, it.epoch)));
         if lost > 0 {
-            tracing::warn!(
-                "{lost} leases were taken back: they expired, or the campaign was cancelled"
-            );
+            tracing::warn!("{lost} leases have ended: they expired, or the campaign was cancelled");
             self.counters.lost.inc_by(lost as u64);
         }
     }
@@ -301,7 +303,7 @@ impl Session {
     }
 }
 
-/// Waits until something is said or asked again that arrived damaged; not when that was so too often.
+/// Waits before repeating a damaged message; an error after too many attempts.
 async fn goes_again(damaged: &mut u32, what: &str) -> bool {
     *damaged += 1;
     tracing::warn!("{what}: {damaged} of {DAMAGED_MAX} times");

@@ -14,7 +14,7 @@ use tracktwin_library::{Claim, Library, LibraryError, Status};
 use tracktwin_worker::agent::{self, AgentError};
 use tracktwin_worker::{Credentials, Holdings, Token};
 
-/// How often the counts are looked at: often enough for a progress bar.
+/// Interval of reading the counts, short enough for a progress bar.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// How long a library that does not answer is waited for; as long as a blind trial waits for one.
@@ -35,8 +35,8 @@ pub enum FarmError {
     /// The service failed.
     #[error(transparent)]
     Service(#[from] ServeError),
-    /// There is no port to be had.
-    #[error("the farm's service has no port")]
+    /// No port can be bound.
+    #[error("the farm's service cannot bind a port")]
     Port(#[from] std::io::Error),
 }
 
@@ -45,13 +45,13 @@ pub enum FarmError {
 pub struct Task<'a> {
     /// The campaign.
     pub campaign: &'a str,
-    /// Its first cases, so many.
+    /// Number of its first cases.
     pub cases: u32,
     /// Groups of cases simulated at a time.
     pub cores: NonZeroUsize,
     /// How long leases last.
     pub timing: Timing,
-    /// What simulates: the track model, or a stand-in where the farm is tested.
+    /// Prepares a simulation: of the track model, or of a stand-in in tests of the farm.
     pub prepare: Prepare,
 }
 
@@ -63,8 +63,8 @@ impl<'a> Task<'a> {
     }
 }
 
-/// The right to hand out a library's cases, which can be written. Whoever has it may add cases: nobody else
-/// will refuse to hand them out.
+/// The right to lease the cases of a writable library. Its holder may add cases, because it can
+/// lease them.
 ///
 /// # Errors
 /// [`LibraryError::InUse`] when another process works on the library, [`LibraryError::NotWritable`].
@@ -88,9 +88,9 @@ pub async fn run_embedded(
     run_claimed(library, &claim, task, shutdown, progress).await
 }
 
-/// Simulates what a claimed library lacks, by workers in this process, until every case is finished or
-/// given up, or until `shutdown`. Either way the library can be gone on with; it loses no finished
-/// case however the process ends. A library that does not answer is waited for, as the workers do.
+/// Simulates the missing cases of a claimed library with workers in this process, until every case
+/// is finished or given up, or until `shutdown`. A later run can continue; no finished case is lost
+/// however the process ends. An unavailable library is retried.
 ///
 /// `progress` sees the counts now and then.
 ///
@@ -203,7 +203,7 @@ impl Running {
 struct Outage(Option<Instant>);
 
 impl Outage {
-    /// Whether the library may answer later: what has begun meanwhile is not lost, for the workers keep it.
+    /// Returns if the library may respond later: the workers keep their results meanwhile.
     ///
     /// # Errors
     /// The library's error where no waiting helps, or after [`OUTAGE_MAX`].
@@ -212,10 +212,7 @@ impl Outage {
             return Err(error);
         }
         let since = *self.0.get_or_insert_with(|| {
-            tracing::warn!(
-                "{error}; waiting for it for up to {} minutes",
-                OUTAGE_MAX.as_secs() / 60
-            );
+            tracing::warn!("{error}; waiting for up to {} minutes", OUTAGE_MAX.as_secs() / 60);
             Instant::now()
         });
         if since.elapsed() < OUTAGE_MAX { Ok(()) } else { Err(error) }
@@ -233,7 +230,7 @@ async fn dispatch(
         // Whoever held these died with the process that served it.
         library.release_all(task.campaign).await?;
     }
-    // Who runs a campaign that was paused or cancelled means to go on with it.
+    // Running a paused or cancelled campaign resumes it.
     library.resume(task.campaign).await?;
     let settings = Settings {
         timing: task.timing,

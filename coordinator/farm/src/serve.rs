@@ -18,10 +18,10 @@ const CALLS_A_CONNECTION: u32 = 512;
 /// Most bytes of a message in one piece: HTTP/2's own 16 kB make a hundred of a report.
 const FRAME_BYTES: u32 = 1 << 20;
 
-/// How long calls may go on after the service was told to stop.
+/// Time limit of running calls after the service is stopped.
 const FAREWELL: Duration = Duration::from_secs(5);
 
-/// Why a service ends before it is told to.
+/// Errors that end a service.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     /// What it should show or demand can't be used.
@@ -32,7 +32,7 @@ pub enum ServeError {
     Transport(#[from] tonic::transport::Error),
 }
 
-/// Serves workers on a port until told to stop; then calls that are under way are answered first.
+/// Serves workers on a port until it is stopped; running calls are finished first.
 ///
 /// # Errors
 /// [`ServeError`] when certificates can't be used or the port fails.

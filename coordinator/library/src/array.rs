@@ -4,7 +4,7 @@ use crate::engine::{Connection, Write, sql};
 use crate::library::Dated;
 use crate::{Library, LibraryError};
 
-/// Keeps a series; one that is there stays as it is.
+/// Stores a series; an existing one is kept unchanged.
 const INSERT: &str = "
     insert into stored_array (key, kind, meta, numbers, created_at) values ($1, $2, $3, $4, $5)
     on conflict (key) do nothing";
@@ -23,7 +23,7 @@ pub struct StoredArray {
 }
 
 impl Library {
-    /// Keeps a series; one that is there under the key stays as it is.
+    /// Stores a series; an existing one with the key is kept unchanged.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.

@@ -93,7 +93,7 @@ async fn note(
     connection.execute(note).await.map(drop)
 }
 
-/// How many of a case's last so many attempts that count have failed.
+/// Number of failures among the last attempts of a case.
 pub(crate) async fn failures(
     connection: &mut Connection,
     report: &Report,

@@ -1,7 +1,8 @@
 //! The table `audit`: finished cases that another worker simulates again.
 //!
-//! Which cases is decided by their hash, so that the share holds whatever the order and nobody can
-//! choose. What the second worker finds is compared by who asks; here it is only kept.
+//! The hash of a case decides whether it is audited, so that the share is independent of the order
+//! and cannot be influenced. The caller compares the results of the second worker; this module only
+//! stores the outcome.
 
 use crate::case::case_of;
 use crate::engine::{Connection, Row, Text, Write, sql};
@@ -26,8 +27,8 @@ const MARK: Text = Text::Each {
         on conflict (campaign_id, sobol_index) do nothing",
 };
 
-/// Leases until $5 the first $4 audits of a running campaign ($1) that nobody does now ($3), and of nobody's own ($2)
-/// results.
+/// Leases until $5 the first $4 audits of a running campaign ($1) that are not leased at $3, except
+/// those of the worker's ($2) own results.
 const TAKE: Text = Text::Each {
     sqlite: "
         with next as (
@@ -80,7 +81,7 @@ const RELEASE: Text = Text::Each {
         where campaign_id = $1 and auditor = $2 and state = 'leased' and sobol_index = any($3)",
 };
 
-/// Open audits that somebody could do who was heard of since $2.
+/// Open audits that a worker seen since $2 could do.
 const TO_DO: &str = "
     select count(*) as cases from audit
     where campaign_id = $1 and state in ('waiting', 'leased') and exists (
@@ -93,7 +94,7 @@ pub struct Audit {
     pub campaign: String,
     /// The case.
     pub case: Case,
-    /// Whose result is looked at.
+    /// Worker whose result is audited.
     pub worker: String,
 }
 
@@ -123,7 +124,7 @@ pub struct AuditCounts {
     pub differ: u32,
 }
 
-/// Where an audit stands.
+/// State of an audit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum AuditState {
     Waiting,
@@ -201,8 +202,8 @@ impl Library {
         self.write(ReleaseAudits { campaign, auditor, indices }).await
     }
 
-    /// Open audits of a campaign that somebody could do: a worker heard of since, that is not in
-    /// quarantine and did not simulate the case itself.
+    /// Open audits of a campaign that a worker could do: one seen since then, not in quarantine,
+    /// that did not simulate the case itself.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -215,7 +216,7 @@ impl Library {
         rows.first().map_or(Ok(0), |row| row.get_u32("cases"))
     }
 
-    /// How a campaign's audits stand.
+    /// Counts of a campaign's audits by state.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -287,7 +288,7 @@ impl Write for Sample {
 }
 
 impl Sample {
-    /// The cases with these indices, each with whose result is looked at.
+    /// The cases with these indices, each with the worker whose result is audited.
     async fn audits(
         &self,
         connection: &mut Connection,

@@ -4,7 +4,7 @@ use crate::engine::{Connection, Row, Write, sql};
 use crate::library::Dated;
 use crate::{Library, LibraryError, bins};
 
-/// Stores a campaign; one that is there stays as it is.
+/// Stores a campaign; an existing one is kept unchanged.
 const INSERT: &str = "
     insert into campaign (id, name, definition, definition_hash, experiment, experiment_hash, speeds_km_h, seed,
         created_at)
@@ -35,7 +35,7 @@ impl Library {
     /// Stores a campaign; repeating it changes nothing.
     ///
     /// # Errors
-    /// [`LibraryError::OtherDefinition`] when the id stands for something else already.
+    /// [`LibraryError::OtherDefinition`] when the id already has another definition.
     pub async fn insert_campaign(&self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
         self.write_dated(campaign.clone()).await
     }
@@ -53,7 +53,7 @@ impl Library {
     /// One campaign.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownCampaign`] when it is not there.
+    /// [`LibraryError::UnknownCampaign`] when it does not exist.
     pub async fn campaign(&self, id: &str) -> Result<CampaignRecord, LibraryError> {
         let row = self.readers().row(sql("select * from campaign where id = $1").bind(id)).await?;
         row.as_ref()

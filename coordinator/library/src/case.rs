@@ -1,4 +1,4 @@
-//! The table `campaign_case`: the cases and where they stand.
+//! The table `campaign_case`: the cases and their states.
 
 use crate::campaign::{seed_from_sql, sql_seed};
 use crate::engine::{Connection, Row, Statement, Write, sql};
@@ -8,12 +8,12 @@ use tracktwin_parameters::{Case, Parameter, ParameterSet};
 /// Cases in one statement: ten values each, well below the 32,766 that `SQLite` takes.
 const CASES_A_STATEMENT: usize = 1000;
 
-/// A case and where it stands.
+/// A case and its state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseRecord {
     /// The case.
     pub case: Case,
-    /// Where it stands.
+    /// Its state.
     pub state: State,
     /// Leases that ended in a failure or in silence.
     pub attempts: u32,
@@ -23,7 +23,7 @@ pub struct CaseRecord {
     pub error: Option<String>,
 }
 
-/// How many cases of a campaign stand where.
+/// Counts of a campaign's cases by state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
     /// Nobody works on them.
@@ -49,7 +49,7 @@ impl Status {
 }
 
 impl Library {
-    /// Adds cases to a campaign; those that are there stay as they are.
+    /// Adds cases to a campaign; existing ones are kept unchanged.
     ///
     /// # Errors
     /// [`LibraryError::SeedTooLarge`], or when the library cannot be written.
@@ -60,8 +60,8 @@ impl Library {
         Ok(())
     }
 
-    /// How many cases a campaign has from its first on, up to the first that is not there: all, unless a
-    /// malformed library has lost some.
+    /// Number of cases of a campaign before the first missing one: all, unless a damaged library
+    /// has lost some.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.

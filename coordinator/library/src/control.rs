@@ -1,5 +1,4 @@
-//! What people decide about campaigns: whether and in which order their cases are handed out, and
-//! which are tried again.
+//! Control of campaigns: pause, resume, cancel, priority and retry.
 
 use crate::attempt;
 use crate::engine::{Connection, Text, Write, sql};
@@ -71,7 +70,7 @@ pub enum Retry {
 }
 
 impl Library {
-    /// Hands out no more cases of a campaign; those in work are finished.
+    /// Pauses a campaign: leased cases are finished, no further cases are leased.
     ///
     /// # Errors
     /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
@@ -87,8 +86,8 @@ impl Library {
         self.set_state(campaign, CampaignState::Running).await
     }
 
-    /// Hands out no more cases of a campaign and takes back those in work; workers are told when
-    /// they renew. What is stored stays, and a result that still comes is taken.
+    /// Cancels a campaign: no further cases are leased, and leases end; workers learn this when
+    /// they renew. Stored results are kept, and a late result is accepted.
     ///
     /// # Errors
     /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
@@ -101,7 +100,8 @@ impl Library {
         self.write(SetState { campaign: campaign.to_owned(), state, now_unix_ms }).await
     }
 
-    /// Sets a campaign's priority: cases of the largest are handed out first; 0 is the usual.
+    /// Sets the priority of a campaign: cases of the highest priority are leased first; 0 is the
+    /// default.
     ///
     /// # Errors
     /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
@@ -222,7 +222,7 @@ impl RetryCases {
     }
 }
 
-/// Throws results away, and lets their cases be simulated anew.
+/// Deletes results, so that their cases are simulated again.
 struct Discard {
     campaign: String,
     indices: Vec<i64>,
@@ -241,7 +241,7 @@ async fn discard(
     campaign: &str,
     indices: &[i64],
 ) -> Result<u64, LibraryError> {
-    // Audits looked at results that are no more.
+    // Audits of deleted results.
     for change in [DISCARD_AUDITS, RETRY_FINISHED] {
         connection.execute(sql(change).bind(campaign).bind(indices.to_vec())).await?;
     }

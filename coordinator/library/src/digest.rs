@@ -3,12 +3,12 @@
 use crate::{Library, LibraryError};
 
 impl Library {
-    /// BLAKE3 (hexadecimal) over the checksums of a campaign's results by index: parameters, seed and
-    /// features, to the bit. Equal campaigns have equal digests whoever simulated them, in whatever
-    /// order, and in whichever database.
+    /// BLAKE3 (hexadecimal) over the checksums of a campaign's results by index: parameters, seed
+    /// and features, to the bit. Equal campaigns have equal digests, independent of workers, order
+    /// and database.
     ///
-    /// Checksums are made of what is stored, so that a digest says what is there; whether that is what workers
-    /// reported, [`Library::verify`] says.
+    /// Checksums are computed from the stored data, so a digest describes the stored data;
+    /// [`Library::verify`] checks that they are what the workers reported.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read or has no such campaign.

@@ -21,14 +21,15 @@ pub enum LibraryError {
     /// A PostgreSQL URL that cannot be read.
     #[error("library {url}: {reason}; write postgres://USER:PASSWORD@HOST:PORT/DATABASE")]
     BadPostgresUrl {
-        /// The URL, without what stands before its host.
+        /// The URL without user and password.
         url: String,
         /// What is wrong with it.
         reason: String,
     },
     /// There is a folder at this path.
     #[error(
-        "library {library}: this is a folder; name a file, such as sqlite:{library}/library.sqlite"
+        "library {library}: is a folder; give a file, for example \
+             sqlite:{library}/library.sqlite"
     )]
     Folder {
         /// The library.
@@ -36,21 +37,21 @@ pub enum LibraryError {
     },
     /// There is nothing at this path.
     #[error(
-        "library {library}: there is no such file; `tracktwin run --library sqlite:{library}` makes \
-         one"
+        "library {library}: the file does not exist; create it with `tracktwin run \
+             --library sqlite:{library}`"
     )]
     Missing {
         /// The library.
         library: String,
     },
     /// The database holds no library.
-    #[error("library {library}: the database is empty; `tracktwin run` fills it")]
+    #[error("library {library}: the database is empty; fill it with `tracktwin run`")]
     Empty {
         /// The library.
         library: String,
     },
-    /// The folder that should hold the library is not there.
-    #[error("library {library}: the folder {folder} is not there; make it first")]
+    /// The folder of the library does not exist.
+    #[error("library {library}: the folder {folder} does not exist; create it first")]
     NoFolder {
         /// The library.
         library: String,
@@ -58,7 +59,7 @@ pub enum LibraryError {
         folder: PathBuf,
     },
     /// The file or database is something else.
-    #[error("library {library}: what is there is not a tracktwin library")]
+    #[error("library {library}: not a tracktwin library")]
     NotALibrary {
         /// The library.
         library: String,
@@ -68,7 +69,7 @@ pub enum LibraryError {
     NotLetIn {
         /// The library.
         library: String,
-        /// What the server said.
+        /// Error of the server.
         reason: String,
     },
     /// There is no server.
@@ -105,7 +106,7 @@ pub enum LibraryError {
         id: String,
     },
     /// There is no such worker.
-    #[error("the library knows no worker {id}")]
+    #[error("the library has no worker {id}")]
     UnknownWorker {
         /// The worker.
         id: String,
@@ -118,8 +119,8 @@ pub enum LibraryError {
     },
     /// A trial's case that was sealed with another truth.
     #[error(
-        "the library's trial {trial} hides something else in case {number}; take another seed, or the \
-         program that began it"
+        "trial {trial} in the library has another truth in case {number}; use another seed, \
+             or the program version that started it"
     )]
     OtherTruth {
         /// The trial.
@@ -128,7 +129,7 @@ pub enum LibraryError {
         number: u32,
     },
     /// A seed that SQL's signed integers cannot hold.
-    #[error("the seed {seed} is too large; it must stay below 2^63")]
+    #[error("the seed {seed} is too large; it must be below 2^63")]
     SeedTooLarge {
         /// The seed.
         seed: u64,
@@ -141,9 +142,9 @@ pub enum LibraryError {
     },
     /// Results that are not what their worker reported.
     #[error(
-        "the results of case {index} do not have their checksum: a number was altered or a pass lost since they \
-         were stored; `tracktwin library verify` counts such cases, `tracktwin campaign retry --altered` lets \
-         them be simulated anew"
+        "the results of case {index} do not match their checksum: a number was altered or a \
+             pass was lost after storing; count such cases with `tracktwin library verify`, \
+             simulate them again with `tracktwin campaign retry --altered`"
     )]
     Altered {
         /// The first case found so.
@@ -151,8 +152,9 @@ pub enum LibraryError {
     },
     /// The database is not whole.
     #[error(
-        "the library's database is malformed ({reason}); nothing more is written to it: `tracktwin library \
-         verify` says what is wrong, `tracktwin library copy` saves what is whole in another library"
+        "the library's database is damaged ({reason}) and no longer written to: list the \
+             faults with `tracktwin library verify`, copy the intact rows to another library \
+             with `tracktwin library copy`"
     )]
     Malformed {
         /// What was found.
@@ -165,13 +167,13 @@ pub enum LibraryError {
     )]
     OnlyReads,
     /// Whoever asks may not write.
-    #[error("the library can only be read from here: {reason}")]
+    #[error("the library is read-only here: {reason}")]
     NotWritable {
-        /// What the database said.
+        /// Error of the database.
         reason: String,
     },
     /// A statement that the database does not understand.
-    #[error("the database refuses the statement: {reason}")]
+    #[error("the database rejects the statement: {reason}")]
     BadQuery {
         /// What it said.
         reason: String,
@@ -189,8 +191,8 @@ pub enum LibraryError {
     Closed,
     /// The connection that writes to a file has broken.
     #[error(
-        "the connection that writes to the library broke ({reason}); what was acknowledged is stored: \
-         start the program again"
+        "the writing connection to the library was lost ({reason}); acknowledged results \
+             are stored: restart the program"
     )]
     Lost {
         /// What was found.
@@ -201,14 +203,15 @@ pub enum LibraryError {
     Lock {
         /// The library.
         library: String,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// The file system has no locks, or no memory that processes share, which `SQLite` needs.
     #[error(
-        "{library}: SQLite's locks do not work on its file system ({reason}), as on many that several hosts \
-         share: put the library on a disk of this machine (--library sqlite:/PATH/ON/A/LOCAL/DISK), or use a \
-         PostgreSQL server (--library postgres://USER@HOST/DATABASE)"
+        "{library}: SQLite's locks do not work on its file system ({reason}), which is \
+             common on network file systems: put the library on a local disk (--library \
+             sqlite:/PATH/ON/A/LOCAL/DISK), or use a PostgreSQL server (--library \
+             postgres://USER@HOST/DATABASE)"
     )]
     NoLocks {
         /// The library, and what its file system is called where that is known.
@@ -218,8 +221,8 @@ pub enum LibraryError {
     },
     /// The disk, or the network that it is behind, fails.
     #[error(
-        "reading or writing the library's file failed ({reason}): look for the disk's fault in the system's log; \
-         what was acknowledged is stored, and the same command goes on"
+        "reading or writing the library's file failed ({reason}): check the system log for \
+             disk errors; acknowledged results are stored: repeat the command to continue"
     )]
     Disk {
         /// What failed.
@@ -227,8 +230,8 @@ pub enum LibraryError {
     },
     /// A file of the library can't be opened though the library is.
     #[error(
-        "a file of the library could not be opened ({reason}): look whether its folder is there and can be \
-         written, and whether more files may be open (ulimit -n)"
+        "a file of the library could not be opened ({reason}): check that its folder exists \
+             and is writable, and the limit of open files (ulimit -n)"
     )]
     NotOpened {
         /// What failed.
@@ -236,33 +239,33 @@ pub enum LibraryError {
     },
     /// Another process writes for longer than anybody waits.
     #[error(
-        "another program has been writing to the library for longer than 30 s: end it, or try again later; on a \
-         network file system locks that do not work look the same, and a disk of this machine mends that"
+        "another program has been writing to the library for longer than 30 s: stop it, or \
+             try again later; on a network file system the locks may not work: use a local disk"
     )]
     Busy,
     /// The database does not answer now, and may later.
-    #[error("the library's database does not answer: {reason}")]
+    #[error("the library's database does not respond: {reason}")]
     Unavailable {
         /// What was found.
         reason: String,
     },
     /// The file was removed or replaced while it was open.
     #[error(
-        "library {library}: its file was removed, moved or replaced while it was open; put it back, or \
-         stop and begin anew"
+        "library {library}: its file was removed, moved or replaced while it was open; \
+             restore it, or stop and start again"
     )]
     FileGone {
         /// The library.
         library: String,
     },
     /// There is no room for what should be written.
-    #[error("the library's disk is full; nothing is lost: make room and go on")]
+    #[error("the library's disk is full; no data is lost: free space and repeat the command")]
     DiskFull,
     /// The database failed.
     #[error("the library's database failed")]
     Database(#[source] sqlx::Error),
     /// A change of the schema failed.
-    #[error("the library's schema cannot be brought up to date")]
+    #[error("the library's schema cannot be updated")]
     Migration(#[source] MigrateError),
 }
 
@@ -294,7 +297,7 @@ impl LibraryError {
         )
     }
 
-    /// Whether the same may succeed later, when somebody has mended the machine.
+    /// Whether the operation may succeed later, after a repair of the machine.
     pub const fn is_temporary(&self) -> bool {
         matches!(
             self,
@@ -327,9 +330,9 @@ impl LibraryError {
         }
     }
 
-    /// A database that has said nothing for so long.
+    /// A database without a response for this time.
     pub(crate) fn silent(for_so_long: Duration) -> Self {
-        Self::Unavailable { reason: format!("no answer within {} s", for_so_long.as_secs()) }
+        Self::Unavailable { reason: format!("no response within {} s", for_so_long.as_secs()) }
     }
 
     pub(crate) const fn is_unavailable(&self) -> bool {

@@ -1,8 +1,8 @@
 //! The model library: campaigns, their cases, and what came out of each, in SQL.
 //!
-//! Owns the schema's use and every statement; nothing else in the program speaks SQL. It stores and
-//! counts, and decides by what it is told: after how many attempts a case is given up ([`AttemptsMax`]) and what time
-//! it is come in as arguments where anything depends on them.
+//! Owns the schema and every statement; no other crate contains SQL. It stores and counts; policies
+//! are arguments, such as the number of attempts after which a case is given up ([`AttemptsMax`])
+//! and the time.
 
 mod array;
 mod attempt;

@@ -20,7 +20,8 @@ pub struct Claim {
 }
 
 impl Claim {
-    /// Whether nobody else hands out cases, so that whatever is leased is held by nobody alive.
+    /// Whether this process alone leases cases, so that existing leases belong to no running
+    /// worker.
     pub const fn is_exclusive(&self) -> bool {
         self.lock.is_some()
     }
@@ -35,7 +36,7 @@ impl Library {
     pub async fn open(url: &str) -> Result<Self, LibraryError> {
         let library = Self::of(engine::open(url).await?);
         match library.add_missing_bins().await {
-            // A damaged library is opened all the same: to be looked over, and to save what is whole.
+            // A damaged library is opened as well, for verification and salvage.
             Err(error) if !error.is_of_the_database() => Err(error),
             _ => Ok(library),
         }
@@ -44,7 +45,7 @@ impl Library {
     /// Opens the library at `sqlite:PATH` or `postgres://...`, or makes an empty one there.
     ///
     /// # Errors
-    /// As [`Library::open`]; and when the folder that should hold it is not there.
+    /// As [`Library::open`]; and when its folder does not exist.
     pub async fn open_or_create(url: &str) -> Result<Self, LibraryError> {
         Ok(Self::of(engine::open_or_create(url).await?))
     }
@@ -53,8 +54,8 @@ impl Library {
         Self { opened: Arc::new(opened), cursor: Arc::default() }
     }
 
-    /// Finishes what was ordered and closes the connections. Whoever still holds a clone is told
-    /// that the library is closed.
+    /// Finishes pending writes and closes the connections. Calls on a remaining clone return an
+    /// error.
     pub async fn close(self) {
         self.opened.writer.close().await;
         self.opened.readers.close().await;
@@ -64,7 +65,7 @@ impl Library {
     /// this program in the midst of writing, nor once the connection to its file broke.
     ///
     /// # Errors
-    /// Why not: [`LibraryError::Closed`] or [`LibraryError::Lost`]. Only a new start mends it.
+    /// Why not: [`LibraryError::Closed`] or [`LibraryError::Lost`]. A restart is required.
     pub fn takes_writes(&self) -> Result<(), LibraryError> {
         self.opened.writer.runs()
     }
@@ -82,13 +83,13 @@ impl Library {
     /// The library's clock, in ms since 1970: what leases are given and ended by.
     ///
     /// With `SQLite` it is this machine's. With PostgreSQL it is the server's, so that coordinators
-    /// whose clocks differ, or are set anew, agree on when a lease has ended.
+    /// with different or adjusted clocks agree on the end of a lease.
     pub fn now_unix_ms(&self) -> i64 {
         self.opened.clock.unix_ms()
     }
 
-    /// Claims the right to hand out cases. With `SQLite` one process at a time has it, whatever names the
-    /// file has; with PostgreSQL any number has.
+    /// Claims the right to lease cases. With `SQLite` one process at a time has it; with PostgreSQL
+    /// any number of processes.
     ///
     /// The system takes it back when the process ends, however it ends.
     ///

@@ -1,4 +1,4 @@
-//! How all campaigns stand, at a glance.
+//! Overview of all campaigns.
 
 use crate::engine::{Row, sql};
 use crate::throughput::Throughput;
@@ -6,26 +6,26 @@ use crate::{CampaignState, Library, LibraryError, Status};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// Causes of failure that are told apart for one campaign.
+/// Number of failure causes distinguished per campaign.
 const CAUSES_MAX: usize = 20;
 
 /// Errors of a campaign that are read for its causes, the most frequent first.
 const ERRORS_MAX: u32 = 2000;
 
-/// How a campaign stands.
+/// Overview of a campaign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CampaignOverview {
     /// Its id.
     pub id: String,
     /// What people call it.
     pub name: String,
-    /// Whether its cases are handed out.
+    /// Whether its cases are leased.
     pub state: CampaignState,
     /// The larger goes first.
     pub priority: i32,
     /// When it came, as ISO 8601.
     pub created_at: String,
-    /// How many cases stand where.
+    /// Counts of its cases by state.
     pub status: Status,
     /// Cases finished a second: in the last minute or a little more, or since the campaign's first
     /// results, or the first after a pause.
@@ -47,7 +47,7 @@ pub struct Cause {
 }
 
 impl Library {
-    /// How all campaigns stand, oldest first; the cost doesn't depend on how many cases they have.
+    /// Overview of all campaigns, oldest first; the cost does not depend on the number of cases.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -107,7 +107,7 @@ fn without_numbers(text: &str) -> String {
     shown.collect()
 }
 
-/// What a row says of a campaign that goes at this pace.
+/// The overview of a campaign from its row and throughput.
 fn overview(row: &Row, throughput: Throughput) -> Result<CampaignOverview, LibraryError> {
     let priority: i64 = row.get("priority")?;
     Ok(CampaignOverview {

@@ -24,7 +24,7 @@ impl Library {
         Ok(Some(LibraryEntry { case: case_of(first)?, features }))
     }
 
-    /// The finished cases with the largest indices, at the fastest speed: cases are handed out in
+    /// The finished cases with the largest indices, at the fastest speed: cases are leased in
     /// order, so these are the newest, or nearly.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use crate::LibraryError;
 /// stored is not taken for something else.
 ///
 /// # Errors
-/// [`LibraryError::Damaged`] says what `of` is in a state that nobody here knows.
+/// [`LibraryError::Damaged`] names the row that is in an unknown state.
 pub(crate) fn named<T: Copy, const N: usize>(
     of: &str,
     name: &str,
@@ -16,12 +16,12 @@ pub(crate) fn named<T: Copy, const N: usize>(
     spelled: impl Fn(T) -> &'static str,
 ) -> Result<T, LibraryError> {
     let unknown = || LibraryError::Damaged {
-        what: format!("{of} is `{name}`, which this version of the program does not know"),
+        what: format!("{of} is `{name}`, which is unknown to this version of the program"),
     };
     all.into_iter().find(|&it| spelled(it) == name).ok_or_else(unknown)
 }
 
-/// Where a case stands.
+/// State of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
     /// Nobody works on it.
@@ -52,14 +52,14 @@ impl State {
     }
 }
 
-/// Whether a campaign's cases are handed out.
+/// Whether cases of a campaign are leased.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CampaignState {
     /// They are.
     Running,
-    /// None are handed out; those in work are finished.
+    /// No cases are leased; leased ones are finished.
     Paused,
-    /// None are handed out, and those in work are taken back.
+    /// No cases are leased, and leases have ended.
     Cancelled,
 }
 

@@ -4,7 +4,7 @@ use crate::engine::{Connection, Text, sql};
 use crate::{LibraryError, Report, Verdict};
 use tracktwin_experiment::Outcome;
 
-/// Length of the intervals in which progress is told, in s.
+/// Length of the intervals of the progress counts in s.
 pub(crate) const INTERVAL_S: i64 = 10;
 
 /// Adds to a worker's ($1) counts; answers why its results are not to be trusted, if so.

@@ -1,23 +1,24 @@
-//! How fast campaigns go, from what was finished in each ten seconds of the last minute.
+//! Throughput of campaigns, from the cases finished in each ten seconds of the last minute.
 
 use crate::engine::sql;
 use crate::tally::{INTERVAL_S, interval};
 use crate::{Library, LibraryError};
 use std::collections::HashMap;
 
-/// What the rate is a mean over, and the begun interval, in s.
+/// Averaging time of the rate in s; the current interval is added.
 const OVER_S: i64 = 60;
 
-/// A first report in a new interval is no rate of thousands.
+/// Shortest averaging time in s: a first report in a new interval must not give an excessive rate.
 const SHORTEST_S: f64 = 1.0;
 
-/// A time without results is a pause if so many should have come in it at the rate that followed.
+/// A time without results is a pause if this many results were expected in it at the later rate.
 const MISSING_IN_A_PAUSE: f64 = 10.0;
 
-/// And if it is longer than a worker takes for so many cases, some of which it hands in together.
+/// It must also be longer than a worker needs for this number of cases, some of which it reports
+/// together.
 const CASES_IN_A_PAUSE: f64 = 16.0;
 
-/// How fast a campaign goes.
+/// Throughput of a campaign.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Throughput {
     /// Cases finished a second.
@@ -35,7 +36,7 @@ struct Interval {
 }
 
 impl Library {
-    /// The paces of campaigns that have finished something lately.
+    /// Throughput of campaigns with results in the last minute.
     pub(crate) async fn throughputs(&self) -> Result<HashMap<String, Throughput>, LibraryError> {
         let now_unix_ms = self.now_unix_ms();
         let since_unix_s = interval(now_unix_ms) - OVER_S;
@@ -63,7 +64,7 @@ impl Library {
     }
 }
 
-/// The pace of these intervals, ascending: since `begun_unix_s`, or since the last pause.
+/// Throughput over these ascending intervals: since `begun_unix_s`, or since the last pause.
 fn throughput(intervals: &[Interval], begun_unix_s: i64, now_unix_s: f64) -> Throughput {
     let all: f64 = intervals.iter().map(|it| it.finished).sum();
     let busy_s: f64 = intervals.iter().map(|it| it.busy_s).sum();

@@ -1,7 +1,7 @@
 //! Blind trials: the tables `trial`, `trial_case`, `trial_answer` and `trial_lease`.
 //!
-//! Any number of nodes share a trial. Which cases have something left to be asked is theirs to say,
-//! for it follows from the answers; who works on one stands here, and an answer is kept once.
+//! Any number of machines share a trial. They derive the open cases from the stored answers; this
+//! table holds the leases, and each answer is stored once.
 
 use crate::campaign::sql_seed;
 use crate::engine::{Connection, Row, Statement, Text, Write, sql};
@@ -15,12 +15,13 @@ const HASH_DIGITS: usize = 12;
 /// Cases sealed in one statement, of three values each.
 const SEALS_A_STATEMENT: usize = 1000;
 
-/// Stores a trial; one that is there stays as it is.
+/// Stores a trial; an existing one is kept unchanged.
 const INSERT: &str = "
     insert into trial (id, seed, code_version, model_hash, created_at) values ($1, $2, $3, $4, $5)
     on conflict (id) do nothing";
 
-/// Leases until $5 to worker $3 the first of a trial's ($1) cases ($2) that nobody else works on now ($4).
+/// Leases until $5 to worker $3 the first of a trial's ($1) cases ($2) that no other worker holds
+/// at $4.
 const TAKE: Text = Text::Each {
     sqlite: "
         with next as (
@@ -138,8 +139,8 @@ impl Library {
         rows.iter().map(answer).collect()
     }
 
-    /// Leases the first of these cases that nobody else works on: one of the worker's own that it could
-    /// not give back is its again.
+    /// Leases the first of these cases that no other worker holds; a worker gets back its own case
+    /// that it could not release.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -289,7 +290,7 @@ impl Write for ClaimQuestion {
     }
 }
 
-/// Keeps a lease until then, or gives it back.
+/// Renews a lease until then, or releases it.
 struct RenewOrRelease {
     trial: String,
     worker: String,

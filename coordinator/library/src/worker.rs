@@ -13,7 +13,7 @@ pub enum WorkerState {
     Quarantined,
 }
 
-/// What a worker says when it comes.
+/// Registration of a worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Registration {
     /// Its name; one that comes again under the same name keeps its counts.
@@ -45,7 +45,7 @@ pub struct WorkerRecord {
     pub reason: Option<String>,
     /// When it came first.
     pub registered_unix_ms: i64,
-    /// When it was heard of last.
+    /// Time of its last message.
     pub last_seen_unix_ms: i64,
     /// Cases whose results it brought first.
     pub cases_finished: u32,
@@ -82,7 +82,7 @@ impl Library {
         self.write(registration).await
     }
 
-    /// Notes that a worker was heard of; answers what is known of it, if it has registered.
+    /// Records a message of a worker; returns its record if it has registered.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -103,7 +103,7 @@ impl Library {
         self.readers().row(ask).await?.as_ref().map(record).transpose()
     }
 
-    /// Workers that were heard of since, by name.
+    /// Workers with a message since then, by name.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.

@@ -33,14 +33,24 @@ pub fn evaluation_page(
         @for note in notes(evaluation) { p { (note) } }
         p { (evaluation.unevenness.sentence()) }
         h2 { "Along the track" }
-        (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a band of two standard deviations inside the library's range, and the average over the ten library entries that match best. Hollow dots: not valid, the library has no such track. Not told: on the library's test half the models are hardly better than a constant answer."))
+        (figure(&track_charts(evaluation), "Estimates at every sleeper (paper, Fig. 20): mean of the Gaussian processes with a \
+             band of two standard deviations inside the library's range, and the average over \
+             the ten best-matching library entries. Hollow dots: not valid, the track is \
+             outside the library. Not resolved: on the library's test half the models are \
+             hardly better than a constant."))
         @if let Some(inversion) = inversion { (inversion_page::section(inversion, evaluation)) }
-        h2 { "What was measured" }
-        (figure(&maps(evaluation, recording, extractor), "Five sleeper bays in the middle of the recording (paper, Fig. 2); dashed lines are sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet transform (CWT), sharpened in frequency."))
+        h2 { "Measured data" }
+        (figure(&maps(evaluation, recording, extractor), "Five spans in the middle of the recording (paper, Fig. 2); dashed lines are \
+             sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet \
+             transform (CWT), sharpened in frequency."))
         h2 { "Measured and matched spectra" }
-        (figure(&spectra(evaluation), "Local wavelet power spectra (LWPS) of some sleepers, mean over the passes of one speed, and those of the library entries nearest to them (paper, Fig. 11). The nearest entry of a library that has no such track can lie as near as any: at a sleeper marked \"not valid\" a small distance says nothing."))
+        (figure(&spectra(evaluation), "Local wavelet power spectra (LWPS) of some sleepers, mean over the passes of one \
+             speed, and those of the library entries nearest to them (paper, Fig. 11). At a \
+             sleeper marked \"not valid\" a small distance has no meaning."))
         h2 { "Estimates" }
-        p.note { "Mean ± one standard deviation. Rows in italics are not valid, nor are their matches. Match: how far the best library entry is off on average, in dB and as mean absolute percentage error of the logarithm (paper, eq. 10)." }
+        p.note { "Mean ± one standard deviation. Rows in italics and their matches are not valid. \
+             Match: mean distance of the best library entry, in dB and as mean absolute \
+             percentage error of the logarithm (paper, eq. 10)." }
         div.scroll { (table(evaluation)) }
         h2 { "Provenance" }
         (provenance(evaluation, command))
@@ -90,8 +100,8 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
     let at_edge = |sleeper: &&SleeperEvaluation| sleeper.flags.contains(&Flag::AtEdgeOfRange);
     let edge = match evaluation.sleepers.iter().filter(at_edge).count() {
         0 => String::new(),
-        1 => "; 1 has a mean at an end of what the models know".to_owned(),
-        count => format!("; {count} have a mean at an end of what the models know"),
+        1 => "; 1 has a mean at an end of the models' range".to_owned(),
+        count => format!("; {count} have a mean at an end of the models' range"),
     };
     let ranges = if ranges.is_empty() { "no valid estimate".to_owned() } else { ranges.join(", ") };
     format!(

@@ -40,7 +40,7 @@ pub struct InspectionReport {
     pub loss_of_contact: Option<String>,
     /// What makes passes unusable.
     pub pass_defects: Vec<String>,
-    /// What was mended while it was read, or is doubtful.
+    /// Corrections made while reading, and doubts.
     pub doubts: Vec<String>,
     /// What the recording can be used for, and for what not.
     pub uses: Vec<String>,
@@ -68,16 +68,17 @@ pub fn inspection_page(inspection: &InspectionReport) -> String {
         &format!("dB re 1 ({unit})²"),
     );
     let body = html! {
-        (figure(&[spectra, levels], "A curve a pass. Passes at one speed over the same track lie on each other, save for the noise at high frequencies."))
+        (figure(&[spectra, levels], "One curve per pass. Passes at one speed over the same track coincide, except for \
+             noise at high frequencies."))
         h2 { "Passes" }
         div.scroll { (table(&inspection.passes)) }
-        h2 { "What the passes tell by themselves" }
+        h2 { "Findings in the passes alone" }
         (found(inspection))
         @if !inspection.doubts.is_empty() {
-            h2 { "What was mended, or is doubtful" }
+            h2 { "Corrections and doubts" }
             ul { @for text in &inspection.doubts { li { (text) } } }
         }
-        h2 { "What it can be used for" }
+        h2 { "Possible uses" }
         ul { @for text in &inspection.uses { li { (text) } } }
     };
     page(&format!("Recording {}", inspection.name), &inspection.summary, &body)
@@ -89,7 +90,8 @@ fn found(inspection: &InspectionReport) -> Markup {
             p { strong { code { "loss_of_contact" } } ": " (lost) }
         }
         @if inspection.found.is_empty() && inspection.pass_defects.is_empty() && inspection.loss_of_contact.is_none() {
-            p { "Nothing that a faultless chain, a round wheel and a rail without defects wouldn't show (2 % false alarms)." }
+            p { "No finding: consistent with a faultless measuring chain, a round wheel and a rail \
+                 without defects (false-alarm rate 2 %)." }
         }
         @for defect in &inspection.pass_defects { p { strong { "Not usable: " } (defect) } }
         @if !inspection.found.is_empty() {

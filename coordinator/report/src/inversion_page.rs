@@ -29,11 +29,14 @@ pub fn inversion_page(
     let body = html! {
         (banner(inversion))
         h2 { "Along the track" }
-        (figure(&charts(inversion, None), "Posterior mean of every sleeper's own value with a band of two standard deviations. Hollow dots: not valid, the track model does not explain what was measured there."))
+        (figure(&charts(inversion, None), "Posterior mean at every sleeper with a band of two standard deviations. Hollow \
+             dots: not valid, the track model does not explain the measured data there."))
         (common(inversion))
         (variation(inversion))
-        h2 { "What was measured" }
-        (figure(&maps_at(middle, recording, extractor), "Five sleeper bays in the middle of the recording (paper, Fig. 2); dashed lines are sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet transform (CWT), sharpened in frequency."))
+        h2 { "Measured data" }
+        (figure(&maps_at(middle, recording, extractor), "Five spans in the middle of the recording (paper, Fig. 2); dashed lines are \
+             sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet \
+             transform (CWT), sharpened in frequency."))
         h2 { "Estimates" }
         p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the residual over its expectation; above 2 the track model does not explain the recording there." }
         div.scroll { (table(inversion)) }
@@ -46,8 +49,9 @@ pub fn inversion_page(
 /// The section of an evaluation's page that shows the inversion beside the Gaussian processes.
 pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
     html! {
-        h2 { "Each sleeper for itself" }
-        p { "Inversion fits the track model to all passes and speeds at once, each sleeper with a stiffness of its own, without the library." }
+        h2 { "Inversion" }
+        p { "Inversion fits the track model to all passes and speeds, with separate stiffnesses \
+             for every sleeper, and without the library." }
         @for compared in beside(inversion, models) { p { (capital(&compared.sentence())) } }
         @for note in inversion.notes.iter().filter(|note| !models.notes.contains(note)) { p { (note) } }
         (figure(&charts(inversion, Some(models)), "Bold: inversion. Dashed grey: Gaussian processes of the library. Bands are two standard deviations."))
@@ -158,7 +162,7 @@ fn variation(inversion: &Inversion) -> Markup {
     };
     let all: Vec<String> = PER_SLEEPER.iter().filter_map(|&parameter| text(parameter)).collect();
     html! { @if !all.is_empty() {
-        p { "The recording tells that sleepers differ along the track (one standard deviation): " (all.join(", ")) "." }
+        p { "Unevenness along the track estimated from the recording (one standard deviation): " (all.join(", ")) "." }
     } }
 }
 

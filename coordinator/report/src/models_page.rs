@@ -16,10 +16,14 @@ pub fn models_page(models: &Trained, tested: &[Tested]) -> String {
     let scatters: Vec<String> =
         tested.iter().map(|(parameter, pairs)| scatter_chart(*parameter, pairs)).collect();
     let body = html! {
-        (figure(&charts, "Mean absolute scaled error on the test half of the library (paper, eq. 11 and Fig. 14), a bar a feature set, a group of bars a speed. Lower is better; 25 % is what a constant achieves."))
-        (figure(&scatters, "True and predicted values of test cases (paper, Fig. 14), by the models that read most speeds."))
-        h2 { "Every model" }
-        p.note { "Folds: five, within the training half. Held: share of the test half inside its 90 % interval; bias as a share of the range." }
+        (figure(&charts, "Mean absolute scaled error on the test half of the library (paper, eq. 11 and Fig. \
+             14); one bar per feature set, one group of bars per speed. Lower is better; a \
+             constant achieves 25 %."))
+        (figure(&scatters, "True and predicted values of test cases (paper, Fig. 14), by the models of most \
+             speeds."))
+        h2 { "All models" }
+        p.note { "Folds: five, within the training half. Coverage: share of the test half inside its \
+             90 % interval; bias as a share of the range." }
         div.scroll { (table(models)) }
         h2 { "Provenance" }
         dl {

@@ -20,7 +20,8 @@ const KEY: f64 = 36.0;
 pub fn reproduction_page(reproduction: &Reproduction) -> String {
     let of = &reproduction.provenance;
     let body = html! {
-        p.note { "Shen et al. 2023, Mechanical Systems and Signal Processing 204, 110730. A verdict follows from the tolerance that stands beside it." }
+        p.note { "Shen et al. 2023, Mechanical Systems and Signal Processing 204, 110730. Each \
+             verdict follows from the stated tolerance." }
         @for compared in &reproduction.figures { (section(compared)) }
         h2 { "Provenance" }
         dl {
@@ -31,15 +32,14 @@ pub fn reproduction_page(reproduction: &Reproduction) -> String {
         p { "To reproduce, with the library of that digest:" }
         pre { "tracktwin reproduce " (names(reproduction)) " --library URL --out DIR" }
     };
-    page("The paper's results and ours", &summary(reproduction), &body)
+    page("Comparison with the paper's results", &summary(reproduction), &body)
 }
 
 /// What a reader in a hurry needs.
 fn summary(reproduction: &Reproduction) -> String {
     let count = |verdict| reproduction.count(verdict);
     format!(
-        "Of {} statements of the paper {} are reproduced, {} come out different, and of {} it \
-         cannot be told.",
+        "Of {} statements of the paper, {} are reproduced, {} differ, and {} are undecided.",
         reproduction.rows.len(),
         count(Verdict::Reproduced),
         count(Verdict::Differs),

@@ -42,7 +42,7 @@ fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
     let mut label = parameter.label().to_owned();
     label[..1].make_ascii_uppercase();
     if !known.beats_constant() {
-        label += " (not told)";
+        label += " (not resolved)";
     }
     let mut chart = Chart::new(&label, SIZE, x, y);
     draw(&mut chart, &process, &selector, range);

@@ -180,8 +180,8 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
     assert!(page.contains("ring &lt;1&gt;") && !page.contains("ring <1>"));
     assert!(page.contains("1 sleeper is flagged"), "the summary counts flags");
     // Heading and label of one chart.
-    assert_eq!(page.matches("(not told)").count(), 2);
-    assert_eq!(page.matches("Railpad damping (not told)").count(), 2);
+    assert_eq!(page.matches("(not resolved)").count(), 2);
+    assert_eq!(page.matches("Railpad damping (not resolved)").count(), 2);
     // The best match is |sin| off, 2/pi of ln of a power on average.
     let decibel = 2.0 / PI * 10.0 / LN_10;
     let cells = page.matches(&format!("<td>{decibel:.2}</td>")).count();

@@ -55,7 +55,7 @@ fn the_page_shows_every_row_with_its_verdict_and_every_picture() {
     let page = reproduction_page(&reproduction());
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("reproduce.html");
     std::fs::write(file, &page).expect("writable");
-    assert!(page.contains("Of 3 statements of the paper 1 are reproduced, 1 come out different"));
+    assert!(page.contains("Of 3 statements of the paper, 1 are reproduced, 1 differ"));
     for text in ["levels &lt; 5", "ours of meshes", "✗ differs", "? cannot tell", "why of the rest"]
     {
         assert!(page.contains(text), "{text}");

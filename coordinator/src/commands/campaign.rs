@@ -1,4 +1,4 @@
-//! `tracktwin campaign`: adds campaigns to a library and steers them, whoever serves it.
+//! `tracktwin campaign`: adds campaigns to a library and controls them.
 
 use super::library::choose;
 use super::library_url::LibraryUrl;
@@ -13,64 +13,65 @@ use tracktwin_farm::campaign::Campaign;
 use tracktwin_library::{CampaignState, Library, Retry, State};
 use tracktwin_parameters::quantity::CASES;
 
-/// What is to be done.
+/// The action.
 #[derive(Subcommand)]
 pub(super) enum Action {
-    /// Add a campaign, or more cases to one that is there; coordinators hand them out at once.
+    /// Add a campaign, or add cases to an existing one; coordinators lease them immediately.
     Add {
         /// Campaign file (TOML).
         file: PathBuf,
-        /// How many cases, instead of the campaign's own number.
+        /// Number of cases; overrides the number in the campaign file.
         #[arg(long, value_name = "N", value_parser = count::<u32>(CASES))]
         cases: Option<u32>,
-        /// Cases of the campaign with the largest priority are handed out first; 0 is the usual.
+        /// Priority of the campaign; cases of the campaign with the highest priority are leased
+        /// first [default: 0].
         #[arg(long, value_name = "N", allow_negative_numbers = true)]
         priority: Option<i32>,
         #[command(flatten)]
         library: LibraryUrl,
     },
-    /// Hand out no more of a campaign's cases; those in work are finished.
+    /// Pause a campaign: leased cases are finished, no further cases are leased.
     Pause(Named),
-    /// Hand out a paused or cancelled campaign's cases again.
+    /// Resume a paused or cancelled campaign.
     Resume(Named),
-    /// Hand out no more of a campaign's cases and take back those in work. Results stay.
+    /// Cancel a campaign: leases end, no further cases are leased; stored results are kept.
     Cancel(Named),
-    /// Try cases again that were given up.
+    /// Simulate again the cases that were given up.
     Retry {
         #[command(flatten)]
         named: Named,
-        /// Only this case; may be repeated.
+        /// Sobol index of a case; only this case; may be repeated.
         #[arg(long = "case", value_name = "INDEX", conflicts_with = "flagged")]
         cases: Vec<u32>,
-        /// Cases whose results were flagged by an audit; those results are thrown away.
+        /// Cases whose results an audit flagged; their results are deleted.
         #[arg(long)]
         flagged: bool,
-        /// Cases whose results do not have their checksum; those results are thrown away.
+        /// Cases whose results do not match their checksum; their results are deleted.
         #[arg(long, conflicts_with_all = ["cases", "flagged"])]
         altered: bool,
     },
-    /// Say how urgent a campaign is.
+    /// Set the priority of a campaign.
     Priority {
         #[command(flatten)]
         named: Named,
-        /// The largest goes first; 0 is the usual.
+        /// The priority; the campaign with the highest one is served first.
         #[arg(long, value_name = "N", allow_negative_numbers = true, required = true)]
         to: i32,
     },
-    /// Give cases to a worker again that is in quarantine.
+    /// Release a worker from quarantine.
     Pardon {
-        /// The worker's name.
+        /// Name of the worker.
         worker: String,
         #[command(flatten)]
         library: LibraryUrl,
     },
 }
 
-/// Which campaign is meant.
+/// Selects a campaign.
 #[derive(Args)]
 pub(super) struct Named {
-    /// Its id, as `tracktwin status` tells it, or its name if no other has the same; may be left
-    /// out where there is only one.
+    /// Id of the campaign as shown by `tracktwin status`, or its name if the name is unique;
+    /// optional if the library holds one campaign.
     campaign: Option<String>,
     #[command(flatten)]
     library: LibraryUrl,
@@ -84,17 +85,17 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
         Action::Pause(named) => {
             let (library, id) = named.open().await?;
             library.pause(&id).await?;
-            done(library, &format!("{id} is paused; cases in work are finished")).await
+            done(library, &format!("{id} is paused; leased cases are finished")).await
         }
         Action::Resume(named) => {
             let (library, id) = named.open().await?;
             library.resume(&id).await?;
-            done(library, &format!("{id} runs")).await
+            done(library, &format!("{id} is running")).await
         }
         Action::Cancel(named) => {
             let (library, id) = named.open().await?;
             library.cancel(&id).await?;
-            done(library, &format!("{id} is cancelled; its results stay")).await
+            done(library, &format!("{id} is cancelled; its results are kept")).await
         }
         Action::Retry { named, cases, flagged, altered } => {
             let (library, id) = named.open().await?;
@@ -108,7 +109,7 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
                 refuse_others(&library, &id, indices).await?;
             }
             let again = library.retry(&id, which).await?;
-            done(library, &format!("{id}: {again} cases are tried again")).await
+            done(library, &format!("{id}: {again} cases will be simulated again")).await
         }
         Action::Priority { named, to } => {
             let (library, id) = named.open().await?;
@@ -118,7 +119,7 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
         Action::Pardon { worker, library } => {
             let library = library.open().await?;
             library.pardon_worker(&worker).await?;
-            done(library, &format!("{worker} gets cases again")).await
+            done(library, &format!("{worker} is released from quarantine")).await
         }
     }
 }
@@ -135,7 +136,7 @@ async fn add(
     continuity::check(&library, &campaign, println_stderr).await?;
     continuity::tell_what_training_lacks(&campaign, println_stderr);
     tracktwin_farm::campaign::insert_campaign(&library, &campaign).await?;
-    // Before there is anything to hand out.
+    // Before any case can be leased.
     if let Some(priority) = priority {
         library.set_priority(&id, priority).await?;
     }
@@ -147,13 +148,13 @@ async fn add(
     let waits = match state {
         Some(CampaignState::Running) | None => String::new(),
         Some(state) => {
-            format!("; it is {}, `tracktwin campaign resume` hands them out", state.name())
+            format!("; it is {}: run `tracktwin campaign resume`", state.name())
         }
     };
     done(library, &format!("{id}: {cases} cases, {left} of them to be simulated{waits}")).await
 }
 
-/// Adds cases with progress; says how far it came where that is not to the end.
+/// Adds cases with a progress bar; the error of an interrupted run states the progress.
 async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
     let shutdown = stop_on_signal("stopping")?;
     let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
@@ -168,7 +169,7 @@ async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
     let added = added.await;
     let so_far = || {
         let id = campaign.id();
-        format!("{stored} of {total} cases of {id} were added; the same command goes on")
+        format!("{stored} of {total} cases of {id} were added; repeat the command to continue")
     };
     added.with_context(so_far)?;
     if stored < total {
@@ -186,18 +187,20 @@ impl Named {
     }
 }
 
-/// Refuses cases that were not given up.
+/// Returns an error for a case that was not given up.
 async fn refuse_others(library: &Library, id: &str, indices: &[u32]) -> Result<(), Stop> {
     for &index in indices {
         let is = match library.case(id, index).await?.map(|case| case.state) {
             Some(State::Failed) => continue,
-            Some(State::Waiting) => "waits already",
-            Some(State::Leased) => "is in work",
+            Some(State::Waiting) => "is waiting",
+            Some(State::Leased) => "is leased",
             Some(State::Finished) => "is finished",
-            None => "is not there",
+            None => "does not exist",
         };
-        return Err(anyhow!("{id}: case {index} {is}; only what was given up is tried again"))
-            .or_input();
+        return Err(anyhow!(
+            "{id}: case {index} {is}; only cases that were given up can be retried"
+        ))
+        .or_input();
     }
     Ok(())
 }

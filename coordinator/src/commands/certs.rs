@@ -1,4 +1,4 @@
-//! `tracktwin certs`: what a farm needs to trust its own.
+//! `tracktwin certs`: certificates and a token for a farm.
 
 use super::files::Force;
 use super::{OrInput, Stop, println_stdout};
@@ -7,18 +7,18 @@ use std::path::PathBuf;
 use time::OffsetDateTime;
 use tracktwin_farm::security::issue;
 
-/// What `certs` is told.
+/// Arguments of `certs`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Folder to write to; an authority and a token that are there stay.
+    /// Output folder; an existing authority and token are kept.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// Name or address by which workers reach a coordinator; may be repeated.
+    /// Host name or IP address under which workers reach a coordinator; may be repeated.
     #[arg(long = "host", value_name = "NAME", required = true)]
     hosts: Vec<String>,
-    /// How long the certificates are valid; the authority is for ten years.
+    /// Validity of the certificates in days; the authority is valid for ten years.
     #[arg(long, default_value_t = 365, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=3650))]
     days: u32,
 }
@@ -29,7 +29,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let dir = folder.display();
     println_stdout(&format!(
         "{dir}: certificates for {}, valid for {days} days\n\
-         keep {dir}/ca-key.pem; hand ca.pem, token and, for mutual TLS, worker*.pem to workers\n\
+         keep {dir}/ca-key.pem private; give ca.pem, token and, for mutual TLS, worker*.pem to the workers\n\
          coordinator: --tls-cert {dir}/coordinator.pem --tls-key {dir}/coordinator-key.pem \
          --token-file {dir}/token\n\
          worker:      --tls-ca {dir}/ca.pem --token-file {dir}/token",

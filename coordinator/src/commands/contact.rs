@@ -1,13 +1,13 @@
-//! How many cases of a campaign lost contact between wheel and rail, in words.
+//! Sentence on loss of contact between wheel and rail in the cases of a campaign.
 
 use tracktwin_drawing::percent;
 use tracktwin_library::ContactLoss;
 
-/// What a reader has to know of so many finished cases.
+/// The sentence for this number of finished cases.
 pub(crate) fn contact_sentence(lost: ContactLoss, finished: u32) -> String {
     match lost.cases {
         0 => {
-            format!("none of {finished} cases is known to have lost contact between wheel and rail")
+            format!("no loss of contact between wheel and rail is recorded in {finished} cases")
         }
         cases => format!(
             "{cases} of {finished} cases lost contact between wheel and rail (at most {} of the time)",

@@ -1,4 +1,4 @@
-//! Whether a campaign goes on with what a library holds, or begins anew beside it.
+//! Checks whether a campaign continues one in the library or is a new one.
 
 use super::Stop;
 use crate::pipeline::lack::check_for_training;
@@ -6,8 +6,8 @@ use anyhow::anyhow;
 use tracktwin_farm::campaign::{Campaign, Kinship};
 use tracktwin_library::Library;
 
-/// Refuses a campaign that would begin anew only because its number of cases changed the sequence of its
-/// points; `tell`s which other campaigns of the library have its name, and in what they differ.
+/// Returns an error if a campaign would be a new one only because its number of cases changed its
+/// sampling sequence; passes other campaigns of the same name, with their differences, to `tell`.
 pub(super) async fn check(
     library: &Library,
     campaign: &Campaign,
@@ -22,7 +22,7 @@ pub(super) async fn check(
         match campaign.kinship(&other.id, &other.definition_json) {
             Kinship::OtherSequence { remedy } => return Err(Stop::Input(anyhow!(remedy))),
             Kinship::Other { differences } => tell(&format!(
-                "{id} begins from case 0, beside {}, which has the same name and differs in {differences}",
+                "{id} starts from case 0: {} has the same name and differs in {differences}",
                 other.id
             )),
         }
@@ -30,9 +30,9 @@ pub(super) async fn check(
     Ok(())
 }
 
-/// `tell`s what training will lack of a campaign, before it is simulated.
+/// Passes to `tell`, before the simulation, why models cannot be trained on a campaign.
 pub(super) fn tell_what_training_lacks(campaign: &Campaign, tell: impl Fn(&str)) {
     if let Err(lack) = check_for_training(campaign) {
-        tell(&format!("the campaign can be simulated, but not trained on: {lack}"));
+        tell(&format!("the campaign can be simulated, but models cannot be trained on it: {lack}"));
     }
 }

@@ -20,7 +20,7 @@ use tracktwin_parameters::quantity::CASES;
 use tracktwin_traces::Export;
 use tracktwin_worker::Token;
 
-/// What `coordinator` is told.
+/// Arguments of `coordinator`.
 #[derive(Args)]
 #[command(after_help = "On one machine:
   tracktwin coordinator --campaign mine.toml --library sqlite:library.sqlite
@@ -30,61 +30,61 @@ On a cluster:
   tracktwin coordinator --library postgres://... --listen 0.0.0.0:7700 --dashboard 127.0.0.1:7780 \\
       --tls-cert certs/coordinator.pem --tls-key certs/coordinator-key.pem --token-file certs/token
 
-Any number of coordinators may serve one PostgreSQL library; one at a time a SQLite library.
-It may be killed and started again at any time: workers wait and go on.
-OpenTelemetry traces go where OTEL_EXPORTER_OTLP_ENDPOINT says.
+Several coordinators can serve one PostgreSQL library; a SQLite library only one at a time.
+A coordinator can be killed and restarted at any time: workers wait and continue.
+OpenTelemetry traces are sent to OTEL_EXPORTER_OTLP_ENDPOINT.
 
-Exit codes: 0 stopped as asked, or done with --exit-when-done; 2 wrong input; 3 failure.")]
+Exit codes: 0 stopped by a signal, or done with --exit-when-done; 2 wrong input; 3 failure.")]
 pub(super) struct Arguments {
-    /// Campaign file (TOML) to add before serving; may be repeated. `tracktwin campaign add` adds
-    /// more while it runs; with none it serves what the library holds.
+    /// Campaign file (TOML) to add at start; may be repeated. `tracktwin campaign add` adds
+    /// campaigns later. Without this option the coordinator serves the campaigns in the library.
     #[arg(long = "campaign", value_name = "FILE")]
     campaigns: Vec<PathBuf>,
-    /// How many cases, instead of the campaigns' own number.
+    /// Number of cases; overrides the number in the campaign files.
     #[arg(long, value_name = "N", requires = "campaigns", value_parser = count::<u32>(CASES))]
     cases: Option<u32>,
     #[command(flatten)]
     library: LibraryUrl,
-    /// Address for workers, as IP:PORT.
+    /// Address that workers connect to, as IP:PORT.
     #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_LISTEN", default_value = "127.0.0.1:7700")]
     listen: SocketAddr,
-    /// Address for people and Prometheus, as IP:PORT: pages at /, /metrics, /healthz.
+    /// Address of the web dashboard, as IP:PORT; it serves /, /metrics (Prometheus) and /healthz.
     #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_DASHBOARD")]
     dashboard: Option<SocketAddr>,
-    /// End when every running campaign is done.
+    /// Exit when every running campaign is done.
     #[arg(long)]
     exit_when_done: bool,
-    /// Share of the cases that another worker simulates again for comparison, such as 1%.
+    /// Share of cases that a second worker simulates again for comparison, e.g. 1%.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0%")]
     audit: f64,
-    /// After so many seconds without a heartbeat a worker's cases go to others.
+    /// Length of a lease in seconds; a worker without a heartbeat for this time loses its cases.
     #[arg(long, value_name = "SECONDS", value_parser = lease, default_value = "12")]
     lease: Duration,
-    /// File with the token that workers must show.
+    /// File with the token that workers must present.
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TOKEN_FILE")]
     token_file: Option<PathBuf>,
-    /// The coordinator's certificate (PEM).
+    /// Certificate of the coordinator (PEM).
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CERT", requires = "tls_key")]
     tls_cert: Option<PathBuf>,
-    /// Key of that certificate (PEM).
+    /// Private key of the certificate (PEM).
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_KEY", requires = "tls_cert")]
     tls_key: Option<PathBuf>,
-    /// Demand workers' certificates of this authority (mutual TLS).
+    /// Require worker certificates signed by this authority (mutual TLS).
     #[arg(long, value_name = "FILE", env = "TRACKTWIN_TLS_CLIENT_CA", requires = "tls_cert")]
     tls_client_ca: Option<PathBuf>,
-    /// Serve other machines in plain text, or anybody: where the network itself is trusted.
+    /// Allow plain text and missing tokens on a network address; only for a trusted network.
     #[arg(long, env = "TRACKTWIN_INSECURE")]
     insecure: bool,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let security = arguments.security().or_input()?;
-    // Before anything is opened, so that nothing wrong is found out late.
+    // Check the arguments before anything is opened.
     security.check(arguments.listen).context("--listen").or_input()?;
     security.acceptor().or_input()?;
     if let Some(address) = arguments.dashboard {
         let pages = Security { identity_pem: None, ..security.clone() };
-        // Pages are plain HTTP: beyond this machine a proxy has to carry them.
+        // Pages are plain HTTP: access from other machines needs a proxy.
         pages.check(address).context("--dashboard").or_input()?;
     }
     let _traces = Export::from_environment("tracktwin-coordinator").or_input()?;
@@ -96,7 +96,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None => None,
     };
     let library = arguments.library.open_or_create().await?;
-    // A coordinator that can't serve the library adds nothing to it.
+    // A coordinator that cannot serve the library must not add campaigns to it.
     let claim = tracktwin_farm::embedded::claim(&library).await?;
     add(&library, &campaigns).await?;
     let coordinator = Coordinator {
@@ -112,7 +112,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         },
         exit_when_done: arguments.exit_when_done,
     };
-    let stop = stop_on_signal("stopping: calls under way are answered, leases stay")?;
+    let stop = stop_on_signal("stopping: running calls are finished, leases are kept")?;
     let ended = coordinator.run(stop).await;
     library.close().await;
     ended.map_err(|error| match error {
@@ -122,7 +122,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     })
 }
 
-/// Adds campaigns, none where one of them is not to be.
+/// Adds campaigns: all of them or none.
 async fn add(library: &Library, campaigns: &[Campaign]) -> Result<(), Stop> {
     let tell = |line: &str| tracing::warn!("{line}");
     for campaign in campaigns {
@@ -151,21 +151,21 @@ fn token(path: &Path) -> anyhow::Result<String> {
     let text = String::from_utf8_lossy(&read(path)?).trim().to_owned();
     anyhow::ensure!(
         !text.is_empty(),
-        "{}: the file is empty; `tracktwin certs` makes a token",
+        "{}: the file is empty; create a token with `tracktwin certs`",
         path.display()
     );
-    // One that no worker could show would lock all of them out.
+    // No worker could present such a token.
     Token::new(&text).with_context(|| path.display().to_string())?;
     Ok(text)
 }
 
 async fn bind(argument: &str, address: SocketAddr) -> anyhow::Result<TcpListener> {
     let bound = TcpListener::bind(address).await;
-    bound.with_context(|| format!("{argument} {address}: no port to be had"))
+    bound.with_context(|| format!("{argument}: cannot bind {address}"))
 }
 
 fn address(text: &str) -> Result<SocketAddr, String> {
-    let remedy = "write IP:PORT, such as 127.0.0.1:7700, or 0.0.0.0:7700 for all of this machine's";
+    let remedy = "write IP:PORT, for example 127.0.0.1:7700, or 0.0.0.0:7700 for all addresses of this machine";
     text.parse().map_err(|_| remedy.to_owned())
 }
 
@@ -177,17 +177,17 @@ fn share(text: &str) -> Result<f64, String> {
     };
     let share = number.trim().parse::<f64>().map(|number| number / divisor);
     match share {
-        // A bare 1 may mean either.
+        // A bare 1 could mean 1 or 1%.
         Ok(share) if (0.0..=1.0).contains(&share) && (divisor > 1.0 || share < 1.0) => Ok(share),
-        _ => Err("write a share from 0% to 100%, such as 1%".to_owned()),
+        _ => Err("write a share from 0% to 100%, for example 1%".to_owned()),
     }
 }
 
-/// The length of a lease: long enough for a heartbeat to get through, short enough to matter.
+/// The length of a lease in seconds.
 fn lease(text: &str) -> Result<Duration, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.5..=3600.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
-        _ => Err("write seconds from 0.5 to 3600".to_owned()),
+        _ => Err("write a number of seconds from 0.5 to 3600".to_owned()),
     }
 }
 

@@ -1,4 +1,4 @@
-//! `tracktwin coverage`: how often estimates hold and refusals are right.
+//! `tracktwin coverage`: coverage of the intervals and error rates of the domain check.
 
 use super::evaluate::{Method, stop};
 use super::library_url::open_or_create;
@@ -16,44 +16,49 @@ use tracktwin_library::Library;
 use tracktwin_parameters::Parameter;
 use tracktwin_surrogate::{Side, Trained};
 
-/// Most tracks inside the ranges that may have a sleeper called outside.
+/// Largest accepted share of tracks inside the ranges with a sleeper flagged as outside the
+/// library.
 const FALSE_MOST: f64 = 0.02;
-/// Fewest tracks 30 % beyond an end that must be called outside.
+/// Smallest accepted share of tracks 30 % beyond an end that are flagged as outside the library.
 const FOUND_LEAST: f64 = 0.95;
 
-/// What `coverage` is told.
+/// Arguments of `coverage`.
 #[derive(Args)]
 #[command(
-    after_help = "With --models: simulates tracks with all parameters inside the library's ranges (even ones, and \
-ones whose railpads and ballast differ by 5, 15 and 30 % from sleeper to sleeper) and tracks with one parameter 30 % \
-beyond an end, evaluates them, and prints two tables: how many are called outside, and how many true values the 90 % \
-intervals hold, in brackets with the standard deviations of an even track.\n\nWith --method inversion: the reference \
-simulator records tracks of 5, 15 and 30 % scatter, two passes at each of three speeds, and the table tells error and \
-coverage of railpad and ballast stiffness.\n\nExit codes: 0 done, 1 more than 2 % of the even tracks inside are \
-called outside, 2 wrong input, 3 failure."
+    after_help = "With --models: simulates tracks with all parameters inside the library's ranges \
+        (even tracks, and tracks with an unevenness of railpad and ballast stiffness of 5, 15 and \
+        30 %) and tracks with one parameter 30 % beyond an end, evaluates them, and prints two \
+        tables: the share flagged as outside the library, and the coverage of the 90 % intervals; \
+        in brackets the coverage without the unevenness in the standard deviations.\n\nWith \
+            --method inversion: the reference simulator records tracks with an unevenness of 5, \
+            15 and 30 %, two passes at each of three speeds; the table shows error and coverage \
+            of railpad and ballast stiffness.\n\nExit codes: 0 done, 1 more than 2 % of the even \
+            tracks inside are \
+            flagged as outside the library, 2 wrong input, 3 failure."
 )]
 pub(super) struct Arguments {
-    /// The method whose estimates are compared with the truth.
+    /// Method whose estimates are compared with the truth.
     #[arg(long, value_enum, default_value_t = Method::Gp)]
     method: Method,
-    /// Folder of the models, as `train` or `run` wrote it.
+    /// Folder of trained models, written by `train` or `run`.
     #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"))]
     models: Option<PathBuf>,
-    /// The library of the models; with `--method inversion` it keeps null simulations, and is made if
-    /// it is not there.
+    /// Library of the models; with `--method inversion` it stores null simulations and is created
+    /// if missing.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Tracks beyond each end of a range, twice as many inside; of each scatter for `inversion`.
+    /// Number of tracks beyond each end of a range; twice this number lies inside. For `inversion`,
+    /// the number of tracks per unevenness.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     tracks: u32,
-    /// Sleepers of a track.
+    /// Number of sleepers of a track.
     #[arg(long, value_name = "N", default_value_t = 14, value_parser = clap::value_parser!(u32).range(1..=200))]
     sleepers: u32,
-    /// Decides parameters and surfaces.
+    /// Seed of parameters and surfaces.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// A track more, with this value and all others in the middle of their ranges; may stand several
-    /// times: `ballast_stiffness_N_m=6e7`.
+    /// Adds a track with this value and all others in the middle of their ranges:
+    /// `ballast_stiffness_N_m=6e7`; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<Setting>,
     /// Print JSON.
@@ -85,7 +90,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if even.is_some_and(|row| row.any_outside > FALSE_MOST) { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// The table of inversion on uneven tracks.
+/// Table of the inversion on uneven tracks.
 async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
     let library = match &arguments.library {
         Some(url) => Some(open_or_create(url).await?),
@@ -95,7 +100,7 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
     let bar = Mutex::new(Progress::begin("tracks", 0, total));
     let watch = |done, _| bar.lock().at(done, "");
     let rows = inversion_rows(arguments.tracks, arguments.seed, library.as_ref(), &watch);
-    let rows = rows.await.context("inversion can't be scored")?;
+    let rows = rows.await.context("cannot score the inversion")?;
     bar.into_inner().end();
     if arguments.json {
         println_stdout(&serde_json::to_string_pretty(&rows)?);
@@ -124,7 +129,7 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
 fn settings(given: &[Setting]) -> Result<Vec<(Parameter, f64)>, Stop> {
     let setting = |setting: &Setting| match setting.sleepers {
         None => Ok((setting.parameter, setting.value)),
-        Some(_) => Err(anyhow!("--set: a whole track has the value; leave out the sleepers")),
+        Some(_) => Err(anyhow!("--set: the value applies to the whole track; remove the sleepers")),
     };
     given.iter().map(setting).collect::<Result<_, _>>().or_input()
 }
@@ -150,7 +155,7 @@ fn rows(
     Ok(rows)
 }
 
-/// How many tracks are called outside, then how much the intervals hold.
+/// Table of the tracks flagged as outside the library, then the coverage of the intervals.
 fn tables(rows: &[Row]) -> String {
     let width = rows.iter().map(|row| name(row.kind).len()).max().unwrap_or(0);
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
@@ -194,17 +199,21 @@ fn tables(rows: &[Row]) -> String {
     lines.join("\n")
 }
 
-/// Ends beyond which too few tracks are called outside.
+/// Ends beyond which too few tracks are flagged.
 fn shortfalls(rows: &[Row]) -> impl Iterator<Item = String> + '_ {
     let missed = rows
         .iter()
         .filter(|row| matches!(row.kind, Kind::Beyond { .. }) && row.any_outside < FOUND_LEAST);
     missed.map(|row| {
-        format!("{}: fewer than {:.0} % are called outside", name(row.kind), 100.0 * FOUND_LEAST)
+        format!(
+            "{}: fewer than {:.0} % are flagged as outside the library",
+            name(row.kind),
+            100.0 * FOUND_LEAST
+        )
     })
 }
 
-/// What a row's tracks are.
+/// Name of the tracks of a row.
 fn name(kind: Kind) -> String {
     match kind {
         Kind::Inside { scatter } if scatter <= 0.0 => "inside, even".to_owned(),

@@ -1,4 +1,4 @@
-//! `tracktwin diagnose`: where recording and simulation differ, and what physics was left out.
+//! `tracktwin diagnose`: differences between recording and model, and their causes.
 
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
@@ -21,28 +21,28 @@ use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
 use tracktwin_track::extension;
 
-/// What `diagnose` is told.
+/// Arguments of `diagnose`.
 #[derive(Args)]
 #[command(
-    after_help = "Exit codes: 0 nothing is left out, 1 something is, 2 wrong input, 3 failure."
+    after_help = "Exit codes: 0 consistent, 1 left-out physics or a measuring-chain fault was \
+        found, 2 wrong input, 3 failure."
 )]
 pub(super) struct Arguments {
-    /// The recording: a folder with `recording.json` and a file a pass.
+    /// The recording: a folder with `recording.json` and one file per pass.
     recording: PathBuf,
-    /// Folder of the models, as `train` or `run` wrote it: their campaign says what track it is.
+    /// Folder of trained models, written by `train` or `run`; their campaign defines the track.
     #[arg(long, value_name = "DIR", requires = "library")]
     models: Option<PathBuf>,
-    /// The library that keeps null simulations and diagnoses, made if it is not there:
-    /// sqlite:PATH or postgres://...
+    /// Library that stores null simulations and diagnoses, created if missing: sqlite:PATH or
+    /// postgres://...
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Folder for diagnosis.json and report.html.
+    /// Output folder for diagnosis.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// Leave a kind of physics out of the catalogue, to see what else explains the recording; may
-    /// be given several times.
+    /// Leave this kind of physics out of the catalogue; may be repeated.
     #[arg(long, value_name = "PHYSICS", value_parser = PossibleValuesParser::new(names()))]
     without: Vec<String>,
 }
@@ -59,7 +59,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     check(&out, Kind::Results, force, &["report.html", "diagnosis.json"])?;
     recording.doubts.iter().for_each(|doubt| println_stderr(doubt));
     let library = match library {
-        // Models belong to a library that is there already.
+        // The library of models must exist.
         Some(url) if models.is_some() => Some(open_whole(&url).await?),
         Some(url) => Some(open_or_create(&url).await?),
         None => None,
@@ -83,8 +83,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if let Some(library) = &library {
         let record = provenance::diagnosis(&diagnosis, json);
         if let Err(error) = library.record_diagnosis(record).await {
-            // The answer stands in the folder all the same.
-            tracing::warn!("the library does not keep this diagnosis: {error:?}");
+            // The diagnosis in the folder is complete nevertheless.
+            tracing::warn!("cannot store the diagnosis in the library: {error:?}");
         }
     }
     println_stdout(&diagnosis.sentence);
@@ -95,7 +95,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
 }
 
-/// What a recording lacks is mended by its owner; all else is ours.
+/// An unsuitable recording is wrong input; everything else is a failure.
 fn stop(error: DiagnosingError) -> Stop {
     match error {
         DiagnosingError::Recording(error) => Stop::Input(error.into()),
@@ -103,7 +103,7 @@ fn stop(error: DiagnosingError) -> Stop {
     }
 }
 
-/// How the diagnosis is repeated.
+/// The command that repeats the diagnosis.
 fn origin(arguments: &Arguments) -> Origin {
     let Arguments { recording, models, library, out, without, .. } = arguments;
     let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
@@ -128,7 +128,7 @@ async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<Tr
     let campaign = library
         .campaign(models.campaign())
         .await
-        .context("the models belong to another library; train on this one")
+        .context("the models belong to another library; train models on this one")
         .or_input()?;
     Ok(pipeline::train::experiment(&campaign).or_input()?.design)
 }

@@ -1,4 +1,4 @@
-//! `tracktwin evaluate`: the track's parameters under a recording.
+//! `tracktwin evaluate`: estimates of the track parameters from a recording.
 
 use super::files::{Force, check, make_folder};
 use super::library_url::open_whole;
@@ -21,37 +21,37 @@ use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureDefinition};
 use tracktwin_surrogate::Trained;
 
-/// How parameters are told from a recording.
+/// Method of estimation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum Method {
-    /// Gaussian processes trained on a library, and its nearest entries; needs --models.
+    /// Gaussian processes and model selector, trained on a library; requires --models.
     Gp,
-    /// The track model fitted to all passes and speeds at once, each sleeper with its own stiffness.
+    /// Fit of the track model to all passes and speeds, with separate stiffnesses for every
+    /// sleeper.
     Inversion,
 }
 
-/// What `evaluate` is told.
+/// Arguments of `evaluate`.
 #[derive(Args)]
-#[command(
-    after_help = "Without --models the recording is evaluated by inversion, which needs no library and takes any speed. \
-With --models the Gaussian processes evaluate it and the page shows the inversion beside them; --method takes one of \
-the two alone.\n\nExit codes: 0 done, 1 done and the estimates of most sleepers are not valid (the last lines say \
-why), 2 wrong input, 3 failure."
-)]
+#[command(after_help = "Without --models the recording is evaluated by inversion, which needs no \
+        library and accepts any speed. With --models it is evaluated by Gaussian processes, and \
+        the page also shows the inversion; --method selects one of the two.\n\nExit codes: 0 \
+        done, 1 done, but the estimates of most sleepers are not valid \
+        (see the last lines), 2 wrong input, 3 failure.")]
 pub(super) struct Arguments {
-    /// The recording: a folder with `recording.json` and a file a pass.
+    /// The recording: a folder with `recording.json` and one file per pass.
     recording: PathBuf,
-    /// One method alone [default: inversion; with --models both].
+    /// Method [default: inversion; both with --models].
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// Folder of the models, as `train` or `run` wrote it.
+    /// Folder of trained models, written by `train` or `run`.
     #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"))]
     models: Option<PathBuf>,
-    /// The library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
+    /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Folder for evaluation.json, evaluation.csv and report.html; with both methods also inversion.json
-    /// and inversion.csv.
+    /// Output folder for evaluation.json, evaluation.csv and report.html; with both methods also
+    /// inversion.json and inversion.csv.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -60,7 +60,7 @@ pub(super) struct Arguments {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, method, models, library, out, force } = arguments;
-    // The recording first: it is what most often needs mending, and quickest to check.
+    // Read the recording first: it is the most frequent cause of errors and the quickest to check.
     let recording = open(&recording)?;
     check_files(&out, force)?;
     let (Some(models), Some(library)) =
@@ -70,7 +70,9 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     };
     let library = open_whole(&library).await?;
     let models = Trained::load(&models)
-        .with_context(|| format!("{}: no models; `tracktwin train` makes them", models.display()))
+        .with_context(|| {
+            format!("{}: no models found; create them with `tracktwin train`", models.display())
+        })
         .or_input()?;
     let beside = method.is_none();
     let evaluation = evaluate(&recording, &library, models, &out, force, beside).await?;
@@ -82,7 +84,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     conclude(&evaluation)
 }
 
-/// Evaluates a recording by the physics alone.
+/// Evaluates a recording by inversion only.
 async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Result<(), Stop> {
     let (recording, notes) = usable_with_notes(recording)?;
     let design = TrackDesign::v_track();
@@ -111,7 +113,7 @@ async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Res
     if inversion.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// The inversion of a recording, with its progress.
+/// The inversion of a recording, with a progress bar.
 async fn invert(
     recording: &Recording,
     design: &TrackDesign,
@@ -124,25 +126,26 @@ async fn invert(
     inverted
 }
 
-/// The command line that repeats what is done, without passwords.
+/// The command line without passwords.
 fn command() -> String {
     let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
     std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
-/// Says what lies outside the library; if that is most of the track, the answer is negative.
+/// Prints what lies outside the library; a negative result if that is most of the track.
 pub(super) fn conclude(evaluation: &Evaluation) -> Result<(), Stop> {
     let outside = &evaluation.outside_library;
     outside.sentences().iter().for_each(|sentence| println_stdout(sentence));
     if outside.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// The recording in a folder, if there is something in it to evaluate.
+/// The recording in a folder.
 pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
     let recording = Recording::open(folder).or_input()?;
     if recording.sleepers.is_empty() {
         return Err(Stop::Input(anyhow!(
-            "{}/recording.json: sleepers: is []; give their places, or import with --sleeper",
+            "{}/recording.json: sleepers: the list is empty; add the positions of the sleepers, \
+             or import with --sleeper",
             folder.display()
         )));
     }
@@ -150,15 +153,15 @@ pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
     Ok(recording)
 }
 
-/// Makes sure that an evaluation may be written into a folder.
+/// Checks that an evaluation can be written into a folder.
 pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
     let names =
         ["report.html", "evaluation.csv", "evaluation.json", "inversion.csv", "inversion.json"];
     check(folder, Kind::Results, force, &names)
 }
 
-/// Evaluates a recording with models of this library, and by the physics `beside`; writes files and
-/// report to `folder`.
+/// Evaluates a recording with models of this library and, if `beside` is set, by inversion; writes
+/// files and report to `folder`.
 pub(super) async fn evaluate(
     recording: &Recording,
     library: &Library,
@@ -202,7 +205,7 @@ async fn invert_beside(
     match invert(recording, evaluator.design(), Some(library)).await {
         Ok(inversion) => Some(inversion),
         Err(error) => {
-            let line = format!("not evaluated by inversion: {error}");
+            let line = format!("no inversion: {error}");
             println_stderr(&line);
             evaluation.notes.push(line);
             None
@@ -227,15 +230,15 @@ fn write(
     output.commit()
 }
 
-/// Has the library keep an evaluation.
+/// Stores an evaluation in the library.
 async fn keep(library: &Library, evaluation: &Evaluation) {
     if let Err(error) = library.record_evaluation(provenance::evaluation(evaluation)).await {
-        // The answer stands in the folder; somebody who may only read the library has it all the same.
-        tracing::warn!("the library does not keep this evaluation: {error:?}");
+        // The evaluation in the folder is complete, even if the library is read-only.
+        tracing::warn!("cannot store the evaluation in the library: {error:?}");
     }
 }
 
-/// Says where the wheel is in the air, and flags the sleepers there.
+/// Reports loss of contact and flags the affected sleepers.
 fn flag(evaluation: &mut Evaluation, lost: &LossOfContact, passes: usize) {
     for sleeper in evaluation.sleepers.iter_mut().filter(|it| lost.sleepers.contains(&it.id)) {
         sleeper.flags.push(Flag::LossOfContact);
@@ -245,7 +248,7 @@ fn flag(evaluation: &mut Evaluation, lost: &LossOfContact, passes: usize) {
     evaluation.notes.push(line);
 }
 
-/// The usable part of a recording, and what is doubtful of it, which is said at once.
+/// The usable part of a recording, and notes on its defects, which are also printed.
 fn usable_with_notes(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
     let (recording, left_out) = usable(recording)?;
     let notes = [recording.doubts.clone(), left_out].concat();
@@ -253,17 +256,16 @@ fn usable_with_notes(recording: &Recording) -> Result<(Recording, Vec<String>), 
     Ok((recording, notes))
 }
 
-/// The recording without the passes that tell nothing of the track, and a note for what is wrong with
-/// them.
+/// The recording without unusable passes, and a note for each of them.
 fn usable(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
     let (kept, pass_defects) = chain::usable(recording);
     if let (true, Some(first)) = (kept.passes.is_empty(), pass_defects.first()) {
-        return Err(Stop::Input(anyhow!("{}: no pass can be used: {first}", recording.name)));
+        return Err(Stop::Input(anyhow!("{}: no pass is usable: {first}", recording.name)));
     }
     Ok((kept, pass_defects.iter().map(|why| format!("left out: {why}")).collect()))
 }
 
-/// A library that can't be read is a failure; models that don't fit are mended by who gave them.
+/// An unreadable library is a failure; models that do not fit are wrong input.
 pub(super) fn stop(error: EvaluatorError) -> Stop {
     match error {
         EvaluatorError::Library(_) => Stop::Failure(error.into()),

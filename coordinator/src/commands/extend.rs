@@ -1,4 +1,4 @@
-//! `tracktwin extend`: a campaign whose parameter space has what a diagnosis found.
+//! `tracktwin extend`: adds the physics that a diagnosis found to a campaign.
 
 use super::files::{Force, read, read_text, write_file};
 use super::{OrInput, Stop, println_stdout};
@@ -13,27 +13,27 @@ use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::compare_designs;
 use tracktwin_track::extension::{Kind, KindParameter, PlaceKind};
 
-/// Share of the cases that have the extension: models must hold without it as well.
+/// Share of the cases with the extension: models must be valid without it as well.
 const SHARE: f64 = 0.5;
 
-/// A parameter is drawn within so many standard deviations of what was found, and at least within
-/// this factor of it.
+/// A parameter is drawn within this number of standard deviations of the estimate, and at least
+/// within this factor of it.
 const DEVIATIONS: f64 = 3.0;
 const FACTOR_MIN: f64 = 2.0;
 
-/// What `extend` is told.
+/// Arguments of `extend`.
 #[derive(Args)]
 #[command(
-    after_help = "Then `tracktwin run NEW.toml --library URL --out DIR` simulates the campaign \
+    after_help = "Next: `tracktwin run NEW.toml --library URL --out DIR` simulates the campaign \
 and trains models with which `tracktwin evaluate` gives stiffness without the bias."
 )]
 pub(super) struct Arguments {
-    /// The campaign to extend.
+    /// Campaign file (TOML) to extend.
     campaign: PathBuf,
-    /// The diagnosis, as `diagnose` wrote it.
+    /// Diagnosis written by `diagnose` (diagnosis.json).
     #[arg(long, value_name = "FILE")]
     from: PathBuf,
-    /// The new campaign; by default CAMPAIGN-extended.toml beside the old one.
+    /// New campaign file [default: CAMPAIGN-extended.toml beside the old one].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -55,8 +55,9 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
         .collect();
     if accepted.is_empty() {
         let name = from.display();
-        let verdict =
-            format!("{name}: hypotheses: no physics was accepted; there is nothing to extend with");
+        let verdict = format!(
+            "{name}: hypotheses: the diagnosis accepted no physics; there is nothing to add"
+        );
         return Err(Stop::Input(anyhow!(verdict)));
     }
     let experiment = &campaign.definition.experiment;
@@ -71,11 +72,15 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     write_file(&out, FileKind::Campaign, force, extended.as_bytes())?;
     let names: Vec<_> =
         accepted.iter().map(|(hypothesis, _)| hypothesis.physics.as_str()).collect();
-    println_stdout(&format!("{}: half of the cases have {}", out.display(), names.join(" and ")));
+    println_stdout(&format!(
+        "{}: half of the cases contain {}",
+        out.display(),
+        names.join(" and ")
+    ));
     Ok(())
 }
 
-/// Whether the campaign is of the track that diagnoses are of: V-Track.
+/// Checks that the campaign is of V-Track, the track of all diagnoses.
 fn check_design(path: &Path, campaign: &Campaign) -> anyhow::Result<()> {
     let design = &campaign.definition.experiment.design;
     compare_designs(design, &TrackDesign::v_track()).map_err(|other| {
@@ -93,7 +98,7 @@ fn check_design(path: &Path, campaign: &Campaign) -> anyhow::Result<()> {
 fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {
     let name = path.display();
     let diagnosis: Diagnosis =
-        serde_json::from_slice(&read(path)?).with_context(|| format!("{name}: is no diagnosis"))?;
+        serde_json::from_slice(&read(path)?).with_context(|| format!("{name}: not a diagnosis"))?;
     if diagnosis.format != FORMAT {
         return Err(anyhow!("{name}: format: {:?} is not {FORMAT:?}", diagnosis.format));
     }
@@ -105,7 +110,7 @@ fn beside(path: &Path) -> PathBuf {
     path.with_file_name(format!("{stem}-extended.toml"))
 }
 
-/// The campaign's table for a hypothesis: what has a place is put at the sleeper evaluated.
+/// The campaign's table for a hypothesis; a local extension is placed at the evaluated sleeper.
 fn table(
     diagnosis: &Diagnosis,
     hypothesis: &Hypothesis,
@@ -146,7 +151,7 @@ fn table(
     table
 }
 
-/// Where it is on the campaign's track.
+/// Its place on the campaign's track.
 fn place(
     diagnosis: &Diagnosis,
     hypothesis: &Hypothesis,
@@ -177,7 +182,7 @@ fn place(
     }
 }
 
-/// Where a parameter is drawn: about what was found.
+/// Range from which a parameter is drawn: around the estimate.
 fn range(parameter: &KindParameter, estimate: &Estimate) -> [f64; 2] {
     let factor = (DEVIATIONS * estimate.sd / estimate.mean).exp().clamp(FACTOR_MIN, 10.0);
     let least = parameter.v_track[1] * 1e-3;

@@ -1,4 +1,4 @@
-//! Files and folders that the user names; what can't be had is said with its path.
+//! Files and folders named by the user; errors state the path.
 
 use clap::Args;
 use std::fs::File;
@@ -6,16 +6,16 @@ use std::io::Write as _;
 use std::path::Path;
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 
-/// What happens to files that are there already.
+/// Treatment of existing files.
 #[derive(Args, Clone, Copy, Debug)]
 pub(super) struct Force {
-    /// Replace files that tracktwin did not write, too; its own are replaced without.
+    /// Also replace files that tracktwin did not write; files that it wrote are always replaced.
     #[arg(long)]
     pub(super) force: bool,
 }
 
-/// Makes a folder and those above it, and makes sure that files can be written to it: before anything that
-/// takes time is done for them.
+/// Creates a folder and its parents and checks that files can be written to it, before a long
+/// computation.
 pub(super) fn make_folder(path: &Path) -> Result<(), FilesError> {
     tracktwin_files::make_folder(path)?;
     let probe = path.join(format!(".tracktwin-{}", std::process::id()));
@@ -25,13 +25,13 @@ pub(super) fn make_folder(path: &Path) -> Result<(), FilesError> {
     std::fs::remove_file(&probe).map_err(unwritable)
 }
 
-/// Bytes that may still be written where a folder is; nothing where the system does not tell.
+/// Free bytes on the disk of a folder; `None` if the system does not report them.
 pub(super) fn free_bytes(folder: &Path) -> Option<u64> {
     let disk = rustix::fs::statvfs(folder).ok()?;
     Some(disk.f_bavail.saturating_mul(disk.f_frsize))
 }
 
-/// Makes sure, before anything is worked out, that a folder's files may be written.
+/// Checks, before a computation, that files of a folder may be written.
 pub(super) fn check(
     folder: &Path,
     kind: Kind,
@@ -50,7 +50,7 @@ pub(super) fn check_file(path: &Path, kind: Kind, force: Force) -> Result<(), Fi
     check(&folder, kind, force, &[name.as_str()])
 }
 
-/// Writes a single file, whole or not at all; into a pipe or a device as it comes.
+/// Writes a single file atomically; a pipe or device is written directly.
 pub(super) fn write_file(
     path: &Path,
     kind: Kind,
@@ -66,7 +66,7 @@ pub(super) fn write_file(
     output.commit()
 }
 
-/// Whether a path is a pipe, a device or the like: nothing that could be replaced.
+/// Whether a path is a pipe, a device or the like, which cannot be replaced.
 pub(super) fn is_stream(path: &Path) -> bool {
     path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
@@ -80,12 +80,12 @@ fn stream(path: &Path, bytes: &[u8]) -> Result<(), FilesError> {
     })
 }
 
-/// What a small file holds.
+/// Content of a small file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
     tracktwin_files::read(path)
 }
 
-/// What a small file of text holds.
+/// Content of a small text file.
 pub(super) fn read_text(path: &Path) -> Result<String, FilesError> {
     tracktwin_files::read_text(path)
 }
@@ -101,7 +101,7 @@ mod tests {
         make_folder(&deep).unwrap();
         assert_eq!(std::fs::read_dir(&deep).unwrap().count(), 0);
         assert!(free_bytes(&deep).is_some_and(|free| free > 0));
-        // Nobody writes there, not even the superuser.
+        // Not even the superuser can write there.
         let refused = make_folder(Path::new("/proc/self")).unwrap_err();
         assert!(refused.to_string().starts_with("/proc/self: "), "{refused}");
     }

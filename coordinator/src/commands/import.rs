@@ -1,4 +1,4 @@
-//! `tracktwin import`: recordings of other makes.
+//! `tracktwin import`: converts recordings from other formats.
 
 use super::files::{Force, read_text};
 use super::numbers::number;
@@ -13,59 +13,59 @@ use tracktwin_signal::recording::import::{
     AccelerationUnit, Imported, Layout, PositionUnit, SpeedUnit, TimeUnit, import,
 };
 
-/// What `import` is told.
+/// Arguments of `import`.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   tracktwin import run.csv --out recording --column acceleration=acc --column time=t --speed 67
   tracktwin import day1.mat day2.mat --out recording --layout vehicle.toml
 
-Without a column of acceleration the command says which columns a file has. A layout file has the
+Without an acceleration column the command lists the columns of the file. A layout file has the
 same entries: acceleration = [\"acc_left\"], time = \"t_s\", position = \"km\", position_unit = \"km\",
 acceleration_unit = \"g\", sample_rate_Hz = 2000, spacing_m = 0.6. Flags override it.")]
 pub(super) struct Arguments {
-    /// Files of one vehicle over one track, a pass each: .csv .txt .parquet .npy .npz .mat (v5 to
-    /// v7).
+    /// Files of one vehicle on one track, one pass per file: .csv .txt .parquet .npy .npz .mat (v5
+    /// to v7).
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Folder for the recording; of several columns of acceleration each gets a folder inside it.
+    /// Output folder of the recording; with several acceleration columns, each gets a subfolder.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// What the columns mean, as a TOML file.
+    /// TOML file that assigns columns to quantities.
     #[arg(long, value_name = "FILE.toml")]
     layout: Option<PathBuf>,
-    /// What a column means: acceleration=NAME (may stand several times), time=NAME, position=NAME
-    /// or speed=NAME.
+    /// Assigns a column to a quantity: acceleration=NAME (may be repeated), time=NAME,
+    /// position=NAME or speed=NAME.
     #[arg(long = "column", value_name = "QUANTITY=NAME")]
     columns: Vec<Meaning>,
-    /// Unit of the accelerations, m/s2 if neither this nor the file says one; with `unknown` levels
-    /// mean something within the recording only.
+    /// Unit of the accelerations [default: the unit in the file, or m/s2]; with `unknown`, levels
+    /// are comparable within the recording only.
     #[arg(long, value_enum)]
     unit: Option<Unit>,
-    /// Accelerations are positive upwards.
+    /// Accelerations in the file are positive upwards.
     #[arg(long)]
     upwards: bool,
-    /// Unit of the column of positions: m, km or mm.
+    /// Unit of the position column.
     #[arg(long, value_enum)]
     position_unit: Option<LengthUnit>,
-    /// Unit of the column of times.
+    /// Unit of the time column.
     #[arg(long, value_enum)]
     time_unit: Option<DurationUnit>,
-    /// Unit of the column of speeds.
+    /// Unit of the speed column.
     #[arg(long, value_enum)]
     speed_unit: Option<VelocityUnit>,
-    /// Samples per second, where no column of times says it.
+    /// Sample rate in Hz; required without a time column.
     #[arg(long, value_name = "HZ", value_parser = number(SAMPLE_RATE))]
     sample_rate: Option<f64>,
-    /// Speed in km/h, where there is neither a column of positions nor of speeds.
+    /// Speed in km/h; required without a position or speed column.
     #[arg(long, value_name = "KMH", value_parser = number(SPEED))]
     speed: Option<f64>,
-    /// Distance of the sleepers in m; 0.6 if nothing is said.
+    /// Sleeper spacing in m [default: 0.6].
     #[arg(long, value_name = "M", value_parser = number(SPACING))]
     spacing: Option<f64>,
-    /// Place of any one sleeper in m; without it the recording has no sleepers.
+    /// Position of one sleeper in m; without it the recording has no sleepers.
     #[arg(long, value_name = "M", value_parser = number(PLACE), allow_negative_numbers = true)]
     sleeper: Option<f64>,
     /// Radius of the wheel in m.
@@ -79,9 +79,9 @@ enum Unit {
     /// Metres per second squared.
     #[value(name = "m/s2")]
     MetrePerSecondSquared,
-    /// Standard gravity.
+    /// Standard acceleration of gravity.
     G,
-    /// Not known.
+    /// Unknown.
     Unknown,
 }
 
@@ -147,9 +147,7 @@ impl FromStr for Meaning {
             "position" => Quantity::Position,
             "speed" => Quantity::Speed,
             _ => {
-                return Err(format!(
-                    "`{quantity}` is none of acceleration, time, position and speed"
-                ));
+                return Err(format!("`{quantity}` is not acceleration, time, position or speed"));
             }
         };
         Ok(Self { quantity, column: column.to_owned() })
@@ -161,7 +159,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let imported = import(&arguments.files, &layout).or_input()?;
     let folders = folders(&arguments.out, &imported);
     let force = arguments.force.force;
-    // All are written before the first gets its name.
+    // All are written before the first is renamed.
     let mut outputs = Vec::with_capacity(imported.len());
     for (one, folder) in imported.iter().zip(&folders) {
         let mut output = Output::begin(folder, Kind::MeasuredRecording, force)?;
@@ -175,14 +173,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
             println_stdout(note);
         }
         println_stdout(&format!(
-            "recording: {}; look at it: tracktwin inspect {0}",
+            "recording: {}; inspect it with: tracktwin inspect {0}",
             folder.display()
         ));
     }
     Ok(())
 }
 
-/// Where the recordings go: of several columns each has a folder that is called like it.
+/// Folders of the recordings: with several columns, one named after each column.
 fn folders(out: &Path, imported: &[Imported]) -> Vec<PathBuf> {
     if let [_] = imported {
         return vec![out.to_owned()];
@@ -191,7 +189,7 @@ fn folders(out: &Path, imported: &[Imported]) -> Vec<PathBuf> {
     imported.iter().map(|one| names.make(&one.column).within(out)).collect()
 }
 
-/// The layout file's entries under the flags.
+/// The entries of the layout file, overridden by the flags.
 fn layout(arguments: &Arguments) -> Result<Layout, anyhow::Error> {
     let mut layout = arguments.layout.as_deref().map(layout_of).transpose()?.unwrap_or_default();
     if arguments.columns.iter().any(|m| matches!(m.quantity, Quantity::Acceleration)) {
@@ -244,7 +242,7 @@ fn layout(arguments: &Arguments) -> Result<Layout, anyhow::Error> {
 
 fn layout_of(path: &Path) -> Result<Layout, anyhow::Error> {
     let layout: Layout = toml::from_str(&read_text(path)?)
-        .with_context(|| format!("{}: is no layout", path.display()))?;
+        .with_context(|| format!("{}: not a layout", path.display()))?;
     layout.check().with_context(|| path.display().to_string())?;
     Ok(layout)
 }

@@ -1,4 +1,4 @@
-//! `tracktwin inspect`: what is in a recording, and what it can be used for.
+//! `tracktwin inspect`: content and quality of a recording.
 
 use super::files::{Force, check_file, write_file};
 use super::{OrInput, Stop, println_stdout};
@@ -13,24 +13,24 @@ use tracktwin_signal::SAMPLES_A_PERIOD;
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_signal::{PowerSpectrum, Signal};
 
-/// Distance in Hz of the lines of the drawn spectra.
+/// Line spacing of the drawn spectra in Hz.
 const LINES_HZ: f64 = 20.0;
 /// Points of a drawn curve.
 const POINTS: usize = 400;
-/// Samples per second that the features up to 4 kHz need.
+/// Sample rate required for features up to 4 kHz.
 const FEATURES_HZ: f64 = SAMPLES_A_PERIOD * 4000.0;
 
-/// What `inspect` is told.
+/// Arguments of `inspect`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// The recording: a folder with `recording.json` and a file a pass.
+    /// The recording: a folder with `recording.json` and one file per pass.
     recording: PathBuf,
-    /// Page with pictures.
+    /// Output page (HTML) with plots.
     #[arg(long, value_name = "FILE.html")]
     out: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
-    /// Say it as JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
 }
@@ -199,11 +199,16 @@ fn uses(recording: &Recording, inspection: &Inspection) -> Vec<String> {
     let mut uses = Vec::new();
     let rate = recording.sample_rate_hz;
     if recording.sleepers.is_empty() {
-        uses.push("the places of the sleepers are not known: neither `evaluate` nor `diagnose` can tell one from the other; import it with --sleeper".to_owned());
+        uses.push(
+            "the positions of the sleepers are unknown, so `evaluate` and `diagnose` cannot \
+            use the recording; import it with --sleeper"
+                .to_owned(),
+        );
     }
     if rate < FEATURES_HZ {
         uses.push(format!(
-            "sampled at {} Hz it says nothing above {:.0} Hz; features up to 4000 Hz need {FEATURES_HZ:.0} Hz",
+            "the sample rate of {} Hz limits the analysis to {:.0} Hz; features up to 4000 Hz \
+             need {FEATURES_HZ:.0} Hz",
             rounded(rate, 8),
             rate / SAMPLES_A_PERIOD
         ));
@@ -211,12 +216,16 @@ fn uses(recording: &Recording, inspection: &Inspection) -> Vec<String> {
     if !separates_wavelengths(&recording.passes) {
         let fastest = recording.speeds_km_h().into_iter().fold(0.0, f64::max);
         uses.push(format!(
-            "one speed only: what is fixed in frequency (structure) and in wavelength (surface) can't be told apart, so neither corrugation nor orders of a known wheel are looked for; add a pass {:.0} km/h slower",
+            "one speed only: effects of constant frequency (structure) and of constant wavelength \
+             (surface) cannot be separated, so corrugation and wheel orders are not tested; add a \
+             pass {:.0} km/h slower",
             0.25 * fastest
         ));
     }
     if inspection.offsets.is_empty() {
-        uses.push("no speed has two passes: what repeats can't be told from noise".to_owned());
+        uses.push(
+            "no speed has two passes: repeatable signal and noise cannot be separated".to_owned(),
+        );
     }
     if let Err(other) = recording.check_track(&TrackDesign::v_track()) {
         uses.push(format!(
@@ -227,7 +236,9 @@ fn uses(recording: &Recording, inspection: &Inspection) -> Vec<String> {
         ));
     }
     if uses.is_empty() && inspection.pass_defects.is_empty() && recording.doubts.is_empty() {
-        uses.push("fit for `evaluate` and `diagnose` with models of its speeds".to_owned());
+        uses.push(
+            "suitable for `evaluate` and `diagnose`, with models of the same speeds".to_owned(),
+        );
     }
     uses
 }
@@ -240,7 +251,7 @@ fn curves(recording: &Recording, points: impl Fn(&Pass) -> Vec<(f64, f64)>) -> V
     recording.passes.iter().enumerate().map(curve).collect()
 }
 
-/// Density in dB at evenly spread places of a logarithmic axis.
+/// Density in dB at equal steps of a logarithmic axis.
 fn spectrum(signal: &Signal) -> Vec<(f64, f64)> {
     let segment = ((signal.sample_rate_hz() / LINES_HZ) as usize).clamp(2, signal.len());
     let Ok(spectrum) = PowerSpectrum::welch(signal, segment) else { return Vec::new() };

@@ -1,15 +1,15 @@
-//! The argument that says which library is meant.
+//! The argument that selects the library.
 
 use super::Stop;
 use anyhow::Context;
 use clap::Args;
 use tracktwin_library::{Library, without_password};
 
-/// Which library is meant.
+/// Selects the library.
 #[derive(Args)]
 pub(super) struct LibraryUrl {
     /// The library: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
-    // Its value may hold a password, which help is not to show.
+    // The value may contain a password, which help must not show.
     #[arg(
         id = "library",
         long,
@@ -21,33 +21,34 @@ pub(super) struct LibraryUrl {
 }
 
 impl LibraryUrl {
-    /// The library, which is there.
+    /// The library, which must exist.
     pub(super) async fn open(&self) -> Result<Library, Stop> {
         Ok(Library::open(&self.url).await?)
     }
 
-    /// The library, which is there and whole: for whoever adds to it, or relies on all of it.
+    /// The library, which must exist and be intact: for commands that add to it or rely on all of
+    /// it.
     pub(super) async fn open_whole(&self) -> Result<Library, Stop> {
         open_whole(&self.url).await
     }
 
-    /// The library, whole, or made where there is none.
+    /// The library, intact; created if missing.
     pub(super) async fn open_or_create(&self) -> Result<Library, Stop> {
         open_or_create(&self.url).await
     }
 
-    /// What it is called, without password.
+    /// Its name, without the password.
     pub(super) fn name(&self) -> String {
         without_password(&self.url)
     }
 }
 
-/// The library of this URL, which is there and whole.
+/// The library of this URL, which must exist and be intact.
 pub(super) async fn open_whole(url: &str) -> Result<Library, Stop> {
     whole(Library::open(url).await?).await
 }
 
-/// The library of this URL, whole, or made where there is none.
+/// The library of this URL, intact; created if missing.
 pub(super) async fn open_or_create(url: &str) -> Result<Library, Stop> {
     whole(Library::open_or_create(url).await?).await
 }

@@ -1,7 +1,7 @@
-//! What the program can be told to do: one file a subcommand, each load, compute, store, report.
+//! The subcommands, one file each: load, compute, store, report.
 //!
-//! Files are read and written where a command stands, in asynchronous ones too: it has nothing else to do
-//! meanwhile. Long computations go through `pipeline::compute`.
+//! Commands read and write files synchronously, also in asynchronous functions, because nothing
+//! else runs meanwhile. Long computations go through `pipeline::compute`.
 
 mod campaign;
 mod certs;
@@ -38,20 +38,18 @@ use std::sync::OnceLock;
 use tracing_subscriber::EnvFilter;
 use tracktwin_worker::{LogFormat, log_to_stderr};
 
-/// Digital twin of railway track: how stiff are railpad, sleeper and ballast, sleeper by sleeper,
-/// from the vibration of a passing axle box.
+/// Digital twin of railway track: estimates the stiffness of railpad, sleeper and ballast at every
+/// sleeper from axle-box acceleration.
 ///
-/// `tracktwin run` simulates a small campaign, trains models on it and evaluates a sample
-/// recording: the shortest way to see everything work.
+/// Start with `tracktwin run`: it simulates a small campaign, trains models on it and evaluates a
+/// sample recording.
 #[derive(Parser)]
 #[command(name = "tracktwin", version, propagate_version = true, max_term_width = 100)]
-#[command(
-    after_help = "Exit codes: 0 done, 1 a negative answer, 2 wrong input or usage, 3 failure."
-)]
+#[command(after_help = "Exit codes: 0 done, 1 negative result, 2 wrong input or usage, 3 failure.")]
 struct Program {
     #[command(subcommand)]
     command: Command,
-    /// How log lines look; which ones appear, `RUST_LOG` says.
+    /// Format of the log; set its level with `RUST_LOG`.
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text,
           env = "TRACKTWIN_LOG_FORMAT")]
     log_format: LogFormat,
@@ -64,39 +62,39 @@ enum Command {
     Run(run::Arguments),
     /// Simulate a vehicle's passes over one track and write them as a recording.
     Simulate(simulate::Arguments),
-    /// Work out how the track answers a force: receptance by frequency (hammer test).
+    /// Compute the receptance of the track by frequency (hammer test).
     Receptance(receptance::Arguments),
     /// Train Gaussian-process models on a library that has at least 200 finished cases.
     Train(train::Arguments),
-    /// Tell the track's parameters under a recording, sleeper by sleeper.
+    /// Estimate the track parameters at every sleeper from a recording.
     Evaluate(evaluate::Arguments),
-    /// Tell how often estimates hold and refusals are right, on simulated tracks nobody has seen.
+    /// Measure coverage and false alarms of the evaluation on simulated tracks.
     Coverage(coverage::Arguments),
-    /// Find where a recording and the simulation differ, and what physics was left out.
+    /// Find where a recording differs from the track model, and which left-out physics explains it.
     Diagnose(diagnose::Arguments),
-    /// Write a campaign that has the physics a diagnosis found in its parameter space.
+    /// Write a campaign that includes the physics found by a diagnosis.
     Extend(extend::Arguments),
-    /// Hide physics in recordings, diagnose them blindly and score the answers.
+    /// Run a blind trial: hide physics in recordings, diagnose them and score the diagnoses.
     Trial(trial::Arguments),
-    /// Set the paper's results beside this program's, figure by figure.
+    /// Compare the results with the paper's, figure by figure.
     Reproduce(reproduce::Arguments),
-    /// Make a recording of CSV, Parquet, NumPy or MATLAB files.
+    /// Convert CSV, Parquet, NumPy or MATLAB files to a recording.
     Import(import::Arguments),
-    /// Say what is in a recording and what it can be used for.
+    /// Check a recording and list its content, defects and possible uses.
     Inspect(inspect::Arguments),
-    /// Ask the model library.
+    /// Query, copy and verify a library.
     #[command(subcommand)]
     Library(library::Question),
     /// Serve campaigns to workers on this and other machines.
     Coordinator(coordinator::Arguments),
-    /// Add campaigns to a library, pause, resume, cancel and retry them.
+    /// Add, pause, resume, cancel and retry campaigns of a library.
     #[command(subcommand)]
     Campaign(campaign::Action),
-    /// Show how far a farm is: campaigns, rates, failures, workers.
+    /// Show the progress of a farm: campaigns, rates, failures, workers.
     Status(status::Arguments),
-    /// Make certificates and a token for a farm of several machines.
+    /// Create certificates and a token for a farm of several machines.
     Certs(certs::Arguments),
-    /// Print a shell's completions for this program.
+    /// Print shell completions.
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
@@ -120,14 +118,14 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// One line that says what is wrong.
+/// The error as one line.
 fn report(error: &anyhow::Error, code: u8) -> ExitCode {
     let line = chain(error).replace('\n', " ");
     println_stderr(&format!("tracktwin: {line}"));
     ExitCode::from(code)
 }
 
-/// What is wrong and why, each thing said once: some errors tell their source themselves.
+/// The error and its sources, without repetition: some errors include their source.
 fn chain(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for part in error.chain().map(ToString::to_string) {
@@ -166,9 +164,9 @@ fn run(command: Command) -> Result<(), Stop> {
     }
 }
 
-/// Warnings, a service's course, or what `RUST_LOG` asks for.
+/// Level of the log: warnings, and information of the coordinator, unless `RUST_LOG` is set.
 fn filter(program: &Program) -> EnvFilter {
-    // A statement over a whole library takes a second or more: that is no fault.
+    // A statement over a whole library takes a second or more, which needs no warning.
     let usual = match program.command {
         Command::Coordinator(_) => "warn,tracktwin=info,sqlx::query=error",
         _ => "warn,sqlx::query=error",
@@ -186,30 +184,30 @@ fn completions(shell: clap_complete::Shell) {
     write_stdout(&script);
 }
 
-/// Says a line of the command's answer on standard output.
+/// Prints a line of the result on standard output.
 fn println_stdout(line: &str) {
     write_stdout(format!("{line}\n").as_bytes());
 }
 
-/// What kept an answer from being written; the program ends with it, once all else is wound up.
+/// First error of standard output; the program ends with it after clean-up.
 static UNWRITTEN: OnceLock<std::io::Error> = OnceLock::new();
 
-/// Whether anybody reads: who did may have gone, as `head` does once it has its lines, and then nothing
-/// is amiss.
+/// Writes to standard output. Returns `false` if the reader has closed it, as `head` does, which is
+/// no error.
 fn write_stdout(text: &[u8]) -> bool {
     let mut out = std::io::stdout().lock();
     match out.write_all(text).and_then(|()| out.flush()) {
         Ok(()) => true,
         Err(error) if error.kind() == ErrorKind::BrokenPipe => false,
         Err(error) => {
-            // The first one says it all.
+            // Only the first error is kept.
             let _ = UNWRITTEN.set(error);
             false
         }
     }
 }
 
-/// Says a line beside the answer on standard error, if anybody reads that.
+/// Prints a line on standard error; errors are ignored.
 fn println_stderr(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
@@ -219,7 +217,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_help_shows_what_the_environment_holds_of_a_library() {
+    fn no_help_shows_the_library_of_the_environment() {
         fn check(command: &clap::Command) {
             for argument in command.get_arguments().filter(|it| it.get_id() == "library") {
                 assert!(argument.is_hide_env_values_set(), "{}", command.get_name());

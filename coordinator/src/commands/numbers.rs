@@ -1,4 +1,4 @@
-//! Numbers on the command line: each is checked against its quantity where it is parsed.
+//! Numbers on the command line, checked against the range of their quantity.
 
 use std::num::NonZeroUsize;
 use tracktwin_parameters::{Quantity, QuantityError};
@@ -10,7 +10,7 @@ pub(super) fn number(
     move |text| of.parse(text)
 }
 
-/// Parses an argument that counts something.
+/// Parses a count.
 pub(super) fn count<T: TryFrom<u64>>(
     of: Quantity,
 ) -> impl Fn(&str) -> Result<T, QuantityError> + Clone + Send + Sync + 'static {

@@ -1,4 +1,4 @@
-//! How far long work has come: a bar in a terminal, a line now and then elsewhere.
+//! Progress of long work: a bar in a terminal, otherwise periodic lines.
 
 use super::println_stderr;
 use crate::pipeline::models::group_name;
@@ -8,24 +8,24 @@ use std::cell::RefCell;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Between two lines where there is no terminal.
+/// Interval of the lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-/// Steps of the bar of a stage of which shares are told.
+/// Steps of the bar of a stage that reports shares.
 const STEPS: u64 = 100;
 
 /// The progress of one stage of a command, on standard error.
 pub(super) struct Progress {
     stage: &'static str,
     bar: ProgressBar,
-    /// Where there is no terminal: when the last line was written.
+    /// Time of the last line; without a terminal only.
     last_line: Option<Instant>,
     begun: Instant,
     begun_at: u64,
 }
 
 impl Progress {
-    /// A stage of `total` steps, `done` of which were done before.
+    /// Starts a stage of `total` steps, `done` of which are already done.
     pub(super) fn begin(stage: &'static str, done: u64, total: u64) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let target =
@@ -41,7 +41,7 @@ impl Progress {
         Self { stage, bar, last_line, begun, begun_at: done }
     }
 
-    /// Shows that `done` steps are done, and a remark.
+    /// Shows the number of steps done, and a remark.
     pub(super) fn at(&mut self, done: u64, remark: &str) {
         self.bar.set_position(done);
         self.bar.set_message(remark.to_owned());
@@ -74,12 +74,12 @@ impl Progress {
     }
 }
 
-/// A line or bar for the stage that goes on, the last one ended when another begins.
+/// Line or bar of the current stage; it ends when the next stage begins.
 #[derive(Default)]
 pub(super) struct Stages(Mutex<Option<(&'static str, Progress)>>);
 
 impl Stages {
-    /// Shows which share of a stage is done.
+    /// Shows the share of a stage that is done.
     pub(super) fn at(&self, stage: &'static str, share: f64) {
         let mut shown = self.0.lock();
         if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
@@ -93,7 +93,7 @@ impl Stages {
         }
     }
 
-    /// Ends the stage that goes on.
+    /// Ends the current stage.
     pub(super) fn end(self) {
         let shown = self.0.into_inner();
         if let Some((_, progress)) = shown {
@@ -102,12 +102,12 @@ impl Stages {
     }
 }
 
-/// The progress of training, which says with its first step how many there are.
+/// Progress of training; the first step states the number of groups.
 #[derive(Default)]
 pub(super) struct TrainingBar(RefCell<Option<Progress>>);
 
 impl TrainingBar {
-    /// Shows which group of models is trained.
+    /// Shows the group of models that is being trained.
     pub(super) fn at(&self, at: &tracktwin_surrogate::Progress<'_>) {
         let mut bar = self.0.borrow_mut();
         let bar = bar.get_or_insert_with(|| Progress::begin("training", 0, at.groups as u64));

@@ -1,4 +1,4 @@
-//! `tracktwin receptance`: how the track answers a force (hammer test).
+//! `tracktwin receptance`: receptance of the track (hammer test).
 
 use super::files::{Force, check, is_stream, write_file};
 use super::numbers::{count, number};
@@ -15,20 +15,21 @@ use tracktwin_report::ReceptanceCurve;
 use tracktwin_track::frequency::{self, Place};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
-/// What `receptance` is told.
+/// Arguments of `receptance`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Where the rail is struck and its motion measured, as in a hammer test; may stand several
-    /// times: `sleeper` (above the middle sleeper), `midspan` (half a spacing on), a position in m,
-    /// or `A:B`, struck at A and measured at B.
+    /// Point of excitation and measurement on the rail: `sleeper` (above the middle sleeper),
+    /// `midspan` (half a spacing further), a position in m, or `A:B` for excitation at A and
+    /// measurement at B; may be repeated.
     #[arg(long = "at", value_name = "PLACE", required = true)]
     at: Vec<Test>,
-    /// File for the receptances (CSV); a picture is written beside it (SVG).
+    /// Output file (CSV); a plot (SVG) is written beside it.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// Sleeper spans; 25 as in the paper have standing waves, 200 are as good as endless.
+    /// Number of sleeper spans; 25 spans, as in the paper, show standing waves, 200 spans behave as
+    /// an infinite track.
     #[arg(long, default_value_t = 200, value_parser = count::<usize>(SPANS))]
     spans: usize,
     /// Lowest frequency in Hz.
@@ -37,18 +38,18 @@ pub(super) struct Arguments {
     /// Highest frequency in Hz.
     #[arg(long, default_value_t = 8000.0, value_name = "HZ", value_parser = number(FREQUENCY))]
     to: f64,
-    /// Frequencies, evenly spread on a logarithmic axis.
+    /// Number of frequencies, in equal steps on a logarithmic axis.
     #[arg(long, default_value_t = 400, value_parser = count::<usize>(POINTS))]
     points: usize,
-    /// A parameter's value: `railpad_stiffness_N_m=9e7`; may stand several times.
+    /// Value of a parameter, e.g. `railpad_stiffness_N_m=9e7`; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<super::simulate::Setting>,
-    /// Track to start from.
+    /// Preset that gives the nominal track.
     #[arg(long, value_enum, default_value_t = Track::VTrack)]
     preset: Track,
 }
 
-/// A place on the rail, as it is written.
+/// A point on the rail as written on the command line.
 #[derive(Clone, Copy, Debug)]
 enum TestPoint {
     Sleeper,
@@ -56,7 +57,7 @@ enum TestPoint {
     At(f64),
 }
 
-/// Where is struck, where is measured, and how that was written.
+/// Points of excitation and measurement, and their text.
 #[derive(Clone, Debug)]
 struct Test {
     struck: TestPoint,
@@ -113,7 +114,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     write(arguments, &table, &picture)
 }
 
-/// Table and picture, together.
+/// Writes table and plot together.
 fn write(arguments: &Arguments, table: &[u8], picture: &str) -> Result<(), Stop> {
     let Arguments { out, force, .. } = arguments;
     if is_stream(out) {
@@ -126,17 +127,17 @@ fn write(arguments: &Arguments, table: &[u8], picture: &str) -> Result<(), Stop>
     output.add(&table_name, table)?;
     output.commit()?;
     let picture = picture_name.within(&folder);
-    println_stdout(&format!("receptance: {}; picture: {}", out.display(), picture.display()));
+    println_stdout(&format!("receptance: {}; plot: {}", out.display(), picture.display()));
     Ok(())
 }
 
-/// What table and picture are called.
+/// Names of table and plot.
 fn names(out: &Path) -> Result<[FileName; 2], Stop> {
     let (_, table) = FileName::of_path(out)?;
     let (_, picture) = FileName::of_path(&out.with_extension("svg"))?;
     if table == picture {
         let table = anyhow!(
-            "--out {}: that is the picture's name; give the table's, such as ",
+            "--out {}: this is the name of the plot; give the name of the table, for example ",
             out.display()
         );
         return Err(anyhow!("{table}{}", out.with_extension("csv").display())).or_input();
@@ -144,7 +145,7 @@ fn names(out: &Path) -> Result<[FileName; 2], Stop> {
     Ok([table, picture])
 }
 
-/// Makes sure that both may be written.
+/// Checks that both may be written.
 fn check_files(Arguments { out, force, .. }: &Arguments) -> Result<(), Stop> {
     if is_stream(out) {
         return Ok(());
@@ -157,9 +158,7 @@ fn check_files(Arguments { out, force, .. }: &Arguments) -> Result<(), Stop> {
 fn frequencies(arguments: &Arguments) -> Result<Vec<f64>, anyhow::Error> {
     let Arguments { from, to, points, .. } = *arguments;
     if from >= to {
-        return Err(anyhow!(
-            "--from {from} --to {to}: give two frequencies in Hz, the lower first"
-        ));
+        return Err(anyhow!("--from {from} --to {to}: the lower frequency in Hz must come first"));
     }
     let ratio = (to / from).powf(1.0 / (points - 1) as f64);
     Ok((0..points).map(|point| from * ratio.powf(point as f64)).collect())

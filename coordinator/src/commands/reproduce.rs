@@ -1,4 +1,4 @@
-//! `tracktwin reproduce`: the paper's results beside this program's.
+//! `tracktwin reproduce`: compares this program's results with the paper's.
 
 use super::files::{Force, check, make_folder};
 use super::library::{CHOOSE_REMEDY, choose};
@@ -19,7 +19,7 @@ use tracktwin_library::{CampaignRecord, Library};
 use tracktwin_reproduction::{Compared, Figure, Provenance, Reproduction, Results, Verdict};
 use tracktwin_surrogate::{Trained, TrainingSet};
 
-/// What `reproduce` is told.
+/// Arguments of `reproduce`.
 #[derive(Args)]
 #[command(after_long_help = "\
 The paper: Shen et al. 2023, Mechanical Systems and Signal Processing 204, 110730.
@@ -34,35 +34,35 @@ The paper: Shen et al. 2023, Mechanical Systems and Signal Processing 204, 11073
   fig18   example: bending stiffness of the sleepers (likewise)
   fig19   example: stiffness reduced at a few sleepers (likewise)
 
-A library for all of them, and what the command says of it:
+Commands that fill a library for all figures and compare the results:
 
   tracktwin run --cases 10000 --no-train --library sqlite:library.sqlite --out out
   tracktwin reproduce --library sqlite:library.sqlite --out reproduction
 
-Exit codes: 0 nothing differs, 1 a row differs, 2 wrong input, 3 failure.")]
+Exit codes: 0 no row differs, 1 a row differs, 2 wrong input, 3 failure.")]
 pub(super) struct Arguments {
-    /// Figures of the paper, `fig9` to `fig19` [default: all that are known].
+    /// Figures of the paper, `fig9` to `fig19` [default: all available].
     #[arg(value_name = "FIGURE")]
     figures: Vec<String>,
     #[command(flatten)]
     library: LibraryUrl,
-    /// Folder for reproduce.json and reproduce.html.
+    /// Output folder for reproduce.json and reproduce.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// Folder of models trained on this library [default: train them into OUT/models].
+    /// Folder of models trained on this library [default: train models in OUT/models].
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// The campaign by its id or name, where the library holds several.
+    /// Id or name of the campaign; required if the library holds several.
     #[arg(long, value_name = "CAMPAIGN")]
     campaign: Option<String>,
 }
 
-/// Which half of the cases trains and is searched where no models were given, as with `train`.
+/// Seed that selects the training half of the cases when no models are given, as with `train`.
 const SEED: u64 = 0;
 
-/// The files that are written.
+/// The output files.
 const PAGE: &str = "reproduce.html";
 const ANSWER: &str = "reproduce.json";
 
@@ -89,7 +89,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     write_and_print(&reproduction, out, arguments.force)
 }
 
-/// Models of the campaign, where none were given.
+/// Trains models of the campaign when none were given.
 async fn train(
     library: &Library,
     campaign: &CampaignRecord,
@@ -105,7 +105,7 @@ async fn train(
     Ok(trained)
 }
 
-/// The figures of these names, each once and in the paper's order; all if there are no names.
+/// The figures of these names, each once, in the order of the paper; all figures without names.
 fn figures(names: &[String]) -> Result<Vec<Figure>, anyhow::Error> {
     if names.is_empty() {
         return Ok(Figure::ALL.to_vec());
@@ -127,14 +127,16 @@ async fn campaign(
     match models {
         Some(models) if models.campaign() != campaign.id => {
             let (of, id) = (models.campaign(), &campaign.id);
-            Err(anyhow!("--models: they are of campaign {of}, not {id}; train on that one"))
-                .or_input()
+            Err(anyhow!(
+                "--models: the models belong to campaign {of}, not {id}; train models on {id}"
+            ))
+            .or_input()
         }
         _ => Ok(campaign),
     }
 }
 
-/// A library's results, and the models that were trained on them.
+/// The results of a library, and the models trained on them.
 enum Material {
     Results(TrainingSet),
     Models(Box<Evaluator>),
@@ -209,7 +211,7 @@ fn compare(
     Ok(Reproduction::new(provenance, all))
 }
 
-/// Writes the files, says every row, and is negative if one differs.
+/// Writes the files and prints every row; a negative result if a row differs.
 fn write_and_print(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), Stop> {
     let page = tracktwin_report::reproduction_page(reproduction);
     let mut output = Output::begin(out, Kind::Results, force.force)?;
@@ -225,7 +227,7 @@ fn write_and_print(reproduction: &Reproduction, out: &Path, force: Force) -> Res
     }
     let count = |verdict| reproduction.count(verdict);
     println_stdout(&format!(
-        "{} reproduced, {} differ, {} cannot be told; page: {}",
+        "{} reproduced, {} differ, {} undecided; page: {}",
         count(Verdict::Reproduced),
         count(Verdict::Differs),
         count(Verdict::CannotTell),

@@ -1,13 +1,12 @@
-//! What ends long work from outside.
+//! Signals that stop long work.
 
 use super::println_stderr;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 
-/// Is cancelled by the first Ctrl-C or SIGTERM, which is answered with `notice`.
+/// A token that the first Ctrl-C or SIGTERM cancels; `notice` is printed.
 ///
-/// A signal after that, or once the caller has cancelled it because nothing is left to wind up,
-/// ends the process as if nobody listened.
+/// A second signal, or a signal after the caller has cancelled the token, ends the process at once.
 pub(super) fn stop_on_signal(notice: &'static str) -> std::io::Result<CancellationToken> {
     let shutdown = CancellationToken::new();
     let (mut interrupt, mut terminate) =

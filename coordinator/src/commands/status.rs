@@ -1,4 +1,4 @@
-//! `tracktwin status`: how far a farm is, once or all the time.
+//! `tracktwin status`: progress of a farm, once or continuously.
 
 use super::library_url::LibraryUrl;
 use super::{Stop, write_stdout};
@@ -14,28 +14,28 @@ use tracktwin_library::ContactLoss;
 /// Characters of a progress bar.
 const BAR: usize = 30;
 
-/// Causes of failure shown for a campaign.
+/// Number of failure causes shown per campaign.
 const CAUSES: usize = 3;
 
-/// Workers shown; the others are counted.
+/// Number of workers shown; the others are counted.
 const WORKERS: usize = 20;
 
 /// Clears the screen and puts the cursor into its corner (ECMA-48).
 const CLEAR: &str = "\x1b[2J\x1b[H";
 
-/// What `status` is told.
+/// Arguments of `status`.
 #[derive(Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
     library: LibraryUrl,
-    /// Look again and again, until Ctrl-C.
+    /// Repeat until Ctrl-C.
     #[arg(long, conflicts_with = "json")]
     watch: bool,
-    /// Between two looks.
+    /// Interval of `--watch`.
     #[arg(long, value_name = "SECONDS", default_value_t = 2, requires = "watch",
           value_parser = clap::value_parser!(u64).range(1..=86_400))]
     every: u64,
-    /// Answer in JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
 }
@@ -64,7 +64,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 fn text(farm: &Farm) -> String {
     let mut text = format!("{}   {}\n", farm.library, farm.at);
     if farm.campaigns.is_empty() {
-        text += "\nno campaign yet; `tracktwin campaign add FILE` adds one\n";
+        text += "\nno campaign yet; add one with `tracktwin campaign add FILE`\n";
     }
     for campaign in &farm.campaigns {
         campaign_text(&mut text, campaign);

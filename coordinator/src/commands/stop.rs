@@ -1,4 +1,4 @@
-//! Why a command ends without being done.
+//! Unsuccessful ends of a command.
 
 use crate::pipeline::models::ModelsError;
 use tracktwin_farm::campaign::StoreError;
@@ -6,18 +6,18 @@ use tracktwin_farm::embedded::FarmError;
 use tracktwin_files::FilesError;
 use tracktwin_library::LibraryError;
 
-/// The end of a command that is not success; each has its exit code.
+/// Unsuccessful end of a command; each variant has its exit code.
 #[derive(Debug)]
 pub(super) enum Stop {
-    /// The answer is no, and was said (exit code 1).
+    /// The result is negative and was printed (exit code 1).
     Negative,
-    /// What the user gave can't be used (exit code 2).
+    /// The input is wrong (exit code 2).
     Input(anyhow::Error),
     /// The machine, the network or the program failed (exit code 3).
     Failure(anyhow::Error),
 }
 
-/// A library or a file that says so was given something wrong; all else is a failure.
+/// Errors of a library or a file that state wrong input are wrong input; all others are failures.
 impl<E: Into<anyhow::Error>> From<E> for Stop {
     fn from(error: E) -> Self {
         let error = error.into();
@@ -29,7 +29,7 @@ impl<E: Into<anyhow::Error>> From<E> for Stop {
     }
 }
 
-/// What libraries and files say of whose fault an error is.
+/// Whether an error of a library or a file is wrong input.
 fn is_wrong_input(error: &anyhow::Error) -> Option<bool> {
     if let Some(library) = library_error(error) {
         return Some(library.is_wrong_input());
@@ -41,7 +41,7 @@ fn is_wrong_input(error: &anyhow::Error) -> Option<bool> {
     file.map(FilesError::is_wrong_input)
 }
 
-/// What a library says, whoever passes it on.
+/// The same for a library error inside another error.
 fn library_error(error: &anyhow::Error) -> Option<&LibraryError> {
     if let Some(FarmError::Library(library)) = error.downcast_ref() {
         return Some(library);
@@ -52,7 +52,7 @@ fn library_error(error: &anyhow::Error) -> Option<&LibraryError> {
     error.downcast_ref()
 }
 
-/// Blames an error on what the user gave, unless it says that the machine is to blame.
+/// Classifies an error as wrong input, unless it states a failure of the machine.
 pub(super) trait OrInput<T> {
     /// The value, or [`Stop::Input`].
     ///

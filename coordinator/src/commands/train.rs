@@ -1,4 +1,4 @@
-//! `tracktwin train`: Gaussian-process models from a library.
+//! `tracktwin train`: trains Gaussian-process models on a library.
 
 use super::files::{Force, make_folder};
 use super::library::{CHOOSE_REMEDY, choose};
@@ -10,24 +10,25 @@ use clap::Args;
 use std::path::PathBuf;
 use tracktwin_surrogate::{ModelGroup, ParameterModel, Trained};
 
-/// What `train` is told.
+/// Arguments of `train`.
 #[derive(Args)]
 #[command(
-    after_help = "At least 200 cases of the campaign must be finished: half of them train, the other half tests. \
-Exit codes: 0 done, 2 wrong input (too few cases, or none of their parameters varies), 3 failure."
+    after_help = "At least 200 cases of the campaign must be finished: one half is used for \
+        training, the other half for testing. \
+Exit codes: 0 done, 2 wrong input (too few cases, or no parameter varies), 3 failure."
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
     library: LibraryUrl,
-    /// Folder for the models.
+    /// Output folder for the models.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// The campaign by its id or name, where the library holds several.
+    /// Id or name of the campaign; required if the library holds several.
     #[arg(long, value_name = "CAMPAIGN")]
     campaign: Option<String>,
-    /// Decides which half of the cases trains; the other tests.
+    /// Seed that selects the training half of the cases.
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }
@@ -37,7 +38,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     check_files(&out, force)?;
     let library = library.open_whole().await?;
     let campaign = choose(&library, campaign.as_deref(), CHOOSE_REMEDY).await?;
-    // Before hours of training.
+    // Before the training, which takes hours.
     make_folder(&out)?;
     let bar = TrainingBar::default();
     let trained = train_into(&out, force, &library, &campaign, seed, &|at| bar.at(&at)).await?;
@@ -47,8 +48,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-/// MASE on the test set in per cent, a row a group of models (paper, eq. 11 and Fig. 14), and how
-/// much of the test set the 90 % intervals hold.
+/// MASE on the test set in per cent, one row per group of models (paper, eq. 11 and Fig. 14), and
+/// the coverage of the 90 % intervals.
 fn table(trained: &Trained) -> String {
     let width =
         trained.groups().iter().map(|group| group_name(group.key()).len()).max().unwrap_or(0);
@@ -61,7 +62,7 @@ fn table(trained: &Trained) -> String {
         });
         format!("{:width$}{}", group_name(group.key()), cells.collect::<Vec<_>>().concat())
     });
-    let title = "Test MASE in % (share of the test set inside its 90 % interval)";
+    let title = "Test MASE in % (coverage of the 90 % interval)";
     let heads = format!("{:width$}{}", "", heads.collect::<Vec<_>>().concat());
     let lines: Vec<_> = [title.to_owned(), heads].into_iter().chain(rows).collect();
     lines.join("\n")

@@ -1,4 +1,4 @@
-//! `tracktwin trial`: how often a diagnosis is right, on recordings whose truth it does not know.
+//! `tracktwin trial`: blind trial of the diagnosis.
 
 use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
@@ -13,43 +13,43 @@ use tracktwin_parameters::Preset;
 use tracktwin_signal::recording::compare_designs;
 use tracktwin_surrogate::Trained;
 
-/// What `trial` is told.
+/// Arguments of `trial`.
 #[derive(Args)]
 #[command(
     after_help = "In DIR: recordings/, sealed/ (the truth), seals.sha256 (check it with `sha256sum -c`), \
-diagnoses/, scores.jsonl, and trial.md with the tables. The same command goes on where it was interrupted. \
-Started on several nodes with the same --library, it shares the cases among them; a node that dies loses \
-its case to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 2 wrong input, 3 failure."
+diagnoses/, scores.jsonl, and trial.md with the tables. Repeat the command to continue an interrupted trial. \
+Started on several machines with the same --library, it distributes the cases; the case of a machine that fails goes \
+to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 2 wrong input, 3 failure."
 )]
 pub(super) struct Arguments {
-    /// How many recordings are made and diagnosed.
+    /// Number of recordings.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=9999))]
     cases: u32,
-    /// Decides what is hidden in which case.
+    /// Seed of the hidden physics.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
-    /// Folder of this node's files.
+    /// Output folder of this machine.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// The library that keeps answers and null simulations; by default one in DIR. Nodes that share
-    /// it share the trial.
+    /// Library that stores scores and null simulations [default: one in DIR]. Machines that share a
+    /// library share the trial.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Diagnose every single effect once more with its kind left out of the catalogue: the answer
-    /// should then be "unknown".
+    /// Knock-out test: diagnose every recording with a single effect again with its kind left out
+    /// of the catalogue; "unknown" is expected.
     #[arg(long)]
     knock_out: bool,
-    /// Diagnose every local effect that was found once more with the sleepers of each speed shuffled:
-    /// no physics should then be named.
+    /// Shuffle test: diagnose every local effect that was found again with the sleepers of each
+    /// speed shuffled; no physics should be accepted.
     #[arg(long)]
     shuffle: bool,
-    /// Folder of models trained on the library: asks the paper's own pipeline too whether it looks
-    /// content with each recording.
+    /// Folder of models trained on the library; also tests whether the paper's method flags the
+    /// recordings.
     #[arg(long, value_name = "DIR", requires = "library")]
     models: Option<PathBuf>,
-    /// Remove a recording's passes once it is scored; its seal and diagnosis stay.
+    /// Delete the passes of a recording after scoring; its seal and diagnosis are kept.
     #[arg(long)]
     discard_recordings: bool,
 }
@@ -68,7 +68,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     } = arguments;
     let own = || format!("sqlite:{}", out.join("library.sqlite").display());
     let url = library.unwrap_or_else(own);
-    // Before anything is made.
+    // Before anything is created.
     let models = models.as_deref().map(Trained::load).transpose().or_input()?;
     check_folder(&out, force.force)?;
     make_folder(&out)?;
@@ -98,7 +98,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     println_stdout(&format!("sealed: {cases} truths, SHA-256 of seals.sha256 {digest}"));
     let done = trial.answered().await.map_err(stop)?;
     println_stdout(&format!(
-        "trial {} in {}: {done} of {cases} answered",
+        "trial {} in {}: {done} of {cases} scored",
         trial.id(),
         trial.library.name()
     ));
@@ -116,7 +116,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if missed { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// Whether models are of the track that is recorded: V-Track.
+/// Checks that the models are of V-Track.
 fn check_models(evaluator: &Evaluator) -> anyhow::Result<()> {
     compare_designs(evaluator.design(), &Preset::VTrack.design()).map_err(|other| {
         anyhow!(

@@ -57,16 +57,16 @@ pub enum DiagnosingError {
     #[error(transparent)]
     Recording(#[from] PreparationError),
     /// The model of the track cannot be fitted without anything left out.
-    #[error("no baseline fits: {0}")]
+    #[error("cannot fit the baseline: {0}")]
     Baseline(#[source] CalibrationError),
     /// The null simulations are not to be had.
     #[error(transparent)]
     NullModel(#[from] NullModelError),
     /// The search broke down.
-    #[error("the search for left-out physics broke down: {0}")]
+    #[error("the search for left-out physics failed: {0}")]
     Search(#[source] CalibrationError),
     /// What the search found comes to no conclusion.
-    #[error("no conclusion can be drawn: {0}")]
+    #[error("the search gives no conclusion: {0}")]
     Conclusion(#[source] CalibrationError),
 }
 

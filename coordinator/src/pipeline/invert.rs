@@ -22,7 +22,7 @@ pub enum InvertingError {
     #[error(transparent)]
     Recording(#[from] PreparationError),
     /// No track fits.
-    #[error("no track fits the recording: {0}")]
+    #[error("cannot fit a track to the recording: {0}")]
     Fit(#[from] CalibrationError),
     /// The null simulations are not to be had.
     #[error(transparent)]

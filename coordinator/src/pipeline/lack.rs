@@ -3,21 +3,19 @@
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_surrogate::ENTRIES_MIN;
 
-/// What a campaign lacks to be trained on; one line each, with what mends it.
+/// Why models cannot be trained on a campaign; one line each, with the remedy.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Lack {
     /// Too few cases to fit and to test.
-    #[error(
-        "{cases} cases are too few to train on, which takes {ENTRIES_MIN}: give `--cases {ENTRIES_MIN}` or more"
-    )]
+    #[error("{cases} cases are too few for training; use `--cases {ENTRIES_MIN}` or more")]
     Cases {
         /// The cases there are.
         cases: u32,
     },
     /// No parameter varies.
     #[error(
-        "parameters: each is held at one value, so that there is nothing to learn; give at least one a range, \
-         as in `ballast_stiffness_N_m = [4e6, 22e6]`"
+        "parameters: no parameter varies; give at least one a range, for example \
+             `ballast_stiffness_N_m = [4e6, 22e6]`"
     )]
     Axes,
 }

@@ -71,7 +71,7 @@ pub async fn train_into(
     save(folder, force, &trained, &tested)?;
     if let Err(error) = library.record_training(provenance::training(&trained)).await {
         // The models stand in the folder; somebody who may only read the library has them all the same.
-        tracing::warn!("the library does not keep what was trained: {error:?}");
+        tracing::warn!("cannot store the training in the library: {error:?}");
     }
     Ok(trained)
 }

@@ -21,7 +21,7 @@ pub enum NullModelError {
     #[error(transparent)]
     Library(#[from] LibraryError),
     /// A simulation breaks down.
-    #[error("the null simulations broke down: {0}")]
+    #[error("the null simulations failed: {0}")]
     Simulation(#[from] NullError),
 }
 

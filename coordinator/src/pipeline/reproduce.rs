@@ -25,8 +25,8 @@ pub enum ReproducingError {
     OtherTrack,
     /// The track of the campaign is too short for the examples.
     #[error(
-        "the examples need {needed} spans; the campaign's track has {spans}: take a library of the \
-         built-in campaign, or leave out fig16 to fig19"
+        "the examples need {needed} spans, but the campaign's track has {spans}: use a \
+             library of the built-in campaign, or omit fig16 to fig19"
     )]
     TooShort {
         /// Spans of the campaign's track.

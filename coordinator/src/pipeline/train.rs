@@ -23,8 +23,8 @@ pub enum TrainingError {
     Library(#[from] LibraryError),
     /// No parameter varies.
     #[error(
-        "campaign {campaign}: no parameter varies over its finished cases, so that there is nothing to learn; \
-         train on a campaign that gives at least one parameter a range"
+        "campaign {campaign}: no parameter varies over its finished cases; train on a \
+             campaign with a range for at least one parameter"
     )]
     NothingVaries {
         /// The campaign.
@@ -32,8 +32,9 @@ pub enum TrainingError {
     },
     /// Too few cases are finished.
     #[error(
-        "campaign {campaign}: {finished} of its cases are finished and training takes {ENTRIES_MIN}; let more be \
-         simulated: `tracktwin run --cases N`, or a coordinator and `tracktwin campaign add --cases N`"
+        "campaign {campaign}: {finished} cases are finished, but training needs \
+             {ENTRIES_MIN}; simulate more with `tracktwin run --cases N`, or with a coordinator \
+             and `tracktwin campaign add --cases N`"
     )]
     TooFew {
         /// The campaign.
@@ -42,7 +43,7 @@ pub enum TrainingError {
         finished: u32,
     },
     /// The campaign's experiment isn't understood by this version.
-    #[error("campaign {campaign}: its experiment is not understood: {source}")]
+    #[error("campaign {campaign}: invalid experiment: {source}")]
     Experiment {
         /// The campaign.
         campaign: String,
@@ -50,7 +51,7 @@ pub enum TrainingError {
         source: ExperimentError,
     },
     /// The campaign's definition isn't understood by this version.
-    #[error("campaign {campaign}: its definition is not understood: {source}")]
+    #[error("campaign {campaign}: invalid definition: {source}")]
     Definition {
         /// The campaign.
         campaign: String,

@@ -56,7 +56,10 @@ pub struct Experiment {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExperimentError {
     /// Speeds are missing, not positive, or not in order.
-    #[error("speeds_km_h: {speeds:?} must be one or more positive speeds, ascending, none twice")]
+    #[error(
+        "speeds_km_h: {speeds:?} must be one or more positive speeds in ascending order \
+         without duplicates"
+    )]
     Speeds {
         /// The speeds.
         speeds: Vec<f64>,
@@ -78,8 +81,8 @@ pub enum ExperimentError {
     Speed(#[from] QuantityError),
     /// A pass takes more time steps than can be held.
     #[error(
-        "time_step_s: {time_step_s:e} makes {steps:.1e} steps at {speed_km_h} km/h; {STEPS_MAX:.0e} \
-         are the most: give a longer step or higher speeds"
+        "time_step_s: {time_step_s:e} gives {steps:.1e} steps at {speed_km_h} km/h, but the \
+             limit is {STEPS_MAX:.0e}; use a longer step or higher speeds"
     )]
     TooManySteps {
         /// The time step, in s.
@@ -97,8 +100,8 @@ pub enum ExperimentError {
     },
     /// What is kept comes too near to the held ends of the rail.
     #[error(
-        "spans: {spans} are too few for {speed_km_h} km/h: what is evaluated must stay \
-         {END_SPANS} spans off the ends of the rail; {needed} spans suffice"
+        "spans: {spans} is too small for {speed_km_h} km/h: the evaluated sleepers must be \
+             {END_SPANS} spans away from the ends of the rail; use {needed} spans"
     )]
     TooShort {
         /// The spans.
@@ -335,7 +338,7 @@ mod tests {
     #[test]
     fn a_track_too_short_is_refused_with_a_length_that_suffices() {
         let message = refusal(|experiment| experiment.spans = 16);
-        assert!(message.starts_with("spans: 16 are too few for 13 km/h"), "{message}");
+        assert!(message.starts_with("spans: 16 is too small for 13 km/h"), "{message}");
         let mut longer = experiment();
         longer.speeds_km_h = vec![13.0, 100.0];
         let Err(ExperimentError::TooShort { needed, .. }) = longer.clone().checked() else {

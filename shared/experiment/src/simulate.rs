@@ -48,9 +48,7 @@ enum CaseError {
     Signal { speed_km_h: f64, source: SignalError },
     #[error("features at {speed_km_h} km/h: {source}")]
     Features { speed_km_h: f64, source: FeatureError },
-    #[error(
-        "features at {speed_km_h} km/h are not finite: the accelerations are beyond all bounds"
-    )]
+    #[error("features at {speed_km_h} km/h are not finite: the accelerations diverge")]
     NotFinite { speed_km_h: f64 },
 }
 

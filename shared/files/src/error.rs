@@ -1,4 +1,4 @@
-//! What may go wrong with files, and who is to mend it.
+//! Errors of files.
 
 use crate::{Kind, NameError};
 use std::io::ErrorKind;
@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 pub enum FilesError {
     /// A file that the program did not make stands where one is to be written.
     #[error(
-        "{}: tracktwin did not write this file, or it was changed since, and does not replace it; \
-         give another --out, or --force to replace it",
+        "{}: the file was not written by tracktwin, or was changed since; use another \
+             --out, or --force to replace it",
         path.display()
     )]
     Foreign {
@@ -19,7 +19,7 @@ pub enum FilesError {
     },
     /// A file of another kind stands where one is to be written.
     #[error(
-        "{}: belongs to {kind}, which is not replaced; give another --out, or --force to replace it",
+        "{}: the file belongs to {kind}; use another --out, or --force to replace it",
         path.display()
     )]
     OtherKind {
@@ -29,7 +29,7 @@ pub enum FilesError {
         kind: Kind,
     },
     /// A folder stands where a file is to be written.
-    #[error("{}: is a folder, where a file is to be written; give another --out", path.display())]
+    #[error("{}: is a folder, not a file; use another --out", path.display())]
     Folder {
         /// The folder.
         path: PathBuf,
@@ -44,8 +44,8 @@ pub enum FilesError {
     },
     /// A file that another file names lies outside its folder.
     #[error(
-        "{name:?} lies outside {}; a file that is named there must lie in that folder, \
-         and a link must not lead out of it: copy the file into it",
+        "{name:?} is outside {}; files named there, and targets of links, must be inside \
+             that folder: copy the file into it",
         folder.display()
     )]
     Outside {
@@ -76,8 +76,8 @@ impl FilesError {
         move |source| Self::System { path, action, source }
     }
 
-    /// Whether whoever named the file can mend it, as with any file that is to be read; all else is
-    /// the machine's.
+    /// Whether the user who named the file can correct it, as with any file to be read; everything
+    /// else is the machine's.
     pub fn is_wrong_input(&self) -> bool {
         match self {
             Self::System { action: "read", .. } => true,

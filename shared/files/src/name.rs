@@ -32,22 +32,22 @@ pub struct FileName(String);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
     /// Nothing, or nothing but dots.
-    #[error("is no name of a file; give one")]
+    #[error("is not a file name; use another name")]
     Empty,
     /// Too long.
-    #[error("is longer than {BYTES_MAX} bytes; give a shorter name")]
+    #[error("is longer than {BYTES_MAX} bytes; use a shorter name")]
     Long,
     /// A character that can't stand there.
     #[error(
-        "has {0:?} where a file's name cannot; use letters, digits, spaces and . _ - +, and begin \
-         with a letter or digit"
+        "contains {0:?}; use letters, digits, spaces and . _ - +, and start with a letter \
+             or digit"
     )]
     Character(char),
     /// A name that operating systems keep for themselves.
-    #[error("is a name that operating systems keep for themselves; give another")]
+    #[error("is a reserved name of an operating system; use another name")]
     Reserved,
     /// Letters in pieces: they look like others and are not.
-    #[error("has decomposed letters; write them composed (Unicode NFC)")]
+    #[error("contains decomposed letters; use composed letters (Unicode NFC)")]
     Decomposed,
 }
 

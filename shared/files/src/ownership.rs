@@ -78,7 +78,7 @@ pub(crate) struct List {
 impl Default for List {
     fn default() -> Self {
         let about =
-            "files that tracktwin wrote into this folder and may replace; others it does not";
+            "files in this folder that tracktwin wrote and may replace; it replaces no others";
         Self { format: FORMAT.to_owned(), about: about.to_owned(), files: BTreeMap::new() }
     }
 }

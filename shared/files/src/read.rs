@@ -17,7 +17,10 @@ pub fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
         let mut bytes = Vec::new();
         File::open(path)?.take(BYTES_MAX + 1).read_to_end(&mut bytes)?;
         if bytes.len() as u64 > BYTES_MAX {
-            let large = format!("it is larger than {} MiB; is it another file?", BYTES_MAX >> 20);
+            let large = format!(
+                "the file is larger than {} MiB; check that it is the right file",
+                BYTES_MAX >> 20
+            );
             return Err(Error::new(ErrorKind::InvalidInput, large));
         }
         Ok(bytes)
@@ -31,7 +34,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
 /// As [`read`], and when it is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FilesError> {
     String::from_utf8(read(path)?).map_err(|error| {
-        let error = Error::new(ErrorKind::InvalidInput, format!("it is no text ({error})"));
+        let error = Error::new(ErrorKind::InvalidInput, format!("the file is not text ({error})"));
         FilesError::system(path, "read")(error)
     })
 }
@@ -47,7 +50,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("text");
         std::fs::write(&path, [0xff, 0xfe]).unwrap();
-        assert!(read_text(&path).unwrap_err().to_string().contains("no text"));
+        assert!(read_text(&path).unwrap_err().to_string().contains("not text"));
         std::fs::write(&path, "text").unwrap();
         assert_eq!(read_text(&path).unwrap(), "text");
     }

@@ -133,7 +133,7 @@ impl TryFrom<String> for Parameter {
     fn try_from(name: String) -> Result<Self, String> {
         Self::from_name(&name).ok_or_else(|| {
             let known: Vec<_> = Self::ALL.iter().map(|parameter| parameter.name()).collect();
-            format!("no parameter is called `{name}`; known are {}", known.join(", "))
+            format!("unknown parameter `{name}`; known parameters: {}", known.join(", "))
         })
     }
 }

@@ -5,7 +5,7 @@
 /// Every number that enters, from a command line or a file, is checked against one of these.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// What it is, to follow "no": `distance of sleepers`.
+    /// What it is, to follow "no": `sleeper spacing`.
     pub name: &'static str,
     /// Its unit as plain text; empty for counts and ratios.
     pub unit: &'static str,
@@ -21,7 +21,7 @@ pub struct Quantity {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum QuantityError {
     /// The text is no number.
-    #[error("`{text}` is no {}number; give the {}", if of.is_count { "whole " } else { "" }, of.described())]
+    #[error("`{text}` is not a {}number; give the {}", if of.is_count { "whole " } else { "" }, of.described())]
     Text {
         /// The beginning of the text.
         text: String,
@@ -29,7 +29,7 @@ pub enum QuantityError {
         of: Box<Quantity>,
     },
     /// The number lies outside what can be.
-    #[error("{} is no {}{}", with_unit(*value, of.unit), of.described(), of.guess(*value))]
+    #[error("{} is not a valid {}{}", with_unit(*value, of.unit), of.described(), of.guess(*value))]
     Range {
         /// The number.
         value: f64,
@@ -101,7 +101,7 @@ impl Quantity {
         let [low, high, from, to] = [low, high, from, to].map(number);
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let usual = if from == to { from } else { format!("{from} to {to}") };
-        format!("{name}: it can be {low} to {high}{unit}; usual is {usual}{unit}")
+        format!("{name}: it can be {low} to {high}{unit}; a usual value is {usual}{unit}")
     }
 
     /// What was meant, if another unit makes the value a usual one.
@@ -140,14 +140,14 @@ fn number(value: f64) -> String {
 pub const SPEED: Quantity = Quantity::new("speed", "km/h", [0.5, 500.0], [5.0, 350.0]);
 
 /// Distance of neighbouring sleepers in m.
-pub const SPACING: Quantity = Quantity::new("distance of sleepers", "m", [0.05, 2.0], [0.1, 0.8]);
+pub const SPACING: Quantity = Quantity::new("sleeper spacing", "m", [0.05, 2.0], [0.1, 0.8]);
 
 /// Samples per second of a recording in Hz.
 pub const SAMPLE_RATE: Quantity =
     Quantity::new("sample rate", "Hz", [10.0, 1e7], [1000.0, 200_000.0]);
 
 /// Place along a track in m.
-pub const PLACE: Quantity = Quantity::new("place along a track", "m", [-1e7, 1e7], [0.0, 1e5]);
+pub const PLACE: Quantity = Quantity::new("position along a track", "m", [-1e7, 1e7], [0.0, 1e5]);
 
 /// Radius of a wheel in m.
 pub const WHEEL_RADIUS: Quantity =
@@ -182,7 +182,7 @@ pub const SENSOR: Quantity =
     Quantity::new("noise or resolution of a sensor", "m/s2", [0.0, 1e5], [0.0, 10.0]);
 
 /// By how much an odometer wanders in m: with the most, positions still grow.
-pub const WANDER: Quantity = Quantity::new("wander of an odometer", "m", [0.0, 0.05], [0.0, 0.02]);
+pub const WANDER: Quantity = Quantity::new("odometer error", "m", [0.0, 0.05], [0.0, 0.02]);
 
 /// Seconds that a process waits: up to a year.
 pub const SECONDS: Quantity = Quantity::count("time in seconds", [0, 31_536_000], [1, 86_400]);
@@ -199,15 +199,19 @@ mod tests {
         let refused = |text: &str| SPACING.parse(text).unwrap_err().to_string();
         assert_eq!(
             refused("600"),
-            "600 m is no distance of sleepers: it can be 0.05 to 2 m; usual is 0.1 to 0.8 m; did \
-             you mean 0.6?"
+            "600 m is not a valid sleeper spacing: it can be 0.05 to 2 m; a usual value is 0.1 to 0.8 m; did you \
+                 mean 0.6?"
         );
-        assert!(refused("1e-6").starts_with("1e-6 m is no distance"), "{}", refused("1e-6"));
+        assert!(
+            refused("1e-6").starts_with("1e-6 m is not a valid sleeper spacing"),
+            "{}",
+            refused("1e-6")
+        );
         for none in ["NaN", "inf", "-inf", "0", "-0.6", "1e400"] {
             assert!(refused(none).contains("it can be 0.05 to 2 m"), "{none}");
         }
         for none in ["", "wide", "0,6", "0.6m", "0x1"] {
-            assert!(refused(none).contains("is no number; give the distance"), "{none}");
+            assert!(refused(none).contains("is not a number; give the sleeper spacing"), "{none}");
         }
         assert_eq!(SPACING.parse("0.6"), Ok(0.6));
         assert_eq!(SPEED.parse(" 13 "), Ok(13.0));
@@ -218,7 +222,7 @@ mod tests {
     fn a_count_is_whole() {
         let refused = |text: &str| CORES.parse_count(text).unwrap_err().to_string();
         for none in ["1.5", "1e3", "", "-", "four", "NaN"] {
-            assert!(refused(none).contains("is no whole number"), "{none}: {}", refused(none));
+            assert!(refused(none).contains("is not a whole number"), "{none}: {}", refused(none));
         }
         for none in ["0", "-1", "1000000000", "18446744073709551616", "99999999999999999999999"] {
             assert!(refused(none).contains("it can be 1 to 4096"), "{none}: {}", refused(none));

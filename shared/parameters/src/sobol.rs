@@ -24,15 +24,15 @@ pub enum Sequence {
 pub enum SobolError {
     /// The Owen-scrambled sequence would repeat.
     #[error(
-        "the owen_scrambled sequence has {OWEN_POINTS_MAX} points and index {index} lies beyond; \
-         set `sequence = \"rotated\"` in the campaign"
+        "index {index} exceeds the {OWEN_POINTS_MAX} points of the owen_scrambled sequence; \
+             set `sequence = \"rotated\"` in the campaign"
     )]
     Exhausted {
         /// The index asked for.
         index: u32,
     },
     /// More dimensions than the sequence has.
-    #[error("{dimensions} axes are more than a Sobol sequence has here ({DIMENSIONS_MAX})")]
+    #[error("{dimensions} axes exceed the limit of the Sobol sequence ({DIMENSIONS_MAX})")]
     TooManyDimensions {
         /// The dimensions asked for.
         dimensions: usize,

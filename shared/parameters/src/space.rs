@@ -61,7 +61,7 @@ pub enum SpaceError {
     #[error("{0}: values must be positive")]
     NotPositive(Parameter),
     /// A parameter has two axes.
-    #[error("{0}: stands twice among the axes")]
+    #[error("{0}: duplicate axis")]
     Twice(Parameter),
 }
 

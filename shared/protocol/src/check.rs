@@ -22,7 +22,7 @@ pub enum BadMessage {
         max: usize,
     },
     /// A name with characters that nobody sees.
-    #[error("{field} has control characters")]
+    #[error("{field} contains control characters")]
     ControlCharacters {
         /// The field.
         field: &'static str,
@@ -36,7 +36,7 @@ pub enum BadMessage {
         value: f64,
     },
     /// A share that is not a number from 0 to 1.
-    #[error("{field} is {value}; a share lies in 0 to 1")]
+    #[error("{field} is {value}; a share must lie in 0 to 1")]
     NotAShare {
         /// The field.
         field: &'static str,
@@ -54,7 +54,7 @@ pub enum BadMessage {
         limit: u32,
     },
     /// An enum value this program doesn't know.
-    #[error("{field} is {value}, which this program does not know")]
+    #[error("{field} is {value}, which is unknown to this program")]
     UnknownValue {
         /// The field.
         field: &'static str,
@@ -62,7 +62,10 @@ pub enum BadMessage {
         value: i32,
     },
     /// A parameter this program doesn't know, and would ignore.
-    #[error("case {index}: no parameter is called `{name}`; coordinator and worker differ")]
+    #[error(
+        "case {index}: unknown parameter `{name}`; coordinator and worker have different \
+         versions"
+    )]
     UnknownParameter {
         /// The case.
         index: u32,
@@ -70,7 +73,7 @@ pub enum BadMessage {
         name: String,
     },
     /// A parameter does not stand exactly once.
-    #[error("case {index}: parameter {name} stands {count} times, not once")]
+    #[error("case {index}: parameter {name} occurs {count} times instead of once")]
     ParameterCount {
         /// The case.
         index: u32,
@@ -80,13 +83,13 @@ pub enum BadMessage {
         count: usize,
     },
     /// A hash does not belong to what it came with.
-    #[error("{what} does not have the hash that came with it")]
+    #[error("{what} does not match its hash")]
     WrongHash {
         /// What was hashed.
         what: String,
     },
     /// The report of a case is not what its worker sent.
-    #[error("case {index}: the report was damaged on its way; its checksum is another")]
+    #[error("case {index}: the report was damaged in transmission: its checksum does not match")]
     Damaged {
         /// The case.
         index: u32,

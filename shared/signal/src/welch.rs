@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 /// A signal shorter than one segment, or a segment of nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{samples} samples do not hold one segment of {segment}")]
+#[error("{samples} samples are fewer than one segment of {segment}")]
 pub struct WelchError {
     /// Samples of the signal.
     pub samples: usize,

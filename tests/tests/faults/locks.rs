@@ -65,7 +65,7 @@ fn run_without_locks(environment: &[(&str, &str)]) -> Option<Output> {
 fn assert_told(output: &Output) {
     let err = String::from_utf8_lossy(&output.stderr);
     let last = err.lines().last().unwrap_or_default();
-    for word in ["library.sqlite", "locks do not work", "a disk of this machine", "postgres://"] {
+    for word in ["library.sqlite", "locks do not work", "a local disk", "postgres://"] {
         assert!(last.contains(word), "`{word}` is missing in: {err}");
     }
     assert_eq!(output.status.code(), Some(2), "{err}");

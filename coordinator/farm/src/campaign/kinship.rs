@@ -4,16 +4,16 @@ use super::Campaign;
 use serde_json::Value;
 use tracktwin_parameters::{OWEN_POINTS_MAX, Sequence};
 
-/// Differences that are told; the rest is counted.
+/// Number of differences listed; the others are counted.
 const LISTED_MAX: usize = 4;
 
-/// How a campaign stands to one that a library holds already.
+/// Relation of a campaign to one in the library.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kinship {
-    /// All that differs is the sequence of the points, and nobody asked for that: it follows from the
-    /// number of cases.
+    /// Only the sampling sequence differs, because of the number of cases, without a request in the
+    /// file.
     OtherSequence {
-        /// What is wrong, and how to go on.
+        /// What is wrong, and how to continue.
         remedy: String,
     },
     /// It is another campaign.
@@ -24,7 +24,7 @@ pub enum Kinship {
 }
 
 impl Campaign {
-    /// How it stands to a campaign `id` that is defined by this JSON.
+    /// Relation to the campaign `id` with this definition in JSON.
     pub fn kinship(&self, id: &str, definition_json: &str) -> Kinship {
         let own = serde_json::from_str(&self.definition_json()).unwrap_or(Value::Null);
         let other = serde_json::from_str(definition_json).unwrap_or(Value::Null);
@@ -51,21 +51,22 @@ impl Campaign {
             Sequence::Rotated => (
                 "rotated",
                 format!(
-                    "the points of {id} in the library end at case {OWEN_POINTS_MAX}: `--cases \
-                     {OWEN_POINTS_MAX}` goes on with it to its end"
+                    "the points of {id} in the library end at case {OWEN_POINTS_MAX}: to continue it, \
+                         use `--cases {OWEN_POINTS_MAX}`"
                 ),
             ),
             Sequence::OwenScrambled => (
                 "owen_scrambled",
                 format!(
-                    "{id} in the library has the sequence `rotated`: write `sequence = \"rotated\"` into the campaign file to go on with it"
+                    "{id} in the library has the sequence `rotated`: to continue it, write `sequence = \
+                         \"rotated\"` into the campaign file"
                 ),
             ),
         };
         format!(
-            "cases: {cases} cases take their points from the sequence `{name}`, and would begin another campaign \
-             from case 0; {go_on}. To begin anew all the same, write `sequence = \"{name}\"` into the campaign \
-             file (`tracktwin run --print-campaign` prints the built-in one)"
+            "cases: {cases} cases use the sequence `{name}` and would start another campaign \
+                 from case 0; {go_on}. To start a new campaign, write `sequence = \"{name}\"` into \
+                 the campaign file (`tracktwin run --print-campaign` prints the built-in one)"
         )
     }
 }

@@ -47,7 +47,7 @@ pub struct Definition {
     pub space: ParameterSpace,
     /// The values of the parameters that don't vary, in catalogue order.
     pub fixed: [f64; Parameter::COUNT],
-    /// Whether every case has an irregularity of its own.
+    /// Whether every case has a separate irregularity.
     #[serde(skip_serializing_if = "Surfaces::is_default")]
     pub surfaces: Surfaces,
     /// What is simulated and measured in each case.
@@ -86,13 +86,13 @@ pub enum SpecError {
         path: String,
         /// The line, from 1.
         line: usize,
-        /// What the parser said.
+        /// Error of the parser.
         message: String,
     },
     /// A name that terminals, pages and commands can't take.
     #[error(
-        "{path}: name: {name:?} must begin with a letter or digit and have up to {NAME_CHARACTERS_MAX} \
-         letters, digits, spaces, and . _ - +"
+        "{path}: name: {name:?} must start with a letter or digit and have up to \
+             {NAME_CHARACTERS_MAX} letters, digits, spaces, and . _ - +"
     )]
     Name {
         /// The file.
@@ -134,8 +134,8 @@ pub enum SpecError {
     },
     /// More cases than the sequence has points.
     #[error(
-        "{path}: cases: the owen_scrambled sequence repeats beyond {OWEN_POINTS_MAX} points and \
-         {cases} are asked for; write `sequence = \"rotated\"`"
+        "{path}: cases: {cases} exceeds the {OWEN_POINTS_MAX} points of the owen_scrambled \
+             sequence; write `sequence = \"rotated\"`"
     )]
     SequenceExhausted {
         /// The file.
@@ -204,7 +204,7 @@ impl Campaign {
     /// Reads a campaign file; `cases`, if given, takes the place of the file's own number.
     ///
     /// # Errors
-    /// [`SpecError`] says in one line what is wrong, where, and how to mend it.
+    /// [`SpecError`] states in one line what is wrong, where, and what to do.
     pub fn read(path: &Path, cases: Option<u32>) -> Result<Self, SpecError> {
         let shown = path.display().to_string();
         let text = tracktwin_files::read_text(path)?;

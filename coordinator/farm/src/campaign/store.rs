@@ -21,7 +21,7 @@ pub enum StoreError {
 /// Stores a campaign and those of its cases that the library does not have yet.
 ///
 /// # Errors
-/// [`StoreError`] when the library fails or the campaign has not so many cases.
+/// [`StoreError`] when the library fails or the campaign has fewer cases.
 pub async fn store_campaign(library: &Library, campaign: &Campaign) -> Result<(), StoreError> {
     insert_campaign(library, campaign).await?;
     add_cases(library, campaign, |_| true).await
@@ -46,8 +46,8 @@ pub async fn insert_campaign(library: &Library, campaign: &Campaign) -> Result<(
     Ok(library.insert_campaign(&record).await?)
 }
 
-/// Stores those of a campaign's cases that the library does not have yet, for as long as `goes_on`,
-/// which is told how many are stored.
+/// Stores the missing cases of a campaign while `goes_on` returns true; its argument is the number
+/// of stored cases.
 ///
 /// # Errors
 /// As [`store_campaign`]; what was stored before stays.
@@ -57,7 +57,8 @@ pub async fn add_cases(
     mut goes_on: impl FnMut(u32) -> bool,
 ) -> Result<(), StoreError> {
     let id = campaign.id();
-    // Cases are stored in order, so the ones that are there are the first; behind a gap they stay as they are.
+    // Cases are stored in order, so the existing ones are the first; those after a gap are kept
+    // unchanged.
     let mut stored = library.cases_in_order(&id).await?;
     while goes_on(stored) && stored < campaign.cases {
         let end = campaign.cases.min(stored.saturating_add(CASES_AT_A_TIME));

@@ -30,7 +30,7 @@ pub struct Coordinator {
     pub exit_when_done: bool,
 }
 
-/// Why a coordinator ends before it is told to.
+/// Errors that stop a coordinator.
 #[derive(Debug, thiserror::Error)]
 pub enum CoordinatorError {
     /// The library fails or refuses.
@@ -43,13 +43,13 @@ pub enum CoordinatorError {
     #[error(transparent)]
     Security(#[from] SecurityError),
     /// A port has no address.
-    #[error("a port was lost")]
+    #[error("a listening port failed")]
     Port(#[from] std::io::Error),
 }
 
 impl Coordinator {
-    /// Serves until told to stop, or until everything is done where that was asked for. Leases stay
-    /// with their workers: whoever serves the library next goes on where this ended.
+    /// Serves until it is stopped, or until everything is done if requested. Leases stay with their
+    /// workers: the next coordinator of the library continues from here.
     ///
     /// # Errors
     /// [`CoordinatorError`].
@@ -59,7 +59,7 @@ impl Coordinator {
         self.security.check(address)?;
         let _claim = self.claim;
         let stop = stop.child_token();
-        // However this ends, nothing goes on behind its back.
+        // All tasks end with this function.
         let _guard = stop.clone().drop_guard();
         let counts = Counts::default();
         let dispatch = Dispatch::new(self.library.clone(), self.settings, counts.clone());
@@ -70,12 +70,12 @@ impl Coordinator {
             tracing::info!(%dashboard_address, "the dashboard is at http://{dashboard_address}/");
             tokio::spawn(dashboard::serve(listener, dashboard, stop.clone()));
         }
-        tracing::info!(%address, library = self.library.name(), "coordinator serves");
+        tracing::info!(%address, library = self.library.name(), "coordinator started");
         let watch = tokio::spawn(watch(self.library, self.exit_when_done, stop.clone()));
         let served = serve(self.listener, dispatch, &self.security, stop.clone()).await;
         stop.cancel();
         let watched = watch.await.expect("watching does not panic");
-        tracing::info!("coordinator ends");
+        tracing::info!("coordinator stopped");
         served?;
         Ok(watched?)
     }
@@ -86,6 +86,6 @@ impl Coordinator {
 fn raise_descriptors() {
     let Rlimit { maximum, .. } = getrlimit(Resource::Nofile);
     if let Err(error) = setrlimit(Resource::Nofile, Rlimit { current: maximum, maximum }) {
-        tracing::warn!("the number of open files stays bounded as it is: {error}");
+        tracing::warn!("the limit of open files cannot be raised: {error}");
     }
 }

@@ -1,4 +1,4 @@
-//! What a coordinator says of its campaigns, and when everything is done.
+//! Log of a coordinator's campaigns, and the end when all are done.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -7,20 +7,20 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tracktwin_library::{CampaignOverview, CampaignState, Library, LibraryError};
 
-/// How often the campaigns are looked at.
+/// Interval of checking the campaigns.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// Between two lines of the log about how far it is.
+/// Interval of the progress lines in the log.
 const TELL_EVERY: Duration = Duration::from_mins(1);
 
-/// A worker heard of within this many ms is there.
+/// A worker with a message in this time, in ms, is present.
 const PRESENT_MS: i64 = 60_000;
 
-/// Looks at the campaigns until told to stop, or until there is nothing left to do.
+/// Checks the campaigns until it is stopped, or until nothing is left to do.
 ///
 /// # Errors
-/// [`LibraryError::Closed`] or [`LibraryError::Lost`] when nothing can be written any more, which only a
-/// new start mends.
+/// [`LibraryError::Closed`] or [`LibraryError::Lost`] when nothing can be written any more; a
+/// restart is required.
 pub(super) async fn watch(
     library: Library,
     exit_when_done: bool,
@@ -44,7 +44,7 @@ pub(super) async fn watch(
                 }
             }
             Err(error) => {
-                tracing::error!(error = &error as &dyn Error, "the library does not answer");
+                tracing::error!(error = &error as &dyn Error, "the library does not respond");
             }
         }
         tokio::select! {
@@ -55,7 +55,7 @@ pub(super) async fn watch(
     Ok(())
 }
 
-/// What was said last, so that it is said once.
+/// What was logged last, to avoid repetition.
 #[derive(Default)]
 struct Logged {
     /// Of each campaign: cases given up, and whether it is done.
@@ -85,12 +85,12 @@ impl Logged {
         };
         if self.remaining.as_ref().is_none_or(is_news) {
             self.remaining = Some((remaining.cases, Instant::now()));
-            tracing::info!(cases = remaining.cases, "left to be simulated");
+            tracing::info!(cases = remaining.cases, "cases left to simulate");
         }
     }
 }
 
-/// What is left to be simulated.
+/// What is cases left to simulate.
 #[derive(Default)]
 struct Remaining {
     /// In campaigns that run.
@@ -111,11 +111,11 @@ impl Remaining {
     fn log_end(&self) {
         let Self { paused, audits, .. } = *self;
         if paused > 0 {
-            tracing::warn!(cases = paused, "done but for paused campaigns");
+            tracing::warn!(cases = paused, "done, except for paused campaigns");
         } else if audits > 0 {
-            tracing::warn!(audits, "done but for audits that no other worker is there for");
+            tracing::warn!(audits, "waiting: audits need a second worker");
         } else {
-            tracing::info!("everything is done");
+            tracing::info!("all campaigns are done");
         }
     }
 }

@@ -34,7 +34,7 @@ pub(crate) fn text(farm: &Farm, counts: &Counts) -> String {
     let depth: u64 = running.map(|it| u64::from(it.waiting) + u64::from(it.leased)).sum();
     let queue = Gauge::<i64>::default();
     queue.set(i64::try_from(depth).unwrap_or(i64::MAX));
-    registry.register("queue_depth", "Cases left in running campaigns: what to scale by", queue);
+    registry.register("queue_depth", "Cases left in running campaigns, for autoscaling", queue);
 
     let present = farm.workers.iter().filter(|worker| worker.is_present());
     let (workers, cores) =
@@ -44,8 +44,8 @@ pub(crate) fn text(farm: &Farm, counts: &Counts) -> String {
         gauge.set(value);
         gauge
     };
-    registry.register("workers", "Workers heard of within a minute", gauge(workers));
-    registry.register("worker_cores", "Cores of these", gauge(cores));
+    registry.register("workers", "Workers with a message in the last minute", gauge(workers));
+    registry.register("worker_cores", "Cores of these workers", gauge(cores));
 
     let mut text = String::new();
     encode(&mut text, &registry).expect("a string takes everything that is written to it");

@@ -22,7 +22,7 @@ const STYLE: &str = "
 form{display:inline}button,input{font:inherit;font-size:.88rem;padding:.15rem .6rem}.state{font-weight:600}.bad{color:var(--b);font-weight:600}
 ";
 
-/// Asks for the page's middle every other second; without it the page says how it was.
+/// Updates the main part of the page every two seconds; without the script the page is static.
 const SCRIPT: &str = "
 setInterval(async()=>{try{const answer=await fetch('view');if(answer.ok)document.querySelector('main').innerHTML=await answer.text();
 document.querySelector('footer').style.opacity=1}catch{document.querySelector('footer').style.opacity=.3}},2000)
@@ -58,7 +58,7 @@ fn summary(farm: &Farm) -> String {
     let rate: f64 = at_work.iter().map(|campaign| campaign.per_second).sum();
     let present = farm.workers.iter().filter(|worker| worker.is_present()).count();
     format!(
-        "Campaigns with work to do: {} of {}; workers: {present}; {} cases a second.",
+        "Campaigns with work to do: {} of {}; workers: {present}; {} cases per second.",
         at_work.len(),
         farm.campaigns.len(),
         significant(rate)
@@ -69,8 +69,8 @@ fn summary(farm: &Farm) -> String {
 const FEW: usize = 300;
 
 /// Below the pictures of a campaign.
-const CAPTION: &str = "Local wavelet power spectra of the newest cases, by their index, at the fastest \
-    speed; finished cases in the parameter space, and in orange those given up.";
+const CAPTION: &str = "Local wavelet power spectra of the newest cases, by case index, at the highest \
+     speed; finished cases in the parameter space; given-up cases in orange.";
 
 fn campaign_part(campaign: &FarmCampaign, may_control: bool) -> Markup {
     let FarmCampaign { waiting, leased, finished, failed, .. } = campaign;
@@ -130,7 +130,7 @@ fn buttons(campaign: &FarmCampaign) -> Markup {
 fn causes(causes: &[(String, u32)]) -> Markup {
     html! {
         div.scroll { table {
-            thead { tr { th.words { "given up because" } th { "cases" } } }
+            thead { tr { th.words { "reason of giving up" } th { "cases" } } }
             tbody { @for (cause, count) in causes { tr { td.words { (cause) } td { (count) } } } }
         } }
     }

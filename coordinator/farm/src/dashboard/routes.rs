@@ -22,7 +22,7 @@ use tracktwin_worker::BoundedListener;
 /// The cookie of those who have shown the token.
 const COOKIE: &str = "tracktwin";
 
-/// Nothing is loaded from elsewhere, and nobody may frame the page.
+/// Nothing is loaded from other sites, and the page cannot be framed.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
                       connect-src 'self'; form-action 'self'; frame-ancestors 'none'";
 
@@ -36,15 +36,15 @@ struct Inner {
     guard: Guard,
     /// What the cookie must hold: a hash of the token, so that the token itself is not kept.
     key: Option<String>,
-    /// Whether whoever reaches the farm's ports may do what there is to do.
+    /// Whether every caller may use the controls.
     open: bool,
     /// Whether only this machine can reach the port.
     loopback: bool,
 }
 
 impl Dashboard {
-    /// Pages about a library. Only who has shown the token may press buttons; without one nobody, where
-    /// workers must show certificates, for no page can ask for those.
+    /// Pages of a library. The controls require the token; if only worker certificates are required
+    /// and there is no token, the controls are disabled.
     pub fn new(library: Library, counts: Counts, security: &Security, address: SocketAddr) -> Self {
         let token = security.token.as_deref();
         let open = token.is_none() && security.client_ca_pem.is_none();
@@ -57,7 +57,7 @@ impl Dashboard {
 
     /// Whether the caller may press buttons: by the cookie, or by the token itself.
     ///
-    /// Where nothing is demanded, nobody else can reach the port, or the network was said to be trusted.
+    /// Without a token or certificates the port is local, or the network is trusted.
     fn admits(&self, headers: &HeaderMap) -> bool {
         let Some(key) = &self.0.key else { return self.0.open };
         let authorization = headers.get(header::AUTHORIZATION).map(HeaderValue::as_bytes);
@@ -70,7 +70,7 @@ impl Dashboard {
     }
 }
 
-/// Serves pages on a port until told to stop.
+/// Serves pages on a port until it is stopped.
 pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: CancellationToken) {
     let routes = Router::new()
         .route("/", get(page))
@@ -84,7 +84,7 @@ pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: Cancellati
     let served = axum::serve(BoundedListener::new(listener), routes)
         .with_graceful_shutdown(stop.cancelled_owned());
     if let Err(error) = served.await {
-        tracing::error!("the dashboard is no longer served: {error}");
+        tracing::error!("the dashboard has stopped: {error}");
     }
 }
 
@@ -105,13 +105,13 @@ async fn same_origin(
     if headers.get(header::ORIGIN).is_some_and(|origin| !ours(origin)) {
         return (StatusCode::FORBIDDEN, "from another site\n").into_response();
     }
-    // A name that leads here is somebody else's, unless it says that it is this machine.
+    // A host name other than this machine's may belong to an attacker (DNS rebinding).
     let local = |host: &str| {
         let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
         name == "localhost" || name.trim_matches(['[', ']']).parse::<std::net::IpAddr>().is_ok()
     };
     if dashboard.0.loopback && !local(host) {
-        return (StatusCode::FORBIDDEN, "not this machine's name\n").into_response();
+        return (StatusCode::FORBIDDEN, "not a name of this machine\n").into_response();
     }
     let may_control = MayControl(dashboard.admits(headers));
     request.extensions_mut().insert(may_control);
@@ -153,7 +153,7 @@ async fn login(State(dashboard): State<Dashboard>, Form(login): Form<Login>) -> 
     let key =
         dashboard.0.key.as_ref().filter(|_| dashboard.0.guard.admits(Some(header.as_bytes())));
     let Some(key) = key else {
-        tracing::warn!("a wrong token was shown to the dashboard");
+        tracing::warn!("the dashboard was given a wrong token");
         return (StatusCode::FORBIDDEN, "the token is wrong\n").into_response();
     };
     let cookie = format!("{COOKIE}={key}; HttpOnly; SameSite=Strict; Path=/");
@@ -172,16 +172,16 @@ async fn control(
     Form(Chosen { campaign }): Form<Chosen>,
 ) -> Result<Response, Failed> {
     if !may_control {
-        return Ok((StatusCode::FORBIDDEN, "show the token first\n").into_response());
+        return Ok((StatusCode::FORBIDDEN, "enter the token first\n").into_response());
     }
     let library = &dashboard.0.library;
     match action.as_str() {
         "pause" => library.pause(&campaign).await?,
         "resume" => library.resume(&campaign).await?,
         "retry" => library.retry(&campaign, Retry::Failed).await.map(drop)?,
-        _ => return Ok((StatusCode::NOT_FOUND, "no such action\n").into_response()),
+        _ => return Ok((StatusCode::NOT_FOUND, "unknown action\n").into_response()),
     }
-    tracing::info!(campaign, action, "asked for at the dashboard");
+    tracing::info!(campaign, action, "requested on the dashboard");
     Ok(Redirect::to("/").into_response())
 }
 

@@ -11,22 +11,22 @@ pub struct Farm {
     pub at: String,
     /// The campaigns, in the order they are worked on.
     pub campaigns: Vec<FarmCampaign>,
-    /// The workers, those heard of last first.
+    /// The workers, by time of their last message.
     pub workers: Vec<FarmWorker>,
     /// Whether the reader may press buttons.
     pub may_control: bool,
 }
 
-/// A campaign as it stands.
+/// State of a campaign.
 #[derive(Clone, Debug, Default)]
 pub struct FarmCampaign {
     /// Its id.
     pub id: String,
     /// `running`, `paused` or `cancelled`.
     pub state: String,
-    /// Cases of the largest are handed out first.
+    /// Cases of the highest priority are leased first.
     pub priority: i64,
-    /// Cases nobody works on.
+    /// Waiting cases.
     pub waiting: u32,
     /// Cases that workers hold.
     pub leased: u32,
@@ -52,7 +52,7 @@ pub struct FarmCampaign {
     pub given_up: Vec<ParameterSet>,
 }
 
-/// A worker as it was last heard of.
+/// A worker at its last message.
 #[derive(Clone, Debug, Default)]
 pub struct FarmWorker {
     /// Its name.
@@ -67,15 +67,15 @@ pub struct FarmWorker {
     pub failed: u64,
     /// Mean computing time of a case in s.
     pub case_s: Option<f64>,
-    /// For how long it was not heard of, in s.
+    /// Time since its last message in s.
     pub silent_s: f64,
     /// Why it gets no cases, if so.
     pub aside: Option<String>,
 }
 
 impl FarmWorker {
-    /// Whether it was heard of within a minute. Idle ones of a large farm, and those put aside for a
-    /// while, ask less often than leases are renewed.
+    /// Whether its last message is less than a minute old. Idle and suspended workers ask less
+    /// often than leases are renewed.
     pub fn is_present(&self) -> bool {
         self.silent_s < 60.0
     }
@@ -92,17 +92,17 @@ impl FarmCampaign {
         self.waiting + self.leased == 0
     }
 
-    /// How it stands, for people: its state, or that it is done.
+    /// Text of its state, or that it is done.
     pub fn state_text(&self) -> &str {
         if self.is_done() { "done" } else { &self.state }
     }
 
-    /// Whether its cases are handed out and some are left.
+    /// Whether it is running and has cases left.
     pub fn is_at_work(&self) -> bool {
         self.state == "running" && !self.is_done()
     }
 
-    /// How long the rest takes at the present rate, in s; none where nothing is handed out.
+    /// How long the rest takes at the present rate, in s; none where no cases are leased.
     pub fn eta_s(&self) -> Option<f64> {
         let left = f64::from(self.waiting + self.leased);
         (self.is_at_work() && self.per_second > 0.0).then(|| left / self.per_second)
@@ -113,11 +113,11 @@ impl FarmCampaign {
         match self.eta_s() {
             Some(eta_s) => format!("{} left", duration(eta_s)),
             None if self.is_done() && self.failed > 0 => {
-                "done but for what was given up".to_owned()
+                "done, except for given-up cases".to_owned()
             }
             None if self.is_done() => "nothing left to do".to_owned(),
-            None if !self.is_at_work() => "nothing is handed out".to_owned(),
-            None => "rate not known yet".to_owned(),
+            None if !self.is_at_work() => "no cases are leased".to_owned(),
+            None => "rate unknown".to_owned(),
         }
     }
 }
@@ -149,11 +149,11 @@ mod tests {
         };
         assert_eq!(running.left(), "35 s left");
         let paused = FarmCampaign { state: "paused".to_owned(), ..running };
-        assert_eq!((paused.eta_s(), paused.left().as_str()), (None, "nothing is handed out"));
+        assert_eq!((paused.eta_s(), paused.left().as_str()), (None, "no cases are leased"));
         let done = FarmCampaign { waiting: 0, leased: 0, failed: 1, ..paused };
         assert_eq!(
             (done.state_text(), done.left().as_str()),
-            ("done", "done but for what was given up")
+            ("done", "done, except for given-up cases")
         );
     }
 

@@ -33,7 +33,7 @@ pub enum Detail {
 pub async fn farm(library: &Library, detail: Detail) -> Result<Farm, LibraryError> {
     let now_unix_ms = library.now_unix_ms();
     let mut overview = library.overview().await?;
-    // As they are handed out: the most urgent first, the oldest among equals.
+    // In the order of leasing: highest priority first, the oldest among equals.
     overview.sort_by_key(|campaign| std::cmp::Reverse(campaign.priority));
     let mut campaigns = Vec::with_capacity(overview.len());
     for overview in overview {

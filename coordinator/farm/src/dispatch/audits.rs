@@ -19,7 +19,7 @@ use tracktwin_signal::Features;
 /// The lease number of audited cases: the library counts real ones from 1.
 const EPOCH: u32 = 0;
 
-/// What a lease is of, as its number says.
+/// Kind of a lease, from its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LeaseKind {
     /// A case that waited.
@@ -139,9 +139,10 @@ impl Audits {
         is_time
     }
 
-    /// Takes what an auditor found. Answers whether it was asked, and who was wrong, if somebody.
+    /// Takes an auditor's result. Returns whether it was expected, and the worker that was wrong,
+    /// if any.
     ///
-    /// It is gone through with even if nobody waits for the answer any more.
+    /// It is completed even if the caller is gone.
     pub(crate) async fn report(
         self: &Arc<Self>,
         worker: &str,
@@ -194,7 +195,9 @@ impl Audits {
             return Ok(Some(AuditOutcome::Agreement));
         }
         let Some(wrong) = wrong else {
-            tracing::error!("{reason}; this machine could not simulate it, so nobody is blamed");
+            tracing::error!(
+                "{reason}; this machine could not simulate the case, so no worker is quarantined"
+            );
             return Ok(Some(AuditOutcome::Unjudged));
         };
         tracing::error!(worker = wrong, "quarantined: {reason}");
@@ -216,7 +219,7 @@ impl Audits {
 pub(crate) enum AuditOutcome {
     /// Both agree, or it is known already.
     Agreement,
-    /// They differ, and nobody knows who is wrong.
+    /// They differ, and it is unknown which worker is wrong.
     Unjudged,
     /// A worker is wrong, and was put into quarantine.
     Wrong {

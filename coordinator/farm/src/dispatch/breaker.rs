@@ -3,13 +3,13 @@
 use std::time::Duration;
 use tokio::time::Instant;
 
-/// Failures in a row after which a worker is put aside: one group of cases.
+/// Failures in a row after which a worker is suspended: one group of cases.
 const FAILURES_IN_A_ROW: u32 = 8;
 
-/// How long it is put aside the first time; twice as long each further time.
+/// Length of the first suspension; each further one is twice as long.
 const FIRST: Duration = Duration::from_secs(15);
 
-/// The longest: a machine that was mended is of use again within this.
+/// The longest suspension: a repaired machine works again within this time.
 const LONGEST: Duration = Duration::from_mins(10);
 
 /// The circuit breaker of one worker.
@@ -34,7 +34,7 @@ impl Breaker {
 
     /// Whether it has failed too often in a row.
     pub const fn is_failing(&self) -> bool {
-        // After it was put aside one further failure suffices.
+        // After a suspension one further failure suffices.
         self.failures_in_a_row >= FAILURES_IN_A_ROW
             || (self.openings > 0 && self.failures_in_a_row > 0)
     }
@@ -53,7 +53,7 @@ impl Breaker {
         (!left.is_zero()).then_some(left)
     }
 
-    /// Whether it was put aside and has not yet shown that it works again.
+    /// Whether it was suspended and has not finished a case since.
     pub const fn is_on_trial(&self) -> bool {
         self.openings > 0
     }

@@ -1,4 +1,4 @@
-//! The campaigns whose cases are handed out, as messages need them.
+//! The campaigns being leased, prepared for messages.
 
 use super::LeaseSizer;
 use parking_lot::Mutex;
@@ -49,7 +49,7 @@ impl Served {
         durations_s.into_iter().for_each(|case_s| lease_sizer.measured(case_s));
     }
 
-    /// Cases of a lease where so many cores are at work.
+    /// Cases of a lease for this number of working cores.
     fn cases_per_lease(&self, cores: u32) -> u32 {
         self.lease_sizer.lock().cases_per_lease(cores)
     }
@@ -78,7 +78,7 @@ impl Campaigns {
         Ok(known.entry(id.to_owned()).or_insert(served).clone())
     }
 
-    /// Remembers whose cases were handed out last: the next will most likely be of the same.
+    /// Caches the campaign leased last: the next lease is most likely of the same one.
     pub(crate) fn leased(&self, served: &Arc<Served>) {
         *self.latest.lock() = Some(served.clone());
     }

@@ -47,18 +47,22 @@ impl Default for Counts {
 impl Counts {
     /// Makes the counts known to those who ask.
     pub fn register(&self, to: &mut Registry) {
-        to.register("cases_leased", "Cases handed to workers", self.leased.clone());
+        to.register("cases_leased", "Cases leased to workers", self.leased.clone());
         to.register("reports_stored", "Reports of cases stored", self.stored.clone());
-        to.register("reports_duplicate", "Results that were there", self.duplicates.clone());
+        to.register(
+            "reports_duplicate",
+            "Results that were already stored",
+            self.duplicates.clone(),
+        );
         to.register("reports_late", "Failures of ended leases", self.late.clone());
         to.register("reports_refused", "Reports of unknown cases", self.refused.clone());
         to.register("workers_registered", "Registrations", self.registered.clone());
         to.register("workers_unfit", "Registrations refused", self.incompatible.clone());
-        to.register("messages_malformed", "Messages refused", self.malformed.clone());
-        to.register("workers_put_aside", "Workers put aside for failing", self.suspended.clone());
+        to.register("messages_malformed", "Malformed messages refused", self.malformed.clone());
+        to.register("workers_put_aside", "Workers suspended for failures", self.suspended.clone());
         to.register("cases_audited", "Cases simulated a second time", self.audited.clone());
         to.register("cases_differed", "Audited cases that differed", self.differed.clone());
-        to.register("lease_seconds", "Time to answer a lease", self.lease_s.clone());
-        to.register("report_seconds", "Time to answer a report", self.report_s.clone());
+        to.register("lease_seconds", "Time to respond to a lease request", self.lease_s.clone());
+        to.register("report_seconds", "Time to respond to a report", self.report_s.clone());
     }
 }

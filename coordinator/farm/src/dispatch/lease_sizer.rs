@@ -16,7 +16,7 @@ const LEASES_A_SECOND: f64 = 100.0;
 /// Computing time that a lease holds at most, in s: what the last cores may be waited for.
 const LEASE_WORK_MAX_S: f64 = 30.0;
 
-/// Most groups in a lease, whatever they take: what a lost worker may hold up.
+/// Upper limit of groups in a lease, which bounds the loss with a worker.
 const GROUPS_MAX: f64 = 64.0;
 
 /// Weight of the newest measurement in the running mean.
@@ -35,7 +35,7 @@ impl LeaseSizer {
         self.case_s = Some(mean + NEWEST * (case_s - mean));
     }
 
-    /// Cases of a lease where so many cores are at work: whole groups, at least one.
+    /// Cases of a lease for this number of working cores: whole groups, at least one.
     pub fn cases_per_lease(&self, cores: u32) -> u32 {
         let work_s = (f64::from(cores) / LEASES_A_SECOND).clamp(LEASE_WORK_S, LEASE_WORK_MAX_S);
         let groups = self.case_s.map_or(1.0, |case_s| work_s / (case_s * GROUP as f64));

@@ -6,7 +6,7 @@ use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
 use tracktwin_library::{Held, LibraryError, Verdict};
 use tracktwin_protocol::{BadMessage, PROTOCOL_VERSION, Registration, farm, held_from_messages};
 
-/// Why a worker is of no use here, if so, and what mends it.
+/// Why a worker is incompatible with this coordinator, if so, with the remedy.
 pub(crate) fn incompatibility(registration: &Registration) -> Option<String> {
     let Registration { worker, code_version, model_hash, protocol_version, .. } = registration;
     if *protocol_version != PROTOCOL_VERSION {
@@ -16,15 +16,15 @@ pub(crate) fn incompatibility(registration: &Registration) -> Option<String> {
             "install the coordinator's version on the worker, or update the coordinator"
         };
         return Some(format!(
-            "worker {worker} (version {code_version}) speaks protocol {protocol_version}, this \
-             coordinator (version {CODE_VERSION}) speaks {PROTOCOL_VERSION}: {remedy}"
+            "worker {worker} (version {code_version}) uses protocol {protocol_version}, this \
+                 coordinator (version {CODE_VERSION}) uses {PROTOCOL_VERSION}: {remedy}"
         ));
     }
     (model_hash != MODEL_HASH).then(|| {
         format!(
             "worker {worker} simulates other physics than this coordinator: its model hash is \
-             {model_hash} (version {code_version}), here it is {MODEL_HASH} (version \
-             {CODE_VERSION}); install the coordinator's version"
+                 {model_hash} (version {code_version}), the coordinator's is {MODEL_HASH} (version \
+                 {CODE_VERSION}); install the coordinator's version"
         )
     })
 }
@@ -49,6 +49,6 @@ pub(crate) fn malformed(error: &BadMessage) -> Status {
 
 /// The worker asks again; what is wrong with the library is the coordinator's to say.
 pub(crate) fn unavailable(error: &LibraryError) -> Status {
-    tracing::error!(error = error as &dyn Error, "the library does not do what is asked");
+    tracing::error!(error = error as &dyn Error, "library request failed");
     Status::unavailable(error.to_string())
 }

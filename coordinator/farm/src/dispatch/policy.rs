@@ -1,4 +1,4 @@
-//! After how many attempts without result a case is given up, or handed out alone.
+//! Numbers of attempts without result after which a case is given up, or leased alone.
 
 use tracktwin_library::AttemptsMax;
 
@@ -10,14 +10,14 @@ pub const FAILURES_MAX: u32 = 3;
 
 /// Attempts after which a case that loses its workers is given up.
 ///
-/// A lost worker takes its whole lease with it, and where a scheduler takes nodes away every few
-/// seconds an innocent case loses one attempt in two. Twenty in a row are then one in a million, and
-/// a case that kills its workers stops after so many.
+/// A lost worker loses its whole lease. If a scheduler removes machines every few seconds, a sound
+/// case loses one attempt in two; twenty in a row then have a probability of one in a million, and
+/// a case that kills its workers stops after twenty.
 pub const LOSSES_MAX: u32 = 20;
 
-/// Attempts without result after which a case is handed out alone, so that it takes no other case
-/// with it if it is what ends its workers, and is soon done if it isn't.
+/// Attempts without result after which a case is leased alone: if it kills its workers, no other
+/// case is lost; otherwise it is soon done.
 pub const SUSPECT_AFTER: u32 = 4;
 
-/// Both, as the library is told them.
+/// Both, as an argument for the library.
 pub const ATTEMPTS_MAX: AttemptsMax = AttemptsMax { failed: FAILURES_MAX, lost: LOSSES_MAX };

@@ -7,13 +7,13 @@ use std::time::Duration;
 use tokio::time::Instant;
 use tracktwin_protocol::Registration;
 
-/// A worker that was not heard of for so long is forgotten; if it comes back, it registers anew.
+/// A worker without a message for this time is forgotten; it must register again.
 const FORGET_AFTER: Duration = Duration::from_mins(10);
 
-/// One heard of within this counts as present.
+/// A worker with a message within this time is present.
 const PRESENT: Duration = Duration::from_mins(1);
 
-/// How often the library is told that a worker is alive.
+/// Interval of recording in the library that a worker is alive.
 const NOTE_EVERY: Duration = Duration::from_secs(5);
 
 /// Workers known at a time: what strangers with the token may make a coordinator remember.
@@ -26,14 +26,14 @@ pub(crate) struct Roster(Mutex<HashMap<String, Worker>>);
 struct Worker {
     registration: Registration,
     heard_of: Instant,
-    /// When the library was told last.
+    /// Time of the last record in the library.
     noted: Instant,
     /// Why it is in quarantine.
     quarantine: Option<String>,
     breaker: Breaker,
 }
 
-/// What speaks for or against giving a worker cases.
+/// Whether a worker may get cases.
 #[derive(Clone, Debug)]
 pub(crate) struct WorkerEligibility {
     /// Version of its program.
@@ -44,7 +44,7 @@ pub(crate) struct WorkerEligibility {
     pub(crate) exclusion: Option<(Duration, String)>,
     /// Whether it gets one only, to show that it works again.
     pub(crate) on_trial: bool,
-    /// Whether the library is to be told that it is alive.
+    /// Whether the library must record that it is alive.
     pub(crate) to_be_noted: bool,
 }
 
@@ -53,7 +53,7 @@ pub(crate) struct WorkerEligibility {
 pub(crate) struct Full;
 
 impl Roster {
-    /// Takes in a worker, or takes it in anew.
+    /// Adds a worker, or registers it again.
     pub(crate) fn add(&self, registration: Registration) -> Result<(), Full> {
         let mut workers = self.0.lock();
         workers.retain(|_, worker| worker.heard_of.elapsed() < FORGET_AFTER);
@@ -69,7 +69,7 @@ impl Roster {
         Ok(())
     }
 
-    /// How a worker stands; nothing if it has not registered.
+    /// Eligibility of a worker; `None` if it has not registered.
     pub(crate) fn eligibility(&self, worker: &str) -> Option<WorkerEligibility> {
         let mut workers = self.0.lock();
         let worker = workers.get_mut(worker)?;
@@ -83,7 +83,7 @@ impl Roster {
         let exclusion = quarantine.map(|reason| (PRESENT, format!("in quarantine: {reason}")));
         let failing = || {
             let left = worker.breaker.open_for(now)?;
-            Some((left, "put aside: it fails where other workers don't".to_owned()))
+            Some((left, "suspended: its cases fail, those of other workers do not".to_owned()))
         };
         Some(WorkerEligibility {
             code_version: worker.registration.code_version.clone(),
@@ -101,7 +101,7 @@ impl Roster {
         }
     }
 
-    /// Notes how a worker's cases ended; says whether it was put aside for it.
+    /// Records the outcomes of a worker's cases; returns whether it was suspended.
     ///
     /// Only where others succeed: where everybody fails, the cases are at fault.
     pub(crate) fn reported(&self, worker: &str, failed: &[bool]) -> bool {

@@ -1,4 +1,4 @@
-//! What a dispatch is told at its start.
+//! Settings of a dispatch.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -33,7 +33,7 @@ impl Timing {
     }
 }
 
-/// The part of a library that is handed out.
+/// The part of a library that is leased.
 #[derive(Clone, Debug)]
 pub struct Scope {
     /// This campaign only.
@@ -42,16 +42,16 @@ pub struct Scope {
     pub cases: u32,
 }
 
-/// What a dispatch is told at its start.
+/// Settings of a dispatch.
 #[derive(Clone)]
 pub struct Settings {
     /// How long leases last.
     pub timing: Timing,
-    /// What is handed out; everything that runs if none.
+    /// What is leased; all running campaigns if `None`.
     pub scope: Option<Scope>,
     /// Share of the cases that are simulated again by another worker, 0 to 1.
     pub audit_share: f64,
-    /// Whether a worker is put aside that fails where others don't.
+    /// Whether a worker is suspended if its cases fail and those of others do not.
     pub suspends_failing: bool,
     /// What decides between two workers that differ.
     pub prepare: Prepare,

@@ -28,34 +28,35 @@ const TOKEN_BYTES: usize = 32;
 #[derive(Debug, thiserror::Error)]
 pub enum CertificatesError {
     /// The folder, or a file in it, can't be read.
-    #[error("{path}: cannot be read: {source}")]
+    #[error("cannot read {path}: {source}")]
     File {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// A file can't be written, or stands in the way.
+    /// A file cannot be written, or exists already.
     #[error("{0}")]
     Files(#[from] FilesError),
     /// A host that workers can't call.
     #[error(
-        "{host:?} is no host; write a name such as head.cluster or an address such as 10.0.0.1"
+        "{host:?} is not a host; write a name such as head.cluster or an address such as \
+             10.0.0.1"
     )]
     Host {
         /// What was given.
         host: String,
     },
-    /// A name that certificates can't hold, or a key that is none.
-    #[error("no certificate can be made of it: {0}")]
+    /// A name that is not allowed in certificates, or an invalid key.
+    #[error("cannot create a certificate: {0}")]
     Certificate(#[from] rcgen::Error),
 }
 
 /// Writes a farm's authority, certificates and token into a folder.
 ///
-/// An authority and a token that are there stay, so that certificates can be renewed, or made for
-/// further hosts, without touching the others' machines. Files that are not of this program are
-/// replaced with `force` only.
+/// An existing authority and token are kept, so that certificates can be renewed, or created for
+/// further hosts, without changes on the other machines. Files of other programs are replaced with
+/// `force` only.
 ///
 /// | file | whose |
 /// |---|---|

@@ -33,9 +33,9 @@ impl Interceptor for Guard {
             return Ok(request);
         }
         let peer = caller.map_or_else(|| "unknown".to_owned(), |caller| caller.address.to_string());
-        let fault = if header.is_some() { "the token is wrong" } else { "no token was shown" };
+        let fault = if header.is_some() { "the token is wrong" } else { "the token is missing" };
         tracing::warn!(peer, "call refused: {fault}");
-        Err(Status::permission_denied(format!("{fault}; give the worker --token-file")))
+        Err(Status::permission_denied(format!("{fault}; use --token-file with the worker")))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Lets connections in, or turns them away and says why in the log.
+//! Accepts or refuses connections, with the reason in the log.
 
 use super::peer::{Peer, Stream};
 use super::settings::HTTP2;
@@ -18,33 +18,33 @@ const CONNECTIONS_MAX: usize = 4096;
 /// Connections that were let in and wait for the service.
 const WAITING_MAX: usize = 64;
 
-/// How long a caller may take to say what it wants; TLS over a slow line takes a second.
+/// Time limit of the connection preface; TLS over a slow line takes a second.
 const PREFACE_TIME: Duration = Duration::from_secs(10);
 
-/// Pause after the system had no connection for us: descriptors come back within moments.
+/// Pause after a failed accept: file descriptors become free within moments.
 const SYSTEM_PAUSE: Duration = Duration::from_millis(100);
 
-/// What every HTTP/2 connection begins with (RFC 9113, 3.4).
+/// Preface of every HTTP/2 connection (RFC 9113, 3.4).
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
-/// Why a caller is turned away.
+/// Reasons of refusing a connection.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
-    #[error("said nothing for {} s", PREFACE_TIME.as_secs())]
+    #[error("no data for {} s", PREFACE_TIME.as_secs())]
     Silent,
-    #[error("spoke neither gRPC nor anything else that is served here")]
+    #[error("unknown protocol; gRPC is expected")]
     UnknownProtocol,
     #[error("TLS: {0}")]
     Tls(std::io::Error),
     #[error("TLS without HTTP/2")]
     NoHttp2,
-    #[error("went away: {0}")]
+    #[error("connection lost: {0}")]
     Gone(#[from] std::io::Error),
 }
 
-/// The connections of a port, as they are let in. It ends when the stream is dropped.
+/// The accepted connections of a port. It ends when the stream is dropped.
 ///
-/// Each greets in a task of its own, so that a slow or silent caller holds up nobody.
+/// Each preface is read in a separate task, so that a slow or silent caller delays no other.
 pub fn accept(
     listener: TcpListener,
     tls: Option<TlsAcceptor>,
@@ -59,7 +59,7 @@ pub fn accept(
                 accepted = listener.accept() => match accepted {
                     Ok(accepted) => accepted,
                     Err(error) => {
-                        tracing::warn!("a connection could not be taken: {error}");
+                        tracing::warn!("cannot accept a connection: {error}");
                         tokio::time::sleep(SYSTEM_PAUSE).await;
                         continue;
                     }
@@ -118,7 +118,7 @@ mod tests {
     use tokio::io::AsyncWriteExt;
     use tokio_stream::StreamExt;
 
-    /// A port with a caller on it that has said `begin`.
+    /// A port with a caller that has sent `begin`.
     async fn called(begin: &[u8]) -> (ReceiverStream<std::io::Result<Peer>>, TcpStream) {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let mut caller = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();

@@ -25,14 +25,14 @@ pub struct Security {
     pub insecure: bool,
 }
 
-/// Why a port is not opened; each says how to mend it.
+/// Reasons of not opening a port, each with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum SecurityError {
     /// A port that others can reach, in plain text.
     #[error(
-        "{address} can be reached by other machines and would speak plain text; give it a \
-         certificate (`tracktwin certs` makes one; --tls-cert, --tls-key), or --insecure where the \
-         network itself is trusted"
+        "{address} is reachable from other machines, but has no certificate; create one \
+             with `tracktwin certs` and use --tls-cert and --tls-key, or use --insecure on a \
+             trusted network"
     )]
     PlainText {
         /// The address.
@@ -40,16 +40,16 @@ pub enum SecurityError {
     },
     /// A port that others can reach, and nothing that they must show.
     #[error(
-        "{address} can be reached by other machines and would serve anybody; demand a token \
-         (--token-file) or workers' certificates (--tls-client-ca), or --insecure where the \
-         network itself is trusted"
+        "{address} is reachable from other machines, but requires no token; use \
+             --token-file or worker certificates (--tls-client-ca), or --insecure on a trusted \
+             network"
     )]
     Anybody {
         /// The address.
         address: SocketAddr,
     },
     /// A PEM file that holds something else.
-    #[error("{what}: not the PEM file that it should be: {source}")]
+    #[error("{what}: not a valid PEM file: {source}")]
     Pem {
         /// What it should be.
         what: &'static str,
@@ -68,7 +68,7 @@ impl Security {
     /// Whether a port at this address is safe.
     ///
     /// # Errors
-    /// [`SecurityError`] says what is missing.
+    /// [`SecurityError`] states what is missing.
     pub fn check(&self, address: SocketAddr) -> Result<(), SecurityError> {
         if address.ip().is_loopback() || self.insecure {
             return Ok(());

@@ -1,4 +1,4 @@
-//! A worker that computes wrongly is found out, and one that fails is put aside.
+//! A worker that computes wrong results is quarantined; one that fails is suspended.
 
 use crate::support::{
     CORES, Coordinator, StandIn, coordinator_with, lease, library, registered, registration,
@@ -187,7 +187,7 @@ async fn a_worker_that_fails_where_another_does_not_is_put_aside() {
         client.report(request).await.unwrap();
     }
     let answer = lease(&mut client, "bad").await;
-    assert!(answer.cases.is_empty() && answer.reason.contains("put aside"), "{answer:?}");
+    assert!(answer.cases.is_empty() && answer.reason.contains("suspended"), "{answer:?}");
     assert!(answer.retry_after_s > 10.0);
     assert_eq!(lease(&mut client, "good").await.cases.len(), 4);
 }

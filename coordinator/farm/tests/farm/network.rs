@@ -262,7 +262,7 @@ fn dial(endpoint: &Endpoint) -> Channel {
     }))
 }
 
-/// Cuts, delays, mends or crashes something, now and then.
+/// Cuts, delays, repairs or crashes something at random.
 fn inject_fault(sim: &mut turmoil::Sim<'_>, chance: &Chance) {
     let worker = WORKERS[chance.below(3) as usize];
     match chance.below(12) {

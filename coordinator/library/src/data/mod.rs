@@ -1,4 +1,4 @@
-//! The library as plain tables: asked in SQL, read out, written in, looked over.
+//! The library as plain tables: SQL queries, reading, writing, verification.
 //!
 //! Owns what is the same for every table; knows no file format and compares nothing but what the
 //! schema itself promises.

@@ -31,12 +31,11 @@ pub trait Answer {
 }
 
 impl Library {
-    /// Asks one statement of the user's, on a connection of its own that the database lets read
-    /// only.
+    /// Runs one statement of the user on a separate read-only connection.
     ///
     /// # Errors
     /// [`LibraryError::OnlyReads`] for a statement that would write, [`LibraryError::BadQuery`] for
-    /// one that the database does not understand; or what `answer` says.
+    /// one that the database rejects; or the error of `answer`.
     pub async fn query<A: Answer>(&self, text: &str, answer: &mut A) -> Result<(), A::Error> {
         match self.target() {
             Target::Sqlite(path) => sqlite(path, text, answer).await,
@@ -96,8 +95,8 @@ async fn postgres<A: Answer>(
     Ok(())
 }
 
-/// The same question with times, decimal numbers, arrays of integers and whatever else no cell is made for as texts,
-/// as the server writes them; none where there are no such columns.
+/// The same statement with columns of types without a cell (times, decimal numbers, arrays of
+/// integers) cast to text; `None` if there are no such columns.
 fn with_texts(text: &str, columns: &[PgColumn]) -> Option<String> {
     let is_cell = |column: &PgColumn| decode::is_postgres_cell(column.type_info().name());
     if columns.iter().all(is_cell) {

@@ -1,8 +1,8 @@
 //! Whether a text is one statement that asks.
 //!
-//! A file that is opened for reading can't be changed, nor can a database in a transaction that reads,
-//! whatever the statement. But `vacuum into` and `copy` write other files, and `SQLite` runs statements one
-//! after the other where several are given.
+//! No statement can change a file opened read-only, or a database in a read-only transaction. But
+//! `vacuum into` and `copy` write other files, and `SQLite` runs several statements one after the
+//! other.
 
 use crate::LibraryError;
 use crate::engine::Dialect;
@@ -21,11 +21,11 @@ pub(super) fn check(text: &str, dialect: Dialect) -> Result<(), LibraryError> {
     let refused = |reason: &str| LibraryError::BadQuery { reason: reason.to_owned() };
     // PostgreSQL takes one only, and has texts between dollars that are not understood here.
     if bare.contains(';') && matches!(dialect, Dialect::Sqlite) {
-        return Err(refused("one statement at a time"));
+        return Err(refused("more than one statement; give one"));
     }
     let bare = bare.trim_start_matches(|it: char| it == '(' || it.is_whitespace());
     if bare.is_empty() {
-        return Err(refused("there is no statement"));
+        return Err(refused("the statement is empty"));
     }
     let word: String = bare.chars().take_while(char::is_ascii_alphabetic).collect();
     let more: &[&str] = match dialect {
@@ -39,7 +39,7 @@ pub(super) fn check(text: &str, dialect: Dialect) -> Result<(), LibraryError> {
     }
 }
 
-/// The text without what stands in quotes and in remarks.
+/// The text without quoted parts and comments.
 fn bare(text: &str, dialect: Dialect) -> String {
     let mut bare = String::new();
     let mut rest = text;

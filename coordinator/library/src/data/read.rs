@@ -10,8 +10,8 @@ impl Library {
     /// Hands the rows of a table to `take`, by its key, at most `rows_max` at a time.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library cannot be read, or results do not have their checksum; or what `take`
-    /// says.
+    /// [`LibraryError`] when the library cannot be read, or results do not match their checksum; or
+    /// the error of `take`.
     pub async fn read_table<E: From<LibraryError>>(
         &self,
         table: &Table,
@@ -27,7 +27,8 @@ impl Library {
         Ok(attestation.end()?)
     }
 
-    /// Hands the rows that a statement answers to `take`; tells failing to read from what `take` says.
+    /// Passes the rows of a statement to `take`; distinguishes errors of reading from errors of
+    /// `take`.
     pub(super) async fn read<E>(
         &self,
         table: &Table,

@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Rows or cases that are asked for together; what cannot be read is asked for in halves.
 const TOGETHER: i64 = 1024;
 
-/// The largest index that is looked for where nothing tells how many cases there are.
+/// The largest index searched when the number of cases is unknown.
 const INDICES_MAX: i64 = 1 << 20;
 
 /// What could not be read of a table.
@@ -16,7 +16,7 @@ const INDICES_MAX: i64 = 1 << 20;
 pub struct Lost {
     /// How many rows at most, if that is known; of cases, each counts as one.
     pub rows: Option<u64>,
-    /// What the database said at the first of them.
+    /// Error of the database at the first of them.
     pub reason: String,
 }
 
@@ -31,11 +31,11 @@ enum Way {
 }
 
 impl Library {
-    /// As [`Library::read_table`], but goes on behind what cannot be read, and answers what that was. Rows may
+    /// As [`Library::read_table`], but skips unreadable rows and returns what was skipped. Rows may
     /// then come twice and in any order.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library does not answer; or what `take` says.
+    /// [`LibraryError`] when the library does not respond; or the error of `take`.
     pub async fn read_what_is_whole<E: From<LibraryError>>(
         &self,
         table: &Table,

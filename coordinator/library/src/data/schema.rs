@@ -33,7 +33,7 @@ pub struct Table {
     pub name: &'static str,
     /// Its columns.
     pub columns: &'static [Column],
-    /// The columns that tell its rows apart.
+    /// The columns of its key.
     pub key: &'static [&'static str],
 }
 

@@ -176,8 +176,8 @@ impl Library {
         Ok(())
     }
 
-    /// Says of all cases whose results are here that they are finished, as [`Self::write_table`] does of
-    /// those whose results it adds; that a copy was cut off between the passes of a case is mended so.
+    /// Marks all cases with complete results as finished, as [`Self::write_table`] does for the
+    /// results that it adds; this repairs a copy that was interrupted between the passes of a case.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -198,7 +198,7 @@ fn refuse_other_parameters(table: &Table, rows: &[Vec<Cell>]) -> Result<(), Libr
             continue;
         };
         if row.get(hash) != Some(&Cell::Text(case.parameter_hash())) {
-            let what = format!("case {} does not have the hash of its parameters", case.index);
+            let what = format!("case {} does not match its parameter hash", case.index);
             return Err(LibraryError::BadRow { table: table.name, what });
         }
     }
@@ -217,7 +217,7 @@ fn integer(cell: &Cell) -> Option<i64> {
     }
 }
 
-/// A row as it stands where nobody works on it; a case is finished when its results are there as well.
+/// A row without a lease; a case becomes finished when its results are stored as well.
 fn without_lease(table: &Table, mut row: Vec<Cell>) -> Vec<Cell> {
     let state = table.column("state");
     let expires = table.column("lease_expires_unix_ms");
@@ -264,7 +264,7 @@ impl Write for Rows {
 }
 
 impl Rows {
-    /// Says of these rows' cases that they are finished, where all their passes are here.
+    /// Marks the cases of these rows as finished if all their passes are stored.
     async fn finish_complete_cases(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let mut campaigns = self.texts("campaign_id");
         campaigns.dedup();
@@ -297,8 +297,8 @@ impl Rows {
             if let Some(altered) = altered {
                 let index = altered.case.index;
                 let what = format!(
-                    "the results of case {index} of {campaign} do not have their checksum: a number was \
-                     altered"
+                    "the results of case {index} of {campaign} do not match their checksum: a number \
+                         was altered"
                 );
                 return Err(LibraryError::BadRow { table: self.table.name, what });
             }
@@ -314,7 +314,7 @@ impl Rows {
         if found == expected {
             return Ok(());
         }
-        let what = format!("{} of {expected} cases are not in campaign_case", expected - found);
+        let what = format!("{} of {expected} cases are missing in campaign_case", expected - found);
         Err(LibraryError::BadRow { table: self.table.name, what })
     }
 

@@ -6,21 +6,21 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// After so long a server is asked for its time again, for no two clocks run equally fast.
 const READ_EVERY: Duration = Duration::from_mins(1);
 
-/// What leases are given and ended by: with a file this machine's time, with a server the server's, so
-/// that coordinators agree on when a lease has ended, whatever happens to the time of their machines.
+/// The clock of leases: this machine's with `SQLite`, the server's with PostgreSQL, so that
+/// coordinators agree on the end of a lease, independent of their own clocks.
 pub(crate) enum Clock {
     Machine,
     Server(Mutex<Reading>),
 }
 
-/// What the server's clock said, and when that was.
+/// Last reading of the server's clock, and its local time.
 pub(crate) struct Reading {
     unix_ms: i64,
     at: Instant,
 }
 
 impl Clock {
-    /// A server's, that says so now.
+    /// A server's clock with its present reading.
     pub(super) fn server(unix_ms: i64) -> Self {
         Self::Server(Mutex::new(Reading { unix_ms, at: Instant::now() }))
     }
@@ -50,7 +50,7 @@ impl Clock {
         }
     }
 
-    /// Takes what the server says now.
+    /// Takes a reading of the server's clock.
     pub(super) fn set(&self, unix_ms: i64) {
         if let Self::Server(reading) = self {
             let reading = &mut *reading.lock().expect("nobody panics while holding it");

@@ -53,7 +53,7 @@ impl Connection {
         })
     }
 
-    /// Shows a statement to whoever listens: the account of the lease protocol is held against these
+    /// Traces a statement; a test compares the description of the lease protocol with these
     /// (docs/lease-protocol.md).
     fn tell(&self, statement: &Statement) {
         tracing::trace!(target: STATEMENTS, text = &*statement.text(self.dialect()));
@@ -88,7 +88,7 @@ impl Connection {
 
     /// Leaves nothing of the present transaction, if there is one.
     pub(super) async fn rollback(&mut self) {
-        // It fails where the database has rolled back by itself, or is gone with the transaction.
+        // It fails if the database has rolled back already, or if the connection is lost.
         let _ = self.execute(sql("rollback")).await;
     }
 
@@ -132,7 +132,7 @@ impl Readers {
         }
     }
 
-    /// A server that does not answer has gone, whatever the network says.
+    /// A server that does not respond is treated as lost, even if the network reports no error.
     async fn within_bounds<T>(
         &self,
         asked: impl Future<Output = Result<T, LibraryError>>,

@@ -19,7 +19,7 @@ impl Dialect {
         }
     }
 
-    /// So many rows of so many values each, the only values of their statement: `(?, ?), (?, ?)`.
+    /// Placeholders of `rows` rows of values, the only values of their statement: `(?, ?), (?, ?)`.
     ///
     /// `SQLite` looks a named place up among all that have names, so that a statement with a thousand
     /// of `$1`, `$2`, ... takes a million steps; question marks have none.

@@ -1,4 +1,4 @@
-//! The lock of a library's file: on the file itself, by whatever name it is found.
+//! The lock of a library's file: on the file itself, independent of its name.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -10,11 +10,11 @@ use std::sync::{Mutex, MutexGuard};
 
 /// The files that this process has locked once, by device and inode.
 ///
-/// None is closed before the process ends: whoever closes any descriptor of a file gives up all POSIX
-/// locks that his process has on that file, and `SQLite`'s are among them.
+/// No descriptor is closed before the process exits: closing any descriptor of a file releases all
+/// POSIX locks of the process on that file, including those of `SQLite`.
 static FILES: Mutex<BTreeMap<Identity, Locked>> = Mutex::new(BTreeMap::new());
 
-/// Device and inode: what the kernel knows a file by, whatever links and mounts lead to it.
+/// Device and inode: identity of a file, independent of links and mounts.
 pub(super) type Identity = [u64; 2];
 
 /// The file at a path, if there is one.
@@ -46,7 +46,7 @@ impl FileLock {
     /// Takes the lock; none while another has it, in this process or in another.
     ///
     /// # Errors
-    /// What the system says where the file system has no locks, or the folder can't be written.
+    /// The error of the system if the file system has no locks, or the folder is not writable.
     pub(crate) fn try_take(path: &Path) -> io::Result<Option<Self>> {
         let beside = File::create(beside(&path.canonicalize()?))?;
         match beside.try_lock() {
@@ -70,7 +70,7 @@ impl Drop for FileLock {
         if let Some(locked) = files().get_mut(&identity) {
             locked.held = false;
             if let Err(error) = locked.file.unlock() {
-                tracing::warn!("the library's file stays locked until this program ends: {error}");
+                tracing::warn!("the library's file stays locked until this program exits: {error}");
             }
         }
     }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-/// File systems that several hosts may share, by the number that `statfs(2)` tells, and what they are
-/// called.
+/// File systems that several machines may share, by their magic number of `statfs(2)`, with their
+/// names.
 ///
 /// `SQLite`'s locks and the memory that its log shares between processes work at most between the
 /// processes of one host there, and on some not at all.

@@ -17,7 +17,7 @@ pub(crate) fn iso_utc(unix_ms: i64) -> String {
 mod tests {
     use super::iso_utc;
 
-    /// As `date -u -d @SECONDS +%FT%T` says.
+    /// Format of `date -u -d @SECONDS +%FT%T`.
     #[test]
     fn instants_read_as_the_calendar_has_them() {
         assert_eq!(iso_utc(0), "1970-01-01T00:00:00.000Z");

@@ -14,7 +14,7 @@ pub(crate) struct Opened {
     pub(crate) clock: Arc<Clock>,
 }
 
-/// Opens a library that is there.
+/// Opens an existing library.
 pub(crate) async fn open(url: &str) -> Result<Opened, LibraryError> {
     let target = parse(url)?;
     if target.path().is_some_and(|path| !path.is_file()) {

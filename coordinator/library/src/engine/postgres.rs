@@ -19,7 +19,7 @@ const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(10);
 /// How long a connection may take: a server on the other side of the world answers within a second or two.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// What those hold who make views; any number that nobody else has.
+/// Key of the advisory lock for creating views; an arbitrary unique number.
 const VIEWS_LOCK: i64 = 0x7477_696e;
 
 /// Opens the library in this database and brings its schema up to date; answers also the server's clock.
@@ -57,14 +57,14 @@ pub(super) async fn connect(options: &PgConnectOptions) -> Result<Connection, Li
 /// would be waited for for minutes, and a port that takes connections but never answers for ever.
 async fn within_bounds(options: &PgConnectOptions) -> Result<PgConnection, sqlx::Error> {
     let silent = || {
-        let reason = format!("no answer within {} s", CONNECT_TIMEOUT.as_secs());
+        let reason = format!("no response within {} s", CONNECT_TIMEOUT.as_secs());
         sqlx::Error::Io(std::io::Error::new(std::io::ErrorKind::TimedOut, reason))
     };
     let connecting = tokio::time::timeout(CONNECT_TIMEOUT, options.connect());
     connecting.await.unwrap_or_else(|_| Err(silent()))
 }
 
-/// Why there is no connection: what the user can mend, or what may pass.
+/// Classifies a connection error: wrong input, or a temporary failure.
 fn unreachable(error: sqlx::Error, name: &str) -> LibraryError {
     let library = name.to_owned();
     match &error {
@@ -138,8 +138,8 @@ async fn make_views(connection: &mut PgConnection) -> Result<(), LibraryError> {
     Ok(alone.commit().await?)
 }
 
-/// Version of the views that are there; 0 for those that migrations made. A comment can be read by who may read
-/// nothing else.
+/// Version of the existing views; 0 for those created by migrations. A comment is readable without
+/// any other right.
 async fn views_version(connection: &mut PgConnection) -> Result<i64, LibraryError> {
     let ask = "select coalesce(cast(substring(
             obj_description(to_regclass('campaign_status'), 'pg_class') from '[0-9]+$') as bigint), 0)";

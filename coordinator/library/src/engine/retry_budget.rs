@@ -1,8 +1,8 @@
-//! How long a database that is away is waited for.
+//! How long an unavailable database is retried.
 
 use std::time::{Duration, Instant};
 
-/// Long enough for a server that is restarted, short enough for those who wait for an answer.
+/// Long enough for the restart of a server, short enough for waiting callers.
 const RETRY_BUDGET: Duration = Duration::from_secs(10);
 
 /// The first pause; each later one is twice as long.
@@ -11,17 +11,17 @@ const FIRST_PAUSE: Duration = Duration::from_millis(50);
 /// The longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
-/// Patience has run out.
+/// The retry budget is used up.
 pub(crate) struct Exhausted;
 
-/// Pauses between attempts, until it is enough.
+/// Pauses between attempts, within the budget.
 pub(crate) struct RetryBudget {
     until: Instant,
     pause: Duration,
 }
 
 impl RetryBudget {
-    /// None at all unless `some`.
+    /// An empty budget unless `some`.
     pub(crate) fn new(some: bool) -> Self {
         let budget = if some { RETRY_BUDGET } else { Duration::ZERO };
         Self { until: Instant::now() + budget, pause: FIRST_PAUSE }

@@ -35,8 +35,7 @@ const LOG_PAGES: &str = "2048";
 /// Connections that read beside the one that writes.
 const READERS: u32 = 4;
 
-/// Opens the file and brings its schema up to date; fills one that is empty, or makes one, where `create` says
-/// so.
+/// Opens the file and updates its schema; with `create`, fills an empty file or creates one.
 pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connection), LibraryError> {
     refuse_what_seems_empty(path)?;
     warn_of_the_place(path);
@@ -61,7 +60,8 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connecti
     let mut budget = RetryBudget::new(true);
     let mut connection = loop {
         match options.connect().await.map_err(|error| closed_to_us(error, path)) {
-            // A log begins only where nobody else looks, and doesn't wait for that itself.
+            // Switching to the write-ahead log needs exclusive access, and `SQLite` does not wait
+            // for it.
             Err(error) if error.is_temporary() && budget.wait().await.is_ok() => {}
             opened => break opened?,
         }
@@ -103,7 +103,7 @@ fn gone(path: &Path) -> LibraryError {
     LibraryError::FileGone { library: path.display().to_string() }
 }
 
-/// Why a file cannot be opened, as far as a user can mend it.
+/// Reasons, correctable by the user, why a file cannot be opened.
 fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
     let library = path.display().to_string();
     let code = error.as_database_error().and_then(sqlx::error::DatabaseError::code);
@@ -117,10 +117,10 @@ fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
     };
     match error.into() {
         LibraryError::NotOpened { .. } => {
-            not_let_in("the file can't be opened or made; look at the rights of its folder")
+            not_let_in("the file cannot be opened or created; check the permissions of its folder")
         }
         LibraryError::NotWritable { .. } => not_let_in(
-            "its folder can't be written, which SQLite needs even to read; copy the library",
+            "its folder is not writable, which SQLite needs even to read; copy the library",
         ),
         LibraryError::NoLocks { reason, .. } => {
             LibraryError::NoLocks { library: place(path), reason }
@@ -155,16 +155,18 @@ fn place(path: &Path) -> String {
 fn warn_of_the_place(path: &Path) {
     if let Some(name) = shared_between_hosts(path) {
         tracing::warn!(
-            "library {}: it lies on {name}, which several hosts may share; only programs of one host at a time \
-             may use it there: a disk of this machine is safer, and for several hosts there is PostgreSQL",
+            "library {}: it is on {name}, which several machines may share; only programs of \
+                 one machine at a time may use it there: a local disk is safer, and several \
+                 machines need PostgreSQL",
             path.display()
         );
     }
     let links = std::fs::metadata(path).map_or(1, |file| file.nlink());
     if links > 1 {
         tracing::warn!(
-            "library {}: the file has {links} names (hard links), and SQLite keeps what it wrote last beside the \
-             name that it was opened by: always use the same one, or make the others symbolic links",
+            "library {}: the file has {links} hard links, but SQLite stores its write-ahead log \
+                 beside the name that was opened: always use the same name, or replace the others \
+                 by symbolic links",
             path.display()
         );
     }
@@ -174,8 +176,8 @@ fn warn_of_the_place(path: &Path) {
 const HEAD: &[u8] = b"SQLite format 3\0";
 const BYTES_MIN: usize = 512;
 
-/// Refuses what `SQLite` would take for an empty database and write over: a short file of something else, the
-/// beginning of one of its own, and an empty one whose log is not.
+/// Returns an error for files that `SQLite` would treat as empty and overwrite: a short foreign
+/// file, a truncated database, and an empty file with a non-empty log.
 fn refuse_what_seems_empty(path: &Path) -> Result<(), LibraryError> {
     let mut log = path.as_os_str().to_owned();
     log.push("-wal");
@@ -183,13 +185,13 @@ fn refuse_what_seems_empty(path: &Path) -> Result<(), LibraryError> {
     let lost = |reason: &str| Err(LibraryError::Malformed { reason: reason.to_owned() });
     match begin.len() {
         0 if begin_of_log(&log) => {
-            lost("the file is empty, its log is not: what was in it is lost")
+            lost("the file is empty, but its write-ahead log is not: its content is lost")
         }
         0 | BYTES_MIN.. => Ok(()),
         length if begin[..length.min(HEAD.len())] != HEAD[..length.min(HEAD.len())] => {
             Err(LibraryError::NotALibrary { library: path.display().to_string() })
         }
-        length => lost(&format!("the file is cut off after {length} bytes")),
+        length => lost(&format!("the file is truncated after {length} bytes")),
     }
 }
 
@@ -205,7 +207,8 @@ fn begin_of_log(log: &OsStr) -> bool {
     begin(Path::new(log)).is_some_and(|begin| !begin.is_empty())
 }
 
-/// Refuses a database of somebody else, before anything is written to it; answers whether it is empty.
+/// Returns an error for a foreign database before anything is written; otherwise whether it is
+/// empty.
 async fn refuse_foreign_database(
     connection: &mut SqliteConnection,
     path: &Path,

@@ -38,7 +38,7 @@ pub(super) async fn bring_up_to_date(
     Ok(alone.commit().await?)
 }
 
-/// Makes the views anew where they are of an earlier version.
+/// Creates the views again if they are of an earlier version.
 async fn renew_views(connection: &mut SqliteConnection) -> Result<(), LibraryError> {
     if views_version(&mut *connection).await? >= views::VERSION {
         return Ok(());
@@ -51,7 +51,7 @@ async fn renew_views(connection: &mut SqliteConnection) -> Result<(), LibraryErr
     Ok(alone.commit().await?)
 }
 
-/// Version of the views that are there; 0 for those that migrations made.
+/// Version of the existing views; 0 for those created by migrations.
 async fn views_version<'c>(connection: impl SqliteExecutor<'c>) -> Result<i64, LibraryError> {
     Ok(sqlx::query_scalar("select user_version from pragma_user_version")
         .fetch_one(connection)

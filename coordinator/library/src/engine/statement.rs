@@ -25,7 +25,7 @@ pub(crate) enum Value {
     OptionalReals(Vec<Option<f64>>),
 }
 
-/// What a statement says.
+/// Text of a statement.
 #[derive(Clone, Debug)]
 pub(crate) enum Text {
     /// The same in both databases.
@@ -86,7 +86,7 @@ impl Statement {
         self
     }
 
-    /// What it says to this database.
+    /// Its text for this database.
     pub(super) fn text(&self, dialect: Dialect) -> Cow<'static, str> {
         self.text.clone().of(dialect)
     }

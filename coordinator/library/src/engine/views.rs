@@ -1,6 +1,6 @@
 //! The views: one file a database, outside the numbered migrations.
 //!
-//! Opening a library makes them anew where those that are there are of an earlier version.
+//! Opening a library creates them again if the existing ones are of an earlier version.
 
 use crate::LibraryError;
 
@@ -10,8 +10,8 @@ pub(super) const VERSION: i64 = 1;
 pub(super) const SQLITE: &str = include_str!("../../../../migrations/sqlite/views.sql");
 pub(super) const POSTGRES: &str = include_str!("../../../../migrations/postgres/views.sql");
 
-/// Takes what kept somebody from making views anew for a warning, where those that are there do: for who may only
-/// read, and for who opens a malformed library to see what is left of it.
+/// Reduces an error of creating views to a warning if the existing views are usable: for read-only
+/// access, and for the salvage of a damaged library.
 ///
 /// # Errors
 /// Whatever else went wrong.
@@ -20,7 +20,7 @@ pub(super) fn made(done: Result<(), LibraryError>, library: &str) -> Result<(), 
     match done {
         Err(error @ (Busy | DiskFull | Malformed { .. } | NotWritable { .. })) => {
             tracing::warn!(
-                "library {library}: its views are an earlier program's, and stay so: {error}"
+                "library {library}: its views are of an earlier version and cannot be updated: {error}"
             );
             Ok(())
         }

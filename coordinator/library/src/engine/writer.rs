@@ -2,8 +2,8 @@
 //!
 //! A durable commit waits for the disk, and `SQLite` has one writer at a time. So all writes of a
 //! process go through one connection, or a few with PostgreSQL, where one waits for the disk while
-//! another fills its transaction; and nobody is answered before the commit. A server that goes away
-//! is waited for, within a bound.
+//! another fills its transaction. A caller gets its result after the commit. A lost server is
+//! retried within a bound.
 
 use super::clock::Clock;
 use super::retry_budget::RetryBudget;
@@ -25,7 +25,8 @@ const GROUP_MAX: usize = 256;
 /// Writes that wait for the writer before those who ask have to wait themselves.
 const QUEUE_MAX: usize = 1024;
 
-/// A question or a transaction on a server that takes longer has lost its server, whatever the network says.
+/// A query or a transaction that takes longer is treated as a lost connection, even if the network
+/// reports no error.
 pub(super) const SERVER_TIMEOUT: Duration = Duration::from_mins(1);
 
 /// Connections that write to a server.
@@ -36,14 +37,14 @@ pub(crate) trait Write: Send + Sync + 'static {
     /// What it answers once it is committed.
     type Answer: Send + 'static;
 
-    /// Whose it is: what one worker has changed is changed by one transaction at a time, so that
-    /// none waits for another. Whatever is nobody's is so as well.
+    /// Worker whose rows this write changes. Writes of one worker are serialized; writes without a
+    /// worker share one queue.
     fn worker(&self) -> Option<&str> {
         None
     }
 
     /// Makes the change. It may be called again after a transaction that failed, or whose success
-    /// was not heard of.
+    /// is unknown.
     fn apply(
         &self,
         connection: &mut Connection,
@@ -176,7 +177,7 @@ impl<W: Write> WriteRequest for Pending<W> {
     fn respond(self: Box<Self>, committed: Result<(), LibraryError>) {
         let Self { answer, responder, .. } = *self;
         let answer = committed.map(|()| answer.expect("what is committed was applied"));
-        // Who asked may have gone; the write stands all the same.
+        // The caller may have gone; the write is committed nevertheless.
         let _ = responder.send(answer);
     }
 }
@@ -212,15 +213,16 @@ struct Session {
     connection: Option<Connection>,
     /// Kept right from here, where there is a connection anyway.
     clock: Arc<Clock>,
-    /// Whether to wait for the database: not after having waited in vain, until it is back.
+    /// Whether to wait for the database: false after the retry budget was used up, until the
+    /// database responds again.
     retries: bool,
-    /// What broke the connection of a file. It is not opened again, for nobody knows what became of it:
-    /// nothing can be written from here any more, and who supervises the program is to start it anew.
+    /// Error that broke the connection of a file. The file is not opened again, because its state
+    /// is unknown: nothing can be written any more, and a supervisor should restart the program.
     lost: Arc<OnceLock<String>>,
 }
 
 impl Session {
-    /// Drops a connection that has broken; answers what those are told whose file it led to.
+    /// Drops a broken connection; returns the error for the waiting writes if it was of a file.
     fn disconnect(&mut self, error: &LibraryError) -> Result<(), LibraryError> {
         self.connection = None;
         if matches!(self.target, Target::Postgres { .. }) {

@@ -1,23 +1,23 @@
-//! Which of several transactions at a time a write goes into.
+//! Distribution of writes over parallel transactions.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-/// Writes on their way, by lane.
+/// Pending writes by shard.
 ///
-/// Those of one worker are in one lane, for they change the same rows; whoever has none under way
-/// takes the emptiest.
+/// Writes of one worker share a shard, because they change the same rows; a worker without pending
+/// writes takes the emptiest shard.
 #[derive(Clone)]
 pub(super) struct WriterShards(Arc<Mutex<UnderWay>>);
 
 struct UnderWay {
-    /// Writes in each lane.
+    /// Pending writes of each shard.
     counts: Vec<usize>,
-    /// The lane of each worker with writes under way, and how many they are.
+    /// Shard of each worker with pending writes, and their number.
     workers: HashMap<String, (usize, usize)>,
 }
 
-/// A write's place in a lane, until it is dropped.
+/// A write's slot in a shard, until it is dropped.
 pub(super) struct Slot {
     shards: WriterShards,
     number: usize,
@@ -25,13 +25,13 @@ pub(super) struct Slot {
 }
 
 impl WriterShards {
-    /// So many empty ones, at least one.
+    /// `count` empty shards, at least one.
     pub(super) fn new(count: usize) -> Self {
         let under_way = UnderWay { counts: vec![0; count], workers: HashMap::new() };
         Self(Arc::new(Mutex::new(under_way)))
     }
 
-    /// A place for a write of a worker.
+    /// A slot for a write of a worker.
     pub(super) fn enter(&self, worker: &str) -> Slot {
         let mut under_way = self.lock();
         let UnderWay { counts, workers } = &mut *under_way;
@@ -48,7 +48,7 @@ impl WriterShards {
 }
 
 impl Slot {
-    /// The lane, from 0.
+    /// The shard, from 0.
     pub(super) const fn number(&self) -> usize {
         self.number
     }

@@ -5,8 +5,9 @@ use crate::engine::{Connection, Row, Statement, Text, Write, sql};
 use crate::{LibraryError, attempt};
 use std::collections::HashSet;
 
-// In these statements the leases of worker $2 are told twice: the indices of their cases are $3, and these with
-// their epochs, as one number each, $4. The indices alone stand first: by them cases are found, in both databases.
+// In these statements the leases of worker $2 are given twice: $3 holds the indices of their cases,
+// and $4 these with their epochs, as one number each. The indices come first, because both
+// databases find the cases by them.
 
 /// Lets leases last until $5.
 const RENEW: Text = Text::Each {
@@ -130,7 +131,7 @@ impl Renew {
     }
 }
 
-/// The leases that rows tell.
+/// The leases of these rows.
 fn leases(rows: &[Row]) -> Result<HashSet<Held>, LibraryError> {
     let held =
         |row: &Row| Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? });

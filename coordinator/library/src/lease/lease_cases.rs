@@ -10,7 +10,7 @@ use crate::{AttemptsMax, LibraryError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Campaigns that are looked at for one lease.
+/// Number of campaigns considered for one lease.
 ///
 /// The first has cases to give, except where other coordinators take its last ones just now.
 const CAMPAIGNS_TRIED: u32 = 4;
@@ -18,7 +18,7 @@ const CAMPAIGNS_TRIED: u32 = 4;
 /// Expired leases ended with one lease; more wait for the next.
 const EXPIRED_MAX: u32 = 500;
 
-/// Expired leases, the first first; those that somebody else ends just now are passed over.
+/// Expired leases in the order of expiry; those locked by another transaction are skipped.
 const EXPIRED: Text = Text::Each {
     sqlite: "
         select campaign_id, sobol_index, attempts from campaign_case
@@ -30,7 +30,8 @@ const EXPIRED: Text = Text::Each {
         order by lease_expires_unix_ms limit $2 for update skip locked",
 };
 
-/// The $2 most urgent campaigns that have waiting cases and are handed out; none for a worker ($1) in quarantine.
+/// The $2 running campaigns of highest priority with waiting cases; none for a worker ($1) in
+/// quarantine.
 const CAMPAIGNS: &str = "
     select id from campaign
     where state = 'running'
@@ -48,9 +49,9 @@ const CAMPAIGN: &str = "
             where campaign_id = campaign.id and case_count.state = 'waiting')
     order by priority desc, created_at, id limit $2";
 
-/// The first $4 waiting cases of a campaign from $2 on and below $3, which nobody else may take before this
-/// transaction ends. `SQLite` is told by which index, for without statistics it would go through all that are
-/// finished.
+/// The first $4 waiting cases of a campaign with index from $2 to below $3, locked until this
+/// transaction ends. The index is prescribed for `SQLite`, which without statistics would scan all
+/// finished cases.
 const WAITING: Text = Text::Each {
     sqlite: "
         select * from campaign_case indexed by campaign_case_by_state
@@ -161,7 +162,7 @@ impl LeaseCases {
         Ok(taken.into_iter().map(|it| it.leased).collect())
     }
 
-    /// A campaign's first waiting cases from a place on, which nobody else may take.
+    /// The first waiting cases of a campaign from an index on, locked.
     async fn waiting(
         &self,
         connection: &mut Connection,
@@ -181,7 +182,7 @@ impl LeaseCases {
     }
 }
 
-/// A case to be handed out.
+/// A case to be leased.
 struct Waiting {
     /// As it is once it is.
     leased: Leased,
@@ -194,8 +195,8 @@ impl Waiting {
     }
 }
 
-/// Which of the first waiting cases go into one lease, and which don't: each of those with so many attempts without
-/// result goes alone.
+/// Selects the waiting cases of one lease: a case with this number of attempts without result is
+/// leased alone.
 fn share(mut waiting: Vec<Waiting>, alone_after: u32) -> (Vec<Waiting>, Vec<Waiting>) {
     if waiting.first().is_some_and(|first| first.attempts >= alone_after) {
         let others = waiting.split_off(1);
@@ -211,8 +212,8 @@ struct Expired {
     attempts: u32,
 }
 
-/// Ends leases that have expired, of any campaign: two statements for all cases of a campaign that
-/// have the same number of attempts, so that many lost workers hold up nobody's report.
+/// Ends expired leases of all campaigns: two statements for all cases of a campaign with the same
+/// number of attempts, so that many lost workers do not delay reports.
 async fn end_expired(
     connection: &mut Connection,
     now_unix_ms: i64,
@@ -234,7 +235,7 @@ async fn end_expired(
             attempts,
             state: attempts_max.after(Ending::Lost, attempts),
             ending: "lost",
-            error: "the lease expired: its worker fell silent",
+            error: "the lease expired: no heartbeat from its worker",
             now_unix_ms,
         };
         attempt::end(connection, ended).await?;
@@ -242,7 +243,7 @@ async fn end_expired(
     Ok(())
 }
 
-/// The cases of each campaign that have had so many attempts.
+/// The cases of each campaign with this number of attempts.
 fn alike(expired: Vec<Expired>) -> BTreeMap<(String, u32), Vec<i64>> {
     let mut alike = BTreeMap::<_, Vec<i64>>::new();
     for Expired { campaign, index, attempts } in expired {

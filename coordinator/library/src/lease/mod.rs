@@ -32,8 +32,8 @@ pub struct LeaseRequest {
     pub lease_ms: i64,
     /// When cases whose lease has expired are given up.
     pub attempts_max: AttemptsMax,
-    /// Attempts without result after which a case is handed out alone: if it is what ends its
-    /// workers, it takes no other case with it.
+    /// Attempts without result after which a case is leased alone: if it kills its workers, no
+    /// other case is lost with it.
     pub alone_after: u32,
 }
 
@@ -68,8 +68,8 @@ impl Library {
     /// Hands out waiting cases of a campaign that is running, the first first. There are none for a
     /// worker in quarantine.
     ///
-    /// Expired leases are ended, and cases that wait again are seen, several times in the length of a
-    /// lease, and before it is said that there are none.
+    /// Expired leases end, and cases waiting again are found, several times per lease duration, and
+    /// always before an empty lease is returned.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.

@@ -1,18 +1,17 @@
-//! What of a queue needs not be gone through again for each lease.
+//! Cursor of the lease queries: start of the waiting cases.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
 
-/// How often all is looked at while a lease lasts.
+/// Full scans per lease duration.
 const LOOKS_PER_LEASE: i64 = 24;
 
-/// Where a campaign's waiting cases begin, as far as was seen.
+/// Lowest index of each campaign that may be waiting.
 ///
-/// An index of PostgreSQL holds what has left it until it is vacuumed, so that the first waiting case
-/// stands behind all that have been finished since, and the first lease that expires behind all that
-/// have ended. A lease begins where the last one ended instead; what waits again before that place is
-/// seen when all is looked at. Several coordinators may serve a library, and none knows what
-/// the others have put back.
+/// An index of PostgreSQL keeps removed entries until it is vacuumed, so a query for the first
+/// waiting case would scan all cases finished since. A lease query therefore starts at the cursor.
+/// Cases that wait again before the cursor are found by a full scan from time to time; several
+/// coordinators may serve a library, and none knows the cases released by the others.
 #[derive(Debug, Default)]
 pub(crate) struct QueueCursor(Mutex<CursorState>);
 
@@ -23,11 +22,11 @@ struct CursorState {
 }
 
 impl QueueCursor {
-    /// Whether it is time to look at everything; whoever is told so does it.
+    /// Whether a full scan is due; the caller must then run it.
     pub(super) fn is_due(&self, now_unix_ms: i64, lease_ms: i64) -> bool {
         let mut state = self.0.lock().expect("nobody panics while holding it");
         let since_ms = state.looked_unix_ms.map(|looked| now_unix_ms.saturating_sub(looked));
-        // A clock that was put back says nothing.
+        // A clock that was set back makes a full scan due.
         let is_due = since_ms.is_none_or(|since| since < 0 || since >= lease_ms / LOOKS_PER_LEASE);
         if is_due {
             *state =
@@ -36,14 +35,14 @@ impl QueueCursor {
         is_due
     }
 
-    /// No case waits before it, as far as was seen.
+    /// Invariant: no known case with a lower index is waiting.
     pub(super) fn first_waiting(&self, campaign: &str) -> u32 {
         let state = self.0.lock().expect("nobody panics while holding it");
         state.first_waiting.get(campaign).copied().unwrap_or(0)
     }
 
-    /// Whoever began to look `from` a place has found none waiting before another. Others may have
-    /// moved it meanwhile; then theirs stands.
+    /// Moves the cursor after a scan from `from` found no waiting case before `to`; keeps it if
+    /// another scan has moved it meanwhile.
     pub(super) fn advance(&self, campaign: &str, from: u32, to: u32) {
         let mut state = self.0.lock().expect("nobody panics while holding it");
         let first = state.first_waiting.entry(campaign.to_owned()).or_insert(0);
@@ -52,7 +51,7 @@ impl QueueCursor {
         }
     }
 
-    /// Everything is looked at with the next lease.
+    /// Requires a full scan with the next lease.
     pub(super) fn forget(&self) {
         *self.0.lock().expect("nobody panics while holding it") = CursorState::default();
     }

@@ -4,7 +4,7 @@ use crate::engine::{Connection, Value, Write, sql};
 use crate::library::Dated;
 use crate::{Library, LibraryError};
 
-/// Keeps a diagnosis; one that is there stays as it is.
+/// Stores a diagnosis; an existing one is kept unchanged.
 const INSERT: &str = "
     insert into diagnosis (id, recording, verdict, code_version, document, created_at)
     values ($1, $2, $3, $4, $5, $6) on conflict (id) do nothing";

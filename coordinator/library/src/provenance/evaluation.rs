@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use tracktwin_parameters::Parameter;
 
-/// Keeps an evaluation; one that is there stays as it is.
+/// Stores an evaluation; an existing one is kept unchanged.
 const INSERT: &str = "
     insert into evaluation (id, recording, method, campaign_id, library_digest, code_version, document, created_at)
     values ($1, $2, $3, $4, $5, $6, $7, $8) on conflict (id) do nothing";
@@ -31,7 +31,7 @@ pub struct EvaluationRecord {
     pub sleepers: Vec<SleeperRecord>,
 }
 
-/// What an evaluation says of a sleeper.
+/// Estimates of a sleeper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SleeperRecord {
     /// Its name.

@@ -1,7 +1,7 @@
 //! What was made of the library's results, and from what: trainings, evaluations, diagnoses.
 //!
-//! The tables hold what one asks about, and the whole document beside it. Recording the same again
-//! changes nothing: a record's id is a hash of what it says.
+//! The tables hold the queried columns and the whole document. Storing the same record again
+//! changes nothing: the id of a record is a hash of its content.
 
 mod diagnosis;
 mod evaluation;

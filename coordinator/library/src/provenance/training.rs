@@ -5,7 +5,7 @@ use crate::library::Dated;
 use crate::{Library, LibraryError};
 use tracktwin_parameters::Parameter;
 
-/// Keeps a training; one that is there stays as it is.
+/// Stores a training; an existing one is kept unchanged.
 const INSERT: &str = "
     insert into training (id, campaign_id, library_digest, cases, seed, code_version, created_at)
     values ($1, $2, $3, $4, $5, $6, $7) on conflict (id) do nothing";
@@ -40,7 +40,7 @@ pub struct SurrogateRecord {
     pub feature: String,
     /// The speeds it reads together, ascending.
     pub speeds_km_h: Vec<f64>,
-    /// What it tells.
+    /// Parameter that it estimates.
     pub parameter: Parameter,
     /// Mean absolute error on the test set over the parameter's range (paper, eq. 11).
     pub mase_test: f64,

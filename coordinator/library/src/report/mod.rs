@@ -1,4 +1,4 @@
-//! Taking reports: each case's first result is stored, and whatever comes later changes nothing.
+//! Reports: the first result of each case is stored; later ones change nothing.
 //!
 //! Owns what a report is; what it changes is `record`'s.
 

@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_protocol::CaseReport;
 
-/// Where cases ($2) of a campaign stand, locked against others until this transaction ends.
+/// States of cases ($2) of a campaign, locked until this transaction ends.
 const STANDINGS: Text = Text::Each {
     sqlite: "
         select sobol_index, state, epoch, attempts, worker, parameter_hash from campaign_case
@@ -81,7 +81,7 @@ impl Write for Report {
     }
 }
 
-/// Where a case stands before a report of it.
+/// State of a case before a report.
 struct CaseState {
     state: State,
     epoch: u32,
@@ -91,7 +91,7 @@ struct CaseState {
 }
 
 impl Report {
-    /// Where the reported cases stand, locked against others.
+    /// States of the reported cases, locked.
     async fn case_states(
         &self,
         connection: &mut Connection,

@@ -24,8 +24,8 @@ pub struct ContactLoss {
 }
 
 impl Library {
-    /// How many cases of a campaign lost the rail. Results stored before schema 8 do not tell, and are not
-    /// counted.
+    /// Number of cases of a campaign with loss of contact. Results stored before schema 8 lack this
+    /// information and are not counted.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.

@@ -67,7 +67,7 @@ pub(crate) async fn flag(
 /// Stores the results of cases that have none, flagged where there is a reason to.
 ///
 /// # Panics
-/// When features have another shape than the first: whoever took the message in looked at that.
+/// When features have another shape than the first: the receiver of the message has checked this.
 pub(crate) async fn insert_results(
     connection: &mut Connection,
     report: &Report,

@@ -76,7 +76,7 @@ async fn alter(home: &Home, (_, sqlite, postgres): (&str, &'static str, &'static
 /// What is wrong with results' checksums, as `verify` says it.
 async fn unlike_their_checksum(library: &Library) -> Option<(u64, Option<u32>)> {
     let findings = library.verify(|| ()).await.unwrap().findings;
-    let finding = findings.iter().find(|it| it.what.contains("do not have their checksum"));
+    let finding = findings.iter().find(|it| it.what.contains("do not match their checksum"));
     finding.map(|it| (it.count, it.first_index))
 }
 
@@ -192,7 +192,7 @@ on_both_databases! {
         assert_eq!(library.digest(CAMPAIGN).await.unwrap(), digest);
         let findings = library.verify(|| ()).await.unwrap().findings;
         // Its campaign's hashes are single letters.
-        assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+        assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     }
 
     async fn results_that_are_thrown_away_leave_nothing_behind(home: &Home) {
@@ -203,7 +203,7 @@ on_both_databases! {
         sql(home, flag).await;
         assert_eq!(library.retry(CAMPAIGN, Retry::Flagged).await.unwrap(), 3);
         let findings = library.verify(|| ()).await.unwrap().findings;
-        assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+        assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     }
 
     async fn results_of_before_there_were_checksums_are_counted_and_pass(home: &Home) {
@@ -234,7 +234,7 @@ on_both_databases! {
         library.insert_cases(CAMPAIGN, &(2..6).map(case).collect::<Vec<_>>()).await.unwrap();
         assert_eq!(library.cases_in_order(CAMPAIGN).await.unwrap(), 6);
         let findings = library.verify(|| ()).await.unwrap().findings;
-        assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+        assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     }
 
     async fn cases_whose_wheel_was_in_the_air_are_counted(home: &Home) {

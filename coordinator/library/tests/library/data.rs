@@ -275,7 +275,7 @@ on_both_databases! {
         let library = some_of_all(home).await;
         let findings = library.verify(|| ()).await.unwrap().findings;
         // Its campaign's hashes are single letters.
-        assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")));
+        assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")));
         assert_eq!(findings.len(), 2, "{findings:?}");
     }
 
@@ -298,21 +298,21 @@ on_both_databases! {
             )
         };
         for (damage, what) in [
-            (lost_pass, "finished cases without result"),
+            (lost_pass, "finished cases without a result"),
             ("update campaign_case set state = 'waiting' where state = 'finished'", "not finished"),
-            (other_parameters, "of other parameters"),
-            (other_experiment, "of another experiment"),
+            (other_parameters, "with parameters that differ"),
+            (other_experiment, "with an experiment that differs"),
             (
                 "update campaign_case set irregularity_level = 1.5 where sobol_index = 3",
-                "cases that do not have their hash",
+                "cases that do not match their hash",
             ),
-            (infinite, "no numbers"),
+            (infinite, "NaN or infinite"),
             ("update case_count set cases = cases + 1", "counts"),
             ("delete from campaign_case where sobol_index = 2", "gaps"),
             (
                 "update campaign_case set parameter_hash = (select parameter_hash from campaign_case
                     where sobol_index = 2) where sobol_index = 3",
-                "of an earlier one",
+                "of an earlier case",
             ),
         ] {
             verify_finds(&home.another(), damage, what).await;
@@ -342,8 +342,8 @@ async fn what_no_foreign_key_keeps_together_on_a_server_is_looked_over() {
     let Some(home) = Home::postgres() else { return };
     for (damage, what) in [
         ("delete from case_series where speed_km_h = 7", "results without their series"),
-        ("update case_result set sobol_index = 17", "results of cases that are not there"),
-        ("update case_result set campaign_id = 'x'", "results of cases that are not there"),
+        ("update case_result set sobol_index = 17", "orphaned results: their case is missing"),
+        ("update case_result set campaign_id = 'x'", "orphaned results: their case is missing"),
         ("delete from case_result", "series without their results"),
     ] {
         verify_finds(&home.another(), damage, what).await;

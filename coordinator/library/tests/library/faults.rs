@@ -96,7 +96,7 @@ async fn a_server_that_stays_away_is_told_as_such_within_a_bound() {
     let error = library.pause(CAMPAIGN).await.unwrap_err();
     assert!(matches!(error, LibraryError::Unavailable { .. }), "{error:?}");
     assert!(error.is_temporary() && !error.is_wrong_input());
-    // Ten seconds of patience, and room for a slow machine.
+    // The retry budget of ten seconds, and room for a slow machine.
     assert!(begin.elapsed() < Duration::from_secs(30), "{:?}", begin.elapsed());
     // Whoever comes now need not wait as long again.
     let begin = Instant::now();
@@ -184,7 +184,7 @@ async fn a_full_disk_is_said_and_survived() {
     assert!(verdicts.iter().all(|it| matches!(it, Verdict::Stored | Verdict::Duplicate)));
     assert_eq!(library.digest(CAMPAIGN).await.unwrap(), undisturbed(CASES).await);
     let findings = library.verify(|| ()).await.unwrap().findings;
-    assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+    assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     library.close().await;
 }
 
@@ -220,7 +220,7 @@ async fn kill_writers(home: &Home) {
     }
     let library = home.open().await;
     let findings = library.verify(|| ()).await.unwrap().findings;
-    assert!(findings.iter().all(|it| it.what.ends_with("does not have its hash")), "{findings:?}");
+    assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");
     // The victims' leases have long expired.
     let later = library.now_unix_ms() + 3_600_000;
     loop {

@@ -68,7 +68,7 @@ async fn is_found(url: &str) -> bool {
             library.close().await;
             assert!(findings.iter().all(|it| !it.what.contains('\n')), "{findings:?}");
             // The campaign's own hashes are single letters.
-            findings.iter().any(|it| !it.what.ends_with("does not have its hash"))
+            findings.iter().any(|it| !it.what.ends_with("does not match its hash"))
         }
     }
 }
@@ -222,11 +222,11 @@ async fn what_the_schema_lacks_is_found() {
         ("pragma foreign_keys = off; drop table campaign", "the table campaign is missing"),
         (
             "pragma foreign_keys = off; update result set sobol_index = 9 where sobol_index = 1",
-            "rows of result whose row of campaign_case is not there",
+            "orphaned rows of result: their row of campaign_case is missing",
         ),
         (
             "pragma foreign_keys = off; update attempt set epoch = 7",
-            "leases that their case never had",
+            "leases with an impossible epoch",
         ),
     ] {
         let (file, url) = sound.with(|_| ());

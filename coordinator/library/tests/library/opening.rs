@@ -220,7 +220,7 @@ async fn a_server_that_takes_connections_and_never_answers_is_given_up_within_a_
     let opening = tokio::time::timeout(std::time::Duration::from_mins(1), Library::open(&url));
     let error = opening.await.expect("opening waits for ever").err().unwrap();
     let LibraryError::Unreachable { source, .. } = &error else { panic!("{error:?}") };
-    assert!(source.to_string().contains("no answer within"), "{source}");
+    assert!(source.to_string().contains("no response within"), "{source}");
 }
 
 on_both_databases! {

@@ -128,7 +128,7 @@ on_both_databases! {
         assert_eq!(lease(&library, "w", 1, 3000).await, []);
         let failures = library.failures(CAMPAIGN, 10).await.unwrap();
         assert_eq!(failures[0].attempts, 3);
-        assert_eq!(failures[0].error.as_deref(), Some("the lease expired: its worker fell silent"));
+        assert_eq!(failures[0].error.as_deref(), Some("the lease expired: no heartbeat from its worker"));
     }
 
     async fn a_case_that_has_lost_workers_twice_goes_alone(home: &Home) {

@@ -85,19 +85,21 @@ fn mark_places(chart: &mut Chart, diagnosis: &Diagnosis) {
 fn caption(diagnosis: &Diagnosis) -> String {
     let band = "Bands are two standard deviations.";
     match addition(diagnosis) {
-        None => format!("What the re-tuned track model comes to at every sleeper. {band}"),
+        None => format!("Parameters of the re-tuned track model at every sleeper. {band}"),
         Some(with) if accepted(diagnosis).all(|h| is_chain(&h.physics)) => format!(
-            "Dashed grey: the stiffness that the re-tuned track model takes on to imitate what the measuring chain did. Bold: with the {with} in the model. {band}"
+            "Dashed grey: stiffness of the re-tuned track model, biased by the fault of the \
+                 measuring chain. Bold: with the {with} in the model. {band}"
         ),
         Some(with) => format!(
-            "Dashed grey: the stiffness that the re-tuned track model takes on to imitate what it lacks. Bold: with the {with} in the model. Dotted lines mark the place. {band}"
+            "Dashed grey: stiffness of the re-tuned track model, biased by the left-out \
+                 physics. Bold: with the {with} in the model. Dotted lines mark the place. {band}"
         ),
     }
 }
 
 fn biases(diagnosis: &Diagnosis) -> Markup {
     html! {
-        p { "Leaving it out would have biased these estimates:" }
+        p { "Bias of the estimates without it:" }
         div.scroll { table {
             thead { tr { th { "parameter" } th { "without it" } th { "with it" } th { "bias removed" } } }
             tbody {

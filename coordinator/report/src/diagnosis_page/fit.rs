@@ -20,7 +20,7 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
         "on speeds withheld from it"
     };
     html! {
-        h2 { "How well it fits" }
+        h2 { "Goodness of fit" }
         p { (meaning(diagnosis)) }
         div.scroll { table {
             thead { tr { th { "model" } th { "score" small { "on what it was fitted to" } } th { "score" small { (withheld) } } } }
@@ -47,9 +47,11 @@ fn scores(name: &str, scores: &Scores, better: bool) -> Markup {
 /// One sentence that says what the scores mean.
 fn meaning(diagnosis: &Diagnosis) -> String {
     let fit = &diagnosis.fit;
-    let single = "With a single speed nothing could be withheld, so no model was tested on passes that it had not seen; a second speed would make up for that.";
+    let single = "With a single speed no speed could be withheld, so no model was tested on other \
+         passes; add a second speed.";
     match (fit.before.held_out, fit.after.held_out) {
-        _ if diagnosis.track.is_empty() => "No model of a track was compared. Every other block of the recording was withheld, and what was fitted on its neighbours was tried on it.".to_owned(),
+        _ if diagnosis.track.is_empty() => "No track model was compared. Every other block of the recording was withheld, and \
+             predicted by a fit to its neighbours.".to_owned(),
         (Some(before), Some(after)) if addition(diagnosis).is_some() => {
             let factor = (after.score - before.score).exp();
             let change = if factor >= 1.0 { "more" } else { "less" };
@@ -102,7 +104,8 @@ fn by_speed(diagnosis: &Diagnosis, extended: bool) -> Markup {
                 }
             }
         } }
-        @if gains { p.note { "A gain is the logarithm of how much more probable the withheld passes are with the addition: 2.3 nats are a factor of ten." } }
+        @if gains { p.note { "A gain is the logarithm of the probability ratio of the withheld passes with and \
+             without the addition; 2.3 nats are a factor of ten." } }
     }
 }
 

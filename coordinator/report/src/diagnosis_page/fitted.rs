@@ -14,7 +14,7 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
         return Markup::default();
     }
     html! {
-        h2 { "How strong it is" }
+        h2 { "Estimated parameters" }
         div.scroll { table {
             thead { tr { th { "of" } th.words { "parameter" } th { "estimate" } th { "95 % interval" } th { "name" } } }
             tbody {
@@ -32,7 +32,8 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
                 }
             }
         } }
-        p.note { "Interval: two standard deviations to either side, with the stiffness at every sleeper free at the same time." }
+        p.note { "Interval: two standard deviations on either side; the stiffness at every sleeper \
+             is fitted at the same time." }
     }
 }
 

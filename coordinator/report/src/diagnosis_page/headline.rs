@@ -23,22 +23,20 @@ pub(super) fn headline(diagnosis: &Diagnosis) -> Markup {
 pub(super) const fn verdict(verdict: Verdict) -> (&'static str, &'static str, &'static str) {
     match verdict {
         Verdict::Consistent => {
-            ("consistent", "consistent", "nothing was found that the re-tuned track model has not")
+            ("consistent", "consistent", "the re-tuned track model explains the recording")
         }
-        Verdict::LeftOutPhysics => (
-            "left-out",
-            "left-out physics",
-            "the track has something that the re-tuned track model has not",
-        ),
+        Verdict::LeftOutPhysics => {
+            ("left-out", "left-out physics", "the track has physics that the track model lacks")
+        }
         Verdict::UnknownPhysics => (
             "unknown",
             "unknown physics",
-            "something is there that nothing in the catalogue explains",
+            "the recording contains physics that no kind in the catalogue explains",
         ),
         Verdict::MeasurementChain => (
             "chain",
             "measuring chain",
-            "it is the sensor, its mounting, the clock or the odometer, not the track",
+            "the fault is in the sensor, its mounting, the clock or the odometer, not in the track",
         ),
     }
 }
@@ -66,7 +64,8 @@ fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
 /// How sure it is that nothing is left out, where nothing was found.
 fn nothing(diagnosis: &Diagnosis) -> Option<(String, String)> {
     let probability = diagnosis.nothing_left_out?;
-    let what = "probability that nothing is left out; the rest is what would be too weak to show";
+    let what =
+        "probability that nothing is left out; the remainder is for effects too weak to detect";
     (diagnosis.verdict == Verdict::Consistent).then(|| (per_cent(probability), what.to_owned()))
 }
 
@@ -91,23 +90,20 @@ fn improvement(diagnosis: &Diagnosis) -> Option<(String, String)> {
 
 fn unexplained(diagnosis: &Diagnosis, mismatch: &Mismatch) -> Vec<(String, String)> {
     let by_chance = usual_scatter(&diagnosis.levels).map_or_else(String::new, |db| {
-        format!("; the rail's roughness alone gives about {} dB", digits(db, 2))
+        format!("; roughness alone gives about {} dB", digits(db, 2))
     });
     vec![
         (
             format!("{} dB", digits(mismatch.level_db, 2)),
             format!("between measured and predicted level in the largest mismatch{by_chance}"),
         ),
-        (
-            chance(mismatch.p_value),
-            "probability to see as much anywhere if nothing were left out".to_owned(),
-        ),
+        (chance(mismatch.p_value), "probability of such a mismatch anywhere by chance".to_owned()),
     ]
 }
 
 fn chance_alone(diagnosis: &Diagnosis) -> Option<(String, String)> {
     let share = share_within_two_sd(diagnosis, Side::Before)?;
-    let what = "of all levels lie within twice the scatter to expect; by chance it would be 95 %";
+    let what = "of all levels lie within twice the expected scatter; 95 % are expected";
     Some((format!("{:.0} %", 100.0 * share), what.to_owned()))
 }
 

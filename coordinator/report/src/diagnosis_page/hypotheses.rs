@@ -22,7 +22,7 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
         diagnosis.hypotheses.iter().enumerate().filter(worth).map(|(_, h)| h).collect();
     let rest = diagnosis.hypotheses.len() - shown.len();
     html! {
-        h2 { "What explains it" }
+        h2 { "Hypotheses" }
         p { (opening(diagnosis)) }
         @for hypothesis in &shown { (row(diagnosis, hypothesis)) }
         @if rest > 0 { p.note { (rest) " further " (if rest == 1 { "hypothesis is" } else { "hypotheses are" }) " less probable than these." } }
@@ -30,33 +30,43 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-const LEGEND: &str = "Log evidence: the logarithm of how much more probable the recording is with the hypothesis than without it, in nats (3 is a factor of 20). \
-    Detectability d′: the size of its trace over the scatter once the track was re-tuned; where it is small, the effect looks like a change of stiffness or drowns in the scatter.";
+const LEGEND: &str = "Log evidence: logarithm of the probability ratio of the recording with and without \
+     the hypothesis, in nats (3 nats are a factor of 20). Detectability d′: size of the \
+     signature relative to the scatter, after re-tuning the track; if it is small, the \
+     effect resembles a change of stiffness or is hidden by the scatter.";
 
 fn opening(diagnosis: &Diagnosis) -> &'static str {
     let any = !diagnosis.hypotheses.is_empty();
     match (diagnosis.verdict, any) {
         (Verdict::Consistent, _) if accepted(diagnosis).next().is_some() => {
-            "What was accepted is within what the track model, with its own stiffness at every sleeper, is meant to show."
+            "The accepted hypothesis lies within the track model with a separate stiffness at \
+                 every sleeper."
         }
         (Verdict::Consistent, true) => {
-            "Nothing was accepted. These came nearest, but none gains enough to be named."
+            "No hypothesis was accepted. These have the highest evidence, but none reaches the \
+                 threshold."
         }
         (Verdict::Consistent, false) => {
-            "Nothing in the catalogue explains the recording better than the track model with its own stiffness at every sleeper. \
-             That excludes what would have stood out of the scatter; it doesn't exclude an effect that is weaker than the scatter or that looks just like a change of stiffness."
+            "No kind in the catalogue explains the recording better than the track model with a \
+                 separate stiffness at every sleeper. This excludes effects above the scatter; it \
+                 does not exclude an effect that is weaker than the scatter or that resembles a \
+                 change of stiffness."
         }
         (Verdict::UnknownPhysics, _) => {
-            "The difference is real, but no kind of physics in the catalogue was accepted for it: each either explains too little or fails on passes that it was not fitted to."
+            "The difference is significant, but no kind of physics in the catalogue was \
+                 accepted: each explains too little, or fails on passes that were not fitted."
         }
         (Verdict::MeasurementChain, _) => {
-            "What was accepted is in how the recording was made. As long as the measuring chain is at fault, nothing is said about physics of the track."
+            "The accepted hypothesis is a fault of the measuring chain. Physics of the track \
+                 cannot be assessed until it is corrected."
         }
         (Verdict::LeftOutPhysics, _) if addition(diagnosis).is_none() => {
-            "What was accepted shows in the passes themselves, without any model of the track. The predictions on this page are without it."
+            "The accepted hypothesis follows from the passes alone, without a track model. The \
+                 predictions on this page do not include it."
         }
         (Verdict::LeftOutPhysics, _) => {
-            "What was accepted improves also the passes that it was not fitted to. Everything else is listed with its probability."
+            "The accepted hypothesis also improves the prediction of passes that were not \
+                 fitted. The others are listed with their probabilities."
         }
     }
 }
@@ -111,7 +121,7 @@ fn facts(diagnosis: &Diagnosis, hypothesis: &Hypothesis) -> String {
             hypothesis.detectability
         ),
         _ => format!(
-            "{place} · seen in the passes themselves; probability by chance {}",
+            "{place} · found in the passes alone; probability by chance {}",
             chance(by_chance)
         ),
     }
@@ -121,8 +131,8 @@ fn alike(hypothesis: &Hypothesis) -> String {
     let names: Vec<String> = hypothesis.look_alikes.iter().map(|name| physics(name)).collect();
     let separate = hypothesis.would_separate.trim_end_matches('.');
     match (names.is_empty(), separate.is_empty()) {
-        (false, false) => format!("Looks much like {}. What would tell: {separate}.", list(&names)),
-        (false, true) => format!("Looks much like {}.", list(&names)),
-        _ => format!("What would tell: {separate}."),
+        (false, false) => format!("Look-alikes: {}. To separate them: {separate}.", list(&names)),
+        (false, true) => format!("Look-alikes: {}.", list(&names)),
+        _ => format!("To separate: {separate}."),
     }
 }

@@ -42,7 +42,7 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
         .map(|(speed, side)| panel(diagnosis, speed, side, limit_db))
         .collect();
     html! {
-        h2 { "Where recording and prediction differ" }
+        h2 { "Differences between recording and prediction" }
         (scale(limit_db))
         (figure(&panels, &caption(diagnosis, with.as_deref())))
         (mismatches(diagnosis))
@@ -216,17 +216,28 @@ fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
         many => format!("the mean of {many} sleepers"),
     };
     let shown = format!(
-        "Each cell is {sleepers} in one band of frequency: its colour is the measured less the predicted vibration level."
+        "Each cell is {sleepers} in one frequency band; the colour is the measured minus \
+             the predicted level."
     );
     let scatter = usual_scatter(&diagnosis.levels).map_or_else(String::new, |db| {
         format!(
-            " The rail's roughness alone scatters a level by about {} dB, and by more at low frequencies, of which a sleeper bay holds few waves: a speckle is to be expected everywhere, paler above, and what stands out of it in one place or in one band all along is not chance.",
+            " Roughness alone scatters a level by about {} dB, and by more at low frequencies, \
+                 where a span holds few waves. Speckle is therefore expected everywhere; a \
+                 deviation concentrated at one place or in one band is not chance.",
             digits(db, 2)
         )
     });
     let sides = with.map_or_else(
-        || " The prediction is that of the track model with its own stiffness at every sleeper.".to_owned(),
-        |with| format!(" Before is the track model re-tuned, with its own stiffness at every sleeper, after the same with {with}."),
+        || {
+            " The prediction is that of the track model with a separate stiffness at every sleeper."
+                .to_owned()
+        },
+        |with| {
+            format!(
+                " Before: re-tuned track model with a separate stiffness at every sleeper. After: \
+             the same model with {with}."
+            )
+        },
     );
     let boxes = if diagnosis.mismatches.is_empty() {
         ""
@@ -238,12 +249,13 @@ fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
 
 fn mismatches(diagnosis: &Diagnosis) -> Markup {
     if diagnosis.mismatches.is_empty() {
-        return html! { p { "No difference here is one that something left out would explain better." } };
+        return html! { p { "No difference is better explained by left-out physics." } };
     }
     let words = |mismatch: &Mismatch| {
         let [low, high] = mismatch.frequency_hz;
         format!(
-            "{}, {low:.0} to {high:.0} Hz, at {}: {} dB between measured and predicted (root mean square); probability to see as much anywhere by chance {}",
+            "{}, {low:.0} to {high:.0} Hz, at {}: {} dB between measured and predicted (root \
+                 mean square); probability of such a mismatch anywhere by chance {}",
             where_it_is(diagnosis, mismatch),
             speeds(&mismatch.speeds_km_h),
             digits(mismatch.level_db, 2),

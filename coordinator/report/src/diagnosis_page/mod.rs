@@ -51,7 +51,7 @@ pub fn diagnosis_page(diagnosis: &Diagnosis, origin: &Origin) -> String {
 
 fn reproduce(diagnosis: &Diagnosis, origin: &Origin) -> Markup {
     html! {
-        h2 { "How to reproduce it" }
+        h2 { "How to reproduce this diagnosis" }
         pre { (origin.command) }
         dl {
             dt { "recording" } dd { (diagnosis.recording) }

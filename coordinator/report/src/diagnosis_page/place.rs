@@ -238,6 +238,8 @@ fn caption(site: &Site) -> String {
         _ => format!("Levels averaged over the passes of a speed and {}.", site.at()),
     };
     format!(
-        "{what} The band is twice the scatter that roughness alone gives; dots outside it are what the prediction can't explain. What keeps its frequency when the speed changes is structure; what moves with the speed is the shape of rail or wheel."
+        "{what} The band is twice the scatter of roughness alone; the prediction does not \
+             explain dots outside it. Effects of the structure keep their frequency when the \
+             speed changes; effects of the shape of rail or wheel move with the speed."
     )
 }

@@ -1,4 +1,4 @@
-//! `tracktwin library copy`: a library into another, of either kind.
+//! `tracktwin library copy`: copies a library into another, SQLite or PostgreSQL.
 
 use super::{OrInput, Stop};
 use crate::commands::library_url::open_or_create;
@@ -9,28 +9,28 @@ use clap::Args;
 use std::error::Error;
 use tracktwin_library::{Cell, Library, LibraryError, Lost, Table};
 
-/// Rows held at a time: 4 MB of results.
+/// Rows in memory at a time: 4 MB of results.
 const ROWS_AT_A_TIME: usize = 1000;
 
-/// What `library copy` is told.
+/// Arguments of `library copy`.
 #[derive(Args)]
 #[command(
-    after_help = "Rows that are there already stay as they are, so a copy that was interrupted \
-    is gone on with,\nand two libraries can be joined in a third. In the end the digests are compared: \
-    exit code 1\nwhere a campaign is not the same in both.\n\n\
-    Of a malformed library, what is whole is copied: what cannot be read, and results that do not have\n\
-    their checksum, are left out and told (exit code 1). `tracktwin run` on the copy simulates them anew."
+    after_help = "Existing rows of the target are kept, so an interrupted copy can be continued, and two \
+    libraries can be merged into a third. At the end the digests are compared; the exit code is 1 if a \
+    campaign differs.\n\n\
+    From a damaged library the intact rows are copied. Unreadable rows, and results that do not match \
+    their checksum, are left out and listed (exit code 1). `tracktwin run` on the copy simulates them again."
 )]
 pub(in crate::commands) struct Arguments {
-    /// The library to copy: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
+    /// Source library: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL")]
     from: String,
-    /// Where to; made where there is none.
+    /// Target library; created if missing.
     #[arg(long, value_name = "URL")]
     to: String,
 }
 
-/// What was copied, and what could not be.
+/// What was copied and what was left out.
 #[derive(Default)]
 struct Copied {
     done: u64,
@@ -49,11 +49,11 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     if !copied.left_out.is_empty() {
         let incomplete = to.discard_incomplete().await?;
         if incomplete > 0 {
-            copied.left_out.push(format!("{incomplete} cases have only some of their results"));
+            copied.left_out.push(format!("{incomplete} cases with incomplete results"));
         }
     }
     println_stdout(&format!(
-        "{} of {} rows copied; the others were there",
+        "{} of {} rows copied; the others already existed",
         copied.added, copied.done
     ));
     for what in &copied.left_out {
@@ -67,7 +67,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
 async fn copy(from: &Library, to: &Library) -> Result<Copied, Stop> {
     let mut total = 0;
     for table in Table::ALL {
-        // Of what cannot be counted, it is found out how much can be read.
+        // A table that cannot be counted is read as far as possible.
         total += from.count(table).await.unwrap_or(0);
     }
     let mut progress = Progress::begin("copying", 0, total);
@@ -92,7 +92,7 @@ async fn copy(from: &Library, to: &Library) -> Result<Copied, Stop> {
 
 fn unread(table: &Table, lost: &Lost) -> String {
     let rows = lost.rows.map_or_else(|| "some".to_owned(), |rows| format!("up to {rows}"));
-    format!("{rows} rows of {} that cannot be read: {}", table.name, lost.reason)
+    format!("{rows} unreadable rows of {}: {}", table.name, lost.reason)
 }
 
 fn unwritten(table: &Table, refused: &[LibraryError]) -> Option<String> {
@@ -101,22 +101,16 @@ fn unwritten(table: &Table, refused: &[LibraryError]) -> Option<String> {
         Some(source) => format!("{first}: {source}"),
         None => first.to_string(),
     };
-    Some(format!(
-        "{} rows of {} that are not whole; the first: {reason}",
-        refused.len(),
-        table.name
-    ))
+    Some(format!("{} damaged rows of {}; the first: {reason}", refused.len(), table.name))
 }
 
-/// Says of each campaign whether it is the same in both.
+/// Prints whether each campaign is equal in both libraries.
 async fn compare(from: &Library, to: &Library) -> Result<(), Stop> {
     let mut differ = false;
     for campaign in from.campaigns().await.unwrap_or_default() {
         let there = to.digest(&campaign.id).await?;
         match from.digest(&campaign.id).await {
-            Ok(here) if here == there => {
-                println_stdout(&format!("{here}  {}: the same in both", campaign.id))
-            }
+            Ok(here) if here == there => println_stdout(&format!("{here}  {}: equal", campaign.id)),
             Ok(here) => {
                 differ = true;
                 println_stdout(&format!("{}: differs: {here} and {there}", campaign.id));

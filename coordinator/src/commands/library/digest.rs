@@ -1,4 +1,4 @@
-//! `tracktwin library digest`: one hash a campaign.
+//! `tracktwin library digest`: one hash per campaign.
 
 use super::{Stop, Which, open, print_answers};
 use serde::Serialize;

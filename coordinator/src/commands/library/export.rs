@@ -1,4 +1,4 @@
-//! `tracktwin library export`: the library as files that others open as they are.
+//! `tracktwin library export`: writes a library as Parquet or CSV files.
 
 use super::files::csv_file::CsvFile;
 use super::files::parquet_file::ParquetFile;
@@ -12,33 +12,33 @@ use std::path::{Path, PathBuf};
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Cell, Library, Table};
 
-/// Rows held at a time, and in one group of a Parquet file: 30 MB of results.
+/// Rows in memory at a time, and rows in one group of a Parquet file: 30 MB of results.
 const ROWS_A_GROUP: usize = 8192;
 
-/// What `library export` is told.
+/// Arguments of `library export`.
 #[derive(Args)]
 #[command(
-    after_help = "A folder gets a file a table, which `library import` reads again. A file gets \
-    the training set:\none row a case and speed, parameters beside features.\n\n\
+    after_help = "A folder receives one file per table, for `library import`. A file receives the training \
+    set:\none row per case and speed, with parameters and features.\n\n\
     Examples:\n  tracktwin library export --out training.parquet --library sqlite:out/library.sqlite\n  \
     python3 -c \"import pandas; print(pandas.read_parquet('training.parquet'))\""
 )]
 pub(in crate::commands) struct Arguments {
     #[command(flatten)]
     library: LibraryUrl,
-    /// A folder for all tables, or a file for the training set.
+    /// Output folder for all tables, or output file for the training set.
     #[arg(long, value_name = "DIR|FILE")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// The files' format [default: what the file's name ends in, else parquet].
+    /// File format [default: from the extension of the file, otherwise parquet].
     #[arg(long, value_enum)]
     format: Option<Format>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// Parquet: small, exact, with types; series are lists.
+    /// Parquet: small, exact, typed; series are lists.
     Parquet,
     /// CSV: series are JSON arrays.
     Csv,
@@ -82,7 +82,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     for &(table, ref name) in &tables {
         let rows = export(&library, table, name, &mut output, format).await?;
         let path = name.within(&folder);
-        let each = if named.is_some() { ", one a case and speed" } else { "" };
+        let each = if named.is_some() { ", one per case and speed" } else { "" };
         said.push(format!("{}: {rows} rows{each}", path.display()));
     }
     output.commit()?;
@@ -92,7 +92,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-/// All tables, each with its file's name.
+/// All tables with the names of their files.
 fn tables(format: Format) -> Result<Vec<(&'static Table, FileName)>, Stop> {
     let named = |table: &'static Table| {
         Ok((table, FileName::new(table.name)?.with_ending(format.extension())))
@@ -108,7 +108,7 @@ async fn export(
     output: &mut Output,
     format: Format,
 ) -> Result<usize, Stop> {
-    let at = || format!("{name}: it cannot be written");
+    let at = || format!("{name}: cannot be written");
     let path = output.stage(name);
     let mut file = Sink::create(&path, table, format).with_context(at)?;
     let mut count = 0;

@@ -1,4 +1,4 @@
-//! `tracktwin library import`: what `export` wrote, into a library.
+//! `tracktwin library import`: adds exported tables to a library.
 
 use super::files::parquet_file;
 use super::{OrInput, Stop};
@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use tracktwin_files::inside;
 use tracktwin_library::{Cell, Library, LibraryError, Table};
 
-/// What `library import` is told.
+/// Arguments of `library import`.
 #[derive(Args)]
 pub(in crate::commands) struct Arguments {
-    /// The folder that `library export --format parquet` wrote.
+    /// Folder written by `library export --format parquet`.
     folder: PathBuf,
     #[command(flatten)]
     library: LibraryUrl,
@@ -22,12 +22,12 @@ pub(in crate::commands) struct Arguments {
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let folder = &arguments.folder;
     let file = |table: &Table| inside(folder, &format!("{}.parquet", table.name));
-    // Before anything is written.
+    // Check before anything is written.
     let files = Table::ALL.iter().map(|table| file(table)).collect::<Result<Vec<_>, _>>()?;
     let missing = Table::ALL.iter().zip(&files).find(|(_, file)| !file.is_file());
     if let Some((missing, _)) = missing {
         return Err(anyhow!(
-            "{}: there is no {}.parquet in it; `tracktwin library export --out FOLDER` writes all tables",
+            "{}: {}.parquet is missing; `tracktwin library export --out FOLDER` writes all tables",
             folder.display(),
             missing.name
         ))
@@ -56,7 +56,7 @@ async fn import(
     };
     let taken = parquet_file::read(path, table, take).await;
     taken.map_err(|error| {
-        // The file is to blame, unless the library could not be written.
+        // Wrong input, unless the library could not be written.
         let is_input = error.downcast_ref().is_none_or(LibraryError::is_wrong_input);
         let error = error.context(path.display().to_string());
         if is_input { Stop::Input(error) } else { Stop::Failure(error) }

@@ -1,4 +1,4 @@
-//! `tracktwin library`: what a library holds, asked, copied and looked over.
+//! `tracktwin library`: queries, copies and verifies a library.
 
 mod copy;
 mod digest;
@@ -16,32 +16,32 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 use tracktwin_library::{CampaignRecord, Library};
 
-/// What can be asked of a library, and done with it.
+/// The subcommands.
 #[derive(Subcommand)]
 pub(super) enum Question {
-    /// How many cases of each campaign are finished, waiting, in work and given up.
+    /// Count the finished, waiting, leased and given-up cases of each campaign.
     Status(Which),
-    /// A hash over all results in order: equal for equal campaigns, however and wherever they were
-    /// run.
+    /// Print one hash over all results of each campaign; equal campaigns have equal hashes.
     Digest(Which),
-    /// Ask in SQL; nothing can be changed.
+    /// Query with SQL (read-only).
     Sql(sql::Arguments),
-    /// Write the library's tables, or its training set, as Parquet or CSV files.
+    /// Write the tables or the training set as Parquet or CSV files.
     Export(export::Arguments),
-    /// Add what `export` wrote as Parquet files to a library.
+    /// Add tables written by `export` (Parquet) to a library.
     Import(import::Arguments),
-    /// Copy a library into another, of either kind; interrupted, the same command goes on.
+    /// Copy a library into another, SQLite or PostgreSQL; repeat the command to continue an
+    /// interrupted copy.
     Copy(copy::Arguments),
-    /// Look everything over: hashes, gaps, duplicates, numbers that are none.
+    /// Verify integrity: hashes, gaps, duplicates, NaN and infinite values.
     Verify(Which),
 }
 
-/// Which library is asked, and how it answers.
+/// Library and output format.
 #[derive(Args)]
 pub(super) struct Which {
     #[command(flatten)]
     library: LibraryUrl,
-    /// Answer in JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
 }
@@ -64,11 +64,11 @@ async fn open(url: &LibraryUrl) -> Result<(Library, Vec<CampaignRecord>), Stop> 
     Ok((library, campaigns))
 }
 
-/// How one of several campaigns is named with most commands.
+/// Remedy if the library holds several campaigns, for most commands.
 pub(super) const CHOOSE_REMEDY: &str = "choose one with --campaign";
 
-/// One campaign of a library: the one with this id or this name, or the only one; `remedy` says how
-/// to name one of several.
+/// One campaign of a library: the one with this id or name, or the only one; `remedy` states how to
+/// choose one of several.
 pub(super) async fn choose(
     library: &Library,
     named: Option<&str>,
@@ -82,16 +82,21 @@ pub(super) async fn choose(
     let meant: Vec<_> = all.iter().filter(is_meant).collect();
     let wrong = match (&meant[..], named) {
         ([one], _) => return Ok((*one).clone()),
-        ([], _) if all.is_empty() => "it holds no campaign yet; `tracktwin run` or `tracktwin \
-                                      campaign add` adds one"
-            .to_owned(),
+        ([], _) if all.is_empty() => {
+            "it holds no campaign; add one with `tracktwin run` or `tracktwin campaign add`"
+                .to_owned()
+        }
         ([], named) => {
             let all: Vec<_> = all.iter().collect();
-            format!("it has no campaign {}; it has {}", named.unwrap_or_default(), ids(&all))
+            format!(
+                "it has no campaign {}; choose one of: {}",
+                named.unwrap_or_default(),
+                ids(&all)
+            )
         }
         (several, None) => format!("it holds several campaigns; {remedy}: {}", ids(several)),
         (several, Some(named)) => {
-            format!("several campaigns are called {named}; give the id: {}", ids(several))
+            format!("several campaigns are named {named}; give the id: {}", ids(several))
         }
     };
     Err(Stop::Input(anyhow!("library {}: {wrong}", library.name())))
@@ -103,7 +108,9 @@ fn print_answers<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> S
         println_stdout(&json);
     } else {
         if answers.is_empty() {
-            println_stderr("it holds no campaign yet; `tracktwin campaign add FILE` adds one");
+            println_stderr(
+                "the library holds no campaign; add one with `tracktwin campaign add FILE`",
+            );
         }
         for answer in answers {
             println_stdout(&text(answer));

@@ -1,4 +1,4 @@
-//! `tracktwin library sql`: the library asked in SQL.
+//! `tracktwin library sql`: queries a library with SQL.
 
 use super::files::text;
 use super::{OrInput, Stop};
@@ -11,32 +11,32 @@ use tracktwin_library::{Answer, Cell, LibraryError};
 /// Significant digits of a number in a table.
 const DIGITS: usize = 9;
 
-/// What `library sql` is told.
+/// Arguments of `library sql`.
 #[derive(Args)]
 #[command(
     after_help = "Tables and views, with worked queries: docs/how-to/query-the-library.md.\n\
-    Names with capitals need no quotes, in either database.\n\n\
+    Names with capital letters need no quotes, with SQLite and PostgreSQL.\n\n\
     Example:\n  tracktwin library sql \"select name, finished, cases from campaign_status\" \
     --library sqlite:out/library.sqlite"
 )]
 pub(in crate::commands) struct Arguments {
-    /// The statement; `-` reads it from standard input.
+    /// SQL statement; `-` reads it from standard input.
     #[arg(allow_hyphen_values = true)]
     statement: String,
     #[command(flatten)]
     library: LibraryUrl,
-    /// How the answer is written.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Format {
-    /// Aligned columns, for people: numbers with nine digits.
+    /// Aligned columns; numbers with nine digits.
     Table,
-    /// Comma-separated values with a head, numbers with all their digits.
+    /// Comma-separated values with column names; numbers with all digits.
     Csv,
-    /// An array with an object a row, numbers with all their digits.
+    /// Array with one object per row; numbers with all digits.
     Json,
 }
 
@@ -56,22 +56,22 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let answered = library.query(&statement, &mut printer).await;
     match answered.and_then(|()| printer.end()) {
         Ok(()) => Ok(()),
-        // Who reads has seen enough, as `head` has.
+        // The reader has closed the output, as `head` does.
         Err(Ended::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(Ended::Output(error)) => Err(error.into()),
         Err(Ended::Library(error)) => Err(error.into()),
         Err(Ended::Twice(column)) => {
-            Err(anyhow!("two columns are called {column}; rename one with `as` for JSON"))
+            Err(anyhow!("two columns are named {column}; rename one with `as` for JSON output"))
                 .or_input()
         }
     }
 }
 
-/// Why an answer ends early.
+/// Reason for an early end of the output.
 enum Ended {
     Library(LibraryError),
     Output(io::Error),
-    /// JSON has each name once in an object.
+    /// A name can occur only once in a JSON object.
     Twice(String),
 }
 
@@ -91,7 +91,7 @@ struct Printer {
     out: BufWriter<StdoutLock<'static>>,
     format: Format,
     names: Vec<String>,
-    /// For a table: all of it, since its columns are as wide as their widest cell.
+    /// All rows, for a table, because its columns are as wide as their widest cell.
     rows: Vec<Vec<String>>,
     printed: usize,
 }
@@ -139,13 +139,13 @@ impl Answer for Printer {
 }
 
 fn csv_record(out: &mut impl Write, cells: &[String]) -> io::Result<()> {
-    // Nothing is kept back: `out` has a buffer of its own.
+    // Rows are written at once: `out` is buffered.
     let mut writer = csv::WriterBuilder::new().buffer_capacity(256).from_writer(out);
     writer.write_record(cells)?;
     writer.flush()
 }
 
-/// A number with no more digits than people read; programs get all of them.
+/// A number rounded to the digits of a table.
 fn legible(cell: &Cell) -> Cell {
     match cell {
         Cell::Real(real) => {

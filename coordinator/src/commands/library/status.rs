@@ -1,11 +1,11 @@
-//! `tracktwin library status`: how many cases stand where.
+//! `tracktwin library status`: counts of cases by state.
 
 use super::{Stop, Which, open, print_answers};
 use crate::commands::contact::contact_sentence;
 use serde::Serialize;
 use tracktwin_library::{CampaignRecord, ContactLoss, Library};
 
-/// How many given-up cases are explained.
+/// Number of given-up cases listed with their reason.
 const FAILURES_SHOWN: u32 = 5;
 
 #[derive(Serialize)]
@@ -42,8 +42,8 @@ impl Counts {
     fn text(&self) -> String {
         let Self { campaign, cases, finished, waiting, leased, failed, .. } = self;
         let counts = format!(
-            "{campaign}: {cases} cases, {finished} finished, {waiting} waiting, {leased} in work, \
-             {failed} given up"
+            "{campaign}: {cases} cases, {finished} finished, {waiting} waiting, {leased} \
+                 leased, {failed} given up"
         );
         let failures = self.failures.iter().map(|Failure { sobol_index, error }| {
             format!("\n  case {sobol_index} was given up: {error}")

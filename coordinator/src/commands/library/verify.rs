@@ -1,13 +1,13 @@
-//! `tracktwin library verify`: whether the library is what it says it is.
+//! `tracktwin library verify`: integrity of a library.
 
 use super::{Stop, Which};
 use crate::commands::progress::Progress;
 use crate::commands::{println_stderr, println_stdout};
 use tracktwin_library::{IntegrityFault, Library, LibraryError, Verified};
 
-/// What no checksum is made of, and no hash.
-const UNCHECKED: &str = "not checked: who computed a case, when and for how long; attempts, audits, workers, \
-                         progress; scores of trainings; what estimates, findings and trials say";
+/// Data that no checksum or hash covers.
+const UNCHECKED: &str = "not checked: worker, time and duration of a case; attempts, audits, workers, progress; \
+                         scores of trainings; contents of estimates, findings and trials";
 
 pub(super) async fn run(which: &Which) -> Result<(), Stop> {
     let (name, verified) = match which.library.open().await {
@@ -24,7 +24,7 @@ pub(super) async fn run(which: &Which) -> Result<(), Stop> {
 }
 
 async fn verify(library: &Library) -> Result<Verified, Stop> {
-    // What the counts are worth is found out in between.
+    // The counts may be wrong; the verification checks them.
     let mut cases = 0;
     for campaign in library.campaigns().await.unwrap_or_default() {
         cases += library.status(&campaign.id).await.map_or(0, |it| u64::from(it.finished));
@@ -40,7 +40,8 @@ async fn verify(library: &Library) -> Result<Verified, Stop> {
     Ok(verified)
 }
 
-/// Whether a library can't be opened for what is there, rather than because nothing is or answers.
+/// Whether a library cannot be opened because of its content, not because it is missing or does not
+/// respond.
 fn says_what_is_there(error: &anyhow::Error) -> bool {
     error.downcast_ref().is_some_and(|error| {
         matches!(
@@ -65,14 +66,14 @@ fn tell(json: bool, name: &str, verified: &Verified) {
         }
         if findings.is_empty() {
             println_stdout(&format!(
-                "nothing is wrong with {name} ({attested} cases have their checksums)"
+                "{name}: no faults found ({attested} cases match their checksums)"
             ));
         }
     }
     if *unattested > 0 {
         println_stderr(&format!(
-            "{unattested} cases have results without checksum, of before schema 8: nothing tells whether they \
-             were altered"
+            "{unattested} cases have results without a checksum (stored before schema 8): no \
+                 test shows whether they were altered"
         ));
     }
     for note in notes.iter().map(String::as_str).chain([UNCHECKED]) {

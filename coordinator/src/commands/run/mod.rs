@@ -1,4 +1,4 @@
-//! `tracktwin run`: the whole chain, from a campaign to an evaluated recording.
+//! `tracktwin run`: simulates a campaign, trains models and evaluates a recording.
 
 mod room;
 mod sample;
@@ -23,36 +23,37 @@ use tracktwin_library::{Library, Status};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_signal::recording::Recording;
 
-/// Folder of the models in the folder for all.
+/// Name of the models' folder inside the output folder.
 const MODELS: &str = "models";
 
-/// What `run` is told.
+/// Arguments of `run`.
 #[derive(Args)]
 pub(super) struct Arguments {
     /// Campaign file (TOML) [default: a small campaign over the paper's Table D1].
     campaign: Option<PathBuf>,
-    /// How many cases, instead of the campaign's own number; at least 200, unless --no-train is given.
+    /// Number of cases; overrides the number in the campaign file; at least 200, unless --no-train
+    /// is given.
     #[arg(long, value_name = "N", value_parser = count::<u32>(CASES))]
     cases: Option<u32>,
-    /// Library to fill: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`; one that holds part of the
-    /// campaign is gone on with [default: sqlite:OUT/library.sqlite].
+    /// Library for the results: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`; a campaign that
+    /// it holds in part is continued [default: sqlite:OUT/library.sqlite].
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Folder for models and report.
+    /// Output folder for models and report.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// Simulate only.
+    /// Simulate only; do not train models.
     #[arg(long)]
     no_train: bool,
     /// Recording to evaluate [default: a bundled sample].
     #[arg(long, value_name = "DIR", conflicts_with = "no_train")]
     recording: Option<PathBuf>,
-    /// Cores to simulate on [default: all].
+    /// Number of cores for the simulation [default: all].
     #[arg(long, value_name = "N", value_parser = cores)]
     cores: Option<NonZeroUsize>,
-    /// Print the built-in campaign file and do nothing: a start for one's own.
+    /// Print the built-in campaign file, as a template, and exit.
     #[arg(long)]
     print_campaign: bool,
 }
@@ -67,7 +68,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None => Campaign::built_in(arguments.cases),
     }
     .or_input()?;
-    // A recording that can't be used should not be found out after the simulation.
+    // Check the recording before the simulation.
     let given = arguments.recording.as_deref().map(evaluate::open).transpose()?;
     if let Some(recording) = &given {
         check(recording, &campaign).or_input()?;
@@ -94,14 +95,14 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
     let library = open_or_create(&url).await?;
     let said = chain(&library, &campaign, recording, &arguments).await;
-    // What the library holds is then in one file, fit to be copied.
+    // Closing leaves the library in one file, which can be copied.
     library.close().await;
     let (line, evaluation) = said?;
     println_stdout(&line);
     evaluation.map_or(Ok(()), |evaluation| evaluate::conclude(&evaluation))
 }
 
-/// Simulates, trains and evaluates; says what was made of it.
+/// Simulates, trains and evaluates; returns the line to print.
 async fn chain(
     library: &Library,
     campaign: &Campaign,
@@ -120,7 +121,8 @@ async fn chain(
     bar.end();
     let Some(recording) = recording else {
         let models = out.join(MODELS);
-        let line = format!("models: {}; `tracktwin evaluate` takes a recording", models.display());
+        let line =
+            format!("models: {}; evaluate a recording with `tracktwin evaluate`", models.display());
         return Ok((line, None));
     };
     let evaluation =
@@ -128,16 +130,16 @@ async fn chain(
     Ok((format!("report: {}", out.join("report.html").display()), Some(evaluation)))
 }
 
-/// The bundled recording, if models of the campaign can evaluate it; else it is said at once that nothing
-/// will be evaluated.
+/// The bundled recording, if models of the campaign can evaluate it; otherwise a line states that
+/// nothing will be evaluated.
 fn sample_for(campaign: &Campaign, out: &Path, force: Force) -> Result<Option<Recording>, Stop> {
     let recording = sample::open(&out.join("sample"), force)?;
     match check(&recording, campaign) {
         Ok(()) => Ok(Some(recording)),
         Err(other) => {
             println_stderr(&format!(
-                "models will be trained and nothing evaluated, for the sample recording is of another kind \
-                 ({other}); `--recording DIR` evaluates one of your own"
+                "models will be trained, but the sample recording will not be evaluated: it is of \
+                     another kind ({other}); `--recording DIR` evaluates one of your own"
             ));
             Ok(None)
         }
@@ -158,15 +160,15 @@ fn all_cores() -> NonZeroUsize {
     std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN)
 }
 
-/// Simulates what the library lacks of a campaign; Ctrl-C leaves it to be gone on with.
+/// Simulates the missing cases of a campaign; Ctrl-C interrupts it, and a later run continues it.
 async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -> Result<(), Stop> {
     continuity::check(library, campaign, println_stderr).await?;
-    // Whoever is refused has added nothing.
+    // A rejected campaign adds nothing to the library.
     let claim = tracktwin_farm::embedded::claim(library).await?;
     room::check(library, campaign).await?;
     tracktwin_farm::campaign::store_campaign(library, campaign).await?;
     let id = campaign.id();
-    let shutdown = stop_on_signal("stopping: cases that are begun go back to the library")?;
+    let shutdown = stop_on_signal("stopping: cases in progress are returned to the library")?;
     let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
     let stopped = shutdown.clone();
     let mut progress = None::<Progress>;
@@ -185,12 +187,14 @@ async fn simulate(library: &Library, campaign: &Campaign, cores: NonZeroUsize) -
     progress.into_iter().for_each(Progress::end);
     if stopped.is_cancelled() || status.done() < status.total() {
         let left = status.total() - status.done();
-        return Err(anyhow!("interrupted with {left} cases left; the same command goes on").into());
+        return Err(
+            anyhow!("interrupted with {left} cases left; repeat the command to continue").into()
+        );
     }
     println_stderr(&contact_sentence(library.contact_loss(&id).await?, status.finished));
     if status.failed > 0 {
         println_stderr(&format!(
-            "{} cases were given up; `tracktwin library status` says why; going on without them",
+            "{} cases were given up (reasons: `tracktwin library status`); continuing without them",
             status.failed
         ));
     }

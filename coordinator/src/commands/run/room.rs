@@ -1,4 +1,4 @@
-//! Whether there is room for what a campaign will make.
+//! Checks the disk space for the results of a campaign.
 
 use super::super::files::free_bytes;
 use super::super::{Stop, println_stderr};
@@ -6,11 +6,11 @@ use tracktwin_farm::campaign::Campaign;
 use tracktwin_library::Library;
 use tracktwin_signal::ThirdOctave;
 
-/// Bytes of a pass beside its numbers: keys, hashes, indices and the log that is written before the file.
+/// Bytes of a pass in addition to its numbers: keys, hashes, indices and write-ahead log.
 const BESIDE_A_PASS_BYTES: u64 = 1500;
 
-/// Says at once where the disk of a library in a file will not hold the cases that are left. That is no reason
-/// not to begin: what is stored by then stays, and the same command goes on when there is room.
+/// Warns if the disk of a SQLite library is too small for the remaining cases. The simulation may
+/// start nevertheless: stored results are kept, and the command continues once there is space.
 pub(super) async fn check(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
     let Some(path) = library.path() else { return Ok(()) };
     let finished = library.status(&campaign.id()).await?.finished;
@@ -19,8 +19,8 @@ pub(super) async fn check(library: &Library, campaign: &Campaign) -> Result<(), 
     let free = free_bytes(folder.unwrap_or(std::path::Path::new(".")));
     if let Some(free) = free.filter(|free| *free < needed) {
         println_stderr(&format!(
-            "{}: the disk has {:.1} GB left, and the cases to be simulated will take about {:.1} GB; make room, \
-             or give another --library",
+            "{}: the disk has {:.1} GB of free space, but the remaining cases need about {:.1} GB; free space \
+             or use another --library",
             library.name(),
             free as f64 / 1e9,
             needed as f64 / 1e9
@@ -29,7 +29,7 @@ pub(super) async fn check(library: &Library, campaign: &Campaign) -> Result<(), 
     Ok(())
 }
 
-/// Bytes that a case's results take.
+/// Bytes of the results of a case.
 fn case_bytes(campaign: &Campaign) -> u64 {
     let experiment = &campaign.definition.experiment;
     let numbers = experiment.features.frequencies_hz().len() + ThirdOctave::COUNT;

@@ -1,7 +1,7 @@
-//! The recording that comes with the program, for those who have none at hand.
+//! The sample recording bundled with the program.
 //!
-//! Made by `tracktwin simulate`; how, and what is hidden in it, stands beside it in
-//! `coordinator/sample/README.md`.
+//! Made by `tracktwin simulate`; `coordinator/sample/README.md` states the command and the hidden
+//! parameters.
 
 use super::super::Stop;
 use super::super::files::{Force, check};
@@ -9,7 +9,7 @@ use std::path::Path;
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_signal::recording::Recording;
 
-/// The files of the sample's folder.
+/// The files of the sample.
 const FILES: [(&str, &[u8]); 4] = [
     ("recording.json", include_bytes!("../../../sample/recording.json")),
     ("pass-07kmh-1.parquet", include_bytes!("../../../sample/pass-07kmh-1.parquet")),
@@ -17,12 +17,12 @@ const FILES: [(&str, &[u8]); 4] = [
     ("pass-13kmh-1.parquet", include_bytes!("../../../sample/pass-13kmh-1.parquet")),
 ];
 
-/// Makes sure that the sample may be written.
+/// Checks that the sample may be written.
 pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
     check(folder, Kind::SimulatedRecording, force, &FILES.map(|(name, _)| name))
 }
 
-/// Writes the sample to `folder`, so that a user can look at it, and opens it.
+/// Writes the sample to `folder` and opens it.
 pub(super) fn open(folder: &Path, force: Force) -> Result<Recording, Stop> {
     let mut output = Output::begin(folder, Kind::SimulatedRecording, force.force)?;
     let [manifest, passes @ ..] = FILES;

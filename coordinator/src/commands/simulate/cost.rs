@@ -1,17 +1,17 @@
-//! What a simulation costs, said before it is begun.
+//! Size of a simulation, checked before it starts.
 
 use super::track::SimulatedTrack;
 use super::{Arguments, Drive, RUN_IN_SPANS};
 use anyhow::anyhow;
 
-/// Bytes that a time step takes until it is in the recording's file: acceleration, force, position
-/// and surface as the solver has them, twice over while they are measured, and the file's columns.
+/// Bytes per time step until it is in the recording's file: acceleration, force, position and
+/// surface of the solver, a second copy during measurement, and the columns of the file.
 const BYTES_A_STEP: f64 = 120.0;
 
 /// Time steps of all passes together.
 const STEPS_MAX: f64 = 2e7;
 
-/// Refuses what no memory holds, with what would do.
+/// Returns an error, with a remedy, for a simulation that exceeds the memory.
 pub(super) fn check(
     arguments: &Arguments,
     track: &SimulatedTrack,
@@ -25,8 +25,8 @@ pub(super) fn check(
         return Ok(());
     }
     Err(anyhow!(
-        "{seconds:.3} s of passes in steps of {:e} s are {steps:.1e} samples and {:.1} GB; {STEPS_MAX:.0e} \
-         are the most: give higher speeds, fewer passes or spans, or --time-step {:.1e}",
+        "{seconds:.3} s of passes in steps of {:e} s give {steps:.1e} samples and {:.1} GB; the limit is \
+         {STEPS_MAX:.0e} samples: use higher speeds, fewer passes or spans, or --time-step {:.1e}",
         arguments.time_step,
         1e-9 * BYTES_A_STEP * steps,
         seconds / STEPS_MAX

@@ -11,14 +11,14 @@ use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter};
 /// Physics beyond the paper's model, and faults of the measuring chain.
 #[derive(Args)]
 pub(in crate::commands) struct Extensions {
-    /// Physics beyond the paper or a fault of the measuring chain; may stand several times:
+    /// Extension: physics beyond the paper or a fault of the measuring chain, e.g.
     /// `sleeper_bolt:stiffness_N_per_m=3e7`, `hanging_sleeper@SN19-SN20:gap_m=2e-4`,
-    /// `fastening_clamp@SN10-SN30/4:...`, `rail_joint@2.4375m:dip_m=8e-5`,
-    /// `corrugation@2m-3m:...`; `--extend list` shows all with their parameters.
+    /// `fastening_clamp@SN10-SN30/4:...`, `rail_joint@2.4375m:dip_m=8e-5`, `corrugation@2m-3m:...`;
+    /// may be repeated. `--extend list` lists all kinds with their parameters.
     #[arg(long = "extend", value_name = "NAME[@PLACE][:PARAMETER=VALUE,...]")]
     extend: Vec<String>,
-    /// TOML file of `[[extension]]` tables, each with `physics`, `x_m` or `sleepers`, and values;
-    /// may stand several times.
+    /// TOML file with `[[extension]]` tables, each with `physics`, `x_m` or `sleepers`, and
+    /// parameters; may be repeated.
     #[arg(long = "extension", value_name = "FILE.toml")]
     files: Vec<PathBuf>,
 }
@@ -31,12 +31,12 @@ struct File {
 }
 
 impl Extensions {
-    /// Whether only the list of all kinds is asked for.
+    /// Whether only the list of all kinds is requested.
     pub(in crate::commands) fn asks_for_list(&self) -> bool {
         self.extend.iter().any(|text| text == "list")
     }
 
-    /// Those of the files, then those of the command line.
+    /// The extensions of the files, then those of the command line.
     pub(in crate::commands) fn instances(&self) -> Result<Vec<ExtensionInstance>, Stop> {
         let mut instances = Vec::new();
         for path in &self.files {
@@ -58,12 +58,12 @@ impl Extensions {
     }
 }
 
-/// All kinds, with what they need.
+/// All kinds with their parameters.
 pub(in crate::commands) fn list() -> String {
     let parameter = |parameter: &KindParameter| {
         let given = match parameter.default {
-            Some(value) => format!("else {value}"),
-            None => format!("needed, such as {:e}", parameter.typical),
+            Some(value) => format!("default {value}"),
+            None => format!("required, e.g. {:e}", parameter.typical),
         };
         format!("\n  {}: {}; {given}", parameter.name, parameter.meaning)
     };

@@ -1,4 +1,4 @@
-//! `tracktwin simulate`: passes over one track, written as a recording.
+//! `tracktwin simulate`: simulates passes over one track and writes them as a recording.
 
 mod cost;
 mod extensions;
@@ -27,40 +27,40 @@ use tracktwin_track::extension::Class;
 use tracktwin_track::model::{Roughness, Surface};
 use tracktwin_track::time;
 
-/// Spans at either end of the track that are not recorded: the ends are held.
+/// Spans at either end of the track that are not recorded, because the ends are fixed.
 const END_SPANS: usize = 6;
 
-/// Spans that the wheel runs before anything is recorded.
+/// Spans that the wheel travels before the recording starts.
 const RUN_IN_SPANS: usize = 3;
 
-/// What was put in, beside the recording.
+/// File with the simulated parameters and extensions.
 const TRUTH: &str = "truth.json";
 
-/// What `simulate` is told.
+/// Arguments of `simulate`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Folder to write the recording to; what was put in is written beside it as `truth.json`.
+    /// Output folder of the recording; the simulated parameters are written to `truth.json` in it.
     #[arg(long, value_name = "DIR", required_unless_present = "extend")]
     out: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
-    /// Speed in km/h; may stand several times [default: the preset's three].
+    /// Speed in km/h; may be repeated [default: the preset's three].
     #[arg(long = "speed", value_name = "KMH", value_parser = number(SPEED))]
     speeds_km_h: Vec<f64>,
-    /// Sleeper spans of the track; recorded is what lies six or more from either end.
+    /// Number of sleeper spans of the track; the six spans at either end are not recorded.
     #[arg(long, default_value_t = 25, value_parser = count::<usize>(SPANS))]
     spans: usize,
-    /// Seed of the surface and of the noise.
+    /// Seed of surface and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// A parameter's value, everywhere or at some sleepers; may stand several times:
-    /// `railpad_stiffness_N_m=9e7`, `ballast_stiffness_N_m@SN12=4e6`, `...@SN12-SN15=4e6`.
+    /// Value of a parameter at all sleepers or at some of them, e.g. `railpad_stiffness_N_m=9e7`,
+    /// `ballast_stiffness_N_m@SN12=4e6`, `...@SN12-SN15=4e6`; may be repeated.
     #[arg(long = "set", value_name = "NAME[@SLEEPERS]=VALUE")]
     settings: Vec<Setting>,
-    /// Track to start from.
+    /// Preset that gives the nominal track.
     #[arg(long, value_enum, default_value_t = Track::VTrack)]
     preset: Track,
-    /// Passes at each speed.
+    /// Number of passes at each speed.
     #[arg(long, default_value_t = 1, value_parser = count::<u32>(PASSES))]
     passes: u32,
     /// Share of the surface's power that differs from pass to pass, 0 to 1.
@@ -70,24 +70,24 @@ pub(super) struct Arguments {
     sensor: Sensor,
     #[command(flatten)]
     extensions: Extensions,
-    /// Rail elements a span.
+    /// Number of rail elements per span.
     #[arg(long, default_value_t = 8, value_parser = count::<usize>(ELEMENTS))]
     rail_elements: usize,
-    /// Elements of a half sleeper.
+    /// Number of elements of a half sleeper.
     #[arg(long, default_value_t = 8, value_parser = count::<usize>(ELEMENTS))]
     sleeper_elements: usize,
-    /// Time step in s, at the same time the sample interval.
+    /// Time step in s; also the sample interval.
     #[arg(long, default_value_t = 1e-5, value_name = "S", value_parser = number(TIME_STEP))]
     time_step: f64,
-    /// Leave out the local flexibility of the loaded element, as the paper does.
+    /// Neglect the local flexibility of the loaded element, as the paper does.
     #[arg(long)]
     no_local_flexibility: bool,
 }
 
-/// A preset by its name on the command line.
+/// A preset.
 #[derive(Clone, Copy, ValueEnum)]
 pub(super) enum Track {
-    /// The downscaled test rig of the paper.
+    /// V-Track, the downscaled test rig of the paper.
     VTrack,
     /// V-Track enlarged five times.
     RealScale,
@@ -108,7 +108,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
         return Ok(());
     }
     let Some(out) = &arguments.out else {
-        return Err(anyhow!("--out: say in which folder the recording goes")).or_input();
+        return Err(anyhow!("--out: the folder of the recording is missing")).or_input();
     };
     check(out, Kind::SimulatedRecording, arguments.force, &["recording.json", TRUTH])?;
     let track = SimulatedTrack::new(arguments)?;
@@ -133,7 +133,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-/// For how long the wheel was in the air, of all passes the one that was longest.
+/// Sentence on loss of contact, from the pass with the largest share.
 fn contact_sentence(passes: &[Pass]) -> String {
     let lost = passes.iter().filter(|pass| pass.contact_loss_share > Some(0.0));
     let share = |pass: &&Pass| pass.contact_loss_share.unwrap_or(0.0);
@@ -149,18 +149,19 @@ fn contact_sentence(passes: &[Pass]) -> String {
     }
 }
 
-/// One pass as it is to be driven.
+/// One pass to simulate.
 struct Drive {
     speed_km_h: f64,
-    /// Seed of everything that differs from pass to pass.
+    /// Seed of all random numbers that differ between passes.
     seed: u64,
-    /// How far the wheel has rolled, modulo a turn, before it comes to the track's origin.
+    /// Distance that the wheel has rolled, modulo its circumference, before the origin of the
+    /// track.
     wheel_turned_m: f64,
 }
 
 /// The passes at each speed.
 ///
-/// Where the wheel's own shape matters, every pass but the first begins at a random angle.
+/// If the shape of the wheel matters, every pass except the first starts at a random angle.
 fn drives(arguments: &Arguments, track: &SimulatedTrack) -> Vec<Drive> {
     let speeds_km_h = match &arguments.speeds_km_h[..] {
         [] => Preset::from(arguments.preset).speeds_km_h(),
@@ -182,7 +183,7 @@ fn drives(arguments: &Arguments, track: &SimulatedTrack) -> Vec<Drive> {
     drives
 }
 
-/// Runs the wheel over the track, all passes of a speed together.
+/// Simulates all passes of a speed together.
 fn record(
     arguments: &Arguments,
     track: &SimulatedTrack,
@@ -215,7 +216,7 @@ fn record(
     Ok(passes)
 }
 
-/// The surface that a pass sees: shared by all passes but for the unrepeated share.
+/// The surface of a pass: shared by all passes, except for the unrepeated share.
 fn surface(arguments: &Arguments, track: &SimulatedTrack, pass_seed: u64) -> Surface {
     let roughness = Roughness::new(track.level());
     let shared = track.model().surface(&roughness, arguments.seed);
@@ -226,7 +227,7 @@ fn surface(arguments: &Arguments, track: &SimulatedTrack, pass_seed: u64) -> Sur
     }
 }
 
-/// A seed for what differs from pass to pass.
+/// Seed of the random numbers of a pass.
 fn pass_seed(seed: u64, speed_km_h: f64, pass: u32) -> u64 {
     let mut hasher = blake3::Hasher::new_derive_key("tracktwin simulated pass 1");
     hasher.update(&seed.to_le_bytes()).update(&speed_km_h.to_le_bytes());
@@ -238,5 +239,9 @@ fn pass_seed(seed: u64, speed_km_h: f64, pass: u32) -> u64 {
 /// A number from 0 to 1.
 fn share(text: &str) -> Result<f64, String> {
     let share: f64 = text.parse().map_err(|_| "write a number from 0 to 1".to_owned())?;
-    if (0.0..=1.0).contains(&share) { Ok(share) } else { Err("it goes from 0 to 1".to_owned()) }
+    if (0.0..=1.0).contains(&share) {
+        Ok(share)
+    } else {
+        Err("it must lie between 0 and 1".to_owned())
+    }
 }

@@ -1,4 +1,4 @@
-//! The measuring chain of a simulated recording: extensions of the chain, noise, steps, odometer.
+//! The measuring chain of a simulated recording: extensions, noise, resolution, odometer.
 
 use super::super::Stop;
 use super::super::numbers::number;
@@ -16,25 +16,25 @@ use tracktwin_track::extension::Measured;
 use tracktwin_track::model::TrackModel;
 use tracktwin_track::time::PassRecord;
 
-/// Wavelengths of the odometer's wander in m.
+/// Wavelengths of the odometer error in m.
 const WANDER_M: [f64; 4] = [0.6, 1.1, 2.3, 4.7];
 
-/// How what was felt is recorded.
+/// Properties of the measuring chain.
 #[derive(Args)]
 pub(super) struct Sensor {
     /// Standard deviation of the sensor's white noise in m/s2.
     #[arg(long, default_value_t = 0.0, value_name = "M_S2", value_parser = number(SENSOR))]
     noise: f64,
-    /// Steps in which accelerations are recorded, in m/s2; 0 for none.
+    /// Resolution of the recorded accelerations in m/s2; 0 for no rounding.
     #[arg(long, default_value_t = 0.0, value_name = "M_S2", value_parser = number(SENSOR))]
     resolution: f64,
-    /// By how much the odometer wanders at most, in m.
+    /// Largest odometer error in m.
     #[arg(long, default_value_t = 0.0, value_name = "M", value_parser = number(WANDER))]
     odometer: f64,
 }
 
 impl Sensor {
-    /// What is recorded of a pass from `from_m` on; `seed` fixes noise and wander.
+    /// The recording of a pass from `from_m` on; `seed` determines noise and odometer error.
     pub(super) fn measured(
         &self,
         model: &TrackModel,
@@ -73,7 +73,7 @@ impl Sensor {
         Ok(())
     }
 
-    /// Waves of random phase whose sum never exceeds the limit.
+    /// Sum of waves with random phases that never exceeds the limit.
     fn wander(&self, position_m: &mut [f64], random: &mut impl Rng) {
         let phases = WANDER_M.map(|_| TAU * unit(random.next_u64()));
         let amplitude_m = self.odometer / WANDER_M.len() as f64;
@@ -86,7 +86,7 @@ impl Sensor {
     }
 }
 
-/// Samples a second, to the nanohertz: 1 / 2e-5 s is 50 kHz, not 49999.99999999999 Hz.
+/// Sample rate, rounded to 1 nHz: 1 / 2e-5 s is 50 kHz, not 49999.99999999999 Hz.
 pub(super) fn sample_rate_hz(time_step_s: f64) -> f64 {
     (1e9 / time_step_s).round() / 1e9
 }

@@ -1,19 +1,19 @@
-//! `NAME[@SLEEPERS]=VALUE`: a parameter's value at all sleepers or some.
+//! `NAME[@SLEEPERS]=VALUE`: value of a parameter at all sleepers or some.
 
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 use tracktwin_parameters::{Parameter, ParameterSet, QuantityError};
 
-/// A parameter's value, and where it holds.
+/// Value of a parameter, and the sleepers to which it applies.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::commands) struct Setting {
     pub(in crate::commands) parameter: Parameter,
     pub(in crate::commands) value: f64,
-    /// Numbers of the sleepers; everywhere if there are none.
+    /// Numbers of the sleepers; all sleepers if `None`.
     pub(in crate::commands) sleepers: Option<RangeInclusive<usize>>,
 }
 
-/// Why a setting is refused.
+/// Errors of a setting.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub(in crate::commands) enum SettingError {
     #[error("write NAME=VALUE, NAME@SN12=VALUE or NAME@SN12-SN15=VALUE")]
@@ -22,9 +22,9 @@ pub(in crate::commands) enum SettingError {
     Parameter(String),
     #[error(transparent)]
     Value(#[from] QuantityError),
-    #[error("`{0}` names no sleepers; write SN12 or SN12-SN15")]
+    #[error("`{0}` is not a sleeper or range; write SN12 or SN12-SN15")]
     Sleepers(String),
-    #[error("the irregularity belongs to the whole surface, not to single sleepers")]
+    #[error("the irregularity applies to the whole surface, not to single sleepers")]
     Local,
 }
 
@@ -56,7 +56,7 @@ fn range(text: &str) -> Result<RangeInclusive<usize>, SettingError> {
 }
 
 impl Setting {
-    /// The set of sleeper `number` with this setting, if it holds there.
+    /// The parameter set of sleeper `number` with this setting, if it applies there.
     pub(in crate::commands) fn apply(&self, set: ParameterSet, number: usize) -> ParameterSet {
         if self.sleepers.as_ref().is_none_or(|sleepers| sleepers.contains(&number)) {
             set.with(self.parameter, self.value)

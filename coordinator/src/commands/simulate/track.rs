@@ -1,4 +1,4 @@
-//! The track that is simulated, and what is told of it.
+//! The simulated track and its description.
 
 use super::super::{OrInput, Stop};
 use super::{Arguments, Drive, END_SPANS, Setting};
@@ -22,7 +22,7 @@ impl SimulatedTrack {
     pub(super) fn new(arguments: &Arguments) -> Result<Self, Stop> {
         let spans = arguments.spans;
         if spans <= 2 * END_SPANS {
-            return Err(anyhow!("--spans: {spans} are too few; give more than {}", 2 * END_SPANS))
+            return Err(anyhow!("--spans: {spans} is too small; give more than {}", 2 * END_SPANS))
                 .or_input();
         }
         let preset = Preset::from(arguments.preset);
@@ -58,7 +58,7 @@ impl SimulatedTrack {
         self.extensions.iter().filter_map(|instance| Kind::from_name(&instance.physics))
     }
 
-    /// Where recording begins and ends, in m: so that every wheel stays away from the track's ends.
+    /// Start and end of the recording in m; every wheel stays away from the ends of the track.
     pub(super) fn recorded_m(&self) -> [f64; 2] {
         let further_m = &self.model.vehicle().further_wheels_m;
         let behind_m = further_m.iter().copied().fold(0.0, f64::min);
@@ -68,11 +68,11 @@ impl SimulatedTrack {
         [from_m - behind_m, to_m - ahead_m]
     }
 
-    /// The sleepers that stand where it is recorded.
+    /// The sleepers inside the recorded stretch.
     pub(super) fn sleepers_recorded(&self) -> Vec<Sleeper> {
         let spacing_m = self.design.sleeper.spacing_m;
         let [from_m, to_m] = self.recorded_m();
-        // Half a spacing: a sleeper at the very end is not lost to rounding.
+        // Half a spacing, so that rounding does not lose a sleeper at the end.
         let recorded = from_m - 0.5 * spacing_m..to_m + 0.5 * spacing_m;
         (0..self.sleepers.len())
             .map(|number| Sleeper { id: id(number), x_m: (number + 1) as f64 * spacing_m })
@@ -80,13 +80,13 @@ impl SimulatedTrack {
             .collect()
     }
 
-    /// What a recording says of the track, in the recording format's words.
+    /// Description of the track in the recording format.
     pub(super) fn nominal(&self) -> Map<String, Value> {
         recording::nominal(&self.design)
     }
 
-    /// What was put in: the parameters of every sleeper, the physics beyond the paper, and with
-    /// which side down the wheel began every pass.
+    /// The truth: parameters of every sleeper, extensions, and the angle of the wheel at the start
+    /// of every pass.
     pub(super) fn truth_json(&self, drives: &[Drive]) -> String {
         let of = |set: &ParameterSet| -> Map<String, Value> {
             set.iter()
@@ -110,7 +110,7 @@ impl SimulatedTrack {
     }
 }
 
-/// The name of sleeper `number`, counted from the first that isn't at the rail's end.
+/// Name of sleeper `number`, counted from the first that is not at the end of the rail.
 fn id(number: usize) -> String {
     format!("SN{number}")
 }
@@ -123,7 +123,11 @@ fn sleepers(
 ) -> Result<Vec<ParameterSet>, anyhow::Error> {
     for Setting { sleepers, .. } in settings {
         if let Some(last) = sleepers.as_ref().map(|range| *range.end()).filter(|&n| n >= count) {
-            return Err(anyhow!("--set: there is no {}; the last is {}", id(last), id(count - 1)));
+            return Err(anyhow!(
+                "--set: {} does not exist; the last sleeper is {}",
+                id(last),
+                id(count - 1)
+            ));
         }
     }
     let set_of =

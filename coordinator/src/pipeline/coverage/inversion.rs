@@ -26,10 +26,10 @@ const ENDS: usize = 1;
 #[derive(Debug, thiserror::Error)]
 pub enum InversionCoverageError {
     /// A track can't be simulated.
-    #[error("a simulated track: {0}")]
+    #[error("cannot simulate a track: {0}")]
     Track(#[from] TruthError),
     /// A recording can't be evaluated.
-    #[error("a simulated recording: {0}")]
+    #[error("cannot evaluate a simulated recording: {0}")]
     Inverting(#[from] InvertingError),
 }
 

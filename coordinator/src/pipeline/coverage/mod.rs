@@ -25,10 +25,10 @@ const TOGETHER: usize = 8;
 #[derive(Debug, thiserror::Error)]
 pub enum CoverageError {
     /// A track can't be simulated.
-    #[error("a simulated track: {0}")]
+    #[error("cannot simulate a track: {0}")]
     Track(#[from] TrackError),
     /// A recording can't be evaluated.
-    #[error("a simulated recording: {0}")]
+    #[error("cannot evaluate a simulated recording: {0}")]
     Evaluation(#[from] tracktwin_evaluation::Error),
 }
 

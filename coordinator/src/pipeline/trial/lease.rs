@@ -33,7 +33,7 @@ impl Trial {
                 if let Err(error) =
                     library.renew_trial_case(&trial, &node, number, lease_ms()).await
                 {
-                    tracing::warn!("the lease of case {number} is not renewed: {error}");
+                    tracing::warn!("cannot renew the lease of case {number}: {error}");
                 }
             }
         }))

@@ -82,7 +82,8 @@ struct Terms {
 pub enum TrialError {
     /// The folder holds another trial.
     #[error(
-        "{folder}: holds a trial of seed {seed} by version {version}; take another folder with --out, or the same seed"
+        "{folder}: contains a trial of seed {seed} by version {version}; use another --out, \
+             or the same seed"
     )]
     Other {
         /// The folder.
@@ -106,7 +107,7 @@ pub enum TrialError {
     Recording(#[from] RecordingError),
     /// Diagnoses broke down, each with its reason by the number of its case; all others are answered.
     #[error(
-        "{} of {of} diagnoses broke down; all others are answered\n{}",
+        "{} of {of} diagnoses failed; all others are scored\n{}",
         .cases.len(),
         .cases.iter().map(|(number, reason)| format!("case {number}: {reason}")).collect::<Vec<_>>().join("\n")
     )]
@@ -235,11 +236,11 @@ impl Trial {
                     if since.elapsed() > PATIENCE {
                         return Err(error);
                     }
-                    tracing::warn!("{error}; tried again");
+                    tracing::warn!("{error}; retrying");
                     tokio::time::sleep(WAIT).await;
                 }
                 Err(TrialError::Diagnosis { number, source }) => {
-                    tracing::warn!("case {number}: {source}; the others go on");
+                    tracing::warn!("case {number}: {source}; the other cases continue");
                     broken.insert(number, source.to_string());
                 }
                 Err(error) => return Err(error),
@@ -266,7 +267,7 @@ impl Trial {
             progress(done, &format!("case {number}"));
             self.work_on(number).await?;
         } else {
-            progress(done, &format!("waiting for other nodes: {others}"));
+            progress(done, &format!("waiting for other machines: {others}"));
             tokio::time::sleep(WAIT).await;
         }
         Ok(None)

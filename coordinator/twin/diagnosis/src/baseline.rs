@@ -2,7 +2,7 @@
 //!
 //! Every sleeper has its own ballast, railpad and irregularity level, the surface its own spectrum,
 //! every speed its own gain; the sensor is flat to two per cent, and nobody knows where the track
-//! ends and how the sleepers beyond are held. This is the honest opponent of every extension.
+//! ends and how the sleepers beyond are held. Every extension is compared with this baseline.
 
 use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;

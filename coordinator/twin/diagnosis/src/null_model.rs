@@ -1,8 +1,8 @@
 //! What recording and prediction differ by when nothing is left out.
 //!
 //! Time simulations of the calibrated track over random surfaces tell by how much one pass's log
-//! powers lie off their expected value (an offset), and how they scatter together: over bands, and
-//! over speeds at equal wave numbers, since all speeds roll over one surface.
+//! powers lie off their expected value (an offset), and their covariance: over bands, and over
+//! speeds at equal wave numbers, since all speeds roll over one surface.
 
 use crate::forward::Forward;
 use crate::section::Section;

@@ -37,21 +37,20 @@ const UNEVEN: f64 = 0.1;
 pub enum PreparationError {
     /// The track that it would be compared with is not V-Track.
     #[error(
-        "the models are of another track than V-Track ({} {}, V-Track's {}); diagnoses compare with \
-         V-Track only, whose stiffness, damping, bands and kinds of physics they know; leave out \
-         --models for a recording of V-Track", .0.quantity, .0.found(), .0.known()
+        "the models are of another track than V-Track ({} {}, V-Track's {}); a diagnosis \
+             supports V-Track only; omit --models for a recording of V-Track", .0.quantity, .0.found(), .0.known()
     )]
     OtherDesign(OtherTrack),
     /// It states another track or vehicle.
     #[error(
-        "recording.json: {} {}, V-Track's {}; diagnoses compare with V-Track only", .0.quantity,
+        "recording.json: {} {}, V-Track's {}; a diagnosis supports V-Track only", .0.quantity,
         .0.found(), .0.known()
     )]
     OtherTrack(OtherTrack),
     /// Its sleepers are not evenly spaced.
     #[error(
-        "recording.json: sleepers: {} and {} lie {distance_m:.3} m apart, the model's {spacing_m} m; list \
-         every sleeper, or keep the stretch where they are evenly spaced", .between[0], .between[1]
+        "recording.json: sleepers: the distance between {} and {} is {distance_m:.3} m, the \
+             model's {spacing_m} m; list every sleeper, or keep the evenly spaced stretch", .between[0], .between[1]
     )]
     Uneven {
         /// The two sleepers.
@@ -62,11 +61,12 @@ pub enum PreparationError {
         spacing_m: f64,
     },
     /// Levels without a unit.
-    #[error("recording.json: nominal.gain_known: is false; a model predicts levels in m/s2")]
+    #[error("recording.json: nominal.gain_known: is false; the model needs accelerations in m/s2")]
     GainUnknown,
     /// No sleepers.
     #[error(
-        "sleepers: their places are not known; give recording.json theirs, or import with --sleeper"
+        "sleepers: their positions are unknown; add them to recording.json, or import with \
+             --sleeper"
     )]
     NoSleepers,
     /// Too few sleepers.
@@ -82,12 +82,12 @@ pub enum PreparationError {
     },
     /// Too low a sample rate.
     #[error(
-        "sample_rate_Hz: {0} is too low: nothing above {high:.0} Hz can be compared with a model \
-         of this track", high = SAMPLE_RATE_SHARE * .0
+        "sample_rate_Hz: {0} is too low: the comparison with the model is limited to \
+             {high:.0} Hz", high = SAMPLE_RATE_SHARE * .0
     )]
     SampleRate(f64),
     /// Passes without a track in them.
-    #[error("passes: nothing can be said of the track from {0}")]
+    #[error("passes: unusable: {0}")]
     Unusable(PassDefect),
 }
 

@@ -46,7 +46,7 @@ mod tests {
         let check = |speeds: &[f64]| check_recording(&recording, &TrackDesign::v_track(), speeds);
         check(&[10.0, 13.0]).unwrap();
         let refusal = check(&[7.0, 10.0]).unwrap_err().to_string();
-        assert!(refusal.contains("passes at 13 km/h; the models know 7, 10 km/h"), "{refusal}");
+        assert!(refusal.contains("passes at 13 km/h; the models are for 7, 10 km/h"), "{refusal}");
     }
 
     #[test]

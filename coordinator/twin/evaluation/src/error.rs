@@ -9,7 +9,8 @@ use tracktwin_signal::recording::OtherTrack;
 pub enum Error {
     /// The passes have a speed for which there is no model.
     #[error(
-        "the recording {recording} has passes at {} km/h; the models know {} km/h (within 2 %)",
+        "the recording {recording} has passes at {} km/h; the models are for {} km/h \
+             (within 2 %)",
         rounded(*speed_km_h, 4),
         join(known)
     )]
@@ -31,7 +32,8 @@ pub enum Error {
     },
     /// The sensor's gain is not known.
     #[error(
-        "recording.json: nominal.gain_known: is false; stiffness is told from levels, so give accelerations in m/s2"
+        "recording.json: nominal.gain_known: is false; the evaluation needs levels: give \
+             accelerations in m/s2"
     )]
     GainUnknown,
     /// The recording is of another track or vehicle.
@@ -40,7 +42,7 @@ pub enum Error {
     )]
     OtherTrack(#[from] OtherTrack),
     /// There is no model for these features.
-    #[error("there is no {feature} model for {} km/h; train it", join(speeds_km_h))]
+    #[error("the {feature} model for {} km/h is missing; train it", join(speeds_km_h))]
     NoModel {
         /// Speeds in km/h.
         speeds_km_h: Vec<f64>,

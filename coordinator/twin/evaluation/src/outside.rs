@@ -200,7 +200,7 @@ impl OutsideLibrary {
             return Vec::new();
         }
         let mut sentences = vec![format!(
-            "{:.0} % of the sleepers have features that no track of the library has: their estimates are not valid.",
+            "{:.0} % of the sleepers are outside the library: their estimates are not valid.",
             (100.0 * self.share).ceil()
         )];
         sentences.extend(self.ends.iter().map(BeyondEnd::sentence));

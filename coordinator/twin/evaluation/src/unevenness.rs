@@ -73,12 +73,14 @@ impl Unevenness {
     /// The assumption in words.
     pub fn sentence(&self) -> String {
         let how = if self.learned_from.is_some() {
-            "as the estimates along the track show"
+            "from the estimates along the track"
         } else {
-            "the least that is assumed: this recording shows no more"
+            "the minimum: this recording shows no more"
         };
         format!(
-            "Railpads and ballast are taken to differ by {:.0} % from sleeper to sleeper ({how}); the standard deviations of k_p and k_b hold that an estimate sees little of a single sleeper's own deviation.",
+            "The assumed unevenness of railpads and ballast is {:.0} % ({how}); the standard \
+                 deviations of k_p and k_b include it, because an estimate resolves little of a \
+                 single sleeper's deviation.",
             100.0 * self.scatter
         )
     }

@@ -16,7 +16,7 @@ pub enum Place {
     },
 }
 
-/// One kind of physics, or of trouble in the measuring chain, as one test sees it.
+/// One kind of physics, or a fault of the measuring chain, found by one test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// Its name in the catalogue, such as `wheel_flat`.

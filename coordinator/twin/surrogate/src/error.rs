@@ -6,7 +6,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A table has not the rows or columns it says.
-    #[error("{what}: {found} numbers where {expected} belong")]
+    #[error("{what}: {found} numbers instead of {expected}")]
     Shape {
         /// The table.
         what: &'static str,
@@ -24,7 +24,7 @@ pub enum Error {
         entry: usize,
     },
     /// Too few entries to fit and to validate.
-    #[error("{found} cases are too few to train on; at least {least} are needed")]
+    #[error("{found} cases are too few for training; at least {least} are needed")]
     TooFewEntries {
         /// Entries there are.
         found: usize,
@@ -47,7 +47,7 @@ pub enum Error {
         bins: usize,
     },
     /// A feature set that nobody defined.
-    #[error("no feature set is called {0}")]
+    #[error("unknown feature set {0}")]
     UnknownFeature(String),
     /// The covariance has a pivot that is not positive.
     #[error("the covariance matrix of {entries} library entries is not positive definite")]
@@ -65,7 +65,7 @@ pub enum Error {
     #[error("{0}")]
     Files(#[source] tracktwin_files::FilesError),
     /// A file cannot be read.
-    #[error("{path}: cannot be read: {source}")]
+    #[error("cannot read {path}: {source}")]
     File {
         /// The file.
         path: PathBuf,
@@ -81,7 +81,7 @@ pub enum Error {
         reason: String,
     },
     /// A file was changed after it was written.
-    #[error("{path}: the file is not the one that was saved with these models (checksum differs)")]
+    #[error("{path}: the file does not belong to these models (checksum differs)")]
     Changed {
         /// The file.
         path: PathBuf,

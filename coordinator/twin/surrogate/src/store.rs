@@ -194,7 +194,11 @@ impl Trained {
                     "the format is {other}; this program reads {FORMAT}"
                 )));
             }
-            None => return Err(malformed(format!("no format; this program reads {FORMAT}"))),
+            None => {
+                return Err(malformed(format!(
+                    "the format is missing; this program reads {FORMAT}"
+                )));
+            }
         }
         let index: Index =
             serde_json::from_value(json).map_err(|error| malformed(error.to_string()))?;
@@ -278,7 +282,7 @@ fn little_endian(table: MatRef<'_, f64>) -> Vec<u8> {
 fn table(tensors: &SafeTensors<'_>, name: &str) -> Result<Mat<f64>, String> {
     let view = tensors.tensor(name).map_err(|error| error.to_string())?;
     let (Dtype::F64, &[rows, columns]) = (view.dtype(), view.shape()) else {
-        return Err(format!("{name} is no table of float64"));
+        return Err(format!("{name} is not a table of float64"));
     };
     let (numbers, _) = view.data().as_chunks::<8>();
     Ok(Mat::from_fn(rows, columns, |i, j| f64::from_le_bytes(numbers[i * columns + j])))

@@ -6,7 +6,7 @@ use tracktwin_files::FilesError;
 #[derive(Debug, thiserror::Error)]
 pub enum TruthError {
     /// A value is no number of its kind.
-    #[error("{field} is {value}; make it {form}")]
+    #[error("{field} is {value}; it must be {form}")]
     Value {
         /// The field's name in files.
         field: &'static str,
@@ -16,7 +16,7 @@ pub enum TruthError {
         form: &'static str,
     },
     /// A value is beyond what can be simulated.
-    #[error("{field} is {value}; make it {most} at most")]
+    #[error("{field} is {value}; it must be at most {most}")]
     TooLarge {
         /// The field's name in files.
         field: &'static str,
@@ -35,8 +35,8 @@ pub enum TruthError {
     },
     /// What is recorded is shorter than a span or too near to an end of the track.
     #[error(
-        "{from_m} to {to_m} m cannot be recorded: take a span or more, {end_m} m or more from the \
-         ends of the track of {length_m} m"
+        "{from_m} to {to_m} m cannot be recorded: record at least one span, at least \
+             {end_m} m from the ends of the track of {length_m} m"
     )]
     Recorded {
         /// Begin in m.
@@ -62,7 +62,7 @@ pub enum TruthError {
         sleepers: usize,
     },
     /// The motion is not finite any more: something carries nothing.
-    #[error("the wheel's motion is no number any more at {position_m} m")]
+    #[error("the motion of the wheel diverges at {position_m} m")]
     Diverged {
         /// Where in m.
         position_m: f64,

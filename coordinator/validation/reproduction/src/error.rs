@@ -16,13 +16,13 @@ pub enum Error {
         known: Vec<f64>,
     },
     /// One speed cannot be compared with another.
-    #[error("{figure} compares speeds; the library has one, a campaign with more is needed")]
+    #[error("{figure} compares speeds, but the library has one; use a campaign with several")]
     OneSpeed {
         /// The figure.
         figure: Figure,
     },
     /// A parameter is the same in all cases.
-    #[error("{figure}: the library does not vary {symbol}; take one over all of Table D1")]
+    #[error("{figure}: the library does not vary {symbol}; use a library over all of Table D1")]
     NotVaried {
         /// The figure.
         figure: Figure,
@@ -30,7 +30,7 @@ pub enum Error {
         symbol: &'static str,
     },
     /// There are too few cases to compare.
-    #[error("{figure}: {found} finished cases are too few; give at least {least}")]
+    #[error("{figure}: {found} finished cases are too few; at least {least} are needed")]
     TooFewCases {
         /// The figure.
         figure: Figure,
@@ -40,7 +40,7 @@ pub enum Error {
         least: usize,
     },
     /// There is no such model.
-    #[error("{figure}: there is no {feature} model at {speed_km_h} km/h; train again")]
+    #[error("{figure}: the {feature} model at {speed_km_h} km/h is missing; train again")]
     NoModel {
         /// The figure.
         figure: Figure,

@@ -83,7 +83,7 @@ impl FromStr for Figure {
     fn from_str(text: &str) -> Result<Self, String> {
         Self::ALL.into_iter().find(|figure| figure.name() == text).ok_or_else(|| {
             let known: Vec<_> = Self::ALL.iter().map(|figure| figure.name()).collect();
-            format!("no figure `{text}` is reproduced; known are {}", known.join(", "))
+            format!("unknown figure `{text}`; known figures: {}", known.join(", "))
         })
     }
 }

@@ -12,13 +12,13 @@ pub struct Seals(BTreeMap<String, String>);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SealError {
     /// A file was never sealed.
-    #[error("{0}: is not sealed; the trial was begun without it")]
+    #[error("{0}: not sealed; the trial was started without it")]
     NotSealed(String),
     /// A file is another than the one that was sealed.
-    #[error("{0}: was changed after it was sealed; start the trial anew in another folder")]
+    #[error("{0}: changed after sealing; start a new trial in another folder")]
     Broken(String),
     /// A line of the file of seals can't be read.
-    #[error("seals: `{0}` is no line of `sha256sum`; start the trial anew in another folder")]
+    #[error("seals: `{0}` is not a line of `sha256sum`; start a new trial in another folder")]
     Line(String),
 }
 

@@ -8,7 +8,7 @@ use std::fmt::Write;
 impl Summary {
     /// The tables, with a line a case that did not come out as it should.
     pub fn to_markdown(&self, scores: &[Score]) -> String {
-        let mut page = String::from("| measure | came out | asked | |\n|---|---|---|---|\n");
+        let mut page = String::from("| measure | result | target | met |\n|---|---|---|---|\n");
         self.rows.iter().for_each(|row| page.push_str(&measure(row)));
         page.push_str(
             "\n| hidden | alarm | first name | placed within a sleeper | median d' | re-tuned \

@@ -1,4 +1,4 @@
-//! What may be wrong with a recording: file, field, what, and how to mend it, on one line.
+//! Errors of a recording: file, field, fault and remedy, on one line.
 
 use std::path::Path;
 use tracktwin_number::{rounded, significant};
@@ -22,14 +22,14 @@ impl RecordingError {
     }
 }
 
-/// What is wrong with a field of a recording, and how to mend it.
+/// Faults of a field of a recording, with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
     /// Nothing lies where a file should.
-    #[error("there is no such file; put it there or correct its name")]
+    #[error("the file does not exist; add it or correct its name")]
     NoSuchFile,
     /// The operating system or the decoder refuses the file.
-    #[error("cannot be read ({reason}); write it anew from its source")]
+    #[error("unreadable ({reason}); generate it again from its source")]
     Unreadable {
         /// The words of the operating system or of the decoder.
         reason: String,
@@ -39,7 +39,7 @@ pub enum Fault {
     OutOfRange(QuantityError),
     /// A file has more numbers than are held in memory.
     #[error(
-        "has {:.1} GB of numbers, and {:.1} GB are the most that is held at once; split it into passes",
+        "has {:.1} GB of numbers, but the limit is {:.1} GB; split it into passes",
         1e-9 * *bytes as f64, 1e-9 * *most as f64
     )]
     TooLarge {
@@ -55,13 +55,13 @@ pub enum Fault {
         reason: String,
     },
     /// `recording.json` is not JSON.
-    #[error("is not JSON ({reason}); mend the text there")]
+    #[error("is not valid JSON ({reason}); correct the text there")]
     NotJson {
         /// The parser's words, with line and column.
         reason: String,
     },
     /// The format's name is absent or another one.
-    #[error("says {found}; this program reads \"{expected}\"")]
+    #[error("is {found}; this program reads \"{expected}\"")]
     WrongFormat {
         /// What stands there, as JSON.
         found: String,
@@ -83,27 +83,28 @@ pub enum Fault {
         expected: &'static str,
     },
     /// Two sleepers bear one name.
-    #[error("the id {id} stands twice; give every sleeper its own")]
+    #[error("duplicate sleeper id {id}; give every sleeper a unique id")]
     SleeperTwice {
         /// The name.
         id: String,
     },
     /// A file stands where a folder should.
-    #[error("is a file; a recording is a folder, and `tracktwin import` makes one")]
+    #[error("is a file, but a recording is a folder; create one with `tracktwin import`")]
     NoFolder,
     /// Columns of a CSV file are separated by something else than commas.
-    #[error("its columns are not separated by commas; do so, or run `tracktwin import`")]
+    #[error("the columns are not separated by commas; convert the file with `tracktwin import`")]
     Separator,
     /// The kind of file is not one that is read.
-    #[error("its name ends in neither .parquet nor .csv; convert it to one of these")]
+    #[error("the extension is neither .parquet nor .csv; convert the file to one of these formats")]
     UnknownKind,
     /// The kind of table is not one that can be imported.
     #[error(
-        "its name ends in none of .csv .txt .tsv .dat .parquet .npy .npz .mat; convert it to one of these"
+        "the extension is not one of .csv .txt .tsv .dat .parquet .npy .npz .mat; convert \
+             the file to one of these formats"
     )]
     UnknownTable,
     /// The file is of a known kind that is not read.
-    #[error("is {kind}, which is not read here; {remedy}")]
+    #[error("is {kind}, which is not supported; {remedy}")]
     Foreign {
         /// What it is.
         kind: &'static str,
@@ -111,7 +112,7 @@ pub enum Fault {
         remedy: &'static str,
     },
     /// A text table holds bytes that no text has.
-    #[error("is no text (byte {byte} is {value:#04x}); export it from its program as CSV")]
+    #[error("is not text (byte {byte} is {value:#04x}); export the data as CSV")]
     NoText {
         /// The place of the first such byte, counted from 1.
         byte: usize,
@@ -133,7 +134,8 @@ pub enum Fault {
     },
     /// The rows have a field more than the head has names, and the first one is no row name.
     #[error(
-        "the head has {names} names, the rows have {} fields, and the first of them counts no rows; name every column",
+        "the header has {names} names, but the rows have {} fields, and the first field is \
+             not a row number; name every column",
         names + 1
     )]
     ShortHead {
@@ -141,13 +143,13 @@ pub enum Fault {
         names: usize,
     },
     /// Two columns bear one name.
-    #[error("columns {} are all called so; give each its own name", list(places))]
+    #[error("columns {} have this name; give each column a unique name", list(places))]
     ColumnTwice {
         /// Where they stand, counted from 1.
         places: Vec<usize>,
     },
     /// The name or the file says a unit that is not known for such a column.
-    #[error("its unit is \"{unit}\", which is none of {known}; {remedy}")]
+    #[error("the unit is \"{unit}\", but must be one of {known}; {remedy}")]
     UnknownUnit {
         /// What the file says.
         unit: String,
@@ -157,7 +159,7 @@ pub enum Fault {
         remedy: &'static str,
     },
     /// A column that is needed is absent.
-    #[error("there is no such column; name it so (the file has {})", present.join(", "))]
+    #[error("the column is missing; rename one of the file's columns: {}", present.join(", "))]
     NoColumn {
         /// The columns that are there.
         present: Vec<String>,
@@ -169,7 +171,7 @@ pub enum Fault {
         kind: String,
     },
     /// A value is not a finite number; rows count from 1, the first row of data.
-    #[error("row {row} is {value}; write a plain number there, or drop that stretch")]
+    #[error("row {row} is {value}; write a number there, or remove that stretch")]
     NotFinite {
         /// The row, counted from 1.
         row: usize,
@@ -178,7 +180,8 @@ pub enum Fault {
     },
     /// A value stands for one that was not measured.
     #[error(
-        "row {row} is {value}, far from all others: it stands for a missing value; drop that stretch"
+        "row {row} is {value}, far from all other values: probably a code for a missing \
+             value; remove that stretch"
     )]
     Missing {
         /// The row, counted from 1.
@@ -188,7 +191,9 @@ pub enum Fault {
     },
     /// A column of speeds that goes to and fro between two values.
     #[error(
-        "goes {changes} times to and fro between {} and {}: pulses of a tachometer, not speeds; add up the pulses times the distance of one and give that as position",
+        "alternates {changes} times between {} and {}: these are tachometer pulses, not \
+             speeds; multiply the cumulated pulses by the distance per pulse and import the \
+             result as position",
         rounded(*low, 3), rounded(*high, 3)
     )]
     Pulses {
@@ -206,7 +211,10 @@ pub enum Fault {
         rows: usize,
     },
     /// Columns of one file differ in length.
-    #[error("has {rows} rows where the file's other columns have {others}; write them alike")]
+    #[error(
+        "has {rows} rows, but the other columns of the file have {others}; give all columns \
+         the same length"
+    )]
     LengthMismatch {
         /// Rows of this column.
         rows: usize,
@@ -228,7 +236,8 @@ pub enum Fault {
     },
     /// A step in time differs from the sample interval.
     #[error(
-        "steps by {} s to row {row} where {} s is expected; drop repeated rows, split the pass at a gap, or leave the times out and state the sample rate",
+        "the step to row {row} is {} s, but {} s is expected; remove repeated rows, split \
+             the pass at a gap, or omit the times and state the sample rate",
         rounded(*step, 3),
         rounded(*expected, 3)
     )]
@@ -242,7 +251,8 @@ pub enum Fault {
     },
     /// The position decreases.
     #[error(
-        "runs back from {} m to {} m at row {row}; smooth it, or leave it out and give the speed",
+        "decreases from {} m to {} m at row {row}; smooth the positions, or omit them and \
+             give the speed",
         rounded(*before, 9), rounded(*after, 9)
     )]
     RunsBack {
@@ -255,7 +265,8 @@ pub enum Fault {
     },
     /// The position decreases from begin to end.
     #[error(
-        "decreases along the travel, from {} m to {} m; give it, and the places of the sleepers, the other sign",
+        "decreases along the pass, from {} m to {} m; change the sign of the positions, \
+             also those of the sleepers",
         rounded(*from_m, 9), rounded(*to_m, 9)
     )]
     Decreases {
@@ -266,12 +277,13 @@ pub enum Fault {
     },
     /// Some files run one way along the positions and some the other.
     #[error(
-        "runs towards smaller positions and other files towards greater ones; import each direction by itself"
+        "the positions decrease, but those of other files increase; import each direction \
+             separately"
     )]
     Directions,
     /// The position begins anew.
     #[error(
-        "begins anew at row {row}, from {} m to {} m; split the pass there",
+        "restarts at row {row}, from {} m to {} m; split the pass there",
         rounded(*before, 9), rounded(*after, 9)
     )]
     Restarts {
@@ -296,7 +308,7 @@ pub enum Fault {
         after: f64,
     },
     /// The wheel stands.
-    #[error("stands still {}; keep only where the wheel rolls", standing(*from_s, *to_s))]
+    #[error("does not change {}; keep only the part where the wheel rolls", standing(*from_s, *to_s))]
     StandsStill {
         /// From when on, in s from the first row.
         from_s: f64,
@@ -305,7 +317,8 @@ pub enum Fault {
     },
     /// The position changes too rarely to be straightened.
     #[error(
-        "changes only {steps} time{}, by {} m each; record positions finer, or leave them out and give the speed",
+        "changes only {steps} time{}, by {} m each; record positions with a finer \
+             resolution, or omit them and give the speed",
         if *steps == 1 { "" } else { "s" }, significant(*step_m, 2)
     )]
     FewSteps {
@@ -316,7 +329,8 @@ pub enum Fault {
     },
     /// Steps of the position are too long to tell one sleeper from the next.
     #[error(
-        "advances in steps of {} m; to tell sleepers apart they must not exceed {} m: record positions finer, or give the speed and the place of a sleeper",
+        "advances in steps of {} m; steps above {} m cannot separate sleepers: record \
+             positions with a finer resolution, or give the speed and the position of a sleeper",
         significant(*step_m, 2), significant(*needed_m, 2)
     )]
     CoarsePosition {
@@ -327,7 +341,7 @@ pub enum Fault {
     },
     /// Two passes are one.
     #[error(
-        "is a copy of {of}{}; a copy repeats nothing: remove one",
+        "is a copy of {of}{}; a copy is no second pass: remove one of the two",
         if (*factor - 1.0).abs() < 1e-6 { String::new() } else { format!(", times {}", significant(*factor, 4)) }
     )]
     Copy {
@@ -337,7 +351,7 @@ pub enum Fault {
         factor: f64,
     },
     /// Two statements about one thing disagree.
-    #[error("{says}, but {but}; correct one of them, or leave one out")]
+    #[error("{says}, but {but}; correct one of them, or omit one")]
     Contradiction {
         /// One of them.
         says: String,
@@ -385,7 +399,7 @@ pub enum Fault {
     },
     /// The pass is shorter than a sleeper's window.
     #[error(
-        "covers {} m; one sleeper's window needs {} m, record more",
+        "covers {} m; the window of one sleeper needs {} m: record a longer stretch",
         significant(*length_m, 3), rounded(*spacing_m, 6)
     )]
     TooShort {
@@ -396,7 +410,8 @@ pub enum Fault {
     },
     /// No sleeper has its window inside any pass.
     #[error(
-        "none lies inside a pass (passes cover {} to {} m); give them on the scale of `position_m`",
+        "no sleeper lies inside a pass (the passes cover {} to {} m); give their positions \
+             on the scale of `position_m`",
         rounded(*from_m, 9), rounded(*to_m, 9)
     )]
     NoSleeperInside {
@@ -419,7 +434,7 @@ fn list(places: &[usize]) -> String {
 /// When a wheel stands.
 fn standing(from_s: f64, to_s: Option<f64>) -> String {
     to_s.map_or_else(
-        || "all the time".to_owned(),
+        || "during the whole pass".to_owned(),
         |to_s| format!("from {from_s:.1} s to {to_s:.1} s"),
     )
 }

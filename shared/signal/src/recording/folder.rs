@@ -35,7 +35,7 @@ pub struct Recording {
     pub nominal: Map<String, Value>,
     /// Distance of the sleepers in m: the length of a sleeper's window.
     pub spacing_m: f64,
-    /// What was mended while the recording was read, or is doubtful in it: a sentence each.
+    /// Corrections made while reading, and doubts: a sentence each.
     pub doubts: Vec<String>,
 }
 
@@ -59,7 +59,7 @@ impl Recording {
     /// Reads and checks the recording in the folder `path`.
     ///
     /// # Errors
-    /// The first thing that is wrong: its file, its field and how to mend it.
+    /// The first error: its file, its field and the remedy.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let folder = path.as_ref();
         if folder.is_file() {
@@ -270,7 +270,8 @@ fn read_pass(
 pub(super) fn straightened(file: &str, step_m: f64) -> String {
     let step = significant(step_m, 2);
     format!(
-        "{file}: the positions advance in steps of {step} m; between them the speed was taken as constant, and the zero of the positions is known to one step"
+        "{file}: the positions advance in steps of {step} m; a constant speed is assumed \
+             between steps, and the origin of the positions is known to one step"
     )
 }
 

@@ -55,7 +55,7 @@ impl Manifest {
         let sleepers =
             if none_known { Vec::new() } else { root.list("sleepers", "a list of {id, x_m}")? };
         Ok(Self {
-            sample_rate_hz: root.positive("sample_rate_Hz", "the samples per second")?,
+            sample_rate_hz: root.positive("sample_rate_Hz", "the sample rate in Hz")?,
             channel: root.get("channel").and_then(Value::as_str).unwrap_or_default().to_owned(),
             passes: passes.iter().map(PassEntry::parse).collect::<Result<_, _>>()?,
             sleepers: sleepers_along_the_track(root, &sleepers)?,
@@ -85,7 +85,7 @@ impl Manifest {
 
 impl PassEntry {
     fn parse(fields: &Fields<'_>) -> Result<Self, RecordingError> {
-        let file = fields.text("file", "the name of the pass's file")?.to_owned();
+        let file = fields.text("file", "the file name of the pass")?.to_owned();
         let speed_km_h = fields.positive("speed_km_h", "the nominal speed in km/h")?;
         let contact_loss_share = fields.get("contact_loss_share").and_then(Value::as_f64);
         Ok(Self { file, speed_km_h, contact_loss_share })
@@ -107,11 +107,11 @@ fn sleepers_along_the_track(
     let mut sleepers = Vec::with_capacity(entries.len());
     let mut ids = HashSet::new();
     for entry in entries {
-        let id = entry.text("id", "the sleeper's name")?.to_owned();
+        let id = entry.text("id", "the id of the sleeper")?.to_owned();
         if !ids.insert(id.clone()) {
             return Err(root.fault("sleepers", Fault::SleeperTwice { id }));
         }
-        sleepers.push(Sleeper { id, x_m: entry.number("x_m", "its place in m")? });
+        sleepers.push(Sleeper { id, x_m: entry.number("x_m", "its position in m")? });
     }
     sleepers.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
     Ok(sleepers)

@@ -113,9 +113,11 @@ impl Kind {
             }
             (_, PhysicalType::INT64) => duration_s.map_or(Self::Plain, Self::Time),
             (_, PhysicalType::DOUBLE | PhysicalType::FLOAT | PhysicalType::INT32) => Self::Plain,
-            (_, PhysicalType::BOOLEAN) => Self::Other("true and false values".to_owned()),
-            (ConvertedType::DECIMAL, _) => Self::Other("long decimal numbers".to_owned()),
-            (_, PhysicalType::INT96) => Self::Other("timestamps of an old kind (INT96)".to_owned()),
+            (_, PhysicalType::BOOLEAN) => Self::Other("Boolean values".to_owned()),
+            (ConvertedType::DECIMAL, _) => Self::Other("decimal numbers".to_owned()),
+            (_, PhysicalType::INT96) => {
+                Self::Other("timestamps of the deprecated type INT96".to_owned())
+            }
             (_, PhysicalType::BYTE_ARRAY) => Self::Other("texts".to_owned()),
             (_, PhysicalType::FIXED_LEN_BYTE_ARRAY) => Self::Other("bytes".to_owned()),
         }

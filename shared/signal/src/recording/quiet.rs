@@ -21,13 +21,15 @@ pub(super) fn doubt(pass: &Pass, gain_known: bool) -> Option<String> {
     if gain_known && rms < QUIET * speed {
         let (rms, speed) = (significant(rms, 2), rounded(speed, 3));
         return Some(format!(
-            "doubt: {file}: {rms} m/s2 rms is nearly no signal for {speed} km/h: did the train stand, was the sensor off, is it another unit or channel?"
+            "doubt: {file}: {rms} m/s2 rms is hardly a signal at {speed} km/h; check whether \
+                 the train was standing, the sensor was off, or the unit or channel is wrong"
         ));
     }
     let step = step(samples)?;
     (rms < STEPS_MIN * step).then(|| {
         format!(
-            "doubt: {file}: the signal is only {} steps of its resolution loud: nearly no signal; record with more gain, or with the train rolling",
+            "doubt: {file}: the signal is only {} steps of its resolution: hardly a signal; \
+                 record with more gain, or with the train rolling",
             significant(rms / step, 2)
         )
     })

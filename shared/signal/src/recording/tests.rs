@@ -140,11 +140,11 @@ fn a_missing_or_broken_manifest_is_named() {
     let empty = tempfile::tempdir().unwrap();
     assert_eq!(
         complaint(empty.path()),
-        "recording.json: file: there is no such file; put it there or correct its name"
+        "recording.json: file: the file does not exist; add it or correct its name"
     );
     fs::write(empty.path().join("recording.json"), "{\"format\": ").unwrap();
     let text = complaint(empty.path());
-    assert!(text.starts_with("recording.json: file: is not JSON (EOF"), "{text}");
+    assert!(text.starts_with("recording.json: file: is not valid JSON (EOF"), "{text}");
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn every_field_that_is_needed_is_asked_for_by_name() {
     );
     assert_eq!(
         message(|root| root["sleepers"][2]["id"] = json!("SN1")),
-        "recording.json: sleepers: the id SN1 stands twice; give every sleeper its own"
+        "recording.json: sleepers: duplicate sleeper id SN1; give every sleeper a unique id"
     );
     let text = message(|root| root["format"] = json!("aba-recording/2"));
     assert!(text.contains("\"aba-recording/1\""), "{text}");
@@ -175,7 +175,7 @@ fn every_field_that_is_needed_is_asked_for_by_name() {
 #[test]
 fn a_missing_pass_and_an_unknown_kind_are_named() {
     let text = message(|root| root["passes"][0]["file"] = json!("gone.parquet"));
-    assert!(text.starts_with("gone.parquet: file: there is no such file"), "{text}");
+    assert!(text.starts_with("gone.parquet: file: the file does not exist"), "{text}");
     let text = message(|root| root["passes"][0]["file"] = json!("recording.json"));
     assert!(text.contains("neither .parquet nor .csv"), "{text}");
 }
@@ -185,7 +185,7 @@ fn a_missing_column_is_named_with_those_present() {
     let text = csv_message("time_s,acc\n0,1\n");
     assert_eq!(
         text,
-        "pass.csv: position_m: there is no such column; name it so (the file has time_s, acc)"
+        "pass.csv: position_m: the column is missing; rename one of the file's columns: time_s, acc"
     );
 }
 
@@ -212,7 +212,7 @@ fn a_file_that_is_no_parquet_is_refused() {
     let folder = folder(|root| root["passes"][0]["file"] = json!("text.parquet"));
     fs::write(folder.path().join("text.parquet"), "time_s").unwrap();
     let text = complaint(folder.path());
-    assert!(text.starts_with("text.parquet: file: cannot be read ("), "{text}");
+    assert!(text.starts_with("text.parquet: file: unreadable ("), "{text}");
 }
 
 #[test]
@@ -231,8 +231,8 @@ fn a_gap_in_time_is_named_by_its_row() {
             values[0] += 0.001;
         }
     }));
-    assert!(text.starts_with("pass.csv: time_s: steps by 0.0011 s"), "{text}");
-    assert!(text.contains("to row 901"), "{text}");
+    assert!(text.starts_with("pass.csv: time_s: the step to row 901 is 0.0011 s"), "{text}");
+    assert!(text.contains("step to row 901"), "{text}");
 }
 
 #[test]
@@ -243,7 +243,7 @@ fn a_short_gap_in_time_is_told_by_the_declared_rate() {
             values[0] += 0.01;
         }
     }));
-    assert!(text.contains("where 0.0001 s is expected"), "{text}");
+    assert!(text.contains("but 0.0001 s is expected"), "{text}");
 }
 
 #[test]
@@ -259,7 +259,7 @@ fn a_position_that_runs_back_is_named_by_its_row() {
             values[1] -= 0.01;
         }
     }));
-    assert!(text.starts_with("pass.csv: position_m: runs back from"), "{text}");
+    assert!(text.starts_with("pass.csv: position_m: decreases from"), "{text}");
     assert!(text.contains("at row 101"), "{text}");
 }
 
@@ -268,13 +268,13 @@ fn a_wrong_speed_a_short_pass_and_a_foreign_place_are_refused() {
     let text = message(|root| root["passes"][1]["speed_km_h"] = json!(13));
     assert!(text.starts_with("recording.json: passes[1].speed_km_h: is 13 km/h"), "{text}");
     let text = message(|root| root["nominal"]["sleeper"]["spacing_m"] = json!(0.6));
-    assert!(text.contains("covers 0.500 m; one sleeper's window needs 0.6 m"), "{text}");
+    assert!(text.contains("covers 0.500 m; the window of one sleeper needs 0.6 m"), "{text}");
     let text = message(|root| {
         for sleeper in root["sleepers"].as_array_mut().unwrap() {
             sleeper["x_m"] = json!(sleeper["x_m"].as_f64().unwrap() + 100.0);
         }
     });
-    assert!(text.starts_with("recording.json: sleepers: none lies inside a pass"), "{text}");
+    assert!(text.starts_with("recording.json: sleepers: no sleeper lies inside a pass"), "{text}");
 }
 
 #[test]

@@ -115,7 +115,7 @@ impl Recording {
         if let Some(distance_m) = self.median_distance_m() {
             // To a tenth of a millimetre, as a message can show it.
             let distance_m = (1e4 * distance_m).round() / 1e4;
-            let quantity = "the sleepers of the recording lie".to_owned();
+            let quantity = "the sleeper spacing in the recording is".to_owned();
             OtherTrack::new(quantity, distance_m, spacing_m, "m")?;
         }
         for quantity in &QUANTITIES {
@@ -209,7 +209,7 @@ mod tests {
         let mut far = recording();
         far.sleepers.iter_mut().for_each(|sleeper| sleeper.x_m *= 1.12);
         let far = far.check_track(&TrackDesign::v_track()).unwrap_err().to_string();
-        assert_eq!(far, "the sleepers of the recording lie 0.14 m, not 0.125 m");
+        assert_eq!(far, "the sleeper spacing in the recording is 0.14 m, not 0.125 m");
     }
 
     #[test]

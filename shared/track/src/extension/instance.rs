@@ -29,7 +29,7 @@ pub struct ExtensionInstance {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InstanceError {
     /// No kind has the name.
-    #[error("no extension is called `{physics}`; known are {}", known_kinds())]
+    #[error("unknown extension `{physics}`; known extensions: {}", known_kinds())]
     Unknown {
         /// The name.
         physics: String,

@@ -12,18 +12,20 @@ use std::str::FromStr;
 pub enum InstanceTextError {
     /// No name stands first.
     #[error(
-        "write NAME[@PLACE][:PARAMETER=VALUE,...], as in `sleeper_bolt@SN8-SN31:stiffness_N_per_m=3e7`"
+        "write NAME[@PLACE][:PARAMETER=VALUE,...], for example \
+             `sleeper_bolt@SN8-SN31:stiffness_N_per_m=3e7`"
     )]
     Form,
     /// A parameter is not `NAME=NUMBER`.
-    #[error("`{0}` is no parameter; write NAME=NUMBER")]
+    #[error("`{0}` is not a parameter; write NAME=NUMBER")]
     Parameter(String),
     /// A parameter stands twice.
-    #[error("`{0}` stands twice")]
+    #[error("duplicate parameter `{0}`")]
     Twice(String),
     /// The place is none.
     #[error(
-        "`{0}` is no place; write `2.43m`, `2m-3m`, `SN18`, `SN10-SN30`, `SN10-SN30/4` or several of these with commas"
+        "`{0}` is not a place; write `2.43m`, `2m-3m`, `SN18`, `SN10-SN30`, `SN10-SN30/4` \
+             or several sleepers separated by commas"
     )]
     Place(String),
 }

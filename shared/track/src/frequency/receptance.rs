@@ -33,10 +33,10 @@ pub enum FrequencyError {
         sleepers: usize,
     },
     /// A frequency is negative, NaN or infinite.
-    #[error("{0} Hz is not a frequency to excite at")]
+    #[error("{0} Hz is not a valid excitation frequency")]
     Frequency(f64),
     /// The dynamic stiffness has no inverse there: an undamped resonance.
-    #[error("the track resonates without damping at {0} Hz")]
+    #[error("the track has an undamped resonance at {0} Hz")]
     Singular(f64),
 }
 

@@ -33,7 +33,7 @@ pub struct TrackModel {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A track has at least one sleeper, a span at least one element, and a sleeper too.
-    #[error("the mesh needs two spans or more and at least one element in each and in a sleeper")]
+    #[error("the mesh needs at least two spans, and at least one element per span and per sleeper")]
     Mesh,
     /// There must be a support a sleeper.
     #[error("{spans} spans have {} sleepers, but {supports} supports are given", spans - 1)]

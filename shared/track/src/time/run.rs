@@ -57,7 +57,8 @@ impl PassRecord {
 pub enum PassError {
     /// A wheel leaves the track, stands still, runs backwards or has no time step.
     #[error(
-        "a pass from {} to {} m at {} m/s does not lie, with all its wheels, on a track of {length_m} m",
+        "a pass from {} to {} m at {} m/s exceeds the track of {length_m} m with at least \
+             one wheel",
         pass.start_m,
         pass.end_m,
         pass.speed_m_s
@@ -69,7 +70,7 @@ pub enum PassError {
         length_m: f64,
     },
     /// Something carries nothing: stiffness or inertia is not positive definite.
-    #[error("the track does not carry itself: its stiffness is not positive definite")]
+    #[error("the stiffness matrix of the track is not positive definite (unsupported track?)")]
     Unstable,
     /// The contact force is not a number any more.
     #[error("the contact force is not a number at {position_m} m")]
@@ -78,7 +79,7 @@ pub enum PassError {
         position_m: f64,
     },
     /// Cases and surfaces must come in pairs.
-    #[error("{models} tracks need as many surfaces, not {surfaces}")]
+    #[error("{models} tracks need {models} surfaces, not {surfaces}")]
     Surfaces {
         /// Track models given.
         models: usize,

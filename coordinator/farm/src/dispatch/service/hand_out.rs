@@ -13,7 +13,7 @@ use tracktwin_protocol::{CaseLease, Lease, LeasedCase};
 /// After the library had no case to give, it is not asked again for so long.
 const NOTHING: Duration = Duration::from_millis(100);
 
-/// The longest that a worker without work is told to wait: new campaigns are to find it.
+/// Longest waiting time of a worker without work, so that it soon finds new campaigns.
 const WAIT_MAX: Duration = Duration::from_mins(1);
 
 /// Workers without work that may ask once a second all together.
@@ -23,7 +23,7 @@ impl Dispatch {
     /// Cases for a worker that is to have some.
     pub(super) async fn hand_out(&self, worker: &str, cases_max: u32) -> Result<Lease, Status> {
         let failed = |error: &DispatchError| {
-            tracing::error!("no cases can be handed out: {error:?}");
+            tracing::error!("cannot lease cases: {error:?}");
             Status::unavailable(error.to_string())
         };
         let audit = self.audits.lease(worker, cases_max, &self.campaigns).await;
@@ -75,7 +75,7 @@ impl Dispatch {
         tracing::error!("campaign {} is paused: {released:?}, {paused:?}", leased.campaign);
     }
 
-    /// What the worker in this process holds of the campaign that is handed out.
+    /// Cases of the campaign that the worker in this process holds.
     fn held_here(&self) -> Vec<library::Held> {
         let (Some(own), Some(scope)) = (&self.settings.own, &self.settings.scope) else {
             return Vec::new();
@@ -100,7 +100,7 @@ impl Dispatch {
 }
 
 impl Served {
-    /// These cases, as they are handed out.
+    /// These cases as a lease message.
     pub(crate) fn lease(&self, cases: Vec<LeasedCase>) -> CaseLease {
         CaseLease {
             campaign: self.record.id.clone(),

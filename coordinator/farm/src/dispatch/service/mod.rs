@@ -59,7 +59,7 @@ impl Dispatch {
         }
     }
 
-    /// How a worker stands; one that has not registered is told to.
+    /// Eligibility of a worker; an unregistered one gets an error.
     async fn eligibility(&self, worker: &str) -> Result<WorkerEligibility, Status> {
         let not_registered = || Status::unauthenticated("register first");
         let eligibility = self.roster.eligibility(worker).ok_or_else(not_registered)?;
@@ -70,7 +70,7 @@ impl Dispatch {
         self.roster.eligibility(worker).ok_or_else(not_registered)
     }
 
-    /// Tells the library that a worker is alive, and hears whether it is in quarantine.
+    /// Records in the library that a worker is alive, and reads whether it is in quarantine.
     async fn note(&self, worker: &str) -> Result<(), Status> {
         let known = self.library.heartbeat(worker, self.now_unix_ms()).await;
         if let Some(record) = known.map_err(|error| unavailable(&error))? {

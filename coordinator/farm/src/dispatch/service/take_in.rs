@@ -28,7 +28,10 @@ impl Dispatch {
         let (mut places, mut ordinary) = (Vec::new(), Vec::new());
         for (place, report) in reports.into_iter().enumerate() {
             let Some(report) = report else {
-                tracing::warn!(worker, "a case arrived damaged; its worker is to send it again");
+                tracing::warn!(
+                    worker,
+                    "a case was damaged in transmission; its worker must send it again"
+                );
                 self.counts.malformed.inc();
                 continue;
             };
@@ -79,14 +82,17 @@ impl Dispatch {
             step.fail(&error.to_string());
             unavailable(&error)
         })?;
-        // What is said again counts once.
+        // Repeated reports count once.
         let stored = ended.iter().zip(&verdicts).filter(|(_, it)| matches!(it, Verdict::Stored));
         let (failed, durations_s): (Vec<bool>, Vec<f64>) = stored.map(|(ended, _)| *ended).unzip();
         step.count("cases_stored", failed.len());
         drop(step);
         served.measured(durations_s);
         if self.settings.suspends_failing && self.roster.reported(worker, &failed) {
-            tracing::warn!(worker, "put aside: it fails where other workers don't");
+            tracing::warn!(
+                worker,
+                "worker suspended: its cases fail, those of other workers do not"
+            );
             self.counts.suspended.inc();
         }
         Ok(verdicts)

@@ -9,7 +9,7 @@ use tokio_stream::StreamExt;
 /// Statements that find the indices of cases with a fault; `$1` is the campaign.
 const FAULTS: [(&str, Text); 7] = [
     (
-        "finished cases without result at every speed",
+        "finished cases without a result at every speed",
         Text::Each {
             sqlite: "
                 select sobol_index from campaign_case where campaign_id = $1 and state = 'finished'
@@ -31,14 +31,14 @@ const FAULTS: [(&str, Text); 7] = [
         ),
     ),
     (
-        "results of other parameters than their case has",
+        "results with parameters that differ from their case's",
         Text::same(
             "select distinct sobol_index from result join campaign_case using (campaign_id, sobol_index)
         where campaign_id = $1 and result.parameter_hash <> campaign_case.parameter_hash",
         ),
     ),
     (
-        "results of another experiment than the campaign's",
+        "results with an experiment that differs from the campaign's",
         Text::same(
             "select distinct sobol_index from result
         where campaign_id = $1
@@ -46,7 +46,7 @@ const FAULTS: [(&str, Text); 7] = [
         ),
     ),
     (
-        "cases with the parameters and surface of an earlier one",
+        "cases with the parameters and surface of an earlier case",
         Text::same(
             "select max(sobol_index) as sobol_index from campaign_case where campaign_id = $1
         group by parameter_hash having count(*) > 1",
@@ -62,7 +62,7 @@ const FAULTS: [(&str, Text); 7] = [
         ),
     ),
     (
-        "leases that their case never had",
+        "leases with an impossible epoch",
         Text::same(
             "select distinct sobol_index from attempt join campaign_case using (campaign_id, sobol_index)
         where campaign_id = $1 and attempt.epoch not between 1 and campaign_case.epoch",
@@ -118,8 +118,8 @@ impl<F: FnMut()> Survey<'_, F> {
                 finite.at(case.index);
             }
         }
-        self.fault(&campaign.id, "cases that do not have their hash", &hash);
-        self.fault(&campaign.id, "cases with parameters that are no numbers", &finite);
+        self.fault(&campaign.id, "cases that do not match their hash", &hash);
+        self.fault(&campaign.id, "cases with NaN or infinite parameters", &finite);
         Ok(())
     }
 
@@ -132,7 +132,7 @@ impl<F: FnMut()> Survey<'_, F> {
         match counted.and_then(|counted| Ok(counted == kept?)) {
             Ok(true) => {}
             Ok(false) => {
-                self.add(&campaign.id, "the counts of cases are not those of the cases", 1, None);
+                self.add(&campaign.id, "the stored counts of cases differ from the cases", 1, None);
             }
             Err(error) => self.unreadable(&campaign.id, "counts of cases", error)?,
         }

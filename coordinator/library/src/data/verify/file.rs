@@ -49,7 +49,7 @@ impl<F: FnMut()> Survey<'_, F> {
                 Some((_, _, sql)) if !same(sql, &expected) => {
                     self.add(
                         &name,
-                        format!("the {kind} {object} is another than this program's"),
+                        format!("the {kind} {object} differs from this program's"),
                         1,
                         None,
                     );
@@ -68,11 +68,11 @@ impl<F: FnMut()> Survey<'_, F> {
             group by 1, 2");
         let rows = match self.library.readers().rows(ask).await {
             Ok(rows) => rows,
-            Err(error) => return self.unreadable(&name, "what refers to other rows", error),
+            Err(error) => return self.unreadable(&name, "references to other rows", error),
         };
         for row in rows {
             let (child, parent): (String, String) = (row.get("child")?, row.get("parent")?);
-            let what = format!("rows of {child} whose row of {parent} is not there");
+            let what = format!("orphaned rows of {child}: their row of {parent} is missing");
             self.add(&name, what, row.get_u32("n")?.into(), None);
         }
         Ok(())

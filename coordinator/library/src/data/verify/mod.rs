@@ -1,6 +1,6 @@
-//! Looking a library over: what it holds is what it says it holds.
+//! Verification of a library's integrity.
 //!
-//! What can't be read is a finding like any other, and what comes after it is looked over all the same.
+//! Unreadable data are findings as well, and the verification continues after them.
 
 mod cases;
 mod file;
@@ -32,15 +32,16 @@ pub struct Verified {
     pub findings: Vec<IntegrityFault>,
     /// Cases whose results have the checksum that came with them.
     pub attested: u64,
-    /// Cases whose results came without one, so that nothing tells whether they were altered.
+    /// Cases whose results have no checksum, so that alterations cannot be detected.
     pub unattested: u64,
-    /// What was not looked at, and why.
+    /// What was not verified, and why.
     pub notes: Vec<String>,
 }
 
 impl Library {
-    /// Looks over everything: the file with `SQLite`, the schema, whether all can be read, checksums, hashes,
-    /// gaps, duplicates, numbers that are none, and counts. `looked_at` hears of each case whose results were.
+    /// Verifies everything: the file with `SQLite`, the schema, readability, checksums, hashes,
+    /// gaps, duplicates, NaN and infinite values, and counts. `looked_at` is called for each case
+    /// whose results were verified.
     ///
     /// # Errors
     /// [`LibraryError`] when the library does not answer; what is wrong with it is a finding.
@@ -63,7 +64,7 @@ impl Library {
     }
 }
 
-/// A library that is being looked over.
+/// A verification in progress.
 struct Survey<'a, F> {
     library: &'a Library,
     found: Verified,
@@ -87,7 +88,7 @@ impl<F: FnMut()> Survey<'_, F> {
             return Err(error);
         }
         let reason = reason(&error);
-        self.add(place, format!("{what} cannot be read: {reason}"), 1, None);
+        self.add(place, format!("{what}: unreadable: {reason}"), 1, None);
         Ok(())
     }
 
@@ -106,7 +107,7 @@ impl<F: FnMut()> Survey<'_, F> {
         ];
         for (what, json, hash) in hashes {
             if blake3::hash(json.as_bytes()).to_hex().as_str() != hash {
-                self.add(&campaign.id, format!("the {what} does not have its hash"), 1, None);
+                self.add(&campaign.id, format!("the {what} does not match its hash"), 1, None);
             }
         }
     }
@@ -132,7 +133,7 @@ impl<F: FnMut()> Survey<'_, F> {
     }
 }
 
-/// What the database said, in one line.
+/// The error of the database as one line.
 pub(super) fn reason(error: &LibraryError) -> String {
     let mut reason = error.to_string();
     if let LibraryError::Malformed { reason: said } = error {

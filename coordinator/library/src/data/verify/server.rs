@@ -8,7 +8,7 @@ use crate::engine::sql;
 /// or a series' result (docs/decisions/0035), and find its first index.
 const LOOSE: [(&str, &str); 3] = [
     (
-        "results of cases that are not there",
+        "orphaned results: their case is missing",
         "select count(*) as n, min(sobol_index) as first_index from case_result
         left join campaign_case using (campaign_id, sobol_index) where state is null",
     ),

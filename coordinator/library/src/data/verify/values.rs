@@ -44,10 +44,10 @@ impl<F: FnMut()> Survey<'_, F> {
         let place = &campaign.id;
         self.fault(
             place,
-            "results that do not have their checksum: a number was altered",
+            "results that do not match their checksum: a number was altered",
             &altered,
         );
-        self.fault(place, "results with features that are no numbers", &finite);
+        self.fault(place, "results with NaN or infinite features", &finite);
         self.fault(place, "results with too many or too few bins", &shape);
         Ok(())
     }

@@ -6,13 +6,13 @@ use std::io;
 use std::path::Path;
 use tracktwin_library::{Cell, Table};
 
-/// A CSV file that is being written.
+/// A CSV file open for writing.
 pub(in crate::commands::library) struct CsvFile {
     out: csv::Writer<File>,
 }
 
 impl CsvFile {
-    /// Begins a file with the table's heads.
+    /// Starts a file with the column names.
     pub(in crate::commands::library) fn create(path: &Path, table: &Table) -> io::Result<Self> {
         let mut out = csv::Writer::from_path(path)?;
         out.write_record(table.columns.iter().map(|column| column.name))?;

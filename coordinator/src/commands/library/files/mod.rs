@@ -1,4 +1,4 @@
-//! Tables as text and as Parquet files; knows nothing of where they come from.
+//! Tables as text and Parquet files, independent of their source.
 
 pub(super) mod csv_file;
 pub(super) mod parquet_file;

@@ -1,5 +1,5 @@
-//! Tables as Parquet files: texts are UTF-8 strings, integers INT64, numbers DOUBLE, series lists of
-//! DOUBLE; all may be missing.
+//! Tables as Parquet files: texts are UTF-8 strings, integers INT64, numbers DOUBLE, series lists
+//! of DOUBLE; all values are optional.
 
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -16,11 +16,11 @@ use std::path::Path;
 use std::sync::Arc;
 use tracktwin_library::{Cell, Column, ColumnKind, Table};
 
-/// Levels of a value that may be missing, and of an element of a list that may be missing.
+/// Definition levels of an optional value, and of an element of an optional list.
 const PRESENT: i16 = 1;
 const ELEMENT: i16 = 2;
 
-/// A Parquet file that is being written.
+/// A Parquet file open for writing.
 pub(in crate::commands::library) struct ParquetFile {
     writer: SerializedFileWriter<File>,
     columns: &'static [Column],
@@ -39,7 +39,7 @@ impl ParquetFile {
         Ok(Self { writer, columns: table.columns })
     }
 
-    /// Writes rows as a group of their own.
+    /// Writes rows as one row group.
     pub(in crate::commands::library) fn write(
         &mut self,
         rows: &[Vec<Cell>],
@@ -116,8 +116,8 @@ fn write_column<'a>(
     .map(drop)
 }
 
-/// Lists as Parquet has them: all values in a row, and for each whether it is there and whether it
-/// goes on with a list.
+/// Lists in Parquet's representation: all values in sequence, each with its definition and
+/// repetition level.
 #[derive(Default)]
 struct Lists {
     values: Vec<f64>,
@@ -145,7 +145,7 @@ impl Lists {
         lists
     }
 
-    /// The lists again.
+    /// The inverse: lists from Parquet's representation.
     fn cells(self) -> Vec<Cell> {
         let mut values = self.values.into_iter();
         let mut cells: Vec<Cell> = Vec::new();
@@ -161,7 +161,7 @@ impl Lists {
     }
 }
 
-/// Hands the rows of a file that [`ParquetFile`] wrote to `take`, a group at a time.
+/// Passes the rows of a file written by [`ParquetFile`] to `take`, one group at a time.
 pub(in crate::commands::library) async fn read<E: From<ParquetError>>(
     path: &Path,
     table: &Table,
@@ -184,7 +184,7 @@ fn check_columns(reader: &impl FileReader, table: &Table) -> Result<(), ParquetE
     }
     let missing = expected.iter().find(|name| !found.contains(name)).unwrap_or(&"in another order");
     Err(ParquetError::General(format!(
-        "the columns are not those of the table {}: {missing}",
+        "the columns differ from those of the table {}: {missing}",
         table.name
     )))
 }
@@ -236,7 +236,7 @@ fn read_column(
     }
 }
 
-/// The values of a column without lists, and which are there.
+/// The values of a column without lists, and which of them are present.
 fn flat<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     count: usize,

@@ -4,7 +4,7 @@ use serde_json::Value;
 use std::io::{self, Write};
 use tracktwin_library::Cell;
 
-/// A cell as people and CSV files have it; a missing one is empty, a series is a JSON array.
+/// A cell as text; a missing value is empty, a series is a JSON array.
 pub(in crate::commands::library) fn cell(cell: &Cell) -> String {
     match cell {
         Cell::Null => String::new(),
@@ -19,7 +19,7 @@ pub(in crate::commands::library) fn cell(cell: &Cell) -> String {
     }
 }
 
-/// As short as reads back to the same number.
+/// The shortest text that reads back to the same number.
 fn number(value: f64) -> String {
     if value == 0.0 || (1e-5..1e15).contains(&value.abs()) || !value.is_finite() {
         value.to_string()
@@ -28,7 +28,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// A cell as JSON; a number that is none is null.
+/// A cell as JSON; NaN and infinite values are null.
 pub(in crate::commands::library) fn json(cell: Cell) -> Value {
     match cell {
         Cell::Null => Value::Null,
@@ -40,8 +40,7 @@ pub(in crate::commands::library) fn json(cell: Cell) -> Value {
     }
 }
 
-/// Rows in aligned columns, the first of them being the heads. What looks like a number stands to
-/// the right.
+/// Rows in aligned columns; the first row holds the headings. Numbers are right-aligned.
 pub(in crate::commands::library) fn table(
     rows: &[Vec<String>],
     out: &mut impl Write,

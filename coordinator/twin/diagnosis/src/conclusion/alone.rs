@@ -40,12 +40,12 @@ pub fn passes_alone(
         first.evidence
     );
     let hypotheses: Vec<Hypothesis> = found.iter().map(|(_, it)| it.clone()).collect();
-    let mut notes = vec![format!("No model of a track was compared with the recording: {reason}.")];
+    let mut notes = vec![format!("No track model was compared with the recording: {reason}.")];
     if let [speed_km_h] = recording.speeds_km_h()[..] {
         notes.push(one_speed(speed_km_h));
     }
     if !recording.gain_known() {
-        notes.push("The unit of the signal is not known: amplitudes are relative.".to_owned());
+        notes.push("The unit of the signal is unknown: amplitudes are relative.".to_owned());
     }
     notes.extend(inspection.pass_defects.iter().map(ToString::to_string));
     notes.extend(lost(inspection, recording));

@@ -34,9 +34,9 @@ impl Evidence<'_> {
         }
         let at_wheel = kind.classes.contains(&Class::WheelAngle);
         let (port, would_separate) = if at_wheel {
-            ("wheel_surface", "a look at the wheel's tread, or its measured profile")
+            ("wheel_surface", "an inspection or a profile measurement of the wheel's tread")
         } else {
-            ("rail_surface", "a look at the rail at the place, or its measured profile")
+            ("rail_surface", "an inspection or a profile measurement of the rail at the place")
         };
         all.retain(|other| other.physics != UNKNOWN);
         all.push(Hypothesis {
@@ -62,7 +62,7 @@ impl Evidence<'_> {
         let sleepers: Vec<usize> = patch.sleepers.clone().collect();
         let (port, would_separate) = match patch.fixed {
             Fixed::Wavelength(_) => {
-                ("rail_surface", "a look at the rail at the place, or its measured profile")
+                ("rail_surface", "an inspection or a profile measurement of the rail at the place")
             }
             Fixed::Frequency(_) => {
                 ("rail_seat", "a hammer test at the place, above and between the sleepers")

@@ -18,8 +18,8 @@ impl Evidence<'_> {
         }
         if !self.repeats() {
             notes.push(format!(
-                "One pass a speed: how far passes repeat each other had to be assumed, so that no \
-                 name is more certain than {:.0} %. Add a second pass at each speed.",
+                "One pass per speed: the repeatability of passes is assumed, which limits every \
+                     probability to {:.0} %. Add a second pass at each speed.",
                 100.0 * ONE_PASS_MAX
             ));
         }
@@ -42,22 +42,22 @@ impl Evidence<'_> {
         });
         if let (Some(nats), Some(best)) = (round.remainder, round.fitted.first()) {
             return Some(format!(
-                "{} explains most of what is left out{place}, but leaves {nats:.0} nats there: it \
-                 looks like it and is something else.",
+                "{} explains most of the left-out physics{place}, but leaves {nats:.0} nats \
+                     unexplained there: the cause is something similar.",
                 best.candidate.kind.physics
             ));
         }
         if round.port_differs_between_speeds {
             return Some(format!(
-                "Something is left{place} that chance does not explain (probability {}), but no two speeds \
-                 hear it there: what stays where it is, all of them pass.",
+                "A significant residual remains{place} (probability by chance {}), but no two \
+                     speeds show it there; a fixed cause would appear at every speed.",
                 chance(round.p_value)
             ));
         }
         let rest = if self.search.accepted.is_empty() { "Something" } else { "A remainder" };
         let left = format!(
-            "{rest} is left{place} that chance does not explain (probability {}); it may be the model's \
-             own error, for nothing in the catalogue predicts the held-out speeds better.",
+            "{rest} is left{place} that chance does not explain (probability {}); it may be a \
+                 model error, because no kind in the catalogue predicts the held-out speeds better.",
             chance(round.p_value)
         );
         (!round.accepted).then_some(left)
@@ -68,7 +68,7 @@ impl Evidence<'_> {
 pub(super) fn lost(inspection: &Inspection, recording: &Recording) -> Option<String> {
     let lost = inspection.loss_of_contact.as_ref()?;
     Some(format!(
-        "loss_of_contact: {}: what was fitted near there says little.",
+        "loss_of_contact: {}: estimates near there are unreliable.",
         lost.sentence(recording.passes.len())
     ))
 }
@@ -80,8 +80,9 @@ pub(super) fn shown(finding: &Finding) -> String {
 
 pub(super) fn one_speed(speed_km_h: f64) -> String {
     format!(
-        "One speed only: nothing could be tested on a speed that was not fitted, so that no name \
-         that needs such a test is more certain than {:.0} %. Add a pass at {:.0} km/h or at {:.0} km/h.",
+        "One speed only: no test on a held-out speed was possible, which limits the \
+             probability of a hypothesis that needs this test to {:.0} %. Add a pass at {:.0} \
+             km/h or at {:.0} km/h.",
         100.0 * ONE_SPEED_MAX,
         speed_km_h / SPEED_RATIO,
         speed_km_h * SPEED_RATIO,

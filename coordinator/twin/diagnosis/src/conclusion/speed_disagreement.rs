@@ -35,9 +35,9 @@ impl Evidence<'_> {
             self.inspection.findings.iter().any(|finding| finding.physics == CLIPPING.physics);
         (self.search.speeds_disagree() && !are_cut).then(|| {
             format!(
-                "The speeds do not agree about the track: one for each explains the recording better \
-                 than one for all, by {:.0} nats. Positions of some pass belong to another place, or to \
-                 the other rail.",
+                "The speeds disagree about the track: a separate track for each speed explains the \
+                     recording better than one for all, by {:.0} nats. The positions of some passes are \
+                     wrong, or some passes are of the other rail.",
                 self.search.speed_disagreement
             )
         })

@@ -256,7 +256,7 @@ impl Search {
         let (mut round, mut ports) =
             setting.round(&problem, &self.last, all, threshold, &hopeless, progress)?;
         if let Some(better) = retuned(&problem, &self.last, &round.fitted)? {
-            // The candidates found a better baseline on their way: the opponent gets it too.
+            // The fits of the candidates found a better baseline, which is used from here on.
             self.last = better;
             let held_out = setting.held_out(&accepted, &self.last.values)?;
             densities[accepted.len()] = log_densities(&held_out);

@@ -1,8 +1,9 @@
-//! A wheel in the air: its acceleration stays at the load over the unsprung mass, for nothing else pushes it.
+//! Loss of contact: the acceleration of the wheel equals load over unsprung mass, because no other
+//! force acts.
 //!
-//! A recorder at its limit makes plateaus too. It does so on both sides, or at any level, and nothing it
-//! records lies beyond; a wheel in the air makes them on one side only, at one level, and lands with blows
-//! that reach further the other way.
+//! A recorder at its limit makes plateaus too. It does so on both sides, or at any level, and
+//! nothing it records lies beyond; loss of contact makes them on one side only, at one level, and
+//! lands with blows that reach further the other way.
 
 use super::plateau::Plateaus;
 use super::standstill::Standstill;
@@ -34,7 +35,7 @@ const APART: f64 = 1.0;
 /// Loss of contact between wheel and rail.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LossOfContact {
-    /// Acceleration in m/s2 of the wheel in the air, positive as the recording has it.
+    /// Acceleration in m/s2 without contact, with the sign of the recording.
     pub level_m_s2: f64,
     /// Load over unsprung mass in m/s2, where the recording states both.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -113,9 +114,13 @@ impl LossOfContact {
         let known = format!(", where load over unsprung mass is {expected:.1} m/s2");
         if off.abs() > NEAR {
             let percent = 1e2 * off;
-            return known + &format!(" as stated: load, mass or gain are off by {percent:+.0} %");
+            return known + &format!(" as stated: load, mass or gain deviate by {percent:+.0} %");
         }
-        if self.level_m_s2 < 0.0 { known + ", upwards: the sensor's sign is turned" } else { known }
+        if self.level_m_s2 < 0.0 {
+            known + ", upwards: the sign of the sensor is reversed"
+        } else {
+            known
+        }
     }
 }
 
@@ -154,8 +159,8 @@ pub(crate) fn expected_m_s2(recording: &Recording) -> Option<f64> {
     (recording.gain_known() && level.is_finite() && level > 0.0).then_some(level)
 }
 
-/// Whether a wheel in the air has this acceleration in m/s2, by what the recording states: no limit can be
-/// told from it.
+/// Whether this is the acceleration in m/s2 without contact, by what the recording states: no limit
+/// can be told from it.
 pub(super) fn is_at_flight_level(recording: &Recording, level_m_s2: f64) -> bool {
     expected_m_s2(recording).is_some_and(|level| (level_m_s2 / level - 1.0).abs() <= NEAR)
 }

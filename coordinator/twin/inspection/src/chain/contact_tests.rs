@@ -155,7 +155,7 @@ fn a_gain_that_is_off_is_said_beside_the_level() {
     let louder = through(&DEEP, |sample, noise| 1.2 * (sample + noise));
     let found = loss_of_contact(&louder).unwrap();
     let said = found.sentence(3);
-    assert!(said.contains("load, mass or gain are off by +20 %"), "{said}");
+    assert!(said.contains("load, mass or gain deviate by +20 %"), "{said}");
     assert!(clipping(&louder, ALPHA).is_empty());
 }
 
@@ -164,7 +164,7 @@ fn a_sensor_upside_down_is_said() {
     let turned = through(&DEEP, |sample, noise| -sample + noise);
     let found = loss_of_contact(&turned).unwrap();
     assert!((found.level_m_s2 / -FLIGHT_M_S2 - 1.0).abs() < 0.01, "{found:?}");
-    assert!(found.sentence(3).contains("sign is turned"), "{}", found.sentence(3));
+    assert!(found.sentence(3).contains("sign of the sensor is reversed"), "{}", found.sentence(3));
     assert!(clipping(&turned, ALPHA).is_empty());
 }
 

@@ -33,7 +33,7 @@ const USUAL_DEVIATION: f64 = 8e-3;
 pub struct Offset {
     /// Place in m.
     pub x_m: f64,
-    /// How much further on the second pass says the same spot of the rail is, in m.
+    /// Shift in m of the same point of the rail in the second pass.
     pub offset_m: f64,
     /// Correlation of the two, 0 to 1.
     pub correlation: f64,

@@ -96,16 +96,16 @@ impl fmt::Display for PassDefect {
         match self {
             Self::DropOut { pass, from_m, duration_s } => write!(
                 f,
-                "pass {}: no change for {:.1} ms from {from_m:.3} m on: a drop-out; leave the stretch out",
+                "pass {}: no change for {:.1} ms from {from_m:.3} m on: a drop-out; remove that stretch",
                 pass + 1,
                 1e3 * duration_s
             ),
             Self::Dead { pass } => {
-                write!(f, "pass {}: the signal doesn't change; check sensor and cable", pass + 1)
+                write!(f, "pass {}: the signal does not change; check sensor and cable", pass + 1)
             }
             Self::Noise { pass } => write!(
                 f,
-                "pass {}: nothing stands out of the noise floor; check sensor, cable and gain",
+                "pass {}: no signal above the noise floor; check sensor, cable and gain",
                 pass + 1
             ),
             Self::Saturated { pass, share } => write!(
@@ -116,7 +116,8 @@ impl fmt::Display for PassDefect {
             ),
             Self::Airborne { pass, share } => write!(
                 f,
-                "pass {}: the wheel is off the rail for {:.0} % of the time; check load and unsprung mass, and record slower or on a smoother rail",
+                "pass {}: the wheel is off the rail for {:.0} % of the time; check load and \
+                     unsprung mass, and record at a lower speed or on a smoother rail",
                 pass + 1,
                 1e2 * share
             ),
@@ -133,7 +134,8 @@ impl fmt::Display for PassDefect {
             ),
             Self::Short { pass, length_m } => write!(
                 f,
-                "pass {}: covers {length_m:.2} m, fewer than {SPANS_MIN:.0} sleeper spacings; record more",
+                "pass {}: covers {length_m:.2} m, fewer than {SPANS_MIN:.0} sleeper spacings; \
+                     record a longer stretch",
                 pass + 1
             ),
         }

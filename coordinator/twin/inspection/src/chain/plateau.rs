@@ -1,4 +1,4 @@
-//! Crests of a pass that stay at one level: cut off by a recorder, or of a wheel in the air.
+//! Crests of a pass that stay at one level: cut off by a recorder, or by loss of contact.
 
 use crate::along::{bonferroni, ln_binomial_tail};
 use std::ops::Range;

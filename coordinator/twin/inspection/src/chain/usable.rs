@@ -30,7 +30,7 @@ fn only(recording: &Recording, passes: &[usize]) -> Recording {
     Recording { passes, ..recording.clone() }
 }
 
-/// Those of the passes that no trouble is about.
+/// The passes without a defect.
 fn without(
     recording: &Recording,
     mut passes: Vec<usize>,
@@ -43,7 +43,7 @@ fn without(
     passes
 }
 
-/// Indices of the passes that a trouble is about.
+/// Indices of the passes with a defect.
 fn about(defect: &PassDefect, recording: &Recording) -> Vec<usize> {
     match *defect {
         PassDefect::DropOut { pass, .. }

@@ -22,10 +22,11 @@ pub(super) fn clipping_finding(
     unit: &str,
     is_flight_known: bool,
 ) -> Option<Finding> {
-    // On the side towards the rail alone, a wheel in the air may do the same.
+    // On the side towards the rail alone, loss of contact has the same effect.
     let may_fly = !is_flight_known && passes.iter().all(|pass| pass.level_m_s2 > 0.0);
     let or = if may_fly {
-        "; or the wheel was in the air there: give nominal.wheel.load_N and mass_kg to tell"
+        "; or the wheel lost contact there: give nominal.wheel.load_N and mass_kg to \
+             distinguish"
     } else {
         ""
     };
@@ -37,7 +38,8 @@ pub(super) fn clipping_finding(
         place: Place::Everywhere,
         parameters: BTreeMap::from([("limit_m_s2", (limit, 0.01 * limit))]),
         evidence: format!(
-            "{} of {} passes are cut off: in pass {}, {} crests end within 1 % of {} {unit} ({:.2} % of the samples){or}",
+            "{} of {} passes are clipped: in pass {}, {} crests end within 1 % of {} {unit} \
+                 ({:.2} % of the samples){or}",
             passes.len(),
             recorded,
             worst.pass + 1,
@@ -73,7 +75,11 @@ pub(super) fn hum_finding(lines: &[Hum], unit: &str) -> Option<Finding> {
 pub(super) fn gain_finding(gain: &Gain) -> Finding {
     let (level, deviation) = gain.gain_db;
     let factor = 10f64.powf(level / 20.0);
-    let which = if gain.passes > 2 { "" } else { " (or the other one is off; a third would tell)" };
+    let which = if gain.passes > 2 {
+        ""
+    } else {
+        " (or the other one deviates; a third pass would distinguish)"
+    };
     Finding {
         physics: GAIN_ERROR.physics,
         p_value: number::probability(gain.ln_p),
@@ -97,7 +103,8 @@ pub(super) fn offset_finding(pair: &Offsets) -> Finding {
         place: Place::Everywhere,
         parameters: BTreeMap::from([("offset_m", (offset, 1e-3)), ("scale", (scale, 1e-3))]),
         evidence: format!(
-            "the odometers of passes {} and {} differ by up to {greatest_mm:.1} mm over the same surface ({offset_mm:+.1} mm in the middle, {:+.2} %); {:.0} mm are usual",
+            "the odometers of passes {} and {} differ by up to {greatest_mm:.1} mm over the \
+                 same surface ({offset_mm:+.1} mm in the middle, {:+.2} %); {:.0} mm are usual",
             pair.passes[0] + 1,
             pair.passes[1] + 1,
             1e2 * scale,
@@ -135,7 +142,8 @@ pub(super) fn flat_finding(flat: &Flat) -> Finding {
         place: Place::Everywhere,
         parameters,
         evidence: format!(
-            "one blow a turn in every pass, {turn:.4} m (sd {deviation:.4}) apart and {} times louder than what is around them",
+            "one impact per revolution in every pass, {turn:.4} m (sd {deviation:.4}) apart, {} \
+                 times above its surroundings",
             ratio(flat.power_ratio)
         ),
     }
@@ -153,7 +161,7 @@ pub(super) fn order_finding(orders: &[Order]) -> Option<Finding> {
             ("amplitude_m", first.amplitude_m),
         ]),
         evidence: format!(
-            "lines at whole waves to a turn of the wheel: order {}; order {} is {} times above what lies between orders",
+            "lines at wheel orders: order {}; order {} is {} times above the level between orders",
             names.join(", "),
             first.number,
             ratio(first.ratio)
@@ -170,7 +178,10 @@ pub(super) fn comb_finding(comb: &Comb) -> Finding {
         place: Place::Everywhere,
         parameters: BTreeMap::from([("circumference_m", comb.circumference_m)]),
         evidence: format!(
-            "a comb of wheel orders at multiples of {:.3} Hz, a circumference of {turn:.3} m (sd {deviation:.3}); of {} blocks that nothing was fitted on it explains {:.0} % of the variance in {:.0} to {:.0} Hz ({:.0} % by chance) and predicts {} better than a smooth spectrum does, by {:.1} nats a block",
+            "a comb of wheel orders at multiples of {:.3} Hz, a circumference of {turn:.3} m \
+                 (sd {deviation:.3}); in {} withheld blocks it explains {:.0} % of the variance in \
+                 {:.0} to {:.0} Hz ({:.0} % by chance) and predicts {} better than a smooth \
+                 spectrum, by {:.1} nats per block",
             comb.fundamental_hz,
             held_out.blocks,
             1e2 * held_out.explained,
@@ -222,7 +233,7 @@ pub(super) fn impact_finding(impact: &Impact, passes: &[Pass]) -> Finding {
         place: Place::Stretch { from_m: x - reach, to_m: x + reach },
         parameters,
         evidence: format!(
-            "at {x:.4} m (sd {deviation:.4}) {} is {} times louder than around it{form}",
+            "at {x:.4} m (sd {deviation:.4}) {} is {} times above its surroundings{form}",
             who(passes),
             ratio(impact.power_ratio)
         ),
@@ -240,7 +251,8 @@ pub(super) fn corrugation_finding(waves: &Corrugation) -> Finding {
             ("amplitude_m", waves.amplitude_m),
         ]),
         evidence: format!(
-            "waves of {:.2} mm from {from_m:.2} to {to_m:.2} m, {} times above the surface's own at every speed",
+            "waves of {:.2} mm from {from_m:.2} to {to_m:.2} m, {} times above the surface's at \
+                 every speed",
             1e3 * waves.wavelength_m.0,
             ratio(waves.ratio)
         ),

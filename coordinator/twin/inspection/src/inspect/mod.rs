@@ -147,7 +147,7 @@ fn unknown_wheel(recording: &Recording) -> Option<Comb> {
 
 /// Unit of the accelerations, as sentences have it.
 fn unit(recording: &Recording) -> &'static str {
-    if recording.gain_known() { "m/s2" } else { "of the unknown unit" }
+    if recording.gain_known() { "m/s2" } else { "in the unknown unit" }
 }
 
 /// What wheel and rail surface show.

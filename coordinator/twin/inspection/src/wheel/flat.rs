@@ -11,7 +11,7 @@ const TURNS_MIN: f64 = 3.0;
 /// The least logarithm that one blow contributes: one or two impacts of the track are no flat.
 const BLOW_MIN: f64 = -7.0;
 
-/// Weight of loudness beside probability in the choice of phase and circumference: clear blows all
+/// Weight of power beside probability in the choice of phase and circumference: clear blows all
 /// reach the least logarithm, and the right choice is the loudest of these.
 const LOUDNESS: f64 = 0.01;
 

@@ -205,7 +205,11 @@ impl Reader {
             if !is_row_name(&columns.remove(0)) {
                 return Err(Fault::ShortHead { names });
             }
-            self.notes.push("the head has one name less than the rows have fields: the first field of a row was taken for its name".to_owned());
+            self.notes.push(
+                "the header has one name less than the rows have fields: the first field of a row \
+                 is taken as its name"
+                    .to_owned(),
+            );
         }
         let name = |index: usize| format!("column-{}", index + 1);
         let names = self.names.unwrap_or_else(|| (0..columns.len()).map(name).collect());

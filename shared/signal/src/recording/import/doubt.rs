@@ -30,23 +30,23 @@ pub(super) fn of_acceleration(
     };
     if is_near(of_other) {
         doubts.push(format!(
-            "doubt: {name}: its mean of {shown} would be gravity in {other}, and it is taken in {}: if so, say --unit {other}",
+            "doubt: {name}: the mean of {shown} would be gravity in {other}, but {} is assumed; \
+                 if the unit is {other}, use --unit {other}",
             unit.name()
         ));
     } else if is_near(own) && (mean > 0.0) != upwards {
-        let (is, say) = if upwards {
-            ("downwards", "leave --upwards out")
-        } else {
-            ("upwards", "say --upwards")
-        };
+        let (is, say) =
+            if upwards { ("downwards", "omit --upwards") } else { ("upwards", "use --upwards") };
         doubts.push(format!(
-            "doubt: {name}: its mean of {shown} {} is gravity as a sensor shows it that is positive {is}: if so, {say}",
+            "doubt: {name}: the mean of {shown} {} looks like gravity on a sensor that is \
+                 positive {is}; if so, {say}",
             unit.name()
         ));
     }
     if values.len() >= WHOLE_MIN && values.iter().all(|value| value.fract() == 0.0) {
         doubts.push(format!(
-            "doubt: {name}: holds whole numbers only, as the counts of a converter: if so, say --unit unknown, or give it in m/s2"
+            "doubt: {name}: all values are integers, like the counts of an A/D converter; if \
+                 so, use --unit unknown, or convert the values to m/s2"
         ));
     }
     doubts
@@ -68,8 +68,8 @@ mod tests {
         use AccelerationUnit::{G, MetrePerSecondSquared as Si, Unknown};
         assert!(doubts(1.0, Si, false).contains("gravity in g"));
         assert!(doubts(-9.81, G, false).contains("gravity in m/s2"));
-        assert!(doubts(9.81, Si, false).contains("say --upwards"));
-        assert!(doubts(-1.0, G, true).contains("leave --upwards out"));
+        assert!(doubts(9.81, Si, false).contains("use --upwards"));
+        assert!(doubts(-1.0, G, true).contains("omit --upwards"));
         for (offset, unit, upwards) in
             [(-9.81, Si, false), (9.8, Si, true), (0.3, Si, false), (1.0, Unknown, false)]
         {
@@ -82,6 +82,6 @@ mod tests {
         let values = (0..500).map(|i| f64::from(i * 37 % 101)).collect();
         let column = Column { values, ..Column::default() };
         let doubts = of_acceleration(&column, AccelerationUnit::MetrePerSecondSquared, false);
-        assert!(doubts[0].contains("counts of a converter"), "{doubts:?}");
+        assert!(doubts[0].contains("counts of an A/D converter"), "{doubts:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Kinds of files that loggers and programs write and that are not read here, and their mend.
+//! Unsupported file formats of loggers and programs, with the remedy.
 
 use super::super::error::Fault;
 
@@ -15,7 +15,7 @@ const KINDS: [Kind; 15] = [
         begins: &[b"MATLAB 7.3"],
         endings: &[],
         name: "a MATLAB file of version 7.3 (HDF5)",
-        remedy: "save it anew in MATLAB with `save(file, names, '-v7')`, or read it with Python's h5py",
+        remedy: "save it again in MATLAB with `save(file, names, '-v7')`, or read it with Python's h5py",
     },
     Kind {
         begins: &[b"\x89HDF\r\n"],
@@ -64,7 +64,8 @@ const KINDS: [Kind; 15] = [
         begins: &[b"RIFF", b"RF64"],
         endings: &["wav"],
         name: "a WAV file",
-        remedy: "read it with Python's scipy.io.wavfile and save it with `numpy.save`; say --unit unknown",
+        remedy: "read it with Python's scipy.io.wavfile and save it with `numpy.save`; use --unit \
+             unknown",
     },
     Kind {
         begins: &[b"ARROW1", b"FEA1"],
@@ -75,13 +76,13 @@ const KINDS: [Kind; 15] = [
     Kind {
         begins: &[],
         endings: &["pkl", "pickle", "rds", "rda", "rdata"],
-        name: "a file of Python's or R's own objects",
+        name: "a file of Python or R objects",
         remedy: "save its table as CSV or Parquet",
     },
     Kind {
         begins: &[],
         endings: &["dxd", "d7d", "dat3", "lvm", "tdm", "sie", "rsp", "asc3"],
-        name: "a file of a measuring program's own kind",
+        name: "a proprietary file of a measuring program",
         remedy: "export it there as CSV or MATLAB (v7)",
     },
     Kind {

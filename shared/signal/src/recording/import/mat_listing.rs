@@ -30,11 +30,11 @@ impl Variable {
     pub(super) fn kind(&self) -> Option<String> {
         let kind = match self.class {
             1 => "a cell array",
-            2 => "a structure: save its fields as variables of their own (`save -struct`)",
+            2 => "a structure: save its fields as separate variables (`save -struct`)",
             4 => "text",
             5 => "a sparse array",
             6..=15 if self.is_complex => "complex numbers: save the real part or the magnitude",
-            6..=15 if self.is_logical => "logical values",
+            6..=15 if self.is_logical => "Boolean values",
             6..=15 => return None,
             16 => "a function",
             _ => "an object such as a table, a string or a time",

@@ -19,9 +19,9 @@ pub(super) fn read(path: &Path) -> Result<Vec<Column>, RecordingError> {
             variable.name.as_str(),
             Fault::NotNumeric { kind: variable.kind().unwrap_or_default() },
         ),
-        None => unreadable(format!(
-            "{error}; files of version 4 or 7.3 must be saved anew with `save -v7`"
-        )),
+        None => {
+            unreadable(format!("{error}; save files of version 4 or 7.3 again with `save -v7`"))
+        }
     })?;
     let odd = |name: &str| variables.iter().find(|v| v.name == name).and_then(Variable::kind);
     let mut columns: Vec<Column> = file

@@ -59,18 +59,18 @@ fn array<R: Read>(mut file: R, bytes: u64) -> Result<NpyFile<impl Read>, Error> 
     (&mut file).take(length.min(HEAD_BYTES_MAX)).read_to_end(&mut head)?;
     let text = String::from_utf8_lossy(&head);
     let shape = text.split_once("'shape'").and_then(|(_, rest)| rest.split_once(')'));
-    let (shape, _) = shape.ok_or_else(|| bad("its head has no shape"))?;
+    let (shape, _) = shape.ok_or_else(|| bad("its header has no shape"))?;
     let mut sizes = shape.split([':', '(', ',']).filter_map(|size| size.trim().parse::<u64>().ok());
     let numbers = sizes.try_fold(1, u64::checked_mul);
     if numbers.is_none_or(|numbers| numbers > bytes) {
-        return Err(bad("its head promises more numbers than the file holds"));
+        return Err(bad("its header states more numbers than the file holds"));
     }
     NpyFile::new(Cursor::new(head).chain(file))
 }
 
 fn columns<R: Read>(array: NpyFile<R>, name: &str) -> Result<Vec<Column>, Error> {
     if let DType::Record(fields) = array.dtype() {
-        let kind = "a field of records: save it as an array of its own";
+        let kind = "a field of records: save it as a separate array";
         return Ok(fields.iter().map(|field| other(&field.name, kind)).collect());
     }
     let shape: Vec<usize> = array.shape().iter().map(|&size| size as usize).collect();
@@ -98,7 +98,7 @@ fn numbers<R: Read>(array: NpyFile<R>) -> Result<Result<Vec<f64>, String>, Error
         values.into_iter().map(number).collect()
     }
     let DType::Plain(text) = array.dtype() else {
-        return Ok(Err("arrays in arrays".to_owned()));
+        return Ok(Err("nested arrays".to_owned()));
     };
     // `<f8`, `>i2` ...: kind and size are the last characters.
     let text = text.to_string();
@@ -123,11 +123,13 @@ fn numbers<R: Read>(array: NpyFile<R>) -> Result<Result<Vec<f64>, String>, Error
 fn other_kind(kind: &str) -> String {
     match kind.chars().next() {
         Some('c') => "complex numbers: save the real part or the magnitude".to_owned(),
-        Some('b') => "true and false values".to_owned(),
-        Some('O') => "objects of Python: save them with `astype(float)`".to_owned(),
+        Some('b') => "Boolean values".to_owned(),
+        Some('O') => "Python objects: save them with `astype(float)`".to_owned(),
         Some('U' | 'S' | 'a') => "texts".to_owned(),
         Some('m' | 'M') => {
-            format!("{kind} values: save times in seconds, such as `t / numpy.timedelta64(1, 's')`")
+            format!(
+                "{kind} values: save times in seconds, for example `t / numpy.timedelta64(1, 's')`"
+            )
         }
         _ => format!("{kind} values"),
     }

@@ -86,15 +86,15 @@ fn row_names_before_the_columns_are_seen_and_told() {
         let quote = if head.starts_with('"') { "\"" } else { "" };
         let named = |index: usize| format!("{quote}{}{quote} {}", index + first, row(index));
         let notes = sound(&table(folder.path(), head, named), &layout());
-        assert!(notes.contains("taken for its name"), "{notes}");
+        assert!(notes.contains("taken as its name"), "{notes}");
     }
     let commas = |index: usize| format!("{index},{}", row(index).replace(' ', ","));
     let notes = sound(&table(folder.path(), "t,x,acc\n", commas), &layout());
-    assert!(notes.contains("taken for its name"), "{notes}");
+    assert!(notes.contains("taken as its name"), "{notes}");
     // An index that counts nothing may be a column without a name.
     let other = |index: usize| format!("{},{}", 0.5 * index as f64, row(index).replace(' ', ","));
     let text = complaint(&table(folder.path(), "t,x,acc\n", other), &layout());
-    assert!(text.contains("3 names, the rows have 4 fields"), "{text}");
+    assert!(text.contains("3 names, but the rows have 4 fields"), "{text}");
 }
 
 #[test]
@@ -120,10 +120,10 @@ fn units_stand_in_names_or_in_a_line_of_their_own() {
     };
     for head in ["t [ms];x [km];acc [g]\n", "t (ms);x (km);acc (g)\n", "t;x;acc\nms;km;g\n"] {
         let notes = sound(&table(folder.path(), head, row), &layout());
-        assert!(notes.contains("is taken in g"), "{notes}");
+        assert!(notes.contains("is read in g"), "{notes}");
     }
     let text = complaint(&table(folder.path(), "t;x;acc [mV]\n", row), &layout());
-    assert!(text.contains("\"mV\", which is none of"), "{text}");
+    assert!(text.contains("\"mV\", but must be one of"), "{text}");
     let told = Layout { acceleration_unit: Some(AccelerationUnit::Unknown), ..layout() };
     let notes = one(&table(folder.path(), "t [ms];x [km];acc [mV]\n", row), &told).unwrap().notes;
     assert!(notes.iter().all(|note| !note.starts_with("doubt")), "{notes:?}");
@@ -136,7 +136,7 @@ fn units_that_give_no_speed_or_rate_of_a_train_are_refused_with_those_that_do() 
         let path = changed(folder.path(), |_, [t, x, acc]| [t, factor * x, acc]);
         let text = complaint(&path, &layout());
         assert!(
-            text.contains(&format!("in {unit} it is 67.4 km/h: say --position-unit")),
+            text.contains(&format!("in {unit} it is 67.4 km/h: use --position-unit")),
             "{text}"
         );
         let position_unit = match unit {
@@ -147,7 +147,7 @@ fn units_that_give_no_speed_or_rate_of_a_train_are_refused_with_those_that_do() 
     }
     let path = changed(folder.path(), |_, [t, x, acc]| [1e9 * t, x, acc]);
     let text = complaint(&path, &layout());
-    assert!(text.contains("in ns it is 2000 Hz: say --time-unit"), "{text}");
+    assert!(text.contains("in ns it is 2000 Hz: use --time-unit"), "{text}");
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn two_statements_of_one_thing_must_agree() {
         format!("{},{},18.7,{}", time(row), place(row), acceleration(row))
     });
     let text = complaint(&path, &Layout { speed: Some("v".to_owned()), ..layout() });
-    assert!(text.contains("the column of speeds is 18.7 km/h"), "{text}");
+    assert!(text.contains("the speed column is 18.7 km/h"), "{text}");
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn positions_in_steps_give_the_right_speed_and_no_sleepers() {
         let notes = sound(&path, &layout());
         assert!(notes.contains("the positions advance in steps of"), "{notes}");
         let text = complaint(&path, &Layout { sleeper_m: Some(1000.0), ..layout() });
-        assert!(text.contains("to tell sleepers apart they must not exceed 0.15 m"), "{text}");
+        assert!(text.contains("steps above 0.15 m cannot separate sleepers"), "{text}");
     }
     let path = changed(folder.path(), rounded(0.05));
     sound(&path, &Layout { sleeper_m: Some(1000.0), ..layout() });
@@ -191,14 +191,14 @@ fn a_pass_towards_smaller_positions_is_turned_and_both_ways_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = changed(folder.path(), |_, [t, x, acc]| [t, 2000.0 - x, acc]);
     let layout = Layout { sleeper_m: Some(900.0), ..layout() };
-    assert!(sound(&path, &layout).contains("the other sign"));
+    assert!(sound(&path, &layout).contains("the opposite sign"));
     let recording = one(&path, &layout).unwrap().recording;
     assert!(recording.sleepers.iter().any(|sleeper| (sleeper.x_m + 900.0).abs() < 1e-9));
     let other = folder.path().join("other.csv");
     fs::rename(&path, &other).unwrap();
     let path = changed(folder.path(), |row, [t, x, _]| [t, x, acceleration(row + 7).powi(3)]);
     let text = import(&[other, path], &layout).unwrap_err().to_string();
-    assert!(text.contains("import each direction by itself"), "{text}");
+    assert!(text.contains("import each direction separately"), "{text}");
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn what_stands_for_a_number_or_for_another_column_is_named() {
         format!("{},{},1,{}", time(row), place(row), acceleration(row))
     });
     let text = complaint(&path, &layout());
-    assert!(text.contains("columns 3 and 4 are all called so"), "{text}");
+    assert!(text.contains("columns 3 and 4 have this name"), "{text}");
     for missing in ["-9999", "NaN", "#N/A", ""] {
         let path = table(folder.path(), "t,x,acc\n", |row| {
             let acc = acceleration(row).to_string();
@@ -268,7 +268,7 @@ fn a_tachometers_pulses_are_no_speeds() {
     });
     let text =
         complaint(&path, &Layout { position: None, speed: Some("tacho".into()), ..layout() });
-    assert!(text.contains("pulses of a tachometer, not speeds"), "{text}");
+    assert!(text.contains("tachometer pulses, not speeds"), "{text}");
 }
 
 #[test]
@@ -284,7 +284,7 @@ fn files_of_loggers_are_named_with_their_mend() {
         ("a.csv", b"\x1f\x8b\x08\0", "gunzip"),
         ("a.xlsx", b"PK\x03\x04", "save its sheet as CSV"),
         ("a.csv", b"PK\x03\x04", "an archive or a spreadsheet"),
-        ("a.csv", b"t,acc\n0,\0\0\x03", "is no text (byte 9 is 0x00)"),
+        ("a.csv", b"t,acc\n0,\0\0\x03", "is not text (byte 9 is 0x00)"),
     ] {
         let path = folder.path().join(name);
         fs::write(&path, begin).unwrap();

@@ -174,10 +174,10 @@ fn numpy_arrays_of_any_order_and_precision_are_read_and_others_say_what_they_are
     assert!(found.iter().zip(&values).all(|(a, b)| (a - b).abs() < 1e-3));
     for (kind, width, said) in [
         ("<c16", 16, "complex numbers"),
-        ("|b1", 1, "true and false"),
+        ("|b1", 1, "Boolean values"),
         ("<U4", 16, "texts"),
         ("<m8[ns]", 8, "times in seconds"),
-        ("|O", 8, "objects of Python"),
+        ("|O", 8, "Python objects"),
     ] {
         let bytes = vec![0; width * ROWS as usize];
         let table = Table::read(&npy(folder.path(), kind, &bytes)).unwrap();

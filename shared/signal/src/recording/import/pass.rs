@@ -35,7 +35,7 @@ pub fn import(files: &[PathBuf], layout: &Layout) -> Result<Vec<Imported>, Recor
     };
     if layout.acceleration.is_empty() {
         let names = tables.first().map(names).unwrap_or_default();
-        let expected = format!("the column of acceleration (the file has {names})");
+        let expected = format!("the acceleration column (the columns of the file are {names})");
         return Err(missing("acceleration", &expected));
     }
     layout.check().map_err(|error| {
@@ -58,7 +58,11 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
     alike(&raw)?;
     let is_backwards = is_backwards(&raw)?;
     if is_backwards {
-        notes.push("the positions decrease along the travel: they, and the places of the sleepers, have the other sign in the recording".to_owned());
+        notes.push(
+            "the positions decrease along the pass: the recording stores them, and the \
+             positions of the sleepers, with the opposite sign"
+                .to_owned(),
+        );
     }
     let is_gain_known = raw.iter().all(|raw| raw.unit != AccelerationUnit::Unknown);
     let rate = raw.first().map_or(0.0, |raw| raw.rate_hz);
@@ -72,12 +76,12 @@ fn recording(tables: &[Table], column: &str, layout: &Layout) -> Result<Imported
         .map_or_else(|| Ok(Vec::new()), |x_m| sleepers(&passes, layout.spacing_m, x_m))
         .map_err(|error| RecordingError::new(&first, "spacing_m", Fault::OutOfRange(error)))?;
     if sleepers.is_empty() {
-        notes.push("no place of a sleeper is known: the recording has none".to_owned());
+        notes.push("no sleeper position is known: the recording has no sleepers".to_owned());
     }
     notes.extend(passes.iter().filter_map(|pass| quiet::doubt(pass, is_gain_known)));
     // Doubts last, where they are seen.
     notes.sort_by_key(|note| note.starts_with("doubt: "));
-    let sign = if layout.upwards { ", turned from upwards" } else { "" };
+    let sign = if layout.upwards { ", sign changed from upwards" } else { "" };
     let recording = Recording {
         name: column.to_owned(),
         sample_rate_hz: rate,

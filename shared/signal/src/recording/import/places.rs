@@ -22,7 +22,7 @@ pub(super) struct Places {
     pub position_m: Vec<f64>,
     /// Unit of the column that they come from, and whether somebody said it.
     unit: (&'static str, bool),
-    /// Speed of the column of speeds, where there is one beside the positions, in km/h.
+    /// Speed of the speed column, where there is one beside the positions, in km/h.
     other_km_h: Option<f64>,
 }
 
@@ -56,7 +56,7 @@ impl Places {
             let position_m = (0..count).map(place).collect();
             Self { name: "speed_km_h", position_m, unit: ("km/h", true), other_km_h: None }
         } else {
-            let expected = "a speed in km/h, or a column of positions or speeds".to_owned();
+            let expected = "a speed in km/h, or a position or speed column".to_owned();
             let fault = Fault::NoField { expected };
             return Err(RecordingError::new(&table.path, "speed_km_h", fault));
         };
@@ -93,7 +93,7 @@ impl Places {
             return Err(Fault::Impossible { observed: speed_km_h, unit, remedy });
         }
         let stated = layout.speed_km_h.filter(|_| self.name != "speed_km_h");
-        let others = [("the stated speed", stated), ("the column of speeds", self.other_km_h)];
+        let others = [("the stated speed", stated), ("the speed column", self.other_km_h)];
         for (what, other) in others {
             if other.is_some_and(|other| (other / speed_km_h - 1.0).abs() > ALIKE) {
                 return Err(Fault::Contradiction {

@@ -24,7 +24,7 @@ pub(super) fn of(
 ) -> Result<f64, RecordingError> {
     match (&layout.time, layout.sample_rate_hz) {
         (None, None) => {
-            let fault = Fault::NoField { expected: "it, or the column of times".to_owned() };
+            let fault = Fault::NoField { expected: "it, or a time column".to_owned() };
             Err(RecordingError::new(&table.path, "sample_rate_Hz", fault))
         }
         (None, Some(stated)) => {
@@ -67,12 +67,14 @@ fn clock(
     match clock.stamps {
         Stamps::Even => {}
         Stamps::Coarse(step_s) => notes.push(format!(
-            "column {name} advances in steps of {} ms, a sample takes {} ms: the samples were taken as evenly spaced",
+            "column {name} advances in steps of {} ms, but the sample interval is {} ms: evenly \
+                 spaced samples are assumed",
             shown(step_s),
             shown(interval)
         )),
         Stamps::Jitter(off_s) => notes.push(format!(
-            "column {name} trembles by up to {} ms, a sample takes {} ms: the samples were taken as evenly spaced",
+            "column {name} has a jitter of up to {} ms, and the sample interval is {} ms: \
+                 evenly spaced samples are assumed",
             shown(off_s),
             shown(interval)
         )),
@@ -96,7 +98,7 @@ fn other_unit(per_unit: f64) -> String {
         .map(|(unit, rate)| format!("in {unit} it is {} Hz", rounded(rate, 4)))
         .collect();
     if fits.is_empty() {
-        "give another column, or the sample rate".to_owned()
+        "use another column, or give the sample rate".to_owned()
     } else {
         format!("{}: {}", fits.join(", "), TimeUnit::REMEDY)
     }
@@ -116,7 +118,8 @@ fn doubt(table: &Table, stated: f64) -> Option<String> {
     let agrees = rates.iter().any(|rate| (rate / stated - 1.0).abs() < NEAR);
     let first = rates.first().filter(|_| !agrees)?;
     Some(format!(
-        "doubt: column {} advances at {} Hz, if it holds times in s, and the stated rate is {} Hz: say --column \"time={}\" if that is so",
+        "doubt: column {} advances at {} Hz if it holds times in s, but the stated rate is \
+             {} Hz; if it is the time, use --column \"time={}\"",
         column.name,
         rounded(*first, 4),
         rounded(stated, 8),

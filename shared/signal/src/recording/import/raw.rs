@@ -86,7 +86,7 @@ impl Raw {
         // Gravity and the amplifier's offset; nothing of the track is that slow.
         let samples: Vec<f64> = self.samples.iter().map(|value| value - mean).collect();
         notes.push(format!(
-            "{file}: {column}: {} samples at {} Hz, {} km/h; a constant offset of {} {} was taken out",
+            "{file}: {column}: {} samples at {} Hz, {} km/h; a constant offset of {} {} was removed",
             samples.len(),
             rounded(self.rate_hz, 8),
             significant(speed_km_h, 4),
@@ -102,7 +102,7 @@ impl Raw {
 
     const fn unit_name(&self) -> &'static str {
         match self.unit {
-            AccelerationUnit::Unknown => "of the unknown unit",
+            AccelerationUnit::Unknown => "in the unknown unit",
             _ => "m/s2",
         }
     }

@@ -221,14 +221,17 @@ fn a_layout_that_does_not_suffice_says_what_is_missing() {
     let text = complaint(&path, &Layout { acceleration: Vec::new(), ..layout() });
     assert_eq!(
         text,
-        "pass.csv: acceleration: is missing; add the column of acceleration (the file has t, acc)"
+        "pass.csv: acceleration: is missing; add the acceleration column (the columns of the file are t, acc)"
     );
     let text = complaint(&path, &Layout { sample_rate_hz: None, ..layout() });
-    assert_eq!(text, "pass.csv: sample_rate_Hz: is missing; add it, or the column of times");
+    assert_eq!(text, "pass.csv: sample_rate_Hz: is missing; add it, or a time column");
     let text = complaint(&path, &Layout { speed_km_h: None, ..layout() });
     assert!(text.starts_with("pass.csv: speed_km_h: is missing; add a speed in km/h"), "{text}");
     let text = complaint(&path, &Layout { acceleration: vec!["left".to_owned()], ..layout() });
-    assert!(text.contains("there is no such column; name it so (the file has t, acc)"), "{text}");
+    assert!(
+        text.contains("the column is missing; rename one of the file's columns: t, acc"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -237,10 +240,10 @@ fn what_is_no_number_is_named_by_its_row() {
     let path = folder.path().join("pass.csv");
     fs::write(&path, "t,acc,remark\n0,1,start\n1,n/a,\n2,3,end\n").unwrap();
     let text = complaint(&path, &layout());
-    assert!(text.starts_with("pass.csv: acc: row 2 is \"n/a\"; write a plain number"), "{text}");
+    assert!(text.starts_with("pass.csv: acc: row 2 is \"n/a\"; write a number"), "{text}");
     fs::write(folder.path().join("pass.odd"), "").unwrap();
     let text = complaint(&folder.path().join("pass.odd"), &layout());
-    assert!(text.starts_with("pass.odd: file: its name ends in none of .csv"), "{text}");
+    assert!(text.starts_with("pass.odd: file: the extension is not one of .csv"), "{text}");
     fs::write(folder.path().join("pass.mat"), "MATLAB 7.3 ...").unwrap();
     let text = complaint(&folder.path().join("pass.mat"), &layout());
     assert!(text.contains("-v7"), "{text}");

@@ -87,7 +87,7 @@ impl Unit for AccelerationUnit {
         (Self::G, &["g", "gn", "g0"]),
         (Self::Unknown, &["unknown"]),
     ];
-    const REMEDY: &'static str = "say --unit m/s2, g or unknown";
+    const REMEDY: &'static str = "use --unit m/s2, g or unknown";
 
     fn in_si(self) -> f64 {
         match self {
@@ -104,7 +104,7 @@ impl Unit for TimeUnit {
         (Self::Microsecond, &["us", "\u{b5}s", "\u{3bc}s"]),
         (Self::Nanosecond, &["ns"]),
     ];
-    const REMEDY: &'static str = "say --time-unit s, ms, us or ns";
+    const REMEDY: &'static str = "use --time-unit s, ms, us or ns";
 
     fn in_si(self) -> f64 {
         match self {
@@ -119,7 +119,7 @@ impl Unit for TimeUnit {
 impl Unit for PositionUnit {
     const ALL: &'static [(Self, &'static [&'static str])] =
         &[(Self::Metre, &["m"]), (Self::Kilometre, &["km"]), (Self::Millimetre, &["mm"])];
-    const REMEDY: &'static str = "say --position-unit m, km or mm";
+    const REMEDY: &'static str = "use --position-unit m, km or mm";
 
     fn in_si(self) -> f64 {
         match self {
@@ -135,7 +135,7 @@ impl Unit for SpeedUnit {
         (Self::KilometrePerHour, &["km/h", "kmh", "kmph", "kph"]),
         (Self::MetrePerSecond, &["m/s", "mps", "ms-1"]),
     ];
-    const REMEDY: &'static str = "say --speed-unit km/h or m/s";
+    const REMEDY: &'static str = "use --speed-unit km/h or m/s";
 
     fn in_si(self) -> f64 {
         match self {
@@ -162,7 +162,7 @@ pub(super) fn of_column<U: Unit>(
     match (told, known, stated) {
         (Some(told), Some(known), _) if told != known => {
             notes.push(format!(
-                "doubt: {name} is taken in {}, as told, and its name or file says {}",
+                "doubt: {name} is read in {}, as requested, but its name or file states {}",
                 told.name(),
                 known.name()
             ));
@@ -170,7 +170,7 @@ pub(super) fn of_column<U: Unit>(
         }
         (Some(told), ..) => Ok(told),
         (None, Some(known), _) => {
-            notes.push(format!("{name} is taken in {}, as its name or file says", known.name()));
+            notes.push(format!("{name} is read in {}, as its name or file states", known.name()));
             Ok(known)
         }
         (None, None, Some(unit)) => {
@@ -181,7 +181,7 @@ pub(super) fn of_column<U: Unit>(
         (None, None, None) => {
             let unit = U::default();
             notes.push(format!(
-                "{name} is taken in {}; if that is wrong, {}",
+                "{name} is read in {}; if that is wrong, {}",
                 unit.name(),
                 U::REMEDY
             ));
@@ -251,7 +251,7 @@ mod tests {
         assert_eq!(unit::<TimeUnit>("t [\u{b5}s]", None).0.unwrap(), TimeUnit::Microsecond);
         let (found, notes) = unit::<AccelerationUnit>("acc_left", None);
         assert_eq!(found.unwrap(), AccelerationUnit::MetrePerSecondSquared);
-        assert!(notes[0].contains("taken in m/s2; if that is wrong, say --unit"), "{notes:?}");
+        assert!(notes[0].contains("read in m/s2; if that is wrong, use --unit"), "{notes:?}");
     }
 
     #[test]
@@ -259,10 +259,10 @@ mod tests {
         let told = AccelerationUnit::MetrePerSecondSquared;
         let (found, notes) = unit("acc [g]", Some(told));
         assert_eq!(found.unwrap(), told);
-        assert!(notes[0].starts_with("doubt: acc [g] is taken in m/s2, as told"), "{notes:?}");
+        assert!(notes[0].starts_with("doubt: acc [g] is read in m/s2, as requested"), "{notes:?}");
         let (found, _) = unit::<AccelerationUnit>("acc [mV]", None);
         let text = found.unwrap_err().to_string();
-        assert!(text.contains("\"mV\", which is none of m/s2, g, unknown; say --unit"), "{text}");
+        assert!(text.contains("\"mV\", but must be one of m/s2, g, unknown; use --unit"), "{text}");
         assert!(unit("acc [mV]", Some(AccelerationUnit::Unknown)).0.is_ok());
     }
 }
