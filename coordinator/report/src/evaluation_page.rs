@@ -116,13 +116,13 @@ fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
     )
 }
 
-/// Whether a sleeper was heard in all of its windows at all speeds.
+/// Whether all windows of a sleeper are complete at all speeds.
 fn is_whole(sleeper: &SleeperEvaluation) -> bool {
     sleeper.flags.iter().all(|&flag| flag == Flag::AtEdgeOfRange)
 }
 
-/// Lowest to highest mean of a parameter over the sleepers that were heard as a whole, or over all if
-/// none was.
+/// Lowest to highest mean of a parameter over the sleepers with complete windows, or over all if
+/// there are none.
 fn range(evaluation: &Evaluation, parameter: Parameter) -> Option<String> {
     let valid = || evaluation.sleepers.iter().filter(|sleeper| sleeper.is_valid());
     let none = !valid().any(is_whole);

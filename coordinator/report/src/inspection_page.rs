@@ -8,7 +8,7 @@ const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
 /// A curve and its name.
 pub struct InspectedCurve {
-    /// What the legend says.
+    /// Text of the legend.
     pub name: String,
     /// Its points.
     pub points: Vec<(f64, f64)>,
@@ -30,7 +30,7 @@ pub struct Inspected {
 pub struct InspectionReport {
     /// The recording's name.
     pub name: String,
-    /// One sentence that says it all.
+    /// Summary sentence.
     pub summary: String,
     /// Rows of the table of passes; the first has the heads.
     pub passes: Vec<Vec<String>>,

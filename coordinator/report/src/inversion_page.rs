@@ -153,7 +153,7 @@ fn common(inversion: &Inversion) -> Markup {
     html! { p { "Common to the sleepers in the middle: " (all.join(", ")) "." } }
 }
 
-/// How much sleepers differ, as the recording tells.
+/// Unevenness estimated from the recording.
 fn variation(inversion: &Inversion) -> Markup {
     let text = |parameter: Parameter| {
         let along = inversion.provenance.variation.get(&parameter)?;

@@ -10,15 +10,14 @@ use tracktwin_signal::{Extractor, TimeFrequencyMap};
 
 const SIZE: [f64; 2] = [1130.0, 300.0];
 const COLUMNS: usize = 900;
-/// Levels below the strongest that are told apart, in dB.
+/// Range of the colour scale below the strongest level in dB.
 const DEPTH_DB: f64 = 50.0;
 /// Half the length of the stretch, in sleeper spacings.
 const SPACINGS: f64 = 2.5;
 /// Points of the drawn signal: two a pixel column, its lowest and highest value.
 const SIGNAL_COLUMNS: usize = 1000;
 
-/// Signal, CWT and SSWT over five sleeper bays around `x_m` in one pass; empty where they cannot
-/// be had.
+/// Signal, CWT and SSWT over five spans around `x_m` in one pass; empty if they cannot be computed.
 pub(crate) fn map_charts(
     recording: &Recording,
     extractor: &Extractor,

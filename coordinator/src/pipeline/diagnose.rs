@@ -1,4 +1,4 @@
-//! A recording's way to its diagnosis: first look, baseline, null model, search, conclusion.
+//! Diagnosis of a recording: inspection, baseline, null model, search, conclusion.
 //!
 //! Owns the order of the stages; what each does is the diagnosis crate's, where null simulations
 //! are kept the library's.
@@ -22,7 +22,7 @@ pub struct Setting<'a> {
     pub design: &'a TrackDesign,
     /// Keeps the null simulations, if there is one.
     pub library: Option<&'a Library>,
-    /// Kinds of physics that may not be named.
+    /// Kinds of physics that may not be accepted.
     pub without: &'a [String],
     /// Gives an order of the sleepers for each speed, `[speed][sleeper]`, from the numbers of speeds and
     /// sleepers: a control in which nothing has a place, and the passes don't speak for themselves.
@@ -59,7 +59,7 @@ pub enum DiagnosingError {
     /// The model of the track cannot be fitted without anything left out.
     #[error("cannot fit the baseline: {0}")]
     Baseline(#[source] CalibrationError),
-    /// The null simulations are not to be had.
+    /// The null simulations failed.
     #[error(transparent)]
     NullModel(#[from] NullModelError),
     /// The search broke down.
@@ -70,10 +70,10 @@ pub enum DiagnosingError {
     Conclusion(#[source] CalibrationError),
 }
 
-/// Diagnoses a recording. `watch` hears what is going on and which share of it is done.
+/// Diagnoses a recording. `watch` gets the current stage and the share done.
 ///
 /// # Errors
-/// [`DiagnosingError::Recording`] says what the recording lacks; all else is a failure.
+/// [`DiagnosingError::Recording`] states what the recording lacks; everything else is a failure.
 pub async fn diagnose(
     recording: &Recording,
     setting: Setting<'_>,

@@ -1,4 +1,4 @@
-//! From a recording to its evaluation by the physics: sections, null model, fits.
+//! Inversion of a recording: sections, null model, fits.
 
 use crate::pipeline::compute::compute;
 use crate::pipeline::null_models::{self, NullModelError};
@@ -15,7 +15,7 @@ use tracktwin_library::Library;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 
-/// Why a recording can't be evaluated by the physics.
+/// Errors of the inversion.
 #[derive(Debug, thiserror::Error)]
 pub enum InvertingError {
     /// The recording cannot be compared with the track model.
@@ -24,16 +24,16 @@ pub enum InvertingError {
     /// No track fits.
     #[error("cannot fit a track to the recording: {0}")]
     Fit(#[from] CalibrationError),
-    /// The null simulations are not to be had.
+    /// The null simulations failed.
     #[error(transparent)]
     NullModel(#[from] NullModelError),
 }
 
-/// Evaluates a recording by the physics; `library` keeps the null simulations. `watch` is told what is
-/// going on and which share of it is done.
+/// Evaluates a recording by inversion; `library` stores the null simulations. `watch` gets the
+/// current stage and the share done.
 ///
 /// # Errors
-/// [`InvertingError::Recording`] says what the recording lacks; all else is a failure.
+/// [`InvertingError::Recording`] states what the recording lacks; everything else is a failure.
 pub async fn invert(
     recording: &Recording,
     design: &TrackDesign,

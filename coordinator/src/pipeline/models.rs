@@ -27,7 +27,7 @@ pub enum ModelsError {
 }
 
 impl ModelsError {
-    /// Whether something else must be given; else the machine is to blame.
+    /// Whether the input is wrong; otherwise the machine has failed.
     pub fn is_wrong_input(&self) -> bool {
         match self {
             Self::Training(TrainingError::Library(error)) => error.is_wrong_input(),
@@ -39,7 +39,7 @@ impl ModelsError {
     }
 }
 
-/// Makes sure that models may be written into a folder, over other files if `force` says so.
+/// Checks that models may be written into a folder, with `force` over other files.
 ///
 /// # Errors
 /// [`FilesError`] names the file in the way.
@@ -70,7 +70,7 @@ pub async fn train_into(
     })?;
     save(folder, force, &trained, &tested)?;
     if let Err(error) = library.record_training(provenance::training(&trained)).await {
-        // The models stand in the folder; somebody who may only read the library has them all the same.
+        // The models in the folder are complete, even if the library is read-only.
         tracing::warn!("cannot store the training in the library: {error:?}");
     }
     Ok(trained)

@@ -39,8 +39,8 @@ struct Key<'a> {
     seed: u64,
 }
 
-/// The null model of a subject whose baseline came out at `values`; `progress` hears how many
-/// surfaces are done.
+/// The null model of a prepared recording whose baseline has the parameters `values`; `progress`
+/// gets the number of surfaces done.
 ///
 /// # Errors
 /// [`NullModelError`].

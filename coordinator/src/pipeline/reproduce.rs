@@ -110,8 +110,8 @@ fn evaluated(
     recordings.into_iter().map(told).collect()
 }
 
-/// Recordings of these figures' examples, each example on a surface of its own that it keeps at all
-/// speeds; `at` is told how many speeds are done.
+/// Recordings of these figures' examples, each example on a separate surface, the same at all
+/// speeds; `at` gets the number of speeds done.
 ///
 /// # Errors
 /// [`ReproducingError`].

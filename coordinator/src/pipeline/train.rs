@@ -63,7 +63,8 @@ pub enum TrainingError {
 /// All finished cases of a campaign, if there are enough of them to train on and they differ.
 ///
 /// # Errors
-/// [`TrainingError`]; what can be told without reading the results is told before they are read.
+/// [`TrainingError`]; everything that can be checked without the results is checked before they are
+/// read.
 pub async fn set_to_train_on(
     library: &Library,
     campaign: &CampaignRecord,

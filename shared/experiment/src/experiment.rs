@@ -21,8 +21,8 @@ const WAVELENGTHS_M: [f64; 2] = [0.25e-3, 1.0];
 
 /// A virtual measurement: a track, a vehicle, its speeds, and what is taken from the signal.
 ///
-/// [`Experiment::checked`] says whether it can be done; the fields are open so that a campaign may
-/// change them before.
+/// [`Experiment::checked`] checks it; the fields are public so that a campaign may change them
+/// before.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
@@ -123,7 +123,7 @@ pub enum ExperimentError {
     /// Not the JSON of an experiment that this program knows.
     #[error("not an experiment: {message}")]
     Json {
-        /// What the parser said.
+        /// Error of the parser.
         message: String,
     },
 }
@@ -146,8 +146,8 @@ pub(crate) struct Stretch {
 
 impl Experiment {
     /// The paper's simulation on a track of this design, at Table D1's speeds; 40 spans instead of
-    /// 25, on which the ends of the rail are heard, and 4 rail elements in each, which with the
-    /// local flexibility are within 0.012 dB of 32.
+    /// 25, on which the ends of the rail have an effect, and 4 rail elements in each, which with
+    /// the local flexibility are within 0.012 dB of 32.
     pub fn new(design: TrackDesign) -> Self {
         Self {
             design,
@@ -234,7 +234,7 @@ impl Experiment {
         blake3::hash(self.to_json().as_bytes()).to_hex().to_string()
     }
 
-    /// The middle sleeper: the one whose window is evaluated. It stands at the end of as many
+    /// The middle sleeper: the one whose window is evaluated. It is at the end of this number of
     /// spans.
     pub const fn sleeper(&self) -> usize {
         self.spans / 2

@@ -18,6 +18,6 @@ pub const CODE_VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Version of the physics: BLAKE3 of `golden.json`, the features of some cases.
 ///
-/// A worker with another one is refused, and null simulations of another one are made anew. A test
-/// simulates the cases; where it fails, it says how to write the file, and with it the version, anew.
+/// A worker with another one is refused, and null simulations of another one are repeated. A test
+/// simulates the cases; if it fails, it states how to write the file, and so the version, again.
 pub const MODEL_HASH: &str = env!("TRACKTWIN_MODEL_HASH");

@@ -21,7 +21,7 @@ pub struct PassFeatures {
     pub speed_km_h: f64,
     /// The features.
     pub features: Features,
-    /// Share of the recorded time, 0 to 1, in which the wheel did not touch the rail; none where the worker
-    /// did not tell it.
+    /// Share of the recorded time, 0 to 1, in which the wheel did not touch the rail; none if the
+    /// worker did not report it.
     pub contact_loss_share: Option<f64>,
 }

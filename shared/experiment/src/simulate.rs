@@ -9,7 +9,7 @@ use tracktwin_track::extension::{InstanceError, Measured};
 use tracktwin_track::model::{Mesh, ModelError, Roughness, Support, Surface, TrackModel};
 use tracktwin_track::time::{self, Pass, PassError, PassRecord};
 
-/// What turns cases into outcomes: the track model, or a stand-in where the farm is tested.
+/// Simulates cases: the track model, or a stand-in in tests of the farm.
 pub trait Simulate: Send + Sync {
     /// One outcome a case, in their order.
     fn simulate(&self, cases: &[Case]) -> Vec<Outcome>;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// A file that is not written or not read.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
-    /// A file that the program did not make stands where one is to be written.
+    /// An existing file was not written by the program.
     #[error(
         "{}: the file was not written by tracktwin, or was changed since; use another \
              --out, or --force to replace it",
@@ -17,7 +17,7 @@ pub enum FilesError {
         /// The file.
         path: PathBuf,
     },
-    /// A file of another kind stands where one is to be written.
+    /// An existing file belongs to another kind of output.
     #[error(
         "{}: the file belongs to {kind}; use another --out, or --force to replace it",
         path.display()
@@ -28,7 +28,7 @@ pub enum FilesError {
         /// What it belongs to.
         kind: Kind,
     },
-    /// A folder stands where a file is to be written.
+    /// A folder exists in place of a file.
     #[error("{}: is a folder, not a file; use another --out", path.display())]
     Folder {
         /// The folder.
@@ -61,7 +61,7 @@ pub enum FilesError {
         path: PathBuf,
         /// What was tried: "written", "read", "made".
         action: &'static str,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
 }

@@ -4,7 +4,7 @@ use crate::FilesError;
 use std::path::{Component, Path, PathBuf};
 
 /// The file that a file of `folder` calls `name`: a relative path that stays in the folder, also
-/// when links are followed. A file that is not there is given as it is named.
+/// when links are followed. The path of a missing file is returned unchanged.
 ///
 /// # Errors
 /// [`FilesError::Outside`] for an absolute path, for one with `..`, and for a link that leads out.
@@ -19,7 +19,7 @@ pub fn inside(folder: &Path, name: &str) -> Result<PathBuf, FilesError> {
     }
     let path = folder.join(name);
     let (Ok(real), Ok(real_folder)) = (path.canonicalize(), folder.canonicalize()) else {
-        // Whoever opens it says what is wrong.
+        // Opening it reports the error.
         return Ok(path);
     };
     if real.starts_with(real_folder) { Ok(path) } else { Err(outside()) }

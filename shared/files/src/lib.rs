@@ -1,8 +1,7 @@
-//! Files that the program writes: whole or not at all, over nobody else's, under names that stay in
-//! their folder.
+//! Output files: written atomically, never over files of others, under names that stay in their
+//! folder.
 //!
-//! Owns how files come into being and what may stand in a file's name. What the files hold belongs
-//! to those who write them.
+//! Owns the writing of files and the rules of file names. The content belongs to the callers.
 
 mod error;
 mod inside;

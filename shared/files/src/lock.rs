@@ -10,14 +10,14 @@ pub(crate) struct Lock {
 }
 
 impl Lock {
-    /// Waits for the lock. Where the file system has none, nothing is held and all goes on.
+    /// Waits for the lock. On a file system without locks, nothing is held and the call succeeds.
     pub(crate) fn wait(path: &Path) -> Self {
         let held = File::open(path).and_then(|file| file.lock().map(|()| file));
         Self { _held: held.ok() }
     }
 }
 
-/// Whether nobody holds the lock; no, where that can't be told.
+/// Whether the lock is free; false if this is unknown.
 pub(crate) fn is_free(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
     match file.try_lock() {

@@ -11,13 +11,13 @@ const BYTES_MAX: usize = 100;
 /// Bytes of it that are kept where digits of a hash follow.
 const BYTES_CUT: usize = 80;
 
-/// Hexadecimal digits of a hash that tell two texts with the same name apart.
+/// Hexadecimal digits of a hash that distinguish two texts with the same name.
 const DIGITS: usize = 8;
 
 /// What a name without one usable character becomes.
 const NAMELESS: &str = "unnamed";
 
-/// Names that Windows keeps for devices, with whatever ending.
+/// Names reserved for devices by Windows, with any extension.
 const DEVICES: [&str; 6] = ["con", "prn", "aux", "nul", "conin$", "conout$"];
 
 /// The name of a file or folder, without its folder: the only way from foreign text to a path.
@@ -37,7 +37,7 @@ pub enum NameError {
     /// Too long.
     #[error("is longer than {BYTES_MAX} bytes; use a shorter name")]
     Long,
-    /// A character that can't stand there.
+    /// A character that is not allowed.
     #[error(
         "contains {0:?}; use letters, digits, spaces and . _ - +, and start with a letter \
              or digit"
@@ -55,7 +55,7 @@ impl FileName {
     /// The name that a text is.
     ///
     /// # Errors
-    /// [`FilesError::Name`] says what can't stand in a name.
+    /// [`FilesError::Name`] names what is not allowed.
     pub fn new(text: &str) -> Result<Self, FilesError> {
         match fault(text) {
             None => Ok(Self(text.to_owned())),
@@ -111,15 +111,15 @@ impl std::fmt::Display for FileName {
     }
 }
 
-/// Makes names of texts, no two the same within a folder, whatever the case of their letters.
+/// Makes names of texts, unique within a folder, ignoring case.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
     taken: HashSet<String>,
 }
 
 impl Names {
-    /// A name like `text`: what can't stand in a name becomes an underscore. Of two texts that would
-    /// have one name the second gets digits of its hash.
+    /// A name like `text`: characters that are not allowed become underscores. If two texts would
+    /// have the same name, the second gets digits of its hash.
     pub fn make(&mut self, text: &str) -> FileName {
         let mut name = like(text);
         let mut attempt = 0_u32;

@@ -43,7 +43,7 @@ impl Output {
         Ok(output)
     }
 
-    /// Begins a set of files in a folder that is there.
+    /// Starts a set of files in an existing folder.
     ///
     /// # Errors
     /// [`FilesError::System`] when it is not, or can't be written to.
@@ -70,7 +70,7 @@ impl Output {
     /// Adds a file that `write` writes to the path that it is given.
     ///
     /// # Errors
-    /// [`FilesError::System`] with what `write` says.
+    /// [`FilesError::System`] with the error of `write`.
     pub fn fill<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
         &mut self,
         name: &FileName,
@@ -144,8 +144,9 @@ impl Output {
     /// Gives all files their names.
     ///
     /// # Errors
-    /// [`FilesError::Foreign`], [`FilesError::OtherKind`] or [`FilesError::Folder`] for what stands
-    /// in the way, [`FilesError::System`] when the system refuses; then the old files stand.
+    /// [`FilesError::Foreign`], [`FilesError::OtherKind`] or [`FilesError::Folder`] for an existing
+    /// file that may not be replaced, [`FilesError::System`] when the system refuses; then the old
+    /// files are kept.
     pub fn commit(mut self) -> Result<(), FilesError> {
         let _others_wait = Lock::wait(&self.folder);
         if let Some(manifest) = self.manifest.clone() {

@@ -1,5 +1,5 @@
-//! Which files of a folder the program made: a hidden list beside them, with the hash of each, so
-//! that a file that somebody put there or changed is told from the program's own.
+//! Which files of a folder the program wrote: a hidden list beside them, with the hash of each,
+//! which distinguishes them from files added or changed by others.
 
 use crate::FilesError;
 use serde::{Deserialize, Serialize};
@@ -113,12 +113,12 @@ impl List {
     }
 }
 
-/// Makes sure, before any work is done for them, that files of these names may be written into a
-/// folder: they are not there, or the program made them itself and they are of the same kind, or
-/// whatever is there is to be replaced (`force`).
+/// Checks, before a computation, that files of these names may be written into a folder: they do
+/// not exist, or the program wrote them and they are of the same kind, or they are to be replaced
+/// (`force`).
 ///
 /// # Errors
-/// [`FilesError`] names the first file that stands in the way.
+/// [`FilesError`] names the first file that may not be replaced.
 pub fn check(folder: &Path, kind: Kind, force: bool, names: &[&str]) -> Result<(), FilesError> {
     let list = List::of(folder);
     for name in names {

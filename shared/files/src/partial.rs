@@ -46,7 +46,7 @@ pub(crate) fn file(path: &Path, mode: Option<u32>) -> Result<NamedTempFile, File
     let made =
         Builder::new().prefix(PREFIX).suffix(SUFFIX).permissions(permissions).tempfile_in(folder);
     let file = made.map_err(FilesError::written(path))?;
-    // Where there are no locks nobody sweeps either.
+    // Without locks nothing is cleaned up.
     let _ = file.as_file().lock();
     Ok(file)
 }

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{Error, ErrorKind, Read as _};
 use std::path::Path;
 
-/// Bytes that such a file has at most; a pipe or device may go on for ever.
+/// Upper limit of the size in bytes; a pipe or device may be endless.
 const BYTES_MAX: u64 = 64 << 20;
 
 /// What a file holds, of at most 64 MiB.

@@ -8,12 +8,11 @@ use std::path::Path;
 /// Mode of a file that only its owner reads.
 const SECRET: u32 = 0o600;
 
-/// Writes a file at once: a reader, and whoever comes after a crash or a full disk, finds the old
-/// one or the new one. For files in folders that are known to be the program's own; others go
-/// through [`crate::Output`].
+/// Writes a file atomically: a reader finds the old or the new one, also after a crash or on a full
+/// disk. For files in folders of the program; others go through [`crate::Output`].
 ///
 /// # Errors
-/// [`FilesError::System`] when the file can't be written; then the old one stands.
+/// [`FilesError::System`] when the file cannot be written; then the old one is kept.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), FilesError> {
     write(path, bytes, None)
 }

@@ -2,7 +2,8 @@
 
 use crate::ParameterSet;
 
-/// What one simulation is asked for; where it stands in its campaign, and what decides its result.
+/// Input of one simulation: its position in the campaign, and everything that determines its
+/// result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     /// Place in the campaign's Sobol sequence.
@@ -16,7 +17,7 @@ pub struct Case {
 impl Case {
     /// Hash of parameter names, values and seed: 32 hexadecimal digits of BLAKE3.
     ///
-    /// 128 bits tell any two cases apart and leave a database of a million rows small.
+    /// 128 bits distinguish any two cases and keep a database of a million rows small.
     pub fn parameter_hash(&self) -> String {
         let mut hasher = blake3::Hasher::new_derive_key("tracktwin case parameters 1");
         for (parameter, value) in self.parameters.iter() {

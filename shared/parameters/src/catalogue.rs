@@ -80,7 +80,7 @@ impl Parameter {
         self.row().label
     }
 
-    /// The value on V-Track where nothing else is said.
+    /// The nominal value on V-Track.
     pub const fn nominal(self) -> f64 {
         self.row().nominal
     }

@@ -40,7 +40,7 @@ pub enum SobolError {
 }
 
 impl Sequence {
-    /// The sequence that serves a campaign of so many cases.
+    /// The default sequence of a campaign with this number of cases.
     pub const fn for_cases(cases: u32) -> Self {
         if cases <= OWEN_POINTS_MAX { Self::OwenScrambled } else { Self::Rotated }
     }

@@ -76,8 +76,8 @@ impl ParameterSpace {
     /// The space of these axes, put in catalogue order.
     ///
     /// # Errors
-    /// [`SpaceError`] names the parameter whose range is not finite, positive, low before high,
-    /// or which stands twice.
+    /// [`SpaceError`] names the parameter whose range is not finite, positive, low before high, or
+    /// which is a duplicate.
     pub fn new(mut axes: Vec<Axis>) -> Result<Self, SpaceError> {
         axes.sort_by_key(|axis| axis.parameter);
         for pair in axes.windows(2) {

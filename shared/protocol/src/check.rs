@@ -21,7 +21,7 @@ pub enum BadMessage {
         /// The longest allowed.
         max: usize,
     },
-    /// A name with characters that nobody sees.
+    /// A name with invisible characters.
     #[error("{field} contains control characters")]
     ControlCharacters {
         /// The field.
@@ -32,7 +32,7 @@ pub enum BadMessage {
     NotANumber {
         /// The field.
         field: &'static str,
-        /// What stands there.
+        /// Its value.
         value: f64,
     },
     /// A share that is not a number from 0 to 1.
@@ -40,15 +40,15 @@ pub enum BadMessage {
     NotAShare {
         /// The field.
         field: &'static str,
-        /// What stands there.
+        /// Its value.
         value: f64,
     },
-    /// A count that nobody can have.
+    /// An impossible count.
     #[error("{field} is {value}; it must be below {limit}")]
     TooLarge {
         /// The field.
         field: &'static str,
-        /// What stands there.
+        /// Its value.
         value: u32,
         /// The least that is not allowed.
         limit: u32,
@@ -58,7 +58,7 @@ pub enum BadMessage {
     UnknownValue {
         /// The field.
         field: &'static str,
-        /// What stands there.
+        /// Its value.
         value: i32,
     },
     /// A parameter this program doesn't know, and would ignore.
@@ -72,14 +72,14 @@ pub enum BadMessage {
         /// The parameter's name.
         name: String,
     },
-    /// A parameter does not stand exactly once.
+    /// A parameter does not occur exactly once.
     #[error("case {index}: parameter {name} occurs {count} times instead of once")]
     ParameterCount {
         /// The case.
         index: u32,
         /// The parameter's name.
         name: &'static str,
-        /// How often it stands there.
+        /// Number of occurrences.
         count: usize,
     },
     /// A hash does not belong to what it came with.
@@ -157,7 +157,7 @@ pub(crate) fn bounded<T>(field: &'static str, cases: Vec<T>) -> Result<Vec<T>, B
 /// Longest time that a case may have taken, in s: ten years.
 const DURATION_MAX_S: f64 = 3e8;
 
-/// A time in s that somebody can have measured.
+/// A possible measured time in s.
 pub(crate) fn duration(field: &'static str, value: f64) -> Result<f64, BadMessage> {
     if (0.0..=DURATION_MAX_S).contains(&value) {
         Ok(value)

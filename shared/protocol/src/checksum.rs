@@ -37,7 +37,7 @@ pub fn checksum_of_passes(index: u32, parameter_hash: &str, passes: &[PassFeatur
     hash(&bytes)
 }
 
-/// What comes first, with room for so many bytes behind it.
+/// The header, with capacity for the given number of bytes.
 fn begun(index: u32, parameter_hash: &str, passes: usize, length: usize) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(64 + length);
     bytes.extend(index.to_be_bytes());

@@ -3,7 +3,7 @@
 use crate::check::{BadMessage, name};
 use crate::farm;
 
-/// No machine has so many cores; who says so would have the others wait.
+/// Upper limit of the cores: a false number would make other workers wait.
 const CORES_MAX: u32 = 1 << 14;
 
 /// A worker, as it introduces itself.
@@ -17,7 +17,7 @@ pub struct Registration {
     pub model_hash: String,
     /// Groups of cases it simulates at a time, at least one.
     pub cores: u32,
-    /// Version of the protocol it speaks; 0 from programs before versions were told.
+    /// Version of its protocol; 0 from programs without a version.
     pub protocol_version: u32,
 }
 

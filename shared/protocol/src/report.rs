@@ -103,7 +103,7 @@ impl CaseReport {
         })
     }
 
-    /// What a message says, right or wrong; none where it lacks the outcome.
+    /// The unchecked content of a message; `None` without an outcome.
     fn as_received(message: farm::CaseReport) -> Option<Self> {
         let outcome = match message.outcome? {
             OutcomeMessage::Failure(failure) => Outcome::Failed { reason: failure.reason },

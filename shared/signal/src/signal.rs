@@ -1,6 +1,6 @@
 //! A sampled signal that has been checked once.
 
-/// Evenly sampled values, all finite; an axle-box acceleration in m/s2 unless said otherwise.
+/// Evenly sampled values, all finite; an axle-box acceleration in m/s2 unless stated otherwise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
     sample_rate_hz: f64,
@@ -21,7 +21,7 @@ pub enum SignalError {
     NotFinite {
         /// Place of the first such sample, from 0.
         index: usize,
-        /// What stands there.
+        /// Its value.
         value: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! The synchrosqueezed wavelet transform (SSWT), written as the formula stands.
+//! The synchrosqueezed wavelet transform (SSWT), a literal implementation of the formula.
 
 use crate::{
     transform::{Cwt, TimeFrequency},

@@ -1,4 +1,4 @@
-//! The continuous wavelet transform (CWT), written as the formula stands.
+//! The continuous wavelet transform (CWT), a literal implementation of the formula.
 //!
 //! Owns padding and the transform with its derivative in time. Every voice takes two Fourier
 //! transforms of the whole padded signal: this form is for pictures and for checking the faster
@@ -8,7 +8,7 @@ use crate::wavelet::Morlet;
 use rustfft::{Fft, FftPlanner, num_complex::Complex64};
 use std::{f64::consts::TAU, ops::Range, sync::Arc};
 
-/// What stands around the signal while it is transformed, which is circular.
+/// Padding of the signal for the transform, which is circular.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Padding {
     /// Zeros after the signal, up to this many samples in all.

@@ -49,7 +49,8 @@ impl Export {
 impl Drop for Export {
     fn drop(&mut self) {
         if let Some(provider) = &self.0 {
-            // A collector that is away gets nothing, which the log says; the farm goes on.
+            // Traces are lost while the collector is unreachable, with a warning in the log; the
+            // farm continues.
             let _ = provider.shutdown();
         }
     }

@@ -1,7 +1,7 @@
 //! `OpenTelemetry` traces of the farm: how leases become rows.
 //!
-//! Owns what a step of a trace is, how it is passed on between processes (W3C Trace Context) and where
-//! steps are sent (OTLP). Where nobody asked for traces, steps cost nothing.
+//! Owns what a step of a trace is, how it is passed on between processes (W3C Trace Context) and
+//! where steps are sent (OTLP). Without an exporter, steps cost nothing.
 
 mod export;
 mod step;

@@ -54,8 +54,8 @@ impl Chart {
         let _ = write!(self.marks, r#"<polygon class="band {class}" points="{}"/>"#, join(&points));
     }
 
-    /// A line through means with a band around it; a point is place, mean and half width of the band. What
-    /// others are compared with (`was`) stands behind them, without dots.
+    /// A line through means with a band around it; a point is place, mean and half width of the
+    /// band. The reference line (`was`) is drawn behind the others, without dots.
     pub fn curve(&mut self, class: &str, points: &[(f64, f64, f64)]) {
         let band: Vec<_> = points.iter().map(|&(x, y, half)| (x, y - half, y + half)).collect();
         let means: Vec<_> = points.iter().map(|&(x, y, _)| (x, y)).collect();

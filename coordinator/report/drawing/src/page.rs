@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Colours and lines of charts; light, and dark where the reader prefers it.
 ///
-/// The hues are Okabe and Ito's, which readers with any colour vision tell apart.
+/// The hues are Okabe and Ito's, which readers with any colour vision can distinguish.
 pub const CHART_STYLE: &str = "
 :root{--paper:#fff;--ink:#1b1f24;--faint:#d9dde2;--dim:#5b6470;--a:#0072b2;--b:#d55e00;--c:#009e73;--d:#cc79a7;--e:#e69f00;--f:#56b4e9}
 @media (prefers-color-scheme:dark){:root{--paper:#14171a;--ink:#e6e9ec;--faint:#343a41;--dim:#9aa4af;--a:#56b4e9;--b:#f08a4b;--c:#2cc295;--d:#e29cc2;--e:#f0c04a;--f:#2b8fd0}}
@@ -33,7 +33,7 @@ tr.invalid{color:var(--dim);font-style:italic}.banner{border:2px solid var(--b);
 @media print{body{max-width:none;padding:0;font-size:11pt}figure,tr{break-inside:avoid}}
 ";
 
-/// A whole page: a heading, one sentence that says it all, the rest.
+/// A whole page: heading, summary sentence, content.
 pub fn page(title: &str, summary: &str, body: &Markup) -> String {
     page_with(title, summary, &Markup::default(), body, &Markup::default())
 }
@@ -72,7 +72,7 @@ pub fn figure(charts: &[String], caption: &str) -> Markup {
     }
 }
 
-/// A chart as a file of its own, with the colours that a page would give it.
+/// A chart as a separate file, with the colours of a page.
 pub fn stand_alone(chart: &str) -> String {
     let style = format!("<style>{CHART_STYLE}</style>");
     match chart.find('>') {

@@ -44,7 +44,7 @@ fn scores(name: &str, scores: &Scores, better: bool) -> Markup {
     }
 }
 
-/// One sentence that says what the scores mean.
+/// One sentence on the meaning of the scores.
 fn meaning(diagnosis: &Diagnosis) -> String {
     let fit = &diagnosis.fit;
     let single = "With a single speed no speed could be withheld, so no model was tested on other \

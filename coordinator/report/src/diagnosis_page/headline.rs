@@ -1,4 +1,4 @@
-//! What stands beside and beneath the sentence: verdict, key figures, what to keep in mind.
+//! Headline of the page: sentence, verdict, key figures and notes.
 
 use super::levels::{Side, all_cells, difference, rms, share_within_two_sd, usual_scatter};
 use super::place::Site;
@@ -107,7 +107,7 @@ fn chance_alone(diagnosis: &Diagnosis) -> Option<(String, String)> {
     Some((format!("{:.0} %", 100.0 * share), what.to_owned()))
 }
 
-/// What was looked at.
+/// Extent of the comparison.
 fn compared(diagnosis: &Diagnosis) -> Option<(String, String)> {
     let levels = &diagnosis.levels;
     let (low, high) = (levels.frequency_hz.first()?, levels.frequency_hz.last()?);

@@ -1,4 +1,4 @@
-//! What may be left out: how probable, where, what looks alike, what would tell.
+//! Hypotheses: probability, place, look-alikes, and measurements that separate them.
 
 use super::quantity::{per_cent, signed};
 use super::words::{

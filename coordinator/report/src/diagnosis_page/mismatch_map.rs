@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Mismatch};
 use tracktwin_drawing::{Axis, Chart, figure};
 
-/// Width of a panel where two stand beside each other, and where three do.
+/// Width of a panel in a row of two, and of three.
 const WIDTHS: [f64; 2] = [546.0, 361.0];
 const HEIGHT: f64 = 250.0;
 

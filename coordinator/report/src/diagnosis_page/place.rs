@@ -179,7 +179,7 @@ fn chart(diagnosis: &Diagnosis, site: &Site, speed: usize) -> String {
     chart.into_svg()
 }
 
-/// Thin lines and names at round frequencies, more than the axis would choose itself: they tell
+/// Thin lines and names at round frequencies, more than the axis would choose itself: they show
 /// what moves from one speed to the next.
 fn rule(chart: &mut Chart, levels: &Levels, y: &Axis) {
     let (Some(&low), Some(&high)) = (levels.frequency_hz.first(), levels.frequency_hz.last())

@@ -5,8 +5,8 @@
 use tracktwin_diagnosis::Estimate;
 use tracktwin_parameters::Parameter;
 
-/// Ends of names, longest first where one ends in another, with the unit that they stand for and
-/// whether it takes prefixes.
+/// Suffixes of names, longest first if one contains another, with their unit and whether it takes
+/// prefixes.
 const UNITS: [(&str, &str, bool); 16] = [
     ("_N_m_per_rad", "N m/rad", true),
     ("_dB_per_octave", "dB/octave", false),
@@ -108,7 +108,7 @@ fn decimals(unit: &Unit, estimate: Estimate) -> usize {
     of_mean.min(tracktwin_number::decimals(sd, if leading < 2.0 { 2 } else { 1 }))
 }
 
-/// The number with so many significant digits, without a power of ten.
+/// The number with the given significant digits, without a power of ten.
 pub(super) fn digits(value: f64, count: usize) -> String {
     rounded(value, tracktwin_number::decimals(value, count))
 }

@@ -1,4 +1,4 @@
-//! Names of physics, sleepers and places as a reader says them.
+//! Readable names of physics, sleepers and places.
 
 use tracktwin_diagnosis::{Diagnosis, Hypothesis, Location, UNKNOWN};
 use tracktwin_track::extension::Kind;
@@ -73,7 +73,7 @@ pub(super) fn sleepers(diagnosis: &Diagnosis, ids: &[String]) -> String {
     }
 }
 
-/// Where sleepers of these names stand in the list of sleepers.
+/// Indices of the sleepers with these names.
 pub(super) fn numbers(diagnosis: &Diagnosis, ids: &[String]) -> Vec<usize> {
     ids.iter().filter_map(|id| diagnosis.track.iter().position(|known| known.id == *id)).collect()
 }
@@ -106,7 +106,7 @@ pub(super) fn speeds(speeds_km_h: &[f64]) -> String {
     format!("{} km/h", list(&texts))
 }
 
-/// The least probability that a page tells: a few hundred null simulations know no smaller one.
+/// Smallest probability shown on a page: a few hundred null simulations resolve no smaller one.
 const CHANCE_LEAST: f64 = 1e-3;
 
 /// How probable something is by chance, to follow "probability".

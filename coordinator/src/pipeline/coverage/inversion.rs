@@ -1,4 +1,4 @@
-//! How well inversion tells the sleepers of uneven tracks that the reference simulator recorded.
+//! Accuracy of the inversion on uneven tracks recorded by the reference simulator.
 
 use super::score::WIDTH_90;
 use crate::pipeline::compute::compute;
@@ -19,7 +19,7 @@ const COMPARED: [(Parameter, fn(&SleeperTruth) -> f64); 2] = [
     (Parameter::BallastStiffness, |sleeper| sleeper.ballast_stiffness_n_m),
 ];
 
-/// Sleepers at either end of a recording that are not scored: the run-in is heard there.
+/// Sleepers at either end of a recording that are not scored, because of the run-in.
 const ENDS: usize = 1;
 
 /// Why inversion can't be scored.
@@ -59,7 +59,8 @@ pub struct InversionScore {
     pub correlation: f64,
 }
 
-/// Simulates and evaluates `tracks` tracks of each scatter; tells how many of how many are done.
+/// Simulates and evaluates `tracks` tracks of each unevenness; reports the number done and the
+/// total.
 ///
 /// # Errors
 /// [`InversionCoverageError`] of the first track that has one.

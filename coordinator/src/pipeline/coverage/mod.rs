@@ -21,7 +21,7 @@ use tracktwin_parameters::{Parameter, ParameterSet};
 /// Tracks that are simulated side by side.
 const TOGETHER: usize = 8;
 
-/// Why coverage can't be told.
+/// Errors of measuring the coverage.
 #[derive(Debug, thiserror::Error)]
 pub enum CoverageError {
     /// A track can't be simulated.
@@ -47,7 +47,7 @@ pub struct Coverage<'a> {
 }
 
 impl Coverage<'_> {
-    /// Simulates and evaluates all tracks on all cores; tells how many of how many are done.
+    /// Simulates and evaluates all tracks on all cores; reports the number done and the total.
     ///
     /// # Errors
     /// [`CoverageError`] of the first track that has one.

@@ -149,7 +149,7 @@ fn differs(parameter: Parameter) -> bool {
     matches!(parameter, Parameter::RailpadStiffness | Parameter::BallastStiffness)
 }
 
-/// The set with railpad and ballast stiffness of its own: lognormal, the mean as it was.
+/// The set with random railpad and ballast stiffness: log-normal, with unchanged mean.
 fn uneven(set: ParameterSet, scatter: f64, random: &mut impl Rng) -> ParameterSet {
     let variance = (scatter * scatter).ln_1p();
     [Parameter::RailpadStiffness, Parameter::BallastStiffness].into_iter().fold(

@@ -1,4 +1,4 @@
-//! What evaluations of tracks say against what the tracks are.
+//! Evaluations of tracks compared with the truth.
 
 use super::plan::Kind;
 use super::track::Track;
@@ -56,7 +56,7 @@ pub struct Compared {
     pub along: f64,
 }
 
-/// A track and what was said of it.
+/// A track and its evaluation.
 pub(super) type Answer = (Track, Evaluation);
 
 /// The row of these answers.

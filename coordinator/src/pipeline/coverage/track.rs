@@ -32,7 +32,7 @@ pub enum TrackError {
     /// The wheel can't run over it.
     #[error(transparent)]
     Pass(#[from] PassError),
-    /// What it feels is not finite.
+    /// The acceleration is not finite.
     #[error(transparent)]
     Signal(#[from] SignalError),
 }
@@ -60,7 +60,7 @@ impl Place {
 
 /// Recordings of tracks of one length, a pass at each of the experiment's speeds.
 ///
-/// Beyond the recorded sleepers a track goes on like its outer ones.
+/// Beyond the recorded sleepers a track continues with the outer ones.
 ///
 /// # Errors
 /// [`TrackError`] of a track that has one.

@@ -16,7 +16,7 @@ use tracktwin_signal::recording::Recording;
 use tracktwin_trial::{KnockedOut, Paper, Plan, Seals, detectability, score};
 
 impl Trial {
-    /// Answers what a leased case lacks, and lets go of it.
+    /// Computes the missing answers of a leased case, and releases it.
     pub(super) async fn work_on(&self, number: u32) -> Result<(), TrialError> {
         let renewal = self.renewal(number);
         let answered = self.answer_case(number).await;
@@ -40,7 +40,7 @@ impl Trial {
         self.discard(number)
     }
 
-    /// The library is asked, for another node may have answered since.
+    /// The library is read again, because another machine may have answered since.
     async fn next_question(&self, number: u32) -> Result<Option<Question>, TrialError> {
         let answered = self.scores().await?.remove(&number);
         Ok(self.unanswered(answered.as_ref()).first().copied())
@@ -115,7 +115,7 @@ impl Trial {
         self.keep(number, Question::Paper, &paper, None).await
     }
 
-    /// The case's recording, made if it is not there.
+    /// The case's recording, created if missing.
     fn record_case(&self, number: u32) -> Result<Recording, TrialError> {
         let folder = self.recording(number);
         if !folder.try_exists().map_err(|source| file(&folder, source))? {

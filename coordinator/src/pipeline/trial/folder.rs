@@ -7,11 +7,11 @@ use tracktwin_files::{FilesError, Kind, check, make_folder};
 /// Folders inside it.
 const PARTS: [&str; 3] = ["recordings", "sealed", "diagnoses"];
 
-/// Makes sure that a folder holds a trial or nothing of its names: in one without a trial, files
-/// where the trial's own will be are somebody else's.
+/// Checks that a folder holds a trial, or no file with a name of the trial's files: such a file
+/// would belong to another program.
 ///
 /// # Errors
-/// [`FilesError`] names the first that stands in the way.
+/// [`FilesError`] names the first file that exists already.
 pub fn check_folder(folder: &Path, force: bool) -> Result<(), FilesError> {
     check(folder, Kind::Trial, force, &[TABLES, SCORES, SUMMARY])?;
     if force || folder.join(TERMS).exists() {

@@ -1,11 +1,11 @@
-//! A case is worked on by one node at a time, for as long as the node lives.
+//! A case is processed by one machine at a time, as long as the machine is alive.
 
 use super::{Trial, TrialError};
 use std::time::Duration;
 use tokio::task::JoinHandle;
 use tracktwin_farm::dispatch::Timing;
 
-/// A node that is silent for so long has lost its case to the next that asks.
+/// Duration of a lease: after it, the case goes to the next machine that asks.
 const LEASE: Duration = Duration::from_mins(1);
 
 /// Renews a lease until it is dropped.
@@ -18,7 +18,7 @@ impl Drop for Renewal {
 }
 
 impl Trial {
-    /// Leases the first of these cases that nobody works on.
+    /// Leases the first of these cases that is free.
     pub(super) async fn lease(&self, of: Vec<u32>) -> Result<Option<u32>, TrialError> {
         Ok(self.library.lease_trial_case(&self.id(), &self.node, of, lease_ms()).await?)
     }
@@ -29,7 +29,8 @@ impl Trial {
         Renewal(tokio::spawn(async move {
             loop {
                 tokio::time::sleep(Timing::of_lease(LEASE).heartbeat).await;
-                // Should it fail for long, another node does the case too, and one answer is kept.
+                // If this fails for long, another machine processes the case as well, and one
+                // answer is kept.
                 if let Err(error) =
                     library.renew_trial_case(&trial, &node, number, lease_ms()).await
                 {
@@ -39,7 +40,7 @@ impl Trial {
         }))
     }
 
-    /// Lets go of a case.
+    /// Releases a case.
     pub(super) async fn release(&self, number: u32) -> Result<(), TrialError> {
         Ok(self.library.release_trial_case(&self.id(), &self.node, number).await?)
     }

@@ -1,9 +1,8 @@
 //! A blind trial: truths sealed, recordings made, diagnosed, opened and scored, by as many nodes as
 //! share a library.
 //!
-//! Owns the order of things and the folder's files; what is hidden and how answers are scored is the
-//! trial crate's, who works on which case stands in the library, and so do the answers: a trial that
-//! was interrupted goes on.
+//! Owns the order of the steps and the files of the folder. The trial crate owns the hidden physics
+//! and the scores; the library holds leases and answers, so an interrupted trial can be continued.
 
 mod case;
 mod folder;
@@ -28,7 +27,7 @@ use tracktwin_reference_simulator::TruthError;
 use tracktwin_signal::recording::RecordingError;
 use tracktwin_trial::{Score, SealError, Seals, Summary};
 
-/// File that says which trial the folder holds.
+/// File that identifies the trial of the folder.
 const TERMS: &str = "trial.json";
 
 /// File of the seals.
@@ -39,10 +38,10 @@ const TABLES: &str = "trial.md";
 const SCORES: &str = "scores.jsonl";
 const SUMMARY: &str = "summary.json";
 
-/// How long a node waits for the cases that others work on before it looks again.
+/// Interval of checking the cases of other machines.
 const WAIT: Duration = Duration::from_secs(2);
 
-/// How long a node waits for a library that does not answer before it gives up.
+/// Time limit of an unavailable library.
 const PATIENCE: Duration = Duration::from_mins(10);
 
 /// A trial, as one node takes part in it.
@@ -150,7 +149,7 @@ pub enum TrialError {
         /// Why.
         source: serde_json::Error,
     },
-    /// A file cannot be written, or stands in the way.
+    /// A file cannot be written, or exists already.
     #[error(transparent)]
     Files(#[from] FilesError),
     /// A file cannot be read.
@@ -220,7 +219,8 @@ impl Trial {
     /// is left, and counts as such.
     ///
     /// # Errors
-    /// [`TrialError`] when a seal is broken; [`TrialError::BrokenDown`] at the end, all else summed up.
+    /// [`TrialError`] when a seal is broken; [`TrialError::BrokenDown`] at the end, after the
+    /// summary.
     pub async fn answer(&self, mut progress: impl FnMut(u64, &str)) -> Result<Summary, TrialError> {
         let mut failing_since: Option<Instant> = None;
         let mut broken = BTreeMap::new();

@@ -55,7 +55,7 @@ impl Trial {
         Ok(scores)
     }
 
-    /// Keeps an answer where all nodes find it.
+    /// Stores an answer in the shared library.
     pub(super) async fn keep(
         &self,
         number: u32,

@@ -1,8 +1,8 @@
-//! The re-tuned baseline: all that may vary before any physics is said to be missing.
+//! The re-tuned baseline: all parameters that may vary before physics is called left out.
 //!
 //! Every sleeper has its own ballast, railpad and irregularity level, the surface its own spectrum,
-//! every speed its own gain; the sensor is flat to two per cent, and nobody knows where the track
-//! ends and how the sleepers beyond are held. Every extension is compared with this baseline.
+//! every speed its own gain; the sensor is flat to two per cent, and the ends of the track and the
+//! supports beyond are unknown. Every extension is compared with this baseline.
 
 use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;

@@ -120,7 +120,7 @@ pub struct Hypothesis {
     pub parameters: BTreeMap<String, Estimate>,
     /// What looks alike.
     pub look_alikes: Vec<String>,
-    /// What would tell it from them.
+    /// Measurement that separates it from them.
     pub would_separate: String,
     /// Length of its trace over the scatter, after re-tuning.
     pub detectability: f64,

@@ -19,7 +19,7 @@ const BANDS_HZ: [f64; 2] = [80.0, 5100.0];
 /// Highest band as a part of the sample rate.
 const SAMPLE_RATE_SHARE: f64 = 0.35;
 
-/// Least number of bands from which physics can be told.
+/// Smallest number of bands for a diagnosis.
 const BANDS_MIN: usize = 12;
 
 /// Least number of neighbouring sleepers that all passes cover.
@@ -104,7 +104,7 @@ pub struct PreparedRecording {
     pub first_sleeper: usize,
     /// Numbers in the recording of the passes at each speed.
     pub pass_numbers: Vec<Vec<usize>>,
-    /// Kinds of physics that may not be named.
+    /// Kinds of physics that may not be accepted.
     pub without: Vec<String>,
     /// Where the passes alone show the rail's own shape, from and to in m; nowhere until
     /// [`PreparedRecording::suggested`].

@@ -47,8 +47,8 @@ pub struct Section {
     pub sleepers: usize,
     /// Place of the first of them on the recording's scale in m.
     pub first_x_m: f64,
-    /// Spans modelled beyond the first and the last of them. Nobody knows how the track goes on;
-    /// the further away its ends, the less they matter.
+    /// Spans modelled beyond the first and the last of them. The continuation of the track is
+    /// unknown; distant ends matter less.
     pub spans_beyond: usize,
 }
 

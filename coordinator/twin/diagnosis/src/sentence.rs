@@ -7,17 +7,17 @@ use tracktwin_track::extension::{Kind, PlaceKind};
 /// Logarithm of a parameter's bias that is worth a word.
 const BIAS_MIN: f64 = 0.1;
 
-/// By how much a family is more probable than its member to be told first.
+/// Ratio of a family's to its member's probability from which the family is stated first.
 const FAMILY_MORE: f64 = 0.02;
 
-/// Probability from which another name is told beside the first.
+/// Probability from which another hypothesis is stated beside the first.
 const RIVAL_MIN: f64 = 0.05;
 
 /// Sleepers that are named one by one.
 const NAMED_MAX: usize = 3;
 
-/// What was found, where, how sure, and what it changes; for a section of so many sleepers, of
-/// which nothing is left out with this probability.
+/// Sentence on the hypotheses: what, where, how probable, and the bias removed; for a section of
+/// this number of sleepers and this probability that nothing is left out.
 pub(crate) fn sentence(
     verdict: Verdict,
     hypotheses: &[Hypothesis],
@@ -68,7 +68,7 @@ fn named(hypothesis: &Hypothesis, sleepers: usize) -> String {
     }
 }
 
-/// What else the first one could be, and what would tell them apart.
+/// Look-alikes of the first hypothesis, and the measurement that separates them.
 fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     let is_rival = |other: &&Hypothesis| {
         !other.accepted && other.physics != first.physics && other.probability >= RIVAL_MIN

@@ -1,4 +1,4 @@
-//! What the passes alone suggest, as candidates for the model.
+//! Candidates for the model from the findings of the passes alone.
 
 use crate::candidate::{Candidate, parameter};
 use crate::prepared_recording::PreparedRecording;
@@ -6,8 +6,8 @@ use tracktwin_inspection::{Finding, Inspection, Place};
 use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter, PlaceKind};
 
 impl PreparedRecording {
-    /// Tells the model where the wheel begins its turns, if its blows say so, and where the rail's shape
-    /// was heard; makes candidates of what a first look found.
+    /// Sets the start of the wheel's revolutions from the blows of a flat, and the detected shapes
+    /// of the rail; returns the candidates from an inspection.
     pub fn suggested(&mut self, inspection: &Inspection) -> Vec<Candidate> {
         let section = &self.forward.section;
         let turn_start_m = |pass: &usize| {
@@ -26,7 +26,7 @@ impl PreparedRecording {
     }
 }
 
-/// Where a finding heard the rail's shape.
+/// Stretch in which a finding shows the rail's shape.
 fn detected_shape_m(finding: &Finding) -> Option<[f64; 2]> {
     match finding.place {
         Place::Stretch { from_m, to_m } => Some([from_m, to_m]),

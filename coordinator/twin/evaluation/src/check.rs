@@ -5,8 +5,7 @@ use crate::windows::speed_index;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 
-/// Compares what a recording says of its track, vehicle, sensor and speeds with what the models
-/// were trained on.
+/// Compares the track, vehicle, sensor and speeds stated in a recording with those of the models.
 ///
 /// What `recording.json` doesn't say is not compared.
 ///

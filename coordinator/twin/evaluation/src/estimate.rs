@@ -21,7 +21,7 @@ const EDGE: f64 = 0.02;
 const ALL_SPEEDS: &str = "one model of all speeds together";
 const SINGLE_SPEEDS: &str = "models of single speeds: means weighted by precision; variance their harmonic mean, as if errors were common to all";
 
-/// What stands for the track when a recording is evaluated.
+/// The trained twin that evaluates a recording.
 #[derive(Clone, Copy)]
 pub struct Twin<'a> {
     /// Takes features as they were taken in training.
@@ -109,7 +109,7 @@ fn estimates(sleepers: &[SleeperFeatures], models: &Trained) -> Result<Vec<Estim
     Ok(out.into_iter().map(combined).collect())
 }
 
-/// Adds what the model of these speeds says of the `chosen` sleepers, all in one batch.
+/// Adds the estimates of the model of these speeds for the `chosen` sleepers, all at once.
 fn predict(
     sleepers: &[SleeperFeatures],
     models: &Trained,

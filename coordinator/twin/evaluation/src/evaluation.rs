@@ -1,4 +1,4 @@
-//! What an evaluation says: the record that files and pages are made of.
+//! The record of an evaluation, from which files and pages are made.
 
 use crate::{OutsideLibrary, Unevenness};
 use serde::Serialize;
@@ -77,15 +77,15 @@ pub struct Known {
     /// Mean absolute error on the test half over that range (paper, eq. 11), of the best of the
     /// models that speak.
     pub mase_test: f64,
-    /// The same of an answer that is always the library's median.
+    /// The same of a constant, the library's median.
     pub mase_constant: f64,
 }
 
 impl Known {
-    /// Share of a constant answer's error above which a parameter is as good as not told.
+    /// Share of a constant's error above which a parameter counts as not resolved.
     const HARDLY: f64 = 0.9;
 
-    /// Whether the models tell the parameter noticeably better than a constant does.
+    /// Whether the models estimate the parameter noticeably better than a constant.
     pub fn beats_constant(&self) -> bool {
         self.mase_test < Self::HARDLY * self.mase_constant
     }
@@ -101,7 +101,7 @@ pub struct SleeperEvaluation {
     /// Mean and standard deviation by Gaussian processes.
     #[serde(flatten)]
     pub estimates: Estimates,
-    /// Standard deviations as they would be if all sleepers were alike.
+    /// Standard deviations without the unevenness of the track.
     #[serde(rename = "sd_if_even")]
     pub sd_without_unevenness: BTreeMap<Parameter, f64>,
     /// The model selector's answer.

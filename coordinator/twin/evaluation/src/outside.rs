@@ -1,8 +1,8 @@
 //! Which sleepers' features lie outside what the library knows.
 //!
-//! A track beyond the library is beyond it at many sleepers, and the mean over them tells more than
-//! each. So running windows of one, three, seven and all sleepers are judged, and a sleeper is
-//! outside if any window that holds it is.
+//! A track outside the library is outside at many sleepers, and the mean over them is more
+//! significant than each. So running windows of one, three, seven and all sleepers are tested, and
+//! a sleeper is outside if any window that contains it is.
 
 use crate::{Error, Flag, SleeperFeatures};
 use serde::Serialize;
@@ -66,12 +66,12 @@ impl Domains {
 pub(crate) struct DomainTest {
     pub(crate) outside: bool,
     beyond: Option<Beyond>,
-    /// Sleepers in the window that said so.
+    /// Sleepers in the window that is outside.
     window: usize,
 }
 
 impl DomainTest {
-    /// Takes a window's judgement; larger windows know better what a track is beyond.
+    /// Takes a window's result; larger windows determine the violated range more reliably.
     fn take(&mut self, judgement: &Judgement, window: usize) {
         if !judgement.is_outside() {
             return;
@@ -84,7 +84,7 @@ impl DomainTest {
     }
 }
 
-/// A verdict on every sleeper, in their order.
+/// The test of every sleeper, in their order.
 ///
 /// Sleepers whose windows are not complete are judged by the whole track only.
 ///

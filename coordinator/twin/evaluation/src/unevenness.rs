@@ -1,9 +1,9 @@
 //! What it costs an estimate that sleepers differ.
 //!
-//! The library's tracks are even. Of a sleeper's own deviation from its neighbours the processes
-//! see a part only, and no test on the library shows the rest. How much sleepers differ is told by
-//! how much the means vary along the track beyond their standard deviations, and never taken to be
-//! less than [`LEAST`].
+//! The library's tracks are even. The Gaussian processes resolve only a part of a sleeper's
+//! deviation from its neighbours, and no test on the library shows the rest. The unevenness follows
+//! from the variation of the means along the track beyond their standard deviations, and is at
+//! least [`LEAST`].
 
 use crate::evaluation::{Estimate, Estimates};
 use serde::Serialize;
@@ -34,14 +34,16 @@ pub struct Unevenness {
     pub scatter: f64,
     /// The least that is ever assumed.
     pub least: f64,
-    /// The parameter whose means told it; none if the least was assumed.
+    /// The parameter whose means determined it; none if the minimum was assumed.
     pub learned_from: Option<Parameter>,
 }
 
 impl Unevenness {
-    /// What the `told` sleepers' estimates say, with the standard deviations of an even track.
+    /// The unevenness from the estimates of these sleepers, with the standard deviations of an even
+    /// track.
     ///
-    /// The parameter with the smallest standard deviations is asked: it tells most.
+    /// The parameter with the smallest standard deviations is used, because it is the most
+    /// informative.
     pub(crate) fn of(told: &[&Estimates]) -> Self {
         let learned = OWN
             .into_iter()

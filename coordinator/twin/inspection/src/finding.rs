@@ -1,4 +1,4 @@
-//! What a single test of a recording says.
+//! Findings: results of single tests of a recording.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! What the passes of a recording tell without a model of the track.
+//! Tests of a recording's passes without a track model.
 //!
 //! Owns impacts, waves and the wheel's turns, faults of the measuring chain, and the first look that
 //! puts them together. Pure: a recording goes in, findings come out. What a model of the track explains

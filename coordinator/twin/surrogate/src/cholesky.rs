@@ -15,7 +15,7 @@ use faer::{Mat, MatRef, get_global_parallelism};
 /// faer's own 128 take a tenth longer for 5000 entries.
 const BLOCK: usize = 512;
 
-/// `A = L L'`. What stands above the diagonal of `L` has no meaning and is never read.
+/// `A = L L'`. Entries above the diagonal of `L` are undefined and never read.
 pub(crate) struct Cholesky {
     lower: Mat<f64>,
 }

@@ -8,8 +8,8 @@ use pulp::{Arch, Simd, WithSimd};
 /// Largest rounded number.
 const LARGEST: f64 = 127.0;
 
-/// Standard deviations that [`LARGEST`] stands for: wide enough for nearly all values. Those
-/// beyond are cut off, and what is cut off counts as rounded off.
+/// Standard deviations represented by [`LARGEST`]: wide enough for nearly all values. Larger ones
+/// are clipped, which counts as rounding.
 const REACH: f64 = 4.0;
 
 /// How many times finer an observed vector is rounded, which is read but once.
@@ -25,7 +25,7 @@ const DOUBLE_ROUNDING: f64 = 1e-12;
 pub(crate) struct Coarse {
     /// Mean row: what is centred at it is small, and so is its rounding.
     centre: Vec<f64>,
-    /// What a one in `rows` stands for.
+    /// Value of a one in `rows`.
     step: f64,
     /// Each row filled up with zeros to whole [`STRIDE`]s.
     rows: Vec<i8>,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 /// What goes wrong between a library and a prediction.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A table has not the rows or columns it says.
+    /// A table has another number of rows or columns than stated.
     #[error("{what}: {found} numbers instead of {expected}")]
     Shape {
         /// The table.
@@ -46,7 +46,7 @@ pub enum Error {
         /// Bins there are.
         bins: usize,
     },
-    /// A feature set that nobody defined.
+    /// An undefined feature set.
     #[error("unknown feature set {0}")]
     UnknownFeature(String),
     /// The covariance has a pivot that is not positive.
@@ -69,10 +69,10 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// A file is not what its name says.
+    /// The content of a file does not match its name.
     #[error("{path}: {reason}")]
     Malformed {
         /// The file.

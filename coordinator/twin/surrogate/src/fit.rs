@@ -103,7 +103,8 @@ fn choose(
     let mut least = usize::MAX;
     for &scaling in scalings {
         let map = InputMap::fit(scaling, makers.0, makers.1)?;
-        // Twice the judges: enough to tell scalings apart, and an eighth of the cost of four times.
+        // Twice the test entries: enough to distinguish scalings, and an eighth of the cost of four
+        // times.
         let trained = rest.min(2 * subset);
         let inputs = map.apply(makers.0.subrows(0, trained));
         let mean = MeanFunction::around(scaling);

@@ -26,7 +26,7 @@ pub struct Factor {
     log_determinants: f64,
 }
 
-/// What the factor says of several targets at once (p of them).
+/// Solution with the factor for several targets at once (p of them).
 #[derive(Clone, Debug)]
 pub struct Weights {
     /// `K⁻¹ (y - H b)`, n x p.

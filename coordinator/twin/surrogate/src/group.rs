@@ -15,7 +15,7 @@ pub type Tested = (Parameter, Vec<(f64, f64)>);
 /// Which features a group of models reads.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroupKey {
-    /// Speeds in km/h whose features stand side by side, in this order.
+    /// Speeds in km/h whose features are concatenated, in this order.
     pub speeds_km_h: Vec<f64>,
     /// Name of the feature set.
     pub feature: String,

@@ -13,7 +13,7 @@ pub enum InputScaling {
     /// Every bin divided by its standard deviation over the training set; one that never changes
     /// is left out.
     Standardised,
-    /// Projected on the directions that tell parameters apart, in units of the surface's scatter.
+    /// Projected on the directions that separate parameters, in units of the surface's scatter.
     Whitened {
         /// How many directions.
         components: usize,

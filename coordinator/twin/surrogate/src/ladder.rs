@@ -16,8 +16,8 @@ pub(crate) type Rung = [i32; 2];
 
 /// Rungs for the length, half an octave each: from a quarter of the unit to 64 of it.
 const LENGTH_RUNGS: std::ops::RangeInclusive<i32> = -4..=12;
-/// Rungs for the noise ratio, an octave each: 6e-5 (inputs' own noise dominates) to 16 (nothing
-/// can be told).
+/// Rungs for the noise ratio, an octave each: 6e-5 (inputs' own noise dominates) to 16 (no
+/// information).
 const NOISE_RUNGS: std::ops::RangeInclusive<i32> = -14..=4;
 
 /// What a rung means: lengths in units of a typical distance.

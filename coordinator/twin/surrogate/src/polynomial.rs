@@ -25,8 +25,8 @@ struct UnitAxis {
 }
 
 impl Polynomial {
-    /// The polynomial of the highest total degree, at most `degree_max`, that these `parameters` (n x p)
-    /// can tell.
+    /// The polynomial of the highest total degree, at most `degree_max`, that these `parameters` (n
+    /// x p) can determine.
     pub(crate) fn of(parameters: MatRef<'_, f64>, degree_max: usize) -> Self {
         let axes: Vec<_> =
             parameters.col_iter().map(|column| UnitAxis::of(column.iter().copied())).collect();

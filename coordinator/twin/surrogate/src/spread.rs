@@ -1,8 +1,8 @@
-//! How much wider or narrower errors are than the process says, along the range of a parameter.
+//! Ratio of the errors to the standard deviations of the process, along the range of a parameter.
 //!
 //! A Gaussian process gives nearly the same standard deviation everywhere. Errors are not like
-//! that: a stiff railpad is harder to tell than a soft one (paper, 3.4). The errors of the folds
-//! say by how much, and the factor found there multiplies every standard deviation.
+//! that: a stiff railpad is harder to estimate than a soft one (paper, 3.4). The errors of the
+//! folds determine a factor that multiplies every standard deviation.
 
 use serde::{Deserialize, Serialize};
 

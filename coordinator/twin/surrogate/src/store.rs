@@ -1,8 +1,8 @@
 //! Trained models, and the folder they are kept in.
 //!
-//! `models.json` says everything but the large tables: format, campaign, digest of the library,
-//! feature definition, hyper-parameters, scores. Beside it stands one safetensors file a group,
-//! with float64 tables, that any program can read. A prediction in Python:
+//! `models.json` contains everything except the large tables: format, campaign, digest of the
+//! library, feature definition, hyper-parameters, scores. Beside it is one safetensors file per
+//! group, with float64 tables, that any program can read. A prediction in Python:
 //!
 //! ```python
 //! import json, numpy as np
@@ -154,7 +154,7 @@ impl Trained {
     /// Writes the models into `folder`, which is made if need be: all of them or none.
     ///
     /// # Errors
-    /// [`Error::Files`] names what cannot be written, or what stands in the way.
+    /// [`Error::Files`] names the file that cannot be written, or that exists already.
     pub fn save(&self, folder: &Path) -> Result<(), Error> {
         let mut output = Output::begin(folder, Kind::Models, false).map_err(Error::Files)?;
         self.add_to(&mut output)?;

@@ -63,7 +63,7 @@ pub struct Progress<'a> {
 /// Trains on a random half of the entries and tests on the other (paper, 2.5.5 and 3.4).
 ///
 /// # Errors
-/// [`Error`] says what of the training set or the options cannot be used.
+/// [`Error`] states what is wrong with the training set or the options.
 pub fn train(
     set: &TrainingSet,
     options: &TrainOptions,

@@ -74,8 +74,8 @@ fn rows(of: MatRef<'_, f64>, rows: &[usize]) -> Mat<f64> {
 /// hyper-parameters stay.
 ///
 /// # Errors
-/// [`Error::NotPositiveDefinite`] when a fold holds so many entries that the rest cannot carry the
-/// mean.
+/// [`Error::NotPositiveDefinite`] when a fold holds too many entries for the others to determine
+/// the mean.
 pub fn folds(factor: &Factor, weights: MatRef<'_, f64>, count: usize) -> Result<Folds, Error> {
     let q = factor.projected_inverse();
     let (n, p) = (weights.nrows(), weights.ncols());

@@ -1,4 +1,4 @@
-//! The directions in which features tell parameters apart, measured in units of their noise.
+//! The directions in which features separate parameters, in units of their noise.
 //!
 //! One case sees one random surface, so that its ln-powers scatter around what its parameters make
 //! expected, and the scatter of neighbouring bins is alike. Both are estimated from the training

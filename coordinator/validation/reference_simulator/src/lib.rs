@@ -1,9 +1,9 @@
 //! Recordings whose truth is known: passes over a track with hidden physics.
 //!
-//! Owns a simulator of its own, which shares neither code nor discretisation with the twin's: sine
-//! modes of the rail and Ritz modes of the sleepers instead of finite elements, steps that are exact
-//! for the modes instead of Newmark's, and an irregularity of its own making. Whether a diagnosis
-//! finds what is hidden is left to those who diagnose. How it works and what was checked stands in
+//! An independent simulator, which shares neither code nor discretisation with the twin's: sine
+//! modes of the rail and Ritz modes of the sleepers instead of finite elements, steps that are
+//! exact for the modes instead of Newmark's, and an irregularity of its own making. Whether a
+//! diagnosis finds what is hidden is left to those who diagnose. Method and checks:
 //! `docs/reference-simulator.md`.
 
 mod chain;

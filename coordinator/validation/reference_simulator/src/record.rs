@@ -1,4 +1,4 @@
-//! All passes of a scene, written as a recording; nothing in it tells what is hidden.
+//! All passes of a scene, written as a recording; it contains no information on the hidden physics.
 
 use crate::TruthError;
 use crate::chain::{measure, turn};

@@ -1,4 +1,4 @@
-//! Means with how surely they are known, and what may be said of their sign.
+//! Means with their standard errors, and the significance of their sign.
 
 use crate::Verdict;
 use tracktwin_evaluation::Estimate;
@@ -25,7 +25,7 @@ impl Average {
         Self { mean, error: (squares / (n - 1.0) / n).sqrt() }
     }
 
-    /// Of estimates, each as sure as it says, whose errors are each its own.
+    /// Mean of estimates with independent errors of the stated size.
     pub(crate) fn of_estimates(estimates: &[Estimate]) -> Self {
         let n = estimates.len() as f64;
         let mean = estimates.iter().map(|estimate| estimate.mean).sum::<f64>() / n;
@@ -48,13 +48,13 @@ impl Average {
         Self { mean: self.mean + offset, ..self }
     }
 
-    /// Whether it is told from zero.
+    /// Whether it differs significantly from zero.
     pub(crate) fn differs_from_zero(self) -> bool {
         self.mean.abs() > DEVIATIONS * self.error
     }
 
-    /// What becomes of the claim that it is no more than chance, where `matters` would matter: one
-    /// that is known less surely than that cannot tell.
+    /// Verdict on the claim that it is zero within chance, where `matters` is a relevant size: a
+    /// larger uncertainty gives no verdict.
     pub(crate) fn is_nothing(self, matters: f64) -> Verdict {
         if self.differs_from_zero() {
             Verdict::Differs
@@ -65,7 +65,7 @@ impl Average {
         }
     }
 
-    /// What becomes of the claim that it is above zero.
+    /// Verdict on the claim that it is above zero.
     pub(crate) fn is_positive(self) -> Verdict {
         if self.differs_from_zero() { Verdict::of(self.mean > 0.0) } else { Verdict::CannotTell }
     }

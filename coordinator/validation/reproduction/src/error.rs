@@ -49,7 +49,7 @@ pub enum Error {
         /// The speed in km/h.
         speed_km_h: f64,
     },
-    /// An example's recording was not told at all of its sleepers.
+    /// An example's recording has no estimate at some of its sleepers.
     #[error("{figure}: sleeper {sleeper} of an example has no estimate of {symbol}")]
     NotEstimated {
         /// The figure.

@@ -1,4 +1,4 @@
-//! The tracks of the paper's numerical examples (section 4), and what was told of them.
+//! The tracks of the paper's numerical examples (section 4), and their evaluations.
 
 use crate::{Error, Figure};
 use Parameter::{BallastStiffness, IrregularityLevel, RailpadStiffness, SleeperBendingStiffness};
@@ -11,7 +11,8 @@ pub(crate) const SLEEPERS: usize = 9;
 /// Parameter sets A0 to A3: railpad and ballast stiffness in N/m (paper, Table 4.1).
 const TABLE_4_1: [[f64; 2]; 4] = [[2e8, 2e7], [1.5e8, 1.6e7], [1e8, 1.2e7], [5e7, 8e6]];
 
-/// The smallest change of a stiffness between two of these sets in N/m: what the examples tell.
+/// The smallest change of a stiffness between two of these sets in N/m: the resolution of the
+/// examples.
 pub(crate) fn smallest_step(parameter: Parameter) -> f64 {
     let column = usize::from(parameter == BallastStiffness);
     let steps = TABLE_4_1.windows(2).map(|pair| (pair[0][column] - pair[1][column]).abs());
@@ -98,7 +99,7 @@ impl Example {
     }
 }
 
-/// What was told of an example.
+/// The evaluation of an example.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EvaluatedExample {
     /// The truth.
@@ -108,7 +109,7 @@ pub struct EvaluatedExample {
 }
 
 impl EvaluatedExample {
-    /// What an evaluation of the example's recording says.
+    /// The estimates of an evaluation of the example's recording.
     ///
     /// # Errors
     /// [`Error::NotEstimated`] names a sleeper or a parameter that it lacks.
@@ -136,7 +137,7 @@ impl EvaluatedExample {
         self.example.sleepers[sleeper - 1][parameter]
     }
 
-    /// What was told of it.
+    /// Its estimates.
     pub(crate) fn estimate(&self, sleeper: usize, parameter: Parameter) -> Estimate {
         self.sleepers[sleeper - 1][&parameter]
     }

@@ -9,7 +9,7 @@ use tracktwin_parameters::Parameter::{self, BallastStiffness, RailpadStiffness};
 /// What the extracted text of the paper leaves open.
 const TAKEN: &str = "the text does not say from which set to which; A2 to A3 was taken";
 
-/// What was told of the three reductions beside the paper's Fig. 19.
+/// Comparison of the three reductions with the paper's Fig. 19.
 pub(crate) fn local_change(told: &[EvaluatedExample]) -> Compared {
     let caption = "Truth and estimates where railpads and ballast are reduced from parameter set \
                    A2 to A3 at sleeper 4, at 4 to 6 and at 5 to 9.";
@@ -26,7 +26,7 @@ pub(crate) fn local_change(told: &[EvaluatedExample]) -> Compared {
     compared
 }
 
-/// A single reduced sleeper is heard against those two and more away.
+/// A single reduced sleeper is compared with those at least two away.
 fn one(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parameter) {
     let Some(single) = told.first() else { return };
     let at = Average::of_estimates(&single.estimates(REDUCED[0].clone(), parameter));

@@ -1,4 +1,4 @@
-//! Fig. 17 and 18: one parameter differs from example to example, all else stays.
+//! Fig. 17 and 18: one parameter differs between examples, the others are equal.
 
 use crate::agreement::{Agreement, picture};
 use crate::average::{Average, all};
@@ -15,7 +15,7 @@ const SAME: [Parameter; 2] = [RailpadStiffness, BallastStiffness];
 const FINE: std::ops::RangeInclusive<usize> = 1..=4;
 const COARSE: std::ops::RangeInclusive<usize> = 6..=9;
 
-/// What was told of three levels of irregularity beside the paper's Fig. 17.
+/// Comparison of three levels of irregularity with the paper's Fig. 17.
 pub(crate) fn irregularity(told: &[EvaluatedExample]) -> Compared {
     let caption = "Truth and estimates at irregularity levels 2, 3 and 4; parameter set A2.";
     let mut compared = one_parameter(Figure::Fig17, caption, told, IrregularityLevel);
@@ -25,7 +25,7 @@ pub(crate) fn irregularity(told: &[EvaluatedExample]) -> Compared {
     compared
 }
 
-/// What was told of three bending stiffnesses of the sleepers beside the paper's Fig. 18.
+/// Comparison of three bending stiffnesses of the sleepers with the paper's Fig. 18.
 pub(crate) fn bending_stiffness(told: &[EvaluatedExample]) -> Compared {
     let caption = "Truth and estimates at three bending stiffnesses of the sleepers, 4000, 5000 \
                    and 6000 N m²; parameter set A2.";

@@ -10,7 +10,7 @@ use tracktwin_track::model::{Mesh, Support, TrackModel};
 /// Spans of the paper's track (Table D1).
 const PAPER_SPANS: usize = 25;
 
-/// Spans on which the ends are no longer heard (docs/accuracy.md).
+/// Number of spans above which the ends have no effect (docs/accuracy.md).
 const LONG_SPANS: usize = 200;
 
 /// Elements of a span and of a half sleeper: the receptance is converged (docs/accuracy.md).

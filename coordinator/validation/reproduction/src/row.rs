@@ -1,4 +1,4 @@
-//! What a comparison says: a row a claim.
+//! Rows of a comparison, one per claim.
 
 use crate::{Figure, Picture};
 use serde::Serialize;
@@ -14,7 +14,7 @@ pub enum Verdict {
     Reproduced,
     /// Beyond it.
     Differs,
-    /// Chance, or something the paper does not say, stands in the way.
+    /// Undecided, because of chance or of information missing in the paper.
     CannotTell,
 }
 
@@ -39,7 +39,7 @@ impl Verdict {
 pub struct Row {
     /// The figure it belongs to.
     pub figure: Figure,
-    /// What the paper says, in words.
+    /// Statement of the paper.
     pub claim: String,
     /// Its number or finding.
     pub paper: String,

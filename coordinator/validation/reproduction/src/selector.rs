@@ -55,7 +55,7 @@ pub(crate) fn selector(set: &TrainingSet, seed: u64) -> Result<Compared, Error> 
     Ok(compared)
 }
 
-/// The sizes that so many entries allow, and all of them.
+/// The sizes possible with this number of entries, and the full size.
 fn sizes(entries: usize) -> Vec<usize> {
     SIZES.into_iter().filter(|&size| size < entries).chain([entries]).collect()
 }

@@ -9,7 +9,7 @@ use tracktwin_parameters::Parameter::{self, BallastStiffness, RailpadStiffness};
 const BEFORE: [usize; 3] = [1, 2, 3];
 const BEHIND: [usize; 4] = [6, 7, 8, 9];
 
-/// What was told of the three steps beside the paper's Fig. 16.
+/// Comparison of the three steps with the paper's Fig. 16.
 pub(crate) fn step(told: &[EvaluatedExample]) -> Compared {
     let caption = "Truth and estimates, mean with two standard deviations, sleeper by sleeper: \
                    parameter set A0 up to sleeper 4, A1, A2 and A3 from sleeper 5 on.";

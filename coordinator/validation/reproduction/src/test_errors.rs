@@ -16,7 +16,7 @@ pub type Tested = (Parameter, Vec<(f64, f64)>);
 /// Cases that trained the paper's models.
 const PAPER_TRAINED: usize = 5000;
 
-/// What the paper says of the global feature at 13 km/h: MASE in per cent, its words, and the
+/// The paper's values for the global feature at 13 km/h: MASE in per cent, its words, and the
 /// largest that still is that number: half a per cent above "about", nothing above "less than".
 const PAPER_GF: [(Parameter, &str, f64); 4] = [
     (BallastStiffness, "about 5 %", 5.5),
@@ -28,7 +28,7 @@ const PAPER_GF: [(Parameter, &str, f64); 4] = [
 /// The paper's local features.
 const LOCAL: [FeatureSet; 4] = [FeatureSet::Lf1, FeatureSet::Lf2, FeatureSet::Lf3, FeatureSet::Lf4];
 
-/// The paper's limit in per cent for the level told by any local feature.
+/// The paper's limit in per cent for the level estimated by any local feature.
 const LEVEL_LOCAL: f64 = 10.0;
 
 /// Two numbers that both are "approximately 5 %" differ by this factor at most: 5.5 over 4.5.

@@ -270,7 +270,7 @@ mod tests {
     const NEVER_HIDDEN: [&str; 4] =
         ["roughness_spectrum", "contact_patch_filter", "second_wheel", "support_variation"];
 
-    /// Kinds that it has, but that passes under one load can't tell.
+    /// Kinds in the catalogue that passes under one load cannot separate.
     const NOT_ASKED: [&str; 1] = ["load_dependent_railpad"];
 
     #[test]

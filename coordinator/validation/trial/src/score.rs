@@ -13,7 +13,7 @@ use tracktwin_reference_simulator::{Hidden, Scene};
 /// Probability that the set of answers must hold together.
 const SET: f64 = 0.9;
 
-/// A cell beyond so many deviations of the nulls is seen by anybody who looks.
+/// Deviations of the null simulations above which a cell is visibly anomalous.
 const CELL_DEVIATIONS: f64 = 3.5;
 
 /// What became of a case.
@@ -23,7 +23,7 @@ pub struct Score {
     pub number: u32,
     /// What kind of case it is.
     pub class: Class,
-    /// What the diagnosis said.
+    /// Result of the diagnosis.
     pub verdict: Verdict,
     /// Names that it accepted.
     pub accepted: Vec<String>,
@@ -41,17 +41,17 @@ pub struct Score {
     pub cells_inside: bool,
     /// CPU time of the diagnosis in s.
     pub cpu_s: f64,
-    /// What was said without the hidden kind in the catalogue; none if nobody asked.
+    /// Result without the hidden kind in the catalogue, if tested.
     pub knocked_out: Option<KnockedOut>,
-    /// What was said with its sleepers shuffled; none if nobody asked.
+    /// Result with its sleepers shuffled, if tested.
     #[serde(default)]
     pub shuffled: Option<Verdict>,
-    /// What the paper's own pipeline says of it; none if nobody asked.
+    /// Result of the paper's method, if tested.
     #[serde(default)]
     pub paper: Option<Paper>,
 }
 
-/// What is said of an effect when the catalogue does not have it.
+/// Result of an effect whose kind is missing in the catalogue.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnockedOut {
     /// The verdict.
@@ -83,7 +83,7 @@ pub struct Named {
 /// How well a local effect was placed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placed {
-    /// Distance in sleeper spacings to the nearest accepted place; none where none was said.
+    /// Distance in sleeper spacings to the nearest accepted place; none if there is none.
     pub error_spacings: Option<f64>,
 }
 
@@ -104,20 +104,20 @@ pub struct Bias {
 }
 
 impl Score {
-    /// Whether it can be asked what is said without the hidden kind: one effect, found and named.
+    /// Whether the knock-out test applies: one effect, found and named.
     pub fn can_be_knocked_out(&self) -> bool {
         self.class == Class::Single && self.hidden.iter().all(|named| named.accepted)
     }
 
-    /// Whether it can be asked what is said with shuffled sleepers: one effect with a place, found.
+    /// Whether the shuffle test applies: one local effect, found.
     pub fn can_be_shuffled(&self) -> bool {
         self.class == Class::Single
             && self.verdict != Verdict::Consistent
             && self.hidden.iter().all(|named| named.place.is_some())
     }
 
-    /// Whether nobody could have said it better: hidden effects are the accepted names, faults of
-    /// the chain are not called physics, and where nothing is hidden nothing is said.
+    /// Whether the diagnosis is perfect: the accepted hypotheses are the hidden effects, faults of
+    /// the chain are not called physics, and nothing is accepted where nothing is hidden.
     pub fn is_right(&self) -> bool {
         match self.class {
             Class::Control => self.verdict == Verdict::Consistent,
@@ -254,7 +254,7 @@ fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
     (count > 0.0).then(|| Bias { before: before / count, after: after / count })
 }
 
-/// Whether what the baseline says of every sleeper lies inside Table D1 of the paper.
+/// Whether the baseline of every sleeper lies inside Table D1 of the paper.
 fn parameters_inside(diagnosis: &Diagnosis) -> bool {
     let inside = |parameter: Parameter, value: f64| {
         let Axis { low, high, .. } = Preset::VTrack.axis(parameter);

@@ -72,7 +72,7 @@ impl Seals {
     /// From such a text.
     ///
     /// # Errors
-    /// [`SealError::Line`] names the line that is none.
+    /// [`SealError::Line`] names the invalid line.
     pub fn from_text(text: &str) -> Result<Self, SealError> {
         let line = |line: &str| match line.split_once("  ") {
             Some((digest, name)) if digest.len() == 64 => Ok((name.to_owned(), digest.to_owned())),

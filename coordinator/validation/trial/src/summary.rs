@@ -59,7 +59,7 @@ pub struct KindRow {
 }
 
 impl Summary {
-    /// Of the scores of so many cases; a case without one has a diagnosis that broke down.
+    /// Summary of the scores; a case without a score has a failed diagnosis.
     pub fn new(cases: u32, scores: &[Score]) -> Self {
         Self { cases: scores.len(), rows: rows(cases, scores), kinds: kinds(scores) }
     }

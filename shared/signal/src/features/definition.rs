@@ -38,8 +38,8 @@ pub struct FeatureDefinition {
     ///
     /// Three standard deviations (19 ms) of the wavelet at 50 Hz.
     pub margin_s: f64,
-    /// LWPS in (m/s2)^2 below which nothing is told apart: the logarithm is taken of the larger
-    /// of the two, so that an empty bin counts as this much.
+    /// Floor of the LWPS in (m/s2)^2: the logarithm is taken of the larger of the two, so that an
+    /// empty bin has this value.
     ///
     /// The default is an amplitude of 10 um/s2, beneath the noise of any accelerometer.
     pub floor_m2_s4: f64,

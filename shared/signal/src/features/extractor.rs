@@ -181,8 +181,8 @@ impl Extractor {
         }
     }
 
-    /// Computes the synchrosqueezed transform of a window and hands it to `read`; `definition` says
-    /// whether instants are thinned out.
+    /// Computes the synchrosqueezed transform of a window and passes it to `read`; `definition`
+    /// states whether instants are thinned out.
     pub(super) fn squeeze<R>(
         &self,
         signal: &Signal,

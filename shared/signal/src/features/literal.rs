@@ -1,4 +1,4 @@
-//! Features of a window, as the formulas stand: the reference for the quick way.
+//! Features of a window, a literal implementation of the formulas: reference for the fast one.
 
 use super::{Extractor, FeatureError, Features};
 use crate::{Conventions, Cwt, Normalisation, Padding, Signal, squeeze};

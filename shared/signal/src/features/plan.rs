@@ -142,7 +142,7 @@ impl Plan {
         Self { octaves }
     }
 
-    /// Hands every voice to `take`, from the highest frequency to the lowest: how often its
+    /// Passes every voice to `take`, from the highest frequency to the lowest: how often its
     /// instants are halved, its values at them (from the window's start on; more than the window
     /// has), and the values with each frequency weighted by itself in Hz.
     ///

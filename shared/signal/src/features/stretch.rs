@@ -5,8 +5,8 @@ use std::{f64::consts::PI, ops::Range};
 
 /// The part of a margin, at its far end, over which the signal fades out.
 ///
-/// A cut through the signal is a step, heard at every frequency; a fade over the last quarter is
-/// heard by the lowest voices only, which reach that far with less than 8 % of their weight.
+/// A cut through the signal is a step, which has power at every frequency; a fade over the last
+/// quarter affects the lowest voices only, which reach that far with less than 8 % of their weight.
 const FADED_PART: f64 = 0.25;
 
 /// A window and the real signal around it, without its mean, faded out at both ends; zero beyond.

@@ -36,7 +36,7 @@ pub(super) fn times(
     Ok(clock)
 }
 
-/// The step that is expected is what the declared rate says, unless that is wrong too.
+/// The expected step follows from the declared rate, unless that is wrong too.
 fn known_rate(fault: Fault, declared: f64) -> Fault {
     match fault {
         Fault::UnevenTime { row, step, expected }

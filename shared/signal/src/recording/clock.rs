@@ -27,9 +27,9 @@ pub(super) struct SampleClock {
 pub(super) enum Stamps {
     /// As even as rounding allows.
     Even,
-    /// The clock advances in steps of so many seconds, longer than a sample interval.
+    /// The clock advances in steps of this length in s, longer than a sample interval.
     Coarse(f64),
-    /// Off by up to so many seconds, but never by more than a sample interval.
+    /// Jitter of up to this time in s, but never more than a sample interval.
     Jitter(f64),
 }
 
@@ -59,7 +59,7 @@ impl SampleClock {
     }
 }
 
-/// Times that stand still and then advance by whole steps of a clock.
+/// Times that are constant and then advance by whole steps of a clock.
 fn coarse(times: &[f64], mean: f64) -> Option<SampleClock> {
     let changes: Vec<usize> = (1..times.len()).filter(|&i| times[i] != times[i - 1]).collect();
     let steps = || changes.iter().map(|&i| times[i] - times[i - 1]);

@@ -1,4 +1,4 @@
-//! The three columns of a pass, whatever kind of file they come from.
+//! The three columns of a pass, independent of the file format.
 
 use super::error::{Fault, RecordingError};
 use super::{csv_file, limits, parquet_file};
@@ -18,7 +18,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Reads the columns of a `.parquet` or `.csv` file and checks each by itself.
+    /// Reads the columns of a `.parquet` or `.csv` file and checks each separately.
     pub(super) fn read(path: &Path) -> Result<Self, RecordingError> {
         if !path.is_file() {
             return Err(RecordingError::new(path, "file", Fault::NoSuchFile));

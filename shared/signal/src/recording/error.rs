@@ -63,7 +63,7 @@ pub enum Fault {
     /// The format's name is absent or another one.
     #[error("is {found}; this program reads \"{expected}\"")]
     WrongFormat {
-        /// What stands there, as JSON.
+        /// The value found, as JSON.
         found: String,
         /// The name that is understood.
         expected: &'static str,
@@ -71,15 +71,15 @@ pub enum Fault {
     /// A field that is needed is absent.
     #[error("is missing; add {expected}")]
     NoField {
-        /// What should stand there.
+        /// The expected value.
         expected: String,
     },
     /// A field holds another kind of value.
     #[error("is {found}; give {expected}")]
     WrongValue {
-        /// What stands there, as JSON.
+        /// The value found, as JSON.
         found: String,
-        /// What should stand there.
+        /// The expected value.
         expected: &'static str,
     },
     /// Two sleepers bear one name.
@@ -88,7 +88,7 @@ pub enum Fault {
         /// The name.
         id: String,
     },
-    /// A file stands where a folder should.
+    /// A file instead of a folder.
     #[error("is a file, but a recording is a folder; create one with `tracktwin import`")]
     NoFolder,
     /// Columns of a CSV file are separated by something else than commas.
@@ -145,13 +145,13 @@ pub enum Fault {
     /// Two columns bear one name.
     #[error("columns {} have this name; give each column a unique name", list(places))]
     ColumnTwice {
-        /// Where they stand, counted from 1.
+        /// Their columns, counted from 1.
         places: Vec<usize>,
     },
-    /// The name or the file says a unit that is not known for such a column.
+    /// The name or the file states a unit that is unknown for such a column.
     #[error("the unit is \"{unit}\", but must be one of {known}; {remedy}")]
     UnknownUnit {
-        /// What the file says.
+        /// Unit in the file.
         unit: String,
         /// The units that are known.
         known: String,
@@ -161,7 +161,7 @@ pub enum Fault {
     /// A column that is needed is absent.
     #[error("the column is missing; rename one of the file's columns: {}", present.join(", "))]
     NoColumn {
-        /// The columns that are there.
+        /// The existing columns.
         present: Vec<String>,
     },
     /// A column holds something else than numbers.
@@ -178,7 +178,7 @@ pub enum Fault {
         /// The value, as written.
         value: String,
     },
-    /// A value stands for one that was not measured.
+    /// A code for a missing value.
     #[error(
         "row {row} is {value}, far from all other values: probably a code for a missing \
              value; remove that stretch"
@@ -281,7 +281,7 @@ pub enum Fault {
              separately"
     )]
     Directions,
-    /// The position begins anew.
+    /// The position restarts.
     #[error(
         "restarts at row {row}, from {} m to {} m; split the pass there",
         rounded(*before, 9), rounded(*after, 9)
@@ -307,7 +307,7 @@ pub enum Fault {
         /// The position in m of that row.
         after: f64,
     },
-    /// The wheel stands.
+    /// The wheel is at rest.
     #[error("does not change {}; keep only the part where the wheel rolls", standing(*from_s, *to_s))]
     StandsStill {
         /// From when on, in s from the first row.
@@ -327,7 +327,7 @@ pub enum Fault {
         /// The median change in m.
         step_m: f64,
     },
-    /// Steps of the position are too long to tell one sleeper from the next.
+    /// Steps of the position are too long to separate sleepers.
     #[error(
         "advances in steps of {} m; steps above {} m cannot separate sleepers: record \
              positions with a finer resolution, or give the speed and the position of a sleeper",
@@ -431,7 +431,7 @@ fn list(places: &[usize]) -> String {
     }
 }
 
-/// When a wheel stands.
+/// When a wheel is at rest.
 fn standing(from_s: f64, to_s: Option<f64>) -> String {
     to_s.map_or_else(
         || "during the whole pass".to_owned(),

@@ -102,11 +102,11 @@ impl Recording {
 
     /// Writes the recording as a folder: `recording.json` and one Parquet file a pass.
     ///
-    /// Accelerations are stored in single precision, times count from zero. The folder has the whole
-    /// recording or none; another recording that is there stays, unless it was computed too.
+    /// Accelerations are stored in single precision, times count from zero. The folder has the
+    /// whole recording or none; an existing recording is kept, unless it was computed too.
     ///
     /// # Errors
-    /// [`FilesError`] names the file that can't be written, or that stands in the way.
+    /// [`FilesError`] names the file that cannot be written, or that exists already.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FilesError> {
         let mut output = Output::begin(path.as_ref(), Kind::SimulatedRecording, false)?;
         self.add_to(&mut output)?;

@@ -66,7 +66,7 @@ fn stated(nominal: &Map<String, Value>, part: &str, name: &str) -> Option<f64> {
 
 /// That a file's numbers fit into memory, for they are held there all at once.
 pub(super) fn file(path: &Path) -> Result<(), RecordingError> {
-    // What can't be looked at is refused where it is read.
+    // Values of another type are refused by the reader.
     let bytes = unpacked(path).unwrap_or_default();
     if bytes <= BYTES_MAX {
         return Ok(());

@@ -11,7 +11,7 @@ use tracktwin_files::FilesError;
 pub(super) const FILE_NAME: &str = "recording.json";
 const FORMAT: &str = "aba-recording/1";
 
-/// What `recording.json` says.
+/// Content of `recording.json`.
 pub(super) struct Manifest {
     pub sample_rate_hz: f64,
     pub channel: String,
@@ -50,7 +50,7 @@ impl Manifest {
             return Err(root.fault("format", fault));
         }
         let passes = root.list("passes", "a list of {file, speed_km_h}")?;
-        // An empty list says that their places are not known; the spacing then has to be.
+        // An empty list means that their positions are unknown; then the spacing is required.
         let none_known = root.get("sleepers").and_then(Value::as_array).is_some_and(Vec::is_empty);
         let sleepers =
             if none_known { Vec::new() } else { root.list("sleepers", "a list of {id, x_m}")? };
@@ -117,7 +117,7 @@ fn sleepers_along_the_track(
     Ok(sleepers)
 }
 
-/// An object of the file and the place where it stands, for messages.
+/// An object of the file with its path, for messages.
 struct Fields<'a> {
     path: &'a Path,
     place: String,

@@ -1,23 +1,23 @@
 //! Positions as an odometer, a counter or a satellite receiver gives them: in steps, or finely.
 //!
-//! Owns what a column of positions is worth by itself: steps are straightened, what no wheel does is
-//! refused. Whether positions agree with times and speeds is checked elsewhere.
+//! Checks a position column alone: steps are interpolated, impossible motion is refused. Agreement
+//! with times and speeds is checked elsewhere.
 
 use super::error::Fault;
 
-/// Samples that a position stands still for, as a median, from which on it advances in steps.
+/// Median number of samples with constant position above which it advances in steps.
 const STAIR_SAMPLES: usize = 2;
-/// Steps below which nothing can be said of what lies between them.
+/// Number of steps below which an interpolation is impossible.
 const STEPS_MIN: usize = 4;
-/// Share of the usual speed below which a wheel stands, and the time in s that it must.
+/// Share of the usual speed below which a wheel is at rest, and the shortest time of rest in s.
 const STANDING: f64 = 0.1;
 const STANDING_S: f64 = 0.2;
 /// Times the usual speed above which a position jumps, and the least jump in m.
 const JUMP: f64 = 5.0;
 const JUMP_M: f64 = 0.01;
-/// Share of what a pass covers that a position must fall back by to have begun anew.
+/// Share of a pass's length by which a restarted position falls back.
 const RESTART: f64 = 0.5;
-/// Parts of the sleeper spacing that a step may be long where sleepers are to be told apart.
+/// Longest step as a share of the sleeper spacing that separates sleepers.
 const STEPS_A_SPACING: f64 = 4.0;
 /// Steps at either end of a pass whose speed is taken for what lies outside them.
 const END_STEPS: usize = 8;
@@ -54,7 +54,7 @@ impl Odometer {
         Ok(Self { position_m: steps.straight(), step_m: Some(steps.median_m()) })
     }
 
-    /// Whether steps of this length tell sleepers at this spacing apart.
+    /// Whether steps of this length separate sleepers at this spacing.
     ///
     /// # Errors
     /// [`Fault::CoarsePosition`] where they do not.
@@ -68,7 +68,7 @@ impl Odometer {
     }
 }
 
-/// The position goes on, and never back.
+/// Checks that the position never decreases.
 fn forwards(position_m: &[f64]) -> Result<(), Fault> {
     let (first, last) = (position_m[0], position_m[position_m.len() - 1]);
     if position_m.iter().all(|&place| place == first) {
@@ -120,7 +120,7 @@ impl<'a> Steps<'a> {
         self.position_m[index] - self.position_m[index - 1]
     }
 
-    /// Nothing stands still or jumps on the way.
+    /// Checks that the position neither stops nor jumps.
     fn check(&self, rate_hz: f64) -> Result<(), Fault> {
         let last = self.position_m.len() - 1;
         let (usual, step_m) = (self.usual_speed() * rate_hz, self.median_m());

@@ -77,7 +77,7 @@ pub(super) fn read_all(path: &Path) -> Result<Vec<Column>, RecordingError> {
 /// What the values of a column are.
 #[derive(Clone, Debug, PartialEq)]
 enum Kind {
-    /// Numbers as they stand.
+    /// Numbers without conversion.
     Plain,
     /// Whole numbers without a sign.
     Unsigned,
@@ -85,7 +85,7 @@ enum Kind {
     Half,
     /// Whole numbers of so much each.
     Scaled(f64),
-    /// Times in whole numbers of so many seconds.
+    /// Times as integers in this unit in s.
     Time(f64),
     /// No numbers.
     Other(String),

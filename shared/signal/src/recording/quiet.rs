@@ -8,7 +8,7 @@ use tracktwin_number::{rounded, significant};
 const QUIET: f64 = 5e-3;
 /// Steps of the recorder below which a signal is mostly rounding.
 const STEPS_MIN: f64 = 2.0;
-/// Samples that are looked at for the recorder's steps.
+/// Number of samples examined for the resolution of the recorder.
 const LOOKED_AT: usize = 20_000;
 
 /// What makes it doubtful that the wheel rolled, or that the sensor was on.

@@ -9,7 +9,7 @@ const ALIKE: f64 = 0.02;
 
 /// A quantity that `nominal` of `recording.json` may state.
 struct Quantity {
-    /// The object it stands in; none where it stands in `nominal` itself.
+    /// Its object; `None` if it is in `nominal` itself.
     part: Option<&'static str>,
     name: &'static str,
     unit: &'static str,

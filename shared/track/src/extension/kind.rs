@@ -29,7 +29,7 @@ pub struct Kind {
     pub parameters: &'static [KindParameter],
     /// Kinds that look alike in a recording.
     pub look_alikes: &'static [&'static str],
-    /// What would tell it from them.
+    /// Measurement that separates it from them.
     pub would_separate: &'static str,
     /// How a recording is searched for it.
     pub screening: Screening,

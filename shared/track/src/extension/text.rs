@@ -1,4 +1,4 @@
-//! Extensions as they stand on a command line: `NAME[@PLACE][:PARAMETER=VALUE,...]`.
+//! Extensions on a command line: `NAME[@PLACE][:PARAMETER=VALUE,...]`.
 //!
 //! A place is a point (`2.43m`), a stretch (`2m-3m`), or sleepers (`SN18`, `SN10-SN30`, every
 //! fourth of them `SN10-SN30/4`, several such `SN10,SN14-SN16`).
@@ -10,7 +10,7 @@ use std::str::FromStr;
 /// Why a text is no extension.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InstanceTextError {
-    /// No name stands first.
+    /// The name is missing.
     #[error(
         "write NAME[@PLACE][:PARAMETER=VALUE,...], for example \
              `sleeper_bolt@SN8-SN31:stiffness_N_per_m=3e7`"
@@ -19,7 +19,7 @@ pub enum InstanceTextError {
     /// A parameter is not `NAME=NUMBER`.
     #[error("`{0}` is not a parameter; write NAME=NUMBER")]
     Parameter(String),
-    /// A parameter stands twice.
+    /// A duplicate parameter.
     #[error("duplicate parameter `{0}`")]
     Twice(String),
     /// The place is none.

@@ -66,7 +66,7 @@ impl TrackModel {
     /// their order.
     ///
     /// # Errors
-    /// [`ModelError`] says which part of the input makes no track.
+    /// [`ModelError`] names the invalid input.
     pub fn build(
         design: &TrackDesign,
         mesh: &Mesh,

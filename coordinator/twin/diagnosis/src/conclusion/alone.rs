@@ -1,4 +1,4 @@
-//! What the passes tell by themselves where no model of the track can be compared with them.
+//! Conclusion from the passes alone, if no track model can be compared with them.
 
 use super::finding::{probability, seen};
 use super::notes::{lost, one_speed, shown};
@@ -15,8 +15,8 @@ use tracktwin_track::extension::{Kind, WHEEL_OUT_OF_ROUND};
 /// The diagnosis of a recording that has no track to compare with, for the reason given; none where
 /// the passes show nothing for sure.
 ///
-/// Sure is what was tested on blocks that nothing was fitted on, and a fault of the measuring chain;
-/// all else is a possibility.
+/// Accepted are findings tested on withheld blocks, and faults of the measuring chain; all others
+/// are possibilities.
 pub fn passes_alone(
     recording: &Recording,
     inspection: &Inspection,
@@ -70,7 +70,7 @@ pub fn passes_alone(
     })
 }
 
-/// Whether a name stands for the comb of a wheel, which is tested on blocks that were held out.
+/// Whether a kind is the comb of a wheel, which is tested on withheld blocks.
 fn is_comb(physics: &str, inspection: &Inspection) -> bool {
     physics == WHEEL_OUT_OF_ROUND.physics && inspection.comb.is_some()
 }

@@ -7,7 +7,8 @@ use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind};
 
 impl Evidence<'_> {
-    /// What the passes alone show stands by itself where the model has not found it as well.
+    /// A finding of the passes alone is a separate hypothesis if the model has not found it as
+    /// well.
     pub(super) fn add_finding(&self, finding: &Finding, all: &mut Vec<Hypothesis>) {
         let Some(kind) = Kind::from_name(finding.physics) else { return };
         let probability = probability(finding);
@@ -44,7 +45,7 @@ impl Evidence<'_> {
     }
 }
 
-/// What a finding says as a hypothesis: accepted, as probable as it says.
+/// A finding as an accepted hypothesis with its probability.
 pub(super) fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -> Hypothesis {
     let estimate =
         |(&name, &(mean, sd)): (&&str, &(f64, f64))| (name.to_owned(), Estimate { mean, sd });

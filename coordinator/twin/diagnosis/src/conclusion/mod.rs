@@ -48,9 +48,9 @@ pub struct Evidence<'a> {
     pub recording: &'a Recording,
     /// What was compared.
     pub prepared: &'a PreparedRecording,
-    /// What the passes tell alone.
+    /// Inspection of the passes alone.
     pub inspection: &'a Inspection,
-    /// What the model tells.
+    /// Result of the search with the model.
     pub search: &'a Search,
 }
 

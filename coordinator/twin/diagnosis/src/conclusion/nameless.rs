@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind};
 
-/// Probability of a patch as strong if nothing is left out, up to which it is said to be there.
+/// Probability of such a patch by chance up to which it is reported.
 const PATCH_ALARM: f64 = 0.01;
 
 impl Evidence<'_> {

@@ -6,7 +6,7 @@ use tracktwin_inspection::{Finding, Inspection};
 use tracktwin_number::chance;
 use tracktwin_signal::recording::Recording;
 
-/// Ratio of two speeds that tells structure from geometry well.
+/// Ratio of two speeds that separates structure from geometry well.
 const SPEED_RATIO: f64 = 1.35;
 
 impl Evidence<'_> {

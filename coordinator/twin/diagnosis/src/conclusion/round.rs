@@ -8,8 +8,7 @@ use crate::port_scan::UnknownElement;
 use crate::search::{Fitted, Probabilities, Round};
 use std::collections::BTreeMap;
 
-/// Probability to see such evidence for an unknown stiffness if nothing is left out, up to which it
-/// is said to be there.
+/// Probability of such evidence for an unknown stiffness by chance up to which it is reported.
 const PORT_ALARM: f64 = 0.01;
 
 /// Probability of nothing at all below which something is left out even if no name predicts a

@@ -26,7 +26,7 @@ impl Background {
     /// The median over Hann segments that overlap by half, divided by ln 2: the mean if all
     /// segments are alike, unmoved by impacts in less than half of them.
     ///
-    /// None where the signal is too short for a median or stands still.
+    /// None if the signal is too short for a median or constant.
     pub(crate) fn of(signal: &Signal) -> Option<Self> {
         let rate = signal.sample_rate_hz();
         let segment = ((rate / SEGMENTS_PER_S).round() as usize).max(16) & !1;
@@ -53,7 +53,7 @@ impl Background {
     }
 
     /// Density of the noise floor: the median of the upper half of the spectrum, where a recorder
-    /// that samples fast enough hears only itself.
+    /// with a sufficient sample rate records only its own noise.
     pub(crate) fn floor(&self) -> f64 {
         // The last tenth belongs to the anti-alias filter.
         let bins = self.density.len();

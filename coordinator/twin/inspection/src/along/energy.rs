@@ -68,8 +68,8 @@ pub(crate) fn by_speed(passes: &[Pass]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Whether the fastest pass is fast enough over the slowest to tell what stays in wavelength (surface,
-/// wheel) from what stays in frequency (track, vehicle).
+/// Whether the ratio of the highest to the lowest speed separates effects of constant wavelength
+/// (surface, wheel) from effects of constant frequency (track, vehicle).
 pub fn separates_wavelengths(passes: &[Pass]) -> bool {
     let speeds = || passes.iter().map(|pass| pass.speed_km_h);
     speeds().fold(0.0, f64::max) >= SPEED_RATIO * speeds().fold(f64::MAX, f64::min)

@@ -13,7 +13,7 @@ const PADDING: usize = 2;
 /// Resolution cells on either side of a line that belong to the line (Hann's main lobe).
 const LOBE: f64 = 2.5;
 
-/// Resolution cells on either side up to which neighbours are taken, unless told otherwise.
+/// Resolution cells on either side up to which neighbours are taken by default.
 const REACH: f64 = 18.0;
 
 /// Bins that are worth one independent value of the neighbours' mean.
@@ -58,7 +58,7 @@ impl Line {
     }
 }
 
-/// What tells the place of a sample.
+/// Quantity that gives the position of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ruler {
     /// The positions of the recording.
@@ -125,7 +125,7 @@ impl Spectrum {
         Self { step: 1.0 / (step * (PADDING * length) as f64), power, length, reach: REACH }
     }
 
-    /// The same spectrum with neighbours up to so many resolution cells from a line.
+    /// The same spectrum with neighbours up to this number of resolution cells from a line.
     pub(crate) fn reaching(self, reach: f64) -> Self {
         Self { reach, ..self }
     }

@@ -76,7 +76,7 @@ impl LossOfContact {
         self.passes.iter().map(|pass| pass.longest_s).fold(0.0, f64::max)
     }
 
-    /// What a reader has to know of it, where so many passes were recorded.
+    /// A sentence on it, for this number of recorded passes.
     pub fn sentence(&self, recorded: usize) -> String {
         let speeds: Vec<String> = self.speeds_km_h.iter().map(|it| format!("{it:.1}")).collect();
         let [from_m, to_m] = self.reach_m();
@@ -262,8 +262,8 @@ fn is_held(pass: &Pass, crests: &[Range<usize>]) -> bool {
     f64::from(equal) >= HELD * f64::from(pairs) && noise(samples) > NOISE_MIN * level
 }
 
-/// Standard deviation of a pass's noise, from fourth differences where it is quietest: they hardly hear what
-/// is slower.
+/// Standard deviation of a pass's noise, from fourth differences in its quietest part, which
+/// suppress slower components.
 fn noise(samples: &[f64]) -> f64 {
     let of_part = |part: &[f64]| {
         let fourth = |w: &[f64]| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];

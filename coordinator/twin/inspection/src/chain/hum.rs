@@ -1,4 +1,4 @@
-//! Lines of the mains: at a fixed frequency whatever the speed, narrower than any structure.
+//! Mains hum: lines at a fixed frequency at all speeds, narrower than any structural resonance.
 
 use crate::along::{Line, Spectrum, bonferroni, by_speed, ln_gamma_tail, speed_m_s};
 use rustfft::num_complex::Complex64;
@@ -11,9 +11,10 @@ const MAINS_HZ: [(f64, usize); 3] = [(50.0 / 3.0, 2), (50.0, 6), (60.0, 6)];
 const SEGMENT_S: f64 = 4.0;
 /// How far in Hz the mains may be from their nominal frequency.
 const DRIFT_HZ: f64 = 0.1;
-/// Probability of one speed's line without hum above which it isn't heard at that speed.
+/// Probability of one speed's line without hum above which it is not detected at that speed.
 const EACH_SPEED: f64 = 0.05;
-/// Speeds that must hear it, if there are so many; at others it may be drowned.
+/// Number of speeds at which it must be detected, if there are that many; at others it may be
+/// hidden.
 const SPEEDS_MIN: usize = 2;
 /// Greatest ratio of a line's amplitudes at two speeds: the mains do not know the train's.
 const APART_MAX: f64 = 2.0;
@@ -68,7 +69,7 @@ pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
     found
 }
 
-/// The line nearest to a mains frequency, and how many bins were looked at.
+/// The line nearest to a mains frequency, and the number of bins examined.
 fn line(speeds: &[Vec<PassSpectra>], lengths_m: &[f64], frequency: f64) -> (Option<Hum>, usize) {
     let mut tries = 0;
     let (mut each, mut ratios) = (Vec::new(), Vec::new());
@@ -104,8 +105,8 @@ fn line(speeds: &[Vec<PassSpectra>], lengths_m: &[f64], frequency: f64) -> (Opti
     (Some(hum), tries)
 }
 
-/// One probability of all speeds' (Fisher): at one frequency each hears waves of its own length, and
-/// they don't depend on each other.
+/// One probability of all speeds' (Fisher): at one frequency each speed has another wavelength, so
+/// they are independent.
 fn of_all(ln_probabilities: &[f64]) -> f64 {
     let count = ln_probabilities.len() as f64;
     ln_gamma_tail(count, -ln_probabilities.iter().sum::<f64>() / count)

@@ -31,7 +31,7 @@ use tracktwin_signal::recording::Recording;
 
 /// Density of every pass's noise floor in (m/s2)2/Hz: the median of the upper half of its spectrum.
 ///
-/// None for a pass that is too short or stands still.
+/// None for a pass that is too short or constant.
 pub fn noise_floors(recording: &Recording) -> Vec<Option<f64>> {
     let floor = |pass: &tracktwin_signal::recording::Pass| {
         Background::of(&pass.signal).map(|background| background.floor())

@@ -1,4 +1,4 @@
-//! Where one pass's odometer stands against another's, by the surface that both ran over.
+//! Offset between the odometers of two passes, from the surface common to both.
 
 use crate::along::{
     Background, Ruler, bonferroni, by_speed, ln_normal_bound, median, on_even_places, speed_m_s,

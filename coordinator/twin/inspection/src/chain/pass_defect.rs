@@ -1,4 +1,4 @@
-//! Passes that say nothing about the track, and why.
+//! Unusable passes, and why.
 
 use super::contact::{Airborne, airborne};
 use super::offset::Offsets;
@@ -15,14 +15,15 @@ const STILL_S: f64 = 2e-3;
 const STILL_LN_P: f64 = -20.0;
 /// Share of samples at the limit above which a pass is saturated.
 const SATURATED: f64 = 0.02;
-/// Share of the time off the rail above which a pass says nothing of the track.
+/// Share of the time without contact above which a pass is unusable.
 const AIRBORNE: f64 = 0.5;
 /// Correlation of two passes at one speed below which they have no track in common.
 const UNLIKE: f64 = 0.3;
 /// Coherence of passes at two speeds below which they have no surface in common.
 const STRANGE: f64 = 0.1;
-/// Times the density of its noise floor above which a pass is heard, and up to what frequency times the
-/// sleeper spacing in m/s it must be, 80 Hz on V-Track: lower there is no track to hear, only a vehicle.
+/// Ratio to the noise floor above which a pass contains a signal, and frequency times sleeper
+/// spacing in m/s up to which it must (80 Hz on V-Track): below, the signal is of the vehicle, not
+/// of the track.
 const AUDIBLE: f64 = 4.0;
 const AUDIBLE_M_S: f64 = 10.0;
 /// Sleeper spacings that a pass must cover to be compared with itself elsewhere.
@@ -149,7 +150,7 @@ pub fn pass_defects(recording: &Recording, offsets: &[Offsets]) -> Vec<PassDefec
     all
 }
 
-/// What each pass suffers from by itself.
+/// Defects of single passes.
 pub(super) fn of_passes(recording: &Recording) -> Vec<PassDefect> {
     let passes = recording.passes.iter().enumerate();
     let flying = airborne(recording);
@@ -218,8 +219,8 @@ fn of_pass(
     all
 }
 
-/// Whether nothing stands out of the noise floor. Of a pass that another repeats, that other tells
-/// better.
+/// Whether no signal exceeds the noise floor. For repeated passes the comparison between them is
+/// the better test.
 fn is_noise(pass: &Pass, audible_hz: f64) -> bool {
     let background = Background::of(&pass.signal);
     background.is_some_and(|background| background.audible_hz(AUDIBLE) < audible_hz)

@@ -1,4 +1,4 @@
-//! Passes that share no surface with those at other speeds.
+//! Coherence of the passes at one speed with those at others.
 
 use crate::along::{Background, Ruler, by_speed, hann, on_even_places, speed_m_s, whitened};
 use rustfft::FftPlanner;
@@ -18,18 +18,18 @@ const SEGMENTS_MIN: usize = 8;
 /// Lines of the waves compared in every segment of a pass.
 type Segments = Vec<Vec<Complex64>>;
 
-/// What the passes at one speed have in common with those at others.
+/// Coherence of the passes at one speed with those at others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SpeedCoherence {
     /// Nominal speed in km/h.
     pub(super) speed_km_h: f64,
-    /// Greatest coherence of one of its passes with one at another speed: zero as by chance, one
-    /// where the same surface is all that both hear.
+    /// Greatest coherence of one of its passes with one at another speed: zero by chance, one if
+    /// both contain the same surface only.
     pub(super) coherence: f64,
 }
 
-/// The company of every speed; none where there is one speed only, or where all passes together
-/// cover too little.
+/// The coherence of every speed; none if there is one speed only, or if the common stretch is too
+/// short.
 pub(super) fn speed_coherences(recording: &Recording) -> Vec<SpeedCoherence> {
     let speeds = by_speed(&recording.passes);
     if speeds.len() < 2 {

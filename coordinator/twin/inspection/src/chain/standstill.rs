@@ -1,6 +1,6 @@
-//! The longest stretch of a pass without a change.
+//! The longest constant stretch of a pass.
 
-/// Neighbouring samples that are all alike.
+/// Neighbouring equal samples.
 pub(super) struct Standstill {
     /// The first of them.
     pub(super) from: usize,

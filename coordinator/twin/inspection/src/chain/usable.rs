@@ -1,12 +1,12 @@
-//! The passes of a recording from which something can be said of the track.
+//! The usable passes of a recording.
 
 use super::offset::offsets;
 use super::pass_defect::{PassDefect, between_passes, of_passes};
 use crate::along::by_speed;
 use tracktwin_signal::recording::Recording;
 
-/// A recording without the passes that tell nothing of the track, and what is wrong with those. A
-/// short pass tells what it covers.
+/// A recording without its unusable passes, and their defects. A short pass is usable over its
+/// length.
 pub fn usable(recording: &Recording) -> (Recording, Vec<PassDefect>) {
     let mut own = of_passes(recording);
     own.retain(|defect| !matches!(defect, PassDefect::Short { .. }));

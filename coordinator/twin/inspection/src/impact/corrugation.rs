@@ -11,12 +11,12 @@ use tracktwin_track::model::Roughness;
 
 /// Wavelengths looked for, in sleeper spacings: 2 mm to 62 mm of 125 mm.
 const WAVELENGTHS: [f64; 2] = [0.016, 0.5];
-/// Lengths of the stretches looked at, in sleeper spacings.
+/// Lengths of the stretches examined, in sleeper spacings.
 const STRETCHES: [f64; 3] = [4.0, 8.0, 16.0];
 /// Lowest and highest frequency in Hz and as a share of the sample rate.
 const LOW_HZ: f64 = 60.0;
 const HIGH_SHARE: f64 = 0.4;
-/// Power over the noise floor below which a wave can't be told from the sensor's noise.
+/// Power over the noise floor below which a wave cannot be distinguished from sensor noise.
 const AUDIBLE: f64 = 3.0;
 /// Magnitude at which a whitened signal is held: an impact has lines too, if it repeats.
 const HOLD: f64 = 2.5;
@@ -169,7 +169,7 @@ impl Search<'_> {
             || self.orders_m.is_some_and(|circumference| near(circumference, f64::INFINITY))
     }
 
-    /// The least likely line of a stretch, and how many bins were looked at.
+    /// The least likely line of a stretch, and the number of bins examined.
     fn best_line(&self, stretch_m: [f64; 2], ruler: Ruler) -> (Option<Candidate>, usize) {
         let cell = 1.0 / (stretch_m[1] - stretch_m[0]);
         let speeds: Vec<Vec<Spectrum>> = by_speed(&self.recording.passes)

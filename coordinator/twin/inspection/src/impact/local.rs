@@ -7,7 +7,7 @@ use tracktwin_signal::recording::Recording;
 
 /// Probability of one speed's power without an impact above which it doesn't repeat there.
 const EACH_SPEED: f64 = 0.01;
-/// Cells that are looked at beside a cell: odometers wander by millimetres from speed to speed.
+/// Neighbouring cells that are examined: odometers differ by millimetres between speeds.
 const NEIGHBOURS: usize = 1;
 /// Share of the loudest impact's power below which another is its echo: the ringing of the track and
 /// of the band's edges, spans away.
@@ -24,7 +24,7 @@ pub struct Impact {
     pub ln_p: f64,
     /// Power over what is normal around it, mean of all speeds.
     pub power_ratio: f64,
-    /// What it looks like as a wave of the surface; none where too little of it can be heard.
+    /// Its shape as a wave of the surface; none if its signal is too weak.
     pub shape: Option<Shape>,
 }
 

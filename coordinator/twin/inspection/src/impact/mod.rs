@@ -1,4 +1,4 @@
-//! Short defects and waves of the rail's surface, told from the passes alone.
+//! Short defects and waves of the rail's surface, detected from the passes alone.
 //!
 //! Owns impacts that repeat at a place (`squat`, the dip of a `rail_joint`) and `corrugation`.
 //! What repeats with the wheel is `wheel`'s.

@@ -27,7 +27,7 @@ const NEAR_SPACINGS: f64 = 1.5;
 /// Quartile of the logarithm of a gamma variable over its standard deviation, for a normal one.
 const QUARTILES: f64 = 1.349;
 
-/// What is listened to.
+/// Kind of impact that is searched for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ImpactKind {
     /// The same frequencies at all speeds: kinks, edges, everything that rings.
@@ -106,7 +106,7 @@ pub(crate) fn cells(recording: &Recording, kind: ImpactKind, each: bool) -> Vec<
     groups.into_iter().filter_map(|group| grid.cells(passes, group)).collect()
 }
 
-/// The width of a cell in m, wide enough for the fastest pass; none if nothing can be heard.
+/// The width of a cell in m, wide enough for the fastest pass; none if there is no signal.
 fn width(recording: &Recording, kind: ImpactKind) -> Option<f64> {
     let mut width = CELL_SHARE * recording.spacing_m;
     for pass in &recording.passes {

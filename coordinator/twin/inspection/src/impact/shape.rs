@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 use tracktwin_signal::recording::Pass;
 use tracktwin_track::model::Roughness;
 
-/// Time in s before and after the first blow that is looked at: what follows is the track's ringing.
+/// Time in s before and after the first blow that is examined: later the track rings.
 const BEFORE_S: f64 = 0.005;
 const AFTER_S: f64 = 0.015;
 /// Lowest frequency in Hz of the shape.
@@ -199,7 +199,7 @@ fn spread(grid: &[Fitted], least: f64, quantity: impl Fn(&Fitted) -> f64) -> (f6
     let sum: f64 = grid.iter().map(weight).sum();
     let mean = grid.iter().map(|fitted| weight(fitted) * quantity(fitted)).sum::<f64>() / sum;
     let square = |fitted: &Fitted| weight(fitted) * (quantity(fitted) - mean).powi(2);
-    // The grid's own step is the least that can be told.
+    // The step of the grid is the resolution.
     let variance = grid.iter().map(square).sum::<f64>() / sum;
     (mean, variance.sqrt().max(0.02 * mean))
 }

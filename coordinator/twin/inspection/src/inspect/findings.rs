@@ -194,7 +194,7 @@ pub(super) fn comb_finding(comb: &Comb) -> Finding {
     }
 }
 
-/// Who hears an impact.
+/// Passes in which an impact is found.
 fn who(passes: &[Pass]) -> &'static str {
     match (passes.len(), by_speed(passes).len()) {
         (1, _) => "the only pass",

@@ -1,4 +1,4 @@
-//! What the passes tell before any model of the track: chain, wheel, impacts, in one sweep.
+//! Inspection of a recording without a track model: measuring chain, wheel, impacts.
 //!
 //! Owns the order of the tests, how the false-alarm rate is shared among them, and the sentences.
 
@@ -21,11 +21,11 @@ pub const FALSE_ALARMS: f64 = 0.02;
 /// Share of it that each of the nine kinds of test has.
 const EACH_TEST: f64 = FALSE_ALARMS / 9.0;
 
-/// Sleeper spacings around a place where the wheel's flat meets the rail in every pass: what is
-/// heard there is the flat and its ringing.
+/// Sleeper spacings around a place where the wheel's flat meets the rail in every pass: the signal
+/// there is that of the flat.
 const AROUND_BLOW: f64 = 0.4;
 
-/// What the passes tell by themselves.
+/// Result of an inspection.
 #[derive(Clone, Debug)]
 pub struct Inspection {
     /// What was found: chain first, then wheel, then the rail's surface.
@@ -62,8 +62,8 @@ impl Inspection {
         self.flat = None;
     }
 
-    /// What keeps everybody from saying anything of the track: a pass without a signal, or passes
-    /// that nowhere repeat each other or those at other speeds, unless their odometers are to blame.
+    /// The defect that makes the recording unusable: a pass without a signal, or passes that are
+    /// unrelated to each other or to those at other speeds, unless the odometers explain it.
     pub fn refusal(&self) -> Option<&PassDefect> {
         let silent = |defect: &&PassDefect| {
             matches!(defect, PassDefect::Dead { .. } | PassDefect::Noise { .. })
@@ -84,7 +84,7 @@ impl Inspection {
     }
 }
 
-/// Tests a recording for everything that its passes show without a model of the track.
+/// Runs all tests of a recording that need no track model.
 ///
 /// On a recording without defects a finding comes up at most with probability [`FALSE_ALARMS`].
 pub fn inspect(recording: &Recording) -> Inspection {

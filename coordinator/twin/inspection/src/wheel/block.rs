@@ -7,7 +7,7 @@ use tracktwin_signal::recording::Pass;
 
 /// Bins to a resolution cell.
 pub(super) const PADDING: usize = 8;
-/// Combs whose teeth stand between those of the wheel: what chance explains.
+/// Combs with teeth between those of the wheel: explained variance by chance.
 pub(super) const SHIFTS: usize = 15;
 
 /// One block of a pass.
@@ -85,7 +85,7 @@ impl Block {
     }
 }
 
-/// Shifts of combs that stand between the teeth, as parts of the fundamental.
+/// Shifts of the combs between the teeth, as parts of the fundamental.
 pub(super) fn shifts() -> impl Iterator<Item = f64> {
     (0..SHIFTS).map(|index| 0.2 + 0.6 * index as f64 / (SHIFTS - 1) as f64)
 }

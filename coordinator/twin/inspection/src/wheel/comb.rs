@@ -31,7 +31,7 @@ pub struct Comb {
     pub blocks: Vec<CombBlock>,
     /// Probability of a comb this clear without one, in logarithm.
     pub ln_p: f64,
-    /// What a comb fitted on every other block says of those between.
+    /// Prediction of every other block by a comb fitted on the blocks between.
     pub held_out: HeldOut,
 }
 

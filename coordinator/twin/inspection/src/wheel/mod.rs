@@ -1,7 +1,7 @@
-//! What repeats with the turns of the wheel, told from the passes alone.
+//! Effects that repeat with the wheel's revolutions, detected from the passes alone.
 //!
 //! Owns the flat and the orders of an out-of-round wheel, its circumference where that isn't known,
-//! and how well a model of orders predicts what it hasn't heard. What repeats with the track is
+//! and how well a model of orders predicts withheld data. What repeats with the track is
 //! `impact`'s.
 
 mod block;

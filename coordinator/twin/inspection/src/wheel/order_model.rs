@@ -1,4 +1,4 @@
-//! How well a model of wheel orders predicts what it hasn't heard.
+//! Prediction of withheld data by a model of wheel orders.
 
 use super::block::{Block, CombBlock, PADDING, shifts};
 use crate::along::median;
@@ -57,7 +57,7 @@ pub(super) fn held_out(blocks: &[Block], fitted: &[CombBlock], band_hz: [f64; 2]
 }
 
 impl Block {
-    /// The most that a comb within the neighbours' reach explains.
+    /// Largest power explained by a comb within the neighbouring bins.
     fn near(&self, fundamental: f64, shift: f64, band_hz: [f64; 2]) -> f64 {
         let trials = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|part| fundamental * (1.0 + part * FOLLOW));
         trials.into_iter().map(|f| self.explained(f, shift, band_hz)).fold(0.0, f64::max)

@@ -1,8 +1,8 @@
 //! Orders of an out-of-round wheel: lines at whole numbers of waves to a turn.
 //!
-//! The rail's surface is the same in all passes and drops out of what two of them at one speed differ
-//! by; a wheel that begins each pass with another side down does not. One that always begins with the
-//! same is heard in the passes themselves.
+//! The rail's surface is the same in all passes and drops out of what two of them at one speed
+//! differ by; a wheel that begins each pass with another side down does not. One that always begins
+//! with the same side down appears in the passes themselves.
 
 use crate::along::{
     Line, Ruler, Spectrum, amplitude, bonferroni, by_speed, combine_dependent_p_values,
@@ -21,7 +21,7 @@ const TOLERANCE: f64 = 0.005;
 const ORDER_MAX: usize = 40;
 /// Turns that a pass must have for orders to lie apart from what is between them.
 const TURNS_MIN: f64 = 5.0;
-/// Lowest frequency in Hz of an order that is heard at every speed.
+/// Lowest frequency in Hz of an order at every speed.
 const LOW_HZ: f64 = 15.0;
 /// Highest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
@@ -34,14 +34,14 @@ const SPEEDS_APART_MIN: usize = 2;
 const UNEVEN: f64 = 10.0;
 /// Resolution cells around an order, or a harmonic of the sleepers' passing, that belong to it.
 const CELLS: f64 = 1.5;
-/// Harmonics of the sleepers' passing below which an order is not told from it. On a smooth rail even
-/// the first has a hundredth of what the roughness around it makes.
+/// Harmonics of the sleepers' passing below which an order cannot be distinguished from it. On a
+/// smooth rail even the first has a hundredth of what the roughness around it makes.
 const PASSING_MAX: f64 = 4.5;
 /// Resolution cells on either side in which an order's neighbours lie, four orders of a way of nine
 /// turns: only what is between the orders counts.
 const REACH: f64 = 36.0;
-/// Parts of the way that an order must be heard in, and how much of a steady line's power in each: the
-/// wheel is as uneven at the end as at the beginning.
+/// Number of parts of the stretch in which an order must appear, and the share of a steady line's
+/// power in each: the wheel is as uneven at the end as at the beginning.
 const PARTS: usize = 3;
 const PART_SHARE: f64 = 0.2;
 /// Orders that a line may leak into, and by how much louder it then is: Hann's side lobes five cells away
@@ -68,7 +68,7 @@ pub struct Order {
     powers: Vec<f64>,
 }
 
-/// Where an order is listened for.
+/// Spectra in which an order is searched for.
 #[derive(Clone, Copy)]
 enum SpectrumSource {
     Passes,
@@ -208,7 +208,7 @@ impl Search<'_> {
         order.round() >= 1.0 && (order - order.round()).abs() < CELLS * period_m / self.length()
     }
 
-    /// The order's least likely line, and how many bins were looked at.
+    /// The order's least likely line, and the number of bins examined.
     fn order(&self, speeds: &[AtSpeed], source: SpectrumSource, number: usize) -> (Order, usize) {
         let middle = number as f64 / self.circumference_m;
         let (amplitude_m, powers) = ((0.0, 0.0), Vec::new());

@@ -114,7 +114,7 @@ impl Coordinates {
         self.speeds * self.bins
     }
 
-    /// What is expected at mapped parameters; beyond their ranges it goes on in a straight line.
+    /// Expected value at mapped parameters, with linear extrapolation beyond their ranges.
     pub(super) fn expected(&self, unit: &[f64]) -> Expected {
         let inside: Vec<f64> = unit.iter().map(|value| value.clamp(-1.0, 1.0)).collect();
         let row = MatRef::from_row_major_slice(&inside, 1, inside.len());
@@ -128,7 +128,7 @@ impl Coordinates {
     }
 }
 
-/// The narrowest bands that half of the library's entries can tell the scatter of.
+/// The narrowest bands whose scatter half of the library's entries can determine.
 fn band_bins(set: &TrainingSet, speeds: usize) -> usize {
     let values = |band: usize| speeds * set.frequencies_hz.len().div_ceil(band);
     BAND_BINS

@@ -122,8 +122,8 @@ impl Domain {
         Ok(self.coordinates.apply(row).row(0).iter().copied().collect())
     }
 
-    /// Judges the mean coordinates of so many `windows` of a track, such that one of the library
-    /// is called outside with about that `probability`.
+    /// Tests the mean coordinates of `windows` windows of a track; a track of the library is
+    /// flagged as outside with about this `probability`.
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] when coordinates are not finite.

@@ -43,7 +43,8 @@ impl Null {
         Ok(Self { residuals, variances, discrepancy: coordinates.discrepancy })
     }
 
-    /// What chi-square of a mean of so many windows exceeds with that `probability`.
+    /// Quantile of chi-square of a mean over this number of windows, exceeded with this
+    /// `probability`.
     ///
     /// Means of left-over coordinates of cases drawn by chance, with a discrepancy drawn by chance
     /// too, give mean and variance of chi-square; a gamma distribution with both gives its tail.

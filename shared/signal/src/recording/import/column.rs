@@ -9,7 +9,7 @@ pub struct Column {
     pub values: Vec<f64>,
     /// What in it is no number.
     pub oddity: Option<Oddity>,
-    /// Its unit, where the file says it beside the name.
+    /// Its unit, if the file states it beside the name.
     pub unit: Option<String>,
 }
 

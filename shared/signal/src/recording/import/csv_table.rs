@@ -26,8 +26,8 @@ fn parse(text: &str) -> Result<Content, Fault> {
     reader.map_or_else(|| Err(Fault::Empty { rows: 0 }), Reader::finish)
 }
 
-/// What separates fields: blanks or tabs where numbers stand between them in the first line, else a
-/// semicolon or tab where it has one, else a comma, else a blank.
+/// The field separator: blanks or tabs if they separate numbers in the first line, else a semicolon
+/// or tab if it has one, else a comma, else a blank.
 fn separator(text: &str) -> u8 {
     let first = text.lines().find(|line| !line.trim().is_empty() && !is_remark(line));
     let line = first.unwrap_or_default();
@@ -74,7 +74,7 @@ fn each_row(
     Ok(())
 }
 
-/// Fields between any number of blanks; what stands in quotes is one field.
+/// Fields between any number of blanks; quoted text is one field.
 fn between_blanks(line: &str) -> Vec<&str> {
     let mut fields = Vec::new();
     let mut rest = line.trim();

@@ -1,4 +1,4 @@
-//! What a column of acceleration says against the unit and the direction that it is taken for.
+//! Doubts about the assumed unit and direction of an acceleration column.
 
 use super::column::Column;
 use super::unit::{AccelerationUnit, Unit};

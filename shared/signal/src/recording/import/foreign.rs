@@ -113,7 +113,7 @@ pub(super) fn fault(begin: &[u8], ending: &str, holds_zip: bool) -> Option<Fault
     let ends = |kind: &&Kind| kind.endings.contains(&ending);
     let by_content = KINDS.iter().find(begins).filter(|_| !holds_zip);
     let by_name = KINDS.iter().find(ends);
-    // A spreadsheet is an archive by its beginning; its name says more.
+    // A spreadsheet starts like an archive; its extension distinguishes it.
     let found = match (by_content, by_name) {
         (Some(content), Some(name)) if content.begins.contains(&&b"PK\x03\x04"[..]) => Some(name),
         (content, name) => content.or(name),

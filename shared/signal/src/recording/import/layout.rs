@@ -8,9 +8,9 @@ use tracktwin_parameters::quantity::{PLACE, SAMPLE_RATE, SPACING, SPEED, WHEEL_R
 /// What the columns of the files mean, as a TOML file or flags say it.
 ///
 /// The place of the wheel comes from `position`, else from the sum of `speed` (a column), else from
-/// `speed_km_h` at constant speed. The sample rate comes from `sample_rate_hz`, else from `time`. What
-/// is said twice must agree. Units that are not said here are what the file or the columns' names say,
-/// else m/s2, s, m and km/h.
+/// `speed_km_h` at constant speed. The sample rate comes from `sample_rate_hz`, else from `time`.
+/// Values given twice must agree. Units not given here come from the file or the column names, else
+/// they are m/s2, s, m and km/h.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Layout {

@@ -44,8 +44,8 @@ fn unreadable(path: &Path, error: &Error) -> RecordingError {
     RecordingError::new(path, "file", Fault::Unreadable { reason: error.to_string() })
 }
 
-/// The array in so many bytes, once its head is known to promise no more numbers than these can hold:
-/// what reads it takes the head at its word.
+/// The array in these bytes, after checking that its header states no more numbers than they hold,
+/// because the reader trusts the header.
 fn array<R: Read>(mut file: R, bytes: u64) -> Result<NpyFile<impl Read>, Error> {
     let bad = |what: &str| Error::new(ErrorKind::InvalidData, what.to_owned());
     // Magic, version, and the head's length in two bytes, from version 2 on in four.

@@ -23,8 +23,7 @@ pub struct Imported {
 /// One recording for each column of acceleration, with a pass for each file.
 ///
 /// # Errors
-/// The first thing that is wrong, with file, column and row; a layout that doesn't suffice says
-/// which entry is missing.
+/// The first error, with file, column and row; for an incomplete layout the missing entry.
 pub fn import(files: &[PathBuf], layout: &Layout) -> Result<Vec<Imported>, RecordingError> {
     let tables: Vec<Table> =
         files.iter().map(|file| Table::read(file)).collect::<Result<_, _>>()?;

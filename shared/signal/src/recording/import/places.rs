@@ -20,7 +20,7 @@ pub(super) struct Places {
     pub name: &'static str,
     /// Places in m at every sample, in the file's own direction.
     pub position_m: Vec<f64>,
-    /// Unit of the column that they come from, and whether somebody said it.
+    /// Unit of the column that they come from, and whether it was given.
     unit: (&'static str, bool),
     /// Speed of the speed column, where there is one beside the positions, in km/h.
     other_km_h: Option<f64>,
@@ -80,7 +80,7 @@ impl Places {
         Ok(Self { name: "position", position_m, unit, other_km_h: None })
     }
 
-    /// The speed is one that trains have, and that of everything else that was said.
+    /// Checks that the speed is possible and agrees with the other values given.
     ///
     /// # Errors
     /// [`Fault::Impossible`] or [`Fault::Contradiction`].

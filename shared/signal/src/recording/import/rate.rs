@@ -16,7 +16,7 @@ const PLAUSIBLE_HZ: [f64; 2] = [50.0, 1e7];
 /// Names of columns that hold times, in lower case.
 const TIMES: [&str; 8] = ["t", "time", "zeit", "t_s", "time_s", "t_ms", "time_ms", "timestamp"];
 
-/// Samples per second in Hz: as stated, else as the column of times says; these must agree.
+/// Sample rate in Hz: as stated, else from the time column; both must agree.
 pub(super) fn of(
     table: &Table,
     layout: &Layout,
@@ -104,7 +104,7 @@ fn other_unit(per_unit: f64) -> String {
     }
 }
 
-/// A column that looks like times and says another rate than the one stated.
+/// A column that looks like times with another rate than the stated one.
 fn doubt(table: &Table, stated: f64) -> Option<String> {
     let is_time = |column: &&Column| {
         TIMES.contains(&bare_name(&column.name).to_ascii_lowercase().as_str())

@@ -1,4 +1,4 @@
-//! Named columns of numbers, whatever kind of file they come from.
+//! Named columns of numbers, independent of the file format.
 
 use super::super::error::{Fault, RecordingError};
 use super::super::{limits, parquet_file};
@@ -104,7 +104,7 @@ fn check(column: &Column) -> Option<Fault> {
         .or_else(|| missing(&column.values))
 }
 
-/// A number that stands for none, if it lies far from all others.
+/// A code for a missing value: a number far from all others.
 fn missing(values: &[f64]) -> Option<Fault> {
     let is_sign = |value: &f64| MISSING.iter().any(|sign| (value.abs() / sign - 1.0).abs() < 1e-6);
     let row = values.iter().position(is_sign)?;

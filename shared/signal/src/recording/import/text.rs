@@ -2,7 +2,7 @@
 
 use super::super::error::Fault;
 
-/// Bytes that are looked at to tell UTF-16 without a mark.
+/// Number of bytes examined to detect UTF-16 without a byte-order mark.
 const LOOKED_AT: usize = 1000;
 
 /// UTF-8, UTF-16 of either order with or without a mark, else Latin-1.
@@ -32,7 +32,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<String, Fault> {
 /// Makes a unit of UTF-16 from two bytes.
 type Unit = fn([u8; 2]) -> u16;
 
-/// The text where the bytes are UTF-16: every other one is nought, or a mark says so.
+/// The text if the bytes are UTF-16: every second byte is zero, or there is a byte-order mark.
 fn utf_16(bytes: &[u8]) -> Option<String> {
     let looked_at = &bytes[..bytes.len().min(LOOKED_AT)];
     let noughts = |odd: usize| {

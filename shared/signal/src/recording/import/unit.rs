@@ -1,4 +1,4 @@
-//! Units of columns: what a user says, what a file says, and what they are in SI.
+//! Units of columns: given by the user or by the file, and their value in SI.
 
 use super::super::error::Fault;
 use super::column::Column;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 pub(super) trait Unit: Copy + PartialEq + Default + 'static {
     /// All of them with their spellings, in lower case and without blanks; the first one is shown.
     const ALL: &'static [(Self, &'static [&'static str])];
-    /// How a user says which unit it is.
+    /// The option that gives the unit.
     const REMEDY: &'static str;
 
     /// One of it in SI units.
@@ -145,12 +145,12 @@ impl Unit for SpeedUnit {
     }
 }
 
-/// The unit of a column: as told, else as the file or the column's name says, else the default.
+/// The unit of a column: as given, else from the file or the column name, else the default.
 ///
 /// What is worth saying of it goes into `notes`.
 ///
 /// # Errors
-/// [`Fault::UnknownUnit`] where the file says one that is not known and nothing is told.
+/// [`Fault::UnknownUnit`] if the file states an unknown one and none is given.
 pub(super) fn of_column<U: Unit>(
     column: &Column,
     told: Option<U>,
