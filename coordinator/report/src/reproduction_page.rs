@@ -39,7 +39,7 @@ pub fn reproduction_page(reproduction: &Reproduction) -> String {
 fn summary(reproduction: &Reproduction) -> String {
     let count = |verdict| reproduction.count(verdict);
     format!(
-        "Of {} statements of the paper, {} are reproduced, {} differ, and {} are undecided.",
+        "Of {} statements of the paper, {} are reproduced, {} differ, and {} cannot be decided.",
         reproduction.rows.len(),
         count(Verdict::Reproduced),
         count(Verdict::Differs),
