@@ -298,8 +298,8 @@ impl Problem<'_> {
         Ok((residual, self.observation.whiten_matrix(&jacobian)))
     }
 
-    /// Ballast and railpads that decide under which places of the wheel a candidate's force laws take
-    /// hold: no receptance tells what they change by that.
+    /// Ballast and railpads that decide under which places of the wheel a candidate's force laws
+    /// take hold: no receptance contains this change.
     fn under_load(&self) -> Vec<usize> {
         let unknowns = &self.forward.unknowns;
         // A gap that no load closes has nothing free.

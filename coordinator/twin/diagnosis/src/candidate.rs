@@ -78,7 +78,7 @@ impl Candidate {
     }
 }
 
-/// Every candidate for a section: each kind at each place it may have, as its screening says.
+/// Every candidate for a section: each kind at each possible place, according to its screening.
 pub fn candidates(section: &Section) -> Vec<Candidate> {
     Kind::all().flat_map(|kind| of_kind(kind, section)).collect()
 }

@@ -50,7 +50,7 @@ impl Observation {
         &self.log_power - predicted
     }
 
-    /// The whitened difference: of those held out, what the fitted ones do not tell.
+    /// The whitened difference; for held-out values, the part that the fitted ones do not predict.
     pub fn residual(&self, predicted: &DVector<f64>) -> DVector<f64> {
         self.whiten(&self.difference(predicted))
     }
