@@ -35,7 +35,7 @@ pub fn reproduction_page(reproduction: &Reproduction) -> String {
     page("Comparison with the paper's results", &summary(reproduction), &body)
 }
 
-/// What a reader in a hurry needs.
+/// Summary in one sentence.
 fn summary(reproduction: &Reproduction) -> String {
     let count = |verdict| reproduction.count(verdict);
     format!(

@@ -18,7 +18,7 @@ pub(crate) enum Target {
 }
 
 impl Target {
-    /// What `sqlite:PATH` (or `sqlite://PATH`) or `postgres://[USER[:PASSWORD]@]HOST/DATABASE` means.
+    /// Parses `sqlite:PATH` (or `sqlite://PATH`) or `postgres://[USER[:PASSWORD]@]HOST/DATABASE`.
     pub(crate) fn parse(url: &str) -> Result<Self, LibraryError> {
         if let Some(("postgres" | "postgresql", _)) = url.split_once("://") {
             let name = without_password(url);

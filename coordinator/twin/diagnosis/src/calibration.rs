@@ -44,14 +44,14 @@ pub enum CalibrationError {
     NotFinite,
 }
 
-/// What is to be fitted: a baseline with the candidates that are part of the model.
+/// Fit of a baseline with the candidates that are part of the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
     /// Predicts.
     pub forward: &'a Forward,
-    /// What was measured.
+    /// The observed log powers.
     pub observation: &'a Observation,
-    /// What joins the baseline.
+    /// Candidates in the model.
     pub candidates: &'a [Candidate],
 }
 

@@ -1,4 +1,4 @@
-//! What may be left out, where and how strong: the list that a recording is screened with.
+//! Candidates: kinds of physics with places and strengths for the screening.
 
 use crate::section::Section;
 use tracktwin_track::extension::{Class, ExtensionInstance, Family, Kind, KindParameter, Places};

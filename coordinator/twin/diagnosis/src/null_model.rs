@@ -1,4 +1,4 @@
-//! What recording and prediction differ by when nothing is left out.
+//! Null model: differences between recording and prediction when nothing is left out.
 //!
 //! Time simulations of the calibrated track over random surfaces give the offset of one pass's log
 //! powers from their expected value, and their covariance: over bands, and over speeds at equal

@@ -1,4 +1,4 @@
-//! What was measured, in bands: the wavelet power over every sleeper in every pass.
+//! Measured wavelet power in bands over every sleeper in every pass.
 
 use crate::bands::{Bands, gain};
 use rayon::prelude::*;
