@@ -52,7 +52,7 @@ fn shell(page: &str) -> String {
     shell
 }
 
-/// Commands of ours, each a program and what it is told.
+/// Our commands: programs with their arguments.
 fn commands(shell: &str) -> Vec<(&'static str, Vec<String>)> {
     let lines = shell.replace("\\\n", " ");
     let words = lines.lines().filter_map(shlex::split);

@@ -12,7 +12,7 @@ use test_needs::skipped;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// What somebody else wrote.
+/// Text of another program.
 const THEIRS: &str = "somebody's own words";
 
 fn refused(answer: &Answer, words: &[&str]) {

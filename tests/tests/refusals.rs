@@ -107,7 +107,7 @@ fn cases_that_would_begin_another_campaign_are_refused_with_the_way_to_go_on() {
         let answer = run(PROGRAM, &[command, &more].concat());
         assert_refused(
             &answer,
-            &["from case 0", "`--cases 65536` goes on", "sequence = \"rotated\""],
+            &["from case 0", "to continue it, use `--cases 65536`", "sequence = \"rotated\""],
         );
     }
     let ask =

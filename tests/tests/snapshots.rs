@@ -11,7 +11,7 @@ use test_needs::assert_snapshot;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
-/// What a command says of itself, whatever the environment holds.
+/// The help of a command, independent of the environment.
 fn help(program: &str, command: &[String]) -> String {
     let said = Command::new(program).args(command).arg("--help").env_clear().output().unwrap();
     assert!(said.status.success(), "{command:?}");

@@ -1,4 +1,4 @@
-//! Rules of the house that a compiler does not hold: which crate may use which, and how large things get.
+//! Rules that the compiler does not check: dependencies of crates, sizes of files, words.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -44,7 +44,7 @@ const BORDERS: &[(&str, &[&str])] = &[
     ("tracktwin-experiment", &["tracktwin-protocol", "tokio", "tonic"]),
 ];
 
-/// The twin knows no library, no network and nobody who examines it.
+/// The twin uses no library, no network and none of the crates that test it.
 const OUTSIDE_THE_TWIN: &[&str] = &[
     "tracktwin-library",
     "tracktwin-farm",

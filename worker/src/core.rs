@@ -1,4 +1,4 @@
-//! What one core of a worker does: a lease at a time, a group of cases at a time.
+//! Main loop of one core: a lease at a time, a group of cases at a time.
 
 use crate::counters::Counters;
 use crate::error::AgentError;
@@ -110,8 +110,8 @@ impl Core {
         Ok(())
     }
 
-    /// What simulates the lease's experiment. Preparing it takes as long as it takes, and holds up neither
-    /// heartbeats nor reports.
+    /// The simulator of the lease's experiment. Its preparation delays neither heartbeats nor
+    /// reports.
     async fn prepare(&self, lease: &CaseLease) -> Result<Arc<dyn Simulate>, AgentError> {
         if self.inline {
             return self.prepared.of(lease);

@@ -1,4 +1,4 @@
-//! What a worker counts, for Prometheus.
+//! Counters of a worker for Prometheus.
 
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;

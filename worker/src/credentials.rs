@@ -1,4 +1,4 @@
-//! What a worker shows its coordinator, and what it demands of it.
+//! Credentials of a worker, and checks of its coordinator.
 
 use std::net::IpAddr;
 use tonic::metadata::{Ascii, MetadataValue};

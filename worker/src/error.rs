@@ -38,7 +38,7 @@ pub enum AgentError {
     GaveUp {
         /// For how long, in s.
         silent_s: u64,
-        /// What the last try came to.
+        /// Result of the last attempt.
         reason: String,
     },
     /// The coordinator does not know the worker (any more).

@@ -1,4 +1,4 @@
-//! What a worker answers to those who watch over it: `/healthz` and `/metrics`.
+//! Endpoints of a worker for monitoring: `/healthz` and `/metrics`.
 
 use crate::bounded_listener::BoundedListener;
 use crate::counters::Counters;

@@ -40,7 +40,7 @@ pub enum FarmError {
     Port(#[from] std::io::Error),
 }
 
-/// What is to be simulated, and by how many.
+/// Cases to simulate and number of cores.
 #[derive(Clone, Debug)]
 pub struct Task<'a> {
     /// The campaign.
@@ -219,7 +219,7 @@ impl Outage {
     }
 }
 
-/// What hands out a campaign's cases.
+/// Dispatch of a campaign's cases.
 async fn dispatch(
     library: &Library,
     claim: &Claim,

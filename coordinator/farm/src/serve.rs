@@ -24,7 +24,7 @@ const FAREWELL: Duration = Duration::from_secs(5);
 /// Errors that end a service.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// What it should show or demand can't be used.
+    /// Its certificates or token are invalid.
     #[error(transparent)]
     Security(#[from] SecurityError),
     /// The port was lost.

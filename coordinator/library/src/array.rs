@@ -14,9 +14,9 @@ const INSERT: &str = "
 pub struct StoredArray {
     /// Hash of all that the numbers follow from.
     pub key: String,
-    /// What kind of series it is, as in `null-campaign`.
+    /// Kind of series, e.g. `null-campaign`.
     pub kind: String,
-    /// What the numbers are: shape and units, as JSON.
+    /// Shape and units of the numbers as JSON.
     pub meta_json: String,
     /// The numbers.
     pub numbers: Vec<f64>,

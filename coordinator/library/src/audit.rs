@@ -98,7 +98,7 @@ pub struct Audit {
     pub worker: String,
 }
 
-/// What came of an audit.
+/// Outcome of an audit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AuditFinding {
     /// Whether both agree within the tolerance of who compared.

@@ -15,9 +15,9 @@ const INSERT: &str = "
 pub struct CampaignRecord {
     /// Name and hash of the definition.
     pub id: String,
-    /// What people call it.
+    /// Its name.
     pub name: String,
-    /// What decides its cases and results, as canonical JSON.
+    /// Definition, which determines cases and results, as canonical JSON.
     pub definition_json: String,
     /// Hash of that.
     pub definition_hash: String,

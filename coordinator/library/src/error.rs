@@ -134,7 +134,7 @@ pub enum LibraryError {
         /// The seed.
         seed: u64,
     },
-    /// What is stored cannot be.
+    /// Stored data are invalid.
     #[error("the library is damaged: {what}")]
     Damaged {
         /// What was found.

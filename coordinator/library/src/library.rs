@@ -70,7 +70,7 @@ impl Library {
         self.opened.writer.runs()
     }
 
-    /// What it is called: its file, or its URL without user and password.
+    /// Its name: its file, or its URL without user and password.
     pub fn name(&self) -> String {
         self.opened.target.name()
     }

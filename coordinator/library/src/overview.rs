@@ -17,7 +17,7 @@ const ERRORS_MAX: u32 = 2000;
 pub struct CampaignOverview {
     /// Its id.
     pub id: String,
-    /// What people call it.
+    /// Its name.
     pub name: String,
     /// Whether its cases are leased.
     pub state: CampaignState,
@@ -39,8 +39,8 @@ pub struct CampaignOverview {
 /// Why cases were given up.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cause {
-    /// What the last attempt ended with; where several errors differ in their numbers only, such as
-    /// a place, with dots for these.
+    /// Error of the last attempt; errors that differ in numbers only are grouped, with dots for the
+    /// numbers.
     pub error: String,
     /// How many cases.
     pub cases: u32,

@@ -1,4 +1,4 @@
-//! What reports add up to: the tables `worker` (its counts) and `progress`.
+//! Sums over reports: the counts in the table `worker`, and the table `progress`.
 
 use crate::engine::{Connection, Text, sql};
 use crate::{LibraryError, Report, Verdict};
@@ -34,7 +34,7 @@ const ADD_TO_PROGRESS: Text = Text::Each {
             busy_s = progress.busy_s + excluded.busy_s",
 };
 
-/// What one report adds.
+/// Contribution of one report.
 pub(crate) struct Tally<'a> {
     report: &'a Report,
     finished: u32,

@@ -27,7 +27,7 @@ pub(crate) struct Throughput {
     pub(crate) mean_case_s: Option<f64>,
 }
 
-/// What was finished in an interval.
+/// Cases finished in an interval.
 #[derive(Clone, Copy, Debug)]
 struct Interval {
     from_unix_s: i64,

@@ -83,7 +83,7 @@ pub struct TrialRecord {
     pub seals: Vec<String>,
 }
 
-/// What is asked of a case.
+/// Tests of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Question {
     /// A diagnosis that knows the whole catalogue.
@@ -101,7 +101,7 @@ pub enum Question {
 pub struct TrialAnswer {
     /// Number of the case.
     pub number: u32,
-    /// What was asked.
+    /// The test.
     pub question: Question,
     /// The score, as JSON.
     pub score_json: String,

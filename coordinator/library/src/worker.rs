@@ -94,7 +94,7 @@ impl Library {
         self.write(Heartbeat { worker: worker.to_owned(), now_unix_ms }).await
     }
 
-    /// What is known of a worker, if it has ever registered.
+    /// Record of a worker, if it has ever registered.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.

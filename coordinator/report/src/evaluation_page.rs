@@ -74,7 +74,7 @@ fn banner(evaluation: &Evaluation) -> Markup {
     }
 }
 
-/// What a reader in a hurry needs, in one sentence.
+/// Summary in one sentence.
 fn summary(evaluation: &Evaluation, recording: &Recording) -> String {
     let speeds: Vec<String> =
         evaluation.provenance.speeds_km_h.iter().map(|speed| rounded(*speed, 4)).collect();

@@ -1,4 +1,4 @@
-//! What is in a recording, before any model is asked.
+//! Page of an inspection: content of a recording without a track model.
 
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, figure, page};
@@ -14,15 +14,15 @@ pub struct InspectedCurve {
     pub points: Vec<(f64, f64)>,
 }
 
-/// What was found in a recording by its passes alone.
+/// A finding of the passes alone.
 pub struct Inspected {
-    /// What it is called.
+    /// Its kind.
     pub physics: String,
     /// Where, in words.
     pub place: String,
     /// Probability to see as much without it.
     pub p_value: f64,
-    /// What was seen.
+    /// Evidence.
     pub evidence: String,
 }
 
@@ -38,11 +38,11 @@ pub struct InspectionReport {
     pub found: Vec<Inspected>,
     /// Where the wheel loses contact with the rail, in a sentence.
     pub loss_of_contact: Option<String>,
-    /// What makes passes unusable.
+    /// Defects of unusable passes.
     pub pass_defects: Vec<String>,
     /// Corrections made while reading, and doubts.
     pub doubts: Vec<String>,
-    /// What the recording can be used for, and for what not.
+    /// Possible uses of the recording, and limits.
     pub uses: Vec<String>,
     /// Power spectral density in dB by frequency in Hz, a curve a pass.
     pub spectra: Vec<InspectedCurve>,

@@ -69,7 +69,7 @@ fn banner(inversion: &Inversion) -> Markup {
     }
 }
 
-/// What a reader in a hurry needs, in one sentence.
+/// Summary in one sentence.
 fn summary(inversion: &Inversion, recording: &Recording) -> String {
     let speeds: Vec<String> =
         inversion.provenance.speeds_km_h.iter().map(|speed| rounded(*speed, 3)).collect();
@@ -139,7 +139,7 @@ fn chart(inversion: &Inversion, models: Option<&Evaluation>, parameter: Paramete
     chart.into_svg()
 }
 
-/// What all sleepers have in common.
+/// Parameters common to all sleepers.
 fn common(inversion: &Inversion) -> Markup {
     let Some(sleeper) = inversion.sleepers.get(inversion.sleepers.len() / 2) else {
         return Markup::default();

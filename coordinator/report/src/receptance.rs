@@ -6,7 +6,7 @@ use tracktwin_drawing::{Axis, Chart, stand_alone};
 /// Receptance between two places of the track.
 #[derive(Clone, Debug)]
 pub struct ReceptanceCurve {
-    /// What the legend calls it.
+    /// Name in the legend.
     pub name: String,
     /// Displacement a unit force in m/N, a value a frequency, in the convention `exp(+i w t)`.
     pub values: Vec<Complex64>,

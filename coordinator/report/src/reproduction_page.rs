@@ -35,11 +35,11 @@ pub fn reproduction_page(reproduction: &Reproduction) -> String {
     page("Comparison with the paper's results", &summary(reproduction), &body)
 }
 
-/// What a reader in a hurry needs.
+/// Summary in one sentence.
 fn summary(reproduction: &Reproduction) -> String {
     let count = |verdict| reproduction.count(verdict);
     format!(
-        "Of {} statements of the paper, {} are reproduced, {} differ, and {} are undecided.",
+        "Of {} statements of the paper, {} are reproduced, {} differ, and {} cannot be decided.",
         reproduction.rows.len(),
         count(Verdict::Reproduced),
         count(Verdict::Differs),

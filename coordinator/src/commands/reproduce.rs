@@ -227,7 +227,7 @@ fn write_and_print(reproduction: &Reproduction, out: &Path, force: Force) -> Res
     }
     let count = |verdict| reproduction.count(verdict);
     println_stdout(&format!(
-        "{} reproduced, {} differ, {} undecided; page: {}",
+        "{} reproduced, {} differ, {} cannot tell; page: {}",
         count(Verdict::Reproduced),
         count(Verdict::Differs),
         count(Verdict::CannotTell),

@@ -15,7 +15,7 @@ use tracktwin_library::Library;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 
-/// What a diagnosis is made with.
+/// Settings of a diagnosis.
 #[derive(Clone, Copy)]
 pub struct Setting<'a> {
     /// The track that recordings are compared with.
@@ -35,7 +35,7 @@ pub type Orders<'a> = dyn Fn(usize, usize) -> Vec<Vec<usize>> + Send + Sync + 'a
 /// A diagnosis and what it was concluded from.
 #[derive(Debug)]
 pub struct Diagnosed {
-    /// What is written down.
+    /// The diagnosis document.
     pub diagnosis: Diagnosis,
     /// The comparison; none where the passes spoke for themselves alone.
     pub compared: Option<Compared>,
@@ -44,9 +44,9 @@ pub struct Diagnosed {
 /// A recording's comparison with the model.
 #[derive(Debug)]
 pub struct Compared {
-    /// What was compared.
+    /// The prepared recording.
     pub prepared: PreparedRecording,
-    /// What the search found.
+    /// Result of the search.
     pub search: Search,
 }
 

@@ -65,7 +65,7 @@ impl Evaluator {
         &self.experiment.design
     }
 
-    /// What the library's cases were simulated with.
+    /// Experiment of the library's cases.
     pub const fn experiment(&self) -> &Experiment {
         &self.experiment
     }
@@ -75,7 +75,7 @@ impl Evaluator {
         &self.fixed
     }
 
-    /// What models and selector say of a recording.
+    /// Evaluation of a recording by models and selector.
     ///
     /// # Errors
     /// Those of [`tracktwin_evaluation::evaluate`].

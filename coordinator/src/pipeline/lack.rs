@@ -1,4 +1,4 @@
-//! What training will need of a campaign's cases, asked before the first of them is simulated.
+//! Requirements of training, checked before the simulation of a campaign.
 
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_surrogate::ENTRIES_MIN;

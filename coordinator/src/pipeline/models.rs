@@ -90,7 +90,7 @@ fn save(
     Ok(output.commit()?)
 }
 
-/// What people call a group: `13 km/h GF`, `7+10+13 km/h GF`.
+/// Readable name of a group: `13 km/h GF`, `7+10+13 km/h GF`.
 pub fn group_name(key: &GroupKey) -> String {
     let speeds: Vec<_> =
         key.speeds_km_h.iter().map(|speed| tracktwin_number::rounded(*speed, 4)).collect();

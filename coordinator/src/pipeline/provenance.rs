@@ -1,4 +1,4 @@
-//! What the library keeps of trainings, evaluations and diagnoses: the records made of them.
+//! Library records of trainings, evaluations and diagnoses.
 
 use tracktwin_diagnosis::Diagnosis;
 use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
@@ -9,7 +9,7 @@ use tracktwin_library::{
 };
 use tracktwin_surrogate::{ModelGroup, Trained};
 
-/// What a library keeps of surrogates trained on it.
+/// Library record of trained surrogates.
 #[expect(clippy::missing_panics_doc, reason = "a case's index is a u32, and so is their number")]
 pub fn training(trained: &Trained) -> TrainingRecord {
     TrainingRecord {
@@ -34,7 +34,7 @@ fn surrogates(group: &ModelGroup) -> impl Iterator<Item = SurrogateRecord> {
     })
 }
 
-/// What a library keeps of an evaluation by its surrogates.
+/// Library record of an evaluation by its surrogates.
 pub fn evaluation(evaluation: &Evaluation) -> EvaluationRecord {
     let provenance = &evaluation.provenance;
     EvaluationRecord {
@@ -59,7 +59,7 @@ fn sleeper(sleeper: &SleeperEvaluation) -> SleeperRecord {
     }
 }
 
-/// What a library keeps of a diagnosis, whose document is `document_json`.
+/// Library record of a diagnosis with the document `document_json`.
 #[expect(clippy::missing_panics_doc, reason = "estimates by their names are plain JSON")]
 pub fn diagnosis(diagnosis: &Diagnosis, document_json: String) -> DiagnosisRecord {
     let mismatches = diagnosis.mismatches.iter().map(|mismatch| MismatchRecord {

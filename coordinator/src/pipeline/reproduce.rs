@@ -99,7 +99,7 @@ fn test_errors(set: &TrainingSet, models: &Trained) -> Result<Compared, Reproduc
     Ok(tracktwin_reproduction::test_errors(models, &tested.unwrap_or_default())?)
 }
 
-/// What the models say of the examples' recordings.
+/// Evaluations of the examples' recordings.
 fn evaluated(
     evaluator: &Evaluator,
     recordings: Vec<(Example, Recording)>,

@@ -118,8 +118,8 @@ pub async fn set(
     })
 }
 
-/// What to train: the paper's feature vectors at every speed, and the global feature of all speeds
-/// together.
+/// Models to train: the paper's feature vectors at every speed, and the global feature of all
+/// speeds together.
 pub fn options(set: &TrainingSet) -> TrainOptions {
     let columns = |feature: FeatureSet| FeatureColumns {
         name: feature.name().to_owned(),
@@ -192,7 +192,7 @@ pub fn fixed(campaign: &CampaignRecord) -> Result<ParameterSet, TrainingError> {
         .map_err(|source| TrainingError::Definition { campaign: campaign.id.clone(), source })
 }
 
-/// What a campaign's cases are simulated with.
+/// Experiment of a campaign's cases.
 ///
 /// # Errors
 /// [`TrainingError::Experiment`].

@@ -1,4 +1,4 @@
-//! What is done with every case of a campaign: everything but its parameters that decides results.
+//! Experiment of a campaign: all settings except the parameters that determine results.
 
 use serde::{Deserialize, Serialize};
 use tracktwin_parameters::quantity::SPEED;

@@ -1,4 +1,4 @@
-//! What is done with every case, and what comes of it: the same for coordinator and worker.
+//! Experiment and outcome of a case, common to coordinator and worker.
 //!
 //! Owns the [`Experiment`] (all that decides results but a case's parameters), the [`Simulation`] of
 //! cases, their [`Outcome`], and [`MODEL_HASH`], by which two programs know that their physics agree.

@@ -1,8 +1,8 @@
-//! What becomes of a case.
+//! Outcome of a case.
 
 use tracktwin_signal::Features;
 
-/// What became of a case.
+/// Outcome of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// Features, one pass a speed, by ascending speed.

@@ -32,7 +32,7 @@ impl Host {
         made.then_some(host)
     }
 
-    /// Pulls the cable: nothing gets through, and nobody is told.
+    /// Pulls the cable: blocks all traffic without closing connections.
     fn unplug(&self) {
         assert!(succeeds(&format!("-n {0} link set {0}n down", self.name)));
     }

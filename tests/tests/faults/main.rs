@@ -1,5 +1,5 @@
-//! The farm as processes that are killed, stopped and cut off: whatever happens, the digest is that
-//! of an undisturbed run, no case is lost and none is stored twice.
+//! The farm as processes that are killed, stopped and cut off: in every case the digest is that of
+//! an undisturbed run, no case is lost and none is stored twice.
 //!
 //! The tests marked as ignored take minutes; `docs/farm-faults.md` tells how to run them and what
 //! they found.

@@ -35,7 +35,7 @@ impl Proxy {
         Self { port: own, cut }
     }
 
-    /// Nothing gets through any more, and nobody is told: as with a pulled cable.
+    /// Blocks all traffic without closing connections, as a pulled cable does.
     pub(crate) fn cut(&self) {
         self.cut.store(true, Ordering::Relaxed);
     }

@@ -1,4 +1,4 @@
-//! What a campaign has to do with another of the same name.
+//! Relation of a campaign to another of the same name.
 
 use super::Campaign;
 use serde_json::Value;
@@ -18,7 +18,7 @@ pub enum Kinship {
     },
     /// It is another campaign.
     Other {
-        /// What differs, for people: `simulation.time_step_s (1e-5, was 2e-5)`.
+        /// The differences as text: `simulation.time_step_s (1e-5, was 2e-5)`.
         differences: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What is to be simulated: a campaign's definition, and its cases.
+//! A campaign's definition and its cases.
 //!
 //! Owns the campaign file and the way from an index to a case. Pure but for `store`; running cases is the
 //! worker's.

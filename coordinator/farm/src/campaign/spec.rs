@@ -24,19 +24,19 @@ pub const DEFAULT: &str = include_str!("default.toml");
 /// campaign may be given more cases later and stays itself.
 #[derive(Clone, Debug, Serialize)]
 pub struct Campaign {
-    /// What people call it.
+    /// Its name.
     pub name: String,
     /// How many cases it has.
     pub cases: u32,
     /// Whether the sequence of its points follows from that number, for the file names none.
     #[serde(skip)]
     pub sequence_by_cases: bool,
-    /// What decides the results.
+    /// Settings that determine the results.
     #[serde(flatten)]
     pub definition: Definition,
 }
 
-/// What makes a campaign itself: equal definitions have equal cases and equal results.
+/// Definition of a campaign: equal definitions have equal cases and equal results.
 #[derive(Clone, Debug, Serialize)]
 pub struct Definition {
     /// Seed of the sample points and of every case's surface.
@@ -242,7 +242,7 @@ impl Campaign {
         blake3::hash(self.definition_json().as_bytes()).to_hex().to_string()
     }
 
-    /// What decides the results, as canonical JSON.
+    /// The definition as canonical JSON.
     pub fn definition_json(&self) -> String {
         serde_json::to_string(&self.definition).expect("numbers and names become JSON")
     }

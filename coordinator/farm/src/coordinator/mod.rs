@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 use tracktwin_library::{Claim, Library, LibraryError};
 use watch::watch;
 
-/// What a coordinator is started with.
+/// Configuration of a coordinator.
 pub struct Coordinator {
     /// The library it serves.
     pub library: Library,
@@ -22,7 +22,7 @@ pub struct Coordinator {
     pub listener: TcpListener,
     /// The port for people, if any.
     pub dashboard: Option<TcpListener>,
-    /// What it demands of those who call it.
+    /// Certificates and token.
     pub security: Security,
     /// How it hands out cases.
     pub settings: Settings,

@@ -90,7 +90,7 @@ impl Logged {
     }
 }
 
-/// What is cases left to simulate.
+/// Remaining work.
 #[derive(Default)]
 struct Remaining {
     /// In campaigns that run.

@@ -1,4 +1,4 @@
-//! What people and Prometheus see of a farm: pages and metrics over HTTP.
+//! Pages and Prometheus metrics of a farm over HTTP.
 //!
 //! Owns routes, the token of those who may press buttons, the way from the library to what is shown,
 //! and how it looks.

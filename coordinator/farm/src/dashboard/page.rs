@@ -15,7 +15,7 @@ const PLANES: [[Parameter; 2]; 2] = [
     [Parameter::RailpadDamping, Parameter::BallastDamping],
 ];
 
-/// What the page adds to every page's style.
+/// Style of this page.
 const STYLE: &str = "
 .progress{display:flex;height:1rem;background:var(--faint);max-width:60rem;margin:.4rem 0}.progress i{display:block}
 .progress .finished{background:var(--c)}.progress .leased{background:var(--f)}.progress .failed{background:var(--b)}
@@ -52,7 +52,7 @@ pub(super) fn farm_view(farm: &Farm) -> Markup {
     }
 }
 
-/// What a reader in a hurry needs, in one sentence.
+/// Summary in one sentence.
 fn summary(farm: &Farm) -> String {
     let at_work: Vec<_> = farm.campaigns.iter().filter(|it| it.is_at_work()).collect();
     let rate: f64 = at_work.iter().map(|campaign| campaign.per_second).sum();

@@ -26,7 +26,7 @@ const COOKIE: &str = "tracktwin";
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
                       connect-src 'self'; form-action 'self'; frame-ancestors 'none'";
 
-/// What the pages are made of.
+/// State of the routes.
 #[derive(Clone)]
 pub struct Dashboard(Arc<Inner>);
 
@@ -34,7 +34,7 @@ struct Inner {
     library: Library,
     counts: Counts,
     guard: Guard,
-    /// What the cookie must hold: a hash of the token, so that the token itself is not kept.
+    /// Value of the cookie: a hash of the token, so that the token itself is not stored.
     key: Option<String>,
     /// Whether every caller may use the controls.
     open: bool,

@@ -5,7 +5,7 @@ use tracktwin_parameters::ParameterSet;
 /// Everything that is shown of a farm, at one moment.
 #[derive(Clone, Debug, Default)]
 pub struct Farm {
-    /// What the library is called.
+    /// Name of the library.
     pub library: String,
     /// When, for people.
     pub at: String,
@@ -108,7 +108,7 @@ impl FarmCampaign {
         (self.is_at_work() && self.per_second > 0.0).then(|| left / self.per_second)
     }
 
-    /// What there is to say of the rest, for people.
+    /// Text on the remaining time.
     pub fn left(&self) -> String {
         match self.eta_s() {
             Some(eta_s) => format!("{} left", duration(eta_s)),

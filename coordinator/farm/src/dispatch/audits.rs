@@ -119,7 +119,7 @@ impl Audits {
         self.under_way.lock().insert(key, (worker, audit));
     }
 
-    /// What a worker was asked to audit; another's audit stays.
+    /// Removes and returns the audit leased to this worker; another's is kept.
     fn take(&self, worker: &str, campaign: &str, index: u32) -> Option<Audit> {
         let mut under_way = self.under_way.lock();
         match under_way.entry((campaign.to_owned(), index)) {
@@ -204,7 +204,7 @@ impl Audits {
         Ok(Some(AuditOutcome::Wrong { worker: wrong.to_owned(), reason }))
     }
 
-    /// What this machine makes of a case, if it can simulate it.
+    /// This machine's own result of a case, if it can simulate it.
     async fn judge(&self, served: Arc<Served>, case: Case) -> Option<Outcome> {
         let prepare = self.prepare;
         let simulate = move || {
@@ -215,7 +215,7 @@ impl Audits {
     }
 }
 
-/// What came of an audit.
+/// Outcome of an audit.
 pub(crate) enum AuditOutcome {
     /// Both agree, or it is known already.
     Agreement,
@@ -225,7 +225,7 @@ pub(crate) enum AuditOutcome {
     Wrong {
         /// Which.
         worker: String,
-        /// What speaks against it.
+        /// Reason of the quarantine.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What a coordinator counts, for Prometheus.
+//! Counters of a coordinator for Prometheus.
 
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::histogram::{Histogram, exponential_buckets};

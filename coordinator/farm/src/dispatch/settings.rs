@@ -53,12 +53,12 @@ pub struct Settings {
     pub audit_share: f64,
     /// Whether a worker is suspended if its cases fail and those of others do not.
     pub suspends_failing: bool,
-    /// What decides between two workers that differ.
+    /// Prepares the simulation that decides between two workers that differ.
     pub prepare: Prepare,
     /// The clock that leases go by; the library's if none.
     pub clock: Option<Clock>,
-    /// What the worker holds that runs in this very process, if there is one: its leases don't end
-    /// here while it holds them, however busy the machine is.
+    /// Cases held by the worker of this process, if there is one: their leases do not expire while
+    /// it holds them, even on a busy machine.
     pub own: Option<Holdings>,
 }
 

@@ -18,7 +18,7 @@ const AUTHORITY_DAYS: i64 = 3650;
 /// Clocks of a cluster may differ by this.
 const CLOCKS: Duration = Duration::hours(1);
 
-/// What the authority calls itself.
+/// Name of the authority.
 const AUTHORITY: &str = "tracktwin farm";
 
 /// Bytes of chance in a token.
@@ -44,7 +44,7 @@ pub enum CertificatesError {
              10.0.0.1"
     )]
     Host {
-        /// What was given.
+        /// The given name.
         host: String,
     },
     /// A name that is not allowed in certificates, or an invalid key.

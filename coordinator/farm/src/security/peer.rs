@@ -39,7 +39,7 @@ impl Caller {
 pub struct Peer {
     stream: Stream,
     caller: Caller,
-    /// What was read of it already.
+    /// Bytes already read from it.
     begin: &'static [u8],
     /// Runs until a call was admitted.
     deadline: Option<Pin<Box<Sleep>>>,

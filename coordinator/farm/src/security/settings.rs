@@ -1,4 +1,4 @@
-//! What a coordinator demands of those who call it.
+//! Certificates and token of a coordinator.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use tokio_rustls::rustls::{self, RootCertStore, ServerConfig};
 /// The protocol inside TLS.
 pub(crate) const HTTP2: &[u8] = b"h2";
 
-/// What a coordinator shows and demands; nothing on one machine.
+/// Certificates and token of a coordinator; empty on one machine.
 #[derive(Clone, Debug, Default)]
 pub struct Security {
     /// Its certificate, with what leads to the authority, and its key (PEM).
@@ -51,7 +51,7 @@ pub enum SecurityError {
     /// A PEM file that holds something else.
     #[error("{what}: not a valid PEM file: {source}")]
     Pem {
-        /// What it should be.
+        /// Expected content.
         what: &'static str,
         /// What is wrong.
         source: pem::Error,
@@ -82,7 +82,7 @@ impl Security {
         Ok(())
     }
 
-    /// What makes TLS of a connection; none for plain text.
+    /// TLS acceptor; `None` for plain text.
     ///
     /// # Errors
     /// [`SecurityError`] when certificates can't be used.

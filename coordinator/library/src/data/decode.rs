@@ -1,4 +1,4 @@
-//! What a database answers, as cells.
+//! Rows of a database as cells.
 
 use super::{Cell, Column, ColumnKind, Table};
 use crate::LibraryError;

@@ -12,9 +12,9 @@ use sqlx::{
 use std::path::Path;
 use tokio_stream::StreamExt;
 
-/// What takes the rows of an answer, one after the other.
+/// Receiver of the rows of a query.
 pub trait Answer {
-    /// What may go wrong with it.
+    /// Its error.
     type Error: From<LibraryError>;
 
     /// The columns; comes first, and also where there are no rows.

@@ -68,7 +68,7 @@ fn bare(text: &str, dialect: Dialect) -> String {
     bare
 }
 
-/// What follows the remark that a text begins with; PostgreSQL's may hold others.
+/// The text after its leading comment; comments of PostgreSQL can be nested.
 fn after_remark(text: &str, dialect: Dialect) -> &str {
     let mut rest = &text[2..];
     let mut depth = 1;

@@ -11,7 +11,7 @@ const TOGETHER: i64 = 1024;
 /// The largest index searched when the number of cases is unknown.
 const INDICES_MAX: i64 = 1 << 20;
 
-/// What could not be read of a table.
+/// Unreadable rows of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lost {
     /// How many rows at most, if that is known; of cases, each counts as one.

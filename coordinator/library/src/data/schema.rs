@@ -1,10 +1,10 @@
-//! What tables there are, and their columns; the same in both databases.
+//! Tables and columns of the schema; the same in both databases.
 
 use crate::result::LEVEL_COLUMNS;
 use ColumnKind::{Doubles, Integer, Real, Text};
 use tracktwin_parameters::Parameter;
 
-/// What a column holds.
+/// Type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColumnKind {
     /// Text.
@@ -22,7 +22,7 @@ pub enum ColumnKind {
 pub struct Column {
     /// Its name, with its unit.
     pub name: &'static str,
-    /// What it holds.
+    /// Its type.
     pub kind: ColumnKind,
 }
 
@@ -110,7 +110,7 @@ const ESTIMATES: [Column; 2 * Parameter::COUNT] = {
     columns
 };
 
-/// What follows the name of a parameter in that of its standard deviation.
+/// Suffix of a parameter's standard deviation.
 const DEVIATION: &[u8] = b"_sd";
 
 /// The name of a parameter's standard deviation.

@@ -1,5 +1,5 @@
-//! What statements that are made of a table's columns spell differently for each database. All others are written
-//! down whole: see [`super::Text`].
+//! Differences of the SQL dialects for statements generated from columns. All other statements are
+//! written in full: see [`super::Text`].
 
 use std::fmt::Write as _;
 

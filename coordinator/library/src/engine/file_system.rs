@@ -25,7 +25,7 @@ const SHARED: [(u32, &str); 15] = [
     (0x6573_5546, "FUSE"),
 ];
 
-/// What the file system at a path is called, if it is one that several hosts may share.
+/// Name of the file system at a path, if several machines may share it.
 pub(crate) fn shared_between_hosts(path: &Path) -> Option<&'static str> {
     // A file that is still to be made lies where its folder does.
     let place = path.ancestors().find(|it| it.exists()).filter(|it| !it.as_os_str().is_empty());

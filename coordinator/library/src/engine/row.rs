@@ -13,7 +13,7 @@ pub(crate) enum Row {
     Postgres(PgRow),
 }
 
-/// What a column may be read as: `String`, `i64`, `f64`, or one of these that may be missing.
+/// Type of a column's value: `String`, `i64`, `f64`, or an `Option` of these.
 pub(crate) trait Column:
     for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres>
 {

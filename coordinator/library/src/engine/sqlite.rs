@@ -172,7 +172,7 @@ fn warn_of_the_place(path: &Path) {
     }
 }
 
-/// What every file of `SQLite` begins with, and the least bytes that one has.
+/// Header of every `SQLite` file, and its minimum size.
 const HEAD: &[u8] = b"SQLite format 3\0";
 const BYTES_MIN: usize = 512;
 

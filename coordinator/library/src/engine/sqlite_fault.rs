@@ -1,4 +1,4 @@
-//! What `SQLite`'s codes say of the disk and the locks beneath it.
+//! Faults of disk and locks in `SQLite`'s error codes.
 
 use crate::LibraryError;
 use sqlx::sqlite::SqliteError;
@@ -9,8 +9,8 @@ pub(crate) const SQLITE_FULL: [&str; 2] = ["13", "4874"];
 /// Another process wrote for longer than anybody waits, or recovered what a third had left.
 const SQLITE_BUSY: [&str; 3] = ["5", "261", "773"];
 
-/// What `SQLite` calls the codes of locks that the file system does not have: for a lock, for the memory
-/// that processes share, and for the protocol that both keep.
+/// Names of `SQLite`'s codes for missing locks of the file system: locks, shared memory, and the
+/// locking protocol.
 const SQLITE_NO_LOCKS: [(&str, &str); 8] = [
     ("3850", "SQLITE_IOERR_LOCK"),
     ("2058", "SQLITE_IOERR_UNLOCK"),
@@ -28,7 +28,7 @@ const SQLITE_IOERR: i32 = 10;
 /// `SQLite`'s primary code for a file that can't be opened: the library's, its log's, or a temporary one.
 const SQLITE_CANTOPEN: i32 = 14;
 
-/// What failed beneath `SQLite`, if that is what a code means.
+/// Fault of disk or locks that a code reports, if any.
 pub(crate) fn sqlite_fault(error: &sqlx::Error) -> Option<LibraryError> {
     let fault = error.as_database_error()?;
     fault.try_downcast_ref::<SqliteError>()?;

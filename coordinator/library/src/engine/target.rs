@@ -1,4 +1,4 @@
-//! Which database a library URL means.
+//! The database of a library URL.
 
 use crate::LibraryError;
 use sqlx::postgres::PgConnectOptions;
@@ -18,7 +18,7 @@ pub(crate) enum Target {
 }
 
 impl Target {
-    /// What `sqlite:PATH` (or `sqlite://PATH`) or `postgres://[USER[:PASSWORD]@]HOST/DATABASE` means.
+    /// Parses `sqlite:PATH` (or `sqlite://PATH`) or `postgres://[USER[:PASSWORD]@]HOST/DATABASE`.
     pub(crate) fn parse(url: &str) -> Result<Self, LibraryError> {
         if let Some(("postgres" | "postgresql", _)) = url.split_once("://") {
             let name = without_password(url);
@@ -38,7 +38,7 @@ impl Target {
         }
     }
 
-    /// What people may be told: a path, or a URL without password.
+    /// Printable name: a path, or a URL without password.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Sqlite(path) => path.display().to_string(),
@@ -55,8 +55,8 @@ impl Target {
     }
 }
 
-/// A library's URL as anybody may see it, in a message, on a page or as an argument of a command: without
-/// password, and without settings, which may hold one.
+/// A library's URL for messages, pages and command lines: without password, and without settings,
+/// which may contain one.
 pub fn without_password(url: &str) -> String {
     let Some((scheme, rest)) =
         url.split_once("://").filter(|(scheme, _)| scheme.contains("postgres"))

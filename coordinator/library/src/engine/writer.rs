@@ -34,7 +34,7 @@ const SERVER_SHARDS: usize = 2;
 
 /// A change to the library, made inside a transaction that others share.
 pub(crate) trait Write: Send + Sync + 'static {
-    /// What it answers once it is committed.
+    /// Result of the committed write.
     type Answer: Send + 'static;
 
     /// Worker whose rows this write changes. Writes of one worker are serialized; writes without a
@@ -61,7 +61,7 @@ struct Task {
     requests: mpsc::Sender<Box<dyn WriteRequest>>,
     closing: Arc<Notify>,
     handle: Mutex<Option<JoinHandle<()>>>,
-    /// What broke the connection of a file, if that is why the task has ended.
+    /// Error that broke the connection of a file, if it ended the task.
     lost: Arc<OnceLock<String>>,
 }
 

@@ -1,4 +1,4 @@
-//! What a worker holds: kept, or taken back.
+//! Leases of a worker: renewal and release.
 
 use super::Held;
 use crate::engine::{Connection, Row, Statement, Text, Write, sql};

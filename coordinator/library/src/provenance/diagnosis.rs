@@ -33,7 +33,7 @@ pub struct DiagnosisRecord {
     pub document_json: String,
     /// Where recording and twin differ, in the document's order.
     pub mismatches: Vec<MismatchRecord>,
-    /// What may explain it, the most probable first.
+    /// Hypotheses, the most probable first.
     pub hypotheses: Vec<HypothesisRecord>,
 }
 
@@ -50,7 +50,7 @@ pub struct MismatchRecord {
     pub p_value: f64,
 }
 
-/// What may explain a mismatch.
+/// Hypothesis that explains a mismatch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisRecord {
     /// Name of the physics.

@@ -40,7 +40,7 @@ pub struct SleeperRecord {
     pub x_m: f64,
     /// Mean and standard deviation of each parameter, in its unit.
     pub estimates: BTreeMap<Parameter, [f64; 2]>,
-    /// What to keep in mind, in a few words; empty if nothing.
+    /// Flags as text; empty if there are none.
     pub flags: String,
 }
 

@@ -1,4 +1,4 @@
-//! What was made of the library's results, and from what: trainings, evaluations, diagnoses.
+//! Provenance: trainings, evaluations and diagnoses made from the library's results.
 //!
 //! The tables hold the queried columns and the whole document. Storing the same record again
 //! changes nothing: the id of a record is a hash of its content.

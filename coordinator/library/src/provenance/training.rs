@@ -25,7 +25,7 @@ pub struct TrainingRecord {
     pub library_digest: String,
     /// Cases, those kept for testing included.
     pub cases: u32,
-    /// What decided which were kept; below 2^63.
+    /// Seed of the split; below 2^63.
     pub seed: u64,
     /// Version of the program.
     pub code_version: String,

@@ -7,7 +7,7 @@ mod record;
 use crate::{AttemptsMax, Library, LibraryError};
 use tracktwin_protocol::CaseReport;
 
-/// What a worker hands in.
+/// Report of a worker.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// The campaign.
@@ -32,7 +32,7 @@ pub struct Report {
     pub audit_share: f64,
 }
 
-/// What was done with the report of a case.
+/// Treatment of the report of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// Stored.

@@ -1,4 +1,4 @@
-//! What a report changes, in one transaction.
+//! Changes of a report, in one transaction.
 
 use super::{Report, Verdict};
 use crate::attempt::{self, Ended};

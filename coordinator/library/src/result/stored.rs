@@ -1,4 +1,4 @@
-//! What is stored of a case, put together again from its passes, beside the checksum it came with.
+//! A stored case, assembled from its passes, with its checksum.
 
 use super::columns::levels_of;
 use super::entry::LibraryEntry;
@@ -16,7 +16,7 @@ pub(crate) struct StoredCase {
     pub(crate) case: Case,
     /// One a speed.
     pub(crate) passes: Vec<PassFeatures>,
-    /// What its worker made; none where the result was stored before there were checksums.
+    /// Checksum of its worker; none if the result was stored by a version without checksums.
     checksum: Option<String>,
 }
 

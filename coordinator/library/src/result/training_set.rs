@@ -1,4 +1,4 @@
-//! What surrogates are trained on.
+//! The training set of surrogates.
 
 use super::entry::LibraryEntry;
 use super::stored::StoredCase;

@@ -8,7 +8,7 @@ use test_needs::skipped;
 use test_postgres::{Server, Settings};
 use tracktwin_library::{Leased, Library, LibraryError, Verdict};
 
-/// Leases cases and reports them until none wait; whatever is not answered is tried again.
+/// Leases cases and reports them until none wait; calls without a response are repeated.
 async fn work(library: &Library, cases: usize) -> usize {
     let mut temporary = 0;
     let mut stored = 0;

@@ -73,7 +73,7 @@ async fn is_found(url: &str) -> bool {
     }
 }
 
-/// Whether whoever adds to a library is stopped before.
+/// Whether adding to a library is prevented.
 async fn is_refused(url: &str) -> bool {
     let Ok(library) = Library::open_or_create(url).await else { return true };
     let whole = library.check_whole().await;

@@ -1,4 +1,4 @@
-//! Leases: nobody's case is another's, and none is forgotten.
+//! Leases: a case belongs to one worker at a time, and none is lost.
 
 use crate::support::{
     CAMPAIGN, Home, failed, finished, held, lease, on_both_databases, report, request,

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-/// Set to write the texts anew.
+/// Set to write the texts again.
 const WRITE: &str = "TRACKTWIN_WRITE_GOLDEN";
 
 fn file(name: &str) -> std::path::PathBuf {

@@ -1,4 +1,5 @@
-//! Views are made anew from one file a database, and only where an earlier program made those that are there.
+//! Views are created again from one file per database, and only if the existing ones are of an
+//! earlier program.
 
 use crate::data::{Kept, ask, sql};
 use crate::support::{CAMPAIGN, Home, on_both_databases};

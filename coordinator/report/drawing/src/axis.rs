@@ -3,7 +3,7 @@
 /// A linear or logarithmic axis with its label.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, with the unit.
+    /// Label with the unit.
     pub label: String,
     low: f64,
     high: f64,

@@ -1,4 +1,4 @@
-//! What pages are made of: axes, charts as inline SVG, numbers with units, the frame of a page.
+//! Elements of pages: axes, charts as inline SVG, numbers with units, page frame.
 //!
 //! Owns how things look; what is shown is left to others. No file, font or script from elsewhere.
 

@@ -4,7 +4,7 @@ use tracktwin_parameters::Parameter;
 
 /// How a parameter is shown: divided by `divisor`, in `unit`.
 pub struct Shown {
-    /// What the SI value is divided by.
+    /// Divisor of the SI value.
     pub divisor: f64,
     /// The unit, with its prefix.
     pub unit: String,

@@ -206,7 +206,7 @@ fn band(diagnosis: &Diagnosis, site: &Site, speed: usize, side: Side) -> Vec<(f6
     levels.frequency_hz.iter().enumerate().filter_map(of).collect()
 }
 
-/// What dots, lines and band are.
+/// Legend of dots, lines and band.
 fn keys(with: Option<&str>) -> Markup {
     let sample = |inside: &str| {
         let svg = format!(

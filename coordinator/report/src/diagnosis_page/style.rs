@@ -1,4 +1,4 @@
-//! What the page adds to every page's style.
+//! Style of this page.
 
 /// Headline, tags, map and bars. Colours are the page's own, so that dark and print follow.
 pub(super) const STYLE: &str = "

@@ -11,7 +11,7 @@ pub(super) fn physics(name: &str) -> String {
     name.replace('_', " ")
 }
 
-/// What a kind of physics is, in a sentence without a full stop.
+/// Summary of a kind of physics, without a full stop.
 pub(super) fn summary(name: &str) -> &'static str {
     match Kind::from_name(name) {
         Some(kind) => kind.summary,
@@ -25,7 +25,7 @@ pub(super) fn is_chain(name: &str) -> bool {
     Kind::from_name(name).is_some_and(|kind| kind.measuring_chain)
 }
 
-/// What was accepted.
+/// Accepted hypotheses.
 pub(super) fn accepted(diagnosis: &Diagnosis) -> impl Iterator<Item = &Hypothesis> {
     diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted)
 }
@@ -35,7 +35,7 @@ pub(super) fn is_fitted(hypothesis: &Hypothesis) -> bool {
     hypothesis.physics != UNKNOWN && hypothesis.detectability > 0.0
 }
 
-/// What the second prediction has and the first has not, each kind once.
+/// Kinds in the second prediction only, each once.
 pub(super) fn addition(diagnosis: &Diagnosis) -> Option<String> {
     let fitted = accepted(diagnosis).filter(|hypothesis| is_fitted(hypothesis));
     let mut names: Vec<String> = Vec::new();

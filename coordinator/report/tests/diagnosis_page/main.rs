@@ -54,10 +54,7 @@ fn left_out_physics_is_named_placed_measured_and_its_bias_shown() {
     let diagnosis = left_out();
     let page = page("left-out", &diagnosis);
     assert_reads(&page, &[&unbroken(&diagnosis), "left-out physics", "93 %", "✓ accepted"]);
-    assert_reads(
-        &page,
-        &["SN18 and SN19, 2.438 m", "Looks much like squat", "the dip's part moves"],
-    );
+    assert_reads(&page, &["SN18 and SN19, 2.438 m", "Look-alikes: squat", "the dip's part moves"]);
     assert_reads(&page, &["depth of the dip", "82 µm", "61 to 103 µm", "0.15"]);
     assert_reads(&page, &["84 MN/m", "152 MN/m", "−45 %", "sleeper bending stiffness", "+38 %"]);
     assert_reads(&page, &["449 to 1425 Hz", "below 0.001", "+41.7", "3 of 3"]);

@@ -33,7 +33,7 @@ pub enum InversionCoverageError {
     Inverting(#[from] InvertingError),
 }
 
-/// What came of the tracks of one scatter.
+/// Result of the tracks of one unevenness.
 #[derive(Clone, Debug, Serialize)]
 pub struct InversionRow {
     /// Scatter from sleeper to sleeper.

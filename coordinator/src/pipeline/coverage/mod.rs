@@ -32,11 +32,11 @@ pub enum CoverageError {
     Evaluation(#[from] tracktwin_evaluation::Error),
 }
 
-/// What is to be simulated and with what it is evaluated.
+/// Tracks to simulate, and the models that evaluate them.
 pub struct Coverage<'a> {
     /// Models and library.
     pub evaluator: &'a Evaluator,
-    /// What the library's cases were simulated with.
+    /// Experiment of the library's cases.
     pub experiment: &'a Experiment,
     /// Values of the parameters that do not vary.
     pub fixed: ParameterSet,

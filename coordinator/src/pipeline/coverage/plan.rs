@@ -11,12 +11,12 @@ use tracktwin_surrogate::{Side, TrainingSet};
 
 /// Scatter from sleeper to sleeper, as a share of the mean.
 const SCATTER: [f64; 4] = [0.0, 0.05, 0.15, 0.3];
-/// What an end of a range is multiplied by to lie beyond it.
+/// Factors that move a value beyond the ends of a range.
 const BEYOND: [(Side, f64); 2] = [(Side::Low, 0.7), (Side::High, 1.3)];
 /// Range above which values are drawn evenly in the logarithm.
 const LOGARITHMIC_FROM: f64 = 4.0;
 
-/// What the tracks of a row have in common.
+/// Kind of the tracks of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Kind {

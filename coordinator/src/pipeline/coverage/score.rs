@@ -10,10 +10,10 @@ use tracktwin_parameters::Parameter;
 /// Standard deviations on either side that hold 90 % of a normal distribution.
 pub(super) const WIDTH_90: f64 = 1.644_853_626_951_472_7;
 
-/// What came of the tracks of one row.
+/// Result of the tracks of one row.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// What they have in common.
+    /// Their kind.
     #[serde(flatten)]
     pub kind: Kind,
     /// How many there are.

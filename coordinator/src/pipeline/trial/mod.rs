@@ -33,7 +33,7 @@ const TERMS: &str = "trial.json";
 /// File of the seals.
 const SEALS: &str = "seals.sha256";
 
-/// What the trial comes to: tables for people, a line a case, the numbers.
+/// Result files: tables, one line per case, numbers.
 const TABLES: &str = "trial.md";
 const SCORES: &str = "scores.jsonl";
 const SUMMARY: &str = "summary.json";
@@ -55,7 +55,7 @@ pub struct Trial {
     pub folder: PathBuf,
     /// Where all nodes keep their answers.
     pub library: Library,
-    /// What this node is called.
+    /// Name of this machine.
     pub node: String,
     /// Whether single effects are diagnosed again without their kind.
     pub knock_out: bool,
@@ -69,7 +69,7 @@ pub struct Trial {
     pub force: bool,
 }
 
-/// What a folder's trial is.
+/// Identity of a folder's trial.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Terms {
     seed: u64,
@@ -177,7 +177,7 @@ impl TrialError {
 }
 
 impl Trial {
-    /// What the trial is called in the library.
+    /// Id of the trial in the library.
     pub fn id(&self) -> String {
         self.record(Vec::new()).id()
     }
@@ -356,7 +356,7 @@ fn write(path: &Path, value: &impl Serialize) -> Result<(), TrialError> {
     Ok(replace(path, text(value).as_bytes())?)
 }
 
-/// What a file holds, if it is there. One that can't be read is there, and is no reason to make another.
+/// Content of a file, if it exists. An unreadable file is an error, not a missing file.
 fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, TrialError> {
     match std::fs::read(path) {
         Ok(content) => Ok(Some(content)),

@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use tracktwin_library::{DiagnosisRecord, Question, TrialAnswer};
 use tracktwin_trial::Score;
 
-/// What has been answered, by case.
+/// Stored scores by case.
 pub(super) type Scores = BTreeMap<u32, Answered>;
 
-/// What has been answered of a case.
+/// Stored scores of a case.
 pub(super) struct Answered {
     pub(super) score: Score,
     questions: Vec<Question>,
@@ -31,7 +31,7 @@ impl Trial {
         open.map(|(question, _)| question).collect()
     }
 
-    /// What all nodes have answered of this trial's cases.
+    /// Scores stored by all machines for this trial.
     pub(super) async fn scores(&self) -> Result<Scores, TrialError> {
         let mut answers = self.library.trial_answers(&self.id()).await?;
         answers.retain(|answer| answer.number < self.cases);

@@ -68,7 +68,7 @@ pub(crate) fn gain(centre_hz: f64, frequency_hz: f64) -> f64 {
 }
 
 fn weights(lines_hz: &[f64], centre_hz: f64) -> Vec<(usize, f64)> {
-    // Lines stand at equal steps of the logarithm.
+    // Lines have equal steps of the logarithm.
     let width = |line_hz: f64| line_hz * std::f64::consts::LN_2 / LINES_PER_OCTAVE;
     let weight = |line_hz: f64| 2.0 * gain(centre_hz, line_hz).powi(2) * width(line_hz);
     let reach = REACH / CENTRE_RAD * centre_hz;

@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
 use tracktwin_track::model::Support;
 
-/// What is free in a baseline, as logarithms, and where each stands among the unknowns.
+/// The free parameters of a baseline, as logarithms, and their indices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unknowns {
     sleepers: usize,
@@ -23,7 +23,7 @@ pub struct Unknowns {
     pub mean: [Mean; 3],
     /// How each quantity of [`Own`] varies along the track.
     pub variation: [Variation; 3],
-    /// Sleepers that differ from their neighbours by more than `variation` says.
+    /// Sleepers that differ from their neighbours by more than `variation`.
     pub exceptions: Vec<Exception>,
     /// Standard deviation of the sensor's response to power, in nats at each knot.
     pub response_deviation: f64,
@@ -88,7 +88,7 @@ mod prior {
 /// Distances in spans at which the track may end: what that changes is free to be any of them.
 pub(crate) const ENDS_SPANS: [usize; 7] = [7, 8, 9, 10, 11, 13, 24];
 
-/// Sleepers beyond either end of the section whose support is free; the last of them stands for all
+/// Sleepers beyond either end of the section whose support is free; the last of them represents all
 /// further ones.
 const OUTER: usize = 3;
 
@@ -104,8 +104,8 @@ pub(crate) struct Outer {
 }
 
 impl Unknowns {
-    /// For a section, so many speeds, surfaces whose wave numbers lie in a range in rad/m, and
-    /// bands whose centres lie in a range in Hz.
+    /// For a section, a number of speeds, surfaces with wave numbers in a range in rad/m, and bands
+    /// with centres in a range in Hz.
     pub fn new(
         section: &Section,
         speeds: usize,
@@ -273,7 +273,7 @@ impl Unknowns {
                 let distance = KNOT_DISTANCE * (i as f64 - j as f64) / prior::SPECTRUM_LENGTH;
                 covariance[(i, j)] = prior::SPECTRUM.powi(2) * (-0.5 * distance.powi(2)).exp();
             }
-            // Keeps the inverse well defined where the knots stand close.
+            // Regularises the inverse for close knots.
             covariance[(i, i)] += (0.05 * prior::SPECTRUM).powi(2);
         }
         for index in self.gains() {

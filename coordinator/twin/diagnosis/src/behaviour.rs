@@ -1,4 +1,5 @@
-//! What an unknown dynamic stiffness behaves like: a spring, a damper, a mass, or a mass on a spring.
+//! Element that an unknown dynamic stiffness resembles: a spring, a damper, a mass, or a mass on a
+//! spring.
 //!
 //! Each has a dynamic stiffness of known form, so that how well it explains what is left follows from
 //! the port scan's own traces (docs/diagnosis.md, section 5).
@@ -49,8 +50,8 @@ pub struct Behaviour {
     pub parameters: Vec<(&'static str, Estimate)>,
 }
 
-/// What is known of a port: the slope of the log likelihood with its traces' heights and the square
-/// of those, and the receptance in m/N that they are in parts of, at the centres in Hz.
+/// Evidence on a port: gradient and Hessian of the log likelihood with respect to the heights of
+/// its bumps, and the receptance in m/N to which the heights refer, at the centres in Hz.
 pub(crate) struct PortEvidence<'a> {
     pub(crate) along: &'a DVector<f64>,
     pub(crate) square: &'a DMatrix<f64>,

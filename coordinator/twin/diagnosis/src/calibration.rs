@@ -45,14 +45,14 @@ pub enum CalibrationError {
     NotFinite,
 }
 
-/// What is to be fitted: a baseline with the candidates that are part of the model.
+/// Fit of a baseline with the candidates that are part of the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
     /// Predicts.
     pub forward: &'a Forward,
-    /// What was measured.
+    /// The observed log powers.
     pub observation: &'a Observation,
-    /// What joins the baseline.
+    /// Candidates in the model.
     pub candidates: &'a [Candidate],
 }
 
@@ -299,8 +299,8 @@ impl Problem<'_> {
         Ok((residual, self.observation.whiten_matrix(&jacobian)))
     }
 
-    /// Ballast and railpads that decide under which places of the wheel a candidate's force laws take
-    /// hold: no receptance tells what they change by that.
+    /// Ballast and railpads that decide under which places of the wheel a candidate's force laws
+    /// take hold: no receptance contains this change.
     fn under_load(&self) -> Vec<usize> {
         let unknowns = &self.forward.unknowns;
         // A gap that no load closes has nothing free.

@@ -1,4 +1,4 @@
-//! What may be left out, where and how strong: the list that a recording is screened with.
+//! Candidates: kinds of physics with places and strengths for the screening.
 
 use crate::section::Section;
 use tracktwin_track::extension::{Class, ExtensionInstance, Family, Kind, KindParameter, Places};
@@ -78,7 +78,7 @@ impl Candidate {
     }
 }
 
-/// Every candidate for a section: each kind at each place it may have, as its screening says.
+/// Every candidate for a section: each kind at each possible place, according to its screening.
 pub fn candidates(section: &Section) -> Vec<Candidate> {
     Kind::all().flat_map(|kind| of_kind(kind, section)).collect()
 }

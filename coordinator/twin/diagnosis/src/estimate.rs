@@ -1,4 +1,4 @@
-//! What is known of a number.
+//! Estimate of a number.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
-//! What recording and prediction differ by when nothing is left out.
+//! Null model: differences between recording and prediction when nothing is left out.
 //!
-//! Time simulations of the calibrated track over random surfaces tell by how much one pass's log
-//! powers lie off their expected value (an offset), and their covariance: over bands, and over
-//! speeds at equal wave numbers, since all speeds roll over one surface.
+//! Time simulations of the calibrated track over random surfaces give the offset of one pass's log
+//! powers from their expected value, and their covariance: over bands, and over speeds at equal
+//! wave numbers, since all speeds roll over one surface.
 
 use crate::forward::Forward;
 use crate::section::Section;
@@ -57,7 +57,7 @@ pub struct NullModel {
 
 impl NullModel {
     /// Version of how null models are simulated and predicted, beside that of the physics: those of
-    /// another one are made anew. A test fails when it must be raised.
+    /// another version are simulated again. A test fails when it must be raised.
     pub const VERSION: u32 = 1;
 
     /// Simulates passes over `surfaces` random surfaces with the values of `values`, levels apart,
@@ -138,7 +138,7 @@ impl NullModel {
         sum / count
     }
 
-    /// The offset of so many sleepers, one after the other.
+    /// The offset of this number of sleepers, one after the other.
     pub fn offset_of(&self, sleepers: usize) -> DVector<f64> {
         let offset = self.offset();
         DVector::from_fn(sleepers * self.per_sleeper, |row, _| offset[row % self.per_sleeper])

@@ -1,4 +1,4 @@
-//! What was measured, and how well it is known.
+//! Observed log powers and their covariance.
 
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -15,7 +15,7 @@ pub struct Observation {
     fitted: usize,
     /// Inverse Cholesky factor of a sleeper's covariance, in that order.
     whitening: DMatrix<f64>,
-    /// What each sleeper's whitened values are multiplied by.
+    /// Weights of each sleeper's whitened values.
     weights: Vec<f64>,
 }
 
@@ -50,7 +50,7 @@ impl Observation {
         &self.log_power - predicted
     }
 
-    /// The whitened difference: of those held out, what the fitted ones do not tell.
+    /// The whitened difference; for held-out values, the part that the fitted ones do not predict.
     pub fn residual(&self, predicted: &DVector<f64>) -> DVector<f64> {
         self.whiten(&self.difference(predicted))
     }

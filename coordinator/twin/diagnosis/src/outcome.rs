@@ -9,10 +9,10 @@ use tracktwin_inspection::chain::LossOfContact;
 /// Name and version of the format.
 pub const FORMAT: &str = "tracktwin-diagnosis/1";
 
-/// What is called by no name of the catalogue.
+/// Physics that is not in the catalogue.
 pub const UNKNOWN: &str = "unknown_physics";
 
-/// What a recording is, compared with the model.
+/// Verdict of the comparison with the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -54,11 +54,11 @@ pub struct Diagnosis {
     pub nothing_left_out: Option<f64>,
     /// Where recording and re-tuned baseline differ.
     pub mismatches: Vec<Mismatch>,
-    /// What may be left out, most probable first.
+    /// Hypotheses, most probable first.
     pub hypotheses: Vec<Hypothesis>,
     /// How well recording and model agree, before and after.
     pub fit: Fit,
-    /// What parameters come out as without and with the physics named, by parameter.
+    /// Parameters without and with the accepted physics.
     pub bias_removed: BTreeMap<String, BeforeAfter<f64>>,
     /// The stiffness along the track.
     pub track: Vec<SleeperValues>,
@@ -67,7 +67,7 @@ pub struct Diagnosis {
     /// Where the wheel loses contact with the rail; what was fitted there does not hold.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub loss_of_contact: Option<LossOfContact>,
-    /// What to keep in mind, in sentences.
+    /// Notes.
     pub notes: Vec<String>,
 }
 
@@ -175,7 +175,7 @@ pub struct Score {
     pub score: f64,
 }
 
-/// What a sleeper's parameters come out as.
+/// Parameters of a sleeper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SleeperValues {
     /// Name of the sleeper.
@@ -190,7 +190,7 @@ pub struct SleeperValues {
     pub ballast_stiffness: BeforeAfter<Estimate>,
     /// Irregularity level.
     pub irregularity_level: BeforeAfter<Estimate>,
-    /// What to keep in mind: `loss_of_contact` where the wheel is in the air.
+    /// Flags: `loss_of_contact` where the wheel loses contact.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub flags: Vec<String>,
 }

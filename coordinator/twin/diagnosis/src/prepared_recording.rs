@@ -1,4 +1,4 @@
-//! A recording made ready for diagnosis, or the reason why it can't be.
+//! A recording prepared for diagnosis, or the reason why this is impossible.
 
 use crate::bands::Bands;
 use crate::forward::Forward;
@@ -106,7 +106,7 @@ pub struct PreparedRecording {
     pub pass_numbers: Vec<Vec<usize>>,
     /// Kinds of physics that may not be accepted.
     pub without: Vec<String>,
-    /// Where the passes alone show the rail's own shape, from and to in m; nowhere until
+    /// Stretches in m in which the passes alone show a shape of the rail; empty until
     /// [`PreparedRecording::suggested`].
     pub detected_shapes_m: Vec<[f64; 2]>,
 }
@@ -205,10 +205,10 @@ impl Measured {
 }
 
 impl PreparedRecording {
-    /// Takes from a recording what is compared.
+    /// Prepares a recording.
     ///
     /// # Errors
-    /// [`PreparationError`] says what is missing.
+    /// [`PreparationError`] states what is missing.
     pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, PreparationError> {
         let measured = Measured::of(recording, design)?;
         Ok(measured.prepared(recording, design, measured.sleepers.clone()))
@@ -235,8 +235,9 @@ impl PreparedRecording {
         !self.without.iter().any(|other| other == kind.physics)
     }
 
-    /// The same powers at other sleepers: those of each speed in an order of its own, `[speed][sleeper]`,
-    /// so that speeds have no place in common. A control: what is somewhere can't be found.
+    /// The same powers at other sleepers: those of each speed in a separate order,
+    /// `[speed][sleeper]`, so that speeds have no place in common. A control: no local effect can
+    /// be found.
     pub fn shuffle(&mut self, orders: &[Vec<usize>]) {
         let (bands, per_sleeper) = (self.forward.bands.count(), self.forward.per_sleeper());
         let measured = self.log_power.clone();

@@ -79,8 +79,8 @@ fn squares(
     Some(samples[..SAMPLES / 2].iter().map(|value| value.norm_sqr() * step_m * step_m).collect())
 }
 
-/// Weight of a height at so many spacings from the sleeper: squares of neighbours' weights sum to
-/// one.
+/// Weight of a height at this distance in spacings from the sleeper: squares of neighbours' weights
+/// sum to one.
 fn window(spacings: f64) -> f64 {
     let past = (spacings.abs() - 0.5) / FADE + 0.5;
     (FRAC_PI_2 * past.clamp(0.0, 1.0)).cos()

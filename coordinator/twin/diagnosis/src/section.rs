@@ -13,7 +13,7 @@ const SPANS_BEYOND: usize = 16;
 /// Elements of the rail in a span and of a half sleeper (docs/accuracy.md).
 const ELEMENTS: usize = 8;
 
-/// A window reaches so many standard deviations of its blur beyond its ends.
+/// Standard deviations of its blur by which a window extends beyond its ends.
 const BLUR_REACH: f64 = 3.5;
 
 /// The rail's nodes that are seen, with shares that sum to one.
@@ -53,7 +53,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// A section of so many sleepers with the usual length of track around it.
+    /// A section of `sleepers` sleepers with the usual length of track around it.
     pub const fn new(design: TrackDesign, sleepers: usize, first_x_m: f64) -> Self {
         Self { design, sleepers, first_x_m, spans_beyond: SPANS_BEYOND }
     }

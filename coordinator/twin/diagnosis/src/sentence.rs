@@ -144,7 +144,7 @@ fn biased(bias: &BTreeMap<String, BeforeAfter<f64>>) -> String {
     format!(" Without it, {} comes out {:.0} % too {direction}.", words(name), change.abs())
 }
 
-/// What a parameter is called in a sentence.
+/// Name of a parameter in a sentence.
 fn words(parameter: &str) -> &str {
     match parameter {
         "sleeper_EI_N_m2" => "the sleepers' bending stiffness",

@@ -1,4 +1,4 @@
-//! What was measured, in bands: the wavelet power over every sleeper in every pass.
+//! Measured wavelet power in bands over every sleeper in every pass.
 
 use crate::bands::{Bands, gain};
 use rayon::prelude::*;
@@ -38,8 +38,8 @@ pub struct SpeedSpectra {
     /// Natural logarithm of the mean power in m2/s4, `[pass][sleeper][band]`; none where the pass
     /// does not cover the sleeper's window.
     pub log_power: Vec<Vec<Option<Vec<f64>>>>,
-    /// One-sided power spectral density in m2/s3 of what the sensor adds, as far as the highest
-    /// frequencies tell: an upper bound.
+    /// One-sided power spectral density in m2/s3 of the sensor noise, estimated at the highest
+    /// frequencies: an upper bound.
     pub noise_density: f64,
 }
 

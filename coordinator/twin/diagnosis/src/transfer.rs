@@ -116,8 +116,8 @@ impl Transfer {
         &self.by_seats[line][sleeper]
     }
 
-    /// By what a change of the dynamic stiffness under a sleeper's rail seat changes a window's mean
-    /// power: its product's real part.
+    /// Sensitivity of a window's mean power to a change of the dynamic stiffness under a sleeper's
+    /// rail seat: the real part of the product.
     pub(crate) fn sensitivity(&self, window: &Window, line: usize, sleeper: usize) -> Complex64 {
         let by_seat = &self.by_seats[line][sleeper][window.nodes()];
         window.shares.iter().zip(by_seat).map(|(share, root)| share * root * root).sum()
@@ -234,7 +234,7 @@ mod tests {
         ExtensionInstance::new("second_wheel").with("distance_m", distance_m)
     }
 
-    /// Powers in bands of a third of an octave over a stretch, of so many passes together.
+    /// Powers in third-octave bands over a stretch, mean of this number of passes.
     fn powers(
         model: &TrackModel,
         centres_hz: &[f64],

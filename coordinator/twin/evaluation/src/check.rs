@@ -7,7 +7,7 @@ use tracktwin_signal::recording::Recording;
 
 /// Compares the track, vehicle, sensor and speeds stated in a recording with those of the models.
 ///
-/// What `recording.json` doesn't say is not compared.
+/// Quantities missing in `recording.json` are not compared.
 ///
 /// # Errors
 /// [`Error::GainUnknown`], [`Error::UnknownSpeed`] with the first pass at a speed that is none of

@@ -4,7 +4,7 @@ use tracktwin_number::rounded;
 use tracktwin_signal::FeatureError;
 use tracktwin_signal::recording::OtherTrack;
 
-/// What goes wrong between a recording and its evaluation.
+/// Errors of an evaluation.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The passes have a speed for which there is no model.

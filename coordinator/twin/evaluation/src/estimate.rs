@@ -30,7 +30,7 @@ pub struct Twin<'a> {
     pub models: &'a Trained,
     /// The library they were trained on, searched by the model selector.
     pub library: &'a TrainingSet,
-    /// What that library knows.
+    /// Domains of that library.
     pub domains: &'a Domains,
 }
 
@@ -217,7 +217,7 @@ fn provenance(twin: &Twin<'_>, sleepers: &[SleeperEvaluation]) -> Provenance {
     }
 }
 
-/// What the models of these speeds, together or each alone, know of the parameters.
+/// Ranges and errors of the parameters by the models of these speeds.
 fn known(twin: &Twin<'_>, speeds_km_h: &[f64]) -> BTreeMap<Parameter, Known> {
     let Twin { models, library, .. } = twin;
     let groups: Vec<_> = match models.group(speeds_km_h, METHOD_FEATURE) {

@@ -35,18 +35,18 @@ pub struct Evaluation {
     pub sleepers: Vec<SleeperEvaluation>,
     /// The sleepers that no pass covers.
     pub unevaluated: Vec<Unevaluated>,
-    /// What of the recording lies outside what the library knows.
+    /// Part of the recording outside the library.
     pub outside_library: OutsideLibrary,
     /// How much sleepers are taken to differ.
     pub unevenness: Unevenness,
-    /// What was left out of the recording, and why.
+    /// Passes left out, with the reason.
     pub notes: Vec<String>,
     /// Frequencies of the bins in Hz, ascending; for pictures.
     #[serde(skip)]
     pub frequencies_hz: Vec<f64>,
 }
 
-/// What the estimates rest on.
+/// Provenance of the estimates.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Provenance {
     /// Version of this program.
@@ -65,11 +65,11 @@ pub struct Provenance {
     pub speeds_km_h: Vec<f64>,
     /// Which models speak where a sleeper has all of these speeds.
     pub combination: &'static str,
-    /// What the models know of each parameter.
+    /// Range and error of each parameter.
     pub parameters: BTreeMap<Parameter, Known>,
 }
 
-/// What the models know of a parameter.
+/// Range and error of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Known {
     /// Lowest and highest value in the library, in the parameter's unit. Means stay inside.
@@ -106,7 +106,7 @@ pub struct SleeperEvaluation {
     pub sd_without_unevenness: BTreeMap<Parameter, f64>,
     /// The model selector's answer.
     pub selector: Selected,
-    /// What to keep in mind about it.
+    /// Flags of its estimates.
     pub flags: Vec<Flag>,
     /// Passes that were averaged at each speed.
     pub measured: Vec<Measured>,
@@ -124,7 +124,7 @@ pub struct Selected {
     pub mape: Vec<f64>,
 }
 
-/// What was measured of a sleeper at one speed.
+/// Measured data of a sleeper at one speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Measured {
     /// Speed of the models in km/h.

@@ -18,7 +18,7 @@ const SIZES: [usize; 3] = [1, 3, 7];
 /// Share of the sleepers outside that an end must explain to be named.
 const NAMED_FROM: f64 = 0.2;
 
-/// What of a recording lies outside the library.
+/// Part of a recording outside the library.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct OutsideLibrary {
     /// Share of the evaluated sleepers, 0 to 1.
@@ -44,12 +44,12 @@ pub struct BeyondEnd {
     pub sleepers: usize,
 }
 
-/// What one library knows at each set of speeds that was asked for.
+/// Cache of the domains of one library, by set of speeds.
 #[derive(Default)]
 pub struct Domains(Mutex<HashMap<Vec<usize>, Arc<Domain>>>);
 
 impl Domains {
-    /// What the library knows at these speeds; worked out when first asked for.
+    /// Domain of the library at these speeds; computed on first use.
     fn of(&self, library: &TrainingSet, speeds: &[usize]) -> Result<Arc<Domain>, Error> {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(domain) = known.get(speeds) {
@@ -89,7 +89,7 @@ impl DomainTest {
 /// Sleepers whose windows are not complete are judged by the whole track only.
 ///
 /// # Errors
-/// What [`Domain`] reports.
+/// Errors of [`Domain`].
 pub(crate) fn judge(
     sleepers: &[SleeperFeatures],
     library: &TrainingSet,
@@ -194,7 +194,7 @@ impl OutsideLibrary {
         self.share > 0.5
     }
 
-    /// What is outside and which library to make, a sentence each; none if nothing is outside.
+    /// Sentences on the sleepers outside and the remedy; none if nothing is outside.
     pub fn sentences(&self) -> Vec<String> {
         if self.share <= 0.0 {
             return Vec::new();

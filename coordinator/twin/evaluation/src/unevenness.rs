@@ -1,4 +1,4 @@
-//! What it costs an estimate that sleepers differ.
+//! Additional uncertainty from the unevenness of the track.
 //!
 //! The library's tracks are even. The Gaussian processes resolve only a part of a sleeper's
 //! deviation from its neighbours, and no test on the library shows the rest. The unevenness follows
@@ -24,7 +24,7 @@ const OWN_SHARE: f64 = 0.5;
 const MISSED: f64 = 0.85;
 /// Sleepers below which nothing is learned of the scatter.
 const SLEEPERS_MIN: usize = 5;
-/// What differs from sleeper to sleeper.
+/// Parameters that differ from sleeper to sleeper.
 const OWN: [Parameter; 2] = [Parameter::RailpadStiffness, Parameter::BallastStiffness];
 
 /// How much the sleepers of a recording are taken to differ.
@@ -92,7 +92,7 @@ impl Unevenness {
 struct Variances {
     /// Of the means.
     seen: f64,
-    /// What an even track would show: that of the estimates themselves.
+    /// Variance expected for an even track: that of the estimates.
     expected: f64,
 }
 

@@ -16,18 +16,18 @@ const COMPLETE_SHARE: f64 = 0.98;
 /// anyway, so that three quarters of it lose only the outermost part of wavelets below 70 Hz.
 const MARGIN_SHARE: f64 = 0.75;
 
-/// What is known of a sleeper from all passes over it.
+/// Features of a sleeper from all passes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SleeperFeatures {
     /// Place of the sleeper in [`Recording::sleepers`].
     pub sleeper: usize,
     /// Speeds with at least one pass over it, ascending.
     pub speeds: Vec<SpeedFeatures>,
-    /// What to keep in mind, ascending, each once.
+    /// Flags, ascending, each once.
     pub flags: Vec<Flag>,
 }
 
-/// What is known of a sleeper at one speed.
+/// Features of a sleeper at one speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpeedFeatures {
     /// Place of the speed among the models' speeds.

@@ -55,9 +55,9 @@ impl Beside {
             return format!("{label}: both methods agree within their uncertainty.");
         }
         format!(
-            "{label}: the methods contradict each other at {count} of {all} sleepers. Use the \
-                 inversion there: it fits each sleeper separately, while the Gaussian processes \
-                 were trained on even tracks and average over neighbours."
+            "{label}: the methods contradict each other at {count} of {all} sleepers. Trust the \
+             inversion there: it fits each sleeper for itself, while the Gaussian processes learned \
+             from even tracks and average over neighbours."
         )
     }
 }

@@ -155,9 +155,8 @@ impl Inversion {
         let mut sentences = Vec::new();
         if !unexplained.is_empty() {
             sentences.push(format!(
-                "The track model does not explain the measured data at {} of {} sleepers ({}): the \
-                     estimates there are not valid. Search for left-out physics with `tracktwin \
-                     diagnose`.",
+                "The track model does not explain what was measured at {} of {} sleepers ({}): the \
+                 estimates there are not valid. `tracktwin diagnose` says what may be missing.",
                 unexplained.len(),
                 self.sleepers.len(),
                 listed(&unexplained)

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// What goes wrong between a library and a prediction.
+/// Errors of training and prediction.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A table has another number of rows or columns than stated.

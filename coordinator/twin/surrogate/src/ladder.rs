@@ -20,7 +20,7 @@ const LENGTH_RUNGS: std::ops::RangeInclusive<i32> = -4..=12;
 /// information).
 const NOISE_RUNGS: std::ops::RangeInclusive<i32> = -14..=4;
 
-/// What a rung means: lengths in units of a typical distance.
+/// Meaning of a rung: lengths in units of a typical distance.
 #[derive(Clone, Copy)]
 pub(crate) struct Ladder {
     pub(crate) unit: f64,

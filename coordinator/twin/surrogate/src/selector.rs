@@ -23,7 +23,7 @@ pub struct Neighbour {
     pub distance: f64,
 }
 
-/// What the nearest entries say of one parameter.
+/// Mean and deviation of one parameter over the nearest entries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
     /// Mean over the entries (paper, eq. 8).

@@ -40,7 +40,7 @@ pub struct Trained {
     groups: Vec<ModelGroup>,
 }
 
-/// What holds for all groups.
+/// Data common to all groups.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct About {
     format: String,

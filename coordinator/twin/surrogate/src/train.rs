@@ -15,7 +15,7 @@ const WIDTH_90: f64 = 1.644_853_626_951_472_7;
 /// Fewest entries worth training on: a hundred to find hyper-parameters, a hundred to test.
 pub const ENTRIES_MIN: usize = 200;
 
-/// What to train, and how.
+/// Options of a training.
 #[derive(Clone, Debug)]
 pub struct TrainOptions {
     /// Feature sets, each trained at every speed.
@@ -49,7 +49,7 @@ impl TrainOptions {
     }
 }
 
-/// What training has reached.
+/// Progress of a training.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
     /// Groups finished.

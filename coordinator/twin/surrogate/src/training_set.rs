@@ -1,4 +1,4 @@
-//! What models are trained on, checked once.
+//! The training set of models, checked once.
 
 use crate::Error;
 use faer::Mat;

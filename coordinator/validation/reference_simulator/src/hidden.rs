@@ -1,4 +1,4 @@
-//! What may be hidden in a scene: names, places and sizes, as the files of truth have them.
+//! Hidden physics of a scene: kinds, places and sizes, as in the files of truth.
 //!
 //! Owns the list; what each entry does to track, vehicle, surface or recording is left to those.
 

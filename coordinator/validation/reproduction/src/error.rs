@@ -2,7 +2,7 @@
 
 use crate::Figure;
 
-/// What a library or a track lacks.
+/// Errors of a reproduction.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The library has not the speed of the paper's figure.

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// The format of `reproduce.json`.
 pub const FORMAT: &str = "reproduction/1";
 
-/// What became of a claim.
+/// Verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -82,7 +82,7 @@ impl Compared {
     }
 }
 
-/// What the comparison rests on.
+/// Provenance of the comparison.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Provenance {
     /// Version of this program.

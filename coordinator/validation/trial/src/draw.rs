@@ -1,4 +1,4 @@
-//! What a trial hides in its cases: drawn from the seed alone.
+//! Hidden physics of a trial's cases, drawn from the seed alone.
 //!
 //! Owns shares of classes, places and strengths; what a track looks like is the truth simulator's.
 

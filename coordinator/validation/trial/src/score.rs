@@ -16,7 +16,7 @@ const SET: f64 = 0.9;
 /// Deviations of the null simulations above which a cell is visibly anomalous.
 const CELL_DEVIATIONS: f64 = 3.5;
 
-/// What became of a case.
+/// Score of a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Score {
     /// Number of the case.
@@ -27,7 +27,7 @@ pub struct Score {
     pub verdict: Verdict,
     /// Names that it accepted.
     pub accepted: Vec<String>,
-    /// What became of each hidden effect.
+    /// Results of the hidden effects.
     pub hidden: Vec<Named>,
     /// Each probability that was given, and whether it was so.
     pub probabilities: Vec<(f64, bool)>,
@@ -62,7 +62,7 @@ pub struct KnockedOut {
     pub place: Option<Placed>,
 }
 
-/// What became of a hidden effect.
+/// Result of a hidden effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Named {
     /// What it is.

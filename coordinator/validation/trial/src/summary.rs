@@ -1,4 +1,4 @@
-//! What a trial comes to: rates with their intervals, against what was set as a goal.
+//! Summary of a trial: rates with their intervals, compared with the goals.
 
 use crate::class::Class;
 use crate::paper::Usual;

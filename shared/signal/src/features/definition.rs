@@ -1,4 +1,4 @@
-//! What a feature is: the settings on which simulations and recordings must agree.
+//! Definition of the features: settings on which simulations and recordings must agree.
 
 use super::ThirdOctave;
 use crate::wavelet::Morlet;

@@ -1,4 +1,4 @@
-//! What is kept of a sleeper's window: its LWPS and its levels in one-third octaves.
+//! Features of a sleeper's window: its LWPS and its levels in one-third octaves.
 //!
 //! Owns the definition of the features and their extraction; the sleeper's window, and what
 //! becomes of several passes, is the caller's.

@@ -1,4 +1,4 @@
-//! What a recording's numbers can be, and how much of a file is held in memory.
+//! Limits of a recording's values and of the size of a file in memory.
 
 use super::error::{Fault, RecordingError};
 use super::manifest::Manifest;

@@ -11,7 +11,7 @@ impl<F: FnMut()> Survey<'_, F> {
         self.references().await
     }
 
-    /// What `SQLite` itself finds.
+    /// Faults found by `SQLite` itself.
     async fn integrity(&mut self) -> Result<(), LibraryError> {
         let name = self.library.name();
         let check = sql("select integrity_check as said from pragma_integrity_check");

@@ -25,10 +25,10 @@ pub struct IntegrityFault {
     pub first_index: Option<u32>,
 }
 
-/// What came of looking a library over.
+/// Result of a verification.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Verified {
-    /// What is wrong; nothing in a sound library.
+    /// Faults; empty for an intact library.
     pub findings: Vec<IntegrityFault>,
     /// Cases whose results have the checksum that came with them.
     pub attested: u64,

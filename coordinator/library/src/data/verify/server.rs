@@ -1,4 +1,4 @@
-//! What a server keeps, as far as it can be asked.
+//! Verification of constraints that PostgreSQL does not enforce.
 
 use super::Survey;
 use crate::LibraryError;
@@ -27,7 +27,7 @@ const LOOSE: [(&str, &str); 3] = [
     ),
 ];
 
-/// What the schema has beside the tables that are read whole: a table or view, and one of its columns.
+/// Relations of the schema that are not read completely: a table or view, and one of its columns.
 const RELATIONS: [(&str, &str); 9] = [
     ("case_result", "checksum"),
     ("case_series", "log_power"),
@@ -40,7 +40,7 @@ const RELATIONS: [(&str, &str); 9] = [
     ("campaign_progress", "finished"),
 ];
 
-/// What keeps the counts of cases.
+/// Triggers of the counts of cases.
 const TRIGGERS: [&str; 3] = ["count_inserted_case", "count_updated_case", "count_deleted_case"];
 
 impl<F: FnMut()> Survey<'_, F> {

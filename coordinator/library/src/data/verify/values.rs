@@ -6,7 +6,7 @@ use crate::result::{Attested, Gathering, StoredCase, passes_of};
 use crate::{CampaignRecord, LibraryError};
 use tokio_stream::StreamExt;
 
-/// What is wrong with a campaign's results.
+/// Faults in a campaign's results.
 #[derive(Default)]
 struct Faults {
     altered: Fault,

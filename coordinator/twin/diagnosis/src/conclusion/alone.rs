@@ -104,7 +104,7 @@ fn hypothesis(
     })
 }
 
-/// What the wheel's orders explain, on all blocks and on those that were held out.
+/// Variance explained by the wheel orders, on all blocks and on withheld ones.
 fn fit(recording: &Recording, comb: Option<&Comb>) -> Fit {
     let Some(comb) = comb else {
         let none = Scores { in_sample: Score { score: 0.0 }, held_out: None };

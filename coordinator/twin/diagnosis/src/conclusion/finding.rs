@@ -1,4 +1,4 @@
-//! What the passes show alone, as hypotheses beside those of the model.
+//! Findings of the passes alone, as hypotheses beside those of the model.
 
 use super::{Evidence, FAILED_SHARE, names};
 use crate::estimate::Estimate;

@@ -119,7 +119,7 @@ impl Evidence<'_> {
         ])
     }
 
-    /// What to keep in mind about a sleeper's estimates.
+    /// Flags of a sleeper's estimates.
     fn flags(&self, sleeper: usize) -> Vec<String> {
         let id = self.id(sleeper);
         let lost = self.inspection.loss_of_contact.as_ref();

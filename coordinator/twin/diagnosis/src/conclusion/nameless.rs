@@ -1,4 +1,4 @@
-//! What shows in the passes themselves, but has no name in the catalogue.
+//! Findings of the passes alone whose kind is not in the catalogue.
 
 use super::finding::seen;
 use super::place::meet;

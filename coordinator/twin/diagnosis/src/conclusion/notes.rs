@@ -1,4 +1,4 @@
-//! What a reader should know beside the hypotheses.
+//! Notes beside the hypotheses.
 
 use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
 use crate::port_scan::PortPlace;
@@ -29,7 +29,7 @@ impl Evidence<'_> {
         notes
     }
 
-    /// What the last search left without a name.
+    /// Residual evidence after the last search.
     fn remainder(&self) -> Option<String> {
         let round = self.search.rounds.last().filter(|round| round.is_significant())?;
         let place = round.port.as_ref().map_or(String::new(), |port| match &port.place {

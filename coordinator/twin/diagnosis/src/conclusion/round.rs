@@ -1,4 +1,4 @@
-//! What a search fitted, as hypotheses.
+//! Fits of a search as hypotheses.
 
 use super::{Evidence, FAILED_SHARE, names};
 use crate::behaviour::Behaviour;
@@ -25,7 +25,7 @@ const NEAREST_MAX: usize = 3;
 const ORDER: &str = "order";
 
 impl Evidence<'_> {
-    /// What one search fitted, as hypotheses.
+    /// Fits of one search as hypotheses.
     pub(super) fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
         let Probabilities { named, family, unknown, nothing } = round.probabilities();
         // What is left beside a named effect may be its model's error as well as something new.

@@ -28,8 +28,8 @@ impl Evidence<'_> {
         self.add_finding(&finding, all);
     }
 
-    /// What a reader should know of it, if it is so. Passes that are cut off differ wherever they were:
-    /// the faster they are, the more is missing.
+    /// Note on the disagreement, if there is one. Clipped passes always disagree: the faster they
+    /// are, the more is missing.
     pub(super) fn speed_disagreement(&self) -> Option<String> {
         let are_cut =
             self.inspection.findings.iter().any(|finding| finding.physics == CLIPPING.physics);

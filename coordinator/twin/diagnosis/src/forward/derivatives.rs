@@ -1,5 +1,5 @@
-//! How predicted log powers change with the baseline's unknowns, and with whatever hangs under a
-//! rail seat: exact in the receptances, without predicting anew for each unknown.
+//! Derivatives of the predicted log powers with respect to the baseline's unknowns and the dynamic
+//! stiffness at a rail seat: exact in the receptances, without a new prediction for each unknown.
 
 use super::supports::{NEIGHBOURS, SupportChanges, VARIED, Variation};
 use super::{Forward, mean};
@@ -39,8 +39,8 @@ pub struct Linearised {
     pub(crate) transfer: Transfer,
 }
 
-/// Changes of the log powers by unknown dynamic stiffnesses, in parts of the stiffness that is
-/// there: a row for each log power, a column for each shape over the lines.
+/// Changes of the log powers by unknown dynamic stiffnesses, relative to the existing stiffness: a
+/// row for each log power, a column for each shape over the lines.
 pub(crate) struct PortColumns {
     /// Under the rail seat of each sleeper of the whole track.
     pub(crate) seats: Vec<DMatrix<f64>>,

@@ -36,8 +36,7 @@ pub struct Forward {
     pub unknowns: Unknowns,
     /// One-sided power spectral density in m2/s3 of the sensor's noise at each speed.
     pub noise_density: Vec<f64>,
-    /// Where on the model's track the wheel begins a turn, in m: `[speed][pass]`; empty if nobody
-    /// knows.
+    /// Where on the model's track the wheel begins a turn, in m: `[speed][pass]`; empty if unknown.
     pub wheel_starts_m: Vec<Vec<f64>>,
     /// Changes of the log powers by what lies beyond the sleepers compared, a column for each unknown
     /// of [`Unknowns::beyond`]; zero until [`Forward::allow_beyond`].
@@ -85,7 +84,7 @@ impl Forward {
         }
     }
 
-    /// A predictor of the same for a track that ends so many spans beyond the sleepers compared.
+    /// The same predictor for a track that ends this number of spans beyond the sleepers compared.
     #[must_use]
     pub fn with_ends(&self, spans_beyond: usize) -> Self {
         let section = Section { spans_beyond, ..self.section.clone() };

@@ -13,7 +13,7 @@ use std::ops::Range;
 /// Values of a support that vary.
 pub(super) const VARIED: usize = 5;
 
-/// Sleepers on either side whose supports are felt in a sleeper's window.
+/// Number of sleepers on either side whose supports affect a sleeper's window.
 pub(super) const NEIGHBOURS: usize = 9;
 
 /// Change of the dynamic stiffness at the rail seats: `[line][sleeper of the track]`.

@@ -1,10 +1,10 @@
-//! What a recording says where no name fits: an unknown dynamic stiffness under rail seats, between
-//! two of them or at the wheel.
+//! Port scan: test for an unknown dynamic stiffness under rail seats, between two of them or at the
+//! wheel.
 //!
-//! Whatever a sleeper, its railpad or its ballast have that the model lacks acts on the rail as an
-//! additional dynamic stiffness at the rail seat, free in every frequency; whatever links two
-//! sleepers, between their seats; whatever the vehicle has, at the wheel. Its trace is linear in
-//! that stiffness, so that the evidence for it has a closed form (docs/diagnosis.md, eq. 13).
+//! Left-out physics of a sleeper, its railpad or its ballast acts on the rail as an additional
+//! dynamic stiffness at the rail seat, free in every frequency; a link of two sleepers acts between
+//! their seats; physics of the vehicle acts at the wheel. The signature is linear in that
+//! stiffness, so that its evidence has a closed form (docs/diagnosis.md, eq. 13).
 
 mod bumps;
 mod filter;
@@ -28,20 +28,20 @@ pub struct UnknownElement {
     pub place: PortPlace,
     /// Logarithm of the evidence against the model without it, in nats.
     pub log_evidence: f64,
-    /// What the dynamic stiffness behaves like; none if like no element.
+    /// Element that the dynamic stiffness resembles, if any.
     pub behaviour: Option<Behaviour>,
     /// Its trace: whitened change of the log powers.
     pub change: DVector<f64>,
 }
 
-/// What recordings of a calibrated track are searched with for an unknown dynamic stiffness.
+/// Filters that search recordings of a calibrated track for an unknown dynamic stiffness.
 pub struct PortScan {
     filters: Vec<Filter>,
     centres_hz: Vec<f64>,
 }
 
 impl PortScan {
-    /// Works out the traces on a calibrated track.
+    /// Computes the signatures on a calibrated track.
     ///
     /// # Errors
     /// [`CalibrationError`] when the calibrated track makes no model.
@@ -105,7 +105,7 @@ impl PortScan {
     }
 }
 
-/// What each bump changes at every place.
+/// Signature of each bump at every place.
 fn traces(
     problem: &Problem<'_>,
     current: &Calibration,

@@ -39,8 +39,9 @@ impl PortPlace {
     }
 }
 
-/// Sleepers under which something unknown may be the same: the compared ones, and the same and others
-/// by their numbers in the whole track. A pattern ends with the compared sleepers, or goes on.
+/// Sleepers under which something unknown may be the same: the compared ones, and the same and
+/// others by their numbers in the whole track. A pattern ends with the compared sleepers, or
+/// continues.
 pub(super) fn seats_together(section: &Section) -> Vec<(Vec<usize>, Vec<usize>)> {
     let count = section.sleepers;
     let single = (0..count).map(|sleeper| vec![sleeper]);

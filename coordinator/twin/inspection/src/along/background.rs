@@ -1,4 +1,4 @@
-//! What a pass sounds like where nothing happens: a power spectral density that impacts don't move.
+//! Background of a pass: a power spectral density that impacts do not affect.
 
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;

@@ -1,4 +1,4 @@
-//! What sensor, recorder, clock and odometer did: never physics of the track.
+//! Faults of sensor, recorder, clock and odometer, not physics of the track.
 //!
 //! Owns `clipping`, `electrical_hum`, `gain_error` and `position_error`, passes that can't be used
 //! at all, and per pass what a model of the track must know of the chain: noise, gain, offset. A

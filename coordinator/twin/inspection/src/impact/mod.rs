@@ -1,7 +1,7 @@
 //! Short defects and waves of the rail's surface, detected from the passes alone.
 //!
 //! Owns impacts that repeat at a place (`squat`, the dip of a `rail_joint`) and `corrugation`.
-//! What repeats with the wheel is `wheel`'s.
+//! Effects that repeat with the wheel belong to `wheel`.
 
 mod corrugation;
 mod local;

@@ -1,4 +1,4 @@
-//! What each test found, as a finding with a sentence.
+//! Findings of each test, with a sentence.
 
 use crate::along::by_speed;
 use crate::chain::{Clipping, Gain, Hum, Offsets, Scale};

@@ -28,9 +28,9 @@ const AROUND_BLOW: f64 = 0.4;
 /// Result of an inspection.
 #[derive(Clone, Debug)]
 pub struct Inspection {
-    /// What was found: chain first, then wheel, then the rail's surface.
+    /// Findings: chain first, then wheel, then the rail's surface.
     pub findings: Vec<Finding>,
-    /// What was found too, but has a name that the catalogue lacks; see [`Inspection::forget`].
+    /// Findings whose kind is not in the catalogue; see [`Inspection::forget`].
     pub nameless: Vec<Finding>,
     /// The wheel's flat with the places of its blows, if it has one.
     pub flat: Option<Flat>,
@@ -150,7 +150,7 @@ fn unit(recording: &Recording) -> &'static str {
     if recording.gain_known() { "m/s2" } else { "in the unknown unit" }
 }
 
-/// What wheel and rail surface show.
+/// Findings on wheel and rail surface.
 fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     let circumference = wheel::nominal_circumference_m(recording);
     let flat = circumference.and_then(|length| wheel::flat(recording, length, EACH_TEST));

@@ -27,7 +27,7 @@ pub struct HeldOut {
     pub better: usize,
 }
 
-/// What a spectrum is expected to be: a smooth one, and orders above it.
+/// Expected spectrum: a smooth one with orders above it.
 struct OrderModel {
     /// Mean power by band of [`SMOOTH_HZ`], between the teeth.
     smooth: Vec<f64>,

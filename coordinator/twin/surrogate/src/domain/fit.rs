@@ -47,7 +47,7 @@ impl Bounds {
     }
 }
 
-/// What is to be fitted: observed coordinates and the precision of each.
+/// Observed coordinates and the precision of each.
 pub(super) struct Problem<'a> {
     pub(super) coordinates: &'a Coordinates,
     pub(super) observed: &'a [f64],

@@ -1,4 +1,4 @@
-//! What the library's own cases leave over, in windows and in means of windows.
+//! Residuals of the library's own cases, in windows and in means of windows.
 
 use super::coordinates::Coordinates;
 use crate::{Error, Split, TrainingSet};

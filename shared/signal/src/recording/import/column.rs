@@ -13,7 +13,7 @@ pub struct Column {
     pub unit: Option<String>,
 }
 
-/// What keeps a column from being numbers.
+/// Reason why a column is not numeric.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Oddity {
     /// The first value that is no number.

@@ -1,11 +1,11 @@
-//! What the columns of a foreign table mean: names, units, and what the file doesn't say.
+//! Layout of a table: names and units of its columns, and values missing in the file.
 
 use super::unit::{AccelerationUnit, PositionUnit, SpeedUnit, TimeUnit};
 use serde::Deserialize;
 use tracktwin_parameters::QuantityError;
 use tracktwin_parameters::quantity::{PLACE, SAMPLE_RATE, SPACING, SPEED, WHEEL_RADIUS};
 
-/// What the columns of the files mean, as a TOML file or flags say it.
+/// Meaning of the columns, from a TOML file or flags.
 ///
 /// The place of the wheel comes from `position`, else from the sum of `speed` (a column), else from
 /// `speed_km_h` at constant speed. The sample rate comes from `sample_rate_hz`, else from `time`.
