@@ -179,13 +179,17 @@ fn reason(url: &str, status: &Status) -> String {
     let reason = chain(status);
     let tls = url.starts_with("https:");
     let says = |words: &[&str]| words.iter().any(|it| reason.contains(it));
-    let hint = if says(&["UnknownIssuer"]) {
+    // Authorities that `tracktwin certs` makes have one name: of another one's certificate the
+    // signature is wrong.
+    let hint = if says(&["UnknownIssuer", "BadSignature"]) {
         "; it shows a certificate of another authority than --tls-ca"
     } else if tls && says(&["CertificateRequired", "connection closed", "broken pipe"]) {
         "; it may demand a certificate: --tls-cert and --tls-key"
     } else if tls && says(&["InvalidContentType"]) {
         "; it may speak plain text: http://"
-    } else if says(&["frame with invalid size", "broken pipe"]) {
+    } else if tls && says(&["Connection reset"]) {
+        "; it may speak plain text, http://, or demand a certificate: --tls-cert and --tls-key"
+    } else if says(&["frame with invalid size", "broken pipe", "connection closed"]) {
         "; it may speak TLS: https://"
     } else if says(&["compression flag"]) {
         "; this port may be its dashboard's"
