@@ -179,13 +179,17 @@ fn reason(url: &str, status: &Status) -> String {
     let reason = chain(status);
     let tls = url.starts_with("https:");
     let says = |words: &[&str]| words.iter().any(|it| reason.contains(it));
-    let remedy = if says(&["UnknownIssuer"]) {
+    // Authorities that `tracktwin certs` makes have one name: of another one's certificate the
+    // signature is wrong.
+    let remedy = if says(&["UnknownIssuer", "BadSignature"]) {
         "; its certificate is not signed by the authority of --tls-ca"
     } else if tls && says(&["CertificateRequired", "connection closed", "broken pipe"]) {
         "; it may require a certificate: use --tls-cert and --tls-key"
     } else if tls && says(&["InvalidContentType"]) {
         "; it may use plain text: try http://"
-    } else if says(&["frame with invalid size", "broken pipe"]) {
+    } else if tls && says(&["Connection reset"]) {
+        "; it may use plain text, http://, or require a certificate: use --tls-cert and --tls-key"
+    } else if says(&["frame with invalid size", "broken pipe", "connection closed"]) {
         "; it may use TLS: try https://"
     } else if says(&["compression flag"]) {
         "; this may be the port of its dashboard"

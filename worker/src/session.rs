@@ -200,8 +200,7 @@ impl Session {
                     if request.cases.is_empty() {
                         break;
                     }
-                    let what =
-                        format!("{} results were damaged in transmission", request.cases.len());
+                    let what = format!("{} results arrived damaged", request.cases.len());
                     if !goes_again(&mut damaged, &what).await {
                         step.fail(&what);
                         break;

@@ -252,7 +252,9 @@ fn flag(evaluation: &mut Evaluation, lost: &LossOfContact, passes: usize) {
 fn usable_with_notes(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
     let (recording, left_out) = usable(recording)?;
     let notes = [recording.doubts.clone(), left_out].concat();
-    notes.iter().for_each(|line| println_stderr(line));
+    for line in &notes {
+        println_stderr(line);
+    }
     Ok((recording, notes))
 }
 

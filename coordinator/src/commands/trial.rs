@@ -97,20 +97,16 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let digest = trial.begin().await.map_err(stop)?;
     println_stdout(&format!("sealed: {cases} truths, SHA-256 of seals.sha256 {digest}"));
     let done = trial.answered().await.map_err(stop)?;
-    println_stdout(&format!(
-        "trial {} in {}: {done} of {cases} scored",
-        trial.id(),
-        trial.library.name()
-    ));
+    let (id, library) = (trial.id(), trial.library.name());
+    println_stdout(&format!("trial {id} in {library}: {done} of {cases} scored"));
 
     let mut progress = Progress::begin("diagnosing", done, u64::from(cases));
     let answered = trial.answer(|done, remark| progress.at(done, remark)).await;
     progress.end();
     let summary = answered.map_err(stop)?;
-    summary
-        .rows
-        .iter()
-        .for_each(|row| println_stdout(&format!("{}: {} ({})", row.measure, row.value, row.goal)));
+    for row in &summary.rows {
+        println_stdout(&format!("{}: {} ({})", row.measure, row.value, row.goal));
+    }
     println_stdout(&format!("tables: {}", trial.folder.join("trial.md").display()));
     let missed = summary.rows.iter().any(|row| row.reached == Some(false));
     if missed { Err(Stop::Negative) } else { Ok(()) }

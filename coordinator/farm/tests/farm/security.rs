@@ -98,9 +98,10 @@ async fn a_coordinator_of_another_authority_or_with_an_expired_certificate_gets_
     let ours = certificates(now);
     let others = certificates(now);
     let expired = certificates(now - time::Duration::days(3));
-    for (shown, trusted, fault) in
-        [(&others, &ours, "another authority than --tls-ca"), (&expired, &expired, "expired")]
-    {
+    for (shown, trusted, fault) in [
+        (&others, &ours, "not signed by the authority of --tls-ca"),
+        (&expired, &expired, "expired"),
+    ] {
         let coordinator = guarded(shown.path()).await;
         let credentials = Credentials {
             token: Some(Token::new(&token(shown.path())).unwrap()),
@@ -148,8 +149,7 @@ async fn a_worker_that_speaks_tls_to_plain_text_or_the_other_way_round_is_told_s
     let (plain, guarded) = (coordinator().await, guarded(folder).await);
     let as_tls = work_at(plain.url.replace("http:", "https:"), credentials()).await;
     let as_plain = work_at(guarded.url.replace("https:", "http:"), Credentials::default()).await;
-    for (answer, hint) in
-        [(as_tls, "may speak plain text: http://"), (as_plain, "may speak TLS: https://")]
+    for (answer, hint) in [(as_tls, "may use plain text"), (as_plain, "may use TLS: try https://")]
     {
         let error = answer.unwrap_err().to_string();
         assert!(error.contains(hint), "{error}");

@@ -13,8 +13,11 @@ use tracktwin_reference_simulator::{Scene, SleeperTruth, TruthError, simulate};
 /// Standard deviation of the logarithm from sleeper to sleeper.
 const SCATTER: [f64; 3] = [0.05, 0.15, 0.3];
 
+/// Reads a parameter of a sleeper.
+type TruthOf = fn(&SleeperTruth) -> f64;
+
 /// Parameters whose truth differs from sleeper to sleeper, and where a scene has them.
-const COMPARED: [(Parameter, fn(&SleeperTruth) -> f64); 2] = [
+const COMPARED: [(Parameter, TruthOf); 2] = [
     (Parameter::RailpadStiffness, |sleeper| sleeper.railpad_stiffness_n_m),
     (Parameter::BallastStiffness, |sleeper| sleeper.ballast_stiffness_n_m),
 ];

@@ -18,8 +18,11 @@ use tracktwin_track::model::{ModelError, Support, TrackModel};
 /// Relative step by which stiffnesses are varied for derivatives.
 const STEP: f64 = 1e-4;
 
+/// Varies a support by [`STEP`].
+type Vary = fn(&mut Support);
+
 /// What is varied of a support: which unknown it is, and its step.
-const VARIATIONS: [(Quantity, fn(&mut Support)); VARIED] = [
+const VARIATIONS: [(Quantity, Vary); VARIED] = [
     (Quantity::Own(Own::BallastStiffness), |it| it.ballast_stiffness *= 1.0 + STEP),
     (Quantity::Own(Own::RailpadStiffness), |it| it.railpad_stiffness *= 1.0 + STEP),
     (Quantity::Common(Common::SleeperBendingStiffness), |it| {

@@ -217,7 +217,7 @@ mod tests {
         let usual = values.clone();
         (3..8).for_each(|sleeper| values[railpad + sleeper] -= 1.1);
         let far = Far::new(&unknowns, &values);
-        assert_eq!(far.runs, [3..8]);
+        assert_eq!(far.runs, vec![3..8]);
         assert!((&far.values - usual).amax() < 0.3);
         let section = forward().section;
         let on_runs = far.on_runs(&candidates(&section));
