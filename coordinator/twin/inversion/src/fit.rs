@@ -26,9 +26,9 @@ const MISPLACED: f64 = 0.35;
 
 /// Step of the logarithm of the mean railpad stiffness along the posterior's valley, most steps on either
 /// side, and the log weight in nats below the highest that is negligible.
-const STEP: f64 = 0.15;
-const STEPS_MAX: u32 = 6;
-const NEGLIGIBLE: f64 = 4.0;
+const STEP: f64 = 0.2;
+const STEPS_MAX: u32 = 5;
+const NEGLIGIBLE: f64 = 3.0;
 
 /// Standard deviation of the logarithm of a mean that is held.
 const HELD: f64 = 0.02;
