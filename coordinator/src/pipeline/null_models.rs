@@ -72,7 +72,9 @@ pub async fn of(
         return Ok(null);
     }
     let simulated = compute(|| {
-        NullModel::simulate(forward, &grid, u64::from(SURFACES), SEED, |done| progress(done as u64))
+        NullModel::simulate(forward, &grid, u64::from(SURFACES), SEED, &|done| {
+            progress(done as u64)
+        })
     });
     let null = simulated?;
     if let Some(library) = library {

@@ -70,7 +70,7 @@ impl NullModel {
         values: &DVector<f64>,
         surfaces: u64,
         seed: u64,
-        progress: impl Fn(f64) + Sync,
+        progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Self, NullError> {
         let values = plain(forward, values);
         let level = values[forward.unknowns.level().start].exp();

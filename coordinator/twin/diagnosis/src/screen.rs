@@ -36,7 +36,7 @@ pub fn templates(
     problem: &Problem<'_>,
     calibration: &Calibration,
     candidates: &[Candidate],
-    progress: impl Fn() + Sync,
+    progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<Template>, CalibrationError> {
     let Problem { forward, observation, .. } = *problem;
     let accepted = problem.extensions(&calibration.values)?;

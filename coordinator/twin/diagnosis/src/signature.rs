@@ -28,7 +28,7 @@ pub fn signature(
     section.in_model(&extension).build(&section.design, section.spans())?;
     let (kind, trials) = (extension.kind()?, vec![Vec::new()]);
     let candidate = Candidate { kind, extension, free: Vec::new(), trials };
-    let traces = templates(&problem, &problem.at(values)?, &[candidate], || ())?;
+    let traces = templates(&problem, &problem.at(values)?, &[candidate], &|| ())?;
     let trace = traces.first().ok_or(CalibrationError::NotFinite)?;
     Ok(trace.detectability.max(0.0).sqrt())
 }

@@ -14,7 +14,7 @@ fn differences_are_those_of_the_version_of_null_models() {
     let section = Section::new(TrackDesign::v_track(), 3, 1.0);
     let forward = Forward::new(section, Bands::new(100.0, 3300.0), &[10.0], vec![0.0]);
     let values = NullModel::grid_values(&forward, &forward.unknowns.typical());
-    let null = NullModel::simulate(&forward, &values, 1, 7, |_| ()).unwrap();
+    let null = NullModel::simulate(&forward, &values, 1, 7, &|_| ()).unwrap();
     let now = null.differences.concat();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/null_model.json");
     if std::env::var_os(WRITE).is_some() {

@@ -36,7 +36,7 @@ pub(super) fn fit(
     current: &Calibration,
     all: &[Candidate],
     starts: Vec<(&Template, DVector<f64>)>,
-    progress: &(impl Fn(Stage, f64) + Sync),
+    progress: &(dyn Fn(Stage, f64) + Sync),
 ) -> Vec<Fitted> {
     let count = starts.len() as f64;
     progress(Stage::Refinement, 0.0);

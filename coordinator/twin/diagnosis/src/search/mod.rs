@@ -167,7 +167,7 @@ pub fn search(
     null: &NullModel,
     start: DVector<f64>,
     all: &[Candidate],
-    progress: &(impl Fn(Stage, f64) + Sync),
+    progress: &(dyn Fn(Stage, f64) + Sync),
 ) -> Result<Search, CalibrationError> {
     progress(Stage::Baseline, 0.0);
     let setting = Setting::new(prepared, null);
@@ -240,7 +240,7 @@ impl Search {
         setting: &Setting<'_>,
         all: &[Candidate],
         densities: &mut Vec<Vec<f64>>,
-        progress: &(impl Fn(Stage, f64) + Sync),
+        progress: &(dyn Fn(Stage, f64) + Sync),
     ) -> Result<bool, CalibrationError> {
         let (accepted, observation) = (self.accepted.clone(), self.observation.clone());
         let forward = &setting.prepared.forward;

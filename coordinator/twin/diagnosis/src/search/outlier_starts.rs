@@ -139,7 +139,7 @@ impl OutlierStarts {
             return Ok(Self { far, templates: Vec::new(), typical });
         }
         let smoothed = problem.at(&far.values)?;
-        let mut tried = templates(problem, &smoothed, &there, || {})?;
+        let mut tried = templates(problem, &smoothed, &there, &|| {})?;
         tried.sort_by(|a, b| b.along(&smoothed.residual).total_cmp(&a.along(&smoothed.residual)));
         let kind = |template: &Template| there[template.candidate].kind.physics;
         let mut best: Vec<Template> = Vec::new();

@@ -148,16 +148,16 @@ impl<'a> Setting<'a> {
         all: &[Candidate],
         threshold: EvidenceThreshold<'_>,
         hopeless: &[&str],
-        progress: &(impl Fn(Stage, f64) + Sync),
+        progress: &(dyn Fn(Stage, f64) + Sync),
     ) -> Result<(Round, PortScan), CalibrationError> {
         let trials: usize = all.iter().map(|candidate| candidate.trials.len()).sum();
         let done = AtomicUsize::new(0);
-        let mut screened_with = templates(problem, current, all, || {
+        let mut screened_with = templates(problem, current, all, &|| {
             let done = done.fetch_add(1, Ordering::Relaxed);
             progress(Stage::Screening, done as f64 / trials as f64);
         })?;
         let runs = runs(&screened_with, all, current);
-        for mut template in templates(problem, current, &runs, || ())? {
+        for mut template in templates(problem, current, &runs, &|| ())? {
             template.candidate += all.len();
             screened_with.push(template);
         }
