@@ -1,5 +1,6 @@
 //! The page of an evaluated recording.
 
+use crate::UNDER_LOAD;
 use crate::inversion_page;
 use crate::map_picture::map_charts;
 use crate::spectrum_picture::{chosen, spectrum_chart};
@@ -50,7 +51,7 @@ pub fn evaluation_page(
         h2 { "Estimates" }
         p.note { "Mean ± one standard deviation. Rows in italics and their matches are not valid. \
              Match: mean distance of the best library entry, in dB and as mean absolute \
-             percentage error of the logarithm (paper, eq. 10)." }
+             percentage error of the levels above 1 µm/s² (paper, eq. 10). " (UNDER_LOAD) }
         div.scroll { (table(evaluation)) }
         h2 { "Provenance" }
         (provenance(evaluation, command))

@@ -1,7 +1,7 @@
 //! The page of a recording evaluated by the physics, and the same beside a library's models.
 
-use crate::capital;
 use crate::evaluation_page::maps_at;
+use crate::{UNDER_LOAD, capital};
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, significant};
 use tracktwin_evaluation::{Estimate, Estimates, Evaluation};
@@ -38,7 +38,7 @@ pub fn inversion_page(
              sleepers. The synchrosqueezed transform (SSWT) shows the same power as the wavelet \
              transform (CWT), sharpened in frequency."))
         h2 { "Estimates" }
-        p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the residual over its expectation; above 2 the track model does not explain the recording there." }
+        p.note { "Mean ± one standard deviation. Rows in italics are not valid. Misfit: mean square of the residual over its expectation; above 2 the track model does not explain the recording there. " (UNDER_LOAD) }
         div.scroll { (table(inversion)) }
         h2 { "Provenance" }
         (provenance(inversion, command))

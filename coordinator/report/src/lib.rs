@@ -22,6 +22,9 @@ pub use models_page::models_page;
 pub use receptance::{ReceptanceCurve, receptance_chart};
 pub use reproduction_page::reproduction_page;
 
+/// What an estimate of railpad stiffness is, for a reader who knows railpads from a test bench.
+const UNDER_LOAD: &str = "Railpad stiffness is the dynamic stiffness under the load of the wheel. A railpad that stiffens with load is softer without it; recordings with one load do not show by how much.";
+
 /// With a capital first letter.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();

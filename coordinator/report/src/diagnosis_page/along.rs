@@ -2,6 +2,7 @@
 
 use super::quantity::{Unit, rounded_pair, signed};
 use super::words::{accepted, addition, is_chain, numbers, physics};
+use crate::UNDER_LOAD;
 use maud::{Markup, html};
 use tracktwin_diagnosis::{BeforeAfter, Diagnosis, Estimate, SleeperValues};
 use tracktwin_drawing::{Axis, Chart, Shown, figure};
@@ -83,7 +84,7 @@ fn mark_places(chart: &mut Chart, diagnosis: &Diagnosis) {
 }
 
 fn caption(diagnosis: &Diagnosis) -> String {
-    let band = "Bands are two standard deviations.";
+    let band = format!("Bands are two standard deviations. {UNDER_LOAD}");
     match addition(diagnosis) {
         None => format!("Parameters of the re-tuned track model at every sleeper. {band}"),
         Some(with) if accepted(diagnosis).all(|h| is_chain(&h.physics)) => format!(

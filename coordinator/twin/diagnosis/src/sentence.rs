@@ -16,13 +16,13 @@ const RIVAL_MIN: f64 = 0.05;
 /// Sleepers that are named one by one.
 const NAMED_MAX: usize = 3;
 
-/// Sentence on the hypotheses: what, where, how probable, and the bias removed; for a section of
-/// this number of sleepers and this probability that nothing is left out.
+/// Sentence on the hypotheses: what, where, how probable, and the bias removed; for a section with
+/// these sleepers and this probability that nothing is left out.
 pub(crate) fn sentence(
     verdict: Verdict,
     hypotheses: &[Hypothesis],
     nothing_left_out: f64,
-    sleepers: usize,
+    sleepers: &[String],
     fit: &Fit,
     bias: &BTreeMap<String, BeforeAfter<f64>>,
 ) -> String {
@@ -52,7 +52,7 @@ pub(crate) fn sentence(
 }
 
 /// Place, summary, name and probability.
-fn named(hypothesis: &Hypothesis, sleepers: usize) -> String {
+fn named(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
     let Hypothesis { physics, probability, .. } = hypothesis;
     let summary = Kind::from_name(physics)
         .map_or_else(|| unknown(hypothesis), |kind| kind.summary.to_owned());
@@ -102,7 +102,7 @@ fn capital(text: &str) -> String {
     letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect()
 }
 
-fn place(hypothesis: &Hypothesis, sleepers: usize) -> String {
+fn place(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
     match &hypothesis.location {
         Some(location) if location.sleepers.len() <= NAMED_MAX => {
             let middle_m = 0.5 * (location.x_m[0] + location.x_m[1]);
@@ -111,11 +111,20 @@ fn place(hypothesis: &Hypothesis, sleepers: usize) -> String {
         Some(location) if is_stretch(&hypothesis.physics) => {
             format!("from {:.2} to {:.2} m: ", location.x_m[0], location.x_m[1])
         }
-        Some(location) if location.sleepers.len() < sleepers => {
-            format!("at {}: ", location.sleepers.join(", "))
+        Some(location) if location.sleepers.len() < sleepers.len() => {
+            format!("at {}: ", together(&location.sleepers, sleepers))
         }
         _ if hypothesis.port.as_deref() == Some("rail_seat") => "at all sleepers: ".to_owned(),
         _ => String::new(),
+    }
+}
+
+/// Names of some of all sleepers, of a run only the first and the last.
+fn together(some: &[String], all: &[String]) -> String {
+    if all.windows(some.len()).any(|run| run == some) {
+        format!("{} to {}", some[0], some[some.len() - 1])
+    } else {
+        some.join(", ")
     }
 }
 
@@ -187,7 +196,7 @@ mod tests {
         let (score, held_out_gain_nats) = (String::new(), BTreeMap::new());
         let fit = Fit { score, before: scores, after: scores, held_out_gain_nats };
         let said = |nothing_left_out: f64| {
-            sentence(Verdict::Consistent, &[], nothing_left_out, 25, &fit, &BTreeMap::new())
+            sentence(Verdict::Consistent, &[], nothing_left_out, &track(), &fit, &BTreeMap::new())
         };
         assert!(
             said(0.92).starts_with("Simulation and recording agree (92 %): with every sleeper")
@@ -195,6 +204,18 @@ mod tests {
         let doubt = said(0.03);
         assert!(doubt.starts_with("Nothing can be named: with every sleeper"), "{doubt}");
         assert!(doubt.ends_with("Yet something seems left out (97 %)."), "{doubt}");
+    }
+
+    fn track() -> Vec<String> {
+        (7..32).map(|number| format!("SN{number}")).collect()
+    }
+
+    #[test]
+    fn a_run_of_sleepers_is_named_by_its_ends() {
+        let all = track();
+        assert_eq!(together(&all[5..19], &all), "SN12 to SN25");
+        let every_fourth: Vec<String> = all.iter().step_by(8).cloned().collect();
+        assert_eq!(together(&every_fourth, &all), "SN7, SN15, SN23, SN31");
     }
 
     #[test]
@@ -208,7 +229,7 @@ mod tests {
             after: scores,
             held_out_gain_nats: BTreeMap::from([("10".to_owned(), 12.0)]),
         };
-        let said = sentence(Verdict::LeftOutPhysics, &two, 0.0, 25, &fit, &BTreeMap::new());
+        let said = sentence(Verdict::LeftOutPhysics, &two, 0.0, &track(), &fit, &BTreeMap::new());
         assert_eq!(
             said,
             "A flat of the wheel's tread, met once a turn (wheel_flat, 99 %). Also: at SN9, 1.12 m: a \
@@ -227,7 +248,7 @@ mod tests {
             ..hypothesis("hanging_sleeper", Some(at))
         };
         assert_eq!(
-            named(&first, 25),
+            named(&first, &track()),
             "at SN14, 1.75 m: a support of sleepers that is lost, soft or layered (95 %); most \
              probably a sleeper hangs on the rail over a gap and meets its ballast only when it closes \
              (hanging_sleeper, 80 %)."
@@ -255,13 +276,13 @@ mod tests {
             ..hypothesis("unknown_physics", Some(at))
         };
         assert_eq!(
-            capital(&named(&absorber, 25)),
+            capital(&named(&absorber, &track())),
             "At SN24, 3.00 m: something under the rail seat that no kind in the catalogue explains; it \
              acts like a mass of 0.41 kg on a spring, at 900 Hz (unknown_physics, 99 %)."
         );
         let everywhere = Hypothesis { location: None, behaviour: None, ..absorber };
         assert_eq!(
-            named(&everywhere, 25),
+            named(&everywhere, &track()),
             "at all sleepers: something under the rail seat that no kind in the catalogue explains \
              (unknown_physics, 99 %)."
         );

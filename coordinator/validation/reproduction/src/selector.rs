@@ -108,8 +108,8 @@ fn amount(compared: &mut Compared, curves: &[Curve], sizes: &[usize]) {
             format!("{first:.1} % at {}, {last:.1} % at {}", sizes[0], sizes[sizes.len() - 1]),
         ],
         Verdict::CannotTell,
-        "a percentage of a logarithm depends on its base and on the unit of the power, which the \
-         paper does not give; and its measured cases are sleepers, ours are simulations with a \
+        "a percentage of a level depends on its reference, which the paper does not give; ours is \
+         1 um/s2 (ISO 1683). The paper's measured cases are sleepers, ours are simulations with a \
          surface of their own",
     );
 }
@@ -128,9 +128,8 @@ fn hardest(compared: &mut Compared, curves: &[Curve]) {
         "LF1 is harder to match than LF2 to LF4",
         ["LF1 largest".to_owned(), format!("{} %", ours.join(", "))],
         all(curves[2..].iter().map(harder)),
-        "the largest library, differences of the same measured cases beyond two standard errors; a \
-         percentage of a logarithm grows without bound where the power comes near to its unit, \
-         wherever that is in frequency",
+        "the largest library, differences of the same measured cases beyond two standard errors; \
+         percentages are of the level in dB above 1 um/s2 (ISO 1683)",
     );
 }
 

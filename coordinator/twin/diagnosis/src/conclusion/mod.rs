@@ -80,9 +80,10 @@ impl Evidence<'_> {
         let levels = self.levels()?;
         let fit = self.fit();
         let bias_removed = self.bias_removed(&hypotheses);
-        let sleepers = self.prepared.forward.section.sleepers;
+        let count = self.prepared.forward.section.sleepers;
+        let sleepers: Vec<String> = (0..count).map(|sleeper| self.id(sleeper)).collect();
         let nothing_left_out = self.nothing(&hypotheses).min(most);
-        let said = sentence(verdict, &hypotheses, nothing_left_out, sleepers, &fit, &bias_removed);
+        let said = sentence(verdict, &hypotheses, nothing_left_out, &sleepers, &fit, &bias_removed);
         let sentence = said + &airborne(self.inspection);
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
