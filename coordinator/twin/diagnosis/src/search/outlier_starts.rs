@@ -42,21 +42,23 @@ impl Far {
         let mut far = Self { values: values.clone(), sleepers: Vec::new(), runs: Vec::new() };
         for field in [unknowns.ballast(), unknowns.railpad()] {
             let stiffness = &values.as_slice()[field.clone()];
+            let usual = |others: &mut dyn Iterator<Item = usize>| {
+                median(others.map(|other| stiffness[other]).collect())
+            };
+            if let Some(run) = run_apart(stiffness) {
+                let usual = usual(&mut (0..field.len()).filter(|sleeper| !run.contains(sleeper)));
+                run.clone().for_each(|sleeper| far.values[field.start + sleeper] = usual);
+                far.runs.push(run);
+                continue;
+            }
             for sleeper in 0..field.len() {
-                let near =
-                    sleeper.saturating_sub(NEIGHBOURS)..(sleeper + NEIGHBOURS + 1).min(field.len());
-                let others = near.filter(|other| *other != sleeper);
-                let usual = median(others.map(|other| stiffness[other]).collect());
+                let last = (sleeper + NEIGHBOURS + 1).min(field.len());
+                let near = sleeper.saturating_sub(NEIGHBOURS)..last;
+                let usual = usual(&mut near.filter(|other| *other != sleeper));
                 if (stiffness[sleeper] - usual).abs() > FAR {
                     far.values[field.start + sleeper] = usual;
                     far.sleepers.push(sleeper);
                 }
-            }
-            if let Some(run) = run_apart(stiffness) {
-                let others = (0..field.len()).filter(|sleeper| !run.contains(sleeper));
-                let usual = median(others.map(|other| stiffness[other]).collect());
-                run.clone().for_each(|sleeper| far.values[field.start + sleeper] = usual);
-                far.runs.push(run);
             }
         }
         far.runs.dedup();
