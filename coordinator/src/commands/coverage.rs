@@ -40,7 +40,7 @@ pub(super) struct Arguments {
     /// Method whose estimates are compared with the truth.
     #[arg(long, value_enum, default_value_t = Method::Gp)]
     method: Method,
-    /// Folder of trained models, written by `train` or `run`.
+    /// Folder of trained models, written by `train` or `run`; required with `--method gp`.
     #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"))]
     models: Option<PathBuf>,
     /// Library of the models; with `--method inversion` it stores null simulations and is created
@@ -51,13 +51,13 @@ pub(super) struct Arguments {
     /// the number of tracks per unevenness.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     tracks: u32,
-    /// Number of sleepers of a track.
+    /// Number of sleepers of a track (`gp` only).
     #[arg(long, value_name = "N", default_value_t = 14, value_parser = clap::value_parser!(u32).range(1..=200))]
     sleepers: u32,
     /// Seed of parameters and surfaces.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Adds a track with this value and all others in the middle of their ranges:
+    /// Add a track with this value and all others in the middle of their ranges (`gp` only), e.g.
     /// `ballast_stiffness_N_m=6e7`; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<Setting>,

@@ -23,10 +23,16 @@ use tracktwin_track::extension;
 
 /// Arguments of `diagnose`.
 #[derive(Args)]
-#[command(
-    after_help = "Exit codes: 0 consistent, 1 left-out physics or a measuring-chain fault was \
-        found, 2 wrong input, 3 failure."
-)]
+#[command(after_help = "\
+Example:
+  tracktwin diagnose ride --library sqlite:null.sqlite --out diagnosis
+
+The recording must be of V-Track. With --library, null simulations are stored and used again.
+
+Next: `tracktwin extend CAMPAIGN.toml --from diagnosis/diagnosis.json`
+
+Exit codes: 0 consistent, 1 left-out physics or a measuring-chain fault was found, 2 wrong input,
+3 failure.")]
 pub(super) struct Arguments {
     /// The recording: a folder with `recording.json` and one file per pass.
     recording: PathBuf,

@@ -23,10 +23,16 @@ const FACTOR_MIN: f64 = 2.0;
 
 /// Arguments of `extend`.
 #[derive(Args)]
-#[command(
-    after_help = "Next: `tracktwin run NEW.toml --library URL --out DIR` simulates the campaign \
-and trains models with which `tracktwin evaluate` gives stiffness without the bias."
-)]
+#[command(after_help = "\
+Example:
+  tracktwin extend mine.toml --from diagnosis/diagnosis.json
+
+The campaign must be of V-Track. Faults of the measuring chain are not added.
+
+Next: `tracktwin run mine-extended.toml --library URL --out DIR` simulates the campaign and trains
+models. With these, `tracktwin evaluate` gives stiffness without the bias that this physics causes.
+
+Exit codes: 0 done; 2 wrong input, or the diagnosis accepted no physics; 3 failure.")]
 pub(super) struct Arguments {
     /// Campaign file (TOML) to extend.
     campaign: PathBuf,
