@@ -200,7 +200,8 @@ async fn refuse_others(library: &Library, id: &str, indices: &[u32]) -> Result<(
             None => "does not exist",
         };
         return Err(anyhow!(
-            "{id}: case {index} {is}; only cases that were given up can be retried"
+            "{id}: case {index} {is}; only cases that were given up can be retried; list them with \
+             `tracktwin library status`"
         ))
         .or_input();
     }

@@ -107,12 +107,12 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
         return Ok(());
     }
     println_stdout(
-        "scatter  parameter          sleepers  median |ln error|  in the 90 % interval  correlation  not valid",
+        "unevenness  parameter          sleepers  median |ln error|  in the 90 % interval  correlation  not valid",
     );
     for row in &rows {
         for (parameter, score) in &row.estimates {
             println_stdout(&format!(
-                "{:>5.0} %  {:18} {:>8}  {:>17.3}  {:>18.0} %  {:>11.2}  {:>7.1} %",
+                "{:>8.0} %  {:18} {:>8}  {:>17.3}  {:>18.0} %  {:>11.2}  {:>7.1} %",
                 100.0 * row.scatter,
                 parameter.label(),
                 score.sleepers,
@@ -161,7 +161,7 @@ fn tables(rows: &[Row]) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let mut lines = vec![format!(
         "{:width$}  tracks  any sleeper outside  most outside  named to widen first",
-        "Called outside the library"
+        "Flagged as outside the library"
     )];
     for row in rows {
         let named: Vec<_> =
@@ -180,7 +180,7 @@ fn tables(rows: &[Row]) -> String {
     let heads = columns.iter().map(|parameter| format!("{:>16}", parameter.symbol()));
     lines.push(String::new());
     lines.push(format!(
-        "{:width$}{}  assumed scatter",
+        "{:width$}{}  assumed unevenness",
         "Inside the 90 % interval",
         heads.collect::<String>()
     ));
@@ -217,7 +217,7 @@ fn shortfalls(rows: &[Row]) -> impl Iterator<Item = String> + '_ {
 fn name(kind: Kind) -> String {
     match kind {
         Kind::Inside { scatter } if scatter <= 0.0 => "inside, even".to_owned(),
-        Kind::Inside { scatter } => format!("inside, {:.0} % scatter", 100.0 * scatter),
+        Kind::Inside { scatter } => format!("inside, {:.0} % unevenness", 100.0 * scatter),
         Kind::Beyond { parameter, side: Side::Low } => format!("{parameter} 30 % below"),
         Kind::Beyond { parameter, side: Side::High } => format!("{parameter} 30 % above"),
         Kind::Set { parameter, value } => format!("{parameter} = {value:e}"),

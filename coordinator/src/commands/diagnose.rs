@@ -90,7 +90,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         let record = provenance::diagnosis(&diagnosis, json);
         if let Err(error) = library.record_diagnosis(record).await {
             // The diagnosis in the folder is complete nevertheless.
-            tracing::warn!("cannot store the diagnosis in the library: {error:?}");
+            tracing::warn!(
+                error = &error as &dyn std::error::Error,
+                "the files are complete, but the diagnosis cannot be stored in the library"
+            );
         }
     }
     println_stdout(&diagnosis.sentence);
@@ -134,7 +137,9 @@ async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<Tr
     let campaign = library
         .campaign(models.campaign())
         .await
-        .context("the models belong to another library; train models on this one")
+        .context(
+            "the models belong to another library; give their library, or train models on this one",
+        )
         .or_input()?;
     Ok(pipeline::train::experiment(&campaign).or_input()?.design)
 }

@@ -240,7 +240,10 @@ fn write(
 async fn keep(library: &Library, evaluation: &Evaluation) {
     if let Err(error) = library.record_evaluation(provenance::evaluation(evaluation)).await {
         // The evaluation in the folder is complete, even if the library is read-only.
-        tracing::warn!("cannot store the evaluation in the library: {error:?}");
+        tracing::warn!(
+            error = &error as &dyn std::error::Error,
+            "the files are complete, but the evaluation cannot be stored in the library"
+        );
     }
 }
 

@@ -91,8 +91,8 @@ fn check_design(path: &Path, campaign: &Campaign) -> anyhow::Result<()> {
     let design = &campaign.definition.experiment.design;
     compare_designs(design, &TrackDesign::v_track()).map_err(|other| {
         anyhow!(
-            "{}: preset: the campaign is of another track than V-Track ({} {}, V-Track's {}); what a \
-             diagnosis found is of V-Track",
+            "{}: preset: the campaign is of another track than V-Track ({} {}, V-Track's {}); a \
+             diagnosis is of V-Track: extend a campaign of V-Track",
             path.display(),
             other.quantity,
             other.found(),
@@ -103,10 +103,14 @@ fn check_design(path: &Path, campaign: &Campaign) -> anyhow::Result<()> {
 
 fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {
     let name = path.display();
-    let diagnosis: Diagnosis =
-        serde_json::from_slice(&read(path)?).with_context(|| format!("{name}: not a diagnosis"))?;
+    let diagnosis: Diagnosis = serde_json::from_slice(&read(path)?).with_context(|| {
+        format!("{name}: not a diagnosis; give the diagnosis.json of `tracktwin diagnose`")
+    })?;
     if diagnosis.format != FORMAT {
-        return Err(anyhow!("{name}: format: {:?} is not {FORMAT:?}", diagnosis.format));
+        return Err(anyhow!(
+            "{name}: format: {:?} is not {FORMAT:?}; repeat the diagnosis with this version",
+            diagnosis.format
+        ));
     }
     Ok(diagnosis)
 }
