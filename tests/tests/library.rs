@@ -105,7 +105,7 @@ fn a_statement_that_would_write_is_refused_in_one_line_and_changes_nothing() {
         let answer = sql(statement, &library, "table");
         assert_eq!(answer.code, Some(2), "{statement}: {}", answer.err);
         assert_eq!(answer.err.trim_end().lines().count(), 1, "{}", answer.err);
-        assert!(answer.err.contains("only asks"), "{}", answer.err);
+        assert!(answer.err.contains("only reads"), "{}", answer.err);
         assert!(answer.out.is_empty(), "{}", answer.out);
     }
     assert_eq!(digest(&library), before);

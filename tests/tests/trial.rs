@@ -52,7 +52,7 @@ fn a_node_that_is_killed_loses_its_case_to_another_and_each_case_has_one_answer(
     let arguments = arguments("first");
     let again = run(PROGRAM, &arguments.iter().map(String::as_str).collect::<Vec<_>>());
     assert!(matches!(again.code, Some(0 | 1)), "{}", again.err);
-    assert!(again.out.contains("2 of 2 answered"), "{}", again.out);
+    assert!(again.out.contains("2 of 2 scored"), "{}", again.out);
     assert_eq!(std::fs::read_to_string(path("first/scores.jsonl")).unwrap(), scores);
 }
 

@@ -64,7 +64,7 @@ struct Arguments {
     /// Number of cores [default: all].
     #[arg(long, value_name = "N", env = "TRACKTWIN_CORES", value_parser = cores)]
     cores: Option<NonZeroUsize>,
-    /// Exit with code 0 after this time without work.
+    /// Exit with code 0 after this time without work [default: never].
     #[arg(long, value_name = "SECONDS", env = "TRACKTWIN_IDLE_EXIT", value_parser = seconds)]
     idle_exit: Option<u64>,
     /// Exit with code 3 after this time without a response from a coordinator [default: never; with

@@ -59,7 +59,7 @@ pub enum LibraryError {
         folder: PathBuf,
     },
     /// The file or database is something else.
-    #[error("library {library}: not a tracktwin library")]
+    #[error("library {library}: not a tracktwin library; correct the path or the database")]
     NotALibrary {
         /// The library.
         library: String,
@@ -73,7 +73,10 @@ pub enum LibraryError {
         reason: String,
     },
     /// There is no server.
-    #[error("library {library}: the server cannot be reached")]
+    #[error(
+        "library {library}: the server cannot be reached; check host and port, and that the \
+             server runs"
+    )]
     Unreachable {
         /// The library.
         library: String,
@@ -94,25 +97,28 @@ pub enum LibraryError {
         known: i64,
     },
     /// Another process hands out its cases.
-    #[error("library {library}: another process is running a campaign on it")]
+    #[error(
+        "library {library}: another process is running a campaign on it; stop it, or wait until \
+             it ends"
+    )]
     InUse {
         /// The library.
         library: String,
     },
     /// There is no such campaign.
-    #[error("the library has no campaign {id}")]
+    #[error("the library has no campaign {id}; list the campaigns with `tracktwin library status`")]
     UnknownCampaign {
         /// The campaign.
         id: String,
     },
     /// There is no such worker.
-    #[error("the library has no worker {id}")]
+    #[error("the library has no worker {id}; list the workers with `tracktwin status`")]
     UnknownWorker {
         /// The worker.
         id: String,
     },
     /// A campaign of that id but another definition.
-    #[error("the library has a campaign {id} with another definition")]
+    #[error("the library has a campaign {id} with another definition; use another library")]
     OtherDefinition {
         /// The campaign.
         id: String,
@@ -135,7 +141,7 @@ pub enum LibraryError {
         seed: u64,
     },
     /// Stored data are invalid.
-    #[error("the library is damaged: {what}")]
+    #[error("the library is damaged: {what}; list the faults with `tracktwin library verify`")]
     Damaged {
         /// What was found.
         what: String,
@@ -162,12 +168,15 @@ pub enum LibraryError {
     },
     /// A statement that would write, where only reading is done.
     #[error(
-        "`library sql` only asks: one statement that begins with select, with, values or explain, \
-         and writes nothing"
+        "`library sql` only reads: give one statement that begins with select, with, values or \
+         explain and writes nothing"
     )]
     OnlyReads,
     /// Whoever asks may not write.
-    #[error("the library is read-only here: {reason}")]
+    #[error(
+        "the library is read-only here: {reason}; grant the right to write, or use another \
+             library"
+    )]
     NotWritable {
         /// Error of the database.
         reason: String,
@@ -199,7 +208,10 @@ pub enum LibraryError {
         reason: String,
     },
     /// The lock of the library's file can't be taken, for want of rights or of room.
-    #[error("library {library}: cannot be locked")]
+    #[error(
+        "library {library}: cannot be locked; check the permissions of its folder and the free \
+             space"
+    )]
     Lock {
         /// The library.
         library: String,

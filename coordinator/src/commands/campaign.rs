@@ -36,17 +36,19 @@ pub(super) enum Action {
     Resume(Named),
     /// Cancel a campaign: leases end, no further cases are leased; stored results are kept.
     Cancel(Named),
-    /// Simulate again the cases that were given up.
+    /// Set the given-up cases to waiting; coordinators or `tracktwin run` simulate them again.
     Retry {
         #[command(flatten)]
         named: Named,
-        /// Sobol index of a case; only this case; may be repeated.
+        /// Retry only the case with this Sobol index, as shown by `tracktwin library status`; may
+        /// be repeated.
         #[arg(long = "case", value_name = "INDEX", conflicts_with = "flagged")]
         cases: Vec<u32>,
-        /// Cases whose results an audit flagged; their results are deleted.
+        /// Retry instead the cases whose results an audit flagged; their results are deleted.
         #[arg(long)]
         flagged: bool,
-        /// Cases whose results do not match their checksum; their results are deleted.
+        /// Retry instead the cases whose results do not match their checksum; their results are
+        /// deleted.
         #[arg(long, conflicts_with_all = ["cases", "flagged"])]
         altered: bool,
     },
@@ -60,7 +62,7 @@ pub(super) enum Action {
     },
     /// Release a worker from quarantine.
     Pardon {
-        /// Name of the worker.
+        /// Name of the worker as shown by `tracktwin status`.
         worker: String,
         #[command(flatten)]
         library: LibraryUrl,
@@ -198,7 +200,8 @@ async fn refuse_others(library: &Library, id: &str, indices: &[u32]) -> Result<(
             None => "does not exist",
         };
         return Err(anyhow!(
-            "{id}: case {index} {is}; only cases that were given up can be retried"
+            "{id}: case {index} {is}; only cases that were given up can be retried; list them with \
+             `tracktwin library status`"
         ))
         .or_input();
     }

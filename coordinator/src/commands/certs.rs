@@ -9,6 +9,13 @@ use tracktwin_farm::security::issue;
 
 /// Arguments of `certs`.
 #[derive(Args)]
+#[command(after_help = "\
+Example:
+  tracktwin certs certs --host head --host 10.0.0.1
+
+In DIR: ca.pem and ca-key.pem (the authority), coordinator.pem, coordinator-key.pem, worker.pem,
+worker-key.pem and token. Keep ca-key.pem private. Coordinators need coordinator*.pem and token,
+workers ca.pem and token. Repeat the command to renew certificates or to change the hosts.")]
 pub(super) struct Arguments {
     /// Output folder; an existing authority and token are kept.
     #[arg(value_name = "DIR")]

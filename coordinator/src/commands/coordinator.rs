@@ -45,13 +45,14 @@ pub(super) struct Arguments {
     cases: Option<u32>,
     #[command(flatten)]
     library: LibraryUrl,
-    /// Address that workers connect to, as IP:PORT.
+    /// Address that workers connect to, as IP:PORT; if other machines reach it, --tls-cert and
+    /// --token-file (or --tls-client-ca) are required, or --insecure.
     #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_LISTEN", default_value = "127.0.0.1:7700")]
     listen: SocketAddr,
     /// Address of the web dashboard, as IP:PORT; it serves /, /metrics (Prometheus) and /healthz.
     #[arg(long, value_name = "ADDR", value_parser = address, env = "TRACKTWIN_DASHBOARD")]
     dashboard: Option<SocketAddr>,
-    /// Exit when every running campaign is done.
+    /// Exit when every running campaign is done; given-up cases count as done.
     #[arg(long)]
     exit_when_done: bool,
     /// Share of cases that a second worker simulates again for comparison, e.g. 1%.

@@ -40,7 +40,7 @@ pub(super) struct Arguments {
     /// Method whose estimates are compared with the truth.
     #[arg(long, value_enum, default_value_t = Method::Gp)]
     method: Method,
-    /// Folder of trained models, written by `train` or `run`.
+    /// Folder of trained models, written by `train` or `run`; required with `--method gp`.
     #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"))]
     models: Option<PathBuf>,
     /// Library of the models; with `--method inversion` it stores null simulations and is created
@@ -51,13 +51,13 @@ pub(super) struct Arguments {
     /// the number of tracks per unevenness.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     tracks: u32,
-    /// Number of sleepers of a track.
+    /// Number of sleepers of a track (`gp` only).
     #[arg(long, value_name = "N", default_value_t = 14, value_parser = clap::value_parser!(u32).range(1..=200))]
     sleepers: u32,
     /// Seed of parameters and surfaces.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Adds a track with this value and all others in the middle of their ranges:
+    /// Add a track with this value and all others in the middle of their ranges (`gp` only), e.g.
     /// `ballast_stiffness_N_m=6e7`; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<Setting>,
@@ -107,12 +107,12 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
         return Ok(());
     }
     println_stdout(
-        "scatter  parameter          sleepers  median |ln error|  in the 90 % interval  correlation  not valid",
+        "unevenness  parameter          sleepers  median |ln error|  in the 90 % interval  correlation  not valid",
     );
     for row in &rows {
         for (parameter, score) in &row.estimates {
             println_stdout(&format!(
-                "{:>5.0} %  {:18} {:>8}  {:>17.3}  {:>18.0} %  {:>11.2}  {:>7.1} %",
+                "{:>8.0} %  {:18} {:>8}  {:>17.3}  {:>18.0} %  {:>11.2}  {:>7.1} %",
                 100.0 * row.scatter,
                 parameter.label(),
                 score.sleepers,
@@ -161,7 +161,7 @@ fn tables(rows: &[Row]) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let mut lines = vec![format!(
         "{:width$}  tracks  any sleeper outside  most outside  named to widen first",
-        "Called outside the library"
+        "Flagged as outside the library"
     )];
     for row in rows {
         let named: Vec<_> =
@@ -180,7 +180,7 @@ fn tables(rows: &[Row]) -> String {
     let heads = columns.iter().map(|parameter| format!("{:>16}", parameter.symbol()));
     lines.push(String::new());
     lines.push(format!(
-        "{:width$}{}  assumed scatter",
+        "{:width$}{}  assumed unevenness",
         "Inside the 90 % interval",
         heads.collect::<String>()
     ));
@@ -217,7 +217,7 @@ fn shortfalls(rows: &[Row]) -> impl Iterator<Item = String> + '_ {
 fn name(kind: Kind) -> String {
     match kind {
         Kind::Inside { scatter } if scatter <= 0.0 => "inside, even".to_owned(),
-        Kind::Inside { scatter } => format!("inside, {:.0} % scatter", 100.0 * scatter),
+        Kind::Inside { scatter } => format!("inside, {:.0} % unevenness", 100.0 * scatter),
         Kind::Beyond { parameter, side: Side::Low } => format!("{parameter} 30 % below"),
         Kind::Beyond { parameter, side: Side::High } => format!("{parameter} 30 % above"),
         Kind::Set { parameter, value } => format!("{parameter} = {value:e}"),

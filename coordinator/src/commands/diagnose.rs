@@ -23,10 +23,16 @@ use tracktwin_track::extension;
 
 /// Arguments of `diagnose`.
 #[derive(Args)]
-#[command(
-    after_help = "Exit codes: 0 consistent, 1 left-out physics or a measuring-chain fault was \
-        found, 2 wrong input, 3 failure."
-)]
+#[command(after_help = "\
+Example:
+  tracktwin diagnose ride --library sqlite:null.sqlite --out diagnosis
+
+The recording must be of V-Track. With --library, null simulations are stored and used again.
+
+Next: `tracktwin extend CAMPAIGN.toml --from diagnosis/diagnosis.json`
+
+Exit codes: 0 consistent, 1 left-out physics or a measuring-chain fault was found, 2 wrong input,
+3 failure.")]
 pub(super) struct Arguments {
     /// The recording: a folder with `recording.json` and one file per pass.
     recording: PathBuf,
@@ -84,7 +90,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         let record = provenance::diagnosis(&diagnosis, json);
         if let Err(error) = library.record_diagnosis(record).await {
             // The diagnosis in the folder is complete nevertheless.
-            tracing::warn!("cannot store the diagnosis in the library: {error:?}");
+            tracing::warn!(
+                error = &error as &dyn std::error::Error,
+                "the files are complete, but the diagnosis cannot be stored in the library"
+            );
         }
     }
     println_stdout(&diagnosis.sentence);
@@ -128,7 +137,9 @@ async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<Tr
     let campaign = library
         .campaign(models.campaign())
         .await
-        .context("the models belong to another library; train models on this one")
+        .context(
+            "the models belong to another library; give their library, or train models on this one",
+        )
         .or_input()?;
     Ok(pipeline::train::experiment(&campaign).or_input()?.design)
 }

@@ -33,18 +33,24 @@ pub(super) enum Method {
 
 /// Arguments of `evaluate`.
 #[derive(Args)]
-#[command(after_help = "Without --models the recording is evaluated by inversion, which needs no \
-        library and accepts any speed. With --models it is evaluated by Gaussian processes, and \
-        the page also shows the inversion; --method selects one of the two.\n\nExit codes: 0 \
-        done, 1 done, but the estimates of most sleepers are not valid \
-        (see the last lines), 2 wrong input, 3 failure.")]
+#[command(after_help = "\
+Examples:
+  tracktwin evaluate ride --out result
+  tracktwin evaluate ride --models out/models --library sqlite:out/library.sqlite --out result
+
+Without --models the recording is evaluated by inversion, which needs no library and accepts any
+speed, but only recordings of V-Track. With --models it is evaluated by Gaussian processes, and the
+page also shows the inversion; --method selects one of the two.
+
+Exit codes: 0 done, 1 done, but the estimates of most sleepers are not valid (see the last lines of
+the output), 2 wrong input, 3 failure.")]
 pub(super) struct Arguments {
     /// The recording: a folder with `recording.json` and one file per pass.
     recording: PathBuf,
     /// Method [default: inversion; both with --models].
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// Folder of trained models, written by `train` or `run`.
+    /// Folder of trained models, written by `train` or `run`; requires --library.
     #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"))]
     models: Option<PathBuf>,
     /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
@@ -234,7 +240,10 @@ fn write(
 async fn keep(library: &Library, evaluation: &Evaluation) {
     if let Err(error) = library.record_evaluation(provenance::evaluation(evaluation)).await {
         // The evaluation in the folder is complete, even if the library is read-only.
-        tracing::warn!("cannot store the evaluation in the library: {error:?}");
+        tracing::warn!(
+            error = &error as &dyn std::error::Error,
+            "the files are complete, but the evaluation cannot be stored in the library"
+        );
     }
 }
 

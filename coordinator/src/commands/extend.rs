@@ -23,10 +23,16 @@ const FACTOR_MIN: f64 = 2.0;
 
 /// Arguments of `extend`.
 #[derive(Args)]
-#[command(
-    after_help = "Next: `tracktwin run NEW.toml --library URL --out DIR` simulates the campaign \
-and trains models with which `tracktwin evaluate` gives stiffness without the bias."
-)]
+#[command(after_help = "\
+Example:
+  tracktwin extend mine.toml --from diagnosis/diagnosis.json
+
+The campaign must be of V-Track. Faults of the measuring chain are not added.
+
+Next: `tracktwin run mine-extended.toml --library URL --out DIR` simulates the campaign and trains
+models. With these, `tracktwin evaluate` gives stiffness without the bias that this physics causes.
+
+Exit codes: 0 done; 2 wrong input, or the diagnosis accepted no physics; 3 failure.")]
 pub(super) struct Arguments {
     /// Campaign file (TOML) to extend.
     campaign: PathBuf,
@@ -85,8 +91,8 @@ fn check_design(path: &Path, campaign: &Campaign) -> anyhow::Result<()> {
     let design = &campaign.definition.experiment.design;
     compare_designs(design, &TrackDesign::v_track()).map_err(|other| {
         anyhow!(
-            "{}: preset: the campaign is of another track than V-Track ({} {}, V-Track's {}); what a \
-             diagnosis found is of V-Track",
+            "{}: preset: the campaign is of another track than V-Track ({} {}, V-Track's {}); a \
+             diagnosis is of V-Track: extend a campaign of V-Track",
             path.display(),
             other.quantity,
             other.found(),
@@ -97,10 +103,14 @@ fn check_design(path: &Path, campaign: &Campaign) -> anyhow::Result<()> {
 
 fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {
     let name = path.display();
-    let diagnosis: Diagnosis =
-        serde_json::from_slice(&read(path)?).with_context(|| format!("{name}: not a diagnosis"))?;
+    let diagnosis: Diagnosis = serde_json::from_slice(&read(path)?).with_context(|| {
+        format!("{name}: not a diagnosis; give the diagnosis.json of `tracktwin diagnose`")
+    })?;
     if diagnosis.format != FORMAT {
-        return Err(anyhow!("{name}: format: {:?} is not {FORMAT:?}", diagnosis.format));
+        return Err(anyhow!(
+            "{name}: format: {:?} is not {FORMAT:?}; repeat the diagnosis with this version",
+            diagnosis.format
+        ));
     }
     Ok(diagnosis)
 }

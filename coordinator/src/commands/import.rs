@@ -36,8 +36,8 @@ pub(super) struct Arguments {
     /// TOML file that assigns columns to quantities.
     #[arg(long, value_name = "FILE.toml")]
     layout: Option<PathBuf>,
-    /// Assigns a column to a quantity: acceleration=NAME (may be repeated), time=NAME,
-    /// position=NAME or speed=NAME.
+    /// Assign a column to a quantity: acceleration=NAME (may be repeated), time=NAME, position=NAME
+    /// or speed=NAME.
     #[arg(long = "column", value_name = "QUANTITY=NAME")]
     columns: Vec<Meaning>,
     /// Unit of the accelerations [default: the unit in the file, or m/s2]; with `unknown`, levels
@@ -47,13 +47,13 @@ pub(super) struct Arguments {
     /// Accelerations in the file are positive upwards.
     #[arg(long)]
     upwards: bool,
-    /// Unit of the position column.
+    /// Unit of the position column [default: the unit in the file, or m].
     #[arg(long, value_enum)]
     position_unit: Option<LengthUnit>,
-    /// Unit of the time column.
+    /// Unit of the time column [default: the unit in the file, or s].
     #[arg(long, value_enum)]
     time_unit: Option<DurationUnit>,
-    /// Unit of the speed column.
+    /// Unit of the speed column [default: the unit in the file, or km/h].
     #[arg(long, value_enum)]
     speed_unit: Option<VelocityUnit>,
     /// Sample rate in Hz; required without a time column.
@@ -65,7 +65,7 @@ pub(super) struct Arguments {
     /// Sleeper spacing in m [default: 0.6].
     #[arg(long, value_name = "M", value_parser = number(SPACING))]
     spacing: Option<f64>,
-    /// Position of one sleeper in m; without it the recording has no sleepers.
+    /// Position of one sleeper in m; required for `evaluate` and `diagnose`.
     #[arg(long, value_name = "M", value_parser = number(PLACE), allow_negative_numbers = true)]
     sleeper: Option<f64>,
     /// Radius of the wheel in m.

@@ -22,6 +22,11 @@ const FEATURES_HZ: f64 = SAMPLES_A_PERIOD * 4000.0;
 
 /// Arguments of `inspect`.
 #[derive(Args)]
+#[command(after_help = "\
+Example:
+  tracktwin inspect ride --out ride.html
+
+Exit codes: 0 done, also if there are defects; 2 wrong input; 3 failure.")]
 pub(super) struct Arguments {
     /// The recording: a folder with `recording.json` and one file per pass.
     recording: PathBuf,

@@ -95,6 +95,9 @@ enum Command {
     /// Create certificates and a token for a farm of several machines.
     Certs(certs::Arguments),
     /// Print shell completions.
+    #[command(after_help = "\
+Example:
+  tracktwin completions bash > ~/.local/share/bash-completion/completions/tracktwin")]
     Completions {
         /// The shell.
         shell: clap_complete::Shell,

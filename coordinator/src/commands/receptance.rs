@@ -17,6 +17,12 @@ use tracktwin_track::model::{Mesh, Support, TrackModel};
 
 /// Arguments of `receptance`.
 #[derive(Args)]
+#[command(after_help = "\
+Example:
+  tracktwin receptance --at sleeper --at midspan --out receptance.csv
+
+The columns are frequency_Hz and, for each --at, PLACE_real_m_N and PLACE_imag_m_N: real and
+imaginary part in m/N. Positions count from the start of the rail.")]
 pub(super) struct Arguments {
     /// Point of excitation and measurement on the rail: `sleeper` (above the middle sleeper),
     /// `midspan` (half a spacing further), a position in m, or `A:B` for excitation at A and

@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 2, requires = "watch",
           value_parser = clap::value_parser!(u64).range(1..=86_400))]
     every: u64,
-    /// Print JSON.
+    /// Print JSON; not with `--watch`.
     #[arg(long)]
     json: bool,
 }

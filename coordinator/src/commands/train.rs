@@ -12,11 +12,13 @@ use tracktwin_surrogate::{ModelGroup, ParameterModel, Trained};
 
 /// Arguments of `train`.
 #[derive(Args)]
-#[command(
-    after_help = "At least 200 cases of the campaign must be finished: one half is used for \
-        training, the other half for testing. \
-Exit codes: 0 done, 2 wrong input (too few cases, or no parameter varies), 3 failure."
-)]
+#[command(after_help = "\
+At least 200 cases of the campaign must be finished: one half is used for training, the other half
+for testing.
+
+Next: `tracktwin evaluate RECORDING --models DIR --library URL --out RESULT`
+
+Exit codes: 0 done, 2 wrong input (too few cases, or no parameter varies), 3 failure.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     library: LibraryUrl,

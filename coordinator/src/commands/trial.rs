@@ -17,7 +17,7 @@ use tracktwin_surrogate::Trained;
 #[derive(Args)]
 #[command(
     after_help = "In DIR: recordings/, sealed/ (the truth), seals.sha256 (check it with `sha256sum -c`), \
-diagnoses/, scores.jsonl, and trial.md with the tables. Repeat the command to continue an interrupted trial. \
+diagnoses/, scores.jsonl, summary.json, and trial.md with the tables. Repeat the command to continue an interrupted trial. \
 Started on several machines with the same --library, it distributes the cases; the case of a machine that fails goes \
 to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 2 wrong input, 3 failure."
 )]
@@ -33,16 +33,16 @@ pub(super) struct Arguments {
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// Library that stores scores and null simulations [default: one in DIR]. Machines that share a
-    /// library share the trial.
+    /// Library that stores scores and null simulations [default: sqlite:DIR/library.sqlite].
+    /// Machines that share a library share the trial.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Knock-out test: diagnose every recording with a single effect again with its kind left out
-    /// of the catalogue; "unknown" is expected.
+    /// Knock-out test: repeat the diagnosis of every recording with one extension, with its kind
+    /// left out of the catalogue; "unknown" is expected.
     #[arg(long)]
     knock_out: bool,
-    /// Shuffle test: diagnose every local effect that was found again with the sleepers of each
-    /// speed shuffled; no physics should be accepted.
+    /// Shuffle test: repeat the diagnosis of every recording in which a local extension was found,
+    /// with the sleepers of each speed shuffled; no physics should be accepted.
     #[arg(long)]
     shuffle: bool,
     /// Folder of models trained on the library; also tests whether the paper's method flags the

@@ -25,7 +25,9 @@ pub struct Evaluator {
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluatorError {
     /// The library does not hold what they were trained on.
-    #[error("the models belong to another library; train models on this one")]
+    #[error(
+        "the models belong to another library; give their library, or train models on this one"
+    )]
     Foreign(#[source] LibraryError),
     /// Features of another version.
     #[error(transparent)]

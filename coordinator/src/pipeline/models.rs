@@ -71,7 +71,10 @@ pub async fn train_into(
     save(folder, force, &trained, &tested)?;
     if let Err(error) = library.record_training(provenance::training(&trained)).await {
         // The models in the folder are complete, even if the library is read-only.
-        tracing::warn!("cannot store the training in the library: {error:?}");
+        tracing::warn!(
+            error = &error as &dyn std::error::Error,
+            "the files are complete, but the training cannot be stored in the library"
+        );
     }
     Ok(trained)
 }

@@ -21,7 +21,10 @@ pub enum ReproducingError {
     #[error(transparent)]
     Figure(#[from] Error),
     /// The campaign's track is not the paper's.
-    #[error("the paper's figures are of V-Track; the campaign's track has another design")]
+    #[error(
+        "the paper's figures are of V-Track, but the campaign's track has another design: use a \
+             library of the built-in campaign"
+    )]
     OtherTrack,
     /// The track of the campaign is too short for the examples.
     #[error(

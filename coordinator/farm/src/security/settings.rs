@@ -49,7 +49,7 @@ pub enum SecurityError {
         address: SocketAddr,
     },
     /// A PEM file that holds something else.
-    #[error("{what}: not a valid PEM file: {source}")]
+    #[error("{what}: not a valid PEM file ({source}); create one with `tracktwin certs`")]
     Pem {
         /// Expected content.
         what: &'static str,
@@ -57,10 +57,15 @@ pub enum SecurityError {
         source: pem::Error,
     },
     /// Certificate and key don't go together, or can't be used.
-    #[error("the certificate cannot be used: {0}")]
+    #[error(
+        "the certificate cannot be used ({0}); check that certificate and key belong together, or \
+             create both with `tracktwin certs`"
+    )]
     Tls(#[from] rustls::Error),
     /// The authority can't be used.
-    #[error("the authority of workers' certificates cannot be used: {0}")]
+    #[error(
+        "--tls-client-ca: the authority cannot be used ({0}); give the ca.pem of `tracktwin certs`"
+    )]
     Authority(#[from] VerifierBuilderError),
 }
 

@@ -74,7 +74,8 @@ fn unreachable(error: sqlx::Error, name: &str) -> LibraryError {
                 .map(Some)
                 .contains(&refusal.code().as_deref()) =>
         {
-            LibraryError::NotLetIn { library, reason: refusal.message().to_owned() }
+            let remedy = "correct the user, password or database in the URL";
+            LibraryError::NotLetIn { library, reason: format!("{}; {remedy}", refusal.message()) }
         }
         _ => LibraryError::Unreachable { library, source: error },
     }

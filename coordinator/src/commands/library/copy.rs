@@ -40,7 +40,7 @@ struct Copied {
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     if arguments.from == arguments.to {
-        return Err(anyhow!("--from and --to are the same library")).or_input();
+        return Err(anyhow!("--from and --to are the same library; give another --to")).or_input();
     }
     let from = Library::open(&arguments.from).await?;
     let to = open_or_create(&arguments.to).await?;

@@ -64,7 +64,10 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     let format = format.or(named).unwrap_or(Format::Parquet);
     if let (None, Some(extension), false) = (named, out.extension(), out.is_dir()) {
         let extension = extension.display();
-        return Err(anyhow!("--out {}: {extension} is neither parquet nor csv", out.display()))
+        return Err(anyhow!(
+            "--out {}: {extension} is neither parquet nor csv; name a .parquet or .csv file, or a folder",
+            out.display()
+        ))
             .or_input();
     }
     let (folder, tables) = match named {

@@ -27,12 +27,17 @@ pub(super) enum Question {
     Sql(sql::Arguments),
     /// Write the tables or the training set as Parquet or CSV files.
     Export(export::Arguments),
-    /// Add tables written by `export` (Parquet) to a library.
+    /// Add tables written by `export` (Parquet) to a library, which is created if missing.
     Import(import::Arguments),
     /// Copy a library into another, SQLite or PostgreSQL; repeat the command to continue an
     /// interrupted copy.
     Copy(copy::Arguments),
     /// Verify integrity: hashes, gaps, duplicates, NaN and infinite values.
+    #[command(after_help = "\
+`tracktwin library copy` copies the intact rows to another library. `tracktwin campaign retry
+--altered` has altered results simulated again.
+
+Exit codes: 0 no faults found, 1 faults found, 2 wrong input, 3 failure.")]
     Verify(Which),
 }
 

@@ -16,8 +16,8 @@ const DIGITS: usize = 9;
 #[command(
     after_help = "Tables and views, with worked queries: docs/how-to/query-the-library.md.\n\
     Names with capital letters need no quotes, with SQLite and PostgreSQL.\n\n\
-    Example:\n  tracktwin library sql \"select name, finished, cases from campaign_status\" \
-    --library sqlite:out/library.sqlite"
+    Example:\n  tracktwin library sql --library sqlite:out/library.sqlite \\\n      \
+    \"select name, finished, cases from campaign_status\""
 )]
 pub(in crate::commands) struct Arguments {
     /// SQL statement; `-` reads it from standard input.

@@ -28,6 +28,18 @@ const MODELS: &str = "models";
 
 /// Arguments of `run`.
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  tracktwin run --out out
+  tracktwin run mine.toml --cases 1000 --out mine
+
+In the output folder: library.sqlite, models/, sample/ (the bundled recording), report.html and the
+files of `tracktwin evaluate`. Repeat the command to continue an interrupted run.
+
+Next: `tracktwin evaluate RIDE --models out/models --library sqlite:out/library.sqlite --out DIR`
+
+Exit codes: 0 done, 1 done, but the estimates of most sleepers are not valid, 2 wrong input,
+3 failure or interruption.")]
 pub(super) struct Arguments {
     /// Campaign file (TOML) [default: a small campaign over the paper's Table D1].
     campaign: Option<PathBuf>,

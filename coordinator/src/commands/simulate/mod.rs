@@ -38,13 +38,21 @@ const TRUTH: &str = "truth.json";
 
 /// Arguments of `simulate`.
 #[derive(Args)]
+#[command(after_help = "\
+Example:
+  tracktwin simulate --passes 2 --set ballast_stiffness_N_m@SN12=4e6 --out ride
+
+Parameters of --set: railpad_stiffness_N_m, railpad_damping_N_s_m, ballast_stiffness_N_m,
+ballast_damping_N_s_m, sleeper_EI_N_m2, irregularity_level.
+
+Next: `tracktwin evaluate ride --out result` or `tracktwin diagnose ride --out result`")]
 pub(super) struct Arguments {
     /// Output folder of the recording; the simulated parameters are written to `truth.json` in it.
     #[arg(long, value_name = "DIR", required_unless_present = "extend")]
     out: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
-    /// Speed in km/h; may be repeated [default: the preset's three].
+    /// Speed in km/h; may be repeated [default: 7, 10 and 13; for real-scale 35, 50 and 65].
     #[arg(long = "speed", value_name = "KMH", value_parser = number(SPEED))]
     speeds_km_h: Vec<f64>,
     /// Number of sleeper spans of the track; the six spans at either end are not recorded.

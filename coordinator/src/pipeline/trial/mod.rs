@@ -106,7 +106,7 @@ pub enum TrialError {
     Recording(#[from] RecordingError),
     /// Diagnoses broke down, each with its reason by the number of its case; all others are answered.
     #[error(
-        "{} of {of} diagnoses failed; all others are scored\n{}",
+        "{} of {of} diagnoses failed; all others are scored; repeat the command to try these again\n{}",
         .cases.len(),
         .cases.iter().map(|(number, reason)| format!("case {number}: {reason}")).collect::<Vec<_>>().join("\n")
     )]

@@ -205,7 +205,10 @@ pub enum Fault {
         high: f64,
     },
     /// The file has no rows, or a single one.
-    #[error("has {rows} row{}; a pass needs at least two", if *rows == 1 { "" } else { "s" })]
+    #[error(
+        "has {rows} row{}; a pass needs at least two: remove the pass, or export it again",
+        if *rows == 1 { "" } else { "s" }
+    )]
     Empty {
         /// How many there are.
         rows: usize,

@@ -23,7 +23,7 @@ impl Dispatch {
     /// Cases for a worker that is to have some.
     pub(super) async fn hand_out(&self, worker: &str, cases_max: u32) -> Result<Lease, Status> {
         let failed = |error: &DispatchError| {
-            tracing::error!("cannot lease cases: {error:?}");
+            tracing::error!("cannot lease cases: {error}");
             Status::unavailable(error.to_string())
         };
         let audit = self.audits.lease(worker, cases_max, &self.campaigns).await;
@@ -72,7 +72,11 @@ impl Dispatch {
         let held = held.map(|it| library::Held { index: it.case.index, epoch: it.epoch });
         let released = self.library.release(&leased.campaign, worker, held.collect()).await;
         let paused = self.library.pause(&leased.campaign).await;
-        tracing::error!("campaign {} is paused: {released:?}, {paused:?}", leased.campaign);
+        tracing::error!(
+            "campaign {} is paused, because this version cannot simulate it; use the version that \
+             added it ({released:?}, {paused:?})",
+            leased.campaign
+        );
     }
 
     /// Cases of the campaign that the worker in this process holds.
