@@ -216,7 +216,7 @@ async fn what_the_schema_lacks_is_found() {
         ("drop trigger count_updated_case", "the trigger count_updated_case is missing"),
         (
             "drop view failed_case; create view failed_case as select * from campaign_case",
-            "the view failed_case is another",
+            "the view failed_case differs from this program's",
         ),
         ("pragma foreign_keys = off; drop table result", "the table result is missing"),
         ("pragma foreign_keys = off; drop table campaign", "the table campaign is missing"),
