@@ -55,7 +55,7 @@ mod tests {
         let text = refusal(|recording| recording.spacing_m = 0.6);
         assert!(text.starts_with("nominal.sleeper.spacing_m is 0.6 m, the models are of 0.125 m"));
         let text = refusal(|recording| recording.sleepers.iter_mut().for_each(|s| s.x_m *= 1.12));
-        assert!(text.contains("lie 0.14 m, the models are of 0.125 m"), "{text}");
+        assert!(text.contains("in the recording is 0.14 m, the models are of 0.125 m"), "{text}");
         let nominal = |part: &str, value: Value| {
             refusal(|recording| drop(recording.nominal.insert(part.to_owned(), value.clone())))
         };

@@ -174,7 +174,7 @@ mod tests {
         let mut negative = voids(0.5);
         negative.parameters.insert("gap_m".to_owned(), SampledValue::Between([-1e-5, 1e-4]));
         let refusal = negative.check(&design, 12).unwrap_err().to_string();
-        assert!(refusal.contains("gap_m: -1e-5 m is no gap"), "{refusal}");
+        assert!(refusal.contains("gap_m: -1e-5 m is not a valid gap"), "{refusal}");
         // Both ends can be built; what lies between is no number, or is drawn from the wrong end.
         for (low, high) in [(-3.0, 3.0), (3.0, 1.0)] {
             let slope = SampledValue::Scaled { low, high, scale: Scale::Logarithmic };

@@ -121,7 +121,7 @@ mod tests {
         assert!(refusal("").contains("NAME[@PLACE]"));
         assert!(refusal("squat:depth_m").contains("`depth_m`"));
         assert!(refusal("squat:depth_m=deep").contains("`depth_m=deep`"));
-        assert!(refusal("squat:depth_m=1,depth_m=2").contains("twice"));
+        assert!(refusal("squat:depth_m=1,depth_m=2").contains("duplicate"));
         assert!(refusal("squat@here").contains("`here`"));
         assert!(refusal("sleeper_bolt@SN9-SN3").contains("`SN9-SN3`"));
         assert!(refusal("sleeper_bolt@SN3-SN9/0").contains("SN10-SN30/4"));
