@@ -73,7 +73,7 @@ pub async fn of(
     }
     let simulated = compute(|| {
         NullModel::simulate(forward, &grid, u64::from(SURFACES), SEED, &|done| {
-            progress(done as u64)
+            progress(done as u64);
         })
     });
     let null = simulated?;

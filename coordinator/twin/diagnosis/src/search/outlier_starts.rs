@@ -51,11 +51,11 @@ impl Far {
                 far.runs.push(run);
                 continue;
             }
-            for sleeper in 0..field.len() {
+            for (sleeper, &own) in stiffness.iter().enumerate() {
                 let last = (sleeper + NEIGHBOURS + 1).min(field.len());
                 let near = sleeper.saturating_sub(NEIGHBOURS)..last;
                 let usual = usual(&mut near.filter(|other| *other != sleeper));
-                if (stiffness[sleeper] - usual).abs() > FAR {
+                if (own - usual).abs() > FAR {
                     far.values[field.start + sleeper] = usual;
                     far.sleepers.push(sleeper);
                 }
