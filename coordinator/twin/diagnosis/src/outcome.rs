@@ -137,6 +137,12 @@ pub struct Location {
     pub sleepers: Vec<String>,
 }
 
+/// Whether two places have a sleeper in common; none is everywhere.
+pub(crate) fn meet(one: Option<&Location>, other: Option<&Location>) -> bool {
+    let (Some(one), Some(other)) = (one, other) else { return true };
+    one.sleepers.iter().any(|sleeper| other.sleepers.contains(sleeper))
+}
+
 /// Without and with what was named.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BeforeAfter<T> {

@@ -1,6 +1,6 @@
 //! A diagnosis in one sentence or two.
 
-use crate::outcome::{BeforeAfter, Fit, Hypothesis, Verdict};
+use crate::outcome::{BeforeAfter, Fit, Hypothesis, Verdict, meet};
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{Kind, PlaceKind};
 
@@ -71,7 +71,10 @@ fn named(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
 /// Look-alikes of the first hypothesis, and the measurement that separates them.
 fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     let is_rival = |other: &&Hypothesis| {
-        !other.accepted && other.physics != first.physics && other.probability >= RIVAL_MIN
+        !other.accepted
+            && other.physics != first.physics
+            && other.probability >= RIVAL_MIN
+            && meet(first.location.as_ref(), other.location.as_ref())
     };
     let Some(other) = hypotheses.iter().find(is_rival) else { return String::new() };
     let percent = 100.0 * other.probability;

@@ -6,6 +6,9 @@ use crate::outcome::{Hypothesis, Location, UNKNOWN};
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind};
 
+/// Sleeper spacings from an accepted effect within which its own trace may look like a finding.
+const REACH_SPANS: f64 = 3.0;
+
 impl Evidence<'_> {
     /// A finding of the passes alone is a separate hypothesis if the model has not found it as
     /// well.
@@ -19,13 +22,10 @@ impl Evidence<'_> {
                 return;
             }
         }
-        let at_wheel = |kind: &Kind| kind.classes.contains(&Class::WheelAngle);
-        // What comes back with every turn is the wheel's, whatever else there is.
-        let explains = |known: &Hypothesis| {
-            let known_at_wheel = Kind::from_name(&known.physics).is_some_and(at_wheel);
-            known.accepted && known.physics != UNKNOWN && (known_at_wheel || !at_wheel(kind))
-        };
-        let explained = !kind.measuring_chain && all.iter().any(explains);
+        let location = self.location_of_finding(finding);
+        let reach_m = REACH_SPANS * self.prepared.forward.section.design.sleeper.spacing_m;
+        let explained = !kind.measuring_chain
+            && all.iter().any(|known| explains(known, kind, location.as_ref(), reach_m));
         all.retain(|known| known.accepted || known.physics != finding.physics);
         if !explained {
             // The name that came near it is right after all.
@@ -40,9 +40,21 @@ impl Evidence<'_> {
         all.push(Hypothesis {
             probability: if explained { probability.min(0.5) } else { probability },
             accepted: !explained,
-            ..seen(finding, kind, self.location_of_finding(finding))
+            ..seen(finding, kind, location)
         });
     }
+}
+
+/// Whether an accepted effect accounts for a finding of this kind at a place: not for one that lies farther
+/// away than its trace reaches, nor for one that repeats with every turn of the wheel.
+fn explains(known: &Hypothesis, kind: &Kind, place: Option<&Location>, reach_m: f64) -> bool {
+    let at_wheel = |kind: &Kind| kind.classes.contains(&Class::WheelAngle);
+    let known_at_wheel = Kind::from_name(&known.physics).is_some_and(at_wheel);
+    let is_near = || {
+        let (Some(known), Some(place)) = (&known.location, place) else { return true };
+        known.x_m[0] - reach_m <= place.x_m[1] && place.x_m[0] <= known.x_m[1] + reach_m
+    };
+    known.accepted && known.physics != UNKNOWN && (known_at_wheel || !at_wheel(kind)) && is_near()
 }
 
 /// A finding as an accepted hypothesis with its probability.
@@ -68,4 +80,39 @@ pub(super) fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -
 
 pub(super) fn probability(finding: &Finding) -> f64 {
     1.0 - finding.p_value.clamp(1e-6, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn an_effect_explains_what_is_found_beside_it_and_not_what_is_found_far_away() {
+        let at = |x_m: f64| Location { x_m: [x_m, x_m], sleepers: Vec::new() };
+        let mut void = Hypothesis {
+            physics: "hanging_sleeper".to_owned(),
+            family: None,
+            family_probability: 0.97,
+            probability: 0.97,
+            accepted: true,
+            location: Some(at(3.375)),
+            port: None,
+            behaviour: None,
+            parameters: BTreeMap::new(),
+            look_alikes: Vec::new(),
+            would_separate: String::new(),
+            detectability: 18.0,
+            log_evidence: 400.0,
+        };
+        let joint = Kind::from_name("rail_joint").unwrap();
+        let flat = Kind::from_name("wheel_flat").unwrap();
+        assert!(explains(&void, joint, Some(&at(3.2)), 0.375));
+        assert!(!explains(&void, joint, Some(&at(1.81)), 0.375));
+        assert!(!explains(&void, flat, None, 0.375));
+        void.location = None;
+        assert!(explains(&void, joint, Some(&at(1.81)), 0.375));
+        void.accepted = false;
+        assert!(!explains(&void, joint, Some(&at(1.81)), 0.375));
+    }
 }

@@ -10,9 +10,8 @@ mod round;
 mod speed_disagreement;
 
 pub use self::alone::passes_alone;
-use self::place::meet;
 use crate::calibration::CalibrationError;
-use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict};
+use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, meet};
 use crate::prepared_recording::PreparedRecording;
 use crate::search::Search;
 use crate::sentence::sentence;

@@ -1,10 +1,9 @@
 //! Findings of the passes alone whose kind is not in the catalogue.
 
 use super::finding::seen;
-use super::place::meet;
 use super::{Evidence, FAILED_SHARE};
 use crate::estimate::Estimate;
-use crate::outcome::{Hypothesis, UNKNOWN};
+use crate::outcome::{Hypothesis, UNKNOWN, meet};
 use crate::patch_scan::Fixed;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;

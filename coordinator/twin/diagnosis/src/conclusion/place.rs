@@ -15,12 +15,6 @@ const PLACE_SHARE: f64 = 0.1;
 /// Error of a place on the recording's scale in sleeper spacings: odometers wander by millimetres.
 const PLACE_ERROR: f64 = 0.04;
 
-/// Whether two places have a sleeper in common; none is everywhere.
-pub(super) fn meet(one: Option<&Location>, other: Option<&Location>) -> bool {
-    let (Some(one), Some(other)) = (one, other) else { return true };
-    one.sleepers.iter().any(|sleeper| other.sleepers.contains(sleeper))
-}
-
 impl Evidence<'_> {
     pub(super) fn location_of(&self, candidate: &Candidate) -> Option<Location> {
         let section = &self.prepared.forward.section;
