@@ -21,8 +21,11 @@ const FAR: f64 = 0.6;
 /// Sleepers on either side that a sleeper is compared with.
 const NEIGHBOURS: usize = 3;
 
-/// Sleepers of the shortest run, and of the rest of the track beside it.
-const SHORTEST: usize = 3;
+/// Sleepers of the shortest run: five lie within reach of one or two effects at single sleepers.
+const SHORTEST: usize = 6;
+
+/// Least number of sleepers beside a run.
+const REST: usize = 3;
 
 /// Standard deviations inside a run and outside of it by which their means differ at least.
 const DEVIATIONS: f64 = 3.0;
@@ -96,7 +99,7 @@ fn run_apart(stiffness: &[f64]) -> Option<Range<usize>> {
     let apart = |run: Range<usize>| {
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..count).partition(|it| run.contains(it));
-        if outside.len() < SHORTEST {
+        if outside.len() < REST {
             return None;
         }
         let mean = |of: &[usize]| of.iter().map(|&it| stiffness[it]).sum::<f64>() / of.len() as f64;
@@ -217,14 +220,14 @@ mod tests {
         }
         assert!(Far::new(&unknowns, &values).runs.is_empty());
         let usual = values.clone();
-        (3..8).for_each(|sleeper| values[railpad + sleeper] -= 1.1);
+        (2..8).for_each(|sleeper| values[railpad + sleeper] -= 1.1);
         let far = Far::new(&unknowns, &values);
-        assert_eq!(far.runs, vec![3..8]);
+        assert_eq!(far.runs, vec![2..8]);
         assert!((&far.values - usual).amax() < 0.3);
         let section = forward().section;
         let on_runs = far.on_runs(&candidates(&section));
         assert!(on_runs.iter().any(|it| it.kind.physics == "sleeper_bolt"));
-        assert!(on_runs.iter().all(|it| it.extension.sleepers == Some(vec![3, 4, 5, 6, 7])));
+        assert!(on_runs.iter().all(|it| it.extension.sleepers == Some(vec![2, 3, 4, 5, 6, 7])));
     }
 
     #[test]
