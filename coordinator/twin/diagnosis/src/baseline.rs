@@ -239,6 +239,13 @@ impl Unknowns {
         values
     }
 
+    /// These values of a problem with the baseline's unknowns at the prior mean.
+    pub(crate) fn with_typical(&self, values: &DVector<f64>) -> DVector<f64> {
+        let mut typical = values.clone();
+        typical.rows_mut(0, self.count()).copy_from(&self.typical());
+        typical
+    }
+
     /// Standard deviation of each unknown's prior, without exceptions.
     pub fn prior_deviations(&self) -> DVector<f64> {
         self.covariance().diagonal().map(f64::sqrt)

@@ -13,6 +13,9 @@ const FAMILY_MORE: f64 = 0.02;
 /// Probability from which another hypothesis is stated beside the first.
 const RIVAL_MIN: f64 = 0.05;
 
+/// Error of a sum of probabilities by rounding and by their limits.
+const ROUNDING: f64 = 0.01;
+
 /// Sleepers that are named one by one.
 const NAMED_MAX: usize = 3;
 
@@ -68,12 +71,14 @@ fn named(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
     }
 }
 
-/// Look-alikes of the first hypothesis, and the measurement that separates them.
+/// The next alternative to the first hypothesis, and the measurement that separates them. Alternatives share one
+/// probability: what is probable beside the first is another effect.
 fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     let is_rival = |other: &&Hypothesis| {
         !other.accepted
             && other.physics != first.physics
             && other.probability >= RIVAL_MIN
+            && first.probability + other.probability <= 1.0 + ROUNDING
             && meet(first.location.as_ref(), other.location.as_ref())
     };
     let Some(other) = hypotheses.iter().find(is_rival) else { return String::new() };
@@ -258,6 +263,8 @@ mod tests {
         );
         let mut second = hypothesis("subgrade_layer", None);
         (second.accepted, second.probability) = (false, 0.15);
+        let sure = Hypothesis { probability: 0.97, ..first.clone() };
+        assert_eq!(rival(&sure, &[sure.clone(), second.clone()]), "");
         assert_eq!(
             rival(&first, &[first.clone(), second]),
             " It could also be subgrade_layer (15 %). To tell them apart: passes with another wheel \

@@ -11,9 +11,9 @@ use tracktwin_signal::recording::Recording;
 /// Mean square of a sleeper's residual over its expectation above which the model does not hold.
 const MISFIT_MAX: f64 = 2.0;
 
-/// Railpad stiffness in N/m above which a stiffer one hardly changes a recording of V-Track: one of
-/// 2 GN/m comes out as 0.26 (docs/inversion.md).
-const RAILPAD_TELLABLE: f64 = 2e8;
+/// Railpad stiffness in N/m above which a stiffer one hardly changes a recording of V-Track
+/// (docs/inversion.md).
+const RAILPAD_RESOLVED: f64 = 2e8;
 
 impl Inversion {
     /// The track of a recording from its sections, which lie in order. Of a sleeper in several
@@ -53,7 +53,7 @@ impl Fitted {
         if self.unknowns.exceptions.iter().any(|exception| exception.sleeper == index) {
             flags.push(Flag::UnlikeNeighbours);
         }
-        if estimates[&Parameter::RailpadStiffness].mean > RAILPAD_TELLABLE {
+        if estimates[&Parameter::RailpadStiffness].mean > RAILPAD_RESOLVED {
             flags.push(Flag::RailpadAtLeast);
         }
         if misfit > MISFIT_MAX {

@@ -84,6 +84,7 @@ impl Evidence<'_> {
         let nothing_left_out = self.nothing(&hypotheses).min(most);
         let said = sentence(verdict, &hypotheses, nothing_left_out, &sleepers, &fit, &bias_removed);
         let sentence = said + &airborne(self.inspection);
+        let notes = self.notes(&hypotheses);
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
             recording: self.recording.name.clone(),
@@ -97,7 +98,7 @@ impl Evidence<'_> {
             track: self.track(),
             levels,
             loss_of_contact: self.inspection.loss_of_contact.clone(),
-            notes: self.notes(),
+            notes,
         })
     }
 

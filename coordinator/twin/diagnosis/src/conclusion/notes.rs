@@ -1,6 +1,7 @@
 //! Notes beside the hypotheses.
 
 use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
+use crate::outcome::{Hypothesis, meet};
 use crate::port_scan::PortPlace;
 use tracktwin_inspection::{Finding, Inspection};
 use tracktwin_number::chance;
@@ -10,7 +11,7 @@ use tracktwin_signal::recording::Recording;
 const SPEED_RATIO: f64 = 1.35;
 
 impl Evidence<'_> {
-    pub(super) fn notes(&self) -> Vec<String> {
+    pub(super) fn notes(&self, hypotheses: &[Hypothesis]) -> Vec<String> {
         let mut notes: Vec<String> =
             self.inspection.pass_defects.iter().map(ToString::to_string).collect();
         if self.speeds() == 1 {
@@ -24,13 +25,13 @@ impl Evidence<'_> {
             ));
         }
         notes.extend(lost(self.inspection, self.recording));
-        notes.extend(self.speed_disagreement().or_else(|| self.remainder()));
+        notes.extend(self.speed_disagreement().or_else(|| self.remainder(hypotheses)));
         notes.extend(self.inspection.findings.iter().map(shown));
         notes
     }
 
     /// Residual evidence after the last search.
-    fn remainder(&self) -> Option<String> {
+    fn remainder(&self, hypotheses: &[Hypothesis]) -> Option<String> {
         let round = self.search.rounds.last().filter(|round| round.is_significant())?;
         let place = round.port.as_ref().map_or(String::new(), |port| match &port.place {
             PortPlace::Wheel => " at the wheel".to_owned(),
@@ -60,7 +61,21 @@ impl Evidence<'_> {
                  model error, because no kind in the catalogue predicts the held-out speeds better.",
             chance(round.p_value)
         );
-        (!round.accepted).then_some(left)
+        let named =
+            round.port.as_ref().is_some_and(|port| self.is_found_at(&port.place, hypotheses));
+        (!round.accepted && !named).then_some(left)
+    }
+
+    /// Whether the passes alone show an accepted effect at a place, which the model did not fit.
+    fn is_found_at(&self, place: &PortPlace, hypotheses: &[Hypothesis]) -> bool {
+        let Some(place) = self.location_of_port(place) else { return false };
+        let is_fitted = |physics: &str| {
+            self.search.accepted.iter().any(|fitted| fitted.kind.physics == physics)
+        };
+        let is_there = |found: &Hypothesis| {
+            found.location.is_some() && meet(found.location.as_ref(), Some(&place))
+        };
+        hypotheses.iter().any(|it| it.accepted && !is_fitted(&it.physics) && is_there(it))
     }
 }
 

@@ -131,9 +131,7 @@ impl OutlierStarts {
         far: Far,
         all: &[Candidate],
     ) -> Result<Self, CalibrationError> {
-        let unknowns = &problem.forward.unknowns;
-        let mut typical = far.values.clone();
-        typical.rows_mut(0, unknowns.count()).copy_from(&unknowns.typical());
+        let typical = problem.forward.unknowns.with_typical(&far.values);
         let (numbers, there): (Vec<usize>, Vec<Candidate>) = all
             .iter()
             .enumerate()

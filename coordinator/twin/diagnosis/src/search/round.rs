@@ -318,9 +318,7 @@ fn starts<'t>(
         return starts;
     }
     // The baseline imitates what is everywhere by values far from the track's.
-    let unknowns = &problem.forward.unknowns;
-    let mut typical = current.values.clone();
-    typical.rows_mut(0, unknowns.count()).copy_from(&unknowns.typical());
+    let typical = problem.forward.unknowns.with_typical(&current.values);
     let mut everywhere = everywhere(templates, all, &current.residual);
     everywhere.retain(|template| !hopeless.contains(&all[template.candidate].kind.physics));
     starts.extend(everywhere.into_iter().map(|template| (template, typical.clone())));
