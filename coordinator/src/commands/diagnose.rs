@@ -3,6 +3,7 @@
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::Stages;
+use super::track::TrackOption;
 use super::{OrInput, Stop, println_stderr, println_stdout};
 use crate::pipeline;
 use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
@@ -15,7 +16,7 @@ use tracktwin_diagnosis::{Verdict, check_track};
 use tracktwin_experiment::CODE_VERSION;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Library, without_password};
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::Track;
 use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
@@ -27,7 +28,8 @@ use tracktwin_track::extension;
 Example:
   tracktwin diagnose ride --library sqlite:null.sqlite --out diagnosis
 
-The recording must be of V-Track. With --library, null simulations are stored and used again.
+Without --models the recording is compared with the track of --track, or with the one that
+recording.json states under `nominal`. With --library, null simulations are stored and used again.
 
 Next: `tracktwin extend CAMPAIGN.toml --from diagnosis/diagnosis.json`
 
@@ -37,7 +39,7 @@ pub(super) struct Arguments {
     /// The recording: a folder with `recording.json` and one file per pass.
     recording: PathBuf,
     /// Folder of trained models, written by `train` or `run`; their campaign defines the track.
-    #[arg(long, value_name = "DIR", requires = "library")]
+    #[arg(long, value_name = "DIR", requires = "library", conflicts_with = "track")]
     models: Option<PathBuf>,
     /// Library that stores null simulations and diagnoses, created if missing: sqlite:PATH or
     /// postgres://...
@@ -46,6 +48,8 @@ pub(super) struct Arguments {
     /// Output folder for diagnosis.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    track: TrackOption,
     #[command(flatten)]
     force: Force,
     /// Leave this kind of physics out of the catalogue; may be repeated.
@@ -60,7 +64,7 @@ fn names() -> impl Iterator<Item = &'static str> {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let origin = origin(&arguments);
-    let Arguments { recording, models, library, out, force, without } = arguments;
+    let Arguments { recording, models, library, track, out, force, without } = arguments;
     let recording = Recording::open(&recording).or_input()?;
     check(&out, Kind::Results, force, &["report.html", "diagnosis.json"])?;
     recording.doubts.iter().for_each(|doubt| println_stderr(doubt));
@@ -70,16 +74,20 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         Some(url) => Some(open_or_create(&url).await?),
         None => None,
     };
-    let design = design(models, library.as_ref()).await?;
-    check_track(&recording, &design).or_input()?;
+    let (track, assumed) = match of_models(models, library.as_ref()).await? {
+        Some(track) => (track, Vec::new()),
+        None => track.of(&recording)?,
+    };
+    assumed.iter().for_each(|note| println_stderr(note));
+    check_track(&recording, &track.design).or_input()?;
     make_folder(&out)?;
     let shown = Stages::default();
     let setting =
-        Setting { design: &design, library: library.as_ref(), without: &without, shuffle: None };
+        Setting { track: &track, library: library.as_ref(), without: &without, shuffle: None };
     let diagnosed = diagnose(&recording, setting, &|stage, share| shown.at(stage, share)).await;
     shown.end();
     let mut diagnosis = diagnosed.map_err(stop)?.diagnosis;
-    diagnosis.notes.splice(..0, recording.doubts.iter().cloned());
+    diagnosis.notes.splice(..0, recording.doubts.iter().cloned().chain(assumed));
     let json = serde_json::to_string_pretty(&diagnosis).context("a diagnosis is plain JSON")?;
     let page = tracktwin_report::diagnosis_page(&diagnosis, &origin);
     let mut output = Output::begin(&out, Kind::Results, force.force)?;
@@ -128,10 +136,13 @@ fn origin(arguments: &Arguments) -> Origin {
     }
 }
 
-/// The track that the models' campaign was simulated on; V-Track without models.
-async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<TrackDesign, Stop> {
+/// The track that the models' campaign was simulated on, if there are models.
+async fn of_models(
+    models: Option<PathBuf>,
+    library: Option<&Library>,
+) -> Result<Option<Track>, Stop> {
     let (Some(models), Some(library)) = (models, library) else {
-        return Ok(TrackDesign::v_track());
+        return Ok(None);
     };
     let models = Trained::load(&models).or_input()?;
     let campaign = library
@@ -141,5 +152,5 @@ async fn design(models: Option<PathBuf>, library: Option<&Library>) -> Result<Tr
             "the models belong to another library; give their library, or train models on this one",
         )
         .or_input()?;
-    Ok(pipeline::train::experiment(&campaign).or_input()?.design)
+    Ok(Some(Track::of(pipeline::train::experiment(&campaign).or_input()?.design)))
 }

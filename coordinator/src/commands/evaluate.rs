@@ -3,6 +3,7 @@
 use super::files::{Force, check, make_folder};
 use super::library_url::open_whole;
 use super::progress::Stages;
+use super::track::TrackOption;
 use super::{OrInput, Stop, println_stderr, println_stdout};
 use crate::pipeline::evaluate::{Evaluator, EvaluatorError};
 use crate::pipeline::invert::InvertingError;
@@ -16,7 +17,7 @@ use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_inspection::chain::{self, LossOfContact};
 use tracktwin_inversion::Inversion;
 use tracktwin_library::{Library, without_password};
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureDefinition};
 use tracktwin_surrogate::Trained;
@@ -39,7 +40,7 @@ Examples:
   tracktwin evaluate ride --models out/models --library sqlite:out/library.sqlite --out result
 
 Without --models the recording is evaluated by inversion, which needs no library and accepts any
-speed, but only recordings of V-Track. With --models it is evaluated by Gaussian processes, and the
+track and speed. With --models it is evaluated by Gaussian processes, and the
 page also shows the inversion; --method selects one of the two.
 
 Exit codes: 0 done, 1 done, but the estimates of most sleepers are not valid (see the last lines of
@@ -61,18 +62,20 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
+    track: TrackOption,
+    #[command(flatten)]
     force: Force,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { recording, method, models, library, out, force } = arguments;
+    let Arguments { recording, method, models, library, track, out, force } = arguments;
     // Read the recording first: it is the most frequent cause of errors and the quickest to check.
     let recording = open(&recording)?;
     check_files(&out, force)?;
     let (Some(models), Some(library)) =
         (models.filter(|_| method != Some(Method::Inversion)), library)
     else {
-        return by_inversion(&recording, &out, force).await;
+        return by_inversion(&recording, &track, &out, force).await;
     };
     let library = open_whole(&library).await?;
     let models = Trained::load(&models)
@@ -91,12 +94,19 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 }
 
 /// Evaluates a recording by inversion only.
-async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Result<(), Stop> {
-    let (recording, notes) = usable_with_notes(recording)?;
-    let design = TrackDesign::v_track();
-    check_track(&recording, &design).or_input()?;
+async fn by_inversion(
+    recording: &Recording,
+    track: &TrackOption,
+    folder: &Path,
+    force: Force,
+) -> Result<(), Stop> {
+    let (recording, mut notes) = usable_with_notes(recording)?;
+    let (track, assumed) = track.of(&recording)?;
+    assumed.iter().for_each(|note| println_stderr(note));
+    notes.extend(assumed);
+    check_track(&recording, &track.design).or_input()?;
     make_folder(folder)?;
-    let mut inversion = invert(&recording, &design, None).await.map_err(|error| match error {
+    let mut inversion = invert(&recording, &track, None).await.map_err(|error| match error {
         InvertingError::Recording(error) => Stop::Input(error.into()),
         failed => Stop::Failure(failed.into()),
     })?;
@@ -122,12 +132,12 @@ async fn by_inversion(recording: &Recording, folder: &Path, force: Force) -> Res
 /// The inversion of a recording, with a progress bar.
 async fn invert(
     recording: &Recording,
-    design: &TrackDesign,
+    track: &Track,
     library: Option<&Library>,
 ) -> Result<Inversion, InvertingError> {
     let stages = Stages::default();
     let watch = |stage, share| stages.at(stage, share);
-    let inverted = pipeline::invert::invert(recording, design, library, &watch).await;
+    let inverted = pipeline::invert::invert(recording, track, library, &watch).await;
     stages.end();
     inverted
 }
@@ -208,7 +218,7 @@ async fn invert_beside(
     library: &Library,
     evaluation: &mut Evaluation,
 ) -> Option<Inversion> {
-    match invert(recording, evaluator.design(), Some(library)).await {
+    match invert(recording, &Track::of(evaluator.design().clone()), Some(library)).await {
         Ok(inversion) => Some(inversion),
         Err(error) => {
             let line = format!("no inversion: {error}");

@@ -5,6 +5,7 @@
 
 mod campaign;
 mod certs;
+mod check;
 mod contact;
 mod continuity;
 mod coordinator;
@@ -17,6 +18,7 @@ mod import;
 mod inspect;
 mod library;
 mod library_url;
+mod new;
 mod numbers;
 mod progress;
 mod receptance;
@@ -26,6 +28,7 @@ mod signals;
 mod simulate;
 mod status;
 mod stop;
+mod track;
 mod train;
 mod trial;
 
@@ -60,6 +63,10 @@ struct Program {
 enum Command {
     /// Simulate a campaign, train models on it and evaluate a recording.
     Run(run::Arguments),
+    /// Write the description of a track, to be changed and passed on with --track.
+    New(new::Arguments),
+    /// Check the description of a track: stiffness, resonances, surface, contact.
+    Check(check::Arguments),
     /// Simulate a vehicle's passes over one track and write them as a recording.
     Simulate(simulate::Arguments),
     /// Compute the receptance of the track by frequency (hammer test).
@@ -144,6 +151,8 @@ fn chain(error: &anyhow::Error) -> String {
 fn run(command: Command) -> Result<(), Stop> {
     match command {
         Command::Run(arguments) => asynchronously(run::run(arguments)),
+        Command::New(arguments) => new::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Receptance(arguments) => receptance::run(&arguments),
         Command::Train(arguments) => asynchronously(train::run(arguments)),

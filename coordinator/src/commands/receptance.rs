@@ -2,7 +2,7 @@
 
 use super::files::{Force, check, is_stream, write_file};
 use super::numbers::{count, number};
-use super::simulate::Track;
+use super::track::TrackChoice;
 use super::{OrInput, Stop, println_stdout};
 use anyhow::anyhow;
 use clap::Args;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_parameters::quantity::{FREQUENCY, PLACE, POINTS, SPANS};
-use tracktwin_parameters::{ParameterSet, Preset};
+use tracktwin_parameters::{ParameterSet, Track};
 use tracktwin_report::ReceptanceCurve;
 use tracktwin_track::frequency::{self, Place};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
@@ -50,9 +50,8 @@ pub(super) struct Arguments {
     /// Value of a parameter, e.g. `railpad_stiffness_N_m=9e7`; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<super::simulate::Setting>,
-    /// Preset that gives the nominal track.
-    #[arg(long, value_enum, default_value_t = Track::VTrack)]
-    preset: Track,
+    #[command(flatten)]
+    track: TrackChoice,
 }
 
 /// A point on the rail as written on the command line.
@@ -98,12 +97,12 @@ fn test_point(text: &str) -> Result<TestPoint, String> {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     check_files(arguments)?;
     let frequencies = frequencies(arguments).or_input()?;
-    let preset = Preset::from(arguments.preset);
+    let track = arguments.track.track()?;
     let set =
-        arguments.settings.iter().fold(preset.nominal(), |set, setting| setting.apply(set, 0));
-    let model = model(arguments.spans, preset, &set)?;
+        arguments.settings.iter().fold(track.nominal, |set, setting| setting.apply(set, 0));
+    let model = model(arguments.spans, &track, &set)?;
     let middle = arguments.spans / 2;
-    let spacing = preset.design().sleeper.spacing_m;
+    let spacing = track.design.sleeper.spacing_m;
     let place = |test_point| match test_point {
         TestPoint::Sleeper => Place::Rail(middle as f64 * spacing),
         TestPoint::Midspan => Place::Rail((middle as f64 + 0.5) * spacing),
@@ -170,9 +169,9 @@ fn frequencies(arguments: &Arguments) -> Result<Vec<f64>, anyhow::Error> {
     Ok((0..points).map(|point| from * ratio.powf(point as f64)).collect())
 }
 
-fn model(spans: usize, preset: Preset, set: &ParameterSet) -> Result<TrackModel, Stop> {
+fn model(spans: usize, track: &Track, set: &ParameterSet) -> Result<TrackModel, Stop> {
     let supports = vec![Support::from(set); spans.saturating_sub(1)];
-    TrackModel::build(&preset.design(), &Mesh::uniform(spans, 8, 8), &supports, &[]).or_input()
+    TrackModel::build(&track.design, &Mesh::uniform(spans, 8, 8), &supports, &[]).or_input()
 }
 
 fn csv(frequencies: &[f64], curves: &[ReceptanceCurve]) -> Result<Vec<u8>, anyhow::Error> {

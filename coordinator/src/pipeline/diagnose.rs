@@ -12,14 +12,14 @@ use tracktwin_diagnosis::{
 };
 use tracktwin_inspection::{Inspection, inspect};
 use tracktwin_library::Library;
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
 
 /// Settings of a diagnosis.
 #[derive(Clone, Copy)]
 pub struct Setting<'a> {
     /// The track that recordings are compared with.
-    pub design: &'a TrackDesign,
+    pub track: &'a Track,
     /// Keeps the null simulations, if there is one.
     pub library: Option<&'a Library>,
     /// Kinds of physics that may not be accepted.
@@ -79,12 +79,12 @@ pub async fn diagnose(
     setting: Setting<'_>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Diagnosed, DiagnosingError> {
-    let Setting { design, library, without, shuffle } = setting;
+    let Setting { track, library, without, shuffle } = setting;
     let allowed = |physics: &str| !without.iter().any(|other| other == physics);
-    check_track(recording, design)?;
+    check_track(recording, &track.design)?;
     watch("first look", 0.0);
     let mut inspection = compute(|| inspect(recording));
-    let mut prepared = match compute(|| PreparedRecording::new(recording, design)) {
+    let mut prepared = match compute(|| PreparedRecording::new(recording, track)) {
         Ok(prepared) => prepared,
         Err(reason) => {
             inspection.forget(allowed);

@@ -12,7 +12,7 @@ use tracktwin_evaluation::Flag;
 use tracktwin_inspection::chain;
 use tracktwin_inversion::{Fitted, Inversion, fit, sections};
 use tracktwin_library::Library;
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
 
 /// Errors of the inversion.
@@ -36,12 +36,12 @@ pub enum InvertingError {
 /// [`InvertingError::Recording`] states what the recording lacks; everything else is a failure.
 pub async fn invert(
     recording: &Recording,
-    design: &TrackDesign,
+    track: &Track,
     library: Option<&Library>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Inversion, InvertingError> {
     watch("spectra", 0.0);
-    let prepared = compute(|| sections(recording, design))?;
+    let prepared = compute(|| sections(recording, track))?;
     let started = compute(|| start(prepared, watch))?;
     let (prepared, values) = &started[started.len() / 2];
     watch("null model", 0.0);

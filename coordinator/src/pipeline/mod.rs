@@ -3,6 +3,7 @@
 //! Owns the order of stages and the way between the library, which is asynchronous, and the crates
 //! that compute. What a stage does is its crate's.
 
+pub mod check;
 pub mod compute;
 pub mod coverage;
 pub mod diagnose;

@@ -54,7 +54,7 @@ pub async fn of(
     let grid = NullModel::grid_values(forward, values);
     let key = Key {
         model_hash: MODEL_HASH,
-        design: &forward.section.design,
+        design: &forward.section.track.design,
         sleepers: forward.section.sleepers,
         version: NullModel::VERSION,
         speeds_m_s: &forward.speeds_m_s,

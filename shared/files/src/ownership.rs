@@ -35,12 +35,14 @@ pub enum Kind {
     Certificates,
     /// Curves of `receptance`.
     Curves,
+    /// A description of `new`, which its user changes.
+    Description,
 }
 
 impl Kind {
     /// Whether the program replaces what it made itself.
     const fn is_replaced(self) -> bool {
-        !matches!(self, Self::MeasuredRecording)
+        !matches!(self, Self::MeasuredRecording | Self::Description)
     }
 }
 
@@ -56,6 +58,7 @@ impl Display for Kind {
             Self::Campaign => "a campaign",
             Self::Certificates => "certificates",
             Self::Curves => "receptances",
+            Self::Description => "a description of a track",
         })
     }
 }

@@ -1,6 +1,7 @@
 //! The table of parameters that may differ from case to case or from sleeper to sleeper.
 
-use crate::{Preset, Quantity};
+use crate::Quantity;
+use crate::preset::REAL_SCALE;
 use serde::{Deserialize, Serialize};
 
 /// A row of the catalogue, without its documentation.
@@ -94,7 +95,7 @@ impl Parameter {
     /// real-scale track has.
     pub fn quantity(self) -> Quantity {
         let [low, high] = self.range();
-        let real = self.enlarged(high, Preset::RealScale.length_ratio());
+        let real = self.enlarged(high, REAL_SCALE);
         Quantity::new(self.label(), self.unit(), [1e-3 * low, 1e3 * real], [low, real])
     }
 

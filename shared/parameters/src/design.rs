@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Sleeper spacing of V-Track in m (paper, Table D1).
+const V_TRACK_SPACING_M: f64 = 0.125;
+
 /// Cross-section and material of a beam.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,6 +70,10 @@ pub struct Wheel {
     pub load_n: f64,
     /// Rolling radius in m.
     pub radius_m: f64,
+    /// Places of further wheels of the same mass and load on the same rail, in m ahead of this one;
+    /// negative: behind.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further_wheels_m: Vec<f64>,
 }
 
 /// Everything about wheel and track that is not a [`crate::Parameter`].
@@ -83,6 +90,14 @@ pub struct TrackDesign {
     pub railhead_radius_m: f64,
     /// The wheel.
     pub wheel: Wheel,
+    /// Whether the contact patch averages the irregularity over its length.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub contact_patch_filter: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 impl TrackDesign {
@@ -100,7 +115,7 @@ impl TrackDesign {
             rail: steel.clone(),
             rail_damping_s: 1e-7,
             sleeper: SleeperDesign {
-                spacing_m: 0.125,
+                spacing_m: V_TRACK_SPACING_M,
                 half_length_m: 0.24,
                 rail_seat_m: 0.0,
                 section: BeamSection {
@@ -111,7 +126,13 @@ impl TrackDesign {
                 },
             },
             railhead_radius_m: 0.06,
-            wheel: Wheel { mass_kg: 44.0, load_n: 4500.0, radius_m: 0.065 },
+            wheel: Wheel {
+                mass_kg: 44.0,
+                load_n: 4500.0,
+                radius_m: 0.065,
+                further_wheels_m: Vec::new(),
+            },
+            contact_patch_filter: false,
         }
     }
 
@@ -141,8 +162,15 @@ impl TrackDesign {
                 mass_kg: self.wheel.mass_kg * ratio.powi(3),
                 load_n: self.wheel.load_n * ratio.powi(2),
                 radius_m: self.wheel.radius_m * ratio,
+                further_wheels_m: self.wheel.further_wheels_m.iter().map(|m| m * ratio).collect(),
             },
+            contact_patch_filter: self.contact_patch_filter,
         }
+    }
+
+    /// Sleeper spacing over that of V-Track: the scale of the track's lengths.
+    pub fn length_ratio(&self) -> f64 {
+        self.sleeper.spacing_m / V_TRACK_SPACING_M
     }
 
     /// Mass of one half sleeper in kg.

@@ -1,6 +1,6 @@
 //! Tracks that come with the program: a design, its nominal values, ranges and speeds.
 
-use crate::{Axis, Parameter, ParameterSet, ParameterSpace, Scale, TrackDesign};
+use crate::{Axis, Parameter, ParameterSet, ParameterSpace, Prior, Track, TrackDesign};
 use serde::{Deserialize, Serialize};
 
 /// A track to start from.
@@ -13,7 +13,17 @@ pub enum Preset {
     /// V-Track enlarged five times by the scale factors of Table D1, with the surface of a real rail: a model
     /// of the rig at another scale, not of a line with 60E1 rails.
     RealScale,
+    /// A line: rail 60E1 on concrete monobloc sleepers, railpads from soft to stiff.
+    #[serde(rename = "60E1-concrete")]
+    Concrete60E1,
 }
+
+/// Wavelengths of V-Track's irregularity in m. The paper gives none; at 7 km/h what is 0.5 mm long has a
+/// frequency of 3.9 kHz, inside the features.
+const WAVELENGTHS_M: [f64; 2] = [0.25e-3, 1.0];
+
+/// Sleeper spacing in m between the test rigs and the lines.
+const LINE_SPACING_M: f64 = 0.35;
 
 /// Level `A_irr` of a real rail's surface in 1e-4 m2 rad/m, and its range.
 ///
@@ -26,51 +36,105 @@ pub enum Preset {
 const REAL_LEVEL: f64 = 0.05;
 const REAL_LEVELS: [f64; 2] = [0.02, 0.1];
 
+const CONCRETE_60E1: &str = include_str!("presets/60E1-concrete.toml");
+
 impl Preset {
-    /// Length on this track over length on V-Track.
-    pub const fn length_ratio(self) -> f64 {
+    /// All of them.
+    pub const ALL: &'static [Self] = &[Self::VTrack, Self::RealScale, Self::Concrete60E1];
+
+    /// Its name in files and on the command line.
+    pub const fn name(self) -> &'static str {
         match self {
-            Self::VTrack => 1.0,
-            Self::RealScale => 5.0,
+            Self::VTrack => "v-track",
+            Self::RealScale => "real-scale",
+            Self::Concrete60E1 => "60E1-concrete",
         }
+    }
+
+    /// The preset of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|preset| preset.name() == name)
+    }
+
+    /// The description as a file, with the sources of its numbers where it has them.
+    pub fn text(self) -> String {
+        match self {
+            Self::VTrack | Self::RealScale => self.track().to_toml(),
+            Self::Concrete60E1 => CONCRETE_60E1.to_owned(),
+        }
+    }
+
+    /// The whole description.
+    ///
+    /// # Panics
+    /// Never: a test reads every file.
+    pub fn track(self) -> Track {
+        let text = match self {
+            Self::VTrack => return enlarged("v-track", 1.0),
+            Self::RealScale => return enlarged("real-scale", REAL_SCALE),
+            Self::Concrete60E1 => CONCRETE_60E1,
+        };
+        Track::parse(text).expect("a test reads every preset")
+    }
+
+    /// The one that is meant where a track has sleepers at this spacing and nothing else is known.
+    pub fn like(spacing_m: f64) -> Self {
+        if spacing_m < LINE_SPACING_M { Self::VTrack } else { Self::Concrete60E1 }
     }
 
     /// Sections, masses, spacing and load.
     pub fn design(self) -> TrackDesign {
-        TrackDesign::v_track().enlarged(self.length_ratio())
+        self.track().design
     }
 
     /// Every parameter at its nominal value.
     pub fn nominal(self) -> ParameterSet {
-        Parameter::ALL.iter().fold(ParameterSet::nominal(), |set, &parameter| {
-            let value = match (self, parameter) {
-                (Self::RealScale, Parameter::IrregularityLevel) => REAL_LEVEL,
-                _ => parameter.enlarged(parameter.nominal(), self.length_ratio()),
-            };
-            set.with(parameter, value)
-        })
+        self.track().nominal
     }
 
     /// The range of one parameter.
     pub fn axis(self, parameter: Parameter) -> Axis {
-        let [low, high] = match (self, parameter) {
-            (Self::RealScale, Parameter::IrregularityLevel) => REAL_LEVELS,
-            _ => parameter.range().map(|v| parameter.enlarged(v, self.length_ratio())),
-        };
-        Axis { parameter, low, high, scale: Scale::Linear }
+        self.track().axis(parameter)
     }
 
-    /// All six parameters over the ranges of Table D1; a real rail's surface has its own.
+    /// All six parameters over their ranges.
     pub fn space(self) -> ParameterSpace {
-        let axes = Parameter::ALL.iter().map(|&parameter| self.axis(parameter)).collect();
-        ParameterSpace::new(axes).expect("the catalogue's ranges are positive and in order")
+        self.track().space()
     }
 
-    /// The speeds at which the paper's vehicle runs over it, in km/h.
+    /// The usual speeds in km/h.
     pub fn speeds_km_h(self) -> Vec<f64> {
-        [7.0, 10.0, 13.0].map(|speed| speed * self.length_ratio()).to_vec()
+        self.track().speeds_km_h
     }
 }
+
+/// V-Track with lengths `ratio` times as large; above one, with the surface of a real rail.
+fn enlarged(name: &str, ratio: f64) -> Track {
+    let mut nominal = ParameterSet::nominal();
+    let mut ranges = [[0.0; 2]; Parameter::COUNT];
+    for &parameter in Parameter::ALL {
+        nominal[parameter] = parameter.enlarged(parameter.nominal(), ratio);
+        ranges[parameter.index()] = parameter.range().map(|v| parameter.enlarged(v, ratio));
+    }
+    let mut prior = Prior::v_track().enlarged(ratio);
+    if ratio > 1.0 {
+        nominal[Parameter::IrregularityLevel] = REAL_LEVEL;
+        prior.median[Parameter::IrregularityLevel] = REAL_LEVEL;
+        ranges[Parameter::IrregularityLevel.index()] = REAL_LEVELS;
+    }
+    Track {
+        name: name.to_owned(),
+        design: TrackDesign::v_track().enlarged(ratio),
+        nominal,
+        ranges,
+        prior,
+        wavelengths_m: WAVELENGTHS_M,
+        speeds_km_h: [7.0, 10.0, 13.0].map(|speed| speed * ratio).to_vec(),
+    }
+}
+
+/// Length on the track `real-scale` over length on V-Track.
+pub(crate) const REAL_SCALE: f64 = 5.0;
 
 #[cfg(test)]
 mod tests {

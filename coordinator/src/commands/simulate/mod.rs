@@ -9,9 +9,10 @@ mod track;
 use super::files::{Force, check};
 use super::numbers::{count, number};
 use super::progress::Progress;
+use super::track::TrackChoice;
 use super::{OrInput, Stop};
 use anyhow::anyhow;
-use clap::{Args, ValueEnum};
+use clap::Args;
 pub(super) use extensions::Extensions;
 use sensor::{Sensor, sample_rate_hz};
 pub(super) use setting::Setting;
@@ -21,10 +22,10 @@ use track::SimulatedTrack;
 use tracktwin_drawing::percent;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_parameters::quantity::{ELEMENTS, PASSES, SPANS, SPEED, TIME_STEP};
-use tracktwin_parameters::{Preset, unit};
+use tracktwin_parameters::unit;
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::extension::Class;
-use tracktwin_track::model::{Roughness, Surface};
+use tracktwin_track::model::Surface;
 use tracktwin_track::time;
 
 /// Spans at either end of the track that are not recorded, because the ends are fixed.
@@ -52,7 +53,7 @@ pub(super) struct Arguments {
     out: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
-    /// Speed in km/h; may be repeated [default: 7, 10 and 13; for real-scale 35, 50 and 65].
+    /// Speed in km/h; may be repeated [default: those of the track, 7, 10 and 13 on V-Track].
     #[arg(long = "speed", value_name = "KMH", value_parser = number(SPEED))]
     speeds_km_h: Vec<f64>,
     /// Number of sleeper spans of the track; the six spans at either end are not recorded.
@@ -65,9 +66,8 @@ pub(super) struct Arguments {
     /// `ballast_stiffness_N_m@SN12=4e6`, `...@SN12-SN15=4e6`; may be repeated.
     #[arg(long = "set", value_name = "NAME[@SLEEPERS]=VALUE")]
     settings: Vec<Setting>,
-    /// Preset that gives the nominal track.
-    #[arg(long, value_enum, default_value_t = Track::VTrack)]
-    preset: Track,
+    #[command(flatten)]
+    track: TrackChoice,
     /// Number of passes at each speed.
     #[arg(long, default_value_t = 1, value_parser = count::<u32>(PASSES))]
     passes: u32,
@@ -90,24 +90,6 @@ pub(super) struct Arguments {
     /// Neglect the local flexibility of the loaded element, as the paper does.
     #[arg(long)]
     no_local_flexibility: bool,
-}
-
-/// A preset.
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum Track {
-    /// V-Track, the downscaled test rig of the paper.
-    VTrack,
-    /// V-Track enlarged five times.
-    RealScale,
-}
-
-impl From<Track> for Preset {
-    fn from(track: Track) -> Self {
-        match track {
-            Track::VTrack => Self::VTrack,
-            Track::RealScale => Self::RealScale,
-        }
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
@@ -172,7 +154,7 @@ struct Drive {
 /// If the shape of the wheel matters, every pass except the first starts at a random angle.
 fn drives(arguments: &Arguments, track: &SimulatedTrack) -> Vec<Drive> {
     let speeds_km_h = match &arguments.speeds_km_h[..] {
-        [] => Preset::from(arguments.preset).speeds_km_h(),
+        [] => track.speeds_km_h(),
         given => given.to_vec(),
     };
     let turns = track.kinds().any(|kind| kind.classes.contains(&Class::WheelAngle));
@@ -226,7 +208,7 @@ fn record(
 
 /// The surface of a pass: shared by all passes, except for the unrepeated share.
 fn surface(arguments: &Arguments, track: &SimulatedTrack, pass_seed: u64) -> Surface {
-    let roughness = Roughness::new(track.level());
+    let roughness = track.roughness();
     let shared = track.model().surface(&roughness, arguments.seed);
     if arguments.unrepeated > 0.0 {
         shared.blend(&track.model().surface(&roughness, pass_seed), arguments.unrepeated)

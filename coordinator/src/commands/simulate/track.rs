@@ -4,14 +4,14 @@ use super::super::{OrInput, Stop};
 use super::{Arguments, Drive, END_SPANS, Setting};
 use anyhow::anyhow;
 use serde_json::{Map, Value, json};
-use tracktwin_parameters::{Parameter, ParameterSet, Preset, TrackDesign};
+use tracktwin_parameters::{Parameter, ParameterSet, Track, TrackDesign};
 use tracktwin_signal::recording::{self, Sleeper};
 use tracktwin_track::extension::{ExtensionInstance, Kind};
-use tracktwin_track::model::{Mesh, Support, TrackModel};
+use tracktwin_track::model::{Mesh, Roughness, Support, TrackModel};
 
 /// A track with its own parameters at every sleeper.
 pub(super) struct SimulatedTrack {
-    design: TrackDesign,
+    described: Track,
     spans: usize,
     sleepers: Vec<ParameterSet>,
     extensions: Vec<ExtensionInstance>,
@@ -25,11 +25,11 @@ impl SimulatedTrack {
             return Err(anyhow!("--spans: {spans} is too small; give more than {}", 2 * END_SPANS))
                 .or_input();
         }
-        let preset = Preset::from(arguments.preset);
-        let sleepers = sleepers(preset, spans - 1, &arguments.settings).or_input()?;
+        let described = arguments.track.track()?;
+        let sleepers = sleepers(&described, spans - 1, &arguments.settings).or_input()?;
         let supports: Vec<_> = sleepers.iter().map(Support::from).collect();
         let mesh = Mesh::uniform(spans, arguments.rail_elements, arguments.sleeper_elements);
-        let design = preset.design();
+        let design = described.design.clone();
         let instances = arguments.extensions.instances()?;
         let extensions: Vec<_> = instances
             .iter()
@@ -37,20 +37,26 @@ impl SimulatedTrack {
             .collect::<Result<_, _>>()
             .or_input()?;
         let model = TrackModel::build(&design, &mesh, &supports, &extensions).or_input()?;
-        Ok(Self { design, spans, sleepers, extensions: instances, model })
+        Ok(Self { described, spans, sleepers, extensions: instances, model })
     }
 
     pub(super) fn design(&self) -> &TrackDesign {
-        &self.design
+        &self.described.design
     }
 
     pub(super) fn model(&self) -> &TrackModel {
         &self.model
     }
 
-    /// Level `A_irr` of the surface.
-    pub(super) fn level(&self) -> f64 {
-        self.sleepers[0][Parameter::IrregularityLevel]
+    /// The surface's spectrum.
+    pub(super) fn roughness(&self) -> Roughness {
+        let [shortest_m, longest_m] = self.described.wavelengths_m;
+        Roughness { level: self.sleepers[0][Parameter::IrregularityLevel], shortest_m, longest_m }
+    }
+
+    /// The usual speeds in km/h.
+    pub(super) fn speeds_km_h(&self) -> Vec<f64> {
+        self.described.speeds_km_h.clone()
     }
 
     /// The kinds of its extensions.
@@ -64,13 +70,13 @@ impl SimulatedTrack {
         let behind_m = further_m.iter().copied().fold(0.0, f64::min);
         let ahead_m = further_m.iter().copied().fold(0.0, f64::max);
         let [from_m, to_m] = [END_SPANS, self.spans - END_SPANS]
-            .map(|spans| spans as f64 * self.design.sleeper.spacing_m);
+            .map(|spans| spans as f64 * self.described.design.sleeper.spacing_m);
         [from_m - behind_m, to_m - ahead_m]
     }
 
     /// The sleepers inside the recorded stretch.
     pub(super) fn sleepers_recorded(&self) -> Vec<Sleeper> {
-        let spacing_m = self.design.sleeper.spacing_m;
+        let spacing_m = self.described.design.sleeper.spacing_m;
         let [from_m, to_m] = self.recorded_m();
         // Half a spacing, so that rounding does not lose a sleeper at the end.
         let recorded = from_m - 0.5 * spacing_m..to_m + 0.5 * spacing_m;
@@ -82,7 +88,7 @@ impl SimulatedTrack {
 
     /// Description of the track in the recording format.
     pub(super) fn nominal(&self) -> Map<String, Value> {
-        recording::nominal(&self.design)
+        recording::nominal(&self.described.design)
     }
 
     /// The truth: parameters of every sleeper, extensions, and the angle of the wheel at the start
@@ -102,7 +108,7 @@ impl SimulatedTrack {
         let drive = |drive: &Drive| json!({"speed_km_h": drive.speed_km_h, "wheel_turned_m": drive.wheel_turned_m});
         let truth = json!({
             "left_out": self.extensions,
-            "irregularity_level": self.level(),
+            "irregularity_level": self.roughness().level,
             "sleepers": sleepers,
             "passes": drives.iter().map(drive).collect::<Vec<_>>(),
         });
@@ -117,7 +123,7 @@ fn id(number: usize) -> String {
 
 /// The parameters of every sleeper.
 fn sleepers(
-    preset: Preset,
+    described: &Track,
     count: usize,
     settings: &[Setting],
 ) -> Result<Vec<ParameterSet>, anyhow::Error> {
@@ -131,6 +137,6 @@ fn sleepers(
         }
     }
     let set_of =
-        |number| settings.iter().fold(preset.nominal(), |set, setting| setting.apply(set, number));
+        |number| settings.iter().fold(described.nominal, |set, setting| setting.apply(set, number));
     Ok((0..count).map(set_of).collect())
 }

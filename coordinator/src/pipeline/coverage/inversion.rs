@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_inversion::Inversion;
 use tracktwin_library::Library;
-use tracktwin_parameters::{Parameter, TrackDesign};
+use tracktwin_parameters::{Parameter, Preset};
 use tracktwin_reference_simulator::{Scene, SleeperTruth, TruthError, simulate};
 
 /// Standard deviation of the logarithm from sleeper to sleeper.
@@ -82,8 +82,8 @@ pub async fn inversion_rows(
             let scene = Scene::uneven(seed.wrapping_mul(1000) + u64::from(number), scatter);
             let mut recording = compute(|| simulate(&scene))?;
             recording.name = format!("track {number}");
-            let design = TrackDesign::v_track();
-            let inversion = invert(&recording, &design, library, &|_, _| ()).await?;
+            let track = Preset::VTrack.track();
+            let inversion = invert(&recording, &track, library, &|_, _| ()).await?;
             scores.add(&scene, &inversion);
             done += 1;
             progress(done, total);

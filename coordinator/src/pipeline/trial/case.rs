@@ -25,9 +25,9 @@ impl Trial {
     }
 
     async fn answer_case(&self, number: u32) -> Result<(), TrialError> {
-        let design = Preset::VTrack.design();
+        let track = Preset::VTrack.track();
         let setting =
-            Setting { design: &design, library: Some(&self.library), without: &[], shuffle: None };
+            Setting { track: &track, library: Some(&self.library), without: &[], shuffle: None };
         while let Some(question) = self.next_question(number).await? {
             let recording = self.record_case(number)?;
             match question {

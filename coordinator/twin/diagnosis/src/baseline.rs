@@ -8,6 +8,7 @@ use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
+use tracktwin_parameters::{Parameter, Prior};
 use tracktwin_track::model::Support;
 
 /// The free parameters of a baseline, as logarithms, and their indices.
@@ -25,6 +26,10 @@ pub struct Unknowns {
     pub variation: [Variation; 3],
     /// Sleepers that differ from their neighbours by more than `variation`.
     pub exceptions: Vec<Exception>,
+    /// Each quantity of [`Common`].
+    common: [Mean; 3],
+    /// Standard deviation of the exponent of the surface's spectrum.
+    slope_deviation: f64,
     /// Standard deviation of the sensor's response to power, in nats at each knot.
     pub response_deviation: f64,
 }
@@ -36,6 +41,12 @@ pub struct Mean {
     pub log: f64,
     /// Its standard deviation.
     pub deviation: f64,
+}
+
+impl Mean {
+    fn of(prior: &Prior, parameter: Parameter) -> Self {
+        Self { log: prior.median[parameter].ln(), deviation: prior.log_deviation(parameter) }
+    }
 }
 
 /// How the logarithm of a quantity varies along the track, about its mean.
@@ -63,8 +74,6 @@ const KNOT_DISTANCE: f64 = 0.35;
 
 /// Prior of logarithms: standard deviations, and lengths in sleepers or of `ln kappa`.
 mod prior {
-    /// Mean over all sleepers of each quantity of [`Own`](super::Own).
-    pub(super) const MEAN: [f64; 3] = [0.7, 0.9, 1.2];
     /// Variation along the track where it is not learned from the recording.
     pub(super) const VARIATION: [super::Variation; 3] = [
         super::Variation { smooth: 0.35, length: 3.0, independent: 0.15 },
@@ -73,8 +82,6 @@ mod prior {
     ];
     /// Deviation of an exception from its neighbours.
     pub(super) const EXCEPTION: f64 = 1.0;
-    /// Each quantity of [`Common`](super::Common).
-    pub(super) const COMMON: [f64; 3] = [0.3, 0.4, 0.6];
     /// Spectrum of the surface about eq. B.6, and its length in `ln kappa`.
     pub(super) const SPECTRUM: f64 = 0.5;
     pub(super) const SPECTRUM_LENGTH: f64 = 0.7;
@@ -113,15 +120,15 @@ impl Unknowns {
         frequencies_hz: Range<f64>,
     ) -> Self {
         let (knots, response_knots) = (knots(wave_numbers), knots(frequencies_hz));
+        let known = &section.track.prior;
         Self {
             sleepers: section.sleepers,
             speeds,
             knots,
             response_knots,
-            mean: Own::ALL.map(|quantity| Mean {
-                log: quantity.typical().ln(),
-                deviation: prior::MEAN[quantity as usize],
-            }),
+            mean: Own::ALL.map(|quantity| Mean::of(known, quantity.parameter())),
+            common: Common::ALL.map(|quantity| Mean::of(known, quantity.parameter())),
+            slope_deviation: known.slope_deviation,
             variation: prior::VARIATION,
             exceptions: Vec::new(),
             response_deviation: prior::RESPONSE,
@@ -234,7 +241,7 @@ impl Unknowns {
             values.rows_mut(self.own(quantity).start, self.sleepers).fill(log);
         }
         for quantity in Common::ALL {
-            values[self.common(quantity)] = quantity.typical().ln();
+            values[self.common(quantity)] = self.common[quantity as usize].log;
         }
         values
     }
@@ -272,13 +279,18 @@ impl Unknowns {
             }
         }
         self.add_outer(&mut covariance);
-        for (index, deviation) in self.global().zip(prior::COMMON) {
+        for (index, Mean { deviation, .. }) in self.global().zip(self.common) {
             covariance[(index, index)] = deviation.powi(2);
         }
+        let middle = 0.5 * (self.spectrum().start + self.spectrum().end - 1) as f64;
+        let from_middle = |knot: usize| KNOT_DISTANCE * (knot as f64 - middle);
+        let slope_variance = self.slope_deviation.powi(2);
         for i in self.spectrum() {
             for j in self.spectrum() {
                 let distance = KNOT_DISTANCE * (i as f64 - j as f64) / prior::SPECTRUM_LENGTH;
-                covariance[(i, j)] = prior::SPECTRUM.powi(2) * (-0.5 * distance.powi(2)).exp();
+                let sloped = slope_variance * from_middle(i) * from_middle(j);
+                let about = prior::SPECTRUM.powi(2) * (-0.5 * distance.powi(2)).exp();
+                covariance[(i, j)] = about + sloped;
             }
             // Regularises the inverse for close knots.
             covariance[(i, i)] += (0.05 * prior::SPECTRUM).powi(2);

@@ -217,7 +217,7 @@ impl Problem<'_> {
                 values.rows(place, candidate.free.len()).iter().map(|value| value.exp()).collect();
             place += candidate.free.len();
             let placed = section.in_model(&candidate.with(&parameters));
-            placed.build(&section.design, section.spans())
+            placed.build(&section.track.design, section.spans())
         };
         self.candidates.iter().map(build).collect()
     }

@@ -136,7 +136,7 @@ fn places(places: Places, section: &Section) -> Vec<Place> {
             single().chain(pairs).collect()
         }
         Places::Points => {
-            let half_span_m = 0.5 * section.design.sleeper.spacing_m;
+            let half_span_m = 0.5 * section.track.design.sleeper.spacing_m;
             let point = |half: usize| Place::Point(section.first_x_m + half as f64 * half_span_m);
             (0..2 * section.sleepers - 1).map(point).collect()
         }

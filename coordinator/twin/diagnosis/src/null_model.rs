@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use tracktwin_signal::Signal;
-use tracktwin_track::model::{Mesh, Surface, TrackModel};
+use tracktwin_track::model::{Mesh, Roughness, Surface, TrackModel};
 use tracktwin_track::time::{self, Pass, PassError};
 
 /// Time step in s, and interval of the samples.
@@ -76,20 +76,23 @@ impl NullModel {
         let level = values[forward.unknowns.level().start].exp();
         let mut quiet = forward.with_ends(SPANS_BEYOND);
         quiet.noise_density.fill(0.0);
+        // A further wheel costs twenty times the time and hardly changes the scatter.
+        quiet.section.track.design.wheel.further_wheels_m.clear();
         let expected = quiet.log_power(&values, &[])?;
         let section = &quiet.section;
         let supports = forward.unknowns.supports(section, &values);
         let mesh = Mesh::uniform(section.spans(), ELEMENTS, SLEEPER_ELEMENTS);
-        let model = TrackModel::build(&section.design, &mesh, &supports, &[])?;
+        let model = TrackModel::build(&section.track.design, &mesh, &supports, &[])?;
+        let [shortest_m, longest_m] = section.track.wavelengths_m;
+        let roughness = Roughness { level, shortest_m, longest_m };
         let done = std::sync::atomic::AtomicU64::new(0);
         let groups: Vec<u64> = (0..surfaces).step_by(AT_A_TIME as usize).collect();
         let differences: Vec<Vec<Vec<f64>>> = groups
             .into_par_iter()
             .map(|first| {
                 let seeds = first..(first + AT_A_TIME).min(surfaces);
-                let length_m = model.layout().length_m();
                 let surfaces: Vec<_> =
-                    seeds.map(|s| Surface::rough(seed.wrapping_add(s), level, length_m)).collect();
+                    seeds.map(|s| model.surface(&roughness, seed.wrapping_add(s))).collect();
                 let simulated = simulate(&quiet, &model, &surfaces)?;
                 let count =
                     done.fetch_add(surfaces.len() as u64, std::sync::atomic::Ordering::Relaxed);
@@ -234,7 +237,7 @@ fn simulate(
 }
 
 fn pass(section: &Section, speed_m_s: f64) -> Pass {
-    let spacing_m = section.design.sleeper.spacing_m;
+    let spacing_m = section.track.design.sleeper.spacing_m;
     let first_m = section.model_x_m(section.first_x_m);
     let last_m = first_m + (section.sleepers - 1) as f64 * spacing_m;
     Pass {
@@ -247,7 +250,7 @@ fn pass(section: &Section, speed_m_s: f64) -> Pass {
 }
 
 fn windows(section: &Section, pass: &Pass) -> Vec<Option<Range<usize>>> {
-    let spacing_m = section.design.sleeper.spacing_m;
+    let spacing_m = section.track.design.sleeper.spacing_m;
     let first_m = section.model_x_m(section.first_x_m) - pass.start_m;
     let sample = |x_m: f64| (x_m / (pass.speed_m_s * pass.time_step_s)).round() as usize;
     (0..section.sleepers)

@@ -13,6 +13,8 @@ pub struct Observation {
     order: Vec<usize>,
     /// How many of a sleeper's log powers are fitted.
     fitted: usize,
+    /// How many of a sleeper's log powers are compared: the last in the order are not.
+    compared: usize,
     /// Inverse Cholesky factor of a sleeper's covariance, in that order.
     whitening: DMatrix<f64>,
     /// Weights of each sleeper's whitened values.
@@ -21,21 +23,27 @@ pub struct Observation {
 
 impl Observation {
     /// Log powers with the covariance of any one sleeper's; a sleeper's rows for which `held_out` is
-    /// true are not fitted. None if the covariance is none.
+    /// true are not fitted. A row of infinite variance is not compared: its whitened value is zero. None if
+    /// the covariance is none.
     pub fn new(
         log_power: DVector<f64>,
         covariance: &DMatrix<f64>,
         held_out: impl Fn(usize) -> bool,
     ) -> Option<Self> {
         let size = covariance.nrows();
-        let (last, first): (Vec<usize>, Vec<usize>) = (0..size).partition(|&row| held_out(row));
-        let fitted = first.len();
-        let order = [first, last].concat();
-        let ordered = DMatrix::from_fn(size, size, |i, j| covariance[(order[i], order[j])]);
+        let is_compared = |row: &usize| covariance[(*row, *row)] < f64::INFINITY;
+        let (compared, ignored): (Vec<usize>, Vec<usize>) = (0..size).partition(is_compared);
+        let (last, first): (Vec<usize>, Vec<usize>) =
+            compared.iter().partition(|&&row| held_out(row));
+        let (fitted, compared) = (first.len(), compared.len());
+        let order = [first, last, ignored].concat();
+        let ordered = DMatrix::from_fn(compared, compared, |i, j| covariance[(order[i], order[j])]);
         let factor = nalgebra::Cholesky::new(ordered)?;
-        let whitening = factor.l().solve_lower_triangular(&DMatrix::identity(size, size))?;
+        let inverse = factor.l().solve_lower_triangular(&DMatrix::identity(compared, compared))?;
+        let mut whitening = DMatrix::zeros(size, size);
+        whitening.view_mut((0, 0), (compared, compared)).copy_from(&inverse);
         let weights = vec![1.0; log_power.len() / size];
-        Some(Self { log_power, order, fitted, whitening, weights })
+        Some(Self { log_power, order, fitted, compared, whitening, weights })
     }
 
     /// The same with a covariance at each sleeper that is larger by its own factor.
@@ -43,6 +51,11 @@ impl Observation {
     pub fn with_factors(mut self, factors: &[f64]) -> Self {
         self.weights = factors.iter().map(|factor| factor.sqrt().recip()).collect();
         self
+    }
+
+    /// How many of a sleeper's log powers are compared.
+    pub const fn compared(&self) -> usize {
+        self.compared
     }
 
     /// Measured less predicted log powers.
@@ -96,12 +109,12 @@ impl Observation {
 
     /// Sum over all log powers of the logarithms of their conditional standard deviations.
     pub fn log_deviation(&self) -> f64 {
-        self.log_deviation_of(0..self.order.len())
+        self.log_deviation_of(0..self.compared)
     }
 
     /// Sum over what was held out of the logarithms of its conditional standard deviations.
     pub fn held_out_log_deviation(&self) -> f64 {
-        self.log_deviation_of(self.fitted..self.order.len())
+        self.log_deviation_of(self.fitted..self.compared)
     }
 
     /// Over these of each sleeper's rows, in the order in which they are whitened.

@@ -81,7 +81,7 @@ impl Patch {
     /// frequency. `level` is the irregularity level that the waves add to.
     pub(crate) fn as_waves(&self, section: &Section, level: f64) -> Option<Candidate> {
         let Fixed::Wavelength(length_m) = self.fixed else { return None };
-        let half_m = 0.5 * section.design.sleeper.spacing_m;
+        let half_m = 0.5 * section.track.design.sleeper.spacing_m;
         let (first, last) = (self.sleepers.start, self.sleepers.end - 1);
         let stretch_m = [section.x_m(first) - half_m, section.x_m(last) + half_m];
         // Mean square of the waves: what they add to the band, whose width is 0.3 of its middle.

@@ -6,21 +6,29 @@ use crate::null_model::NullModel;
 use crate::section::Section;
 use crate::spectra::{Spectra, SpeedSpectra};
 use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
 use std::ops::Range;
 use tracktwin_inspection::chain::PassDefect;
-use tracktwin_parameters::TrackDesign;
-use tracktwin_signal::recording::{OtherTrack, Recording, compare_designs};
+use tracktwin_parameters::{Track, TrackDesign};
+use tracktwin_signal::recording::{OtherTrack, Recording};
 use tracktwin_track::extension::Kind;
+use tracktwin_track::model::ContactPatch;
 
-/// Bands compared in Hz, as far as the sample rate lets them: below, a window holds hardly a
-/// wavelet; above, hardly any irregularity.
-const BANDS_HZ: [f64; 2] = [80.0, 5100.0];
+/// Lowest band times the time in which the fastest pass rolls over a sleeper spacing: below, a window
+/// holds hardly a wavelet. 80 Hz on V-Track at 13 km/h.
+const LOWEST_PERIODS: f64 = 80.0 * 0.125 * 3.6 / 13.0;
+
+/// Highest band in Hz, as far as the sample rate lets it: above, there is hardly any irregularity.
+const HIGHEST_HZ: f64 = 5100.0;
 
 /// Highest band as a part of the sample rate.
 const SAMPLE_RATE_SHARE: f64 = 0.35;
 
 /// Smallest number of bands for a diagnosis.
 const BANDS_MIN: usize = 12;
+
+/// Wave number times half the length of the contact patch above which powers are not compared.
+const PATCH_WAVE_NUMBER: f64 = 4.0;
 
 /// Least number of neighbouring sleepers that all passes cover.
 const SLEEPERS_MIN: usize = 6;
@@ -32,19 +40,17 @@ const MARGIN_SPANS: f64 = 0.6;
 /// model's sleepers are evenly spaced.
 const UNEVEN: f64 = 0.1;
 
+/// Step, relative to the nominal speed, to which a true one is rounded: passes that nearly keep the nominal
+/// one share their null simulations.
+const SPEED_STEP: f64 = 5e-3;
+
 /// Why a recording cannot be diagnosed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PreparationError {
-    /// The track that it would be compared with is not V-Track.
+    /// It states another track or vehicle than it would be compared with.
     #[error(
-        "the models are of another track than V-Track ({} {}, V-Track's {}); a diagnosis \
-             supports V-Track only; omit --models for a recording of V-Track", .0.quantity, .0.found(), .0.known()
-    )]
-    OtherDesign(OtherTrack),
-    /// It states another track or vehicle.
-    #[error(
-        "recording.json: {} {}, V-Track's {}; a diagnosis supports V-Track only", .0.quantity,
-        .0.found(), .0.known()
+        "recording.json: {} {}, but the track it is compared with has {}; describe the recording's \
+             track with --track", .0.quantity, .0.found(), .0.known()
     )]
     OtherTrack(OtherTrack),
     /// Its sleepers are not evenly spaced.
@@ -112,21 +118,19 @@ pub struct PreparedRecording {
 }
 
 impl PreparationError {
-    /// Whether the recording or the models are of a track that no diagnosis knows.
+    /// Whether the recording is of another track than it is compared with.
     pub const fn is_of_the_track(&self) -> bool {
-        matches!(self, Self::OtherDesign(_) | Self::OtherTrack(_) | Self::Uneven { .. })
+        matches!(self, Self::OtherTrack(_) | Self::Uneven { .. })
     }
 }
 
-/// Whether a recording can be compared with a track of this design, which must be V-Track: typical values,
-/// ranges and bands are V-Track's.
+/// Whether a recording can be compared with a track of this design.
 ///
 /// A recording whose sleepers are not known is compared with no track.
 ///
 /// # Errors
-/// [`PreparationError::OtherDesign`], [`PreparationError::OtherTrack`] and [`PreparationError::Uneven`].
+/// [`PreparationError::OtherTrack`] and [`PreparationError::Uneven`].
 pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), PreparationError> {
-    compare_designs(design, &TrackDesign::v_track()).map_err(PreparationError::OtherDesign)?;
     if recording.sleepers.is_empty() {
         return Ok(());
     }
@@ -155,8 +159,10 @@ struct Measured {
 impl Measured {
     fn of(recording: &Recording, design: &TrackDesign) -> Result<Self, PreparationError> {
         check_track(recording, design)?;
-        let highest_hz = BANDS_HZ[1].min(SAMPLE_RATE_SHARE * recording.sample_rate_hz);
-        let bands = Bands::new(BANDS_HZ[0], highest_hz.max(BANDS_HZ[0]));
+        let fastest = recording.passes.iter().map(|pass| pass.speed_km_h).fold(0.0, f64::max);
+        let lowest_hz = LOWEST_PERIODS * fastest / 3.6 / design.sleeper.spacing_m;
+        let highest_hz = HIGHEST_HZ.min(SAMPLE_RATE_SHARE * recording.sample_rate_hz);
+        let bands = Bands::new(lowest_hz, highest_hz.max(lowest_hz));
         if bands.count() < BANDS_MIN {
             return Err(PreparationError::SampleRate(recording.sample_rate_hz));
         }
@@ -179,13 +185,17 @@ impl Measured {
     fn prepared(
         &self,
         recording: &Recording,
-        design: &TrackDesign,
+        track: &Track,
         sleepers: Range<usize>,
     ) -> PreparedRecording {
         let Self { bands, spectra, .. } = self;
         let first_x_m = recording.sleepers[sleepers.start].x_m;
-        let section = Section::new(design.clone(), sleepers.len(), first_x_m);
-        let speeds: Vec<f64> = spectra.speeds.iter().map(|speed| speed.speed_km_h).collect();
+        let section = Section::new(track.clone(), sleepers.len(), first_x_m);
+        let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
+        let last_x_m = recording.sleepers[sleepers.end - 1].x_m;
+        let stretch_m = [first_x_m - reach_m, last_x_m + reach_m];
+        let speed = |speed: &SpeedSpectra| true_speed(recording, speed, stretch_m);
+        let speeds: Vec<f64> = spectra.speeds.iter().map(speed).collect();
         let noise = spectra.speeds.iter().map(|speed| speed.noise_density).collect();
         let forward = Forward::new(section, bands.clone(), &speeds, noise);
         let log_power = log_power(&forward, spectra, sleepers.start);
@@ -209,9 +219,9 @@ impl PreparedRecording {
     ///
     /// # Errors
     /// [`PreparationError`] states what is missing.
-    pub fn new(recording: &Recording, design: &TrackDesign) -> Result<Self, PreparationError> {
-        let measured = Measured::of(recording, design)?;
-        Ok(measured.prepared(recording, design, measured.sleepers.clone()))
+    pub fn new(recording: &Recording, track: &Track) -> Result<Self, PreparationError> {
+        let measured = Measured::of(recording, &track.design)?;
+        Ok(measured.prepared(recording, track, measured.sleepers.clone()))
     }
 
     /// The same in sections of at most `length` sleepers, each of which shares at least `overlap` with
@@ -221,13 +231,13 @@ impl PreparedRecording {
     /// As [`PreparedRecording::new`].
     pub fn sections(
         recording: &Recording,
-        design: &TrackDesign,
+        track: &Track,
         length: usize,
         overlap: usize,
     ) -> Result<Vec<Self>, PreparationError> {
-        let measured = Measured::of(recording, design)?;
+        let measured = Measured::of(recording, &track.design)?;
         let ranges = overlapping(measured.sleepers.clone(), length, overlap);
-        Ok(ranges.into_iter().map(|range| measured.prepared(recording, design, range)).collect())
+        Ok(ranges.into_iter().map(|range| measured.prepared(recording, track, range)).collect())
     }
 
     /// Whether physics of a kind may be named.
@@ -258,8 +268,46 @@ impl PreparedRecording {
 
     /// Covariance of any one sleeper's log powers: the null model's, and what the passes do not share.
     pub fn covariance(&self, null: &NullModel) -> DMatrix<f64> {
-        null.covariance(self.forward.bands.count(), &self.pass_variance)
+        let covariance = null.covariance(self.forward.bands.count(), &self.pass_variance);
+        self.of_compared(covariance)
     }
+
+    /// A sleeper's covariance with an infinite variance of what is not compared: waves that are short
+    /// against the contact patch, for its filter is the coarsest part of the model.
+    pub(crate) fn of_compared(&self, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+        let forward = &self.forward;
+        let design = &forward.section.track.design;
+        if !design.contact_patch_filter {
+            return covariance;
+        }
+        let half_length_m = ContactPatch::new(design).half_length_m;
+        for row in 0..covariance.nrows() {
+            let (_, speed, band) = forward.place(row);
+            let wave_number = TAU * forward.bands.centres_hz()[band] / forward.speeds_m_s[speed];
+            if wave_number * half_length_m > PATCH_WAVE_NUMBER {
+                covariance.row_mut(row).fill(0.0);
+                covariance.column_mut(row).fill(0.0);
+                covariance[(row, row)] = f64::INFINITY;
+            }
+        }
+        covariance
+    }
+}
+
+/// Mean speed in km/h of a speed's passes over a stretch, by their positions; the nominal one where it is
+/// hardly different.
+fn true_speed(recording: &Recording, speed: &SpeedSpectra, [from_m, to_m]: [f64; 2]) -> f64 {
+    let of_pass = |&pass: &usize| {
+        let pass = &recording.passes[pass];
+        let sample = |x_m: f64| pass.position_m.partition_point(|&position| position < x_m);
+        let last = pass.position_m.len() - 1;
+        let [from, to] = [from_m, to_m].map(|x_m| sample(x_m).min(last));
+        let way_m = pass.position_m[to] - pass.position_m[from];
+        3.6 * way_m * pass.signal.sample_rate_hz() / (to - from).max(1) as f64
+    };
+    let mean = speed.passes.iter().map(of_pass).sum::<f64>() / speed.passes.len() as f64;
+    let steps = ((mean / speed.speed_km_h - 1.0) / SPEED_STEP).round();
+    speed.speed_km_h * (1.0 + SPEED_STEP * steps)
 }
 
 /// The longest run of neighbouring sleepers that every pass covers with a margin.

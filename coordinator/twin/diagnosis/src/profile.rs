@@ -31,7 +31,7 @@ pub(crate) struct Shape {
 impl Shape {
     /// The spectrum of a height in m by place on the model's track in m; none if it is flat.
     pub(crate) fn new(section: &Section, height_m: impl Fn(f64) -> f64) -> Option<Self> {
-        let spacing_m = section.design.sleeper.spacing_m;
+        let spacing_m = section.track.design.sleeper.spacing_m;
         let step_m = spacing_m / SAMPLES_PER_SPACING as f64;
         let transform = FftPlanner::new().plan_fft_forward(SAMPLES);
         let of = |sleeper: usize| {

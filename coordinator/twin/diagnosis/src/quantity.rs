@@ -1,5 +1,7 @@
 //! The quantities of a support, by which the baseline's unknowns are addressed.
 
+use tracktwin_parameters::Parameter;
+
 /// A quantity of which every sleeper has its own value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Own {
@@ -33,12 +35,12 @@ impl Own {
     /// All of them, in the order of the unknowns.
     pub const ALL: [Self; 3] = [Self::BallastStiffness, Self::RailpadStiffness, Self::Level];
 
-    /// Typical value about which the logarithm lies (paper, Table D1).
-    pub(crate) const fn typical(self) -> f64 {
+    /// The parameter of the track that it is.
+    pub const fn parameter(self) -> Parameter {
         match self {
-            Self::BallastStiffness => 1.0e7,
-            Self::RailpadStiffness => 9.0e7,
-            Self::Level => 2.5,
+            Self::BallastStiffness => Parameter::BallastStiffness,
+            Self::RailpadStiffness => Parameter::RailpadStiffness,
+            Self::Level => Parameter::IrregularityLevel,
         }
     }
 }
@@ -48,12 +50,12 @@ impl Common {
     pub const ALL: [Self; 3] =
         [Self::SleeperBendingStiffness, Self::RailpadDamping, Self::BallastDamping];
 
-    /// Typical value about which the logarithm lies (paper, Table D1).
-    pub(crate) const fn typical(self) -> f64 {
+    /// The parameter of the track that it is.
+    pub const fn parameter(self) -> Parameter {
         match self {
-            Self::SleeperBendingStiffness => 5.0e3,
-            Self::RailpadDamping => 6.0e3,
-            Self::BallastDamping => 8.0e2,
+            Self::SleeperBendingStiffness => Parameter::SleeperBendingStiffness,
+            Self::RailpadDamping => Parameter::RailpadDamping,
+            Self::BallastDamping => Parameter::BallastDamping,
         }
     }
 }

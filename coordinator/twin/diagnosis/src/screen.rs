@@ -53,7 +53,7 @@ pub fn templates(
             let candidate = &candidates[number];
             let extension = candidate.with(&candidate.trials[trial]);
             let section = &forward.section;
-            let built = section.in_model(&extension).build(&section.design, section.spans());
+            let built = section.in_model(&extension).build(&section.track.design, section.spans());
             progress();
             let extensions = [&accepted[..], &[built.ok()?]].concat();
             let transfer = forward.transfer_beside(&known, &calibration.values, &extensions);

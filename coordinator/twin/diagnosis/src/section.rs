@@ -3,7 +3,7 @@
 use crate::bands::{Bands, CENTRE_RAD};
 use std::f64::consts::{SQRT_2, TAU};
 use std::ops::Range;
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::Track;
 use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::model::Mesh;
 
@@ -41,8 +41,8 @@ impl Window {
 /// A stretch of sleepers and the track around it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    /// Rail, sleepers, wheel.
-    pub design: TrackDesign,
+    /// Rail, sleepers, wheel, and what is known of them.
+    pub track: Track,
     /// Sleepers compared.
     pub sleepers: usize,
     /// Place of the first of them on the recording's scale in m.
@@ -54,8 +54,8 @@ pub struct Section {
 
 impl Section {
     /// A section of `sleepers` sleepers with the usual length of track around it.
-    pub const fn new(design: TrackDesign, sleepers: usize, first_x_m: f64) -> Self {
-        Self { design, sleepers, first_x_m, spans_beyond: SPANS_BEYOND }
+    pub fn new(track: impl Into<Track>, sleepers: usize, first_x_m: f64) -> Self {
+        Self { track: track.into(), sleepers, first_x_m, spans_beyond: SPANS_BEYOND }
     }
 
     /// Mesh of the whole track: the sleepers compared and what lies beyond them.
@@ -96,17 +96,17 @@ impl Section {
 
     /// Place on the model's track of a place on the recording's scale, both in m.
     pub fn model_x_m(&self, x_m: f64) -> f64 {
-        x_m - self.first_x_m + self.spans_beyond as f64 * self.design.sleeper.spacing_m
+        x_m - self.first_x_m + self.spans_beyond as f64 * self.track.design.sleeper.spacing_m
     }
 
     /// Place in the middle of a compared sleeper's window on the recording's scale, in m.
     pub fn x_m(&self, sleeper: usize) -> f64 {
-        self.first_x_m + sleeper as f64 * self.design.sleeper.spacing_m
+        self.first_x_m + sleeper as f64 * self.track.design.sleeper.spacing_m
     }
 
     /// Whether two stretches, each from and to in m, are at most a spacing apart.
     pub fn are_beside(&self, one: [f64; 2], other: [f64; 2]) -> bool {
-        let spacing_m = self.design.sleeper.spacing_m;
+        let spacing_m = self.track.design.sleeper.spacing_m;
         one[0] - spacing_m <= other[1] && other[0] - spacing_m <= one[1]
     }
 
@@ -127,7 +127,7 @@ impl Section {
     /// The wavelet smears the window: at position `x` it holds power from around `x`, by a
     /// Gaussian whose deviation is the way rolled in `6 / (2 pi f sqrt 2)`.
     pub fn window(&self, sleeper: usize, speed_m_s: f64, centre_hz: f64) -> Window {
-        let spacing_m = self.design.sleeper.spacing_m;
+        let spacing_m = self.track.design.sleeper.spacing_m;
         let blur_m = speed_m_s * CENTRE_RAD / (TAU * centre_hz * SQRT_2);
         let node_m = spacing_m / ELEMENTS as f64;
         let middle = self.seat_node(sleeper);

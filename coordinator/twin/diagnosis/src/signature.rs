@@ -25,7 +25,7 @@ pub fn signature(
     let problem = Problem { forward: &prepared.forward, observation, candidates: &[] };
     let section = &prepared.forward.section;
     // Screening leaves out what makes no track: here the reason is wanted.
-    section.in_model(&extension).build(&section.design, section.spans())?;
+    section.in_model(&extension).build(&section.track.design, section.spans())?;
     let (kind, trials) = (extension.kind()?, vec![Vec::new()]);
     let candidate = Candidate { kind, extension, free: Vec::new(), trials };
     let traces = templates(&problem, &problem.at(values)?, &[candidate], &|| ())?;

@@ -73,7 +73,7 @@ fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (PreparedRecordi
     let null = NullModel::from_numbers(&forward, &numbers).unwrap();
     let section = &forward.section;
     let built = extension.map(|extension| {
-        section.in_model(&extension).build(&section.design, section.spans()).unwrap()
+        section.in_model(&extension).build(&section.track.design, section.spans()).unwrap()
     });
     let values = forward.unknowns.typical();
     let expected = forward.log_power(&values, built.as_slice()).unwrap();

@@ -6,7 +6,7 @@ use tracktwin_diagnosis::{
     Calibration, CalibrationError, Forward, Mean, NullModel, Observation, Own, PreparationError,
     PreparedRecording, Problem, Unknowns, Variation,
 };
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
 
 /// Times that the variation is learned and the track fitted anew.
@@ -58,9 +58,9 @@ pub struct Fitted {
 /// [`PreparationError`] says what the recording lacks.
 pub fn sections(
     recording: &Recording,
-    design: &TrackDesign,
+    track: &Track,
 ) -> Result<Vec<PreparedRecording>, PreparationError> {
-    PreparedRecording::sections(recording, design, LENGTH, OVERLAP)
+    PreparedRecording::sections(recording, track, LENGTH, OVERLAP)
 }
 
 /// Fits a section; `start` is [`tracktwin_diagnosis::first_calibration`]'s answer, and the subject's
@@ -85,7 +85,8 @@ pub fn fit(
     };
     let mut calibration = fit(&forward, &factors, start)?;
     for _ in 0..ROUNDS {
-        factors = misfit(&calibration, &factors).into_iter().map(factor).collect();
+        let found = misfit(&calibration, &factors, plain.compared());
+        factors = found.into_iter().map(factor).collect();
         calibration = fit(&forward, &factors, calibration.values)?;
         let data = Quadratic::new(&calibration, forward.unknowns.typical());
         learn(&mut forward.unknowns, &data);
@@ -95,7 +96,7 @@ pub fn fit(
     let valley =
         along_valley(|forward, start| fit(forward, &factors, start), &forward, &calibration)?;
     let posterior = Posterior::mixture(&valley);
-    let misfit = misfit(&calibration, &factors);
+    let misfit = misfit(&calibration, &factors, plain.compared());
     Ok(Fitted::of(forward.unknowns, posterior, misfit))
 }
 
@@ -177,12 +178,12 @@ impl Posterior {
     }
 }
 
-/// Sum of squares of each sleeper's residual over the number of its log powers, with the covariance as it
+/// Sum of squares of each sleeper's residual over the number of its compared log powers, with the covariance as it
 /// was before it was multiplied by `factors`.
-fn misfit(calibration: &Calibration, factors: &[f64]) -> Vec<f64> {
+fn misfit(calibration: &Calibration, factors: &[f64], compared: usize) -> Vec<f64> {
     let each = calibration.residual.len() / factors.len();
     let of = |(sleeper, factor): (usize, &f64)| {
-        factor * calibration.residual.rows(sleeper * each, each).norm_squared() / each as f64
+        factor * calibration.residual.rows(sleeper * each, each).norm_squared() / compared as f64
     };
     factors.iter().enumerate().map(of).collect()
 }

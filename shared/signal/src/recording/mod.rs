@@ -24,4 +24,4 @@ mod track;
 pub use error::{Fault, RecordingError};
 pub use folder::{Pass, Recording};
 pub use sleeper::Sleeper;
-pub use track::{OtherTrack, compare_designs, nominal};
+pub use track::{OtherTrack, StatedTrack, compare_designs, nominal};

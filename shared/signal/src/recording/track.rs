@@ -2,7 +2,7 @@
 
 use super::Recording;
 use serde_json::{Map, Value, json};
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::{Preset, Track, TrackDesign};
 
 /// Relative difference up to which two tracks are alike.
 const ALIKE: f64 = 0.02;
@@ -13,7 +13,7 @@ struct Quantity {
     part: Option<&'static str>,
     name: &'static str,
     unit: &'static str,
-    of: fn(&TrackDesign) -> f64,
+    of: fn(&mut TrackDesign) -> &mut f64,
 }
 
 impl Quantity {
@@ -21,7 +21,7 @@ impl Quantity {
         part: Option<&'static str>,
         name: &'static str,
         unit: &'static str,
-        of: fn(&TrackDesign) -> f64,
+        of: fn(&mut TrackDesign) -> &mut f64,
     ) -> Self {
         Self { part, name, unit, of }
     }
@@ -32,6 +32,10 @@ impl Quantity {
             Some(part) => format!("nominal.{part}.{}", self.name),
             None => format!("nominal.{}", self.name),
         }
+    }
+
+    fn value(&self, design: &TrackDesign) -> f64 {
+        *(self.of)(&mut design.clone())
     }
 
     fn stated(&self, recording: &Recording) -> Option<f64> {
@@ -47,22 +51,35 @@ const SLEEPER: Option<&str> = Some("sleeper");
 const WHEEL: Option<&str> = Some("wheel");
 
 /// All quantities, in the order in which they are compared.
-const QUANTITIES: [Quantity; 14] = [
-    Quantity::new(SLEEPER, "spacing_m", "m", |it| it.sleeper.spacing_m),
-    Quantity::new(RAIL, "area_m2", "m2", |it| it.rail.area_m2),
-    Quantity::new(RAIL, "second_moment_m4", "m4", |it| it.rail.second_moment_m4),
-    Quantity::new(RAIL, "youngs_Pa", "Pa", |it| it.rail.youngs_modulus_pa),
-    Quantity::new(RAIL, "density_kg_m3", "kg/m3", |it| it.rail.density_kg_m3),
-    Quantity::new(RAIL, "poisson", "", |it| it.rail.poisson),
-    Quantity::new(RAIL, "shear_coefficient", "", |it| it.rail.shear_coefficient),
-    Quantity::new(SLEEPER, "half_length_m", "m", |it| it.sleeper.half_length_m),
-    Quantity::new(SLEEPER, "area_m2", "m2", |it| it.sleeper.section.area_m2),
-    Quantity::new(SLEEPER, "density_kg_m3", "kg/m3", |it| it.sleeper.section.density_kg_m3),
-    Quantity::new(None, "railhead_radius_m", "m", |it| it.railhead_radius_m),
-    Quantity::new(WHEEL, "mass_kg", "kg", |it| it.wheel.mass_kg),
-    Quantity::new(WHEEL, "load_N", "N", |it| it.wheel.load_n),
-    Quantity::new(WHEEL, "radius_m", "m", |it| it.wheel.radius_m),
+const QUANTITIES: [Quantity; 15] = [
+    Quantity::new(SLEEPER, "spacing_m", "m", |it| &mut it.sleeper.spacing_m),
+    Quantity::new(RAIL, "area_m2", "m2", |it| &mut it.rail.area_m2),
+    Quantity::new(RAIL, "second_moment_m4", "m4", |it| &mut it.rail.second_moment_m4),
+    Quantity::new(RAIL, "youngs_Pa", "Pa", |it| &mut it.rail.youngs_modulus_pa),
+    Quantity::new(RAIL, "density_kg_m3", "kg/m3", |it| &mut it.rail.density_kg_m3),
+    Quantity::new(RAIL, "poisson", "", |it| &mut it.rail.poisson),
+    Quantity::new(RAIL, "shear_coefficient", "", |it| &mut it.rail.shear_coefficient),
+    Quantity::new(SLEEPER, "half_length_m", "m", |it| &mut it.sleeper.half_length_m),
+    Quantity::new(SLEEPER, "rail_seat_m", "m", |it| &mut it.sleeper.rail_seat_m),
+    Quantity::new(SLEEPER, "area_m2", "m2", |it| &mut it.sleeper.section.area_m2),
+    Quantity::new(SLEEPER, "density_kg_m3", "kg/m3", |it| &mut it.sleeper.section.density_kg_m3),
+    Quantity::new(None, "railhead_radius_m", "m", |it| &mut it.railhead_radius_m),
+    Quantity::new(WHEEL, "mass_kg", "kg", |it| &mut it.wheel.mass_kg),
+    Quantity::new(WHEEL, "load_N", "N", |it| &mut it.wheel.load_n),
+    Quantity::new(WHEEL, "radius_m", "m", |it| &mut it.wheel.radius_m),
 ];
+
+/// What a recording may state beside them: the sleeper's bending stiffness is one of the parameters, so
+/// that no two tracks differ by it, and the rail's damping is seldom known.
+const FURTHER: [Quantity; 4] = [
+    Quantity::new(None, "rail_damping_s", "s", |it| &mut it.rail_damping_s),
+    Quantity::new(SLEEPER, "second_moment_m4", "m4", |it| &mut it.sleeper.section.second_moment_m4),
+    Quantity::new(SLEEPER, "youngs_Pa", "Pa", |it| &mut it.sleeper.section.youngs_modulus_pa),
+    Quantity::new(SLEEPER, "poisson", "", |it| &mut it.sleeper.section.poisson),
+];
+
+/// Distance in m of the recorded wheel from the other one of its bogie, which runs behind it.
+const WHEELBASE: &str = "wheelbase_m";
 
 /// A quantity in which two tracks differ by more than 2 %.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -91,7 +108,7 @@ impl OtherTrack {
 
     fn new(quantity: String, found: f64, known: f64, unit: &'static str) -> Result<(), Self> {
         // What is not a number is not alike either.
-        if (found / known - 1.0).abs() <= ALIKE {
+        if (found - known).abs() <= ALIKE * known.abs() {
             return Ok(());
         }
         Err(Self { quantity, found, known, unit })
@@ -120,12 +137,63 @@ impl Recording {
         }
         for quantity in &QUANTITIES {
             if let Some(found) = quantity.stated(self) {
-                let known = (quantity.of)(design);
+                let known = quantity.value(design);
                 OtherTrack::new(format!("{} is", quantity.path()), found, known, quantity.unit)?;
             }
         }
         Ok(())
     }
+
+    /// The track and vehicle that the recording states, and what it leaves open: that is taken from the
+    /// track of the program whose sleepers are spaced most like it.
+    pub fn stated_track(&self) -> StatedTrack {
+        let preset = Preset::ALL.iter().find(|preset| {
+            let design = preset.design();
+            self.states_anything() && self.check_track(&design).is_ok()
+        });
+        let preset = preset.copied().unwrap_or(Preset::like(self.spacing_m));
+        let known = preset.track();
+        let mut design = known.design.clone();
+        let mut assumed = Vec::new();
+        let differs = self.check_track(&design).is_err();
+        for quantity in QUANTITIES.iter().chain(&FURTHER) {
+            match quantity.stated(self) {
+                // What is V-Track's to two per cent is V-Track's.
+                Some(value) if differs || preset != Preset::VTrack => {
+                    *(quantity.of)(&mut design) = value;
+                }
+                Some(_) => (),
+                None => assumed.push(quantity.path()),
+            }
+        }
+        design.sleeper.spacing_m =
+            if differs { self.spacing_m } else { design.sleeper.spacing_m };
+        match self.nominal.get("wheel").and_then(|wheel| wheel.get(WHEELBASE)) {
+            Some(wheelbase) => {
+                design.wheel.further_wheels_m =
+                    wheelbase.as_f64().map(|metres| -metres.abs()).into_iter().collect();
+            }
+            None if preset == Preset::VTrack => (),
+            None => assumed.push(format!("nominal.wheel.{WHEELBASE}")),
+        }
+        let track = if design == known.design { known } else { known.with_design(design) };
+        StatedTrack { track, preset, assumed }
+    }
+
+    fn states_anything(&self) -> bool {
+        QUANTITIES.iter().any(|quantity| quantity.stated(self).is_some())
+    }
+}
+
+/// A track that a recording states.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StatedTrack {
+    /// The track.
+    pub track: Track,
+    /// Where that comes from which the recording does not state.
+    pub preset: Preset,
+    /// Keys of `recording.json` that it does not state.
+    pub assumed: Vec<String>,
 }
 
 /// Compares two designs in all that recordings state.
@@ -134,7 +202,7 @@ impl Recording {
 /// [`OtherTrack`] with the first quantity in which `found` differs from `known` by more than 2 %.
 pub fn compare_designs(found: &TrackDesign, known: &TrackDesign) -> Result<(), OtherTrack> {
     QUANTITIES.iter().try_for_each(|quantity| {
-        let [found, known] = [found, known].map(|design| (quantity.of)(design));
+        let [found, known] = [found, known].map(|design| quantity.value(design));
         OtherTrack::new(format!("{} is", quantity.path()), found, known, quantity.unit)
     })
 }
@@ -143,11 +211,14 @@ pub fn compare_designs(found: &TrackDesign, known: &TrackDesign) -> Result<(), O
 pub fn nominal(design: &TrackDesign) -> Map<String, Value> {
     let mut nominal = json!({});
     for quantity in &QUANTITIES {
-        let value = json!((quantity.of)(design));
+        let value = json!(quantity.value(design));
         match quantity.part {
             Some(part) => nominal[part][quantity.name] = value,
             None => nominal[quantity.name] = value,
         }
+    }
+    if let Some(ahead_m) = design.wheel.further_wheels_m.first() {
+        nominal["wheel"][WHEELBASE] = json!(ahead_m.abs());
     }
     match nominal {
         Value::Object(fields) => fields,
@@ -183,7 +254,7 @@ mod tests {
             for (factor, is_alike) in [(1.019, true), (0.981, true), (1.021, false), (0.979, false)]
             {
                 let mut recording = recording();
-                let known = (quantity.of)(&v_track);
+                let known = quantity.value(&v_track);
                 let part = quantity.part.map(|part| recording.nominal.get_mut(part));
                 let fields = match part {
                     Some(part) => part.and_then(Value::as_object_mut).unwrap(),

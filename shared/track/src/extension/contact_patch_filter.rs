@@ -1,7 +1,7 @@
 //! The contact patch, which averages the irregularity over its length.
 
 use super::{Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
-use std::f64::consts::FRAC_PI_4;
+use crate::model::ContactPatch;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
@@ -23,8 +23,8 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// `|H|² = 1 / (1 + pi/4 (kappa a)³)` for a patch of half length `a` (Remington 1976).
-/// It filters the random irregularity, not what other kinds add to it.
+/// A patch of another length than the design's. It filters the random irregularity, not what other kinds add
+/// to it.
 #[derive(Debug)]
 struct ContactPatchFilter {
     half_length_m: f64,
@@ -32,7 +32,7 @@ struct ContactPatchFilter {
 
 impl Extension for ContactPatchFilter {
     fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
-        1.0 / (1.0 + FRAC_PI_4 * (wave_number_rad_m * self.half_length_m).powi(3))
+        ContactPatch { half_length_m: self.half_length_m }.gain(wave_number_rad_m)
     }
 }
 

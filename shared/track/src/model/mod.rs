@@ -16,7 +16,7 @@ mod track;
 mod vehicle;
 
 pub use assembly::{Assembly, Port};
-pub use contact::HertzContact;
+pub use contact::{ContactPatch, HertzContact};
 pub use force_law::{ForceLaw, Law, Reaction};
 pub use irregularity::{Roughness, Surface};
 pub use layout::{Layout, RailPoint, SleeperLayout};

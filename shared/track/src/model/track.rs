@@ -1,7 +1,7 @@
 //! The assembled track.
 
 use super::assembly::Assembled;
-use super::{Assembly, ForceLaw, Layout, Matrices, Mesh, Roughness, Support, Surface, Vehicle};
+use super::{Assembly, ContactPatch, ForceLaw, Layout, Matrices, Mesh, Roughness, Support, Surface, Vehicle};
 use crate::element::SpringDamper;
 use crate::extension::{Extension, Measured};
 use crate::time;
@@ -175,11 +175,15 @@ impl TrackModel {
         self
     }
 
-    /// By what extensions multiply the spectral density of the irregularity at a wave number in
-    /// rad/m.
+    /// By what the design's contact patch and the extensions multiply the spectral density of the
+    /// irregularity at a wave number in rad/m.
     pub fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
         let gain = |extension: &Arc<dyn Extension>| extension.roughness_gain(wave_number_rad_m);
-        self.extensions.iter().map(gain).product()
+        let by_extensions: f64 = self.extensions.iter().map(gain).product();
+        if !self.design.contact_patch_filter {
+            return by_extensions;
+        }
+        by_extensions * ContactPatch::new(&self.design).gain(wave_number_rad_m)
     }
 
     /// The irregularity of this seed, of the given roughness as extensions change it, along the

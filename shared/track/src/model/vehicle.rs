@@ -42,9 +42,10 @@ impl ContactOscillator {
 }
 
 impl Vehicle {
-    /// A rigid wheel.
+    /// A rigid wheel and the design's further ones.
     pub(super) fn rigid(wheel: &Wheel) -> Self {
-        Self { wheel: wheel.clone(), oscillators: Vec::new(), further_wheels_m: Vec::new() }
+        let further_wheels_m = wheel.further_wheels_m.clone();
+        Self { wheel: wheel.clone(), oscillators: Vec::new(), further_wheels_m }
     }
 
     /// Whether it is one rigid wheel and nothing else.

@@ -23,7 +23,7 @@ impl Evidence<'_> {
             }
         }
         let location = self.location_of_finding(finding);
-        let reach_m = REACH_SPANS * self.prepared.forward.section.design.sleeper.spacing_m;
+        let reach_m = REACH_SPANS * self.prepared.forward.section.track.design.sleeper.spacing_m;
         let explained = !kind.measuring_chain
             && all.iter().any(|known| explains(known, kind, location.as_ref(), reach_m));
         all.retain(|known| known.accepted || known.physics != finding.physics);

@@ -89,7 +89,7 @@ impl Evidence<'_> {
         }
         let place = accepted.and_then(|hypothesis| hypothesis.location.as_ref());
         let section = &self.prepared.forward.section;
-        let half_m = section.design.sleeper.spacing_m;
+        let half_m = section.track.design.sleeper.spacing_m;
         let at_place = |sleeper: &usize| {
             place.is_none_or(|place| {
                 let x_m = section.x_m(*sleeper);

@@ -49,7 +49,7 @@ impl Evidence<'_> {
     /// A stretch with the sleepers whose half bays it touches.
     pub(super) fn location_between(&self, from_m: f64, to_m: f64) -> Location {
         let section = &self.prepared.forward.section;
-        let half_m = (0.5 + PLACE_ERROR) * section.design.sleeper.spacing_m;
+        let half_m = (0.5 + PLACE_ERROR) * section.track.design.sleeper.spacing_m;
         let near = |sleeper: &usize| {
             let x_m = section.x_m(*sleeper);
             from_m - half_m <= x_m && x_m <= to_m + half_m

@@ -199,7 +199,7 @@ impl Forward {
             let mut varied = supports.clone();
             varied.iter_mut().for_each(vary);
             let mesh = self.section.mesh();
-            let model = TrackModel::build(&self.section.design, &mesh, &varied, extensions)?;
+            let model = TrackModel::build(&self.section.track.design, &mesh, &varied, extensions)?;
             Ok(seat_stiffness(&model, lines))
         };
         let plain = stiffness(|_| ())?;

@@ -65,7 +65,9 @@ impl Forward {
         let unknowns = Unknowns::new(&section, speeds_m_s.len(), wave_numbers, frequencies_hz);
         let windows = speeds_m_s.iter().map(|&v| section.windows(v, &bands)).collect();
         // A density per rad/m becomes one per Hz at this speed.
-        let density = |v: f64, hz: f64| Roughness::new(1.0).density(TAU * hz / v) * TAU / v;
+        let [shortest_m, longest_m] = section.track.wavelengths_m;
+        let surface = Roughness { level: 1.0, shortest_m, longest_m };
+        let density = |v: f64, hz: f64| surface.density(TAU * hz / v) * TAU / v;
         let surface =
             speeds_m_s.iter().map(|&v| lines.iter().map(|&hz| density(v, hz)).collect()).collect();
         let wheel_starts_m = Vec::new();
@@ -178,7 +180,7 @@ impl Forward {
         extensions: &[Arc<dyn Extension>],
     ) -> Result<TrackModel, ModelError> {
         let supports = self.unknowns.supports(&self.section, values);
-        TrackModel::build(&self.section.design, &self.section.mesh(), &supports, extensions)
+        TrackModel::build(&self.section.track.design, &self.section.mesh(), &supports, extensions)
     }
 
     fn noise(&self, speed: usize, band: usize) -> f64 {

@@ -147,7 +147,7 @@ fn rough_covariance(prepared: &PreparedRecording) -> DMatrix<f64> {
 /// # Errors
 /// [`CalibrationError`] when no baseline is found.
 pub fn first_calibration(prepared: &PreparedRecording) -> Result<DVector<f64>, CalibrationError> {
-    let covariance = rough_covariance(prepared);
+    let covariance = prepared.of_compared(rough_covariance(prepared));
     let observation = Observation::new(prepared.log_power.clone(), &covariance, |_| false)
         .ok_or(CalibrationError::NotFinite)?;
     let problem =

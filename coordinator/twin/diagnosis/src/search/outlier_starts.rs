@@ -236,7 +236,7 @@ mod tests {
         let section = &forward.section;
         let bolts = ExtensionInstance::new("sleeper_bolt").on([4, 5]);
         let bolts = section.in_model(&bolts.with("stiffness_N_per_m", 4.5e7));
-        let bolts = bolts.build(&section.design, section.spans()).unwrap();
+        let bolts = bolts.build(&section.track.design, section.spans()).unwrap();
         let log_power = forward.log_power(&typical, &[bolts]).unwrap();
         let covariance = 0.02 * DMatrix::identity(forward.per_sleeper(), forward.per_sleeper());
         let observation = Observation::new(log_power, &covariance, |_| false).unwrap();

@@ -256,7 +256,7 @@ fn is_shape_at(port: &PortPlace, candidate: &Candidate, prepared: &PreparedRecor
         PortPlace::Wheel => return false,
     };
     let Some([from_m, to_m]) = candidate.extension.x_m else { return false };
-    let spacing_m = section.design.sleeper.spacing_m;
+    let spacing_m = section.track.design.sleeper.spacing_m;
     let [first, last] = [seats[0], seats[seats.len() - 1]];
     let seats_m = [section.x_m(first) - spacing_m, section.x_m(last) + spacing_m];
     let is_detected = |shape_m: &[f64; 2]| section.are_beside([from_m, to_m], *shape_m);
