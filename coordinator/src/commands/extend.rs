@@ -9,8 +9,6 @@ use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Diagnosis, Estimate, FORMAT, Hypothesis};
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_files::Kind as FileKind;
-use tracktwin_parameters::TrackDesign;
-use tracktwin_signal::recording::compare_designs;
 use tracktwin_track::extension::{Kind, KindParameter, PlaceKind};
 
 /// Share of the cases with the extension: models must be valid without it as well.
@@ -21,13 +19,16 @@ const SHARE: f64 = 0.5;
 const DEVIATIONS: f64 = 3.0;
 const FACTOR_MIN: f64 = 2.0;
 
+/// Greatest relative difference of two sleeper spacings that are alike.
+const ALIKE: f64 = 0.02;
+
 /// Arguments of `extend`.
 #[derive(Args)]
 #[command(after_help = "\
 Example:
   tracktwin extend mine.toml --from diagnosis/diagnosis.json
 
-The campaign must be of V-Track. Faults of the measuring chain are not added.
+The campaign must be of the diagnosed track. Faults of the measuring chain are not added.
 
 Next: `tracktwin run mine-extended.toml --library URL --out DIR` simulates the campaign and trains
 models. With these, `tracktwin evaluate` gives stiffness without the bias that this physics causes.
@@ -50,8 +51,8 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { campaign: path, from, out, force } = arguments;
     let text = read_text(&path).or_input()?;
     let campaign = Campaign::parse(&text, &path.display().to_string(), None).or_input()?;
-    check_design(&path, &campaign).or_input()?;
     let diagnosis = diagnosis(&from).or_input()?;
+    check_spacing(&path, &campaign, &diagnosis).or_input()?;
     let accepted: Vec<_> = diagnosis
         .hypotheses
         .iter()
@@ -86,19 +87,20 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Checks that the campaign is of V-Track, the track of all diagnoses.
-fn check_design(path: &Path, campaign: &Campaign) -> anyhow::Result<()> {
-    let design = &campaign.definition.experiment.design;
-    compare_designs(design, &TrackDesign::v_track()).map_err(|other| {
-        anyhow!(
-            "{}: preset: the campaign is of another track than V-Track ({} {}, V-Track's {}); a \
-             diagnosis is of V-Track: extend a campaign of V-Track",
+/// Checks that the campaign's sleepers are spaced as the diagnosed ones.
+fn check_spacing(path: &Path, campaign: &Campaign, diagnosis: &Diagnosis) -> anyhow::Result<()> {
+    let spacing_m = campaign.definition.experiment.design.sleeper.spacing_m;
+    let mut distances: Vec<f64> =
+        diagnosis.track.windows(2).map(|pair| pair[1].x_m - pair[0].x_m).collect();
+    distances.sort_by(f64::total_cmp);
+    match distances.get(distances.len() / 2) {
+        Some(distance_m) if (distance_m / spacing_m - 1.0).abs() > ALIKE => Err(anyhow!(
+            "{}: preset: the campaign's sleepers are {spacing_m} m apart, those of the diagnosis \
+             {distance_m:.3} m; extend a campaign of the same track",
             path.display(),
-            other.quantity,
-            other.found(),
-            other.known()
-        )
-    })
+        )),
+        _ => Ok(()),
+    }
 }
 
 fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {
@@ -195,6 +197,6 @@ fn place(
 /// Range from which a parameter is drawn: around the estimate.
 fn range(parameter: &KindParameter, estimate: &Estimate) -> [f64; 2] {
     let factor = (DEVIATIONS * estimate.sd / estimate.mean).exp().clamp(FACTOR_MIN, 10.0);
-    let least = parameter.v_track[1] * 1e-3;
+    let least = parameter.v_track[1].min(parameter.real_scale[1]) * 1e-3;
     [(estimate.mean / factor).max(least), (estimate.mean * factor).max(10.0 * least)]
 }

@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use tracktwin_files::Kind;
 use tracktwin_inspection::{Inspection, Place, inspect, separates_wavelengths};
 use tracktwin_number::{chance, rounded, significant};
-use tracktwin_parameters::TrackDesign;
 use tracktwin_report::{Inspected, InspectedCurve, InspectionReport, inspection_page};
 use tracktwin_signal::SAMPLES_A_PERIOD;
 use tracktwin_signal::recording::{Pass, Recording};
@@ -231,14 +230,6 @@ fn uses(recording: &Recording, inspection: &Inspection) -> Vec<String> {
         uses.push(
             "no speed has two passes: repeatable signal and noise cannot be separated".to_owned(),
         );
-    }
-    if let Err(other) = recording.check_track(&TrackDesign::v_track()) {
-        uses.push(format!(
-            "not of V-Track ({} {}, V-Track's {}): `diagnose` compares with V-Track only; `evaluate` takes models of any track",
-            other.quantity,
-            other.found(),
-            other.known()
-        ));
     }
     if uses.is_empty() && inspection.pass_defects.is_empty() && recording.doubts.is_empty() {
         uses.push(

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_diagnosis::{
-    CalibrationError, NullModel, PreparationError, PreparedRecording, first_calibration,
+    CalibrationError, Common, NullModel, PreparationError, PreparedRecording, first_calibration,
 };
 use tracktwin_evaluation::Flag;
 use tracktwin_inspection::chain;
@@ -65,13 +65,33 @@ fn start(
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Vec<(PreparedRecording, DVector<f64>)>, CalibrationError> {
     let (done, all) = (AtomicUsize::new(0), prepared.len() as f64);
-    let one = |mut prepared: PreparedRecording| {
+    let one = |mut prepared: PreparedRecording| -> Result<_, CalibrationError> {
         let values = first_calibration(&prepared)?;
         prepared.forward.allow_beyond(&values)?;
         watch("first fit", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
         Ok((prepared, values))
     };
-    prepared.into_par_iter().map(one).collect()
+    let started = prepared.into_par_iter().map(one).collect::<Result<_, CalibrationError>>()?;
+    Ok(alike(started))
+}
+
+/// Sleepers and railpads of one kind all along: every section starts from the median of what the sections
+/// have in common, so that none starts at the bottom of another valley.
+fn alike(
+    mut started: Vec<(PreparedRecording, DVector<f64>)>,
+) -> Vec<(PreparedRecording, DVector<f64>)> {
+    for common in Common::ALL {
+        let found = |(prepared, values): &(PreparedRecording, DVector<f64>)| {
+            values[prepared.forward.unknowns.common(common)]
+        };
+        let mut all: Vec<f64> = started.iter().map(found).collect();
+        all.sort_by(f64::total_cmp);
+        let median = all[all.len() / 2];
+        for (prepared, values) in &mut started {
+            values[prepared.forward.unknowns.common(common)] = median;
+        }
+    }
+    started
 }
 
 fn fit_all(

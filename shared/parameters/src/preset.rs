@@ -1,6 +1,6 @@
 //! Tracks that come with the program: a design, its nominal values, ranges and speeds.
 
-use crate::{Axis, Parameter, ParameterSet, ParameterSpace, Prior, Track, TrackDesign};
+use crate::{Axis, Parameter, ParameterSet, ParameterSpace, Prior, Scale, Track, TrackDesign};
 use serde::{Deserialize, Serialize};
 
 /// A track to start from.
@@ -16,6 +16,21 @@ pub enum Preset {
     /// A line: rail 60E1 on concrete monobloc sleepers, railpads from soft to stiff.
     #[serde(rename = "60E1-concrete")]
     Concrete60E1,
+    /// The same with soft railpads.
+    #[serde(rename = "60E1-concrete-soft")]
+    SoftConcrete60E1,
+    /// The same with stiff railpads.
+    #[serde(rename = "60E1-concrete-stiff")]
+    StiffConcrete60E1,
+    /// Rail 54E1 on concrete monobloc sleepers.
+    #[serde(rename = "54E1-concrete")]
+    Concrete54E1,
+    /// Rail 54E1 on wooden sleepers.
+    #[serde(rename = "54E1-wood")]
+    Wood54E1,
+    /// Rail 49E1 on bi-block sleepers.
+    #[serde(rename = "49E1-bi-block")]
+    BiBlock49E1,
 }
 
 /// Wavelengths of V-Track's irregularity in m. The paper gives none; at 7 km/h what is 0.5 mm long has a
@@ -36,11 +51,18 @@ const LINE_SPACING_M: f64 = 0.35;
 const REAL_LEVEL: f64 = 0.05;
 const REAL_LEVELS: [f64; 2] = [0.02, 0.1];
 
-const CONCRETE_60E1: &str = include_str!("presets/60E1-concrete.toml");
-
 impl Preset {
     /// All of them.
-    pub const ALL: &'static [Self] = &[Self::VTrack, Self::RealScale, Self::Concrete60E1];
+    pub const ALL: &'static [Self] = &[
+        Self::VTrack,
+        Self::RealScale,
+        Self::Concrete60E1,
+        Self::SoftConcrete60E1,
+        Self::StiffConcrete60E1,
+        Self::Concrete54E1,
+        Self::Wood54E1,
+        Self::BiBlock49E1,
+    ];
 
     /// Its name in files and on the command line.
     pub const fn name(self) -> &'static str {
@@ -48,6 +70,11 @@ impl Preset {
             Self::VTrack => "v-track",
             Self::RealScale => "real-scale",
             Self::Concrete60E1 => "60E1-concrete",
+            Self::SoftConcrete60E1 => "60E1-concrete-soft",
+            Self::StiffConcrete60E1 => "60E1-concrete-stiff",
+            Self::Concrete54E1 => "54E1-concrete",
+            Self::Wood54E1 => "54E1-wood",
+            Self::BiBlock49E1 => "49E1-bi-block",
         }
     }
 
@@ -58,10 +85,20 @@ impl Preset {
 
     /// The description as a file, with the sources of its numbers where it has them.
     pub fn text(self) -> String {
-        match self {
-            Self::VTrack | Self::RealScale => self.track().to_toml(),
-            Self::Concrete60E1 => CONCRETE_60E1.to_owned(),
-        }
+        self.file().map_or_else(|| self.track().to_toml(), str::to_owned)
+    }
+
+    /// The file of a line.
+    const fn file(self) -> Option<&'static str> {
+        Some(match self {
+            Self::VTrack | Self::RealScale => return None,
+            Self::Concrete60E1 => include_str!("presets/60E1-concrete.toml"),
+            Self::SoftConcrete60E1 => include_str!("presets/60E1-concrete-soft.toml"),
+            Self::StiffConcrete60E1 => include_str!("presets/60E1-concrete-stiff.toml"),
+            Self::Concrete54E1 => include_str!("presets/54E1-concrete.toml"),
+            Self::Wood54E1 => include_str!("presets/54E1-wood.toml"),
+            Self::BiBlock49E1 => include_str!("presets/49E1-bi-block.toml"),
+        })
     }
 
     /// The whole description.
@@ -69,12 +106,11 @@ impl Preset {
     /// # Panics
     /// Never: a test reads every file.
     pub fn track(self) -> Track {
-        let text = match self {
-            Self::VTrack => return enlarged("v-track", 1.0),
-            Self::RealScale => return enlarged("real-scale", REAL_SCALE),
-            Self::Concrete60E1 => CONCRETE_60E1,
-        };
-        Track::parse(text).expect("a test reads every preset")
+        match self.file() {
+            Some(text) => Track::parse(text).expect("a test reads every preset"),
+            None if self == Self::VTrack => enlarged(self.name(), 1.0),
+            None => enlarged(self.name(), REAL_SCALE),
+        }
     }
 
     /// The one that is meant where a track has sleepers at this spacing and nothing else is known.
@@ -127,6 +163,7 @@ fn enlarged(name: &str, ratio: f64) -> Track {
         design: TrackDesign::v_track().enlarged(ratio),
         nominal,
         ranges,
+        scales: [Scale::Linear; Parameter::COUNT],
         prior,
         wavelengths_m: WAVELENGTHS_M,
         speeds_km_h: [7.0, 10.0, 13.0].map(|speed| speed * ratio).to_vec(),
@@ -165,6 +202,21 @@ mod tests {
         assert!((level_db(nominal, 0.4) - 17.1).abs() < 0.1, "{}", level_db(nominal, 0.4));
         assert!((level_db(high, 0.2) - 11.0).abs() < 0.2, "{}", level_db(high, 0.2));
         assert!(low < nominal && nominal < high);
+    }
+
+    #[test]
+    fn every_preset_is_a_track_of_its_name() {
+        for preset in Preset::ALL {
+            let track = preset.track();
+            assert_eq!(track.name, preset.name());
+            assert_eq!(Preset::from_name(&track.name), Some(*preset));
+            assert_eq!(Track::parse(&preset.text()).unwrap().design, track.design);
+            // The section's bending stiffness is the nominal one.
+            let stated = track.design.sleeper.section.bending_stiffness();
+            let nominal = track.nominal[Parameter::SleeperBendingStiffness];
+            let is_line = preset.file().is_some();
+            assert!(!is_line || (stated / nominal - 1.0).abs() < 0.01, "{preset:?} {stated}");
+        }
     }
 
     #[test]

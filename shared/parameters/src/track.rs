@@ -20,6 +20,8 @@ pub struct Track {
     pub nominal: ParameterSet,
     /// Lowest and highest usual value of every parameter, in catalogue order.
     pub ranges: [[f64; 2]; Parameter::COUNT],
+    /// How campaigns sample each range, in catalogue order.
+    pub scales: [Scale; Parameter::COUNT],
     /// What is known of the parameters before a recording is evaluated.
     pub prior: Prior,
     /// Shortest and longest wavelength of the irregularity in m.
@@ -150,6 +152,8 @@ struct MeasurementTable {
 struct ParameterTable {
     nominal: f64,
     range: [f64; 2],
+    #[serde(default)]
+    scale: Scale,
 }
 
 /// What a number of the file is, and the values that it can have.
@@ -211,12 +215,14 @@ impl Track {
         file.check()?;
         let mut nominal = ParameterSet::nominal();
         let mut ranges = [[0.0; 2]; Parameter::COUNT];
-        for (name, &ParameterTable { nominal: value, range }) in &file.parameters {
+        let mut scales = [Scale::Linear; Parameter::COUNT];
+        for (name, &ParameterTable { nominal: value, range, scale }) in &file.parameters {
             let parameter = Parameter::try_from(name.clone())
                 .map_err(|message| TrackError::Inconsistent { key: "parameters", message })?;
             check_parameter(parameter, value, range)?;
             nominal[parameter] = value;
             ranges[parameter.index()] = range;
+            scales[parameter.index()] = scale;
         }
         let missing = |parameter: &&Parameter| !file.parameters.contains_key(parameter.name());
         if let Some(&parameter) = Parameter::ALL.iter().find(missing) {
@@ -228,6 +234,7 @@ impl Track {
             prior: Prior::of_ranges(nominal, &ranges, file.surface.slope_deviation),
             nominal,
             ranges,
+            scales,
             wavelengths_m: file.surface.wavelengths_m,
             speeds_km_h: file.measurement.speeds_km_h,
         })
@@ -240,7 +247,8 @@ impl Track {
         let parameter = |&parameter: &Parameter| {
             let nominal = self.nominal[parameter];
             let range = self.ranges[parameter.index()];
-            (parameter.name().to_owned(), ParameterTable { nominal, range })
+            let scale = self.scales[parameter.index()];
+            (parameter.name().to_owned(), ParameterTable { nominal, range, scale })
         };
         let file = File {
             format: TRACK_FORMAT.to_owned(),
@@ -288,7 +296,7 @@ impl Track {
     /// The usual range of one parameter, as an axis of a campaign.
     pub fn axis(&self, parameter: Parameter) -> Axis {
         let [low, high] = self.ranges[parameter.index()];
-        Axis { parameter, low, high, scale: Scale::Linear }
+        Axis { parameter, low, high, scale: self.scales[parameter.index()] }
     }
 
     /// All six parameters over their usual ranges.

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tracktwin_experiment::{Experiment, ExperimentError};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_parameters::{
     Axis, OWEN_POINTS_MAX, Parameter, ParameterSet, ParameterSpace, Preset, QuantityError, Scale,
-    Sequence, SpaceError,
+    Sequence, SpaceError, Track, TrackError,
 };
 use tracktwin_signal::FeatureDefinition;
 use tracktwin_track::extension::SampledExtension;
@@ -116,6 +116,22 @@ pub enum SpecError {
         /// What is wrong.
         source: ExperimentError,
     },
+    /// The track's description is wrong.
+    #[error("{path}: track: {track}: {source}")]
+    Track {
+        /// The campaign file.
+        path: String,
+        /// The track file.
+        track: String,
+        /// What is wrong.
+        source: TrackError,
+    },
+    /// Two descriptions of the track.
+    #[error("{path}: track: a preset is given too; remove one of the two")]
+    TwoTracks {
+        /// The file.
+        path: String,
+    },
     /// A number can't be what it is given for.
     #[error("{path}: {key}: {source}")]
     Number {
@@ -152,8 +168,8 @@ struct File {
     name: String,
     seed: u64,
     cases: u32,
-    #[serde(default)]
-    preset: Preset,
+    preset: Option<Preset>,
+    track: Option<PathBuf>,
     sequence: Option<Sequence>,
     #[serde(default)]
     surfaces: Surfaces,
@@ -219,17 +235,25 @@ impl Campaign {
         Self::parse(DEFAULT, "built-in campaign", cases)
     }
 
+    /// The same campaign on another track, whose name it takes.
+    ///
+    /// # Errors
+    /// As [`Campaign::built_in`].
+    pub fn built_in_on(track: &Track, cases: Option<u32>) -> Result<Self, SpecError> {
+        const PATH: &str = "built-in campaign";
+        let mut file = File::parse(DEFAULT, PATH)?;
+        file.name.clone_from(&track.name);
+        file.check(PATH, cases, track)
+    }
+
     /// Reads a campaign from text, which errors call `path`.
     ///
     /// # Errors
     /// As [`Campaign::read`], the file's own apart.
     pub fn parse(text: &str, path: &str, cases: Option<u32>) -> Result<Self, SpecError> {
-        let file: File = toml::from_str(text).map_err(|error| SpecError::Malformed {
-            path: path.to_owned(),
-            line: line_of(text, error.span()),
-            message: error.message().lines().collect::<Vec<_>>().join(" "),
-        })?;
-        file.check(path, cases)
+        let file = File::parse(text, path)?;
+        let track = file.track(path)?;
+        file.check(path, cases, &track)
     }
 
     /// The name in the library: the given name and the hash of the definition.
@@ -249,7 +273,32 @@ impl Campaign {
 }
 
 impl File {
-    fn check(self, path: &str, cases: Option<u32>) -> Result<Campaign, SpecError> {
+    fn parse(text: &str, path: &str) -> Result<Self, SpecError> {
+        toml::from_str(text).map_err(|error| SpecError::Malformed {
+            path: path.to_owned(),
+            line: line_of(text, error.span()),
+            message: error.message().lines().collect::<Vec<_>>().join(" "),
+        })
+    }
+
+    /// The track of the preset or of the file, whose path is relative to the campaign file's folder.
+    fn track(&self, path: &str) -> Result<Track, SpecError> {
+        let Some(file) = &self.track else {
+            return Ok(self.preset.unwrap_or_default().track());
+        };
+        if self.preset.is_some() {
+            return Err(SpecError::TwoTracks { path: path.to_owned() });
+        }
+        let file = Path::new(path).parent().unwrap_or(Path::new("")).join(file);
+        let text = tracktwin_files::read_text(&file)?;
+        Track::parse(&text).map_err(|source| SpecError::Track {
+            path: path.to_owned(),
+            track: file.display().to_string(),
+            source,
+        })
+    }
+
+    fn check(self, path: &str, cases: Option<u32>, track: &Track) -> Result<Campaign, SpecError> {
         let is_name = |c: char| c.is_alphanumeric() || " ._-+".contains(c);
         let fits = (1..=NAME_CHARACTERS_MAX).contains(&self.name.chars().count());
         let begins = self.name.starts_with(char::is_alphanumeric);
@@ -265,9 +314,9 @@ impl File {
         if sequence == Sequence::OwenScrambled && cases > OWEN_POINTS_MAX {
             return Err(SpecError::SequenceExhausted { path: path.to_owned(), cases });
         }
-        let (space, fixed) = self.sampled(path)?;
+        let (space, fixed) = self.sampled(path, track)?;
         let experiment = self
-            .experiment()
+            .experiment(track)
             .map_err(|source| SpecError::Experiment { path: path.to_owned(), source })?;
         let fixed = *fixed.values();
         let (seed, surfaces) = (self.seed, self.surfaces);
@@ -277,13 +326,17 @@ impl File {
     }
 
     /// The sampled space, and the values of what isn't sampled.
-    fn sampled(&self, path: &str) -> Result<(ParameterSpace, ParameterSet), SpecError> {
+    fn sampled(
+        &self,
+        path: &str,
+        track: &Track,
+    ) -> Result<(ParameterSpace, ParameterSet), SpecError> {
         let mut axes = Vec::new();
-        let mut fixed = self.preset.nominal();
+        let mut fixed = track.nominal;
         for &parameter in Parameter::ALL {
             let linear = |low, high| Axis { parameter, low, high, scale: Scale::Linear };
             match self.parameters.get(&parameter) {
-                None => axes.push(self.preset.axis(parameter)),
+                None => axes.push(track.axis(parameter)),
                 Some(&Range::Between([low, high])) => axes.push(linear(low, high)),
                 Some(&Range::Scaled { low, high, scale }) => {
                     axes.push(Axis { parameter, low, high, scale });
@@ -302,11 +355,12 @@ impl File {
         Ok((space, fixed))
     }
 
-    fn experiment(&self) -> Result<Experiment, ExperimentError> {
+    fn experiment(&self, track: &Track) -> Result<Experiment, ExperimentError> {
         let simulation = &self.simulation;
-        let mut experiment = Experiment::new(self.preset.design());
-        experiment.speeds_km_h =
-            self.speeds_km_h.clone().unwrap_or_else(|| self.preset.speeds_km_h());
+        let mut experiment = Experiment::new(track.design.clone());
+        experiment.wavelengths_m = track.wavelengths_m;
+        let speeds = self.speeds_km_h.as_ref();
+        experiment.speeds_km_h = speeds.unwrap_or(&track.speeds_km_h).clone();
         experiment.features = self.features.clone();
         experiment.extensions.clone_from(&self.extension);
         replace(&mut experiment.spans, simulation.spans);

@@ -8,6 +8,7 @@ use super::library_url::open_or_create;
 use super::numbers::{cores, count};
 use super::progress::{Progress, TrainingBar};
 use super::signals::stop_on_signal;
+use super::track::{preset_parser, read};
 use super::{OrInput, Stop, continuity, evaluate, println_stderr, println_stdout};
 use crate::commands::contact::contact_sentence;
 use crate::pipeline::lack::check_for_training;
@@ -21,6 +22,7 @@ use tracktwin_farm::campaign::{Campaign, DEFAULT};
 use tracktwin_farm::embedded::Task;
 use tracktwin_library::{Library, Status};
 use tracktwin_parameters::quantity::CASES;
+use tracktwin_parameters::{Preset, Track};
 use tracktwin_signal::recording::Recording;
 
 /// Name of the models' folder inside the output folder.
@@ -43,6 +45,12 @@ Exit codes: 0 done, 1 done, but the estimates of most sleepers are not valid, 2 
 pub(super) struct Arguments {
     /// Campaign file (TOML) [default: a small campaign over the paper's Table D1].
     campaign: Option<PathBuf>,
+    /// Preset whose track the built-in campaign is of.
+    #[arg(long, value_name = "NAME", value_parser = preset_parser(), conflicts_with_all = ["campaign", "track"])]
+    preset: Option<Preset>,
+    /// Description of track and vehicle, as `tracktwin new` writes it, that the built-in campaign is of.
+    #[arg(long, value_name = "FILE", conflicts_with = "campaign")]
+    track: Option<PathBuf>,
     /// Number of cases; overrides the number in the campaign file; at least 200, unless --no-train
     /// is given.
     #[arg(long, value_name = "N", value_parser = count::<u32>(CASES))]
@@ -70,6 +78,16 @@ pub(super) struct Arguments {
     print_campaign: bool,
 }
 
+impl Arguments {
+    /// The track that takes the place of V-Track.
+    fn track(&self) -> Result<Option<Track>, Stop> {
+        match (&self.track, self.preset) {
+            (Some(path), _) => read(path).map(Some),
+            (None, preset) => Ok(preset.map(Preset::track)),
+        }
+    }
+}
+
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if arguments.print_campaign {
         println_stdout(DEFAULT.trim_end());
@@ -77,7 +95,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     let campaign = match &arguments.campaign {
         Some(path) => Campaign::read(path, arguments.cases),
-        None => Campaign::built_in(arguments.cases),
+        None => match arguments.track()? {
+            Some(track) => Campaign::built_in_on(&track, arguments.cases),
+            None => Campaign::built_in(arguments.cases),
+        },
     }
     .or_input()?;
     // Check the recording before the simulation.

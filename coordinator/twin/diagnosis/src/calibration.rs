@@ -154,9 +154,11 @@ impl Problem<'_> {
     /// # Errors
     /// As [`Problem::calibrate`].
     pub fn calibrate_in_range(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
-        let free = self.candidates.last().map_or(&[][..], |candidate| &candidate.free);
-        let first = start.len() - free.len();
-        let each = free.iter().map(|parameter| Candidate::range(parameter)).collect();
+        let ranges = |candidate: &Candidate| {
+            candidate.free.iter().map(|parameter| candidate.range(parameter)).collect()
+        };
+        let each: Vec<[f64; 2]> = self.candidates.last().map_or(Vec::new(), ranges);
+        let first = start.len() - each.len();
         self.calibrate_among(start, &Ranges { first, each })
     }
 
@@ -236,8 +238,10 @@ impl Problem<'_> {
 
     fn prior(&self) -> Prior {
         let unknowns = &self.forward.unknowns;
-        let free = self.candidates.iter().flat_map(|candidate| candidate.free.iter());
-        let free: Vec<(f64, f64)> = free.map(|parameter| Candidate::prior(parameter)).collect();
+        let priors = |candidate: &Candidate| -> Vec<(f64, f64)> {
+            candidate.free.iter().map(|parameter| candidate.prior(parameter)).collect()
+        };
+        let free: Vec<(f64, f64)> = self.candidates.iter().flat_map(priors).collect();
         let (count, all) = (unknowns.count(), unknowns.count() + free.len());
         let mut mean = DVector::zeros(all);
         mean.rows_mut(0, count).copy_from(&unknowns.typical());

@@ -17,6 +17,8 @@ pub struct Candidate {
     pub free: Vec<&'static KindParameter>,
     /// Values of the free parameters that screening tries.
     pub trials: Vec<Vec<f64>>,
+    /// Length ratio of the track to V-Track, by which parameters have their ranges.
+    pub length_ratio: f64,
 }
 
 impl Candidate {
@@ -48,7 +50,7 @@ impl Candidate {
     /// Logarithms of values of the free parameters; of none a hundredth of what is usual.
     pub fn logarithms(&self, values: &[f64]) -> Vec<f64> {
         let logarithm = |(parameter, &value): (&&KindParameter, &f64)| {
-            value.max(LEAST * parameter.v_track[1]).ln()
+            value.max(LEAST * parameter.range(self.length_ratio)[1]).ln()
         };
         self.free.iter().zip(values).map(logarithm).collect()
     }
@@ -56,7 +58,7 @@ impl Candidate {
     /// Whether what was found, by the logarithms of the free parameters, may be of this kind.
     pub fn is_plausible(&self, logarithms: &[f64]) -> bool {
         let plausible = |(parameter, &value): (&&KindParameter, &f64)| {
-            let [low, high] = parameter.v_track.map(f64::ln);
+            let [low, high] = parameter.range(self.length_ratio).map(f64::ln);
             let beyond = (low - value).max(value - high);
             beyond <= parameter.slack
         };
@@ -65,15 +67,15 @@ impl Candidate {
 
     /// Middle and standard deviation of a parameter's logarithm before anything is measured: its
     /// range holds two deviations.
-    pub fn prior(parameter: &KindParameter) -> (f64, f64) {
-        let [low, high] = Self::range(parameter);
+    pub fn prior(&self, parameter: &KindParameter) -> (f64, f64) {
+        let [low, high] = self.range(parameter);
         (0.5 * (low + high), 0.5 * (high - low) + 0.1)
     }
 
     /// Logarithms of the ends of a parameter's range; of one that may be zero the lower end is a
     /// hundredth of the upper.
-    pub fn range(parameter: &KindParameter) -> [f64; 2] {
-        let [low, high] = parameter.v_track;
+    pub fn range(&self, parameter: &KindParameter) -> [f64; 2] {
+        let [low, high] = parameter.range(self.length_ratio);
         [low.max(LEAST * high).ln(), high.ln()]
     }
 }
@@ -86,22 +88,36 @@ pub fn candidates(section: &Section) -> Vec<Candidate> {
 /// Those of a kind: families with the same places go through them together.
 fn of_kind(kind: &'static Kind, section: &Section) -> Vec<Candidate> {
     let mut all = Vec::new();
+    let length_ratio = section.track.design.length_ratio();
     for families in kind.screening.families.chunk_by(|a, b| a.places == b.places) {
         for place in places(families[0].places, section) {
             let at_place = place.put(ExtensionInstance::new(kind.physics));
-            all.extend(families.iter().map(|family| of_family(kind, family, at_place.clone())));
+            all.extend(families.iter().map(|family| of_family(kind, family, at_place.clone(), length_ratio)));
         }
     }
     all
 }
 
-fn of_family(kind: &'static Kind, family: &Family, place: ExtensionInstance) -> Candidate {
+fn of_family(
+    kind: &'static Kind,
+    family: &Family,
+    place: ExtensionInstance,
+    length_ratio: f64,
+) -> Candidate {
+    let scaled = |name: &str, value| parameter(kind, name).scaled(value, length_ratio);
     let held = family.held.iter();
+    let free: Vec<_> = family.free.iter().map(|name| parameter(kind, name)).collect();
+    let trial = |values: Vec<f64>| {
+        let pairs = free.iter().zip(values);
+        pairs.map(|(parameter, value)| parameter.scaled(value, length_ratio)).collect()
+    };
     Candidate {
         kind,
-        extension: held.fold(place, |extension, &(name, value)| extension.with(name, value)),
-        free: family.free.iter().map(|name| parameter(kind, name)).collect(),
-        trials: family.trials.values(),
+        extension: held
+            .fold(place, |extension, &(name, value)| extension.with(name, scaled(name, value))),
+        trials: family.trials.values().into_iter().map(trial).collect(),
+        free,
+        length_ratio,
     }
 }
 

@@ -87,12 +87,16 @@ impl Patch {
         // Mean square of the waves: what they add to the band, whose width is 0.3 of its middle.
         let wave_number = TAU / length_m;
         let width = wave_number * PI.sqrt() / CENTRE_RAD;
-        let beside = Roughness::new(level).density(wave_number) * width;
+        let [shortest_m, longest_m] = section.track.wavelengths_m;
+        let surface = Roughness { level, shortest_m, longest_m };
+        let beside = surface.density(wave_number) * width;
         let amplitude_m = (2.0 * self.height.exp_m1().max(0.0) * beside).sqrt();
         let kind = CORRUGATION;
         let free = kind.screening.suggested.iter().map(|name| parameter(kind, name)).collect();
         let extension = ExtensionInstance::new(kind.physics).at(stretch_m);
-        Some(Candidate { kind, extension, free, trials: vec![vec![length_m, amplitude_m]] })
+        let trials = vec![vec![length_m, amplitude_m]];
+        let length_ratio = section.track.design.length_ratio();
+        Some(Candidate { kind, extension, free, trials, length_ratio })
     }
 }
 

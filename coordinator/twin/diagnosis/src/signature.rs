@@ -27,7 +27,13 @@ pub fn signature(
     // Screening leaves out what makes no track: here the reason is wanted.
     section.in_model(&extension).build(&section.track.design, section.spans())?;
     let (kind, trials) = (extension.kind()?, vec![Vec::new()]);
-    let candidate = Candidate { kind, extension, free: Vec::new(), trials };
+    let candidate = Candidate {
+        kind,
+        extension,
+        free: Vec::new(),
+        trials,
+        length_ratio: section.track.design.length_ratio(),
+    };
     let traces = templates(&problem, &problem.at(values)?, &[candidate], &|| ())?;
     let trace = traces.first().ok_or(CalibrationError::NotFinite)?;
     Ok(trace.detectability.max(0.0).sqrt())

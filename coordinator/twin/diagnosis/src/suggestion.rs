@@ -22,6 +22,8 @@ impl PreparedRecording {
             .chain(&inspection.nameless)
             .filter_map(detected_shape_m)
             .collect();
+        let length_ratio = section.track.design.length_ratio();
+        let candidate = |finding| candidate(finding, length_ratio);
         inspection.findings.iter().filter_map(candidate).collect()
     }
 }
@@ -35,7 +37,7 @@ fn detected_shape_m(finding: &Finding) -> Option<[f64; 2]> {
 }
 
 /// The candidate that a finding speaks for; none where a model of the track has nothing to say.
-fn candidate(finding: &Finding) -> Option<Candidate> {
+fn candidate(finding: &Finding, length_ratio: f64) -> Option<Candidate> {
     let kind = Kind::from_name(finding.physics)?;
     if kind.screening.suggested.is_empty() {
         return None;
@@ -56,8 +58,8 @@ fn candidate(finding: &Finding) -> Option<Candidate> {
     let free: Vec<&KindParameter> = suggested.map(|name| parameter(kind, name)).collect();
     let found = |parameter: &&KindParameter| {
         let found = finding.parameters.get(parameter.name);
-        found.map_or(parameter.typical, |&(mean, _)| mean)
+        found.map_or(parameter.scaled(parameter.typical, length_ratio), |&(mean, _)| mean)
     };
     let trial = free.iter().map(found).collect();
-    Some(Candidate { kind, extension, free, trials: vec![trial] })
+    Some(Candidate { kind, extension, free, trials: vec![trial], length_ratio })
 }

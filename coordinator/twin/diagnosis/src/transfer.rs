@@ -24,6 +24,8 @@ pub(crate) struct Transfer {
     pub(crate) rail: Option<Shape>,
     /// The shape of the wheel in each pass, `[speed][pass]`; empty for a round one.
     pub(crate) wheel: Vec<Vec<Shape>>,
+    /// By what the further wheels multiply the power: `[line][node]`; empty for a single wheel.
+    by_further_wheels: Arc<Vec<Vec<f64>>>,
     /// Direct receptances of the rail in m/N: `[line][node]`.
     direct: Arc<Vec<Vec<Complex64>>>,
     model: TrackModel,
@@ -34,7 +36,7 @@ impl Transfer {
     pub(crate) fn new(model: TrackModel, lines_hz: &[f64], from_seats: bool) -> Self {
         let RailReceptances { direct, from_seats } =
             RailReceptances::new(&model, lines_hz, from_seats);
-        Self::on_rail(model, lines_hz, Arc::new(direct)).with_seats(from_seats)
+        Self::on_rail(model, lines_hz, Arc::new(direct), None).with_seats(from_seats)
     }
 
     /// With receptances from the rail seats in m/N, `[line][sleeper][node]`.
@@ -54,19 +56,28 @@ impl Transfer {
         Self { by_seats: from_seats, ..self }
     }
 
-    /// The same for the model with further extensions at the same lines. Where they change no matrix
-    /// and add no force law, as the shape of the rail or the sensor, the rail's receptances stay.
+    /// The same for the model with further extensions at the same lines, which change little: what a further
+    /// wheel does stays. Where they change no matrix and add no force law, as the shape of the rail or the
+    /// sensor, the rail's receptances stay too.
     pub(crate) fn with_model(&self, model: TrackModel, lines_hz: &[f64]) -> Self {
         let adds_law = model.force_laws().len() != self.model.force_laws().len();
-        if !adds_law && model.matrices() == self.model.matrices() {
-            Self::on_rail(model, lines_hz, Arc::clone(&self.direct))
+        let has_wheels = model.vehicle().further_wheels_m == self.model.vehicle().further_wheels_m;
+        let by_further = has_wheels.then(|| Arc::clone(&self.by_further_wheels));
+        let direct = if !adds_law && model.matrices() == self.model.matrices() {
+            Arc::clone(&self.direct)
         } else {
-            Self::new(model, lines_hz, false)
-        }
+            Arc::new(RailReceptances::new(&model, lines_hz, false).direct)
+        };
+        Self::on_rail(model, lines_hz, direct, by_further)
     }
 
     /// Source: docs/diagnosis.md, eq. 2, 3: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.
-    fn on_rail(model: TrackModel, lines_hz: &[f64], direct: Arc<Vec<Vec<Complex64>>>) -> Self {
+    fn on_rail(
+        model: TrackModel,
+        lines_hz: &[f64],
+        direct: Arc<Vec<Vec<Complex64>>>,
+        by_further: Option<Arc<Vec<Vec<f64>>>>,
+    ) -> Self {
         let hertz = hertz(&model);
         let wheel_receptance: Vec<Complex64> =
             lines_hz.iter().map(|&hz| model.vehicle().receptance(TAU * hz)).collect();
@@ -82,14 +93,14 @@ impl Transfer {
             line.iter().map(|k| k.norm_sqr() * sensitivity.norm_sqr()).collect()
         };
         let mut power: Vec<Vec<f64>> = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
-        for &distance_m in &model.vehicle().further_wheels_m {
-            let gains = by_further_wheel(&model, lines_hz, &direct, &stiffness, distance_m);
-            for (power, gain) in power.iter_mut().flatten().zip(gains.into_iter().flatten()) {
-                *power *= gain;
-            }
+        let by_further_wheels = by_further.unwrap_or_else(|| {
+            Arc::new(by_further_wheels(&model, lines_hz, &direct, &stiffness))
+        });
+        for (power, gain) in power.iter_mut().flatten().zip(by_further_wheels.iter().flatten()) {
+            *power *= gain;
         }
         let (by_seats, wheel) = (Vec::new(), Vec::new());
-        Self { power, stiffness, by_seats, wheel_receptance, rail: None, wheel, direct, model }
+        Self { power, stiffness, by_seats, wheel_receptance, rail: None, wheel, by_further_wheels, direct, model }
     }
 
     /// The same with the shapes of rail and wheel over a section; in its passes the wheel begins a
@@ -163,6 +174,25 @@ impl Transfer {
     pub(crate) fn mean_power(&self, window: &Window, line: usize) -> f64 {
         window.mean(&self.power[line], 0)
     }
+}
+
+/// By what all further wheels multiply the power, `[line][node]`; empty where there is none.
+fn by_further_wheels(
+    model: &TrackModel,
+    lines_hz: &[f64],
+    direct: &[Vec<Complex64>],
+    stiffness: &[Vec<Complex64>],
+) -> Vec<Vec<f64>> {
+    let distances_m = model.vehicle().further_wheels_m.iter();
+    let each = distances_m
+        .map(|&distance_m| by_further_wheel(model, lines_hz, direct, stiffness, distance_m));
+    let product = |mut all: Vec<Vec<f64>>, gains: Vec<Vec<f64>>| {
+        for (all, gain) in all.iter_mut().flatten().zip(gains.into_iter().flatten()) {
+            *all *= gain;
+        }
+        all
+    };
+    each.reduce(product).unwrap_or_default()
 }
 
 /// By what a rigid wheel of the same mass and load, so far ahead, multiplies the power that a rough

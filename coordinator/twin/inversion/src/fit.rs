@@ -24,6 +24,10 @@ const RESPONSE: f64 = 0.09;
 /// the model is not nature's; measured with `tracktwin coverage --method inversion`.
 const MISPLACED: f64 = 0.35;
 
+/// Error of the logarithm of what a section's sleepers have in common, beside its posterior: real sleepers
+/// taper and differ, and their shear stiffness is assumed.
+const COMMON_ERROR: f64 = 0.08;
+
 /// Step of the logarithm of the mean railpad stiffness along the posterior's valley, most steps on either
 /// side, and the log weight in nats below the highest that is negligible.
 const STEP: f64 = 0.2;
@@ -215,6 +219,7 @@ impl Fitted {
             let misplaced = (MISPLACED * smooth.hypot(independent)).powi(2);
             range.for_each(|index| deviations[index] += misplaced);
         }
+        unknowns.global().for_each(|index| deviations[index] += COMMON_ERROR.powi(2));
         let deviations = deviations.map(f64::sqrt);
         Self { unknowns, values, deviations, misfit }
     }

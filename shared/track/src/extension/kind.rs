@@ -7,6 +7,9 @@ use tracktwin_parameters::Quantity;
 /// How many times larger or smaller than expected a parameter may be.
 const SIZE: f64 = 1e3;
 
+/// Length ratio to V-Track from which a track is a line: the geometric middle of 1 and 8.
+const REAL_RATIO: f64 = 2.8;
+
 /// Largest seed: whole numbers up to it have a place among the floating-point numbers.
 const SEED_MAX: f64 = 9_007_199_254_740_992.0;
 
@@ -232,6 +235,25 @@ impl KindParameter {
             bound: Bound::Positive,
             slack: 1.0,
         }
+    }
+
+    /// Lowest and highest value to expect on a track whose lengths are `length_ratio` times V-Track's.
+    pub const fn range(&self, length_ratio: f64) -> [f64; 2] {
+        if length_ratio < REAL_RATIO { self.v_track } else { self.real_scale }
+    }
+
+    /// What a value on V-Track becomes on such a track: as far from the ends of the range in logarithms.
+    /// A value that is zero, and one of a range that holds zero, grows as the range's end.
+    pub fn scaled(&self, value: f64, length_ratio: f64) -> f64 {
+        let (from, to) = (self.v_track, self.range(length_ratio));
+        if from == to {
+            return value;
+        }
+        if from[0] > 0.0 && to[0] > 0.0 && value > 0.0 {
+            let share = (value / from[0]).ln() / (from[1] / from[0]).ln();
+            return to[0] * (to[1] / to[0]).powf(share);
+        }
+        value * to[1] / from[1]
     }
 
     /// What it can be: up to a thousand times, and down to a thousandth, of what is to be expected.

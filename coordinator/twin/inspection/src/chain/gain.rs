@@ -7,8 +7,12 @@ use tracktwin_signal::recording::{Pass, Recording};
 const BANDS_HZ: [[f64; 2]; 3] = [[100.0, 400.0], [400.0, 1200.0], [1200.0, 4000.0]];
 /// Greatest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
-/// Difference of two passes in dB that is usual: a speed that is off by one per cent does as much.
+/// Difference of two passes in dB that is usual.
 const USUAL_DB: f64 = 0.2;
+/// Power of the speed with which levels grow, and how much it differs from surface to surface: spectra fall
+/// with the third or fourth power of the wave number.
+const SPEED_POWER: f64 = 3.0;
+const SPEED_POWER_UNSURE: f64 = 1.0;
 /// Difference of the bands' gains in dB above which it is no gain but something else.
 const UNIFORM_DB: f64 = 0.6;
 /// Fewest stretches for a mean and its scatter.
@@ -21,7 +25,8 @@ pub struct Gain {
     pub pass: usize,
     /// How many passes there are at this speed, with it.
     pub passes: usize,
-    /// Level over the median of the other passes at its speed in dB, and its standard deviation.
+    /// Level over the median of the other passes at its nominal speed in dB, less what their true speeds
+    /// explain, and its standard deviation.
     pub gain_db: (f64, f64),
     /// Greatest difference between bands in dB.
     pub spread_db: f64,
@@ -59,9 +64,14 @@ fn of_speed(recording: &Recording, group: &[usize]) -> Vec<Gain> {
     let level = |pass: &&Pass| levels(recording, pass, &background);
     let levels: Vec<Vec<Vec<f64>>> = passes.iter().map(level).collect();
     let gain = |this: usize| {
-        let bands: Vec<Vec<f64>> =
-            (0..levels[this].len()).map(|band| differences(&levels, this, band)).collect();
-        gain(group, this, &bands)
+        let others = (0..passes.len()).filter(|&pass| pass != this);
+        let other = median(others.map(|pass| mean_speed(passes[pass])).collect());
+        let faster_db = 10.0 * (mean_speed(passes[this]) / other).log10();
+        let bands: Vec<Vec<f64>> = (0..levels[this].len())
+            .map(|band| differences(&levels, this, band))
+            .map(|band| band.iter().map(|level| level - SPEED_POWER * faster_db).collect())
+            .collect();
+        gain(group, this, &bands, USUAL_DB + SPEED_POWER_UNSURE * faster_db.abs())
     };
     (0..group.len()).filter_map(gain).collect()
 }
@@ -76,7 +86,7 @@ fn differences(levels: &[Vec<Vec<f64>>], this: usize, band: usize) -> Vec<f64> {
     (0..stretches).map(over).filter(|level| level.is_finite()).collect()
 }
 
-fn gain(group: &[usize], this: usize, bands: &[Vec<f64>]) -> Option<Gain> {
+fn gain(group: &[usize], this: usize, bands: &[Vec<f64>], usual_db: f64) -> Option<Gain> {
     let count = bands.iter().map(Vec::len).min()?;
     if count < STRETCHES_MIN {
         return None;
@@ -87,12 +97,19 @@ fn gain(group: &[usize], this: usize, bands: &[Vec<f64>]) -> Option<Gain> {
     let (mean, deviation) = mean_and_deviation(&all);
     let means: Vec<f64> = bands.iter().map(|band| mean_and_deviation(band).0).collect();
     let ends = means.iter().fold([f64::MAX, f64::MIN], |e, m| [e[0].min(*m), e[1].max(*m)]);
-    let beyond = (mean.abs() - USUAL_DB) / deviation.max(1e-6);
+    let beyond = (mean.abs() - usual_db) / deviation.max(1e-6);
     // Two-sided.
     let ln_p = (ln_student_tail(count as f64 - 1.0, beyond) + 2f64.ln()).min(0.0);
     let gain_db = (mean, deviation);
     let (pass, passes) = (group[this], group.len());
     Some(Gain { pass, passes, gain_db, spread_db: ends[1] - ends[0], ln_p })
+}
+
+/// Mean speed of a pass in m/s, by its positions.
+fn mean_speed(pass: &Pass) -> f64 {
+    let last = pass.position_m.len() - 1;
+    let way_m = pass.position_m[last] - pass.position_m[0];
+    way_m * pass.signal.sample_rate_hz() / last as f64
 }
 
 /// Mean and the standard deviation of it.

@@ -12,6 +12,10 @@ const NEIGHBOURS: usize = 1;
 /// Share of the loudest impact's power below which another is its echo: the ringing of the track and
 /// of the band's edges, spans away.
 const ECHO: f64 = 0.02;
+/// Key of the distance of the bogie's other wheel, and the part of a sleeper spacing within which an impact so
+/// far from a louder one is that of the other wheel at the same place.
+const WHEELBASE: &str = "wheelbase_m";
+const OTHER_WHEEL_SPANS: f64 = 0.1;
 /// Impacts beyond which a rail is rough rather than damaged at places.
 const IMPACTS_MAX: usize = 8;
 
@@ -58,6 +62,18 @@ pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Im
     }
     let loudest = found.iter().map(|impact| impact.power_ratio).fold(0.0, f64::max);
     found.retain(|impact| impact.power_ratio > ECHO * loudest);
+    let louder: Vec<(f64, f64)> =
+        found.iter().map(|impact| (impact.x_m.0, impact.power_ratio)).collect();
+    if let Some(wheelbase_m) = recording.nominal_value("wheel", WHEELBASE) {
+        let is_of_other_wheel = |impact: &Impact| {
+            let tolerance_m = OTHER_WHEEL_SPANS * recording.spacing_m + 2.0 * impact.x_m.1;
+            louder.iter().any(|&(x_m, power_ratio)| {
+                let apart_m = (impact.x_m.0 - x_m).abs();
+                power_ratio > impact.power_ratio && (apart_m - wheelbase_m).abs() < tolerance_m
+            })
+        };
+        found.retain(|impact| !is_of_other_wheel(impact));
+    }
     found
 }
 
