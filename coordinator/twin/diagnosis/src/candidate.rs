@@ -82,7 +82,9 @@ impl Candidate {
 
 /// Every candidate for a section: each kind at each possible place, according to its screening.
 pub fn candidates(section: &Section) -> Vec<Candidate> {
-    Kind::all().flat_map(|kind| of_kind(kind, section)).collect()
+    let design = &section.track.design;
+    let kinds = Kind::all().filter(|kind| !(kind.screening.is_stated)(design));
+    kinds.flat_map(|kind| of_kind(kind, section)).collect()
 }
 
 /// Those of a kind: families with the same places go through them together.

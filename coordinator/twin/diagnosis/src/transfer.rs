@@ -33,10 +33,19 @@ pub(crate) struct Transfer {
 
 impl Transfer {
     /// Works it out for a model at these lines in Hz, with what derivatives need if `from_seats`.
-    pub(crate) fn new(model: TrackModel, lines_hz: &[f64], from_seats: bool) -> Self {
+    /// `by_further_wheels` is what the design's further wheels do, if that is known.
+    pub(crate) fn new(
+        model: TrackModel,
+        lines_hz: &[f64],
+        from_seats: bool,
+        by_further_wheels: Option<&Arc<Vec<Vec<f64>>>>,
+    ) -> Self {
         let RailReceptances { direct, from_seats } =
             RailReceptances::new(&model, lines_hz, from_seats);
-        Self::on_rail(model, lines_hz, Arc::new(direct), None).with_seats(from_seats)
+        let has_wheels =
+            model.vehicle().further_wheels_m == model.design().wheel.further_wheels_m;
+        let known = by_further_wheels.filter(|_| has_wheels).map(Arc::clone);
+        Self::on_rail(model, lines_hz, Arc::new(direct), known).with_seats(from_seats)
     }
 
     /// With receptances from the rail seats in m/N, `[line][sleeper][node]`.
@@ -101,6 +110,11 @@ impl Transfer {
         }
         let (by_seats, wheel) = (Vec::new(), Vec::new());
         Self { power, stiffness, by_seats, wheel_receptance, rail: None, wheel, by_further_wheels, direct, model }
+    }
+
+    /// What the further wheels multiply the power by, `[line][node]`.
+    pub(crate) const fn by_further_wheels(&self) -> &Arc<Vec<Vec<f64>>> {
+        &self.by_further_wheels
     }
 
     /// The same with the shapes of rail and wheel over a section; in its passes the wheel begins a
@@ -311,7 +325,7 @@ mod tests {
             .iter()
             .flat_map(|hz| (0..8).map(move |k| hz * 2_f64.powf((f64::from(k) - 3.5) / 24.0)))
             .collect();
-        let [alone, with] = models.map(|model| Transfer::new(model, &lines_hz, false).power);
+        let [alone, with] = models.map(|model| Transfer::new(model, &lines_hz, false, None).power);
         let turn = |index: usize| TAU * (index as f64 + 0.5) / seen.len() as f64;
         let share = |index: usize| (1.0 - turn(index).cos()).powi(2);
         let of_line = |line: &Vec<f64>| -> f64 {
@@ -363,7 +377,7 @@ mod tests {
     fn a_wheel_beyond_the_rail_changes_nothing() {
         let lines_hz = [500.0, 2000.0];
         let [alone, with] = [None, Some(second_wheel(10.0))]
-            .map(|e| Transfer::new(track(e), &lines_hz, false).power);
+            .map(|e| Transfer::new(track(e), &lines_hz, false, None).power);
         assert_eq!(alone, with);
     }
 }

@@ -1,5 +1,7 @@
 //! How a recording is searched for a kind: at which places, with which parameters, from which values.
 
+use tracktwin_parameters::TrackDesign;
+
 /// How a kind is searched for.
 #[derive(Debug)]
 pub struct Screening {
@@ -9,6 +11,8 @@ pub struct Screening {
     pub suggested: &'static [&'static str],
     /// Why it is neither tried nor suggested.
     pub not_tried: Option<&'static str>,
+    /// Whether the track's description states it already, so that it cannot be left out.
+    pub is_stated: fn(&TrackDesign) -> bool,
 }
 
 /// Candidates of a kind that differ in nothing but their place.
@@ -51,12 +55,18 @@ pub enum Trials {
 impl Screening {
     /// Tried with these families, and never suggested by the passes alone.
     pub const fn tried(families: &'static [Family]) -> Self {
-        Self { families, suggested: &[], not_tried: None }
+        Self { families, suggested: &[], not_tried: None, is_stated: |_| false }
     }
 
     /// Neither tried nor suggested, for this reason.
     pub const fn not_tried(reason: &'static str) -> Self {
-        Self { families: &[], suggested: &[], not_tried: Some(reason) }
+        Self { families: &[], suggested: &[], not_tried: Some(reason), is_stated: |_| false }
+    }
+
+    /// Not tried on tracks whose description states it.
+    #[must_use]
+    pub const fn unless_stated(self, is_stated: fn(&TrackDesign) -> bool) -> Self {
+        Self { is_stated, ..self }
     }
 
     /// Suggested by the passes alone, with these parameters to be fitted.

@@ -35,7 +35,8 @@ pub(super) const KIND: Kind = Kind {
         Places::Everywhere,
         &["distance_m"],
         Trials::Grid(&[&DISTANCES_M]),
-    )]),
+    )])
+    .unless_stated(|design| !design.wheel.further_wheels_m.is_empty()),
     build: |inputs| {
         if inputs.value("distance_m") == 0.0 {
             return Err(inputs.refuse("distance_m", "other than zero"));

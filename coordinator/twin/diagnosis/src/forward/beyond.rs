@@ -17,12 +17,15 @@ const STEP: f64 = 0.25;
 
 impl Forward {
     /// Lets the track end at any of the distances that it may end at, and its next sleepers be held as
-    /// they may be: what that changes is taken from a track of these values.
+    /// they may be: what that changes is taken from a track of these values, and so is what the further
+    /// wheels do.
     ///
     /// # Errors
     /// As [`Forward::log_power`].
     pub fn allow_beyond(&mut self, values: &DVector<f64>) -> Result<(), ModelError> {
-        let plain = self.log_power(values, &[])?;
+        let transfer = self.transfer(values, &[], false)?;
+        self.by_further_wheels = Some(Arc::clone(transfer.by_further_wheels()));
+        let plain = self.levels(&transfer, values);
         let ends = ENDS_SPANS.into_par_iter().map(|spans| {
             let ended = self.with_ends(spans).log_power(values, &[])?;
             Ok(ended - &plain)

@@ -41,6 +41,9 @@ pub struct Forward {
     /// Changes of the log powers by what lies beyond the sleepers compared, a column for each unknown
     /// of [`Unknowns::beyond`]; zero until [`Forward::allow_beyond`].
     beyond: DMatrix<f64>,
+    /// What the further wheels multiply the power by, `[line][node]`; none until
+    /// [`Forward::allow_beyond`].
+    by_further_wheels: Option<Arc<Vec<Vec<f64>>>>,
     /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
     windows: Vec<Vec<Vec<Window>>>,
     /// Spectrum of the surface at level one in m2/Hz at each speed and line.
@@ -81,6 +84,7 @@ impl Forward {
             noise_density,
             wheel_starts_m,
             beyond,
+            by_further_wheels: None,
             windows,
             surface,
         }
@@ -170,7 +174,12 @@ impl Forward {
         from_seats: bool,
     ) -> Result<Transfer, ModelError> {
         let model = self.model(values, extensions)?;
-        let transfer = Transfer::new(model, self.bands.lines_hz(), from_seats);
+        let transfer = Transfer::new(
+            model,
+            self.bands.lines_hz(),
+            from_seats,
+            self.by_further_wheels.as_ref(),
+        );
         Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
     }
 
