@@ -54,9 +54,7 @@ fn print(check: &TrackCheck) {
     if let Some(p2_hz) = check.p2_hz {
         row("wheel on track (P2)", format!("{} Hz", rounded(p2_hz, 3)));
     }
-    if let Some(pinned_hz) = check.pinned_pinned_hz() {
-        row("pinned-pinned", format!("{} Hz", rounded(pinned_hz, 3)));
-    }
+    row("pinned-pinned", format!("{} Hz", rounded(check.pinned_pinned_hz, 4)));
     println_stdout("\nsurface in one-third octaves, dB re 1 um (limit of ISO 3095:2013)");
     for level in &check.surface {
         let label = format!("  {} m", level.wavelength_m);
@@ -73,8 +71,10 @@ fn print(check: &TrackCheck) {
     println_stdout("\ngreatest change of the level by a change of 10 %");
     for parameter in &check.parameters {
         let label = format!("  {}", parameter.parameter);
-        let at_hz = rounded(parameter.at_hz, 3);
-        row(&label, format!("{:.2} dB at {at_hz} Hz", parameter.change_db.abs()));
+        let at = parameter.at_hz.map_or("all frequencies".to_owned(), |hz| {
+            format!("{} Hz", rounded(hz, 3))
+        });
+        row(&label, format!("{:.2} dB at {at}", parameter.change_db.abs()));
     }
     let doubts = check.doubts();
     if !doubts.is_empty() {

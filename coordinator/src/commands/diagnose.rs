@@ -122,9 +122,11 @@ fn stop(error: DiagnosingError) -> Stop {
 
 /// The command that repeats the diagnosis.
 fn origin(arguments: &Arguments) -> Origin {
-    let Arguments { recording, models, library, out, without, .. } = arguments;
+    let Arguments { recording, models, library, track, out, without, .. } = arguments;
     let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
     command.extend(models.as_ref().map(|models| format!("--models {}", models.display())));
+    let track = track.track.as_ref();
+    command.extend(track.map(|file| format!("--track {}", file.display())));
     let library = library.as_deref().map(without_password);
     command.extend(library.as_ref().map(|library| format!("--library {library}")));
     command.extend(without.iter().map(|physics| format!("--without {physics}")));

@@ -52,7 +52,8 @@ pub(super) struct Arguments {
     #[arg(long, value_enum)]
     method: Option<Method>,
     /// Folder of trained models, written by `train` or `run`; requires --library.
-    #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"))]
+    #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"),
+          conflicts_with = "track")]
     models: Option<PathBuf>,
     /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]

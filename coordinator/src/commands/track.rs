@@ -66,7 +66,9 @@ pub(super) fn read(path: &Path) -> Result<Track, Stop> {
 /// The track that a recording states, and a note on what it does not state.
 pub(super) fn stated(recording: &Recording) -> (Track, Vec<String>) {
     let StatedTrack { track, preset, assumed } = recording.stated_track();
-    if assumed.is_empty() || preset == Preset::VTrack {
+    // On the rig a recording states what is its own; its track is known.
+    let is_rig = preset == Preset::VTrack && track == Preset::VTrack.track();
+    if assumed.is_empty() || is_rig {
         return (track, Vec::new());
     }
     let more = match assumed.len().saturating_sub(LISTED) {

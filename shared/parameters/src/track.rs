@@ -2,6 +2,7 @@
 
 use crate::{Axis, Parameter, ParameterSet, ParameterSpace, Preset, Prior, Scale, TrackDesign};
 use crate::{BeamSection, SleeperDesign, Wheel};
+use crate::quantity::SPEED;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -45,7 +46,7 @@ pub enum TrackError {
     #[error("format: {0:?} is not known; this version reads {TRACK_FORMAT:?}")]
     Format(String),
     /// A number that cannot be what it is given for.
-    #[error("{key}: {value} {unit} cannot be; it must lie in {low:e} to {high:e} {unit}{hint}")]
+    #[error("{key}: {value} {unit} cannot be; it must lie in {low} to {high} {unit}{hint}")]
     OutOfRange {
         /// The key.
         key: String,
@@ -420,13 +421,14 @@ impl File {
         }
         let speeds = &self.measurement.speeds_km_h;
         let ascending = speeds.windows(2).all(|pair| pair[0] < pair[1]);
-        let possible = speeds.iter().all(|speed| (0.1..=1000.0).contains(speed));
+        let [slowest, fastest] = SPEED.range;
+        let possible = speeds.iter().all(|speed| (slowest..=fastest).contains(speed));
         if speeds.is_empty() || !ascending || !possible {
             return Err(TrackError::Inconsistent {
                 key: "measurement.speeds_km_h",
                 message: format!(
-                    "{speeds:?} must be one or more speeds in km/h from 0.1 to 1000, ascending and \
-                     without duplicates"
+                    "{speeds:?} must be one or more speeds in km/h from {slowest} to {fastest}, \
+                     ascending and without duplicates"
                 ),
             });
         }

@@ -71,12 +71,18 @@ const QUANTITIES: [Quantity; 15] = [
 
 /// What a recording may state beside them: the sleeper's bending stiffness is one of the parameters, so
 /// that no two tracks differ by it, and the rail's damping is seldom known.
-const FURTHER: [Quantity; 4] = [
+const FURTHER: [Quantity; 5] = [
     Quantity::new(None, "rail_damping_s", "s", |it| &mut it.rail_damping_s),
     Quantity::new(SLEEPER, "second_moment_m4", "m4", |it| &mut it.sleeper.section.second_moment_m4),
     Quantity::new(SLEEPER, "youngs_Pa", "Pa", |it| &mut it.sleeper.section.youngs_modulus_pa),
     Quantity::new(SLEEPER, "poisson", "", |it| &mut it.sleeper.section.poisson),
+    Quantity::new(SLEEPER, "shear_coefficient", "", |it| {
+        &mut it.sleeper.section.shear_coefficient
+    }),
 ];
+
+/// What a recording must state to be recognised as one of a preset.
+const MASSES: [(&str, &str); 2] = [("rail", "area_m2"), ("wheel", "mass_kg")];
 
 /// Distance in m of the recorded wheel from the other one of its bogie, which runs behind it.
 const WHEELBASE: &str = "wheelbase_m";
@@ -147,11 +153,12 @@ impl Recording {
     /// The track and vehicle that the recording states, and what it leaves open: that is taken from the
     /// track of the program whose sleepers are spaced most like it.
     pub fn stated_track(&self) -> StatedTrack {
-        let preset = Preset::ALL.iter().find(|preset| {
-            let design = preset.design();
-            self.states_anything() && self.check_track(&design).is_ok()
-        });
-        let preset = preset.copied().unwrap_or(Preset::like(self.spacing_m));
+        // A preset is recognised by its masses: a spacing alone could be any track's.
+        let states_masses = MASSES.iter().all(|key| self.states(*key));
+        let recognised = Preset::ALL
+            .iter()
+            .find(|preset| states_masses && self.check_track(&preset.design()).is_ok());
+        let preset = recognised.copied().unwrap_or(Preset::like(self.spacing_m));
         let known = preset.track();
         let mut design = known.design.clone();
         let mut assumed = Vec::new();
@@ -180,8 +187,8 @@ impl Recording {
         StatedTrack { track, preset, assumed }
     }
 
-    fn states_anything(&self) -> bool {
-        QUANTITIES.iter().any(|quantity| quantity.stated(self).is_some())
+    fn states(&self, (part, name): (&str, &str)) -> bool {
+        self.nominal_value(part, name).is_some()
     }
 }
 
@@ -217,8 +224,10 @@ pub fn nominal(design: &TrackDesign) -> Map<String, Value> {
             None => nominal[quantity.name] = value,
         }
     }
-    if let Some(ahead_m) = design.wheel.further_wheels_m.first() {
-        nominal["wheel"][WHEELBASE] = json!(ahead_m.abs());
+    // Null: it is known that there is no other wheel.
+    if *design != TrackDesign::v_track() {
+        let wheelbase_m = design.wheel.further_wheels_m.first().map(|ahead_m| ahead_m.abs());
+        nominal["wheel"][WHEELBASE] = json!(wheelbase_m);
     }
     match nominal {
         Value::Object(fields) => fields,
