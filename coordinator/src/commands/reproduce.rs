@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use tracktwin_experiment::Experiment;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
-use tracktwin_reproduction::{Compared, Figure, Provenance, Reproduction, Results, Verdict};
+use tracktwin_reproduction::{ClaimVerdict, Compared, Figure, Provenance, Reproduction, Results};
 use tracktwin_surrogate::{Trained, TrainingSet};
 
 /// Arguments of `reproduce`.
@@ -228,10 +228,10 @@ fn write_and_print(reproduction: &Reproduction, out: &Path, force: Force) -> Res
     let count = |verdict| reproduction.count(verdict);
     println_stdout(&format!(
         "{} reproduced, {} differ, {} cannot tell; page: {}",
-        count(Verdict::Reproduced),
-        count(Verdict::Differs),
-        count(Verdict::CannotTell),
+        count(ClaimVerdict::Reproduced),
+        count(ClaimVerdict::Differs),
+        count(ClaimVerdict::CannotTell),
         out.join(PAGE).display()
     ));
-    if count(Verdict::Differs) > 0 { Err(Stop::Negative) } else { Ok(()) }
+    if count(ClaimVerdict::Differs) > 0 { Err(Stop::Negative) } else { Ok(()) }
 }
