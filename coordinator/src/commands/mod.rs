@@ -35,6 +35,7 @@ mod trial;
 use stop::{OrInput, Stop};
 
 use clap::{CommandFactory, Parser, Subcommand};
+use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -199,6 +200,11 @@ fn completions(shell: clap_complete::Shell) {
 /// Prints a line of the result on standard output.
 fn println_stdout(line: &str) {
     write_stdout(format!("{line}\n").as_bytes());
+}
+
+/// Prints a result as JSON on standard output.
+fn print_json(result: &impl Serialize) {
+    println_stdout(&serde_json::to_string_pretty(result).expect("results are plain data"));
 }
 
 /// First error of standard output; the program ends with it after clean-up.
