@@ -4,12 +4,13 @@ use super::files::{Force, check, make_folder};
 use super::library_url::open_whole;
 use super::progress::Stages;
 use super::track::TrackOption;
-use super::{OrInput, Stop, println_stderr, println_stdout};
+use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline::evaluate::{Evaluator, EvaluatorError};
 use crate::pipeline::invert::InvertingError;
 use crate::pipeline::{self, provenance};
 use anyhow::{Context, anyhow};
 use clap::Args;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::check_track;
 use tracktwin_evaluation::{Evaluation, Flag, check_recording};
@@ -65,17 +66,20 @@ pub(super) struct Arguments {
     track: TrackOption,
     #[command(flatten)]
     force: Force,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { recording, method, models, library, track, out, force } = arguments;
+    let Arguments { recording, method, models, library, track, out, force, json } = arguments;
     // Read the recording first: it is the most frequent cause of errors and the quickest to check.
     let recording = open(&recording)?;
     check_files(&out, force)?;
     let (Some(models), Some(library)) =
         (models.filter(|_| method != Some(Method::Inversion)), library)
     else {
-        return by_inversion(&recording, &track, &out, force).await;
+        return by_inversion(&recording, &track, &out, force, json).await;
     };
     let library = open_whole(&library).await?;
     let models = Trained::load(&models)
@@ -85,12 +89,19 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         .or_input()?;
     let beside = method.is_none();
     let evaluation = evaluate(&recording, &library, models, &out, force, beside).await?;
-    let sleepers = evaluation.sleepers.len();
-    println_stdout(&format!(
-        "{sleepers} sleepers evaluated; report: {}",
-        out.join("report.html").display()
-    ));
+    if json {
+        print_json(&summary(&evaluation, &out));
+    } else {
+        let sleepers = evaluation.sleepers.len();
+        println_stdout(&format!("{sleepers} sleepers evaluated; report: {}", report(&out)));
+        print_outside(&evaluation);
+    }
     conclude(&evaluation)
+}
+
+/// Path of the report in an output folder.
+fn report(folder: &Path) -> String {
+    folder.join("report.html").display().to_string()
 }
 
 /// Evaluates a recording by inversion only.
@@ -99,6 +110,7 @@ async fn by_inversion(
     track: &TrackOption,
     folder: &Path,
     force: Force,
+    json: bool,
 ) -> Result<(), Stop> {
     let (recording, mut notes) = usable_with_notes(recording)?;
     let (track, assumed) = track.of(&recording)?;
@@ -118,13 +130,14 @@ async fn by_inversion(
     output.add(&FileName::new("report.html")?, page.as_bytes())?;
     inversion.add_to(&mut output, "evaluation")?;
     output.commit()?;
-    let (sleepers, report) = (inversion.sleepers.len(), folder.join("report.html"));
-    println_stdout(&format!(
-        "{sleepers} sleepers evaluated by inversion; report: {}",
-        report.display()
-    ));
-    for sentence in &said {
-        println_stdout(sentence);
+    if json {
+        print_json(&inversion_summary(&inversion, folder));
+    } else {
+        let (sleepers, report) = (inversion.sleepers.len(), report(folder));
+        println_stdout(&format!("{sleepers} sleepers evaluated by inversion; report: {report}"));
+        for sentence in &said {
+            println_stdout(sentence);
+        }
     }
     if inversion.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
@@ -148,11 +161,34 @@ fn command() -> String {
     std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
-/// Prints what lies outside the library; a negative result if that is most of the track.
+/// Prints what lies outside the library.
+pub(super) fn print_outside(evaluation: &Evaluation) {
+    for sentence in evaluation.outside_library.sentences() {
+        println_stdout(&sentence);
+    }
+}
+
+/// A negative result if most of the track lies outside the library.
 pub(super) fn conclude(evaluation: &Evaluation) -> Result<(), Stop> {
-    let outside = &evaluation.outside_library;
-    outside.sentences().iter().for_each(|sentence| println_stdout(sentence));
-    if outside.is_most() { Err(Stop::Negative) } else { Ok(()) }
+    if evaluation.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
+}
+
+/// What is printed of an evaluation, as JSON.
+pub(super) fn summary(evaluation: &Evaluation, folder: &Path) -> Value {
+    json!({
+        "recording": evaluation.recording, "method": evaluation.method,
+        "sleepers": evaluation.sleepers.len(), "outside_library": evaluation.outside_library,
+        "notes": evaluation.notes, "report": report(folder),
+    })
+}
+
+/// The same of an inversion.
+fn inversion_summary(inversion: &Inversion, folder: &Path) -> Value {
+    json!({
+        "recording": inversion.recording, "method": inversion.method,
+        "sleepers": inversion.sleepers.len(), "outside_library": inversion.outside_library,
+        "notes": inversion.notes, "report": report(folder),
+    })
 }
 
 /// The recording in a folder.
