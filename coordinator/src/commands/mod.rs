@@ -18,6 +18,7 @@ mod import;
 mod inspect;
 mod library;
 mod library_url;
+mod manual;
 mod new;
 mod numbers;
 mod progress;
@@ -110,6 +111,8 @@ Example:
         /// The shell.
         shell: clap_complete::Shell,
     },
+    /// Write manual pages.
+    Manual(manual::Arguments),
 }
 
 /// Reads the command line, runs one command and turns its end into an exit code.
@@ -174,6 +177,7 @@ fn run(command: Command) -> Result<(), Stop> {
             completions(shell);
             Ok(())
         }
+        Command::Manual(arguments) => manual::run(&arguments),
     }
 }
 
