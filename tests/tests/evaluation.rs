@@ -66,6 +66,10 @@ fn the_sample_s_step_and_soft_railpads_are_found_without_library_or_models() {
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("evaluated by inversion from 3 passes at 7, 10, 13 km/h"));
     assert!(page.contains("Common to the sleepers in the middle"));
+    let picture = fs::read_to_string(out.join("track.svg")).unwrap();
+    for title in ["Railpad stiffness", "Ballast stiffness", "Irregularity level"] {
+        assert!(picture.contains(&format!(">{title}</text>")), "{title} is not in {picture}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Parameters along the track with their uncertainty (paper, Fig. 20).
 
-use tracktwin_drawing::{Axis, Chart, Shown};
+use tracktwin_drawing::{Axis, Chart, Shown, sheet};
 use tracktwin_evaluation::{Estimates, Evaluation, SleeperEvaluation};
 use tracktwin_parameters::Parameter;
 
@@ -14,6 +14,15 @@ const PANELS: [Parameter; 6] = [
     Parameter::BallastDamping,
 ];
 const SIZE: [f64; 2] = [560.0, 250.0];
+
+/// The charts of the page along the track in two columns, as the text of an SVG file.
+pub fn evaluation_chart(evaluation: &Evaluation) -> String {
+    let charts = track_charts(evaluation);
+    let size = [2.0 * SIZE[0], charts.len().div_ceil(2) as f64 * SIZE[1]];
+    let place = |index: usize| [(index % 2) as f64 * SIZE[0], (index / 2) as f64 * SIZE[1]];
+    let placed = charts.into_iter().enumerate().map(|(index, chart)| (place(index), chart));
+    sheet("Parameters along the track", size, &placed.collect::<Vec<_>>())
+}
 
 /// A chart a parameter: Gaussian process with a band of two standard deviations, and selector.
 pub(crate) fn track_charts(evaluation: &Evaluation) -> Vec<String> {

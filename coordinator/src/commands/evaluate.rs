@@ -23,6 +23,10 @@ use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureDefinition};
 use tracktwin_surrogate::Trained;
 
+/// The page, and its charts along the track as a picture.
+const PAGE: &str = "report.html";
+const PICTURE: &str = "track.svg";
+
 /// Method of estimation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum Method {
@@ -58,8 +62,8 @@ pub(super) struct Arguments {
     /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Output folder for evaluation.json, evaluation.csv and report.html; with both methods also
-    /// inversion.json and inversion.csv.
+    /// Output folder for evaluation.json, evaluation.csv, report.html and track.svg (the charts along
+    /// the track); with both methods also inversion.json and inversion.csv.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -100,8 +104,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 }
 
 /// Path of the report in an output folder.
-fn report(folder: &Path) -> String {
-    folder.join("report.html").display().to_string()
+pub(super) fn report(folder: &Path) -> String {
+    folder.join(PAGE).display().to_string()
 }
 
 /// Evaluates a recording by inversion only.
@@ -127,7 +131,9 @@ async fn by_inversion(
     let extractor = Extractor::new(&FeatureDefinition::default()).context("the usual features")?;
     let page = tracktwin_report::inversion_page(&inversion, &recording, &extractor, &command());
     let mut output = Output::begin(folder, Kind::Results, force.force)?;
-    output.add(&FileName::new("report.html")?, page.as_bytes())?;
+    output.add(&FileName::new(PAGE)?, page.as_bytes())?;
+    let picture = tracktwin_report::inversion_chart(&inversion);
+    output.add(&FileName::new(PICTURE)?, picture.as_bytes())?;
     inversion.add_to(&mut output, "evaluation")?;
     output.commit()?;
     if json {
@@ -208,7 +214,7 @@ pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
 /// Checks that an evaluation can be written into a folder.
 pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
     let names =
-        ["report.html", "evaluation.csv", "evaluation.json", "inversion.csv", "inversion.json"];
+        [PAGE, PICTURE, "evaluation.csv", "evaluation.json", "inversion.csv", "inversion.json"];
     check(folder, Kind::Results, force, &names)
 }
 
@@ -274,7 +280,9 @@ fn write(
     force: Force,
 ) -> Result<(), FilesError> {
     let mut output = Output::begin(folder, Kind::Results, force.force)?;
-    output.add(&FileName::new("report.html")?, page.as_bytes())?;
+    output.add(&FileName::new(PAGE)?, page.as_bytes())?;
+    let picture = tracktwin_report::evaluation_chart(evaluation);
+    output.add(&FileName::new(PICTURE)?, picture.as_bytes())?;
     evaluation.add_to(&mut output)?;
     if let Some(inversion) = inversion {
         inversion.add_to(&mut output, "inversion")?;

@@ -164,7 +164,7 @@ impl Made {
                 "models: {}; evaluate a recording with `tracktwin evaluate`",
                 models.display()
             ),
-            (Some(_), Some(_)) => format!("report: {}", out.join("report.html").display()),
+            (Some(_), Some(_)) => format!("report: {}", evaluate::report(out)),
         }
     }
 
