@@ -112,6 +112,20 @@ fn only_what_was_given_up_is_tried_again() {
 }
 
 #[test]
+fn cases_added_and_tried_again_are_counted_in_json() {
+    let home = Home::new();
+    let tell = |arguments: &[&str]| -> serde_json::Value {
+        let answer = home.tell(&[arguments, &["--json"]].concat()).succeeded();
+        serde_json::from_str(&answer).unwrap()
+    };
+    let added = tell(&["add", &home.path("coarse.toml")]);
+    assert_eq!((&added["cases"], &added["to_simulate"]), (&60.into(), &60.into()));
+    assert_eq!(added["state"], "running");
+    let again = tell(&["retry"]);
+    assert_eq!((&again["campaign"], &again["to_simulate"]), (&added["campaign"], &0.into()));
+}
+
+#[test]
 fn watching_ends_when_nobody_reads() {
     let home = Home::new();
     home.add().succeeded();

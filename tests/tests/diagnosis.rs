@@ -86,8 +86,11 @@ fn a_flat_is_named_and_unknown_on_the_tread_where_it_has_no_name() {
     let folder = recorded(&["13", "10"], flat);
     let (_, diagnosis) = diagnosed(folder.path(), &[]);
     assert_eq!(accepted(&diagnosis.unwrap()), [("wheel_flat", Vec::new())]);
-    let (_, diagnosis) = diagnosed(folder.path(), &["--without", "wheel_flat"]);
+    let (answer, diagnosis) = diagnosed(folder.path(), &["--without", "wheel_flat", "--json"]);
     let diagnosis = diagnosis.unwrap();
+    let summary: Value = serde_json::from_str(&answer.out).unwrap();
+    assert_eq!(summary["verdict"], "unknown_physics");
+    assert_eq!(summary["accepted"][0], diagnosis["hypotheses"][0]);
     assert_eq!(accepted(&diagnosis), [("unknown_physics", Vec::new())]);
     assert_eq!(diagnosis["hypotheses"][0]["port"], "wheel_surface");
 }
@@ -107,8 +110,10 @@ fn an_uneven_wheel_that_was_found_joins_a_campaign_with_its_order() {
     let [extended, library] = ["track-extended.toml", "library.sqlite"].map(path);
     let library = format!("sqlite:{library}");
     std::fs::write(&campaign, run(PROGRAM, &["run", "--print-campaign"]).out).unwrap();
-    let answer = run(PROGRAM, &["extend", &campaign, "--from", &found]);
-    assert_eq!(answer.code, Some(0), "{}", answer.err);
+    let answer = run(PROGRAM, &["extend", &campaign, "--from", &found, "--json"]).succeeded();
+    let written: Value = serde_json::from_str(&answer).unwrap();
+    assert_eq!(written["campaign"], *extended);
+    assert_eq!(written["physics"][0], "wheel_out_of_round");
     let text = std::fs::read_to_string(&extended).unwrap();
     assert!(text.contains("\norder = 36.0\n"), "{text}");
     // Of four cases two have the wheel.

@@ -12,12 +12,17 @@ const SAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../coordinator/sample
 
 /// What the program says of a recording without models.
 fn evaluated(recording: &Path, out: &Path) -> Value {
-    let answer = run(
-        PROGRAM,
-        &["evaluate", &recording.display().to_string(), "--out", &out.display().to_string()],
-    );
-    assert_eq!(answer.code, Some(0), "{}", answer.err);
-    serde_json::from_str(&fs::read_to_string(out.join("evaluation.json")).unwrap()).unwrap()
+    let [recording, folder] = [recording, out].map(|path| path.display().to_string());
+    let answer = run(PROGRAM, &["evaluate", &recording, "--out", &folder, "--json"]).succeeded();
+    let summary: Value = serde_json::from_str(&answer).unwrap();
+    let text = fs::read_to_string(out.join("evaluation.json")).unwrap();
+    let evaluation: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(summary["sleepers"], evaluation["sleepers"].as_array().unwrap().len());
+    for key in ["recording", "method", "outside_library", "notes"] {
+        assert_eq!(summary[key], evaluation[key]);
+    }
+    assert!(Path::new(summary["report"].as_str().unwrap()).exists(), "{answer}");
+    evaluation
 }
 
 /// Means of a parameter at the sleepers whose numbers lie in a range.
@@ -61,6 +66,10 @@ fn the_sample_s_step_and_soft_railpads_are_found_without_library_or_models() {
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("evaluated by inversion from 3 passes at 7, 10, 13 km/h"));
     assert!(page.contains("Common to the sleepers in the middle"));
+    let picture = fs::read_to_string(out.join("track.svg")).unwrap();
+    for title in ["Railpad stiffness", "Ballast stiffness", "Irregularity level"] {
+        assert!(picture.contains(&format!(">{title}</text>")), "{title} is not in {picture}");
+    }
 }
 
 #[test]

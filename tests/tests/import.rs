@@ -36,6 +36,12 @@ fn a_table_is_imported_and_inspected() {
     let answer = run(PROGRAM, &arguments);
     assert_eq!(answer.code, Some(0), "{}", answer.err);
 
+    // The same again changes nothing.
+    let answer = run(PROGRAM, &[&arguments[..], &["--json"]].concat()).succeeded();
+    let imported: serde_json::Value = serde_json::from_str(&answer).unwrap();
+    assert_eq!(imported[0]["recording"], *out);
+    assert_eq!(imported[0]["column"], "acc");
+
     let answer = run(PROGRAM, &["inspect", &out, "--out", &page]);
     assert_eq!(answer.code, Some(0), "{}", answer.err);
     assert!(answer.out.contains("2000 Hz") && answer.out.contains("one speed only"));

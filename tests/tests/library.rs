@@ -158,6 +158,35 @@ fn exported_tables_make_the_same_library_again() {
 }
 
 #[test]
+fn what_is_exported_imported_and_copied_is_counted_in_json() {
+    let (folder, library) = home();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        let answer = self::library(&[arguments, &["--json"]].concat());
+        assert_done(&answer);
+        serde_json::from_str(&answer.out).unwrap()
+    };
+    let results = |tables: &serde_json::Value| {
+        tables.as_array().unwrap().iter().find(|it| it["table"] == "result").unwrap().clone()
+    };
+    let (tables, training) = (path("tables"), path("training.csv"));
+    let exported = json(&["export", "--out", &tables, "--library", &library]);
+    assert_eq!(results(&exported)["rows"], CASES * SPEEDS);
+    let exported = json(&["export", "--out", &training, "--library", &library]);
+    assert_eq!(exported[0]["file"], *training);
+    let [again, copy] = ["again.sqlite", "copy.sqlite"].map(|name| url(&folder.path().join(name)));
+    for added in [CASES * SPEEDS, 0] {
+        let imported = results(&json(&["import", &tables, "--library", &again]));
+        assert_eq!(imported["rows"], CASES * SPEEDS);
+        assert_eq!(imported["added"], added);
+    }
+    let copied = json(&["copy", "--from", &library, "--to", &copy]);
+    assert_eq!(copied["added"], copied["rows"]);
+    assert_eq!(copied["left_out"], serde_json::json!([]));
+    assert_eq!(copied["campaigns"][0]["equal"], true);
+}
+
+#[test]
 fn the_training_set_is_one_row_a_case_and_speed() {
     let (folder, library) = home();
     let file = folder.path().join("training.csv");

@@ -173,7 +173,7 @@ fn no_command_replaces_a_file_that_it_did_not_write() {
     let file = |name: &str| format!("{out}/{name}");
     let (table, page, tables) = (file("r.csv"), file("p.html"), file("t.parquet"));
     let models = ["--models", &none, "--library", &library];
-    let commands: [(&str, Vec<&str>); 14] = [
+    let commands: [(&str, Vec<&str>); 15] = [
         ("recording.json", vec!["simulate", "--out", &out]),
         ("truth.json", vec!["simulate", "--out", &out]),
         ("models.json", vec!["train", "--out", &out, "--library", &library]),
@@ -183,6 +183,7 @@ fn no_command_replaces_a_file_that_it_did_not_write() {
         ("r.csv", vec!["receptance", "--at", "sleeper", "--spans", "20", "--out", &table]),
         ("r.svg", vec!["receptance", "--at", "sleeper", "--spans", "20", "--out", &table]),
         ("coordinator.pem", vec!["certs", &out, "--host", "head"]),
+        ("tracktwin.1", vec!["manual", "--out", &out]),
         ("campaign.parquet", vec!["library", "export", "--out", &out, "--library", &library]),
         ("t.parquet", vec!["library", "export", "--out", &tables, "--library", &library]),
         ("evaluation.csv", vec!["run", &campaign, "--out", &out, "--library", &library]),
@@ -207,13 +208,15 @@ fn what_has_been_written_is_written_again_and_into_a_device_too() {
     let path = |name: &str| text(&home.path().join(name));
     let recording = path("recording");
     simulate(&home.path().join("recording"), &[]).succeeded();
-    let (table, page, certs) = (path("r.csv"), path("p.html"), path("certs"));
+    let (table, page) = (path("r.csv"), path("p.html"));
+    let (certs, manual) = (path("certs"), path("manual"));
     for _ in 0..2 {
         let receptance = ["receptance", "--at", "sleeper", "--spans", "20", "--points", "5"];
         run(PROGRAM, &[&receptance[..], &["--out", &table]].concat()).succeeded();
         run(PROGRAM, &[&receptance[..], &["--out", "/dev/null"]].concat()).succeeded();
         run(PROGRAM, &["inspect", &recording, "--out", &page]).succeeded();
         run(PROGRAM, &["certs", &certs, "--host", "head"]).succeeded();
+        run(PROGRAM, &["manual", "--out", &manual]).succeeded();
     }
     refused(
         &run(PROGRAM, &["receptance", "--at", "sleeper", "--out", &path("r.svg")]),

@@ -45,6 +45,13 @@ fn figures_of_a_small_library_come_as_rows_and_a_page() {
     let page = fs::read_to_string(format!("{out}/reproduce.html")).unwrap();
     assert!(page.contains("Fig. 12") && page.contains("<svg") && !page.contains("<script"));
 
+    let out = path("one");
+    let answer = reproduce(&["fig9", "--json"], &out);
+    let printed: Value = serde_json::from_str(&answer.out).unwrap();
+    let text = fs::read_to_string(format!("{out}/reproduce.json")).unwrap();
+    assert_eq!(printed, serde_json::from_str::<Value>(&text).unwrap());
+    assert_eq!((&printed["rows"][0]["figure"], answer.code), (&"fig9".into(), Some(1)));
+
     refused(&reproduce(&["fig11"], &path("none")), &["`fig11`", "fig9, fig10"]);
     refused(&reproduce(&["fig16"], &path("none")), &["24 spans", "omit fig16"]);
     refused(&reproduce(&["fig14"], &path("few")), &["60", "200"]);

@@ -6,6 +6,7 @@ use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto};
 use std::fmt::Write as _;
 use std::process::Command;
+use system_tests::run;
 use test_needs::assert_snapshot;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
@@ -43,6 +44,27 @@ fn arguments_are_those_that_are_kept() {
     assert!(text.matches("\n# ").count() > 20, "few commands were found");
     assert_snapshot("help.txt", &text);
     assert_snapshot("worker-help.txt", &all_help(WORKER, "tracktwin-worker", &[]));
+}
+
+/// The names of the manual pages of a command and of all below it.
+fn pages(program: &str, name: &str, command: &[String]) -> Vec<String> {
+    let page = [&[name.to_owned()], command].concat().join("-") + ".1";
+    let below = commands(&help(program, command)).into_iter();
+    let pages = below.flat_map(|below| pages(program, name, &[command, &[below]].concat()));
+    std::iter::once(page).chain(pages).collect()
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display().to_string();
+    run(PROGRAM, &["manual", "--out", &out]).succeeded();
+    let pages = pages(PROGRAM, "tracktwin", &[]);
+    assert!(pages.len() > 20, "few commands were found: {pages:?}");
+    for name in pages {
+        let page = std::fs::read_to_string(folder.path().join(&name)).unwrap_or_default();
+        assert!(page.contains(".SH SYNOPSIS"), "{name}: {page}");
+    }
 }
 
 /// A field as a line: number, how often, type, name.

@@ -54,6 +54,13 @@ fn a_node_that_is_killed_loses_its_case_to_another_and_each_case_has_one_answer(
     assert!(matches!(again.code, Some(0 | 1)), "{}", again.err);
     assert!(again.out.contains("2 of 2 scored"), "{}", again.out);
     assert_eq!(std::fs::read_to_string(path("first/scores.jsonl")).unwrap(), scores);
+
+    let arguments = arguments.iter().map(String::as_str).chain(["--json"]);
+    let in_json = run(PROGRAM, &arguments.collect::<Vec<_>>());
+    let summary: serde_json::Value = serde_json::from_str(&in_json.out).unwrap();
+    let file = std::fs::read_to_string(path("first/summary.json")).unwrap();
+    assert_eq!(summary, serde_json::from_str::<serde_json::Value>(&file).unwrap());
+    assert_eq!((&summary["cases"], in_json.code), (&2.into(), again.code));
 }
 
 #[test]

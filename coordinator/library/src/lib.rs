@@ -44,7 +44,7 @@ pub use provenance::{
     DiagnosisRecord, EvaluationRecord, HypothesisRecord, MismatchRecord, SleeperRecord,
     SurrogateRecord, TrainingRecord,
 };
-pub use report::{Report, Verdict};
+pub use report::{Report, ReportVerdict};
 pub use result::{ContactLoss, LibraryEntry};
 pub use state::{AttemptsMax, CampaignState, State};
 pub use trial::{Question, TrialAnswer, TrialRecord};

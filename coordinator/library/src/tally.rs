@@ -1,7 +1,7 @@
 //! Sums over reports: the counts in the table `worker`, and the table `progress`.
 
 use crate::engine::{Connection, Text, sql};
-use crate::{LibraryError, Report, Verdict};
+use crate::{LibraryError, Report, ReportVerdict};
 use tracktwin_experiment::Outcome;
 
 /// Length of the intervals of the progress counts in s.
@@ -46,16 +46,16 @@ pub(crate) struct Tally<'a> {
 
 impl<'a> Tally<'a> {
     /// Counts what was stored.
-    pub(crate) fn of(report: &'a Report, verdicts: &[Verdict]) -> Self {
+    pub(crate) fn of(report: &'a Report, verdicts: &[ReportVerdict]) -> Self {
         let mut tally = Self { report, finished: 0, failed: 0, busy_s: 0.0, failed_since: 0 };
         for (case, verdict) in report.cases.iter().zip(verdicts) {
             match (&case.outcome, verdict) {
-                (Outcome::Finished(_), Verdict::Stored) => {
+                (Outcome::Finished(_), ReportVerdict::Stored) => {
                     tally.finished += 1;
                     tally.busy_s += case.duration_s;
                     tally.failed_since = 0;
                 }
-                (Outcome::Failed { .. }, Verdict::Stored) => {
+                (Outcome::Failed { .. }, ReportVerdict::Stored) => {
                     tally.failed += 1;
                     tally.failed_since += 1;
                 }

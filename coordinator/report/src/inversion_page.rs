@@ -3,7 +3,7 @@
 use crate::evaluation_page::maps_at;
 use crate::{UNDER_LOAD, capital};
 use maud::{Markup, html};
-use tracktwin_drawing::{Axis, Chart, Shown, figure, page, significant};
+use tracktwin_drawing::{Axis, Chart, Shown, figure, page, sheet, significant};
 use tracktwin_evaluation::{Estimate, Estimates, Evaluation};
 use tracktwin_inversion::{COMMON, Inversion, PER_SLEEPER, Sleeper, beside};
 use tracktwin_number::rounded;
@@ -44,6 +44,14 @@ pub fn inversion_page(
         (provenance(inversion, command))
     };
     page(&format!("Track under {}", inversion.recording), &summary(inversion, recording), &body)
+}
+
+/// The charts of the page along the track, one below the other, as the text of an SVG file.
+pub fn inversion_chart(inversion: &Inversion) -> String {
+    let charts = charts(inversion, None);
+    let size = [SIZE[0], charts.len() as f64 * SIZE[1]];
+    let placed = charts.into_iter().enumerate().map(|(row, it)| ([0.0, row as f64 * SIZE[1]], it));
+    sheet("Parameters along the track", size, &placed.collect::<Vec<_>>())
 }
 
 /// The section of an evaluation's page that shows the inversion beside the Gaussian processes.

@@ -17,10 +17,11 @@ mod track_picture;
 pub use diagnosis_page::{Origin, diagnosis_page};
 pub use evaluation_page::evaluation_page;
 pub use inspection_page::{Inspected, InspectedCurve, InspectionReport, inspection_page};
-pub use inversion_page::inversion_page;
+pub use inversion_page::{inversion_chart, inversion_page};
 pub use models_page::models_page;
 pub use receptance::{ReceptanceCurve, receptance_chart};
 pub use reproduction_page::reproduction_page;
+pub use track_picture::evaluation_chart;
 
 /// What an estimate of railpad stiffness is, for a reader who knows railpads from a test bench.
 const UNDER_LOAD: &str = "Railpad stiffness is the dynamic stiffness under the load of the wheel. A railpad that stiffens with load is softer without it; recordings with one load do not show by how much.";

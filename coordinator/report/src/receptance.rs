@@ -1,7 +1,7 @@
 //! Receptances as a picture: magnitude and phase against frequency.
 
 use num_complex::Complex64;
-use tracktwin_drawing::{Axis, Chart, stand_alone};
+use tracktwin_drawing::{Axis, Chart, sheet, stand_alone};
 
 /// Receptance between two places of the track.
 #[derive(Clone, Debug)]
@@ -40,12 +40,8 @@ pub fn receptance_chart(frequencies_hz: &[f64], curves: &[ReceptanceCurve]) -> S
         }
         magnitude.explain(class, &curve.name);
     }
-    let total = HEIGHTS[0] + HEIGHTS[1];
-    let below = format!(r#"<g transform="translate(0 {})">{}</g>"#, HEIGHTS[0], phase.into_svg());
-    stand_alone(&format!(
-        r#"<svg xmlns="http://www.w3.org/2000/svg" class="chart" role="img" aria-label="Receptance" viewBox="0 0 {WIDTH} {total}" width="{WIDTH}" height="{total}"><rect width="100%" height="100%" style="fill:var(--paper)"/>{}{below}</svg>"#,
-        magnitude.into_svg()
-    ))
+    let charts = [([0.0; 2], magnitude.into_svg()), ([0.0, HEIGHTS[0]], phase.into_svg())];
+    sheet("Receptance", [WIDTH, HEIGHTS[0] + HEIGHTS[1]], &charts)
 }
 
 /// Phases cut where they jump over 180 degrees, so that no line crosses the picture.

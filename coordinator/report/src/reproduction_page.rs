@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, figure, page};
-use tracktwin_reproduction::{Compared, Curve, Picture, Reproduction, Scale, Style, Verdict};
+use tracktwin_reproduction::{ClaimVerdict, Compared, Curve, Picture, Reproduction, Scale, Style};
 
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
@@ -41,9 +41,9 @@ fn summary(reproduction: &Reproduction) -> String {
     format!(
         "Of {} statements of the paper, {} are reproduced, {} differ, and {} cannot be decided.",
         reproduction.rows.len(),
-        count(Verdict::Reproduced),
-        count(Verdict::Differs),
-        count(Verdict::CannotTell)
+        count(ClaimVerdict::Reproduced),
+        count(ClaimVerdict::Differs),
+        count(ClaimVerdict::CannotTell)
     )
 }
 
@@ -85,11 +85,11 @@ fn table(compared: &Compared) -> Markup {
 }
 
 /// The verdict with a mark, so that it does not hang on colour alone.
-fn verdict(verdict: Verdict) -> Markup {
+fn verdict(verdict: ClaimVerdict) -> Markup {
     let (mark, colour) = match verdict {
-        Verdict::Reproduced => ("✓", "var(--c)"),
-        Verdict::Differs => ("✗", "var(--b)"),
-        Verdict::CannotTell => ("?", "var(--dim)"),
+        ClaimVerdict::Reproduced => ("✓", "var(--c)"),
+        ClaimVerdict::Differs => ("✗", "var(--b)"),
+        ClaimVerdict::CannotTell => ("?", "var(--dim)"),
     };
     html! { strong style=(format!("color:{colour}")) { (mark) " " (verdict.label()) } }
 }

@@ -1,6 +1,6 @@
 //! Parameters along the track with their uncertainty (paper, Fig. 20).
 
-use tracktwin_drawing::{Axis, Chart, Shown};
+use tracktwin_drawing::{Axis, Chart, Shown, sheet};
 use tracktwin_evaluation::{Estimates, Evaluation, SleeperEvaluation};
 use tracktwin_parameters::Parameter;
 
@@ -15,6 +15,15 @@ const PANELS: [Parameter; 6] = [
 ];
 const SIZE: [f64; 2] = [560.0, 250.0];
 
+/// The charts of the page along the track in two columns, as the text of an SVG file.
+pub fn evaluation_chart(evaluation: &Evaluation) -> String {
+    let charts = track_charts(evaluation);
+    let size = [2.0 * SIZE[0], charts.len().div_ceil(2) as f64 * SIZE[1]];
+    let place = |index: usize| [(index % 2) as f64 * SIZE[0], (index / 2) as f64 * SIZE[1]];
+    let placed = charts.into_iter().enumerate().map(|(index, chart)| (place(index), chart));
+    sheet("Parameters along the track", size, &placed.collect::<Vec<_>>())
+}
+
 /// A chart a parameter: Gaussian process with a band of two standard deviations, and selector.
 pub(crate) fn track_charts(evaluation: &Evaluation) -> Vec<String> {
     let known = evaluation.parameters();
@@ -24,11 +33,11 @@ pub(crate) fn track_charts(evaluation: &Evaluation) -> Vec<String> {
 
 fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
     let shown = Shown::of(parameter);
-    let estimates = |pick: fn(&SleeperEvaluation) -> &Estimates| -> Vec<Place> {
+    let estimates = |pick: fn(&SleeperEvaluation) -> &Estimates| -> Vec<ChartEstimate> {
         let value = |sleeper: &SleeperEvaluation| {
             let estimate = pick(sleeper).get(&parameter)?;
             let (mean, two_sd) = (estimate.mean / shown.divisor, 2.0 * estimate.sd / shown.divisor);
-            Some(Place { x_m: sleeper.x_m, mean, two_sd, valid: sleeper.is_valid() })
+            Some(ChartEstimate { x_m: sleeper.x_m, mean, two_sd, valid: sleeper.is_valid() })
         };
         evaluation.sleepers.iter().filter_map(value).collect()
     };
@@ -37,7 +46,7 @@ fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
     let process = estimates(|sleeper| &sleeper.estimates);
     let selector = estimates(|sleeper| &sleeper.selector.estimates);
     let label = format!("{} in {}", parameter.symbol(), shown.unit);
-    let x = Axis::around("position in m", process.iter().map(|place| place.x_m));
+    let x = Axis::around("position in m", process.iter().map(|estimate| estimate.x_m));
     let y = Axis::around(&label, range);
     let mut label = parameter.label().to_owned();
     label[..1].make_ascii_uppercase();
@@ -48,14 +57,14 @@ fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
     draw(&mut chart, &process, &selector, range);
     chart.explain("a", "GP ± 2 sd");
     chart.explain("b", "selector");
-    if process.iter().any(|place| !place.valid) {
+    if process.iter().any(|estimate| !estimate.valid) {
         chart.explain("hollow", "not valid");
     }
     chart.into_svg()
 }
 
 /// An estimate of one parameter at a sleeper, in the chart's unit.
-struct Place {
+struct ChartEstimate {
     x_m: f64,
     mean: f64,
     two_sd: f64,
@@ -63,10 +72,10 @@ struct Place {
 }
 
 /// Lines and bands through neighbours whose estimates are valid; hollow dots for the others.
-fn draw(chart: &mut Chart, process: &[Place], selector: &[Place], range: [f64; 2]) {
+fn draw(chart: &mut Chart, process: &[ChartEstimate], selector: &[ChartEstimate], range: [f64; 2]) {
     // The models know nothing beyond the library's range.
     let within = |value: f64| value.clamp(range[0], range[1]);
-    let stretches = |of: &[Place]| -> Vec<Vec<(f64, f64, f64)>> {
+    let stretches = |of: &[ChartEstimate]| -> Vec<Vec<(f64, f64, f64)>> {
         let alike = of.chunk_by(|a, b| a.valid == b.valid).filter(|stretch| stretch[0].valid);
         alike.map(|it| it.iter().map(|p| (p.x_m, p.mean, p.two_sd)).collect()).collect()
     };
@@ -84,7 +93,7 @@ fn draw(chart: &mut Chart, process: &[Place], selector: &[Place], range: [f64; 2
             chart.dots(class, 2.6, &points(&stretch));
         }
         let invalid: Vec<_> =
-            of.iter().filter(|place| !place.valid).map(|place| (place.x_m, place.mean)).collect();
+            of.iter().filter(|it| !it.valid).map(|it| (it.x_m, it.mean)).collect();
         chart.dots("hollow", 2.6, &invalid);
     }
 }

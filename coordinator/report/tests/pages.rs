@@ -9,7 +9,9 @@ use tracktwin_evaluation::{
     Provenance, Selected, SleeperEvaluation, Unevenness,
 };
 use tracktwin_parameters::Parameter;
-use tracktwin_report::{ReceptanceCurve, evaluation_page, models_page, receptance_chart};
+use tracktwin_report::{
+    ReceptanceCurve, evaluation_chart, evaluation_page, models_page, receptance_chart,
+};
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_signal::{Extractor, FeatureDefinition, Signal};
 use tracktwin_surrogate::{FeatureColumns, Side, TrainOptions, Trained, TrainingSet, train};
@@ -177,6 +179,10 @@ fn the_page_of_an_evaluation_shows_every_sleeper_and_every_picture() {
     // Six parameters, signal and two maps, four spectra.
     assert_eq!(page.matches("class=\"chart\"").count(), 6 + 3 + 4);
     assert_eq!(page.matches("data:image/png;base64,").count(), 2);
+    // The six again, in a frame of their own.
+    let picture = evaluation_chart(&evaluation);
+    keep("track.svg", &picture);
+    assert_eq!(picture.matches("class=\"chart\"").count(), 6 + 1);
     assert!(page.contains("ring &lt;1&gt;") && !page.contains("ring <1>"));
     assert!(page.contains("1 sleeper is flagged"), "the summary counts flags");
     // Heading and label of one chart.

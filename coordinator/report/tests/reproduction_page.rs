@@ -3,13 +3,14 @@
 use std::path::Path;
 use tracktwin_report::reproduction_page;
 use tracktwin_reproduction::{
-    Compared, Curve, Figure, Picture, Provenance, Reproduction, Row, Scale, Style, Verdict,
+    ClaimRow, ClaimVerdict, Compared, Curve, Figure, Picture, Provenance, Reproduction, Scale,
+    Style,
 };
 
-fn row(claim: &str, verdict: Verdict) -> Row {
+fn row(claim: &str, verdict: ClaimVerdict) -> ClaimRow {
     let text = |what: &str| format!("{what} of {claim}");
     let (paper, ours, why) = (text("paper"), text("ours"), text("why"));
-    Row { figure: Figure::Fig17, claim: claim.to_owned(), paper, ours, verdict, why }
+    ClaimRow { figure: Figure::Fig17, claim: claim.to_owned(), paper, ours, verdict, why }
 }
 
 fn picture(styles: Vec<Style>) -> Picture {
@@ -34,9 +35,9 @@ fn reproduction() -> Reproduction {
     let figure = Compared {
         figure: Figure::Fig17,
         rows: vec![
-            row("levels < 5", Verdict::Reproduced),
-            row("meshes", Verdict::Differs),
-            row("the rest", Verdict::CannotTell),
+            row("levels < 5", ClaimVerdict::Reproduced),
+            row("meshes", ClaimVerdict::Differs),
+            row("the rest", ClaimVerdict::CannotTell),
         ],
         pictures: vec![picture(vec![Style::Band(vec![0.5; 9]), Style::Truth, Style::Dots]), bars],
         caption: "Truth and estimates.".to_owned(),

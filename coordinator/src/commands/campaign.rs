@@ -5,9 +5,10 @@ use super::library_url::LibraryUrl;
 use super::numbers::count;
 use super::progress::Progress;
 use super::signals::stop_on_signal;
-use super::{OrInput, Stop, continuity, println_stderr, println_stdout};
+use super::{OrInput, Stop, continuity, print_json, println_stderr, println_stdout};
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_library::{CampaignState, Library, Retry, State};
@@ -29,6 +30,9 @@ pub(super) enum Action {
         priority: Option<i32>,
         #[command(flatten)]
         library: LibraryUrl,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Pause a campaign: leased cases are finished, no further cases are leased.
     Pause(Named),
@@ -51,6 +55,9 @@ pub(super) enum Action {
         /// deleted.
         #[arg(long, conflicts_with_all = ["cases", "flagged"])]
         altered: bool,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Set the priority of a campaign.
     Priority {
@@ -81,8 +88,8 @@ pub(super) struct Named {
 
 pub(super) async fn run(action: Action) -> Result<(), Stop> {
     match action {
-        Action::Add { file, cases, priority, library } => {
-            add(file, cases, priority, &library).await
+        Action::Add { file, cases, priority, library, json } => {
+            add(file, cases, priority, &library, json).await
         }
         Action::Pause(named) => {
             let (library, id) = named.open().await?;
@@ -99,7 +106,7 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
             library.cancel(&id).await?;
             done(library, &format!("{id} is cancelled; its results are kept")).await
         }
-        Action::Retry { named, cases, flagged, altered } => {
+        Action::Retry { named, cases, flagged, altered, json } => {
             let (library, id) = named.open().await?;
             let which = match (flagged, altered, cases.is_empty()) {
                 (true, ..) => Retry::Flagged,
@@ -111,7 +118,8 @@ pub(super) async fn run(action: Action) -> Result<(), Stop> {
                 refuse_others(&library, &id, indices).await?;
             }
             let again = library.retry(&id, which).await?;
-            done(library, &format!("{id}: {again} cases will be simulated again")).await
+            let line = format!("{id}: {again} cases will be simulated again");
+            counted(library, json, &line, &json!({ "campaign": id, "to_simulate": again })).await
         }
         Action::Priority { named, to } => {
             let (library, id) = named.open().await?;
@@ -131,6 +139,7 @@ async fn add(
     cases: Option<u32>,
     priority: Option<i32>,
     url: &LibraryUrl,
+    json: bool,
 ) -> Result<(), Stop> {
     let campaign = Campaign::read(&file, cases).or_input()?;
     let library = url.open_or_create().await?;
@@ -153,7 +162,10 @@ async fn add(
             format!("; it is {}: run `tracktwin campaign resume`", state.name())
         }
     };
-    done(library, &format!("{id}: {cases} cases, {left} of them to be simulated{waits}")).await
+    let line = format!("{id}: {cases} cases, {left} of them to be simulated{waits}");
+    let state = state.map(CampaignState::name);
+    let counts = json!({ "campaign": id, "state": state, "cases": cases, "to_simulate": left });
+    counted(library, json, &line, &counts).await
 }
 
 /// Adds cases with a progress bar; the error of an interrupted run states the progress.
@@ -211,5 +223,15 @@ async fn refuse_others(library: &Library, id: &str, indices: &[u32]) -> Result<(
 async fn done(library: Library, line: &str) -> Result<(), Stop> {
     library.close().await;
     println_stdout(line);
+    Ok(())
+}
+
+/// The same for an action that counts cases: a line, or JSON.
+async fn counted(library: Library, json: bool, line: &str, counts: &Value) -> Result<(), Stop> {
+    if !json {
+        return done(library, line).await;
+    }
+    library.close().await;
+    print_json(counts);
     Ok(())
 }

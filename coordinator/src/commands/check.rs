@@ -1,9 +1,8 @@
 //! `tracktwin check`: explains a described track.
 
 use super::track::read;
-use super::{OrInput, Stop, println_stdout};
+use super::{OrInput, Stop, print_json, println_stdout};
 use crate::pipeline::check::{TrackCheck, check};
-use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_number::rounded;
@@ -28,7 +27,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let track = read(&arguments.file)?;
     let check = check(&track).or_input()?;
     if arguments.json {
-        println_stdout(&serde_json::to_string_pretty(&check).context("figures are plain JSON")?);
+        print_json(&check);
     } else {
         print(&check);
     }
@@ -60,7 +59,9 @@ fn print(check: &TrackCheck) {
         let label = format!("  {} m", level.wavelength_m);
         row(&label, format!("{:.1} ({:.1})", level.level_db, level.limit_db));
     }
-    println_stdout("\nspeed: sleeper passing, standard deviation of the contact force, time without contact");
+    println_stdout(
+        "\nspeed: sleeper passing, standard deviation of the contact force, time without contact",
+    );
     for speed in &check.speeds {
         let label = format!("  {} km/h", speed.speed_km_h);
         let passing_hz = rounded(speed.sleeper_passing_hz, 3);

@@ -4,7 +4,7 @@ use super::evaluate::{Method, stop};
 use super::library_url::open_or_create;
 use super::progress::Progress;
 use super::simulate::Setting;
-use super::{OrInput, Stop, println_stdout};
+use super::{OrInput, Stop, print_json, println_stdout};
 use crate::pipeline::compute::compute;
 use crate::pipeline::coverage::{Counts, Coverage, Kind, Row, inversion_rows};
 use crate::pipeline::evaluate::Evaluator;
@@ -81,7 +81,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let counts = Counts { tracks: tracks as usize, sleepers: sleepers as usize, seed };
     let rows = compute(|| rows(&evaluator, settings, counts))?;
     if json {
-        println_stdout(&serde_json::to_string_pretty(&rows)?);
+        print_json(&rows);
     } else {
         println_stdout(&tables(&rows));
     }
@@ -103,7 +103,7 @@ async fn by_inversion(arguments: &Arguments) -> Result<(), Stop> {
     let rows = rows.await.context("cannot score the inversion")?;
     bar.into_inner().end();
     if arguments.json {
-        println_stdout(&serde_json::to_string_pretty(&rows)?);
+        print_json(&rows);
         return Ok(());
     }
     println_stdout(

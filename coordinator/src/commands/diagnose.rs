@@ -4,15 +4,16 @@ use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
 use super::progress::Stages;
 use super::track::TrackOption;
-use super::{OrInput, Stop, println_stderr, println_stdout};
+use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline;
 use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
 use crate::pipeline::provenance;
 use anyhow::Context;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
+use serde_json::{Value, json};
 use std::path::PathBuf;
-use tracktwin_diagnosis::{Verdict, check_track};
+use tracktwin_diagnosis::{Diagnosis, Verdict, check_track};
 use tracktwin_experiment::CODE_VERSION;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Library, without_password};
@@ -55,6 +56,9 @@ pub(super) struct Arguments {
     /// Leave this kind of physics out of the catalogue; may be repeated.
     #[arg(long, value_name = "PHYSICS", value_parser = PossibleValuesParser::new(names()))]
     without: Vec<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Names of the catalogue.
@@ -64,7 +68,7 @@ fn names() -> impl Iterator<Item = &'static str> {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let origin = origin(&arguments);
-    let Arguments { recording, models, library, track, out, force, without } = arguments;
+    let Arguments { recording, models, library, track, out, force, without, json } = arguments;
     let recording = Recording::open(&recording).or_input()?;
     check(&out, Kind::Results, force, &["report.html", "diagnosis.json"])?;
     recording.doubts.iter().for_each(|doubt| println_stderr(doubt));
@@ -88,14 +92,14 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     shown.end();
     let mut diagnosis = diagnosed.map_err(stop)?.diagnosis;
     diagnosis.notes.splice(..0, recording.doubts.iter().cloned().chain(assumed));
-    let json = serde_json::to_string_pretty(&diagnosis).context("a diagnosis is plain JSON")?;
+    let document = serde_json::to_string_pretty(&diagnosis).context("a diagnosis is plain JSON")?;
     let page = tracktwin_report::diagnosis_page(&diagnosis, &origin);
     let mut output = Output::begin(&out, Kind::Results, force.force)?;
     output.add(&FileName::new("report.html")?, page.as_bytes())?;
-    output.add(&FileName::new("diagnosis.json")?, json.as_bytes())?;
+    output.add(&FileName::new("diagnosis.json")?, document.as_bytes())?;
     output.commit()?;
     if let Some(library) = &library {
-        let record = provenance::diagnosis(&diagnosis, json);
+        let record = provenance::diagnosis(&diagnosis, document);
         if let Err(error) = library.record_diagnosis(record).await {
             // The diagnosis in the folder is complete nevertheless.
             tracing::warn!(
@@ -104,12 +108,27 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
             );
         }
     }
-    println_stdout(&diagnosis.sentence);
-    println_stdout(&format!("report: {}", out.join("report.html").display()));
+    let report = out.join("report.html").display().to_string();
+    if json {
+        print_json(&summary(&diagnosis, &report));
+    } else {
+        println_stdout(&diagnosis.sentence);
+        println_stdout(&format!("report: {report}"));
+    }
     match diagnosis.verdict {
         Verdict::Consistent => Ok(()),
         _ => Err(Stop::Negative),
     }
+}
+
+/// The verdict, what was accepted, and the path of the report, as JSON.
+fn summary(diagnosis: &Diagnosis, report: &str) -> Value {
+    let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
+    json!({
+        "recording": diagnosis.recording, "verdict": diagnosis.verdict,
+        "sentence": diagnosis.sentence, "nothing_left_out": diagnosis.nothing_left_out,
+        "accepted": accepted.collect::<Vec<_>>(), "report": report,
+    })
 }
 
 /// An unsuitable recording is wrong input; everything else is a failure.

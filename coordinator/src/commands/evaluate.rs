@@ -4,12 +4,13 @@ use super::files::{Force, check, make_folder};
 use super::library_url::open_whole;
 use super::progress::Stages;
 use super::track::TrackOption;
-use super::{OrInput, Stop, println_stderr, println_stdout};
+use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline::evaluate::{Evaluator, EvaluatorError};
 use crate::pipeline::invert::InvertingError;
 use crate::pipeline::{self, provenance};
 use anyhow::{Context, anyhow};
 use clap::Args;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::check_track;
 use tracktwin_evaluation::{Evaluation, Flag, check_recording};
@@ -21,6 +22,10 @@ use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureDefinition};
 use tracktwin_surrogate::Trained;
+
+/// The page, and its charts along the track as a picture.
+const PAGE: &str = "report.html";
+const PICTURE: &str = "track.svg";
 
 /// Method of estimation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -58,25 +63,28 @@ pub(super) struct Arguments {
     /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Output folder for evaluation.json, evaluation.csv and report.html; with both methods also
-    /// inversion.json and inversion.csv.
+    /// Output folder for evaluation.json, evaluation.csv, report.html and track.svg (the charts along
+    /// the track); with both methods also inversion.json and inversion.csv.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     track: TrackOption,
     #[command(flatten)]
     force: Force,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { recording, method, models, library, track, out, force } = arguments;
+    let Arguments { recording, method, models, library, track, out, force, json } = arguments;
     // Read the recording first: it is the most frequent cause of errors and the quickest to check.
     let recording = open(&recording)?;
     check_files(&out, force)?;
     let (Some(models), Some(library)) =
         (models.filter(|_| method != Some(Method::Inversion)), library)
     else {
-        return by_inversion(&recording, &track, &out, force).await;
+        return by_inversion(&recording, &track, &out, force, json).await;
     };
     let library = open_whole(&library).await?;
     let models = Trained::load(&models)
@@ -86,12 +94,19 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         .or_input()?;
     let beside = method.is_none();
     let evaluation = evaluate(&recording, &library, models, &out, force, beside).await?;
-    let sleepers = evaluation.sleepers.len();
-    println_stdout(&format!(
-        "{sleepers} sleepers evaluated; report: {}",
-        out.join("report.html").display()
-    ));
+    if json {
+        print_json(&summary(&evaluation, &out));
+    } else {
+        let sleepers = evaluation.sleepers.len();
+        println_stdout(&format!("{sleepers} sleepers evaluated; report: {}", report(&out)));
+        print_outside(&evaluation);
+    }
     conclude(&evaluation)
+}
+
+/// Path of the report in an output folder.
+pub(super) fn report(folder: &Path) -> String {
+    folder.join(PAGE).display().to_string()
 }
 
 /// Evaluates a recording by inversion only.
@@ -100,6 +115,7 @@ async fn by_inversion(
     track: &TrackOption,
     folder: &Path,
     force: Force,
+    json: bool,
 ) -> Result<(), Stop> {
     let (recording, mut notes) = usable_with_notes(recording)?;
     let (track, assumed) = track.of(&recording)?;
@@ -116,16 +132,19 @@ async fn by_inversion(
     let extractor = Extractor::new(&FeatureDefinition::default()).context("the usual features")?;
     let page = tracktwin_report::inversion_page(&inversion, &recording, &extractor, &command());
     let mut output = Output::begin(folder, Kind::Results, force.force)?;
-    output.add(&FileName::new("report.html")?, page.as_bytes())?;
+    output.add(&FileName::new(PAGE)?, page.as_bytes())?;
+    let picture = tracktwin_report::inversion_chart(&inversion);
+    output.add(&FileName::new(PICTURE)?, picture.as_bytes())?;
     inversion.add_to(&mut output, "evaluation")?;
     output.commit()?;
-    let (sleepers, report) = (inversion.sleepers.len(), folder.join("report.html"));
-    println_stdout(&format!(
-        "{sleepers} sleepers evaluated by inversion; report: {}",
-        report.display()
-    ));
-    for sentence in &said {
-        println_stdout(sentence);
+    if json {
+        print_json(&inversion_summary(&inversion, folder));
+    } else {
+        let (sleepers, report) = (inversion.sleepers.len(), report(folder));
+        println_stdout(&format!("{sleepers} sleepers evaluated by inversion; report: {report}"));
+        for sentence in &said {
+            println_stdout(sentence);
+        }
     }
     if inversion.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
@@ -149,11 +168,34 @@ fn command() -> String {
     std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
-/// Prints what lies outside the library; a negative result if that is most of the track.
+/// Prints what lies outside the library.
+pub(super) fn print_outside(evaluation: &Evaluation) {
+    for sentence in evaluation.outside_library.sentences() {
+        println_stdout(&sentence);
+    }
+}
+
+/// A negative result if most of the track lies outside the library.
 pub(super) fn conclude(evaluation: &Evaluation) -> Result<(), Stop> {
-    let outside = &evaluation.outside_library;
-    outside.sentences().iter().for_each(|sentence| println_stdout(sentence));
-    if outside.is_most() { Err(Stop::Negative) } else { Ok(()) }
+    if evaluation.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
+}
+
+/// What is printed of an evaluation, as JSON.
+pub(super) fn summary(evaluation: &Evaluation, folder: &Path) -> Value {
+    json!({
+        "recording": evaluation.recording, "method": evaluation.method,
+        "sleepers": evaluation.sleepers.len(), "outside_library": evaluation.outside_library,
+        "notes": evaluation.notes, "report": report(folder),
+    })
+}
+
+/// The same of an inversion.
+fn inversion_summary(inversion: &Inversion, folder: &Path) -> Value {
+    json!({
+        "recording": inversion.recording, "method": inversion.method,
+        "sleepers": inversion.sleepers.len(), "outside_library": inversion.outside_library,
+        "notes": inversion.notes, "report": report(folder),
+    })
 }
 
 /// The recording in a folder.
@@ -173,7 +215,7 @@ pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
 /// Checks that an evaluation can be written into a folder.
 pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError> {
     let names =
-        ["report.html", "evaluation.csv", "evaluation.json", "inversion.csv", "inversion.json"];
+        [PAGE, PICTURE, "evaluation.csv", "evaluation.json", "inversion.csv", "inversion.json"];
     check(folder, Kind::Results, force, &names)
 }
 
@@ -239,7 +281,9 @@ fn write(
     force: Force,
 ) -> Result<(), FilesError> {
     let mut output = Output::begin(folder, Kind::Results, force.force)?;
-    output.add(&FileName::new("report.html")?, page.as_bytes())?;
+    output.add(&FileName::new(PAGE)?, page.as_bytes())?;
+    let picture = tracktwin_report::evaluation_chart(evaluation);
+    output.add(&FileName::new(PICTURE)?, picture.as_bytes())?;
     evaluation.add_to(&mut output)?;
     if let Some(inversion) = inversion {
         inversion.add_to(&mut output, "inversion")?;

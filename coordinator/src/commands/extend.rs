@@ -1,7 +1,7 @@
 //! `tracktwin extend`: adds the physics that a diagnosis found to a campaign.
 
 use super::files::{Force, read, read_text, write_file};
-use super::{OrInput, Stop, println_stdout};
+use super::{OrInput, Stop, print_json, println_stdout};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use std::fmt::Write as _;
@@ -45,10 +45,13 @@ pub(super) struct Arguments {
     out: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { campaign: path, from, out, force } = arguments;
+    let Arguments { campaign: path, from, out, force, json } = arguments;
     let text = read_text(&path).or_input()?;
     let campaign = Campaign::parse(&text, &path.display().to_string(), None).or_input()?;
     let diagnosis = diagnosis(&from).or_input()?;
@@ -79,11 +82,12 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     write_file(&out, FileKind::Campaign, force, extended.as_bytes())?;
     let names: Vec<_> =
         accepted.iter().map(|(hypothesis, _)| hypothesis.physics.as_str()).collect();
-    println_stdout(&format!(
-        "{}: half of the cases contain {}",
-        out.display(),
-        names.join(" and ")
-    ));
+    let out = out.display().to_string();
+    if json {
+        print_json(&serde_json::json!({ "campaign": out, "physics": names, "share": SHARE }));
+    } else {
+        println_stdout(&format!("{out}: half of the cases contain {}", names.join(" and ")));
+    }
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use super::files::{Force, read_text};
 use super::numbers::number;
-use super::{OrInput, Stop, println_stdout};
+use super::{OrInput, Stop, print_json, println_stdout};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -71,6 +71,9 @@ pub(super) struct Arguments {
     /// Radius of the wheel in m.
     #[arg(long, value_name = "M", value_parser = number(WHEEL_RADIUS))]
     wheel_radius: Option<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Units of acceleration on the command line.
@@ -169,15 +172,31 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     }
     for ((one, folder), output) in imported.iter().zip(&folders).zip(outputs) {
         output.commit()?;
-        for note in &one.notes {
-            println_stdout(note);
+        if !arguments.json {
+            print(one, folder);
         }
-        println_stdout(&format!(
-            "recording: {}; inspect it with: tracktwin inspect {0}",
-            folder.display()
-        ));
+    }
+    if arguments.json {
+        let recordings = imported.iter().zip(&folders).map(|(one, folder)| json(one, folder));
+        print_json(&recordings.collect::<Vec<_>>());
     }
     Ok(())
+}
+
+/// Prints what was changed or assumed, and the path of the recording.
+fn print(imported: &Imported, folder: &Path) {
+    for note in &imported.notes {
+        println_stdout(note);
+    }
+    println_stdout(&format!(
+        "recording: {}; inspect it with: tracktwin inspect {0}",
+        folder.display()
+    ));
+}
+
+fn json(Imported { column, notes, .. }: &Imported, folder: &Path) -> serde_json::Value {
+    let recording = folder.display().to_string();
+    serde_json::json!({ "recording": recording, "column": column, "notes": notes })
 }
 
 /// Folders of the recordings: with several columns, one named after each column.

@@ -1,7 +1,7 @@
 //! `tracktwin inspect`: content and quality of a recording.
 
 use super::files::{Force, check_file, write_file};
-use super::{OrInput, Stop, println_stdout};
+use super::{OrInput, Stop, print_json, println_stdout};
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_files::Kind;
@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let inspection = inspect(&recording);
     let report = report(&recording, &inspection);
     if arguments.json {
-        println_stdout(&format!("{:#}", json(&recording, &inspection, &report)));
+        print_json(&json(&recording, &inspection, &report));
     } else {
         print(&report);
     }

@@ -18,6 +18,7 @@ mod import;
 mod inspect;
 mod library;
 mod library_url;
+mod manual;
 mod new;
 mod numbers;
 mod progress;
@@ -35,6 +36,7 @@ mod trial;
 use stop::{OrInput, Stop};
 
 use clap::{CommandFactory, Parser, Subcommand};
+use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -109,6 +111,8 @@ Example:
         /// The shell.
         shell: clap_complete::Shell,
     },
+    /// Write manual pages.
+    Manual(manual::Arguments),
 }
 
 /// Reads the command line, runs one command and turns its end into an exit code.
@@ -173,6 +177,7 @@ fn run(command: Command) -> Result<(), Stop> {
             completions(shell);
             Ok(())
         }
+        Command::Manual(arguments) => manual::run(&arguments),
     }
 }
 
@@ -199,6 +204,11 @@ fn completions(shell: clap_complete::Shell) {
 /// Prints a line of the result on standard output.
 fn println_stdout(line: &str) {
     write_stdout(format!("{line}\n").as_bytes());
+}
+
+/// Prints a result as JSON on standard output.
+fn print_json(result: &impl Serialize) {
+    println_stdout(&serde_json::to_string_pretty(result).expect("results are plain data"));
 }
 
 /// First error of standard output; the program ends with it after clean-up.

@@ -4,7 +4,7 @@ use super::files::{Force, check, make_folder};
 use super::library::{CHOOSE_REMEDY, choose};
 use super::library_url::LibraryUrl;
 use super::progress::{Progress, TrainingBar};
-use super::{OrInput, Stop, evaluate, println_stdout};
+use super::{OrInput, Stop, evaluate, print_json, println_stdout};
 use crate::pipeline;
 use crate::pipeline::compute::compute;
 use crate::pipeline::evaluate::Evaluator;
@@ -14,9 +14,9 @@ use anyhow::anyhow;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use tracktwin_experiment::Experiment;
-use tracktwin_files::{FileName, Kind, Output};
+use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
-use tracktwin_reproduction::{Compared, Figure, Provenance, Reproduction, Results, Verdict};
+use tracktwin_reproduction::{ClaimVerdict, Compared, Figure, Provenance, Reproduction, Results};
 use tracktwin_surrogate::{Trained, TrainingSet};
 
 /// Arguments of `reproduce`.
@@ -57,6 +57,9 @@ pub(super) struct Arguments {
     /// Id or name of the campaign; required if the library holds several.
     #[arg(long, value_name = "CAMPAIGN")]
     campaign: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Seed that selects the training half of the cases when no models are given, as with `train`.
@@ -86,7 +89,13 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     };
     let material = Material::read(&library, &campaign, models).await?;
     let reproduction = compute(|| compare(&figures, &experiment, &material)).or_input()?;
-    write_and_print(&reproduction, out, arguments.force)
+    write(&reproduction, out, arguments.force)?;
+    if arguments.json {
+        print_json(&reproduction);
+    } else {
+        print(&reproduction, out);
+    }
+    if reproduction.count(ClaimVerdict::Differs) > 0 { Err(Stop::Negative) } else { Ok(()) }
 }
 
 /// Trains models of the campaign when none were given.
@@ -211,13 +220,17 @@ fn compare(
     Ok(Reproduction::new(provenance, all))
 }
 
-/// Writes the files and prints every row; a negative result if a row differs.
-fn write_and_print(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), Stop> {
+/// Writes the files.
+fn write(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), FilesError> {
     let page = tracktwin_report::reproduction_page(reproduction);
     let mut output = Output::begin(out, Kind::Results, force.force)?;
     output.add(&FileName::new(PAGE)?, page.as_bytes())?;
     output.add(&FileName::new(ANSWER)?, reproduction.json().as_bytes())?;
-    output.commit()?;
+    output.commit()
+}
+
+/// Prints every row, and how many of each verdict there are.
+fn print(reproduction: &Reproduction, out: &Path) {
     for row in &reproduction.rows {
         let (figure, verdict) = (row.figure.name(), row.verdict.label());
         println_stdout(&format!(
@@ -228,10 +241,9 @@ fn write_and_print(reproduction: &Reproduction, out: &Path, force: Force) -> Res
     let count = |verdict| reproduction.count(verdict);
     println_stdout(&format!(
         "{} reproduced, {} differ, {} cannot tell; page: {}",
-        count(Verdict::Reproduced),
-        count(Verdict::Differs),
-        count(Verdict::CannotTell),
+        count(ClaimVerdict::Reproduced),
+        count(ClaimVerdict::Differs),
+        count(ClaimVerdict::CannotTell),
         out.join(PAGE).display()
     ));
-    if count(Verdict::Differs) > 0 { Err(Stop::Negative) } else { Ok(()) }
 }

@@ -4,8 +4,8 @@ use super::files::{Force, make_folder};
 use super::library::{CHOOSE_REMEDY, choose};
 use super::library_url::LibraryUrl;
 use super::progress::TrainingBar;
-use super::{Stop, println_stdout};
-use crate::pipeline::models::{check_files, group_name, train_into};
+use super::{Stop, print_json, println_stdout};
+use crate::pipeline::models::{check_files, group_name, scores, train_into};
 use clap::Args;
 use std::path::PathBuf;
 use tracktwin_surrogate::{ModelGroup, ParameterModel, Trained};
@@ -33,10 +33,13 @@ pub(super) struct Arguments {
     /// Seed that selects the training half of the cases.
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { library, out, force: Force { force }, campaign, seed } = arguments;
+    let Arguments { library, out, force: Force { force }, campaign, seed, json } = arguments;
     check_files(&out, force)?;
     let library = library.open_whole().await?;
     let campaign = choose(&library, campaign.as_deref(), CHOOSE_REMEDY).await?;
@@ -45,8 +48,12 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let bar = TrainingBar::default();
     let trained = train_into(&out, force, &library, &campaign, seed, &|at| bar.at(&at)).await?;
     bar.end();
-    println_stdout(&table(&trained));
-    println_stdout(&format!("models: {}", out.display()));
+    if json {
+        print_json(&scores(&trained));
+    } else {
+        println_stdout(&table(&trained));
+        println_stdout(&format!("models: {}", out.display()));
+    }
     Ok(())
 }
 

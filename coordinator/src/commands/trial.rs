@@ -3,15 +3,17 @@
 use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::progress::Progress;
-use super::{OrInput, Stop, println_stdout};
+use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline::evaluate::Evaluator;
 use crate::pipeline::trial::{Trial, TrialError, check_folder};
 use anyhow::anyhow;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use tracktwin_library::Library;
 use tracktwin_parameters::Preset;
 use tracktwin_signal::recording::compare_designs;
 use tracktwin_surrogate::Trained;
+use tracktwin_trial::Summary;
 
 /// Arguments of `trial`.
 #[derive(Args)]
@@ -21,6 +23,7 @@ diagnoses/, scores.jsonl, summary.json, and trial.md with the tables. Repeat the
 Started on several machines with the same --library, it distributes the cases; the case of a machine that fails goes \
 to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 2 wrong input, 3 failure."
 )]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub(super) struct Arguments {
     /// Number of recordings.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=9999))]
@@ -52,6 +55,9 @@ pub(super) struct Arguments {
     /// Delete the passes of a recording after scoring; its seal and diagnosis are kept.
     #[arg(long)]
     discard_recordings: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
@@ -65,6 +71,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         shuffle,
         models,
         discard_recordings,
+        json,
     } = arguments;
     let own = || format!("sqlite:{}", out.join("library.sqlite").display());
     let url = library.unwrap_or_else(own);
@@ -73,14 +80,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     check_folder(&out, force.force)?;
     make_folder(&out)?;
     let library = open_or_create(&url).await?;
-    let paper = match models {
-        Some(models) => {
-            let evaluator = Evaluator::new(models, &library).await.or_input()?;
-            check_models(&evaluator).or_input()?;
-            Some(evaluator)
-        }
-        None => None,
-    };
+    let paper = paper(models, &library).await?;
     let node = tracktwin_worker::agent::unique_name();
     let trial = Trial {
         seed,
@@ -94,22 +94,41 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         discard_recordings,
         force: force.force,
     };
+    // With --json, standard output is for the summary.
+    let tell = if json { println_stderr } else { println_stdout };
     let digest = trial.begin().await.map_err(stop)?;
-    println_stdout(&format!("sealed: {cases} truths, SHA-256 of seals.sha256 {digest}"));
+    tell(&format!("sealed: {cases} truths, SHA-256 of seals.sha256 {digest}"));
     let done = trial.answered().await.map_err(stop)?;
     let (id, library) = (trial.id(), trial.library.name());
-    println_stdout(&format!("trial {id} in {library}: {done} of {cases} scored"));
+    tell(&format!("trial {id} in {library}: {done} of {cases} scored"));
 
     let mut progress = Progress::begin("diagnosing", done, u64::from(cases));
     let answered = trial.answer(|done, remark| progress.at(done, remark)).await;
     progress.end();
     let summary = answered.map_err(stop)?;
+    if json {
+        print_json(&summary);
+    } else {
+        print(&summary, &trial.folder);
+    }
+    let missed = summary.rows.iter().any(|row| row.reached == Some(false));
+    if missed { Err(Stop::Negative) } else { Ok(()) }
+}
+
+/// Prints a line for each measure, and the path of the tables.
+fn print(summary: &Summary, folder: &Path) {
     for row in &summary.rows {
         println_stdout(&format!("{}: {} ({})", row.measure, row.value, row.goal));
     }
-    println_stdout(&format!("tables: {}", trial.folder.join("trial.md").display()));
-    let missed = summary.rows.iter().any(|row| row.reached == Some(false));
-    if missed { Err(Stop::Negative) } else { Ok(()) }
+    println_stdout(&format!("tables: {}", folder.join("trial.md").display()));
+}
+
+/// The paper's method, with models of V-Track.
+async fn paper(models: Option<Trained>, library: &Library) -> Result<Option<Evaluator>, Stop> {
+    let Some(models) = models else { return Ok(None) };
+    let evaluator = Evaluator::new(models, library).await.or_input()?;
+    check_models(&evaluator).or_input()?;
+    Ok(Some(evaluator))
 }
 
 /// Checks that the models are of V-Track.

@@ -88,7 +88,7 @@ fn save(
     let page = tracktwin_report::models_page(trained, tested);
     let mut output = Output::begin(folder, Kind::Models, force)?;
     output.add(&FileName::new(PAGE)?, page.as_bytes())?;
-    output.add(&FileName::new(SCORES)?, scores_json(trained).as_bytes())?;
+    output.add(&FileName::new(SCORES)?, format!("{:#}\n", scores(trained)).as_bytes())?;
     trained.add_to(&mut output)?;
     Ok(output.commit()?)
 }
@@ -100,8 +100,8 @@ pub fn group_name(key: &GroupKey) -> String {
     format!("{} km/h {}", speeds.join("+"), key.feature)
 }
 
-/// The models' errors as JSON: a record a model.
-fn scores_json(trained: &Trained) -> String {
+/// The models' errors, a record a model: the content of `mase.json`.
+pub fn scores(trained: &Trained) -> serde_json::Value {
     let records: Vec<_> = trained
         .groups()
         .iter()
@@ -118,7 +118,5 @@ fn scores_json(trained: &Trained) -> String {
         })
         .collect();
     let cases = trained.entries();
-    let text =
-        serde_json::json!({ "format": "tracktwin-mase/1", "cases": cases, "models": records });
-    format!("{text:#}\n")
+    serde_json::json!({ "format": "tracktwin-mase/1", "cases": cases, "models": records })
 }

@@ -37,6 +37,8 @@ pub enum Kind {
     Curves,
     /// A description of `new`, which its user changes.
     Description,
+    /// Pages of `manual`.
+    Manual,
 }
 
 impl Kind {
@@ -59,6 +61,7 @@ impl Display for Kind {
             Self::Certificates => "certificates",
             Self::Curves => "receptances",
             Self::Description => "a description of a track",
+            Self::Manual => "manual pages",
         })
     }
 }

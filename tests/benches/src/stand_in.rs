@@ -4,7 +4,7 @@ use tempfile::TempDir;
 use tokio::task::JoinSet;
 use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_library::{
-    AttemptsMax, CampaignRecord, LeaseRequest, Leased, Library, Report, Verdict,
+    AttemptsMax, CampaignRecord, LeaseRequest, Leased, Library, Report, ReportVerdict,
 };
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 use tracktwin_protocol::{CaseReport, checksum};
@@ -104,7 +104,7 @@ async fn work(library: &Library, worker: &str, cases: u32, batch: u32) -> Result
             audit_share: 0.0,
         };
         let verdicts = library.report(report).await?;
-        assert!(verdicts.iter().all(|verdict| *verdict == Verdict::Stored));
+        assert!(verdicts.iter().all(|verdict| *verdict == ReportVerdict::Stored));
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use std::error::Error;
 use tonic::Status;
 use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
-use tracktwin_library::{Held, LibraryError, Verdict};
+use tracktwin_library::{Held, LibraryError, ReportVerdict};
 use tracktwin_protocol::{BadMessage, PROTOCOL_VERSION, Registration, farm, held_from_messages};
 
 /// Why a worker is incompatible with this coordinator, if so, with the remedy.
@@ -34,12 +34,12 @@ pub(crate) fn held(messages: Vec<farm::HeldCase>) -> Result<Vec<Held>, Status> {
     Ok(held.into_iter().map(|(index, epoch)| Held { index, epoch }).collect())
 }
 
-pub(crate) const fn verdict_message(verdict: Verdict) -> farm::Verdict {
+pub(crate) const fn verdict_message(verdict: ReportVerdict) -> farm::Verdict {
     match verdict {
-        Verdict::Stored => farm::Verdict::Stored,
-        Verdict::Duplicate => farm::Verdict::Duplicate,
-        Verdict::Late => farm::Verdict::Late,
-        Verdict::Refused => farm::Verdict::Refused,
+        ReportVerdict::Stored => farm::Verdict::Stored,
+        ReportVerdict::Duplicate => farm::Verdict::Duplicate,
+        ReportVerdict::Late => farm::Verdict::Late,
+        ReportVerdict::Refused => farm::Verdict::Refused,
     }
 }
 

@@ -32,9 +32,9 @@ pub struct Report {
     pub audit_share: f64,
 }
 
-/// Treatment of the report of a case.
+/// What became of the report of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum ReportVerdict {
     /// Stored.
     Stored,
     /// A result was there already; nothing changed.
@@ -54,7 +54,7 @@ impl Library {
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written; then nothing is stored.
-    pub async fn report(&self, report: Report) -> Result<Vec<Verdict>, LibraryError> {
+    pub async fn report(&self, report: Report) -> Result<Vec<ReportVerdict>, LibraryError> {
         self.write(report).await
     }
 }

@@ -1,6 +1,6 @@
 //! Changes of a report, in one transaction.
 
-use super::{Report, Verdict};
+use super::{Report, ReportVerdict};
 use crate::attempt::{self, Ended};
 use crate::engine::{Connection, Row, Text, Write, sql};
 use crate::result::insert_results;
@@ -43,13 +43,13 @@ const FINISH: Text = Text::Each {
 };
 
 impl Write for Report {
-    type Answer = Vec<Verdict>;
+    type Answer = Vec<ReportVerdict>;
 
     fn worker(&self) -> Option<&str> {
         Some(&self.worker)
     }
 
-    async fn apply(&self, connection: &mut Connection) -> Result<Vec<Verdict>, LibraryError> {
+    async fn apply(&self, connection: &mut Connection) -> Result<Vec<ReportVerdict>, LibraryError> {
         let mut case_states = self.case_states(connection).await?;
         let earlier = self.earlier_leases(connection, &case_states).await?;
         let mut finished = Vec::new();
@@ -58,9 +58,9 @@ impl Write for Report {
             let case_state = case_states.get_mut(&case.index);
             let verdict = case_state
                 .as_deref()
-                .map_or(Verdict::Refused, |it| self.verdict(case, it, &earlier));
+                .map_or(ReportVerdict::Refused, |it| self.verdict(case, it, &earlier));
             verdicts.push(verdict);
-            let (Verdict::Stored, Some(case_state)) = (verdict, case_state) else { continue };
+            let (ReportVerdict::Stored, Some(case_state)) = (verdict, case_state) else { continue };
             match &case.outcome {
                 Outcome::Finished(passes) => {
                     if self.overtakes(case, case_state) {
@@ -149,17 +149,17 @@ impl Report {
         case: &CaseReport,
         case_state: &CaseState,
         earlier: &HashSet<Held>,
-    ) -> Verdict {
+    ) -> ReportVerdict {
         let present = self.is_present(case, case_state);
         let held = present || earlier.contains(&Held { index: case.index, epoch: case.epoch });
         if !held || case.epoch == 0 || case.parameter_hash != case_state.parameter_hash {
-            return Verdict::Refused;
+            return ReportVerdict::Refused;
         }
         match (&case.outcome, case_state.state) {
-            (_, State::Finished) => Verdict::Duplicate,
-            (Outcome::Finished(_), _) => Verdict::Stored,
-            (Outcome::Failed { .. }, State::Leased) if present => Verdict::Stored,
-            (Outcome::Failed { .. }, _) => Verdict::Late,
+            (_, State::Finished) => ReportVerdict::Duplicate,
+            (Outcome::Finished(_), _) => ReportVerdict::Stored,
+            (Outcome::Failed { .. }, State::Leased) if present => ReportVerdict::Stored,
+            (Outcome::Failed { .. }, _) => ReportVerdict::Late,
         }
     }
 

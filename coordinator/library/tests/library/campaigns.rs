@@ -5,7 +5,8 @@ use crate::support::{
     report, request,
 };
 use tracktwin_library::{
-    CampaignState, Cause, LeaseRequest, Leased, LibraryError, Report, Retry, State, Status, Verdict,
+    CampaignState, Cause, LeaseRequest, Leased, LibraryError, Report, ReportVerdict, Retry, State,
+    Status,
 };
 
 const OTHER: &str = "other-000000000000";
@@ -50,7 +51,7 @@ on_both_databases! {
         assert_eq!(lease(&library, "w", 1, 0).await, []);
         // What is in work may be finished.
         assert_eq!(library.renew(CAMPAIGN, "w", vec![held(&leased[0])], 10).await.unwrap(), []);
-        assert_eq!(report(&library, "w", vec![finished(&leased[0])]).await, [Verdict::Stored]);
+        assert_eq!(report(&library, "w", vec![finished(&leased[0])]).await, [ReportVerdict::Stored]);
         library.resume(CAMPAIGN).await.unwrap();
         assert_eq!(served(&library, 1).await, Some((CAMPAIGN.to_owned(), 1)));
     }
@@ -61,8 +62,8 @@ on_both_databases! {
         library.cancel(CAMPAIGN).await.unwrap();
         let all: Vec<_> = leased.iter().map(held).collect();
         assert_eq!(library.renew(CAMPAIGN, "w", all.clone(), 10).await.unwrap(), all);
-        assert_eq!(report(&library, "w", vec![finished(&leased[0])]).await, [Verdict::Stored]);
-        assert_eq!(report(&library, "w", vec![failed(&leased[1])]).await, [Verdict::Late]);
+        assert_eq!(report(&library, "w", vec![finished(&leased[0])]).await, [ReportVerdict::Stored]);
+        assert_eq!(report(&library, "w", vec![failed(&leased[1])]).await, [ReportVerdict::Late]);
         let status = library.status(CAMPAIGN).await.unwrap();
         assert_eq!(status, Status { waiting: 2, finished: 1, ..Status::default() });
         let overview = library.overview().await.unwrap();

@@ -5,7 +5,9 @@ use crate::support::{
     CAMPAIGN, Home, case, features, finished, lease, on_both_databases, passes, report, reported,
 };
 use tracktwin_experiment::Outcome;
-use tracktwin_library::{Cell, ContactLoss, Library, LibraryError, Retry, Status, Table, Verdict};
+use tracktwin_library::{
+    Cell, ContactLoss, Library, LibraryError, ReportVerdict, Retry, Status, Table,
+};
 
 const CASES: u32 = 3;
 
@@ -175,7 +177,7 @@ on_both_databases! {
             assert_eq!(unlike_their_checksum(&there).await, None);
             // What is simulated anew finds its place.
             let leased = lease(&there, "w", 1, there.now_unix_ms()).await;
-            assert_eq!(report(&there, "w", vec![finished(&leased[0])]).await, [Verdict::Stored]);
+            assert_eq!(report(&there, "w", vec![finished(&leased[0])]).await, [ReportVerdict::Stored]);
             assert_eq!(there.status(CAMPAIGN).await.unwrap().finished, 3);
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::support::{CAMPAIGN, Home, failed, fill, finished, lease, on_both_databases, report};
 use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
-use tracktwin_library::{Answer, Cell, Library, LibraryError, Table, Verdict};
+use tracktwin_library::{Answer, Cell, Library, LibraryError, ReportVerdict, Table};
 
 /// An answer, kept.
 #[derive(Default)]
@@ -206,7 +206,7 @@ on_both_databases! {
         let take = async |rows| there.write_table(results, rows).await.map(drop);
         library.read_table(results, 9, take).await.unwrap();
         // The copy ended here.
-        assert_eq!(report(&there, "v", vec![finished(&leased[0])]).await, [Verdict::Duplicate]);
+        assert_eq!(report(&there, "v", vec![finished(&leased[0])]).await, [ReportVerdict::Duplicate]);
         assert_eq!(there.status(CAMPAIGN).await.unwrap().finished, 1);
         assert_eq!(there.digest(CAMPAIGN).await.unwrap(), library.digest(CAMPAIGN).await.unwrap());
     }

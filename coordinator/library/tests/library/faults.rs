@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use test_needs::skipped;
 use test_postgres::{Server, Settings};
-use tracktwin_library::{Leased, Library, LibraryError, Verdict};
+use tracktwin_library::{Leased, Library, LibraryError, ReportVerdict};
 
 /// Leases cases and reports them until none wait; calls without a response are repeated.
 async fn work(library: &Library, cases: usize) -> usize {
@@ -37,7 +37,7 @@ async fn finish(library: &Library, case: &Leased, temporary: &mut usize) -> usiz
         match library.report(message).await {
             // A duplicate: the first answer got lost.
             Ok(verdicts) => {
-                assert!(matches!(verdicts[0], Verdict::Stored | Verdict::Duplicate));
+                assert!(matches!(verdicts[0], ReportVerdict::Stored | ReportVerdict::Duplicate));
                 return 1;
             }
             Err(error) => {
@@ -181,7 +181,9 @@ async fn a_full_disk_is_said_and_survived() {
     std::fs::remove_file(&ballast).unwrap();
     let reports = leased.iter().map(finished).collect();
     let verdicts = report(&library, "w", reports).await;
-    assert!(verdicts.iter().all(|it| matches!(it, Verdict::Stored | Verdict::Duplicate)));
+    assert!(
+        verdicts.iter().all(|it| matches!(it, ReportVerdict::Stored | ReportVerdict::Duplicate))
+    );
     assert_eq!(library.digest(CAMPAIGN).await.unwrap(), undisturbed(CASES).await);
     let findings = library.verify(|| ()).await.unwrap().findings;
     assert!(findings.iter().all(|it| it.what.ends_with("does not match its hash")), "{findings:?}");

@@ -4,7 +4,7 @@
 use crate::support::{ATTEMPTS_MAX, CAMPAIGN, Home, failed, finished, held, lease, report};
 use proptest::prelude::*;
 use tokio::runtime::Runtime;
-use tracktwin_library::{Leased, Library, Retry, State, Verdict};
+use tracktwin_library::{Leased, Library, ReportVerdict, Retry, State};
 
 const CASES: u32 = 6;
 
@@ -95,8 +95,8 @@ impl<'a> Farm<'a> {
 
     async fn finish(&mut self, worker: &str, leased: &Leased) {
         let verdict = report(self.library(), worker, vec![finished(leased)]).await[0];
-        assert_ne!(verdict, Verdict::Refused, "{worker} held {leased:?}");
-        if verdict == Verdict::Stored {
+        assert_ne!(verdict, ReportVerdict::Refused, "{worker} held {leased:?}");
+        if verdict == ReportVerdict::Stored {
             self.stored[leased.case.index as usize] += 1;
         }
     }

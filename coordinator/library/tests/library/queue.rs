@@ -5,7 +5,7 @@ use crate::support::{
 };
 use std::collections::HashSet;
 use tokio::task::JoinSet;
-use tracktwin_library::{Held, LeaseRequest, Retry, State, Status, Verdict};
+use tracktwin_library::{Held, LeaseRequest, ReportVerdict, Retry, State, Status};
 
 fn first_lease(index: u32) -> Held {
     Held { index, epoch: 1 }
@@ -150,9 +150,9 @@ on_both_databases! {
         let library = home.library(1).await;
         for attempt in 1..=3 {
             let leased = lease(&library, "w", 1, 0).await;
-            assert_eq!(report(&library, "w", vec![failed(&leased[0])]).await, [Verdict::Stored]);
+            assert_eq!(report(&library, "w", vec![failed(&leased[0])]).await, [ReportVerdict::Stored]);
             // Said again, it does not count again.
-            assert_eq!(report(&library, "w", vec![failed(&leased[0])]).await, [Verdict::Late]);
+            assert_eq!(report(&library, "w", vec![failed(&leased[0])]).await, [ReportVerdict::Late]);
             let record = library.case(CAMPAIGN, 0).await.unwrap().unwrap();
             assert_eq!(record.attempts, attempt);
             assert_eq!(record.error.as_deref(), Some("it does not stand"));

@@ -5,7 +5,7 @@ use crate::support::{
     reported,
 };
 use tracktwin_experiment::Outcome;
-use tracktwin_library::{LibraryEntry, LibraryError, Verdict};
+use tracktwin_library::{LibraryEntry, LibraryError, ReportVerdict};
 use tracktwin_protocol::CaseReport;
 
 on_both_databases! {
@@ -13,13 +13,13 @@ on_both_databases! {
         let library = home.library(2).await;
         let leased = lease(&library, "w", 2, 0).await;
         let reports: Vec<_> = leased.iter().map(finished).collect();
-        assert_eq!(report(&library, "w", reports.clone()).await, [Verdict::Stored; 2]);
+        assert_eq!(report(&library, "w", reports.clone()).await, [ReportVerdict::Stored; 2]);
         let digest = library.digest(CAMPAIGN).await.unwrap();
         let mut other = passes(features(0));
         other[0].features.log_power[0] += 1.0;
         let other = reported(&leased[0], Outcome::Finished(other));
-        assert_eq!(report(&library, "w", vec![other]).await, [Verdict::Duplicate]);
-        assert_eq!(report(&library, "w", vec![failed(&leased[1])]).await, [Verdict::Duplicate]);
+        assert_eq!(report(&library, "w", vec![other]).await, [ReportVerdict::Duplicate]);
+        assert_eq!(report(&library, "w", vec![failed(&leased[1])]).await, [ReportVerdict::Duplicate]);
         assert_eq!(library.digest(CAMPAIGN).await.unwrap(), digest);
         assert_eq!(library.status(CAMPAIGN).await.unwrap().finished, 2);
     }
@@ -28,9 +28,9 @@ on_both_databases! {
         let library = home.library(1).await;
         let slow = lease(&library, "slow", 1, 0).await;
         let quick = lease(&library, "quick", 1, 1000).await;
-        assert_eq!(report(&library, "slow", vec![failed(&slow[0])]).await, [Verdict::Late]);
-        assert_eq!(report(&library, "slow", vec![finished(&slow[0])]).await, [Verdict::Stored]);
-        assert_eq!(report(&library, "quick", vec![finished(&quick[0])]).await, [Verdict::Duplicate]);
+        assert_eq!(report(&library, "slow", vec![failed(&slow[0])]).await, [ReportVerdict::Late]);
+        assert_eq!(report(&library, "slow", vec![finished(&slow[0])]).await, [ReportVerdict::Stored]);
+        assert_eq!(report(&library, "quick", vec![finished(&quick[0])]).await, [ReportVerdict::Duplicate]);
     }
 
     async fn results_of_cases_never_leased_or_of_other_parameters_are_refused(home: &Home) {
@@ -44,7 +44,7 @@ on_both_databases! {
             CaseReport { epoch: 2, ..good.clone() },
             CaseReport { parameter_hash: "0".to_owned(), ..good.clone() },
         ];
-        assert_eq!(report(&library, "w", refused).await, [Verdict::Refused; 5]);
+        assert_eq!(report(&library, "w", refused).await, [ReportVerdict::Refused; 5]);
         assert_eq!(library.status(CAMPAIGN).await.unwrap().finished, 0);
     }
 

@@ -4,7 +4,7 @@ use tempfile::TempDir;
 use test_postgres::Server;
 use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_library::{
-    AttemptsMax, CampaignRecord, Held, LeaseRequest, Leased, Library, Report, Verdict,
+    AttemptsMax, CampaignRecord, Held, LeaseRequest, Leased, Library, Report, ReportVerdict,
 };
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 use tracktwin_protocol::{CaseReport, checksum};
@@ -191,7 +191,7 @@ pub(crate) async fn report(
     library: &Library,
     worker: &str,
     cases: Vec<CaseReport>,
-) -> Vec<Verdict> {
+) -> Vec<ReportVerdict> {
     library.report(message(worker, cases)).await.unwrap()
 }
 

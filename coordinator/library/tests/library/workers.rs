@@ -2,8 +2,8 @@
 
 use crate::support::{CAMPAIGN, Home, failed, finished, lease, message, on_both_databases, report};
 use tracktwin_library::{
-    AuditCounts, AuditFinding, Library, LibraryError, Registration, Report, Retry, State, Verdict,
-    WorkerState,
+    AuditCounts, AuditFinding, Library, LibraryError, Registration, Report, ReportVerdict, Retry,
+    State, WorkerState,
 };
 use tracktwin_protocol::CaseReport;
 
@@ -69,13 +69,13 @@ on_both_databases! {
         let library = home.library(2).await;
         let leased = lease(&library, "honest", 2, 0).await;
         let stolen = report(&library, "thief", vec![finished(&leased[0])]).await;
-        assert_eq!(stolen, [Verdict::Refused]);
+        assert_eq!(stolen, [ReportVerdict::Refused]);
         // An epoch that another had.
         lease(&library, "late", 1, 1000).await;
-        assert_eq!(report(&library, "late", vec![finished(&leased[0])]).await, [Verdict::Refused]);
-        assert_eq!(report(&library, "honest", vec![finished(&leased[0])]).await, [Verdict::Stored]);
+        assert_eq!(report(&library, "late", vec![finished(&leased[0])]).await, [ReportVerdict::Refused]);
+        assert_eq!(report(&library, "honest", vec![finished(&leased[0])]).await, [ReportVerdict::Stored]);
         let again = CaseReport { epoch: 2, ..finished(&leased[0]) };
-        assert_eq!(report(&library, "late", vec![again]).await, [Verdict::Duplicate]);
+        assert_eq!(report(&library, "late", vec![again]).await, [ReportVerdict::Duplicate]);
     }
 
     async fn an_audit_goes_to_another_worker_and_is_kept(home: &Home) {
@@ -145,7 +145,7 @@ on_both_databases! {
         library.register_worker(registration("bad", 0)).await.unwrap();
         let leased = lease(&library, "bad", 1, 0).await;
         library.flag_worker("bad", "differs by 3 dB").await.unwrap();
-        assert_eq!(report(&library, "bad", vec![finished(&leased[0])]).await, [Verdict::Stored]);
+        assert_eq!(report(&library, "bad", vec![finished(&leased[0])]).await, [ReportVerdict::Stored]);
         assert_eq!(library.retry(CAMPAIGN, Retry::Flagged).await.unwrap(), 1);
     }
 
@@ -163,6 +163,6 @@ on_both_databases! {
         assert_eq!(library.audits(CAMPAIGN).await.unwrap().open, 1);
         let leased = lease(&library, "good", 3, 0).await;
         let verdicts = report(&library, "good", leased.iter().map(finished).collect()).await;
-        assert_eq!(verdicts, [Verdict::Stored; 2]);
+        assert_eq!(verdicts, [ReportVerdict::Stored; 2]);
     }
 }

@@ -209,7 +209,7 @@ fn join(points: &[[f64; 2]]) -> String {
 }
 
 /// The text with the characters replaced that mean something in SVG and HTML.
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

@@ -10,4 +10,4 @@ mod page;
 pub use axis::Axis;
 pub use chart::Chart;
 pub use number::{Shown, percent, significant};
-pub use page::{CHART_STYLE, figure, page, page_with, stand_alone};
+pub use page::{CHART_STYLE, figure, page, page_with, sheet, stand_alone};

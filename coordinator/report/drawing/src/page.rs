@@ -1,5 +1,6 @@
 //! The frame of every page: head, style sheet, footer.
 
+use crate::chart::escape;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Colours and lines of charts; light, and dark where the reader prefers it.
@@ -70,6 +71,17 @@ pub fn figure(charts: &[String], caption: &str) -> Markup {
             figcaption { (caption) }
         }
     }
+}
+
+/// Charts as one separate file, `width` by `height` px, each with its place in px.
+pub fn sheet(title: &str, [width, height]: [f64; 2], charts: &[([f64; 2], String)]) -> String {
+    let placed = |([x, y], chart): &([f64; 2], String)| {
+        format!(r#"<g transform="translate({x} {y})">{chart}</g>"#)
+    };
+    let (title, charts) = (escape(title), charts.iter().map(placed).collect::<String>());
+    stand_alone(&format!(
+        r#"<svg xmlns="http://www.w3.org/2000/svg" class="chart" role="img" aria-label="{title}" viewBox="0 0 {width} {height}" width="{width}" height="{height}"><rect width="100%" height="100%" style="fill:var(--paper)"/>{charts}</svg>"#
+    ))
 }
 
 /// A chart as a separate file, with the colours of a page.

@@ -2,10 +2,11 @@
 
 use super::{OrInput, Stop};
 use crate::commands::library_url::open_or_create;
-use crate::commands::println_stdout;
 use crate::commands::progress::Progress;
+use crate::commands::{print_json, println_stdout};
 use anyhow::anyhow;
 use clap::Args;
+use serde_json::{Value, json};
 use std::error::Error;
 use tracktwin_library::{Cell, Library, LibraryError, Lost, Table};
 
@@ -28,6 +29,9 @@ pub(in crate::commands) struct Arguments {
     /// Target library; created if missing.
     #[arg(long, value_name = "URL")]
     to: String,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 /// What was copied and what was left out.
@@ -52,16 +56,39 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
             copied.left_out.push(format!("{incomplete} cases with incomplete results"));
         }
     }
-    println_stdout(&format!(
-        "{} of {} rows copied; the others already existed",
-        copied.added, copied.done
-    ));
-    for what in &copied.left_out {
-        println_stdout(&format!("left out: {what}"));
+    if !arguments.json {
+        copied.print();
     }
-    let same = compare(&from, &to).await;
+    let compared = compare(&from, &to).await;
     to.close().await;
-    if copied.left_out.is_empty() { same } else { Err(Stop::Negative) }
+    let compared = compared?;
+    if arguments.json {
+        print_json(&copied.json(&compared));
+    } else {
+        for campaign in &compared {
+            println_stdout(&campaign.text());
+        }
+    }
+    let same = copied.left_out.is_empty() && compared.iter().all(Compared::is_equal);
+    if same { Ok(()) } else { Err(Stop::Negative) }
+}
+
+impl Copied {
+    fn print(&self) {
+        let Self { done, added, left_out } = self;
+        println_stdout(&format!("{added} of {done} rows copied; the others already existed"));
+        for what in left_out {
+            println_stdout(&format!("left out: {what}"));
+        }
+    }
+
+    fn json(&self, compared: &[Compared]) -> Value {
+        let campaigns: Value = compared.iter().map(Compared::json).collect();
+        json!({
+            "rows": self.done, "added": self.added, "left_out": self.left_out,
+            "campaigns": campaigns,
+        })
+    }
 }
 
 async fn copy(from: &Library, to: &Library) -> Result<Copied, Stop> {
@@ -104,22 +131,44 @@ fn unwritten(table: &Table, refused: &[LibraryError]) -> Option<String> {
     Some(format!("{} damaged rows of {}; the first: {reason}", refused.len(), table.name))
 }
 
-/// Prints whether each campaign is equal in both libraries.
-async fn compare(from: &Library, to: &Library) -> Result<(), Stop> {
-    let mut differ = false;
-    for campaign in from.campaigns().await.unwrap_or_default() {
-        let there = to.digest(&campaign.id).await?;
-        match from.digest(&campaign.id).await {
-            Ok(here) if here == there => println_stdout(&format!("{here}  {}: equal", campaign.id)),
-            Ok(here) => {
-                differ = true;
-                println_stdout(&format!("{}: differs: {here} and {there}", campaign.id));
-            }
-            Err(error) => {
-                differ = true;
-                println_stdout(&format!("{}: cannot be compared: {error}", campaign.id));
-            }
+/// The digests of a campaign in both libraries; for the source also why it has none.
+struct Compared {
+    campaign: String,
+    from: Result<String, String>,
+    to: String,
+}
+
+impl Compared {
+    fn is_equal(&self) -> bool {
+        self.from.as_ref().is_ok_and(|from| *from == self.to)
+    }
+
+    fn text(&self) -> String {
+        let Self { campaign, from, to } = self;
+        match from {
+            Ok(from) if from == to => format!("{from}  {campaign}: equal"),
+            Ok(from) => format!("{campaign}: differs: {from} and {to}"),
+            Err(error) => format!("{campaign}: cannot be compared: {error}"),
         }
     }
-    if differ { Err(Stop::Negative) } else { Ok(()) }
+
+    fn json(&self) -> Value {
+        json!({
+            "campaign": self.campaign, "equal": self.is_equal(), "digest_from": self.from.as_ref().ok(),
+            "digest_to": self.to, "error": self.from.as_ref().err(),
+        })
+    }
+}
+
+/// Compares each campaign in both libraries.
+async fn compare(from: &Library, to: &Library) -> Result<Vec<Compared>, Stop> {
+    let mut compared = Vec::new();
+    for campaign in from.campaigns().await.unwrap_or_default() {
+        compared.push(Compared {
+            to: to.digest(&campaign.id).await?,
+            from: from.digest(&campaign.id).await.map_err(|error| error.to_string()),
+            campaign: campaign.id,
+        });
+    }
+    Ok(compared)
 }

@@ -5,9 +5,10 @@ use super::files::parquet_file::ParquetFile;
 use super::{OrInput, Stop};
 use crate::commands::files::{Force, check};
 use crate::commands::library_url::LibraryUrl;
-use crate::commands::println_stdout;
+use crate::commands::{print_json, println_stdout};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Cell, Library, Table};
@@ -34,6 +35,9 @@ pub(in crate::commands) struct Arguments {
     /// File format [default: from the extension of the file, otherwise parquet].
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -58,8 +62,16 @@ impl Format {
     }
 }
 
+/// A file that was written.
+#[derive(Serialize)]
+struct Exported {
+    file: String,
+    table: &'static str,
+    rows: usize,
+}
+
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
-    let Arguments { library, out, force, format } = arguments;
+    let Arguments { library, out, force, format, json } = arguments;
     let named = Format::of(out).filter(|_| !out.is_dir());
     let format = format.or(named).unwrap_or(Format::Parquet);
     if let (None, Some(extension), false) = (named, out.extension(), out.is_dir()) {
@@ -81,16 +93,20 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
     check(&folder, Kind::Export, *force, &names)?;
     let library = library.open().await?;
     let mut output = Output::begin(&folder, Kind::Export, force.force)?;
-    let mut said = Vec::new();
+    let mut written = Vec::new();
     for &(table, ref name) in &tables {
         let rows = export(&library, table, name, &mut output, format).await?;
-        let path = name.within(&folder);
-        let each = if named.is_some() { ", one per case and speed" } else { "" };
-        said.push(format!("{}: {rows} rows{each}", path.display()));
+        let file = name.within(&folder).display().to_string();
+        written.push(Exported { file, table: table.name, rows });
     }
     output.commit()?;
-    for line in &said {
-        println_stdout(line);
+    if *json {
+        print_json(&written);
+        return Ok(());
+    }
+    let each = if named.is_some() { ", one per case and speed" } else { "" };
+    for Exported { file, rows, .. } in &written {
+        println_stdout(&format!("{file}: {rows} rows{each}"));
     }
     Ok(())
 }

@@ -3,9 +3,10 @@
 use super::files::parquet_file;
 use super::{OrInput, Stop};
 use crate::commands::library_url::LibraryUrl;
-use crate::commands::println_stdout;
+use crate::commands::{print_json, println_stdout};
 use anyhow::anyhow;
 use clap::Args;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use tracktwin_files::inside;
 use tracktwin_library::{Cell, Library, LibraryError, Table};
@@ -17,6 +18,17 @@ pub(in crate::commands) struct Arguments {
     folder: PathBuf,
     #[command(flatten)]
     library: LibraryUrl,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A table that was read, and how many of its rows were new.
+#[derive(Serialize)]
+struct Imported {
+    table: &'static str,
+    rows: usize,
+    added: u64,
 }
 
 pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
@@ -34,24 +46,27 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
         .or_input();
     }
     let library = arguments.library.open_or_create().await?;
+    let mut imported = Vec::new();
     for (table, file) in Table::ALL.into_iter().zip(&files) {
-        let (read, added) = import(&library, table, file).await?;
-        println_stdout(&format!("{}: {added} of {read} rows added", table.name));
+        imported.push(import(&library, table, file).await?);
     }
     library.finish_complete_cases().await?;
     library.close().await;
+    if arguments.json {
+        print_json(&imported);
+        return Ok(());
+    }
+    for Imported { table, rows, added } in &imported {
+        println_stdout(&format!("{table}: {added} of {rows} rows added"));
+    }
     Ok(())
 }
 
-async fn import(
-    library: &Library,
-    table: &'static Table,
-    path: &Path,
-) -> Result<(usize, u64), Stop> {
-    let (mut read, mut added) = (0, 0);
+async fn import(library: &Library, table: &'static Table, path: &Path) -> Result<Imported, Stop> {
+    let mut imported = Imported { table: table.name, rows: 0, added: 0 };
     let take = async |rows: Vec<Vec<Cell>>| {
-        read += rows.len();
-        added += library.write_table(table, rows).await?;
+        imported.rows += rows.len();
+        imported.added += library.write_table(table, rows).await?;
         Ok::<(), anyhow::Error>(())
     };
     let taken = parquet_file::read(path, table, take).await;
@@ -61,5 +76,5 @@ async fn import(
         let error = error.context(path.display().to_string());
         if is_input { Stop::Input(error) } else { Stop::Failure(error) }
     })?;
-    Ok((read, added))
+    Ok(imported)
 }

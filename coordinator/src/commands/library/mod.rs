@@ -9,7 +9,7 @@ mod sql;
 mod status;
 mod verify;
 
-use super::{OrInput, Stop, println_stderr, println_stdout};
+use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::commands::library_url::LibraryUrl;
 use anyhow::anyhow;
 use clap::{Args, Subcommand};
@@ -109,8 +109,7 @@ pub(super) async fn choose(
 
 fn print_answers<T: Serialize>(json: bool, answers: &[T], text: impl Fn(&T) -> String) {
     if json {
-        let json = serde_json::to_string_pretty(answers).expect("counts and names become JSON");
-        println_stdout(&json);
+        print_json(&answers);
     } else {
         if answers.is_empty() {
             println_stderr(

@@ -2,7 +2,7 @@
 
 use super::{Stop, Which};
 use crate::commands::progress::Progress;
-use crate::commands::{println_stderr, println_stdout};
+use crate::commands::{print_json, println_stderr, println_stdout};
 use tracktwin_library::{IntegrityFault, Library, LibraryError, Verified};
 
 /// Data that no checksum or hash covers.
@@ -58,8 +58,7 @@ fn says_what_is_there(error: &anyhow::Error) -> bool {
 fn tell(json: bool, name: &str, verified: &Verified) {
     let Verified { findings, attested, unattested, notes } = verified;
     if json {
-        let findings: Vec<_> = findings.iter().map(self::json).collect();
-        println_stdout(&format!("{:#}", serde_json::Value::from(findings)));
+        print_json(&findings.iter().map(self::json).collect::<Vec<_>>());
     } else {
         for finding in findings {
             println_stdout(&text(finding));

@@ -9,12 +9,13 @@ use super::numbers::{cores, count};
 use super::progress::{Progress, TrainingBar};
 use super::signals::stop_on_signal;
 use super::track::{preset_parser, read};
-use super::{OrInput, Stop, continuity, evaluate, println_stderr, println_stdout};
+use super::{OrInput, Stop, continuity, evaluate, print_json, println_stderr, println_stdout};
 use crate::commands::contact::contact_sentence;
 use crate::pipeline::lack::check_for_training;
 use crate::pipeline::models;
 use anyhow::anyhow;
 use clap::Args;
+use serde_json::{Value, json};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use tracktwin_evaluation::{Evaluation, check_recording};
@@ -76,6 +77,9 @@ pub(super) struct Arguments {
     /// Print the built-in campaign file, as a template, and exit.
     #[arg(long)]
     print_campaign: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 impl Arguments {
@@ -127,40 +131,73 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     };
     let url = arguments.library.clone().unwrap_or_else(|| default_library(out));
     let library = open_or_create(&url).await?;
-    let said = chain(&library, &campaign, recording, &arguments).await;
+    let made = chain(&library, &campaign, recording, &arguments).await;
+    let name = library.name();
     // Closing leaves the library in one file, which can be copied.
     library.close().await;
-    let (line, evaluation) = said?;
-    println_stdout(&line);
-    evaluation.map_or(Ok(()), |evaluation| evaluate::conclude(&evaluation))
+    made?.conclude(&name, &arguments)
 }
 
-/// Simulates, trains and evaluates; returns the line to print.
+/// What a run has made besides the library: nothing, models, or models and an evaluation.
+#[derive(Default)]
+struct Made {
+    models: Option<PathBuf>,
+    evaluation: Option<Evaluation>,
+}
+
+impl Made {
+    /// Prints it; a negative result if the estimates of most sleepers are not valid.
+    fn conclude(&self, library: &str, Arguments { out, json, .. }: &Arguments) -> Result<(), Stop> {
+        if *json {
+            print_json(&self.json(library, out));
+        } else {
+            println_stdout(&self.line(library, out));
+            self.evaluation.iter().for_each(evaluate::print_outside);
+        }
+        self.evaluation.as_ref().map_or(Ok(()), evaluate::conclude)
+    }
+
+    fn line(&self, library: &str, out: &Path) -> String {
+        match (&self.models, &self.evaluation) {
+            (None, _) => format!("library: {library}"),
+            (Some(models), None) => format!(
+                "models: {}; evaluate a recording with `tracktwin evaluate`",
+                models.display()
+            ),
+            (Some(_), Some(_)) => format!("report: {}", evaluate::report(out)),
+        }
+    }
+
+    fn json(&self, library: &str, out: &Path) -> Value {
+        let models = self.models.as_ref().map(|models| models.display().to_string());
+        let evaluation = self.evaluation.as_ref().map(|made| evaluate::summary(made, out));
+        json!({ "library": library, "models": models, "evaluation": evaluation })
+    }
+}
+
+/// Simulates, trains and evaluates.
 async fn chain(
     library: &Library,
     campaign: &Campaign,
     recording: Option<Recording>,
     arguments: &Arguments,
-) -> Result<(String, Option<Evaluation>), Stop> {
+) -> Result<Made, Stop> {
     simulate(library, campaign, arguments.cores.unwrap_or_else(all_cores)).await?;
     if arguments.no_train {
-        return Ok((format!("library: {}", library.name()), None));
+        return Ok(Made::default());
     }
-    let out = &arguments.out;
+    let Arguments { out, force, .. } = arguments;
     let record = library.campaign(&campaign.id()).await?;
-    let (folder, force) = (out.join(MODELS), arguments.force.force);
+    let folder = out.join(MODELS);
     let bar = TrainingBar::default();
-    let models = models::train_into(&folder, force, library, &record, 0, &|at| bar.at(&at)).await?;
+    let watch = |at: tracktwin_surrogate::Progress<'_>| bar.at(&at);
+    let trained = models::train_into(&folder, force.force, library, &record, 0, &watch).await?;
     bar.end();
-    let Some(recording) = recording else {
-        let models = out.join(MODELS);
-        let line =
-            format!("models: {}; evaluate a recording with `tracktwin evaluate`", models.display());
-        return Ok((line, None));
+    let evaluation = match recording {
+        Some(it) => Some(evaluate::evaluate(&it, library, trained, out, *force, true).await?),
+        None => None,
     };
-    let evaluation =
-        evaluate::evaluate(&recording, library, models, out, arguments.force, true).await?;
-    Ok((format!("report: {}", out.join("report.html").display()), Some(evaluation)))
+    Ok(Made { models: Some(folder), evaluation })
 }
 
 /// The bundled recording, if models of the campaign can evaluate it; otherwise a line states that

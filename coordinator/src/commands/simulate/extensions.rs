@@ -5,6 +5,7 @@ use super::super::{OrInput, Stop};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use serde::Deserialize;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter};
 
@@ -73,4 +74,22 @@ pub(in crate::commands) fn list() -> String {
         format!("{}: {}{chain}\n  {}{parameters}", kind.physics, kind.summary, kind.place.form())
     };
     Kind::all().map(kind).collect::<Vec<_>>().join("\n")
+}
+
+/// The same as JSON.
+pub(in crate::commands) fn list_json() -> Value {
+    let parameter = |parameter: &KindParameter| {
+        let KindParameter { name, unit, meaning, typical, default, .. } = parameter;
+        json!({
+            "name": name, "unit": unit, "meaning": meaning, "typical": typical, "default": default,
+        })
+    };
+    let kind = |kind: &Kind| {
+        let parameters: Value = kind.parameters.iter().map(parameter).collect();
+        json!({
+            "physics": kind.physics, "summary": kind.summary, "place": kind.place.form(),
+            "measuring_chain": kind.measuring_chain, "parameters": parameters,
+        })
+    };
+    Kind::all().map(kind).collect()
 }

@@ -10,14 +10,15 @@ use super::files::{Force, check};
 use super::numbers::{count, number};
 use super::progress::Progress;
 use super::track::TrackChoice;
-use super::{OrInput, Stop};
+use super::{OrInput, Stop, print_json, println_stdout};
 use anyhow::anyhow;
 use clap::Args;
 pub(super) use extensions::Extensions;
 use sensor::{Sensor, sample_rate_hz};
+use serde_json::{Value, json};
 pub(super) use setting::Setting;
 use std::f64::consts::TAU;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use track::SimulatedTrack;
 use tracktwin_drawing::percent;
 use tracktwin_files::{FileName, Kind, Output};
@@ -90,11 +91,14 @@ pub(super) struct Arguments {
     /// Neglect the local flexibility of the loaded element, as the paper does.
     #[arg(long)]
     no_local_flexibility: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     if arguments.extensions.asks_for_list() {
-        super::println_stdout(&extensions::list());
+        print_list(arguments.json);
         return Ok(());
     }
     let Some(out) = &arguments.out else {
@@ -118,9 +122,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     output.add(&FileName::new(TRUTH)?, track.truth_json(&drives).as_bytes())?;
     recording.add_to(&mut output)?;
     output.commit()?;
-    super::println_stdout(&contact_sentence(&recording.passes));
-    super::println_stdout(&format!("recording: {}", out.display()));
+    if arguments.json {
+        print_json(&summary(out, &recording.passes));
+    } else {
+        println_stdout(&contact_sentence(&recording.passes));
+        println_stdout(&format!("recording: {}", out.display()));
+    }
     Ok(())
+}
+
+/// Prints all kinds of extensions.
+fn print_list(json: bool) {
+    if json {
+        print_json(&extensions::list_json());
+    } else {
+        println_stdout(&extensions::list());
+    }
+}
+
+/// The path of the recording and the contact loss of its passes.
+fn summary(out: &Path, passes: &[Pass]) -> Value {
+    let pass = |pass: &Pass| {
+        json!({
+            "speed_km_h": pass.speed_km_h, "contact_loss_share": pass.contact_loss_share,
+        })
+    };
+    let passes: Value = passes.iter().map(pass).collect();
+    json!({ "recording": out.display().to_string(), "passes": passes })
 }
 
 /// Sentence on loss of contact, from the pass with the largest share.

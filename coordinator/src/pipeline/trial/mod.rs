@@ -25,7 +25,7 @@ use tracktwin_files::{FileName, FilesError, Kind, Output, replace};
 use tracktwin_library::{Library, LibraryError, TrialRecord};
 use tracktwin_reference_simulator::TruthError;
 use tracktwin_signal::recording::RecordingError;
-use tracktwin_trial::{Score, SealError, Seals, Summary};
+use tracktwin_trial::{CaseScore, SealError, Seals, Summary};
 
 /// File that identifies the trial of the folder.
 const TERMS: &str = "trial.json";
@@ -259,7 +259,7 @@ impl Trial {
         let mut open = self.open(&scores);
         open.retain(|number| !broken.contains_key(number));
         if open.is_empty() {
-            let scores: Vec<Score> = scores.into_values().map(|case| case.score).collect();
+            let scores: Vec<CaseScore> = scores.into_values().map(|case| case.score).collect();
             return self.sum_up(&scores).map(Some);
         }
         let (done, others) = (u64::from(self.cases) - open.len() as u64, open.len());
@@ -279,7 +279,7 @@ impl Trial {
         (0..self.cases).filter(lacks).collect()
     }
 
-    fn sum_up(&self, scores: &[Score]) -> Result<Summary, TrialError> {
+    fn sum_up(&self, scores: &[CaseScore]) -> Result<Summary, TrialError> {
         let summary = Summary::new(self.cases, scores);
         let line = |score| serde_json::to_string(score).expect("plain data is plain JSON") + "\n";
         let lines: String = scores.iter().map(line).collect();

@@ -4,14 +4,14 @@ use super::{Trial, TrialError};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_library::{DiagnosisRecord, Question, TrialAnswer};
-use tracktwin_trial::Score;
+use tracktwin_trial::CaseScore;
 
 /// Stored scores by case.
 pub(super) type Scores = BTreeMap<u32, Answered>;
 
 /// Stored scores of a case.
 pub(super) struct Answered {
-    pub(super) score: Score,
+    pub(super) score: CaseScore,
     questions: Vec<Question>,
 }
 

@@ -11,8 +11,8 @@ use tracktwin_signal::recording::Recording;
 /// Mean square of a sleeper's residual over its expectation above which the model does not hold.
 const MISFIT_MAX: f64 = 2.0;
 
-/// Railpad stiffness in N/m above which a stiffer one hardly changes a recording of V-Track
-/// (docs/inversion.md).
+/// Railpad stiffness in N/m above which a stiffer one hardly changes a recording of V-Track; on a track
+/// whose lengths are larger it is larger as they are (docs/inversion.md; paper, Table D1).
 const RAILPAD_RESOLVED: f64 = 2e8;
 
 impl Inversion {
@@ -37,14 +37,17 @@ impl Inversion {
                 unevaluated.push(Unevaluated { id: place.id.clone(), x_m: place.x_m, reason });
                 continue;
             };
-            sleepers.push(fitted.sleeper(number - prepared.first_sleeper, &place.id, place.x_m));
+            let resolved =
+                RAILPAD_RESOLVED * prepared.forward.section.track.design.length_ratio();
+            let index = number - prepared.first_sleeper;
+            sleepers.push(fitted.sleeper(index, &place.id, place.x_m, resolved));
         }
         Self::new(recording.name.clone(), provenance(sections), sleepers, unevaluated)
     }
 }
 
 impl Fitted {
-    fn sleeper(&self, index: usize, id: &str, x_m: f64) -> Sleeper {
+    fn sleeper(&self, index: usize, id: &str, x_m: f64, railpad_resolved: f64) -> Sleeper {
         let estimates: Estimates = places(&self.unknowns, index)
             .map(|(of, at)| (of, log_normal(self.values[at], self.deviations[at])))
             .collect();
@@ -53,7 +56,7 @@ impl Fitted {
         if self.unknowns.exceptions.iter().any(|exception| exception.sleeper == index) {
             flags.push(Flag::UnlikeNeighbours);
         }
-        if estimates[&Parameter::RailpadStiffness].mean > RAILPAD_RESOLVED {
+        if estimates[&Parameter::RailpadStiffness].mean > railpad_resolved {
             flags.push(Flag::RailpadAtLeast);
         }
         if misfit > MISFIT_MAX {

@@ -1,6 +1,6 @@
 //! One pass of the wheel: from rest at its start to its end.
 
-use crate::motion::Motion;
+use crate::pass_state::PassState;
 use crate::scene::Scene;
 use crate::surface::{WheelAngle, shapes};
 use crate::track::Track;
@@ -61,7 +61,7 @@ pub(crate) fn run(
     let steps = ((drive.end_m - drive.start_m) / (drive.speed_m_s * step_s)).floor() as usize;
     let felt = |x_m: f64| height_m(x_m) + shapes(left_out, drive.angle, x_m);
     let first_m = felt(drive.start_m);
-    let mut motion = Motion::at_rest(track, drive.start_m);
+    let mut state = PassState::at_rest(track, drive.start_m);
     let mut driven = Driven {
         time_step_s: step_s,
         acceleration_m_s2: Vec::with_capacity(steps),
@@ -72,7 +72,7 @@ pub(crate) fn run(
         let time_s = step as f64 * step_s;
         let x_m = drive.start_m + drive.speed_m_s * time_s;
         let ease = 0.5 * (1.0 - (PI * (time_s / EASE_S).min(1.0)).cos());
-        let now = motion
+        let now = state
             .step(x_m, ease * (felt(x_m) - first_m))
             .ok_or(TruthError::Diverged { position_m: x_m })?;
         driven.acceleration_m_s2.push(now.acceleration_m_s2);

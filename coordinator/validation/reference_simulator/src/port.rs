@@ -1,7 +1,7 @@
 //! Where something joins the rail: its place, its law of force, what lies behind it.
 //!
 //! Owns railpads, clamps, softened joints and absorbers as ports; solving for their forces is
-//! `track`'s and `motion`'s.
+//! `track`'s and `pass_state`'s.
 
 use crate::rail::{self, RailModes};
 use crate::sleeper::Sleeper;

@@ -2,7 +2,7 @@
 
 use crate::average::DEVIATIONS;
 use crate::picture::{Picture, Scale, Style};
-use crate::{Compared, EvaluatedExample, Verdict};
+use crate::{ClaimVerdict, Compared, EvaluatedExample};
 use tracktwin_parameters::Parameter;
 
 /// Share of a normal distribution beyond [`DEVIATIONS`] standard deviations.
@@ -67,11 +67,11 @@ impl Agreement {
             100.0 * SURE
         );
         let verdict = if self.outside > allowed {
-            Verdict::Differs
+            ClaimVerdict::Differs
         } else if self.sd > SURE {
-            Verdict::CannotTell
+            ClaimVerdict::CannotTell
         } else {
-            Verdict::Reproduced
+            ClaimVerdict::Reproduced
         };
         compared.row(claim, [paper.to_owned(), ours], verdict, why);
     }

@@ -1,6 +1,6 @@
 //! Means with their standard errors, and the significance of their sign.
 
-use crate::Verdict;
+use crate::ClaimVerdict;
 use tracktwin_evaluation::Estimate;
 
 /// Standard deviations beyond which chance is no longer taken for the reason: it reaches further
@@ -55,28 +55,32 @@ impl Average {
 
     /// Verdict on the claim that it is zero within chance, where `matters` is a relevant size: a
     /// larger uncertainty gives no verdict.
-    pub(crate) fn is_nothing(self, matters: f64) -> Verdict {
+    pub(crate) fn is_nothing(self, matters: f64) -> ClaimVerdict {
         if self.differs_from_zero() {
-            Verdict::Differs
+            ClaimVerdict::Differs
         } else if DEVIATIONS * self.error < matters {
-            Verdict::Reproduced
+            ClaimVerdict::Reproduced
         } else {
-            Verdict::CannotTell
+            ClaimVerdict::CannotTell
         }
     }
 
     /// Verdict on the claim that it is above zero.
-    pub(crate) fn is_positive(self) -> Verdict {
-        if self.differs_from_zero() { Verdict::of(self.mean > 0.0) } else { Verdict::CannotTell }
+    pub(crate) fn is_positive(self) -> ClaimVerdict {
+        if self.differs_from_zero() {
+            ClaimVerdict::of(self.mean > 0.0)
+        } else {
+            ClaimVerdict::CannotTell
+        }
     }
 }
 
 /// The verdict on several claims of which all must hold.
-pub(crate) fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
-    verdicts.into_iter().fold(Verdict::Reproduced, |all, verdict| match (all, verdict) {
-        (Verdict::Differs, _) | (_, Verdict::Differs) => Verdict::Differs,
-        (Verdict::CannotTell, _) | (_, Verdict::CannotTell) => Verdict::CannotTell,
-        _ => Verdict::Reproduced,
+pub(crate) fn all(verdicts: impl IntoIterator<Item = ClaimVerdict>) -> ClaimVerdict {
+    verdicts.into_iter().fold(ClaimVerdict::Reproduced, |all, verdict| match (all, verdict) {
+        (ClaimVerdict::Differs, _) | (_, ClaimVerdict::Differs) => ClaimVerdict::Differs,
+        (ClaimVerdict::CannotTell, _) | (_, ClaimVerdict::CannotTell) => ClaimVerdict::CannotTell,
+        _ => ClaimVerdict::Reproduced,
     })
 }
 
@@ -92,18 +96,18 @@ mod tests {
         let other = Average { mean: -3.0, error: 1.0 };
         let difference = average.less(other);
         assert!((difference.error - 2.0_f64.sqrt()).abs() < 1e-12);
-        assert_eq!(difference.is_positive(), Verdict::Reproduced);
-        assert_eq!(other.is_positive(), Verdict::Differs);
+        assert_eq!(difference.is_positive(), ClaimVerdict::Reproduced);
+        assert_eq!(other.is_positive(), ClaimVerdict::Differs);
         let unsure = Average { mean: 1.0, error: 1.0 };
-        assert_eq!(unsure.is_positive(), Verdict::CannotTell);
-        assert_eq!(unsure.is_nothing(3.0), Verdict::Reproduced);
-        assert_eq!(unsure.is_nothing(1.0), Verdict::CannotTell);
-        assert_eq!(other.is_nothing(9.0), Verdict::Differs);
+        assert_eq!(unsure.is_positive(), ClaimVerdict::CannotTell);
+        assert_eq!(unsure.is_nothing(3.0), ClaimVerdict::Reproduced);
+        assert_eq!(unsure.is_nothing(1.0), ClaimVerdict::CannotTell);
+        assert_eq!(other.is_nothing(9.0), ClaimVerdict::Differs);
     }
 
     #[test]
     fn one_that_differs_spoils_all() {
-        use Verdict::{CannotTell, Differs, Reproduced};
+        use ClaimVerdict::{CannotTell, Differs, Reproduced};
         assert_eq!(all([Reproduced, CannotTell, Differs]), Differs);
         assert_eq!(all([Reproduced, CannotTell]), CannotTell);
         assert_eq!(all([Reproduced, Reproduced]), Reproduced);

@@ -28,7 +28,7 @@ pub use error::Error;
 pub use example::{EvaluatedExample, Example, examples};
 pub use figure::Figure;
 pub use picture::{Curve, Picture, Scale, Style};
-pub use row::{Compared, FORMAT, Provenance, Reproduction, Row, Verdict};
+pub use row::{ClaimRow, ClaimVerdict, Compared, FORMAT, Provenance, Reproduction};
 pub use source::{Results, Source};
 pub use spectrum::SPEED_KM_H;
 pub use test_errors::{Tested, test_errors};

@@ -81,7 +81,7 @@ fn closer(compared: &mut Compared, told: &[EvaluatedExample], parameter: Paramet
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Verdict::{CannotTell, Differs, Reproduced};
+    use crate::ClaimVerdict::{CannotTell, Differs, Reproduced};
     use crate::testing::{told, verdicts};
 
     fn smoothed(share: f64, sd: f64) -> Vec<EvaluatedExample> {

@@ -124,7 +124,7 @@ fn mesh(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parameter
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Verdict::{CannotTell, Differs, Reproduced};
+    use crate::ClaimVerdict::{CannotTell, Differs, Reproduced};
     use crate::testing::{told, verdicts};
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::picture::{Picture, Scale, Style};
 use crate::speed::hertz;
-use crate::{Compared, Error, Figure, Verdict};
+use crate::{ClaimVerdict, Compared, Error, Figure};
 use tracktwin_parameters::{Preset, TrackDesign};
 use tracktwin_track::frequency::{self, Place, peaks};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
@@ -90,7 +90,7 @@ pub(crate) fn receptance(tests: &[HammerTest]) -> Compared {
         compared.row(
             format!("{claim} gives the simulation a peak"),
             [format!("about {paper_hz} Hz"), hertz(&peaks)],
-            Verdict::of(!peaks.is_empty()),
+            ClaimVerdict::of(!peaks.is_empty()),
             format!(
                 "a peak of {PROMINENCE_DB} dB on {PAPER_SPANS} spans within {}",
                 limits(paper_hz)
@@ -104,7 +104,7 @@ pub(crate) fn receptance(tests: &[HammerTest]) -> Compared {
             "mode shapes of rail and sleepers".to_owned(),
             format!("{LONG_SPANS} spans: {}", hertz(&long)),
         ],
-        Verdict::of(!long.is_empty()),
+        ClaimVerdict::of(!long.is_empty()),
         "the same peak must be there where the ends of the track are not heard; on 25 spans peaks \
          near 1000 Hz are waves standing between the held ends (docs/accuracy.md)",
     );
@@ -117,7 +117,7 @@ fn pinned(compared: &mut Compared, peaks: &[f64]) {
     compared.row(
         "The simulation does not reproduce the pinned-pinned resonance (PP) well",
         ["measured about 6000 Hz".to_owned(), hertz(peaks)],
-        if peaks.is_empty() { Verdict::Reproduced } else { Verdict::CannotTell },
+        if peaks.is_empty() { ClaimVerdict::Reproduced } else { ClaimVerdict::CannotTell },
         format!(
             "a peak within {} may be called well reproduced or not: the paper does not say how far \
              off its own is; a beam for the rail puts it some per cent high (docs/accuracy.md)",
@@ -154,7 +154,7 @@ fn picture(tests: &[HammerTest], place: &str) -> Picture {
 mod tests {
     use super::*;
     use crate::testing::verdicts;
-    use Verdict::{CannotTell, Differs, Reproduced};
+    use ClaimVerdict::{CannotTell, Differs, Reproduced};
 
     fn test(spans: usize, place: &'static str, peaks_hz: &[f64]) -> HammerTest {
         let frequencies_hz: Vec<f64> = STEPS.map(|step| STEP_HZ * f64::from(step)).collect();

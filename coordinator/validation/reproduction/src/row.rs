@@ -9,7 +9,7 @@ pub const FORMAT: &str = "reproduction/1";
 /// Verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum ClaimVerdict {
     /// Within the stated tolerance.
     Reproduced,
     /// Beyond it.
@@ -18,7 +18,7 @@ pub enum Verdict {
     CannotTell,
 }
 
-impl Verdict {
+impl ClaimVerdict {
     /// `yes` is reproduced, else it differs.
     pub(crate) const fn of(yes: bool) -> Self {
         if yes { Self::Reproduced } else { Self::Differs }
@@ -36,7 +36,7 @@ impl Verdict {
 
 /// A claim of the paper beside what this program gets.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Row {
+pub struct ClaimRow {
     /// The figure it belongs to.
     pub figure: Figure,
     /// Statement of the paper.
@@ -46,7 +46,7 @@ pub struct Row {
     /// Ours.
     pub ours: String,
     /// How the two compare.
-    pub verdict: Verdict,
+    pub verdict: ClaimVerdict,
     /// The tolerance, and the reason for a difference where it is known.
     pub why: String,
 }
@@ -57,7 +57,7 @@ pub struct Compared {
     /// The figure.
     pub figure: Figure,
     /// A row a claim.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ClaimRow>,
     /// Ours, drawn as the paper does.
     pub pictures: Vec<Picture>,
     /// What is to be seen in them.
@@ -74,11 +74,11 @@ impl Compared {
         &mut self,
         claim: impl Into<String>,
         [paper, ours]: [String; 2],
-        verdict: Verdict,
+        verdict: ClaimVerdict,
         why: impl Into<String>,
     ) {
         let (figure, claim, why) = (self.figure, claim.into(), why.into());
-        self.rows.push(Row { figure, claim, paper, ours, verdict, why });
+        self.rows.push(ClaimRow { figure, claim, paper, ours, verdict, why });
     }
 }
 
@@ -104,7 +104,7 @@ pub struct Reproduction {
     #[serde(flatten)]
     pub provenance: Provenance,
     /// A row a claim, in the paper's order.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ClaimRow>,
     /// The figures with their pictures, for a page.
     #[serde(skip)]
     pub figures: Vec<Compared>,
@@ -118,7 +118,7 @@ impl Reproduction {
     }
 
     /// How many rows came out so.
-    pub fn count(&self, verdict: Verdict) -> usize {
+    pub fn count(&self, verdict: ClaimVerdict) -> usize {
         self.rows.iter().filter(|row| row.verdict == verdict).count()
     }
 

@@ -3,7 +3,7 @@
 use crate::average::{Average, all};
 use crate::picture::{Picture, Scale, Style};
 use crate::spectrum::{enough, log_power, speed_index};
-use crate::{Compared, Error, Figure, Verdict};
+use crate::{ClaimVerdict, Compared, Error, Figure};
 use rayon::prelude::*;
 use tracktwin_evaluation::MATCHES;
 use tracktwin_signal::FeatureSet;
@@ -80,7 +80,7 @@ fn falls(compared: &mut Compared, curves: &[Curve], sizes: &[usize]) {
     let [first, .., last] = &curves[0].errors[..] else {
         let why = "the half that is searched has no more than 100 cases";
         let texts = ["falls from 100 to 10,000".to_owned(), "one size only".to_owned()];
-        return compared.row(FALLS, texts, Verdict::CannotTell, why);
+        return compared.row(FALLS, texts, ClaimVerdict::CannotTell, why);
     };
     let fall: Vec<f64> = first.iter().zip(last).map(|(few, many)| few - many).collect();
     let fall = Average::of(&fall).times(100.0);
@@ -107,7 +107,7 @@ fn amount(compared: &mut Compared, curves: &[Curve], sizes: &[usize]) {
             format!("{} % at 100, {} % at 10,000", PAPER_GF[0], PAPER_GF[1]),
             format!("{first:.1} % at {}, {last:.1} % at {}", sizes[0], sizes[sizes.len() - 1]),
         ],
-        Verdict::CannotTell,
+        ClaimVerdict::CannotTell,
         "a percentage of a level depends on its reference, which the paper does not give; ours is \
          1 um/s2 (ISO 1683). The paper's measured cases are sleepers, ours are simulations with a \
          surface of their own",
@@ -160,7 +160,8 @@ mod tests {
             5.0 + low * set[Parameter::IrregularityLevel]
         });
         let compared = selector(&set, 0).unwrap();
-        let expected = [Verdict::Reproduced, Verdict::CannotTell, Verdict::Reproduced];
+        let expected =
+            [ClaimVerdict::Reproduced, ClaimVerdict::CannotTell, ClaimVerdict::Reproduced];
         assert_eq!(verdicts(&compared), expected, "{:#?}", compared.rows);
     }
 
@@ -168,7 +169,7 @@ mod tests {
     fn cases_that_nothing_tells_apart_but_noise_do_not_fall() {
         let set = library(&[13.0], 120, |_, _, _| 5.0);
         let compared = selector(&set, 0).unwrap();
-        assert_eq!(verdicts(&compared)[0], Verdict::CannotTell);
+        assert_eq!(verdicts(&compared)[0], ClaimVerdict::CannotTell);
     }
 
     #[test]
@@ -177,6 +178,6 @@ mod tests {
             let level = set[Parameter::IrregularityLevel];
             if frequency_hz > 2500.0 { 5.0 + (3.0 * level).sin() * level } else { 5.0 }
         });
-        assert_eq!(verdicts(&selector(&set, 0).unwrap())[2], Verdict::Differs);
+        assert_eq!(verdicts(&selector(&set, 0).unwrap())[2], ClaimVerdict::Differs);
     }
 }

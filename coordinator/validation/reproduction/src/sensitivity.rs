@@ -3,7 +3,7 @@
 use crate::average::Average;
 use crate::picture::{Picture, Scale, Style};
 use crate::spectrum::{enough, mean_spectrum, points, speed_index};
-use crate::{Compared, Error, Figure, Verdict};
+use crate::{ClaimVerdict, Compared, Error, Figure};
 use Parameter::{
     BallastDamping, BallastStiffness, IrregularityLevel, RailpadDamping, RailpadStiffness,
     SleeperBendingStiffness,
@@ -143,7 +143,7 @@ fn greatest(compared: &mut Compared, effects: &[Effect]) {
     compared.row(
         "Ballast stiffness and irregularity level move the LWPS most",
         ["k_b, A_irr".to_owned(), format!("{} dB", list.collect::<Vec<_>>().join(", "))],
-        Verdict::of(expected),
+        ClaimVerdict::of(expected),
         "root mean square over the bins of the standard deviation of the five groups' means, less \
          what chance adds; the two largest are compared",
     );
@@ -158,7 +158,7 @@ fn wide(compared: &mut Compared, effects: &[Effect]) {
     compared.row(
         "The irregularity level has the greatest effect over a wide range of frequency",
         ["wide".to_owned(), format!("greatest at {:.0} % of the bins", 100.0 * share)],
-        Verdict::of(share > 0.5),
+        ClaimVerdict::of(share > 0.5),
         "wide is taken as more than half of the figure's logarithmic axis",
     );
 }
@@ -176,7 +176,7 @@ fn below(compared: &mut Compared, set: &TrainingSet, effects: &[Effect]) {
     compared.row(
         "Ballast stiffness acts below approximately 1000 Hz",
         ["< 1000 Hz".to_owned(), format!("{:.0} % below {limit_hz:.0} Hz", 100.0 * MOST)],
-        Verdict::of(limit_hz <= BALLAST_BELOW_HZ),
+        ClaimVerdict::of(limit_hz <= BALLAST_BELOW_HZ),
         format!(
             "frequency below which nine tenths of the groups' variance lie, against 1000 Hz with \
              its rounding, {BALLAST_BELOW_HZ} Hz"
@@ -193,7 +193,7 @@ fn when_low(compared: &mut Compared, effects: &[Effect]) {
             "sensitive below, less so above".to_owned(),
             format!("{low:.2} dB between the lowest groups, {high:.2} dB between the highest"),
         ],
-        Verdict::of(low > high),
+        ClaimVerdict::of(low > high),
         "root mean square over the bins of the standard deviation of two neighbouring groups' \
          means, less what chance adds; the two lowest groups meet at 68 MN/m on Table D1's range",
     );
@@ -207,7 +207,7 @@ fn hardly(compared: &mut Compared, effects: &[Effect], damping: Parameter) {
     compared.row(
         format!("The LWPS is insensitive to {}", damping.label()),
         ["insensitive".to_owned(), format!("{size:.2} dB; {} {least:.2} dB", other.symbol())],
-        Verdict::of(size < least),
+        ClaimVerdict::of(size < least),
         "less than the least of the four parameters that the paper evaluates",
     );
 }
@@ -216,7 +216,7 @@ fn hardly(compared: &mut Compared, effects: &[Effect], damping: Parameter) {
 mod tests {
     use super::*;
     use crate::testing::{library, verdicts};
-    use Verdict::{Differs, Reproduced};
+    use ClaimVerdict::{Differs, Reproduced};
     use tracktwin_parameters::ParameterSet;
 
     fn share(set: &ParameterSet, parameter: Parameter) -> f64 {

@@ -3,7 +3,7 @@
 use crate::average::{Average, all};
 use crate::picture::{Picture, Scale, Style};
 use crate::spectrum::{DB, enough, log_power, mean_spectrum, points};
-use crate::{Compared, Error, Figure, Verdict};
+use crate::{ClaimVerdict, Compared, Error, Figure};
 use std::f64::consts::SQRT_2;
 use tracktwin_signal::FeatureSet;
 use tracktwin_surrogate::TrainingSet;
@@ -79,7 +79,8 @@ fn frequencies(compared: &mut Compared, found: &[Vec<f64>], share: f64) {
     };
     let most = fastest.iter().map(moved).fold(0.0, f64::max);
     let shift = if most.is_finite() { format!("{:.1} %", 100.0 * most) } else { "lost".into() };
-    let verdict = if fastest.is_empty() { Verdict::CannotTell } else { Verdict::of(most <= share) };
+    let verdict =
+        if fastest.is_empty() { ClaimVerdict::CannotTell } else { ClaimVerdict::of(most <= share) };
     compared.row(
         "The characteristic frequencies stay",
         ["constant".to_owned(), format!("{}; largest shift {shift}", hertz(fastest))],
@@ -111,7 +112,7 @@ fn local_features(compared: &mut Compared, found: &[Vec<f64>]) {
     compared.row(
         "The local features LF1 to LF4 lie about the first four characteristic frequencies",
         ["f1 to f4 at their centres".to_owned(), ours],
-        Verdict::of(without.is_empty()),
+        ClaimVerdict::of(without.is_empty()),
         "a peak of the mean LWPS at the highest speed inside each; the paper's f1 to f4 are those of \
          one measured track with fastening clamps, a mean over all of Table D1 smears what moves \
          with the parameters",
@@ -148,7 +149,7 @@ pub(crate) fn hertz(frequencies: &[f64]) -> String {
 mod tests {
     use super::*;
     use crate::testing::{Bump, library, verdicts};
-    use Verdict::{Differs, Reproduced};
+    use ClaimVerdict::{Differs, Reproduced};
 
     const PEAKS_HZ: [f64; 4] = [550.0, 1100.0, 2000.0, 3200.0];
 

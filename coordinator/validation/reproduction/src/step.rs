@@ -58,7 +58,7 @@ fn gradual(compared: &mut Compared, told: &[EvaluatedExample], parameter: Parame
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Verdict::{CannotTell, Differs, Reproduced};
+    use crate::ClaimVerdict::{CannotTell, Differs, Reproduced};
     use crate::testing::{told, verdicts};
 
     /// Estimates that see this share of either neighbour.

@@ -3,7 +3,7 @@
 use crate::average::{Average, all};
 use crate::picture::{Picture, Scale, Style};
 use crate::spectrum::SPEED_KM_H;
-use crate::{Compared, Error, Figure, Verdict};
+use crate::{ClaimVerdict, Compared, Error, Figure};
 use Parameter::{BallastStiffness, IrregularityLevel, RailpadStiffness, SleeperBendingStiffness};
 use std::f64::consts::FRAC_PI_2;
 use tracktwin_parameters::Parameter;
@@ -99,7 +99,7 @@ fn global_rows(compared: &mut Compared, models: &Trained, global: &Mases<'_>) {
         compared.row(
             format!("Error of {} by the global feature at 13 km/h", parameter.symbol()),
             [paper.to_owned(), format!("{ours:.1} %")],
-            Verdict::of(ours < limit),
+            ClaimVerdict::of(ours < limit),
             because(ours < limit, limit, models, REASON),
         );
     }
@@ -142,7 +142,7 @@ fn together(compared: &mut Compared, models: &Trained) {
                 format!("{paper}, at 13 km/h"),
                 format!("{ours:.1} %, at {} km/h", speeds.join(" + ")),
             ],
-            Verdict::of(ours < limit),
+            ClaimVerdict::of(ours < limit),
             because(ours < limit, limit, models, ""),
         );
     }
@@ -182,7 +182,7 @@ fn level_by_any(compared: &mut Compared, locals: &[Mases<'_>]) {
     compared.row(
         "Any local feature tells the irregularity level",
         ["< 10 %".to_owned(), format!("{} %", list.join(", "))],
-        Verdict::of(most < LEVEL_LOCAL),
+        ClaimVerdict::of(most < LEVEL_LOCAL),
         "the largest below 10 %; a narrow band knows the power of one short stretch of surface \
          less surely than the whole range does (docs/decisions/0003)",
     );
@@ -193,7 +193,7 @@ fn ballast_by_first(compared: &mut Compared, global: &Mases<'_>, first: &Mases<'
     compared.row(
         "LF1 tells ballast stiffness about as well as the global feature",
         ["both approximately 5 %".to_owned(), format!("LF1 {local:.1} %, GF {whole:.1} %")],
-        Verdict::of(local <= ALIKE * whole),
+        ClaimVerdict::of(local <= ALIKE * whole),
         format!(
             "numbers that both round to 5 % differ by a factor of {ALIKE:.2} at most; below \
              400 Hz, which LF1 leaves out, the wheel's resonance on the track also tells k_b"
@@ -286,7 +286,7 @@ mod tests {
         train(&set, &TrainOptions::new(features), &|_| ()).unwrap()
     }
 
-    fn verdict(compared: &Compared, words: &str) -> Verdict {
+    fn verdict(compared: &Compared, words: &str) -> ClaimVerdict {
         compared.rows.iter().find(|row| row.claim.contains(words)).unwrap().verdict
     }
 
@@ -304,12 +304,12 @@ mod tests {
         let compared = test_errors(&models, &told(true)).unwrap();
         for parameter in [BallastStiffness, RailpadStiffness, SleeperBendingStiffness] {
             let words = format!("Error of {} by", parameter.symbol());
-            assert_eq!(verdict(&compared, &words), Verdict::Reproduced, "{parameter}");
+            assert_eq!(verdict(&compared, &words), ClaimVerdict::Reproduced, "{parameter}");
         }
-        assert_eq!(verdict(&compared, "Any local feature"), Verdict::Differs);
-        assert_eq!(verdict(&compared, "grow"), Verdict::Reproduced);
+        assert_eq!(verdict(&compared, "Any local feature"), ClaimVerdict::Differs);
+        assert_eq!(verdict(&compared, "grow"), ClaimVerdict::Reproduced);
         let shrinking = test_errors(&models, &told(false)).unwrap();
-        assert_eq!(verdict(&shrinking, "grow"), Verdict::Differs);
+        assert_eq!(verdict(&shrinking, "grow"), ClaimVerdict::Differs);
     }
 
     #[test]
@@ -327,7 +327,7 @@ mod tests {
     fn errors_above_the_paper_s_differ_and_say_why() {
         let compared = test_errors(&models(400.0), &[]).unwrap();
         let row = &compared.rows[0];
-        assert_eq!(row.verdict, Verdict::Differs, "{row:?}");
+        assert_eq!(row.verdict, ClaimVerdict::Differs, "{row:?}");
         assert!(row.why.contains("0003") && row.why.contains("150 cases"), "{}", row.why);
     }
 }

@@ -1,6 +1,6 @@
 //! Made-up libraries whose answers are known, for tests.
 
-use crate::{Compared, EvaluatedExample, Example, Figure, Verdict, examples};
+use crate::{ClaimVerdict, Compared, EvaluatedExample, Example, Figure, examples};
 use tracktwin_evaluation::Estimate;
 use tracktwin_parameters::{Parameter, ParameterSet};
 use tracktwin_surrogate::TrainingSet;
@@ -65,7 +65,7 @@ impl Bump {
     }
 }
 
-pub(crate) fn verdicts(compared: &Compared) -> Vec<Verdict> {
+pub(crate) fn verdicts(compared: &Compared) -> Vec<ClaimVerdict> {
     compared.rows.iter().map(|row| row.verdict).collect()
 }
 

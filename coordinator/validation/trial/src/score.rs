@@ -18,7 +18,7 @@ const CELL_DEVIATIONS: f64 = 3.5;
 
 /// Score of a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Score {
+pub struct CaseScore {
     /// Number of the case.
     pub number: u32,
     /// What kind of case it is.
@@ -103,7 +103,7 @@ pub struct Bias {
     pub after: f64,
 }
 
-impl Score {
+impl CaseScore {
     /// Whether the knock-out test applies: one effect, found and named.
     pub fn can_be_knocked_out(&self) -> bool {
         self.class == Class::Single && self.hidden.iter().all(|named| named.accepted)
@@ -138,12 +138,12 @@ pub fn score(
     diagnosis: &Diagnosis,
     detectability: &[Option<f64>],
     cpu_s: f64,
-) -> Score {
+) -> CaseScore {
     let accepted: Vec<&Hypothesis> = diagnosis.hypotheses.iter().filter(|h| h.accepted).collect();
     let left_out = &plan.scene.left_out;
     let named = left_out.iter().zip(detectability);
     let gains = diagnosis.fit.held_out_gain_nats.values();
-    Score {
+    CaseScore {
         number: plan.number,
         class: plan.class,
         verdict: diagnosis.verdict,

@@ -3,7 +3,7 @@
 use crate::class::Class;
 use crate::paper::Usual;
 use crate::rate::{Rate, median};
-use crate::score::{KnockedOut, Named, Placed, Score};
+use crate::score::{CaseScore, KnockedOut, Named, Placed};
 use serde::{Deserialize, Serialize};
 use tracktwin_diagnosis::Verdict;
 
@@ -20,14 +20,14 @@ pub struct Summary {
     /// Cases scored.
     pub cases: usize,
     /// A row a measure.
-    pub rows: Vec<Row>,
+    pub rows: Vec<MeasureRow>,
     /// A row a kind of physics.
     pub kinds: Vec<KindRow>,
 }
 
 /// A measure, its value and its goal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct MeasureRow {
     /// What is measured.
     pub measure: String,
     /// What came out.
@@ -60,25 +60,25 @@ pub struct KindRow {
 
 impl Summary {
     /// Summary of the scores; a case without a score has a failed diagnosis.
-    pub fn new(cases: u32, scores: &[Score]) -> Self {
+    pub fn new(cases: u32, scores: &[CaseScore]) -> Self {
         Self { cases: scores.len(), rows: rows(cases, scores), kinds: kinds(scores) }
     }
 }
 
-fn alarmed(score: &Score) -> bool {
+fn alarmed(score: &CaseScore) -> bool {
     score.verdict != Verdict::Consistent
 }
 
-fn of_class(scores: &[Score], class: Class) -> impl Iterator<Item = &Score> {
+fn of_class(scores: &[CaseScore], class: Class) -> impl Iterator<Item = &CaseScore> {
     scores.iter().filter(move |score| score.class == class)
 }
 
 /// Effects of the catalogue that were hidden alone, with their scores.
-fn singles(scores: &[Score]) -> impl Iterator<Item = (&Score, &Named)> {
+fn singles(scores: &[CaseScore]) -> impl Iterator<Item = (&CaseScore, &Named)> {
     of_class(scores, Class::Single).filter_map(|score| Some((score, score.hidden.first()?)))
 }
 
-fn rows(cases: u32, scores: &[Score]) -> Vec<Row> {
+fn rows(cases: u32, scores: &[CaseScore]) -> Vec<MeasureRow> {
     let scored: std::collections::BTreeSet<u32> = scores.iter().map(|score| score.number).collect();
     let broken_down = Rate::of((0..cases).map(|number| !scored.contains(&number)));
     [
@@ -91,12 +91,12 @@ fn rows(cases: u32, scores: &[Score]) -> Vec<Row> {
     .concat()
 }
 
-fn visible(scores: &[Score], least: f64) -> impl Iterator<Item = (&Score, &Named)> {
+fn visible(scores: &[CaseScore], least: f64) -> impl Iterator<Item = (&CaseScore, &Named)> {
     singles(scores)
         .filter(move |(_, named)| named.detectability.is_some_and(|length| length >= least))
 }
 
-fn alarms(scores: &[Score]) -> Vec<Row> {
+fn alarms(scores: &[CaseScore]) -> Vec<MeasureRow> {
     let is_physics = |verdict| matches!(verdict, Verdict::LeftOutPhysics | Verdict::UnknownPhysics);
     let detected = |least| Rate::of(visible(scores, least).map(|(score, _)| alarmed(score)));
     let controls = Rate::of(of_class(scores, Class::Control).map(alarmed));
@@ -113,7 +113,7 @@ fn alarms(scores: &[Score]) -> Vec<Row> {
     ]
 }
 
-fn names(scores: &[Score]) -> Vec<Row> {
+fn names(scores: &[CaseScore]) -> Vec<MeasureRow> {
     let found = || visible(scores, LIKELY).filter(|(score, _)| alarmed(score));
     let strange = || of_class(scores, Class::Unknown).filter(|score| alarmed(score));
     let unknown = Rate::of(strange().map(|score| score.verdict == Verdict::UnknownPhysics));
@@ -141,7 +141,7 @@ fn names(scores: &[Score]) -> Vec<Row> {
     ]
 }
 
-fn places(scores: &[Score]) -> Vec<Row> {
+fn places(scores: &[CaseScore]) -> Vec<MeasureRow> {
     let found = singles(scores).filter(|(score, _)| alarmed(score));
     let placed = Rate::of(found.filter_map(|(_, named)| named.place).map(Placed::within_a_sleeper));
     let without = knocked_out(scores).filter(|knocked_out| knocked_out.unknown);
@@ -152,29 +152,29 @@ fn places(scores: &[Score]) -> Vec<Row> {
     ]
 }
 
-fn knocked_out(scores: &[Score]) -> impl Iterator<Item = &KnockedOut> {
+fn knocked_out(scores: &[CaseScore]) -> impl Iterator<Item = &KnockedOut> {
     scores.iter().filter_map(|score| score.knocked_out.as_ref())
 }
 
-fn at_least(measure: &str, rate: Rate, goal: f64) -> Row {
+fn at_least(measure: &str, rate: Rate, goal: f64) -> MeasureRow {
     row(measure, rate, format!("{:.0} % or more", 100.0 * goal), |share| share >= goal)
 }
 
-fn at_most(measure: &str, rate: Rate, goal: f64) -> Row {
+fn at_most(measure: &str, rate: Rate, goal: f64) -> MeasureRow {
     row(measure, rate, format!("{:.0} % at most", 100.0 * goal), |share| share <= goal)
 }
 
-fn row(measure: &str, rate: Rate, goal: String, reached: impl Fn(f64) -> bool) -> Row {
+fn row(measure: &str, rate: Rate, goal: String, reached: impl Fn(f64) -> bool) -> MeasureRow {
     let reached = rate.share().map(reached);
-    Row { measure: measure.to_owned(), value: rate.to_text(), goal, reached }
+    MeasureRow { measure: measure.to_owned(), value: rate.to_text(), goal, reached }
 }
 
 /// Expected calibration error: by how much probabilities and frequencies differ, bin by bin.
-fn calibration(scores: &[Score]) -> Row {
+fn calibration(scores: &[CaseScore]) -> MeasureRow {
     let given: Vec<(f64, bool)> =
         scores.iter().flat_map(|score| score.probabilities.iter().copied()).collect();
     let error = calibration_error(&given);
-    Row {
+    MeasureRow {
         measure: "expected calibration error of the probabilities".to_owned(),
         value: error
             .map_or("none".to_owned(), |error| format!("{error:.3} ({} given)", given.len())),
@@ -195,14 +195,14 @@ fn calibration_error(given: &[(f64, bool)]) -> Option<f64> {
 }
 
 /// Errors of the stiffnesses next to effects that were named.
-fn bias(scores: &[Score]) -> Row {
+fn bias(scores: &[CaseScore]) -> MeasureRow {
     let named = singles(scores).filter(|(_, named)| named.accepted);
     let biases: Vec<_> = named.filter_map(|(score, _)| score.bias).collect();
     let count = biases.len() as f64;
     let before = biases.iter().map(|bias| bias.before).sum::<f64>() / count;
     let after = biases.iter().map(|bias| bias.after).sum::<f64>() / count;
     let known = !biases.is_empty();
-    Row {
+    MeasureRow {
         measure: "mean absolute error of ln stiffness, railpad and ballast, next to what was named"
             .to_owned(),
         value: if known {
@@ -215,7 +215,7 @@ fn bias(scores: &[Score]) -> Row {
     }
 }
 
-fn cost(scores: &[Score]) -> Row {
+fn cost(scores: &[CaseScore]) -> MeasureRow {
     let seconds: Vec<f64> = scores.iter().map(|score| score.cpu_s).collect();
     let most = seconds.iter().copied().max_by(f64::total_cmp);
     let value = match (median(seconds), most) {
@@ -224,10 +224,10 @@ fn cost(scores: &[Score]) -> Row {
     };
     let reached = most.map(|most| most <= 600.0);
     let measure = "CPU time of a diagnosis".to_owned();
-    Row { measure, value, goal: "5 minutes on two cores".to_owned(), reached }
+    MeasureRow { measure, value, goal: "5 minutes on two cores".to_owned(), reached }
 }
 
-fn kinds(scores: &[Score]) -> Vec<KindRow> {
+fn kinds(scores: &[CaseScore]) -> Vec<KindRow> {
     let controls = of_class(scores, Class::Control).filter_map(|score| score.paper.as_ref());
     let usual = Usual::of(&controls.collect::<Vec<_>>());
     let all = || {
@@ -268,8 +268,8 @@ mod tests {
         assert_eq!(calibration_error(&[]), None);
     }
 
-    fn control(number: u32, verdict: Verdict) -> Score {
-        Score {
+    fn control(number: u32, verdict: Verdict) -> CaseScore {
+        CaseScore {
             number,
             class: Class::Control,
             verdict,
@@ -289,7 +289,7 @@ mod tests {
 
     #[test]
     fn one_alarm_on_ten_controls_misses_the_goal() {
-        let scores: Vec<Score> = (0..10)
+        let scores: Vec<CaseScore> = (0..10)
             .map(|n| control(n, if n == 4 { Verdict::LeftOutPhysics } else { Verdict::Consistent }))
             .collect();
         let summary = Summary::new(10, &scores);

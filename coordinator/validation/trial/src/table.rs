@@ -1,13 +1,13 @@
 //! A trial's outcome as a page of Markdown.
 
 use crate::rate::Rate;
-use crate::score::Score;
-use crate::summary::{KindRow, Row, Summary};
+use crate::score::CaseScore;
+use crate::summary::{KindRow, MeasureRow, Summary};
 use std::fmt::Write;
 
 impl Summary {
     /// The tables, with a line a case that did not come out as it should.
-    pub fn to_markdown(&self, scores: &[Score]) -> String {
+    pub fn to_markdown(&self, scores: &[CaseScore]) -> String {
         let mut page = String::from("| measure | result | target | met |\n|---|---|---|---|\n");
         self.rows.iter().for_each(|row| page.push_str(&measure(row)));
         page.push_str(
@@ -23,8 +23,8 @@ impl Summary {
     }
 }
 
-fn measure(row: &Row) -> String {
-    let Row { measure, value, goal, reached } = row;
+fn measure(row: &MeasureRow) -> String {
+    let MeasureRow { measure, value, goal, reached } = row;
     let reached = match reached {
         Some(true) => "reached",
         Some(false) => "**not reached**",
@@ -44,7 +44,7 @@ fn of_kind(row: &KindRow) -> String {
     )
 }
 
-fn case(score: &Score) -> String {
+fn case(score: &CaseScore) -> String {
     let mut hidden = String::new();
     for named in &score.hidden {
         let length = named.detectability.map_or("-".to_owned(), |length| format!("{length:.1}"));

@@ -9,7 +9,7 @@ use crate::dispatch::roster::WorkerEligibility;
 use std::sync::Arc;
 use tonic::Status;
 use tracktwin_experiment::Outcome;
-use tracktwin_library::{Report, Verdict};
+use tracktwin_library::{Report, ReportVerdict};
 use tracktwin_protocol::{CaseReport, farm};
 use tracktwin_traces::Step;
 
@@ -62,7 +62,7 @@ impl Dispatch {
         served: &Served,
         reports: Vec<CaseReport>,
         step: &Step,
-    ) -> Result<Vec<Verdict>, Status> {
+    ) -> Result<Vec<ReportVerdict>, Status> {
         let ended = |it: &CaseReport| (matches!(it.outcome, Outcome::Failed { .. }), it.duration_s);
         let ended: Vec<_> = reports.iter().map(ended).collect();
         let step = Step::after("store", [&step.traceparent()]);
@@ -83,7 +83,8 @@ impl Dispatch {
             unavailable(&error)
         })?;
         // Repeated reports count once.
-        let stored = ended.iter().zip(&verdicts).filter(|(_, it)| matches!(it, Verdict::Stored));
+        let stored =
+            ended.iter().zip(&verdicts).filter(|(_, it)| matches!(it, ReportVerdict::Stored));
         let (failed, durations_s): (Vec<bool>, Vec<f64>) = stored.map(|(ended, _)| *ended).unzip();
         step.count("cases_stored", failed.len());
         drop(step);
@@ -103,38 +104,38 @@ impl Dispatch {
         worker: &str,
         served: &Arc<Served>,
         report: CaseReport,
-    ) -> Result<Verdict, Status> {
+    ) -> Result<ReportVerdict, Status> {
         let found = self.audits.report(worker, served, report).await;
         Ok(match found.map_err(|error| unavailable(&error))? {
             None => {
                 self.counts.refused.inc();
-                Verdict::Refused
+                ReportVerdict::Refused
             }
             Some(AuditOutcome::Agreement) => {
                 self.counts.audited.inc();
-                Verdict::Duplicate
+                ReportVerdict::Duplicate
             }
             Some(AuditOutcome::Unjudged) => {
                 self.counts.audited.inc();
                 self.counts.differed.inc();
-                Verdict::Duplicate
+                ReportVerdict::Duplicate
             }
             Some(AuditOutcome::Wrong { worker, reason }) => {
                 self.counts.audited.inc();
                 self.counts.differed.inc();
                 self.roster.set_quarantine(&worker, Some(reason));
-                Verdict::Duplicate
+                ReportVerdict::Duplicate
             }
         })
     }
 
-    fn count(&self, verdicts: &[Verdict]) {
+    fn count(&self, verdicts: &[ReportVerdict]) {
         for verdict in verdicts {
             match verdict {
-                Verdict::Stored => self.counts.stored.inc(),
-                Verdict::Duplicate => self.counts.duplicates.inc(),
-                Verdict::Late => self.counts.late.inc(),
-                Verdict::Refused => self.counts.refused.inc(),
+                ReportVerdict::Stored => self.counts.stored.inc(),
+                ReportVerdict::Duplicate => self.counts.duplicates.inc(),
+                ReportVerdict::Late => self.counts.late.inc(),
+                ReportVerdict::Refused => self.counts.refused.inc(),
             };
         }
     }

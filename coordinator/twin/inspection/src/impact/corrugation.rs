@@ -75,7 +75,12 @@ pub fn corrugation(
         .iter()
         .map(|pass| held(pass, [1.0 / longest, 1.0 / shortest]))
         .collect::<Option<_>>()?;
-    let search = Search { recording, whitened: &whitened, orders_m, lengths: [shortest, longest] };
+    let search = CorrugationSearch {
+        recording,
+        whitened: &whitened,
+        orders_m,
+        lengths: [shortest, longest],
+    };
     let mut candidates = Vec::new();
     let mut tries = 0;
     for ruler in Ruler::BOTH {
@@ -112,7 +117,8 @@ fn held(pass: &Pass, [low, high]: [f64; 2]) -> Option<(Vec<Complex64>, [f64; 2])
     Some((values, band.map(|frequency| frequency / speed)))
 }
 
-struct Search<'a> {
+/// Where corrugation is searched for.
+struct CorrugationSearch<'a> {
     recording: &'a Recording,
     whitened: &'a [(Vec<Complex64>, [f64; 2])],
     orders_m: Option<f64>,
@@ -120,7 +126,7 @@ struct Search<'a> {
     lengths: [f64; 2],
 }
 
-impl Search<'_> {
+impl CorrugationSearch<'_> {
     /// Stretches of all lengths that overlap by half, inside every pass.
     fn stretches(&self) -> Vec<[f64; 2]> {
         let passes = &self.recording.passes;
@@ -285,7 +291,7 @@ mod tests {
             (pass.position_m.iter().zip(noise).map(value).collect(), [16.0, 500.0])
         };
         let whitened: Vec<_> = recording.passes.iter().map(of_pass).collect();
-        let search = Search {
+        let search = CorrugationSearch {
             recording: &recording,
             whitened: &whitened,
             orders_m: None,

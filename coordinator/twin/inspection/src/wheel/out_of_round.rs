@@ -104,7 +104,7 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
     if !separates_wavelengths(passes) || to - from < TURNS_MIN * circumference_m {
         return Vec::new();
     }
-    let search = Search { recording, circumference_m, stretch_m: [from, to] };
+    let search = OrderSearch { recording, circumference_m, stretch_m: [from, to] };
     let mut tries = 0;
     let mut found: Vec<Order> = Vec::new();
     for ruler in Ruler::BOTH {
@@ -162,13 +162,14 @@ impl Order {
     }
 }
 
-struct Search<'a> {
+/// Where orders are searched for.
+struct OrderSearch<'a> {
     recording: &'a Recording,
     circumference_m: f64,
     stretch_m: [f64; 2],
 }
 
-impl Search<'_> {
+impl OrderSearch<'_> {
     fn length(&self) -> f64 {
         self.stretch_m[1] - self.stretch_m[0]
     }

@@ -19,7 +19,7 @@ pub(crate) struct Felt {
 
 /// Rail, ports and vehicle at one moment.
 #[derive(Clone, Debug)]
-pub(crate) struct Motion<'a> {
+pub(crate) struct PassState<'a> {
     track: &'a Track,
     rail: RailState,
     ports: PortState,
@@ -33,7 +33,7 @@ pub(crate) struct Motion<'a> {
     wheel_m: f64,
 }
 
-impl<'a> Motion<'a> {
+impl<'a> PassState<'a> {
     /// At rest under the wheel at `x_m`.
     pub(crate) fn at_rest(track: &'a Track, x_m: f64) -> Self {
         let rest = Rest::under_wheel(track, x_m);
