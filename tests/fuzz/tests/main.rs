@@ -9,6 +9,7 @@ mod campaigns;
 mod messages;
 mod questions;
 mod recordings;
+mod tracks;
 
 /// Inputs at random in an ordinary run.
 const ITERATIONS: usize = 200;
