@@ -76,8 +76,21 @@ fn a_line_is_simulated_described_again_and_evaluated() {
     run(
         PROGRAM,
         &[
-            "simulate", "--track", &file, "--out", &text(&ride), "--spans", "26", "--speed", "40",
-            "--speed", "80", "--set", "ballast_stiffness_N_m=90e6", "--rail-elements", "4",
+            "simulate",
+            "--track",
+            &file,
+            "--out",
+            &text(&ride),
+            "--spans",
+            "26",
+            "--speed",
+            "40",
+            "--speed",
+            "80",
+            "--set",
+            "ballast_stiffness_N_m=90e6",
+            "--rail-elements",
+            "4",
         ],
     )
     .succeeded();
@@ -118,11 +131,9 @@ fn a_line_of_an_independent_simulator_is_evaluated_sleeper_by_sleeper() {
         .collect();
     for (parameter, most) in [("ballast_stiffness_N_m", 0.1), ("railpad_stiffness_N_m", 0.2)] {
         let errors = judged.iter().map(|sleeper| {
-            let true_value = truth["sleepers"][sleeper["id"].as_str().unwrap()][parameter]
-                .as_f64()
-                .unwrap();
-            let [mean, sd] =
-                ["mean", "sd"].map(|of| sleeper[parameter][of].as_f64().unwrap());
+            let true_value =
+                truth["sleepers"][sleeper["id"].as_str().unwrap()][parameter].as_f64().unwrap();
+            let [mean, sd] = ["mean", "sd"].map(|of| sleeper[parameter][of].as_f64().unwrap());
             ((mean / true_value).ln(), (mean - true_value).abs() < 1.645 * sd)
         });
         let (errors, held): (Vec<f64>, Vec<bool>) = errors.unzip();

@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
 
 fn print(check: &TrackCheck) {
     let hz = |values: &[f64]| {
-        let each = values.iter().map(|value| rounded(*value, 3).to_string());
+        let each = values.iter().map(|value| rounded(*value, 3));
         each.collect::<Vec<_>>().join(", ")
     };
     let row = |label: &str, value: String| println_stdout(&format!("{label:<34} {value}"));
@@ -72,16 +72,18 @@ fn print(check: &TrackCheck) {
     println_stdout("\ngreatest change of the level by a change of 10 %");
     for parameter in &check.parameters {
         let label = format!("  {}", parameter.parameter);
-        let at = parameter.at_hz.map_or("all frequencies".to_owned(), |hz| {
-            format!("{} Hz", rounded(hz, 3))
-        });
+        let at = parameter
+            .at_hz
+            .map_or("all frequencies".to_owned(), |hz| format!("{} Hz", rounded(hz, 3)));
         row(&label, format!("{:.2} dB at {at}", parameter.change_db.abs()));
     }
     let doubts = check.doubts();
     if !doubts.is_empty() {
         println_stdout("");
     }
-    doubts.iter().for_each(|doubt| println_stdout(doubt));
+    for doubt in &doubts {
+        println_stdout(doubt);
+    }
 }
 
 fn mega(value: f64, unit: &str) -> String {

@@ -82,7 +82,9 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         Some(track) => (track, Vec::new()),
         None => track.of(&recording)?,
     };
-    assumed.iter().for_each(|note| println_stderr(note));
+    for note in &assumed {
+        println_stderr(note);
+    }
     check_track(&recording, &track.design).or_input()?;
     make_folder(&out)?;
     let shown = Stages::default();

@@ -57,8 +57,13 @@ pub(super) struct Arguments {
     #[arg(long, value_enum)]
     method: Option<Method>,
     /// Folder of trained models, written by `train` or `run`; requires --library.
-    #[arg(long, value_name = "DIR", requires = "library", required_if_eq("method", "gp"),
-          conflicts_with = "track")]
+    #[arg(
+        long,
+        value_name = "DIR",
+        requires = "library",
+        required_if_eq("method", "gp"),
+        conflicts_with = "track"
+    )]
     models: Option<PathBuf>,
     /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
@@ -119,7 +124,9 @@ async fn by_inversion(
 ) -> Result<(), Stop> {
     let (recording, mut notes) = usable_with_notes(recording)?;
     let (track, assumed) = track.of(&recording)?;
-    assumed.iter().for_each(|note| println_stderr(note));
+    for note in &assumed {
+        println_stderr(note);
+    }
     notes.extend(assumed);
     check_track(&recording, &track.design).or_input()?;
     make_folder(folder)?;

@@ -41,7 +41,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
         (Some(preset), _) => preset.text(),
         (None, Some(from)) => {
             let (track, notes) = stated(&Recording::open(from).or_input()?);
-            notes.iter().for_each(|note| println_stderr(note));
+            for note in &notes {
+                println_stderr(note);
+            }
             track.to_toml()
         }
         (None, None) => Preset::VTrack.text(),

@@ -98,8 +98,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     check_files(arguments)?;
     let frequencies = frequencies(arguments).or_input()?;
     let track = arguments.track.track()?;
-    let set =
-        arguments.settings.iter().fold(track.nominal, |set, setting| setting.apply(set, 0));
+    let set = arguments.settings.iter().fold(track.nominal, |set, setting| setting.apply(set, 0));
     let model = model(arguments.spans, &track, &set)?;
     let middle = arguments.spans / 2;
     let spacing = track.design.sleeper.spacing_m;

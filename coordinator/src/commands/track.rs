@@ -58,9 +58,7 @@ pub(super) fn preset_parser() -> impl TypedValueParser<Value = Preset> {
 /// Reads a track file.
 pub(super) fn read(path: &Path) -> Result<Track, Stop> {
     let text = tracktwin_files::read_text(path).or_input()?;
-    Track::parse(&text)
-        .map_err(|error| anyhow!("{}: {error}", path.display()))
-        .or_input()
+    Track::parse(&text).map_err(|error| anyhow!("{}: {error}", path.display())).or_input()
 }
 
 /// The track that a recording states, and a note on what it does not state.

@@ -124,7 +124,7 @@ pub enum SpecError {
         /// The track file.
         track: String,
         /// What is wrong.
-        source: TrackError,
+        source: Box<TrackError>,
     },
     /// Two descriptions of the track.
     #[error("{path}: track: a preset is given too; remove one of the two")]
@@ -294,7 +294,7 @@ impl File {
         Track::parse(&text).map_err(|source| SpecError::Track {
             path: path.to_owned(),
             track: file.display().to_string(),
-            source,
+            source: Box::new(source),
         })
     }
 
@@ -360,7 +360,7 @@ impl File {
         let mut experiment = Experiment::new(track.design.clone());
         experiment.wavelengths_m = track.wavelengths_m;
         let speeds = self.speeds_km_h.as_ref();
-        experiment.speeds_km_h = speeds.unwrap_or(&track.speeds_km_h).clone();
+        experiment.speeds_km_h.clone_from(speeds.unwrap_or(&track.speeds_km_h));
         experiment.features = self.features.clone();
         experiment.extensions.clone_from(&self.extension);
         replace(&mut experiment.spans, simulation.spans);

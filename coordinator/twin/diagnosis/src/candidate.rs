@@ -94,7 +94,11 @@ fn of_kind(kind: &'static Kind, section: &Section) -> Vec<Candidate> {
     for families in kind.screening.families.chunk_by(|a, b| a.places == b.places) {
         for place in places(families[0].places, section) {
             let at_place = place.put(ExtensionInstance::new(kind.physics));
-            all.extend(families.iter().map(|family| of_family(kind, family, at_place.clone(), length_ratio)));
+            all.extend(
+                families
+                    .iter()
+                    .map(|family| of_family(kind, family, at_place.clone(), length_ratio)),
+            );
         }
     }
     all

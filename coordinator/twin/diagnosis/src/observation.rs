@@ -13,7 +13,7 @@ pub struct Observation {
     order: Vec<usize>,
     /// How many of a sleeper's log powers are fitted.
     fitted: usize,
-    /// How many of a sleeper's log powers are compared: the last in the order are not.
+    /// How many of a sleeper's log powers are compared; the whitened values of the others are zero.
     compared: usize,
     /// Inverse Cholesky factor of a sleeper's covariance, in that order.
     whitening: DMatrix<f64>,
@@ -31,17 +31,22 @@ impl Observation {
         held_out: impl Fn(usize) -> bool,
     ) -> Option<Self> {
         let size = covariance.nrows();
-        let is_compared = |row: &usize| covariance[(*row, *row)] < f64::INFINITY;
-        let (compared, ignored): (Vec<usize>, Vec<usize>) = (0..size).partition(is_compared);
-        let (last, first): (Vec<usize>, Vec<usize>) =
-            compared.iter().partition(|&&row| held_out(row));
-        let (fitted, compared) = (first.len(), compared.len());
-        let order = [first, last, ignored].concat();
-        let ordered = DMatrix::from_fn(compared, compared, |i, j| covariance[(order[i], order[j])]);
-        let factor = nalgebra::Cholesky::new(ordered)?;
+        let (last, first): (Vec<usize>, Vec<usize>) = (0..size).partition(|&row| held_out(row));
+        let fitted = first.len();
+        let order = [first, last].concat();
+        let places: Vec<usize> = (0..size)
+            .filter(|&place| covariance[(order[place], order[place])] < f64::INFINITY)
+            .collect();
+        let compared = places.len();
+        let of_places = |i: usize, j: usize| covariance[(order[places[i]], order[places[j]])];
+        let factor = nalgebra::Cholesky::new(DMatrix::from_fn(compared, compared, of_places))?;
         let inverse = factor.l().solve_lower_triangular(&DMatrix::identity(compared, compared))?;
         let mut whitening = DMatrix::zeros(size, size);
-        whitening.view_mut((0, 0), (compared, compared)).copy_from(&inverse);
+        for (i, &row) in places.iter().enumerate() {
+            for (j, &column) in places.iter().enumerate() {
+                whitening[(row, column)] = inverse[(i, j)];
+            }
+        }
         let weights = vec![1.0; log_power.len() / size];
         Some(Self { log_power, order, fitted, compared, whitening, weights })
     }
@@ -109,17 +114,19 @@ impl Observation {
 
     /// Sum over all log powers of the logarithms of their conditional standard deviations.
     pub fn log_deviation(&self) -> f64 {
-        self.log_deviation_of(0..self.compared)
+        self.log_deviation_of(0..self.order.len())
     }
 
     /// Sum over what was held out of the logarithms of its conditional standard deviations.
     pub fn held_out_log_deviation(&self) -> f64 {
-        self.log_deviation_of(self.fitted..self.compared)
+        self.log_deviation_of(self.fitted..self.order.len())
     }
 
     /// Over these of each sleeper's rows, in the order in which they are whitened.
     fn log_deviation_of(&self, rows: Range<usize>) -> f64 {
-        self.sleepers() as f64 * rows.map(|row| -self.whitening[(row, row)].ln()).sum::<f64>()
+        let inverses = rows.map(|row| self.whitening[(row, row)]);
+        let compared = inverses.filter(|inverse| *inverse > 0.0);
+        self.sleepers() as f64 * compared.map(|inverse| -inverse.ln()).sum::<f64>()
     }
 
     fn sleepers(&self) -> usize {
@@ -132,5 +139,26 @@ impl Observation {
         (0..self.sleepers())
             .flat_map(|sleeper| part.clone().map(move |row| sleeper * size + row))
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_of_infinite_variance_says_nothing_and_leaves_the_others_as_they_are() {
+        let covariance = DMatrix::from_row_slice(2, 2, &[0.5, 0.2, 0.2, 0.4]);
+        let wider =
+            DMatrix::from_row_slice(3, 3, &[0.5, 0.0, 0.2, 0.0, f64::INFINITY, 0.0, 0.2, 0.0, 0.4]);
+        let narrow =
+            Observation::new(DVector::from_vec(vec![1.0, 2.0]), &covariance, |_| false).unwrap();
+        let wide =
+            Observation::new(DVector::from_vec(vec![1.0, 9.0, 2.0]), &wider, |_| false).unwrap();
+        let expected = narrow.residual(&DVector::zeros(2));
+        let found = wide.residual(&DVector::zeros(3));
+        assert_eq!([found[0], found[1], found[2]], [expected[0], 0.0, expected[1]]);
+        assert!((wide.log_deviation() - narrow.log_deviation()).abs() < 1e-12);
+        assert_eq!(wide.compared(), 2);
     }
 }

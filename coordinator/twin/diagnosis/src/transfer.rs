@@ -42,8 +42,7 @@ impl Transfer {
     ) -> Self {
         let RailReceptances { direct, from_seats } =
             RailReceptances::new(&model, lines_hz, from_seats);
-        let has_wheels =
-            model.vehicle().further_wheels_m == model.design().wheel.further_wheels_m;
+        let has_wheels = model.vehicle().further_wheels_m == model.design().wheel.further_wheels_m;
         let known = by_further_wheels.filter(|_| has_wheels).map(Arc::clone);
         Self::on_rail(model, lines_hz, Arc::new(direct), known).with_seats(from_seats)
     }
@@ -102,14 +101,23 @@ impl Transfer {
             line.iter().map(|k| k.norm_sqr() * sensitivity.norm_sqr()).collect()
         };
         let mut power: Vec<Vec<f64>> = lines_hz.iter().zip(&stiffness).map(power_of_line).collect();
-        let by_further_wheels = by_further.unwrap_or_else(|| {
-            Arc::new(by_further_wheels(&model, lines_hz, &direct, &stiffness))
-        });
+        let by_further_wheels = by_further
+            .unwrap_or_else(|| Arc::new(by_further_wheels(&model, lines_hz, &direct, &stiffness)));
         for (power, gain) in power.iter_mut().flatten().zip(by_further_wheels.iter().flatten()) {
             *power *= gain;
         }
         let (by_seats, wheel) = (Vec::new(), Vec::new());
-        Self { power, stiffness, by_seats, wheel_receptance, rail: None, wheel, by_further_wheels, direct, model }
+        Self {
+            power,
+            stiffness,
+            by_seats,
+            wheel_receptance,
+            rail: None,
+            wheel,
+            by_further_wheels,
+            direct,
+            model,
+        }
     }
 
     /// What the further wheels multiply the power by, `[line][node]`.

@@ -37,8 +37,7 @@ impl Inversion {
                 unevaluated.push(Unevaluated { id: place.id.clone(), x_m: place.x_m, reason });
                 continue;
             };
-            let resolved =
-                RAILPAD_RESOLVED * prepared.forward.section.track.design.length_ratio();
+            let resolved = RAILPAD_RESOLVED * prepared.forward.section.track.design.length_ratio();
             let index = number - prepared.first_sleeper;
             sleepers.push(fitted.sleeper(index, &place.id, place.x_m, resolved));
         }

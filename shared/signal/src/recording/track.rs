@@ -76,9 +76,7 @@ const FURTHER: [Quantity; 5] = [
     Quantity::new(SLEEPER, "second_moment_m4", "m4", |it| &mut it.sleeper.section.second_moment_m4),
     Quantity::new(SLEEPER, "youngs_Pa", "Pa", |it| &mut it.sleeper.section.youngs_modulus_pa),
     Quantity::new(SLEEPER, "poisson", "", |it| &mut it.sleeper.section.poisson),
-    Quantity::new(SLEEPER, "shear_coefficient", "", |it| {
-        &mut it.sleeper.section.shear_coefficient
-    }),
+    Quantity::new(SLEEPER, "shear_coefficient", "", |it| &mut it.sleeper.section.shear_coefficient),
 ];
 
 /// What a recording must state to be recognised as one of a preset.
@@ -173,8 +171,7 @@ impl Recording {
                 None => assumed.push(quantity.path()),
             }
         }
-        design.sleeper.spacing_m =
-            if differs { self.spacing_m } else { design.sleeper.spacing_m };
+        design.sleeper.spacing_m = if differs { self.spacing_m } else { design.sleeper.spacing_m };
         match self.nominal.get("wheel").and_then(|wheel| wheel.get(WHEELBASE)) {
             Some(wheelbase) => {
                 design.wheel.further_wheels_m =

@@ -1,7 +1,9 @@
 //! The assembled track.
 
 use super::assembly::Assembled;
-use super::{Assembly, ContactPatch, ForceLaw, Layout, Matrices, Mesh, Roughness, Support, Surface, Vehicle};
+use super::{
+    Assembly, ContactPatch, ForceLaw, Layout, Matrices, Mesh, Roughness, Support, Surface, Vehicle,
+};
 use crate::element::SpringDamper;
 use crate::extension::{Extension, Measured};
 use crate::time;
