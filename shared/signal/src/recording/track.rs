@@ -256,7 +256,8 @@ mod tests {
     fn every_quantity_that_a_recording_states_is_compared() {
         let v_track = TrackDesign::v_track();
         assert_eq!(recording().check_track(&v_track), Ok(()));
-        for quantity in &QUANTITIES {
+        // V-Track's rail seat is at the middle of the sleeper: no factor changes that.
+        for quantity in QUANTITIES.iter().filter(|quantity| quantity.value(&v_track) > 0.0) {
             for (factor, is_alike) in [(1.019, true), (0.981, true), (1.021, false), (0.979, false)]
             {
                 let mut recording = recording();
