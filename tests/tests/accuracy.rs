@@ -21,8 +21,8 @@ const LINE_TIME_STEP_S: f64 = 1.0 / 102_400.0;
 const SEGMENT: usize = 16_384;
 /// Below it the analysis window smears the wheel-on-track resonance (the reference's README).
 const LOWEST_HZ: f64 = 124.0;
-/// Bands of the line that are demanded, in Hz: below, bins about the resonance of wheel and track, 57 Hz,
-/// decide about levels, and the table is to be read.
+/// Bands of the line that must agree, in Hz. Below, levels depend on where the bins of the spectrum lie about
+/// the resonance of wheel and track at 57 Hz; the printed table has them.
 const LINE_HZ: [f64; 2] = [95.0, 4100.0];
 /// Wavelengths of the line's surface in m.
 const LINE_WAVELENGTHS_M: [f64; 2] = [2e-3, 3.0];
@@ -151,9 +151,8 @@ impl Reference {
             time_step_s: self.time_step_s,
             local_flexibility: true,
         };
-        let [shortest_m, longest_m] = self.wavelengths_m;
         let level = self.set[Parameter::IrregularityLevel];
-        let roughness = Roughness { level, shortest_m, longest_m };
+        let roughness = Roughness::between(level, self.wavelengths_m);
         let rough: Vec<Surface> =
             (0..surfaces).map(|seed| model.surface(&roughness, u64::from(seed))).collect();
         let models = vec![model; rough.len()];

@@ -17,7 +17,7 @@ use tracktwin_diagnosis::{Diagnosis, Verdict, check_track};
 use tracktwin_experiment::CODE_VERSION;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Library, without_password};
-use tracktwin_parameters::Track;
+use tracktwin_parameters::{Track, TrackDesign};
 use tracktwin_report::Origin;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::Trained;
@@ -78,10 +78,11 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         Some(url) => Some(open_or_create(&url).await?),
         None => None,
     };
-    let (track, assumed) = match of_models(models, library.as_ref()).await? {
+    let (track, mut assumed) = match of_models(models, library.as_ref()).await? {
         Some(track) => (track, Vec::new()),
         None => track.of(&recording)?,
     };
+    assumed.extend(uncalibrated(&track));
     for note in &assumed {
         println_stderr(note);
     }
@@ -157,6 +158,17 @@ fn origin(arguments: &Arguments) -> Origin {
         version: format!("tracktwin {CODE_VERSION}"),
         library: library.unwrap_or_default(),
     }
+}
+
+/// What a diagnosis of another track than V-Track rests on.
+fn uncalibrated(track: &Track) -> Option<String> {
+    (track.design != TrackDesign::v_track()).then(|| {
+        format!(
+            "the error rates of diagnoses are measured on V-Track only: on {} the probabilities \
+             are not calibrated, so check a finding on site",
+            track.name
+        )
+    })
 }
 
 /// The track that the models' campaign was simulated on, if there are models.

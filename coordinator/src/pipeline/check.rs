@@ -38,7 +38,7 @@ const ISO_3095: [(f64, f64); 5] =
 pub struct TrackCheck {
     /// The description's name.
     pub name: String,
-    /// Mass of half a sleeper in kg, and of the rail in kg/m.
+    /// Mass of half a sleeper in kg.
     pub half_sleeper_mass_kg: f64,
     /// Mass per length of the rail in kg/m.
     pub rail_mass_kg_m: f64,
@@ -46,7 +46,7 @@ pub struct TrackCheck {
     pub point_stiffness_n_m: f64,
     /// Stiffness of railpad and ballast in series per length in N/m2: the track modulus.
     pub track_modulus_n_m2: f64,
-    /// Stiffness of the contact under the static load in N/m, and half the length of its patch in m.
+    /// Stiffness of the contact under the static load in N/m.
     pub contact_stiffness_n_m: f64,
     /// Half the length of the contact patch in m.
     pub contact_patch_half_length_m: f64,
@@ -222,14 +222,11 @@ fn model(track: &Track, set: &ParameterSet) -> Result<TrackModel, ModelError> {
 
 /// Derivative of the force by the approach under the static load.
 fn contact_stiffness(track: &Track) -> f64 {
-    let load_n = track.design.wheel.load_n;
-    1.5 * load_n / HertzContact::new(&track.design).approach(load_n)
+    HertzContact::new(&track.design).stiffness(track.design.wheel.load_n)
 }
 
 fn roughness(track: &Track) -> Roughness {
-    let [shortest_m, longest_m] = track.wavelengths_m;
-    let level = track.nominal[Parameter::IrregularityLevel];
-    Roughness { level, shortest_m, longest_m }
+    Roughness::between(track.nominal[Parameter::IrregularityLevel], track.wavelengths_m)
 }
 
 /// Level of eq. B.6 in a one-third octave, whose width is 0.2316 of its centre.

@@ -201,9 +201,8 @@ impl<'a> ExampleTrack<'a> {
     }
 
     fn surface(&self, track: &TrackModel, example: &Example, seed: u64) -> Surface {
-        let [shortest_m, longest_m] = self.experiment.wavelengths_m;
         let level = example.sleepers[0][Parameter::IrregularityLevel];
-        track.surface(&Roughness { level, shortest_m, longest_m }, seed)
+        track.surface(&Roughness::between(level, self.experiment.wavelengths_m), seed)
     }
 
     /// From the run-in before the first sleeper's window to the margin behind the last one's.

@@ -109,9 +109,9 @@ impl Simulation {
 
     /// The surface that the wheel meets at every speed.
     fn surface(&self, case: &Case, model: &TrackModel) -> Surface {
-        let [shortest_m, longest_m] = self.experiment.wavelengths_m;
         let level = case.parameters[Parameter::IrregularityLevel];
-        model.surface(&Roughness { level, shortest_m, longest_m }, case.surface_seed)
+        let roughness = Roughness::between(level, self.experiment.wavelengths_m);
+        model.surface(&roughness, case.surface_seed)
     }
 
     fn pass(&self, speed_km_h: f64) -> Pass {

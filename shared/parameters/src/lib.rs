@@ -28,4 +28,4 @@ pub use random::unit;
 pub use set::ParameterSet;
 pub use sobol::{OWEN_POINTS_MAX, Sequence, SobolError};
 pub use space::{Axis, ParameterSpace, Scale, SpaceError};
-pub use track::{TRACK_FORMAT, Track, TrackError};
+pub use track::{TRACK_FORMAT, Track, TrackError, toml_fault};

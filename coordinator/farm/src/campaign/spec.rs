@@ -7,7 +7,7 @@ use tracktwin_experiment::{Experiment, ExperimentError};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_parameters::{
     Axis, OWEN_POINTS_MAX, Parameter, ParameterSet, ParameterSpace, Preset, QuantityError, Scale,
-    Sequence, SpaceError, Track, TrackError,
+    Sequence, SpaceError, Track, TrackError, toml_fault,
 };
 use tracktwin_signal::FeatureDefinition;
 use tracktwin_track::extension::SampledExtension;
@@ -274,10 +274,9 @@ impl Campaign {
 
 impl File {
     fn parse(text: &str, path: &str) -> Result<Self, SpecError> {
-        toml::from_str(text).map_err(|error| SpecError::Malformed {
-            path: path.to_owned(),
-            line: line_of(text, error.span()),
-            message: error.message().lines().collect::<Vec<_>>().join(" "),
+        toml::from_str(text).map_err(|error| {
+            let (line, message) = toml_fault(text, &error);
+            SpecError::Malformed { path: path.to_owned(), line, message }
         })
     }
 
@@ -381,12 +380,6 @@ fn replace<T>(setting: &mut T, chosen: Option<T>) {
     if let Some(value) = chosen {
         *setting = value;
     }
-}
-
-/// The line, from 1, at which a span of `text` begins.
-fn line_of(text: &str, span: Option<std::ops::Range<usize>>) -> usize {
-    let start = span.map_or(0, |span| span.start.min(text.len()));
-    text[..start].matches('\n').count() + 1
 }
 
 #[cfg(test)]

@@ -50,8 +50,8 @@ impl SimulatedTrack {
 
     /// The surface's spectrum.
     pub(super) fn roughness(&self) -> Roughness {
-        let [shortest_m, longest_m] = self.described.wavelengths_m;
-        Roughness { level: self.sleepers[0][Parameter::IrregularityLevel], shortest_m, longest_m }
+        let level = self.sleepers[0][Parameter::IrregularityLevel];
+        Roughness::between(level, self.described.wavelengths_m)
     }
 
     /// The usual speeds in km/h.

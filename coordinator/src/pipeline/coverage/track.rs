@@ -73,10 +73,10 @@ pub(super) fn record(
         .iter()
         .map(|track| model(experiment, track, &place))
         .collect::<Result<Vec<_>, _>>()?;
-    let [shortest_m, longest_m] = experiment.wavelengths_m;
     let surface = |(track, model): (&Track, &TrackModel)| {
         let level = track.sleepers[0][Parameter::IrregularityLevel];
-        model.surface(&Roughness { level, shortest_m, longest_m }, track.surface_seed)
+        let roughness = Roughness::between(level, experiment.wavelengths_m);
+        model.surface(&roughness, track.surface_seed)
     };
     let surfaces: Vec<_> = tracks.iter().zip(&models).map(surface).collect();
     let mut recordings = vec![empty(experiment, &place); tracks.len()];

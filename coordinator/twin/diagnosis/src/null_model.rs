@@ -83,8 +83,7 @@ impl NullModel {
         let supports = forward.unknowns.supports(section, &values);
         let mesh = Mesh::uniform(section.spans(), ELEMENTS, SLEEPER_ELEMENTS);
         let model = TrackModel::build(&section.track.design, &mesh, &supports, &[])?;
-        let [shortest_m, longest_m] = section.track.wavelengths_m;
-        let roughness = Roughness { level, shortest_m, longest_m };
+        let roughness = Roughness::between(level, section.track.wavelengths_m);
         let done = std::sync::atomic::AtomicU64::new(0);
         let groups: Vec<u64> = (0..surfaces).step_by(AT_A_TIME as usize).collect();
         let differences: Vec<Vec<Vec<f64>>> = groups

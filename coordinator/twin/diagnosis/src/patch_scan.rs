@@ -87,8 +87,7 @@ impl Patch {
         // Mean square of the waves: what they add to the band, whose width is 0.3 of its middle.
         let wave_number = TAU / length_m;
         let width = wave_number * PI.sqrt() / CENTRE_RAD;
-        let [shortest_m, longest_m] = section.track.wavelengths_m;
-        let surface = Roughness { level, shortest_m, longest_m };
+        let surface = Roughness::between(level, section.track.wavelengths_m);
         let beside = surface.density(wave_number) * width;
         let amplitude_m = (2.0 * self.height.exp_m1().max(0.0) * beside).sqrt();
         let kind = CORRUGATION;

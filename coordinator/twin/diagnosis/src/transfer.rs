@@ -258,8 +258,7 @@ fn by_further_wheel(
 
 /// Slope of the Hertzian law at the static load, in N/m.
 fn hertz(model: &TrackModel) -> f64 {
-    let load = model.design().wheel.load_n;
-    1.5 * load / HertzContact::new(model.design()).approach(load)
+    HertzContact::new(model.design()).stiffness(model.design().wheel.load_n)
 }
 
 #[cfg(test)]

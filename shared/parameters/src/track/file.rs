@@ -97,9 +97,9 @@ impl Track {
     /// # Errors
     /// [`TrackError`] says in a line what is wrong, where, and what can be.
     pub fn parse(text: &str) -> Result<Self, TrackError> {
-        let file: File = toml::from_str(text).map_err(|error| TrackError::Malformed {
-            line: line_of(text, error.span()),
-            message: error.message().lines().collect::<Vec<_>>().join(" "),
+        let file: File = toml::from_str(text).map_err(|error| {
+            let (line, message) = toml_fault(text, &error);
+            TrackError::Malformed { line, message }
         })?;
         file.check()?;
         let mut nominal = ParameterSet::nominal();
@@ -221,8 +221,10 @@ impl File {
     }
 }
 
-/// The line, from 1, at which a span of `text` begins.
-fn line_of(text: &str, span: Option<std::ops::Range<usize>>) -> usize {
-    let start = span.map_or(0, |span| span.start.min(text.len()));
-    text[..start].matches('\n').count() + 1
+/// The line, from 1, at which a text is not what TOML should be there, and the parser's message in one
+/// line.
+pub fn toml_fault(text: &str, error: &toml::de::Error) -> (usize, String) {
+    let start = error.span().map_or(0, |span| span.start.min(text.len()));
+    let message = error.message().lines().collect::<Vec<_>>().join(" ");
+    (text[..start].matches('\n').count() + 1, message)
 }

@@ -3,6 +3,8 @@
 mod file;
 mod limits;
 
+pub use file::toml_fault;
+
 use crate::{Axis, Parameter, ParameterSet, ParameterSpace, Preset, Prior, Scale, TrackDesign};
 
 /// Format of a track file.

@@ -41,6 +41,11 @@ impl HertzContact {
         (force_n / self.coefficient).powf(2.0 / 3.0)
     }
 
+    /// Slope of the law in N/m under a contact force in N.
+    pub fn stiffness(&self, force_n: f64) -> f64 {
+        1.5 * force_n / self.approach(force_n)
+    }
+
     /// Contact force in N between bodies that would overlap by `overlap_m` without it and that
     /// together give way by `compliance` in m/N: the root of `δ + compliance F(δ) = overlap`.
     ///

@@ -45,6 +45,11 @@ impl Roughness {
         Self { level, shortest_m: 0.25e-3, longest_m: 1.0 }
     }
 
+    /// The spectrum at a level, with wavelengths from the shortest to the longest in m.
+    pub const fn between(level: f64, [shortest_m, longest_m]: [f64; 2]) -> Self {
+        Self { level, shortest_m, longest_m }
+    }
+
     /// One-sided power spectral density `S` in m2/(rad/m) at a wave number in rad/m: its integral
     /// over positive wave numbers is the mean square of the height.
     ///

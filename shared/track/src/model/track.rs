@@ -26,6 +26,8 @@ pub struct TrackModel {
     matrices: Matrices,
     force_laws: Vec<ForceLaw>,
     vehicle: Vehicle,
+    /// The contact patch that filters the irregularity, if the design has one.
+    contact_patch: Option<ContactPatch>,
     /// How far the first wheel had rolled before it came to the track's origin, in m.
     wheel_turned_m: f64,
     extensions: Vec<Arc<dyn Extension>>,
@@ -83,10 +85,19 @@ impl TrackModel {
             extension.equip(&mut vehicle);
         }
         let Assembled { layout, matrices, force_laws } = assembly.finish();
+        let contact_patch = design.contact_patch_filter.then(|| ContactPatch::new(design));
         let (design, extensions) = (design.clone(), extensions.to_vec());
         let wheel_turned_m = 0.0;
-        let assembled =
-            Self { design, layout, matrices, force_laws, vehicle, wheel_turned_m, extensions };
+        let assembled = Self {
+            design,
+            layout,
+            matrices,
+            force_laws,
+            vehicle,
+            contact_patch,
+            wheel_turned_m,
+            extensions,
+        };
         Ok(assembled.linearised())
     }
 
@@ -182,10 +193,8 @@ impl TrackModel {
     pub fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
         let gain = |extension: &Arc<dyn Extension>| extension.roughness_gain(wave_number_rad_m);
         let by_extensions: f64 = self.extensions.iter().map(gain).product();
-        if !self.design.contact_patch_filter {
-            return by_extensions;
-        }
-        by_extensions * ContactPatch::new(&self.design).gain(wave_number_rad_m)
+        let by_patch = self.contact_patch.map_or(1.0, |patch| patch.gain(wave_number_rad_m));
+        by_extensions * by_patch
     }
 
     /// The irregularity of this seed, of the given roughness as extensions change it, along the

@@ -68,8 +68,7 @@ impl Forward {
         let unknowns = Unknowns::new(&section, speeds_m_s.len(), wave_numbers, frequencies_hz);
         let windows = speeds_m_s.iter().map(|&v| section.windows(v, &bands)).collect();
         // A density per rad/m becomes one per Hz at this speed.
-        let [shortest_m, longest_m] = section.track.wavelengths_m;
-        let surface = Roughness { level: 1.0, shortest_m, longest_m };
+        let surface = Roughness::between(1.0, section.track.wavelengths_m);
         let density = |v: f64, hz: f64| surface.density(TAU * hz / v) * TAU / v;
         let surface =
             speeds_m_s.iter().map(|&v| lines.iter().map(|&hz| density(v, hz)).collect()).collect();
