@@ -224,7 +224,7 @@ fn levels_of_a_line_with_one_wheel_agree_with_the_reference() {
 }
 
 #[test]
-#[ignore = "takes minutes: two wheels are not simulated in lanes"]
+#[ignore = "takes more than nine minutes: two wheels are not simulated in lanes"]
 fn levels_of_a_line_with_a_bogie_agree_with_the_reference() {
     agrees(&Reference::line("B"), 10);
 }
