@@ -47,8 +47,7 @@ impl Prior {
         self
     }
 
-    /// Of a track with these usual values and ranges, each a range of [`DEVIATIONS_IN_RANGE`] standard
-    /// deviations.
+    /// Of a track with these usual values and ranges, each a range of 2.6 standard deviations.
     pub fn of_ranges(
         median: ParameterSet,
         ranges: &[[f64; 2]; Parameter::COUNT],
