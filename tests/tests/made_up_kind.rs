@@ -8,7 +8,7 @@ use system_tests::{RAIL_ABSORBER, run};
 use tracktwin_diagnosis::{Section, candidates};
 use tracktwin_parameters::{ParameterSet, TrackDesign};
 use tracktwin_track::extension::{ExtensionInstance, Kind};
-use tracktwin_track::frequency::{Place, receptance};
+use tracktwin_track::frequency::{ReceptancePoint, receptance};
 use tracktwin_track::model::{Mesh, Support, Surface, TrackModel};
 use tracktwin_track::time::{self, Pass};
 use tracktwin_trial::{Class, plan};
@@ -42,7 +42,7 @@ fn track(has_it: bool) -> TrackModel {
 fn both_domains_have_it() {
     add();
     let [without, with] = [track(false), track(true)];
-    let at = Place::Rail(PLACE_M);
+    let at = ReceptancePoint::Rail(PLACE_M);
     let direct = |model| receptance(model, at, at, &[900.0]).unwrap()[0];
     let change = (direct(&with) - direct(&without)).norm() / direct(&without).norm();
     assert!(change > 0.05, "{change}");

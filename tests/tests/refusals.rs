@@ -279,10 +279,12 @@ fn a_good_recording_is_followed_by_the_library_s_refusal() {
     refused_recording(|_| {}, &["nowhere.sqlite", "does not exist"]);
 }
 
-/// `diagnose` of a small recording whose `nominal` has been given this.
+/// `diagnose` as on V-Track of a small recording whose `nominal` has been given this.
 fn refused_diagnosis(nominal: &str, words: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
-    let recording = folder.path().join("recording");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let [recording, out, v_track] = ["recording", "out", "v-track"].map(path);
+    run(PROGRAM, &["new", &v_track, "--preset", "v-track"]).succeeded();
     fs::create_dir(&recording).unwrap();
     let manifest = format!(
         r#"{{"format": "aba-recording/1", "sample_rate_Hz": 10000,
@@ -290,17 +292,17 @@ fn refused_diagnosis(nominal: &str, words: &[&str]) {
         "sleepers": [{{"id": "SN1", "x_m": 0.25}}, {{"id": "SN2", "x_m": 0.375}}],
         "nominal": {nominal}}}"#
     );
-    fs::write(recording.join("recording.json"), manifest).unwrap();
-    fs::write(recording.join("pass.csv"), pass_csv(2000)).unwrap();
-    let [recording, out] =
-        [recording, folder.path().join("out")].map(|it| it.display().to_string());
-    assert_refused(&run(PROGRAM, &["diagnose", &recording, "--out", &out]), words);
-    assert_eq!(contents(folder.path()), ["recording"]);
+    fs::write(path("recording/recording.json"), manifest).unwrap();
+    fs::write(path("recording/pass.csv"), pass_csv(2000)).unwrap();
+    let track = path("v-track/track.toml");
+    let answer = run(PROGRAM, &["diagnose", &recording, "--track", &track, "--out", &out]);
+    assert_refused(&answer, words);
+    assert_eq!(contents(folder.path()), ["recording", "v-track"]);
 }
 
 #[test]
-fn a_diagnosis_of_another_track_or_vehicle_is_refused_with_both_numbers() {
-    refused_diagnosis(r#"{"sleeper": {"spacing_m": 0.6}}"#, &["0.6 m", "0.125 m", "V-Track"]);
+fn a_diagnosis_on_another_track_or_vehicle_than_the_recording_s_is_refused_with_both_numbers() {
+    refused_diagnosis(r#"{"sleeper": {"spacing_m": 0.6}}"#, &["0.6 m", "0.125 m", "--track"]);
     refused_diagnosis(r#"{"wheel": {"mass_kg": 600}}"#, &["mass_kg", "600 kg", "44 kg"]);
     refused_diagnosis(r#"{"wheel": {"load_N": 5000}}"#, &["load_N", "5000 N", "4500 N"]);
     refused_diagnosis(r#"{"railhead_radius_m": 0.3}"#, &["railhead_radius_m", "0.3 m", "0.06 m"]);
@@ -308,13 +310,35 @@ fn a_diagnosis_of_another_track_or_vehicle_is_refused_with_both_numbers() {
 }
 
 #[test]
-fn what_a_diagnosis_found_on_v_track_extends_no_campaign_of_another_track() {
+fn what_a_diagnosis_found_extends_no_campaign_of_other_spacing() {
     let folder = tempfile::tempdir().unwrap();
     let [campaign, diagnosis] =
         ["large.toml", "diagnosis.json"].map(|name| folder.path().join(name).display().to_string());
     fs::write(&campaign, "name = \"c\"\nseed = 1\ncases = 8\npreset = \"real-scale\"\n").unwrap();
-    fs::write(&diagnosis, "{}").unwrap();
+    fs::write(&diagnosis, diagnosis_of_v_track().to_string()).unwrap();
     let answer = run(PROGRAM, &["extend", &campaign, "--from", &diagnosis]);
-    assert_refused(&answer, &["large.toml", "0.625 m", "0.125 m", "V-Track"]);
+    assert_refused(&answer, &["large.toml", "0.625 m", "0.125 m"]);
     assert_eq!(contents(folder.path()), ["diagnosis.json", "large.toml"]);
+}
+
+/// A diagnosis of three sleepers of V-Track without any finding.
+fn diagnosis_of_v_track() -> serde_json::Value {
+    let known = serde_json::json!({"mean": 1.0, "sd": 0.1});
+    let known = serde_json::json!({"before": known, "after": known});
+    let sleeper = |number: u8| {
+        serde_json::json!({
+            "id": format!("SN{number}"), "x_m": 0.125 * f64::from(number),
+            "railpad_stiffness_N_m": known, "ballast_stiffness_N_m": known,
+            "irregularity_level": known,
+        })
+    };
+    let scores = serde_json::json!({"in_sample": {"score": 0.0}, "held_out": null});
+    serde_json::json!({
+        "format": "tracktwin-diagnosis/1", "recording": "r", "verdict": "consistent", "sentence": "",
+        "mismatches": [], "hypotheses": [], "bias_removed": {}, "notes": [],
+        "fit": {"score": "", "before": scores, "after": scores, "held_out_gain_nats": {}},
+        "track": [sleeper(1), sleeper(2), sleeper(3)],
+        "levels": {"frequency_Hz": [], "speeds_km_h": [], "measured_dB": [], "before_dB": [],
+                   "after_dB": [], "scatter_dB": []},
+    })
 }

@@ -6,7 +6,7 @@ use super::progress::Progress;
 use super::simulate::Setting;
 use super::{OrInput, Stop, print_json, println_stdout};
 use crate::pipeline::compute::compute;
-use crate::pipeline::coverage::{Counts, Coverage, Kind, Row, inversion_rows};
+use crate::pipeline::coverage::{Counts, Coverage, CoverageRow, Kind, inversion_rows};
 use crate::pipeline::evaluate::Evaluator;
 use anyhow::{Context, anyhow};
 use clap::Args;
@@ -138,7 +138,7 @@ fn rows(
     evaluator: &Evaluator,
     settings: Vec<(Parameter, f64)>,
     counts: Counts,
-) -> anyhow::Result<Vec<Row>> {
+) -> anyhow::Result<Vec<CoverageRow>> {
     let coverage = Coverage {
         evaluator,
         experiment: evaluator.experiment(),
@@ -156,7 +156,7 @@ fn rows(
 }
 
 /// Table of the tracks flagged as outside the library, then the coverage of the intervals.
-fn tables(rows: &[Row]) -> String {
+fn tables(rows: &[CoverageRow]) -> String {
     let width = rows.iter().map(|row| name(row.kind).len()).max().unwrap_or(0);
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let mut lines = vec![format!(
@@ -200,7 +200,7 @@ fn tables(rows: &[Row]) -> String {
 }
 
 /// Ends beyond which too few tracks are flagged.
-fn shortfalls(rows: &[Row]) -> impl Iterator<Item = String> + '_ {
+fn shortfalls(rows: &[CoverageRow]) -> impl Iterator<Item = String> + '_ {
     let missed = rows
         .iter()
         .filter(|row| matches!(row.kind, Kind::Beyond { .. }) && row.any_outside < FOUND_LEAST);

@@ -163,11 +163,9 @@ fn origin(arguments: &Arguments) -> Origin {
 /// What a diagnosis of another track than V-Track rests on.
 fn uncalibrated(track: &Track) -> Option<String> {
     (track.design != TrackDesign::v_track()).then(|| {
-        format!(
-            "the error rates of diagnoses are measured on V-Track only: on {} the probabilities \
-             are not calibrated, so check a finding on site",
-            track.name
-        )
+        "the error rates of diagnoses are measured on V-Track only: on any other track the \
+         probabilities are not calibrated, so check a finding on site"
+            .to_owned()
     })
 }
 

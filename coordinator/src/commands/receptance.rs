@@ -12,7 +12,7 @@ use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_parameters::quantity::{FREQUENCY, PLACE, POINTS, SPANS};
 use tracktwin_parameters::{ParameterSet, Track};
 use tracktwin_report::ReceptanceCurve;
-use tracktwin_track::frequency::{self, Place};
+use tracktwin_track::frequency::{self, ReceptancePoint};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
 /// Arguments of `receptance`.
@@ -103,9 +103,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     let middle = arguments.spans / 2;
     let spacing = track.design.sleeper.spacing_m;
     let place = |test_point| match test_point {
-        TestPoint::Sleeper => Place::Rail(middle as f64 * spacing),
-        TestPoint::Midspan => Place::Rail((middle as f64 + 0.5) * spacing),
-        TestPoint::At(x_m) => Place::Rail(x_m),
+        TestPoint::Sleeper => ReceptancePoint::Rail(middle as f64 * spacing),
+        TestPoint::Midspan => ReceptancePoint::Rail((middle as f64 + 0.5) * spacing),
+        TestPoint::At(x_m) => ReceptancePoint::Rail(x_m),
     };
     let mut curves = Vec::new();
     for test in &arguments.at {

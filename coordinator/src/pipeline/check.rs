@@ -4,7 +4,7 @@ use rustfft::num_complex::Complex64;
 use serde::Serialize;
 use std::f64::consts::{PI, SQRT_2, TAU};
 use tracktwin_parameters::{Parameter, ParameterSet, Track, TrackDesign};
-use tracktwin_track::frequency::{FrequencyError, Place, peaks, receptance};
+use tracktwin_track::frequency::{FrequencyError, ReceptancePoint, peaks, receptance};
 use tracktwin_track::model::{
     ContactPatch, HertzContact, Mesh, ModelError, Roughness, Support, TrackModel,
 };
@@ -125,7 +125,7 @@ impl Response {
         let spacing_m = track.design.sleeper.spacing_m;
         let middle_m = (SPANS / 2) as f64 * spacing_m;
         let at = |x_m: f64| {
-            let place = Place::Rail(x_m);
+            let place = ReceptancePoint::Rail(x_m);
             receptance(&model, place, place, frequencies)
         };
         let rail = [at(middle_m)?, at(middle_m + 0.5 * spacing_m)?];

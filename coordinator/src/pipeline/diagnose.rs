@@ -7,8 +7,8 @@ use crate::pipeline::compute::compute;
 use crate::pipeline::null_models::{self, NullModelError};
 use nalgebra::DVector;
 use tracktwin_diagnosis::{
-    CalibrationError, Candidate, Diagnosis, Evidence, PreparationError, PreparedRecording, Search,
-    Stage, check_track, first_calibration, passes_alone, search,
+    CalibrationError, Candidate, Diagnosis, Evidence, PreparationError, PreparedRecording,
+    SearchOutcome, Stage, check_track, first_calibration, passes_alone, search,
 };
 use tracktwin_inspection::{Inspection, inspect};
 use tracktwin_library::Library;
@@ -47,7 +47,7 @@ pub struct Compared {
     /// The prepared recording.
     pub prepared: PreparedRecording,
     /// Result of the search.
-    pub search: Search,
+    pub search: SearchOutcome,
 }
 
 /// Why there is no diagnosis.
@@ -130,7 +130,7 @@ fn conclude(
     recording: &Recording,
     prepared: &PreparedRecording,
     inspection: &Inspection,
-    search: &Search,
+    search: &SearchOutcome,
 ) -> Result<Diagnosis, DiagnosingError> {
     let evidence = Evidence { recording, prepared, inspection, search };
     evidence.conclude().map_err(DiagnosingError::Conclusion)

@@ -2,7 +2,7 @@
 //! `cargo run --release -p tracktwin-track --example receptance_peaks`.
 
 use tracktwin_parameters::{ParameterSet, TrackDesign};
-use tracktwin_track::frequency::{Place, peaks, receptance};
+use tracktwin_track::frequency::{ReceptancePoint, peaks, receptance};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
 /// Lengths of the track in spans; an even number has a sleeper in the middle.
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for (name, x_m) in
             [("sleeper", middle), ("midspan", middle + design.sleeper.spacing_m / 2.0)]
         {
-            let place = Place::Rail(x_m);
+            let place = ReceptancePoint::Rail(x_m);
             let magnitudes: Vec<f64> = receptance(&model, place, place, &frequencies)?
                 .iter()
                 .map(|value| value.norm())

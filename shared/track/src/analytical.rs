@@ -35,7 +35,7 @@ pub(crate) fn winkler_deflection(beam: &BeamElement, foundation: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frequency::{Place, receptance};
+    use crate::frequency::{ReceptancePoint, receptance};
     use crate::model::{Mesh, Support, TrackModel};
     use nalgebra::DMatrix;
     use tracktwin_parameters::{ParameterSet, TrackDesign};
@@ -107,7 +107,7 @@ mod tests {
         let model = track(&design, &Mesh::uniform(60, 2, 2), support);
         let middle = model.layout().length_m() / 2.0;
         let at = |x_m| {
-            let place = Place::Rail(x_m);
+            let place = ReceptancePoint::Rail(x_m);
             receptance(&model, place, place, &[0.0]).unwrap()[0].re
         };
         let spacing = design.sleeper.spacing_m;

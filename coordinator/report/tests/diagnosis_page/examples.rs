@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{
-    BeforeAfter, Diagnosis, Estimate, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score,
-    Scores, SleeperValues, Verdict,
+    BeforeAfter, Diagnosis, Estimate, FORMAT, FitScores, Hypothesis, Levels, Location, Mismatch,
+    Score, Scores, SleeperValues, Verdict,
 };
 
 /// As metres a second times 3.6 come out.
@@ -73,12 +73,12 @@ fn track(biased: impl Fn(usize) -> f64) -> Vec<SleeperValues> {
     (0..SLEEPERS).map(sleeper).collect()
 }
 
-fn fit(before: f64, after: f64, gains: &[(&str, f64)]) -> Fit {
+fn fit(before: f64, after: f64, gains: &[(&str, f64)]) -> FitScores {
     let scores = |held_out: f64| Scores {
         in_sample: Score { score: held_out + 0.15 },
         held_out: Some(Score { score: held_out }),
     };
-    Fit {
+    FitScores {
         score: "mean log predictive density per band and sleeper, nats".to_owned(),
         before: scores(before),
         after: scores(after),

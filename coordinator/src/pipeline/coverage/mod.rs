@@ -8,7 +8,7 @@ mod track;
 
 pub use inversion::{InversionCoverageError, InversionRow, InversionScore, inversion_rows};
 pub use plan::{Counts, Kind};
-pub use score::{Compared, Row};
+pub use score::{Compared, CoverageRow};
 pub use track::TrackError;
 
 use crate::pipeline::evaluate::Evaluator;
@@ -54,7 +54,7 @@ impl Coverage<'_> {
     pub fn rows(
         &self,
         progress: &(dyn Fn(usize, usize) + Sync),
-    ) -> Result<Vec<Row>, CoverageError> {
+    ) -> Result<Vec<CoverageRow>, CoverageError> {
         let library = self.evaluator.set();
         let rows = plan::rows(library, &self.fixed, &self.settings, self.counts);
         let total = rows.iter().map(|(_, tracks)| tracks.len()).sum();

@@ -12,7 +12,7 @@ pub(super) const WIDTH_90: f64 = 1.644_853_626_951_472_7;
 
 /// Result of the tracks of one row.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct CoverageRow {
     /// Their kind.
     #[serde(flatten)]
     pub kind: Kind,
@@ -60,7 +60,7 @@ pub struct Compared {
 pub(super) type Answer = (Track, Evaluation);
 
 /// The row of these answers.
-pub(super) fn row(kind: Kind, answers: &[Answer]) -> Row {
+pub(super) fn row(kind: Kind, answers: &[Answer]) -> CoverageRow {
     let tracks = answers.len();
     let share = |of: &dyn Fn(&Evaluation) -> bool| {
         answers.iter().filter(|(_, evaluation)| of(evaluation)).count() as f64 / tracks as f64
@@ -75,7 +75,7 @@ pub(super) fn row(kind: Kind, answers: &[Answer]) -> Row {
     let parameters = answers.first().map(|(_, it)| it.parameters()).unwrap_or_default();
     let compared =
         |all: bool| parameters.iter().map(|&of| (of, compare(of, answers, all))).collect();
-    Row {
+    CoverageRow {
         kind,
         tracks,
         any_outside: share(&|it| it.outside_library.share > 0.0),

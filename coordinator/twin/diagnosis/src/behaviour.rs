@@ -60,7 +60,7 @@ pub(crate) struct PortEvidence<'a> {
 }
 
 /// One element's best fit.
-struct Fit {
+struct ElementFit {
     behaviour: Behaviour,
     nats: f64,
 }
@@ -83,13 +83,13 @@ impl PortEvidence<'_> {
         element: Element,
         name: &'static str,
         stiffness: impl Fn(f64) -> Complex64,
-    ) -> Fit {
+    ) -> ElementFit {
         let (parameter, nats) = self.amplitude(stiffness);
-        Fit { behaviour: Behaviour { element, parameters: vec![(name, parameter)] }, nats }
+        ElementFit { behaviour: Behaviour { element, parameters: vec![(name, parameter)] }, nats }
     }
 
     /// The resonance and damping with which a mass above zero explains most.
-    fn mass_on_spring(&self) -> Option<Fit> {
+    fn mass_on_spring(&self) -> Option<ElementFit> {
         let (first, last) =
             (self.centres_hz[0].ln(), self.centres_hz[self.centres_hz.len() - 1].ln());
         let steps = RESONANCES * (self.centres_hz.len() - 1);
@@ -108,7 +108,7 @@ impl PortEvidence<'_> {
             ("damping_ratio", Estimate { mean: ratio, sd: 0.5 * ratio }),
         ];
         let behaviour = Behaviour { element: Element::MassOnSpring, parameters };
-        Some(Fit { behaviour, nats: nats - 2.0 * PARAMETER_NATS })
+        Some(ElementFit { behaviour, nats: nats - 2.0 * PARAMETER_NATS })
     }
 
     /// Best factor of a dynamic stiffness in N/m, and what it explains in nats.

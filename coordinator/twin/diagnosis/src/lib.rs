@@ -12,6 +12,7 @@ mod candidate;
 mod conclusion;
 mod estimate;
 mod forward;
+mod further_wheels;
 mod held_out;
 mod null_model;
 mod observation;
@@ -41,15 +42,15 @@ pub use forward::{Forward, Linearised};
 pub use null_model::{NullError, NullModel};
 pub use observation::Observation;
 pub use outcome::{
-    BeforeAfter, Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Mismatch, Score, Scores,
-    SleeperValues, UNKNOWN, Verdict,
+    BeforeAfter, Diagnosis, FORMAT, FitScores, Hypothesis, Levels, Location, Mismatch, Score,
+    Scores, SleeperValues, UNKNOWN, Verdict,
 };
 pub use patch_scan::{Fixed, Patch};
 pub use port_scan::{PortPlace, PortScan, UnknownElement};
 pub use prepared_recording::{PreparationError, PreparedRecording, check_track};
 pub use quantity::{Common, Own};
 pub use screen::{Template, templates};
-pub use search::{Fitted, Round, Search, Stage, first_calibration, search};
+pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search};
 pub use section::Section;
 pub use signature::signature;
 pub use spectra::{Spectra, SpeedSpectra};

@@ -7,7 +7,10 @@
 use crate::forward::Forward;
 use crate::section::Section;
 use crate::spectra::log_powers;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -151,37 +154,69 @@ impl NullModel {
     ///
     /// `pass_variance` is the variance of the mean over the passes, a value a speed and band.
     pub fn covariance(&self, bands: usize, pass_variance: &DVector<f64>) -> DMatrix<f64> {
+        let simulated = self.simulated_covariance();
+        let further = further_covariance(&simulated, bands, pass_variance);
+        (1.0 - SHRINKAGE) * simulated + further
+    }
+
+    /// The differences less their offset, each with a draw of what the simulations lack: what the passes do
+    /// not share and the prediction's own error. They scatter as [`NullModel::covariance`] says.
+    pub(crate) fn drawn(&self, bands: usize, pass_variance: &DVector<f64>) -> Vec<DVector<f64>> {
         let offset = self.offset();
-        let size = self.per_sleeper;
-        let mut sum = DMatrix::zeros(size, size);
+        let further = further_covariance(&self.simulated_covariance(), bands, pass_variance);
+        // What is no covariance makes no observation either, which is told there.
+        let none = || DMatrix::zeros(self.per_sleeper, self.per_sleeper);
+        let factor = Cholesky::new(further).map_or_else(none, Cholesky::unpack);
+        let draw = |(number, difference): (usize, &Vec<f64>)| {
+            let mut random = ChaCha8Rng::seed_from_u64(number as u64);
+            let mut drawn = DVector::from_column_slice(difference);
+            for first in (0..drawn.len()).step_by(self.per_sleeper) {
+                let normal =
+                    DVector::from_fn(self.per_sleeper, |_, _| StandardNormal.sample(&mut random));
+                let mut sleeper = drawn.rows_mut(first, self.per_sleeper);
+                sleeper -= &offset;
+                sleeper *= (1.0 - SHRINKAGE).sqrt();
+                sleeper += &factor * normal;
+            }
+            drawn
+        };
+        self.differences.par_iter().enumerate().map(draw).collect()
+    }
+
+    fn simulated_covariance(&self) -> DMatrix<f64> {
+        let offset = self.offset();
+        let mut sum = DMatrix::zeros(self.per_sleeper, self.per_sleeper);
         let mut count = 0.0;
         for part in self.parts() {
             let difference = DVector::from_column_slice(part) - &offset;
             sum.ger(1.0, &difference, &difference, 1.0);
             count += 1.0;
         }
-        sum /= count - 1.0;
-        let deviation = sum.diagonal().map(f64::sqrt);
-        DMatrix::from_fn(size, size, |i, j| {
-            let mut value = sum[(i, j)];
-            if i == j {
-                value += 1e-6;
-            } else {
-                value *= 1.0 - SHRINKAGE;
-            }
-            if i / bands == j / bands {
-                let correlation = sum[(i, j)] / (deviation[i] * deviation[j]);
-                value += correlation * (pass_variance[i] * pass_variance[j]).sqrt();
-                let distance = (i as f64 - j as f64) / PREDICTION_LENGTH;
-                value += PREDICTION_ERROR.powi(2) * (-0.5 * distance * distance).exp();
-            }
-            value
-        })
+        sum / (count - 1.0)
     }
 
     fn parts(&self) -> impl Iterator<Item = &[f64]> {
         self.differences.iter().flat_map(|row| row.chunks_exact(self.per_sleeper))
     }
+}
+
+/// What is added to the simulated covariance, of which the shrinkage takes a part.
+fn further_covariance(
+    simulated: &DMatrix<f64>,
+    bands: usize,
+    pass_variance: &DVector<f64>,
+) -> DMatrix<f64> {
+    let deviation = simulated.diagonal().map(f64::sqrt);
+    DMatrix::from_fn(simulated.nrows(), simulated.ncols(), |i, j| {
+        let mut value = if i == j { 1e-6 + SHRINKAGE * simulated[(i, i)] } else { 0.0 };
+        if i / bands == j / bands {
+            let correlation = simulated[(i, j)] / (deviation[i] * deviation[j]);
+            value += correlation * (pass_variance[i] * pass_variance[j]).sqrt();
+            let distance = (i as f64 - j as f64) / PREDICTION_LENGTH;
+            value += PREDICTION_ERROR.powi(2) * (-0.5 * distance * distance).exp();
+        }
+        value
+    })
 }
 
 /// Why there is no null model.

@@ -57,7 +57,7 @@ pub struct Diagnosis {
     /// Hypotheses, most probable first.
     pub hypotheses: Vec<Hypothesis>,
     /// How well recording and model agree, before and after.
-    pub fit: Fit,
+    pub fit: FitScores,
     /// Parameters without and with the accepted physics.
     pub bias_removed: BTreeMap<String, BeforeAfter<f64>>,
     /// The stiffness along the track.
@@ -154,7 +154,7 @@ pub struct BeforeAfter<T> {
 
 /// Mean log predictive densities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Fit {
+pub struct FitScores {
     /// What the scores are.
     pub score: String,
     /// The re-tuned baseline.

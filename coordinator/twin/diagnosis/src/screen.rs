@@ -2,6 +2,7 @@
 
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
+use crate::search::Extent;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -21,6 +22,8 @@ pub struct Template {
     pub trial: usize,
     /// Whitened change of the log powers.
     pub change: DVector<f64>,
+    /// Its product with the baseline's derivatives.
+    pub projected_gradient: DVector<f64>,
     /// The baseline's part in it: what it is multiplied with for a residual's projection.
     pub imitation: DVector<f64>,
     /// Square of its length, after the baseline has taken what it can: `d'^2`.
@@ -40,7 +43,7 @@ pub fn templates(
 ) -> Result<Vec<Template>, CalibrationError> {
     let Problem { forward, observation, .. } = *problem;
     let accepted = problem.extensions(&calibration.values)?;
-    let known = forward.transfer(&calibration.values, &accepted, false)?;
+    let known = forward.transfer_to_vary(&calibration.values, &accepted)?;
     let plain = forward.levels(&known, &calibration.values);
     let trials: Vec<(usize, usize)> = candidates
         .iter()
@@ -57,12 +60,28 @@ pub fn templates(
             progress();
             let extensions = [&accepted[..], &[built.ok()?]].concat();
             let transfer = forward.transfer_beside(&known, &calibration.values, &extensions);
-            let changed = forward.levels(&transfer.ok()?, &calibration.values);
-            let change = observation.fitted(&observation.whiten(&(changed - &plain)));
+            let sleepers = if candidate.is_everywhere() {
+                0..section.sleepers
+            } else {
+                forward.felt_at(Extent::of(candidate, section).spacings())
+            };
+            let first = sleepers.start * forward.per_sleeper();
+            let near = forward.levels_at(&transfer.ok()?, &calibration.values, sleepers);
+            let mut changed = DVector::zeros(plain.len());
+            let mut rows = changed.rows_mut(first, near.len());
+            rows.copy_from(&(near - plain.rows(first, rows.len())));
+            let change = observation.fitted(&observation.whiten(&changed));
             let projected_gradient = calibration.jacobian.tr_mul(&change);
             let imitation = calibration.precision.solve(&projected_gradient);
             let detectability = change.norm_squared() - projected_gradient.dot(&imitation);
-            Some(Template { candidate: number, trial, change, imitation, detectability })
+            Some(Template {
+                candidate: number,
+                trial,
+                change,
+                projected_gradient,
+                imitation,
+                detectability,
+            })
         })
         .collect();
     Ok(templates)

@@ -1,6 +1,6 @@
 //! A diagnosis in one sentence or two.
 
-use crate::outcome::{BeforeAfter, Fit, Hypothesis, Verdict, meet};
+use crate::outcome::{BeforeAfter, FitScores, Hypothesis, Verdict, meet};
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{Kind, PlaceKind};
 
@@ -26,7 +26,7 @@ pub(crate) fn sentence(
     hypotheses: &[Hypothesis],
     nothing_left_out: f64,
     sleepers: &[String],
-    fit: &Fit,
+    fit: &FitScores,
     bias: &BTreeMap<String, BeforeAfter<f64>>,
 ) -> String {
     let mut accepted = hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
@@ -141,7 +141,7 @@ fn is_stretch(physics: &str) -> bool {
     Kind::from_name(physics).is_some_and(|kind| kind.place == PlaceKind::Stretch)
 }
 
-fn gained(fit: &Fit) -> String {
+fn gained(fit: &FitScores) -> String {
     let gain: f64 = fit.held_out_gain_nats.values().sum();
     if gain <= 0.0 {
         return String::new();
@@ -202,7 +202,7 @@ mod tests {
         let held_out = Some(Score { score: -1.0 });
         let scores = Scores { in_sample: Score { score: -1.0 }, held_out };
         let (score, held_out_gain_nats) = (String::new(), BTreeMap::new());
-        let fit = Fit { score, before: scores, after: scores, held_out_gain_nats };
+        let fit = FitScores { score, before: scores, after: scores, held_out_gain_nats };
         let said = |nothing_left_out: f64| {
             sentence(Verdict::Consistent, &[], nothing_left_out, &track(), &fit, &BTreeMap::new())
         };
@@ -231,7 +231,7 @@ mod tests {
         let at = Location { x_m: [1.125, 1.125], sleepers: vec!["SN9".to_owned()] };
         let two = [hypothesis("wheel_flat", None), hypothesis("missing_railpad", Some(at))];
         let scores = Scores { in_sample: Score { score: -1.0 }, held_out: None };
-        let fit = Fit {
+        let fit = FitScores {
             score: String::new(),
             before: scores,
             after: scores,

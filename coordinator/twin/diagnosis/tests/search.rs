@@ -7,8 +7,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use tracktwin_diagnosis::{
-    Bands, Fixed, Forward, NullModel, PortPlace, PreparedRecording, Search, Section, candidates,
-    search,
+    Bands, Fixed, Forward, NullModel, PortPlace, PreparedRecording, SearchOutcome, Section,
+    candidates, search,
 };
 use tracktwin_parameters::TrackDesign;
 use tracktwin_track::extension::ExtensionInstance;
@@ -50,7 +50,7 @@ impl Normal {
 }
 
 /// Searches a recording of this track with an extension in it for all that the catalogue has.
-fn searched(seed: u64, extension: Option<ExtensionInstance>) -> Search {
+fn searched(seed: u64, extension: Option<ExtensionInstance>) -> SearchOutcome {
     searched_for(seed, extension, |_| true)
 }
 
@@ -59,7 +59,7 @@ fn searched_for(
     seed: u64,
     extension: Option<ExtensionInstance>,
     is_known: impl Fn(&str) -> bool,
-) -> Search {
+) -> SearchOutcome {
     let (prepared, null) = recorded(seed, extension);
     search_for(&prepared, &null, is_known)
 }
@@ -97,7 +97,7 @@ fn search_for(
     prepared: &PreparedRecording,
     null: &NullModel,
     is_known: impl Fn(&str) -> bool,
-) -> Search {
+) -> SearchOutcome {
     let mut all = candidates(&prepared.forward.section);
     all.retain(|candidate| is_known(candidate.kind.physics));
     let mut prepared = prepared.clone();

@@ -41,7 +41,7 @@ impl Quadratic {
     pub(super) fn new(calibration: &Calibration, mean: DVector<f64>) -> Self {
         let jacobian = &calibration.jacobian;
         let at_mean = &calibration.residual + jacobian * (&calibration.values - &mean);
-        let information = jacobian.tr_mul(jacobian);
+        let information = jacobian.transpose() * jacobian;
         Self { information, slope: jacobian.tr_mul(&at_mean), mean }
     }
 

@@ -28,7 +28,7 @@ pub enum MeanFunction {
 }
 
 /// Everything that is found before the final weights.
-pub struct Fit {
+pub struct HyperparameterFit {
     /// From features to inputs.
     pub input_map: InputMap,
     /// The mean.
@@ -74,7 +74,7 @@ pub fn fit(
     targets: MatRef<'_, f64>,
     scalings: &[InputScaling],
     subset: usize,
-) -> Result<Fit, Error> {
+) -> Result<HyperparameterFit, Error> {
     let subset = subset.min(features.nrows() / 3);
     let (scaling, rungs) = choose(features, targets, scalings, subset)?;
     let input_map = InputMap::fit(scaling, features, targets)?;
@@ -82,11 +82,11 @@ pub fn fit(
     let climbers = features.nrows().min(CLIMBERS_MAX);
     let mean = MeanFunction::around(scaling);
     let climbing = inputs.subrows(0, climbers);
-    let search = Search::new(climbing, mean, targets.subrows(0, climbers));
+    let search = LikelihoodSearch::new(climbing, mean, targets.subrows(0, climbers));
     let mut tried = Tried::default();
     tried.climb(&rungs, 1, &mut |rung| search.log_likelihoods(rung))?;
     let hyperparameters = tried.shared().into_iter().map(|rung| search.ladder.at(rung)).collect();
-    Ok(Fit { input_map, mean, inputs, hyperparameters })
+    Ok(HyperparameterFit { input_map, mean, inputs, hyperparameters })
 }
 
 /// The scaling with the smallest errors, and the most likely rungs under it.
@@ -109,7 +109,7 @@ fn choose(
         let inputs = map.apply(makers.0.subrows(0, trained));
         let mean = MeanFunction::around(scaling);
         let climbers = inputs.subrows(0, subset);
-        let search = Search::new(climbers, mean, makers.1.subrows(0, subset));
+        let search = LikelihoodSearch::new(climbers, mean, makers.1.subrows(0, subset));
         let needed = 2 * search.basis.ncols();
         if needed > subset {
             least = least.min(3 * needed);
@@ -156,14 +156,14 @@ fn log_errors(
 }
 
 /// Inputs and targets whose likelihood is asked for again and again.
-struct Search<'a> {
+struct LikelihoodSearch<'a> {
     distances: Mat<f64>,
     basis: Mat<f64>,
     targets: MatRef<'a, f64>,
     ladder: Ladder,
 }
 
-impl<'a> Search<'a> {
+impl<'a> LikelihoodSearch<'a> {
     fn new(inputs: MatRef<'_, f64>, mean: MeanFunction, targets: MatRef<'a, f64>) -> Self {
         let distances = distances_within(inputs);
         let basis = mean.basis(inputs);

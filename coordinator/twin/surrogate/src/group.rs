@@ -25,7 +25,7 @@ pub struct GroupKey {
 
 /// How good one model is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Score {
+pub struct ModelScore {
     /// MASE (paper, eq. 11) over the folds of the training set; 0.05 is 5 %.
     pub mase_folds: f64,
     /// MASE over the test set.
@@ -54,7 +54,7 @@ pub struct ParameterModel {
     /// Correction of the standard deviation, over the parameter mapped onto [0, 1].
     pub spread: Spread,
     /// How good it is.
-    pub score: Score,
+    pub score: ModelScore,
 }
 
 /// A predicted value, in the parameter's unit.

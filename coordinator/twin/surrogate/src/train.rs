@@ -4,8 +4,8 @@ use crate::distance::distances_within;
 use crate::group::different;
 use crate::validate::{coverage, folds, folds_with_own_maps, mase};
 use crate::{
-    Error, Factor, FeatureColumns, Fit, Folds, GroupKey, Hyperparameters, InputScaling, ModelGroup,
-    ParameterModel, Score, Split, Spread, Trained, TrainingSet, fit,
+    Error, Factor, FeatureColumns, Folds, GroupKey, HyperparameterFit, Hyperparameters,
+    InputScaling, ModelGroup, ModelScore, ParameterModel, Split, Spread, Trained, TrainingSet, fit,
 };
 use faer::Mat;
 use std::sync::OnceLock;
@@ -154,7 +154,7 @@ fn speed_indices(set: &TrainingSet, key: &GroupKey) -> Vec<usize> {
 fn held_out(
     features: &Mat<f64>,
     targets: &Mat<f64>,
-    fit: &Fit,
+    fit: &HyperparameterFit,
     at: &[Hyperparameters],
     count: usize,
 ) -> Result<Vec<Folds>, Error> {
@@ -176,7 +176,7 @@ fn held_out(
 fn weigh(
     set: &TrainingSet,
     key: &GroupKey,
-    fit: Fit,
+    fit: HyperparameterFit,
     targets: &Mat<f64>,
 ) -> Result<ModelGroup, Error> {
     let away = distances_within(fit.inputs.as_ref());
@@ -199,7 +199,7 @@ fn weigh(
                 signal_variance: all.signal_variances[j],
                 log_likelihood: all.log_likelihoods[j],
                 spread: Spread::none(),
-                score: Score::default(),
+                score: ModelScore::default(),
             });
         }
         factors.push((at, OnceLock::from(factor)));

@@ -4,7 +4,7 @@ use crate::picture::{Picture, Scale, Style};
 use crate::speed::hertz;
 use crate::{ClaimVerdict, Compared, Error, Figure};
 use tracktwin_parameters::{Preset, TrackDesign};
-use tracktwin_track::frequency::{self, Place, peaks};
+use tracktwin_track::frequency::{self, ReceptancePoint, peaks};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
 /// Spans of the paper's track (Table D1).
@@ -49,7 +49,7 @@ pub(crate) fn hammer_tests(design: &TrackDesign) -> Result<Vec<HammerTest>, Erro
         let model = TrackModel::build(design, &mesh, &supports, &[])?;
         for (place, offset) in [("sleeper", 0.0), ("midspan", 0.5)] {
             let x_m = ((spans / 2) as f64 + offset) * design.sleeper.spacing_m;
-            let at = Place::Rail(x_m);
+            let at = ReceptancePoint::Rail(x_m);
             let values = frequency::receptance(&model, at, at, &frequencies_hz)?;
             let magnitudes = values.iter().map(|value| value.norm()).collect();
             let frequencies_hz = frequencies_hz.clone();

@@ -4,7 +4,7 @@
 
 use crate::known::kind;
 use nalgebra::DVector;
-use tracktwin_diagnosis::{CalibrationError, PreparedRecording, Search, signature};
+use tracktwin_diagnosis::{CalibrationError, PreparedRecording, SearchOutcome, signature};
 use tracktwin_reference_simulator::{Hidden, Scene};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::ExtensionInstance;
@@ -16,7 +16,7 @@ use tracktwin_track::extension::ExtensionInstance;
 pub fn detectability(
     recording: &Recording,
     prepared: &PreparedRecording,
-    search: &Search,
+    search: &SearchOutcome,
     scene: &Scene,
     hidden: &Hidden,
 ) -> Result<Option<f64>, CalibrationError> {

@@ -70,7 +70,7 @@ mod tests {
         assert_felt_alike_in_both_solvers, direct_receptance, instance, relative_distance, track,
         track_on,
     };
-    use crate::frequency::Place;
+    use crate::frequency::ReceptancePoint;
     use crate::model::Support;
     use tracktwin_parameters::ParameterSet;
 
@@ -78,9 +78,9 @@ mod tests {
     fn a_vertical_clamp_is_more_stiffness_of_the_railpad() {
         let clamps = instance("fastening_clamp").with("vertical_N_per_m", 5e7);
         let mut support = Support::from(&ParameterSet::nominal());
-        let clamped = direct_receptance(&track(&[clamps]), Place::Rail(0.8));
+        let clamped = direct_receptance(&track(&[clamps]), ReceptancePoint::Rail(0.8));
         support.railpad_stiffness += 5e7;
-        let stiffer = direct_receptance(&track_on(support, &[]), Place::Rail(0.8));
+        let stiffer = direct_receptance(&track_on(support, &[]), ReceptancePoint::Rail(0.8));
         // Sums in another order.
         assert!(relative_distance(&clamped, &stiffer) < 1e-9);
     }
@@ -91,7 +91,7 @@ mod tests {
         let clamp = instance("fastening_clamp").on([5]).with("rotational_N_m_per_rad", 3e5);
         let (with, without) = (track(&[clamp]), track(&[]));
         let felt = |x_m: f64| {
-            let place = Place::Rail(x_m);
+            let place = ReceptancePoint::Rail(x_m);
             relative_distance(&direct_receptance(&with, place), &direct_receptance(&without, place))
         };
         assert!(felt(0.75) < 1e-9, "{}", felt(0.75));

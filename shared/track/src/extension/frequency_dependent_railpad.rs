@@ -69,18 +69,21 @@ mod tests {
         FREQUENCIES_HZ, assert_felt_alike_in_both_solvers, direct_receptance, instance,
         relative_distance, track, track_on,
     };
-    use crate::frequency::Place;
+    use crate::frequency::ReceptancePoint;
     use crate::model::Support;
     use tracktwin_parameters::ParameterSet;
 
     fn relaxing(time_s: f64) -> Vec<rustfft::num_complex::Complex64> {
         let pads = instance("frequency_dependent_railpad").with("stiffness_ratio", 0.5);
-        direct_receptance(&track(&[pads.with("relaxation_time_s", time_s)]), Place::Rail(0.75))
+        direct_receptance(
+            &track(&[pads.with("relaxation_time_s", time_s)]),
+            ReceptancePoint::Rail(0.75),
+        )
     }
 
     #[test]
     fn a_pad_that_relaxes_at_once_is_the_plain_one() {
-        let plain = direct_receptance(&track(&[]), Place::Rail(0.75));
+        let plain = direct_receptance(&track(&[]), ReceptancePoint::Rail(0.75));
         // Omega tau is 2e-6 at the highest frequency.
         assert!(relative_distance(&relaxing(1e-10), &plain) < 1e-5);
         // At rest it is the plain one in any case.
@@ -92,7 +95,7 @@ mod tests {
     fn a_pad_that_never_relaxes_has_both_stiffnesses() {
         let mut support = Support::from(&ParameterSet::nominal());
         support.railpad_stiffness *= 1.5;
-        let stiffer = direct_receptance(&track_on(support, &[]), Place::Rail(0.75));
+        let stiffer = direct_receptance(&track_on(support, &[]), ReceptancePoint::Rail(0.75));
         // From 120 Hz on: omega tau is above 7e5.
         let error = relative_distance(&relaxing(1e3)[1..], &stiffer[1..]);
         assert!(error < 1e-5, "{error}");

@@ -110,7 +110,7 @@ mod tests {
     use crate::extension::testing::{
         direct_receptance, distance, instance, pass_at, relative_distance, track, track_on,
     };
-    use crate::frequency::{Place, receptance};
+    use crate::frequency::{ReceptancePoint, receptance};
     use crate::model::{Surface, TrackModel};
     use crate::time::{self, Pass};
     use tracktwin_parameters::ParameterSet;
@@ -133,9 +133,9 @@ mod tests {
     #[test]
     fn a_gap_that_closes_takes_over_from_the_rail() {
         let (open, closed) = (hanging(1.0), hanging(0.0));
-        let place = Place::SleeperSeat(5);
+        let place = ReceptancePoint::SleeperSeat(5);
         let of = |from, to| receptance(&open, from, to, &[0.0]).unwrap()[0].re;
-        let (own, cross) = (of(place, place), of(Place::Rail(0.75), place));
+        let (own, cross) = (of(place, place), of(ReceptancePoint::Rail(0.75), place));
         let stiffness = rigid().ballast_stiffness;
         for gap_m in [0.0, 2e-5, 5e-5] {
             // What the open gap would close by, less what the ballast pushes back.
@@ -164,7 +164,7 @@ mod tests {
         let kept = instance("hanging_sleeper").on([5]).with("gap_m", 1.0);
         let kept = track_on(rigid(), &[kept.with("damping_share", 0.4)]);
         let plain = track_on(rigid(), &[]);
-        let seat = Place::SleeperSeat(5);
+        let seat = ReceptancePoint::SleeperSeat(5);
         let of = |model: &TrackModel, hz| {
             let receptance = receptance(model, seat, seat, &[hz]).unwrap()[0];
             receptance.inv()
@@ -194,7 +194,7 @@ mod tests {
     fn in_the_matrices_a_gap_that_closes_under_the_wheel_is_closed() {
         let [closing, open] = [2e-5, 1.0].map(hanging);
         let plain = track_on(rigid(), &[]);
-        let of = |model| direct_receptance(model, Place::Rail(0.75));
+        let of = |model| direct_receptance(model, ReceptancePoint::Rail(0.75));
         // What was taken away and put back again: rounding.
         assert!(relative_distance(&of(&closing), &of(&plain)) < 1e-9);
         assert!(relative_distance(&of(&open), &of(&plain)) > 0.05);

@@ -80,7 +80,7 @@ pub enum InstanceError {
     #[error(
         "{physics}: its place must be {form}, on the track of {length_m} m and {sleepers} sleepers"
     )]
-    Place {
+    ReceptancePoint {
         /// Name of the kind.
         physics: String,
         /// What place it must have.
@@ -258,7 +258,7 @@ impl Inputs<'_> {
         if fits {
             return Ok(());
         }
-        Err(InstanceError::Place {
+        Err(InstanceError::ReceptancePoint {
             physics: self.kind.physics.to_owned(),
             form: self.kind.place.form(),
             length_m: self.length_m(),

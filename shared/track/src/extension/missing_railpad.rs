@@ -57,7 +57,7 @@ mod tests {
         assert_felt_alike_in_both_solvers, direct_receptance, instance, relative_distance, track,
         track_on,
     };
-    use crate::frequency::Place;
+    use crate::frequency::ReceptancePoint;
     use crate::model::Support;
     use tracktwin_parameters::ParameterSet;
 
@@ -67,8 +67,8 @@ mod tests {
         let soft = Support::from(&ParameterSet::nominal());
         let railpad_damping = soft.railpad_damping * 1e7 / soft.railpad_stiffness;
         let soft = Support { railpad_stiffness: 1e7, railpad_damping, ..soft };
-        let missing = direct_receptance(&track(&[missing]), Place::Rail(0.75));
-        let soft = direct_receptance(&track_on(soft, &[]), Place::Rail(0.75));
+        let missing = direct_receptance(&track(&[missing]), ReceptancePoint::Rail(0.75));
+        let soft = direct_receptance(&track_on(soft, &[]), ReceptancePoint::Rail(0.75));
         // What is taken out again cancels up to rounding.
         assert!(relative_distance(&missing, &soft) < 1e-9);
     }

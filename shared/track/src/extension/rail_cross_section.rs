@@ -67,7 +67,7 @@ impl Extension for RailCrossSection {
 #[cfg(test)]
 mod tests {
     use crate::extension::testing::{FREQUENCIES_HZ, instance, pass_at, track};
-    use crate::frequency::{Place, receptance};
+    use crate::frequency::{ReceptancePoint, receptance};
     use crate::model::{HertzContact, Surface, TrackModel};
     use crate::time;
     use rustfft::num_complex::Complex64;
@@ -114,7 +114,7 @@ mod tests {
             let expected = |model: &TrackModel| {
                 let (omega, contact) = (TAU * 2e3, HertzContact::new(model.design()));
                 let stiffness = 1.5 * 4500.0 / contact.approach(4500.0);
-                let place = Place::Rail(0.68);
+                let place = ReceptancePoint::Rail(0.68);
                 let rail = receptance(model, place, place, &[2e3]).unwrap()[0];
                 let vehicle = model.vehicle();
                 let force = 1e-9 / (1.0 / stiffness + rail + vehicle.receptance(omega));

@@ -83,7 +83,7 @@ mod tests {
     use crate::extension::testing::{
         assert_felt_alike_in_both_solvers, extension, instance, track,
     };
-    use crate::frequency::{Place, receptance};
+    use crate::frequency::{ReceptancePoint, receptance};
     use crate::model::{Mesh, Support, TrackModel};
     use tracktwin_parameters::TrackDesign;
 
@@ -106,7 +106,7 @@ mod tests {
         });
         let (mesh, joint) = (Mesh::uniform(2, elements, 2), Vec::from_iter(joint));
         let model = TrackModel::build(&design, &mesh, &[NOTHING], &joint).unwrap();
-        let middle = Place::Rail(0.125);
+        let middle = ReceptancePoint::Rail(0.125);
         receptance(&model, middle, middle, &[0.0]).unwrap()[0].re
     }
 

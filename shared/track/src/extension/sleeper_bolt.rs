@@ -58,7 +58,7 @@ impl Extension for SleeperBolt {
 #[cfg(test)]
 mod tests {
     use crate::extension::ExtensionInstance;
-    use crate::frequency::{Place, receptance};
+    use crate::frequency::{ReceptancePoint, receptance};
     use crate::model::{Mesh, Support, Surface, TrackModel};
     use crate::time::{self, Pass};
     use rustfft::num_complex::Complex64;
@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn one_bolt_changes_the_receptance_as_sherman_and_morrison_say() {
         let (plain, bolted) = (track(&[]), track(&[BOLTED]));
-        let (rail, tip) = (Place::Rail(0.8), Place::SleeperTip(BOLTED));
+        let (rail, tip) = (ReceptancePoint::Rail(0.8), ReceptancePoint::SleeperTip(BOLTED));
         let frequencies = [0.0, 100.0, 700.0, 2800.0];
         let of = |model: &TrackModel, from, to| receptance(model, from, to, &frequencies).unwrap();
         let (direct, cross) = (of(&plain, rail, rail), of(&plain, rail, tip));
@@ -99,7 +99,9 @@ mod tests {
     #[test]
     fn bolts_stiffen_the_track_under_a_standing_load() {
         let static_receptance = |model: &TrackModel| {
-            receptance(model, Place::Rail(0.75), Place::Rail(0.75), &[0.0]).unwrap()[0].re
+            receptance(model, ReceptancePoint::Rail(0.75), ReceptancePoint::Rail(0.75), &[0.0])
+                .unwrap()[0]
+                .re
         };
         let all: Vec<usize> = (0..SPANS - 1).collect();
         let ratio = static_receptance(&track(&all)) / static_receptance(&track(&[]));

@@ -84,7 +84,7 @@ mod tests {
         assert_felt_alike_in_both_solvers, direct_receptance, instance, relative_distance, track,
         track_on,
     };
-    use crate::frequency::Place;
+    use crate::frequency::ReceptancePoint;
     use crate::model::Support;
     use tracktwin_parameters::ParameterSet;
 
@@ -95,8 +95,8 @@ mod tests {
 
     #[test]
     fn a_layer_as_hard_as_the_ground_is_none() {
-        let with = direct_receptance(&track(&[layer(1e-9, 1e16)]), Place::Rail(0.8));
-        let without = direct_receptance(&track(&[]), Place::Rail(0.8));
+        let with = direct_receptance(&track(&[layer(1e-9, 1e16)]), ReceptancePoint::Rail(0.8));
+        let without = direct_receptance(&track(&[]), ReceptancePoint::Rail(0.8));
         // The ballast is a thousand-millionth of the layer's stiffness.
         assert!(relative_distance(&with, &without) < 1e-6);
     }
@@ -107,8 +107,9 @@ mod tests {
             Support { sleeper_bending_stiffness: 5e9, ..Support::from(&ParameterSet::nominal()) };
         let ballast_stiffness = 1.0 / (1.0 / rigid.ballast_stiffness + 1.0 / 6e7);
         let series = Support { ballast_stiffness, ..rigid };
-        let layered = direct_receptance(&track_on(rigid, &[layer(3.0, 6e7)]), Place::Rail(0.75));
-        let series = direct_receptance(&track_on(series, &[]), Place::Rail(0.75));
+        let layered =
+            direct_receptance(&track_on(rigid, &[layer(3.0, 6e7)]), ReceptancePoint::Rail(0.75));
+        let series = direct_receptance(&track_on(series, &[]), ReceptancePoint::Rail(0.75));
         // The sleeper bends by a millionth of what it sinks.
         assert!(relative_distance(&layered[..1], &series[..1]) < 1e-5);
     }

@@ -1,7 +1,7 @@
 //! What the tests of several kinds share.
 
 use super::{Extension, ExtensionInstance};
-use crate::frequency::{Place, receptance};
+use crate::frequency::{ReceptancePoint, receptance};
 use crate::model::{Mesh, Support, Surface, TrackModel};
 use crate::time::{self, Pass};
 use rustfft::num_complex::Complex64;
@@ -36,7 +36,7 @@ pub(super) fn track(instances: &[ExtensionInstance]) -> TrackModel {
     track_on(Support::from(&ParameterSet::nominal()), instances)
 }
 
-pub(super) fn direct_receptance(model: &TrackModel, place: Place) -> Vec<Complex64> {
+pub(super) fn direct_receptance(model: &TrackModel, place: ReceptancePoint) -> Vec<Complex64> {
     receptance(model, place, place, &FREQUENCIES_HZ).unwrap()
 }
 

@@ -27,7 +27,7 @@ pub enum InstanceTextError {
         "`{0}` is not a place; write `2.43m`, `2m-3m`, `SN18`, `SN10-SN30`, `SN10-SN30/4` \
              or several sleepers separated by commas"
     )]
-    Place(String),
+    ReceptancePoint(String),
 }
 
 impl FromStr for ExtensionInstance {
@@ -70,12 +70,12 @@ fn stretch(text: &str) -> Result<[f64; 2], InstanceTextError> {
     let (from, to) = text.split_once('-').unwrap_or((text, text));
     match (metres(from), metres(to)) {
         (Ok(from), Ok(to)) => Ok([from, to]),
-        _ => Err(InstanceTextError::Place(text.to_owned())),
+        _ => Err(InstanceTextError::ReceptancePoint(text.to_owned())),
     }
 }
 
 fn sleepers(text: &str) -> Result<Vec<usize>, InstanceTextError> {
-    let wrong = || InstanceTextError::Place(text.to_owned());
+    let wrong = || InstanceTextError::ReceptancePoint(text.to_owned());
     let number = |id: &str| id.strip_prefix("SN").and_then(|digits| digits.parse::<usize>().ok());
     let mut sleepers: Vec<usize> = Vec::new();
     for part in text.split(',') {

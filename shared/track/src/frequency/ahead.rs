@@ -52,13 +52,14 @@ impl Partition<'_> {
         omega: impl Fn(usize) -> f64,
         pairs: &[Vec<(usize, usize, f64)>],
     ) -> Vec<Lane> {
-        let (rail, inverse) = self.inverted(omega);
+        let inverse = self.inverted(omega);
         let mut work = vec![Lane::default(); self.rail_dofs];
         let mut sums = vec![Lane::default(); pairs.len()];
         for (sum, pairs) in sums.iter_mut().zip(pairs) {
             for &(one, other, share) in pairs {
-                let place = (one.min(other), one.max(other));
-                *sum = *sum + rail.inverse_entry(&inverse, place, &mut work) * Lane::real(share);
+                let (row, column) = (one.min(other), one.max(other));
+                inverse.column_above(column, row, &mut work);
+                *sum = *sum + work[row] * Lane::real(share);
             }
         }
         sums
@@ -69,7 +70,7 @@ impl Partition<'_> {
 mod tests {
     use super::super::rail::tests::track;
     use super::*;
-    use crate::frequency::{Place, receptance};
+    use crate::frequency::{ReceptancePoint, receptance};
 
     #[test]
     fn receptances_ahead_are_those_of_the_general_solver() {
@@ -83,8 +84,8 @@ mod tests {
                 .map(|more_m| receptances_ahead(&track, &frequencies, distance_m + more_m));
             for node in [7, 16, 20] {
                 let at = |x_m: f64| {
-                    let from = Place::Rail(nodes_m[node]);
-                    receptance(&track, from, Place::Rail(x_m), &frequencies).unwrap()
+                    let from = ReceptancePoint::Rail(nodes_m[node]);
+                    receptance(&track, from, ReceptancePoint::Rail(x_m), &frequencies).unwrap()
                 };
                 let there_m = nodes_m[node] + distance_m;
                 let [cross, next] = [there_m, there_m + spacing_m].map(at);

@@ -8,15 +8,19 @@
 )]
 
 mod ahead;
+mod banded;
 mod lane;
 mod peaks;
+mod piece;
 mod rail;
 mod receptance;
 mod receptances;
 mod states;
+mod varied;
 
 pub use ahead::{receptances_ahead, shares};
 pub use peaks::{Peak, peaks};
 pub use rail::seat_stiffness;
-pub use receptance::{FrequencyError, Place, receptance};
-pub use receptances::RailReceptances;
+pub use receptance::{FrequencyError, ReceptancePoint, receptance};
+pub use receptances::{RailReceptances, SeatReceptances};
+pub use varied::KnownRail;

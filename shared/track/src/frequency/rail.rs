@@ -4,60 +4,63 @@
 //! whose inverse is taken only where it is asked for. A hundred times faster than solving for one
 //! place after the other, on the same matrices.
 
-use super::lane::{Banded, LANES, Lane};
-use super::receptances::RailReceptances;
+use super::banded::{Banded, Inverse};
+use super::lane::{LANES, Lane};
+use super::piece::{Piece, pieces};
+use super::receptances::{RailReceptances, SeatReceptances};
 use super::states::States;
 use crate::model::{Matrices, TrackModel};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
-
-/// Degrees of freedom off the rail that hang together, such as a sleeper's.
-struct Piece {
-    /// Its degrees of freedom, the last ones next to the rail.
-    dofs: Vec<usize>,
-    width: usize,
-    /// Places in the matrices, with local row and column, of the lower triangle.
-    inner: Vec<(usize, usize, usize)>,
-    /// Rail degrees of freedom that it touches, each with local rows and places.
-    touched: Vec<(usize, Vec<(usize, usize)>)>,
-}
+use std::ops::Range;
 
 /// How the matrices of a track come apart into the rail and what hangs on it.
 pub(super) struct Partition<'a> {
-    matrices: &'a Matrices,
+    pub(super) matrices: &'a Matrices,
     pub(super) rail_dofs: usize,
     width: usize,
-    rail: Vec<(usize, usize, usize)>,
-    pieces: Vec<Piece>,
+    /// Row, column and place in the matrices of the rail's own entries, of the lower triangle.
+    pub(super) rail: Vec<(usize, usize, usize)>,
+    pub(super) pieces: Vec<Piece>,
 }
 
 impl RailReceptances {
-    /// Works them out, with those from every rail seat if `from_seats`: at each node those of the
-    /// track as it is while the wheel stands there.
+    /// Works them out, with those from every rail seat to so many nodes on either side where `reach` says
+    /// it: at each node those of the track as it is while the wheel stands there.
     ///
     /// Solves `K + i w C - w^2 M` on the model's own matrices, in the convention `exp(+i w t)`.
-    pub fn new(model: &TrackModel, frequencies_hz: &[f64], from_seats: bool) -> Self {
-        let of = |track: &TrackModel| Self::of_matrices(track, frequencies_hz, from_seats);
+    pub fn new(model: &TrackModel, frequencies_hz: &[f64], reach: Option<usize>) -> Self {
+        let of = |track: &TrackModel| Self::of_matrices(track, frequencies_hz, reach);
         match States::new(model) {
             Some(states) => states.mix(of),
             None => of(model),
         }
     }
 
-    fn of_matrices(model: &TrackModel, frequencies_hz: &[f64], from_seats: bool) -> Self {
+    /// The same on the model's matrices, wherever the wheel stands.
+    pub(super) fn of_matrices(
+        model: &TrackModel,
+        frequencies_hz: &[f64],
+        reach: Option<usize>,
+    ) -> Self {
         let partition = Partition::new(model);
         let layout = model.layout();
         let nodes: Vec<_> =
             (0..layout.rail_nodes_m().len()).map(|node| layout.rail_node_dofs(node)[0]).collect();
-        let sleepers = if from_seats { layout.sleepers() } else { &[] };
-        let seats: Vec<_> = sleepers.iter().map(|sleeper| nodes[sleeper.rail_node]).collect();
+        let seats = layout.sleepers().iter().map(|sleeper| sleeper.rail_node);
+        let near = |seat: usize, reach: usize| Near {
+            seat,
+            nodes: seat.saturating_sub(reach)..(seat + reach + 1).min(nodes.len()),
+        };
+        let near: Vec<Near> =
+            reach.map_or(Vec::new(), |reach| seats.map(|seat| near(seat, reach)).collect());
         let solved: Vec<_> = frequencies_hz
             .par_chunks(LANES)
             .map(|chunk| {
                 let omega = |lane: usize| TAU * chunk[lane.min(chunk.len() - 1)];
-                let lanes = pulp::Arch::new().dispatch(|| partition.solve(omega, &nodes, &seats));
-                (0..chunk.len()).map(|lane| lanes.unpack(lane)).collect::<Vec<_>>()
+                let lanes = pulp::Arch::new().dispatch(|| partition.solve(omega, &nodes, &near));
+                (0..chunk.len()).map(|lane| lanes.unpack(lane, &near)).collect::<Vec<_>>()
             })
             .collect();
         let (direct, from_seats) = solved.into_iter().flatten().unzip();
@@ -87,6 +90,42 @@ pub fn seat_stiffness(model: &TrackModel, frequencies_hz: &[f64]) -> Vec<Vec<Com
     chunks.collect()
 }
 
+/// A rail seat's node, and the nodes near it.
+struct Near {
+    seat: usize,
+    nodes: Range<usize>,
+}
+
+impl Near {
+    /// Receptances from the seat to the nodes near it, by the rail's inverse and that of the mirrored
+    /// rail.
+    #[inline(always)]
+    fn receptances(
+        &self,
+        dofs: &[Option<usize>],
+        [inverse, mirrored]: [&Inverse; 2],
+        work: &mut [Lane],
+    ) -> Vec<Lane> {
+        let mut values = vec![Lane::default(); self.nodes.len()];
+        let Some(seat) = dofs[self.seat] else { return values };
+        let last = work.len() - 1;
+        let (before, after) = (self.nodes.start..self.seat + 1, self.seat..self.nodes.end);
+        // The seat itself is not held.
+        let first = dofs[before.clone()].iter().flatten().next().map_or(seat, |first| *first);
+        inverse.column_above(seat, first, work);
+        for node in before {
+            values[node - self.nodes.start] = dofs[node].map_or(Lane::default(), |dof| work[dof]);
+        }
+        let end = dofs[after.clone()].iter().flatten().next_back().map_or(seat, |end| *end);
+        mirrored.column_above(last - seat, last - end, work);
+        for node in after {
+            let at = |dof: usize| work[last - dof];
+            values[node - self.nodes.start] = dofs[node].map_or(Lane::default(), at);
+        }
+        values
+    }
+}
+
 /// What is known at [`LANES`] frequencies.
 struct Solved {
     direct: Vec<Lane>,
@@ -94,9 +133,14 @@ struct Solved {
 }
 
 impl Solved {
-    fn unpack(&self, lane: usize) -> (Vec<Complex64>, Vec<Vec<Complex64>>) {
+    fn unpack(&self, lane: usize, near: &[Near]) -> (Vec<Complex64>, Vec<SeatReceptances>) {
         let values = |lanes: &Vec<Lane>| lanes.iter().map(|value| value.get(lane)).collect();
-        (values(&self.direct), self.from_seats.iter().map(values).collect())
+        let of_seat = |(lanes, near): (&Vec<Lane>, &Near)| SeatReceptances {
+            first: near.nodes.start,
+            values: values(lanes),
+        };
+        let from_seats = self.from_seats.iter().zip(near).map(of_seat).collect();
+        (values(&self.direct), from_seats)
     }
 }
 
@@ -137,7 +181,7 @@ impl<'a> Partition<'a> {
 
     /// The value of `K + i w C - w^2 M` at a place of the matrices.
     #[inline(always)]
-    fn dynamic_stiffness(&self, omega: impl Fn(usize) -> f64) -> impl Fn(usize) -> Lane {
+    pub(super) fn dynamic_stiffness(&self, omega: impl Fn(usize) -> f64) -> impl Fn(usize) -> Lane {
         move |place: usize| {
             let (mass, damping, stiffness) = (
                 self.matrices.mass()[place],
@@ -159,129 +203,68 @@ impl<'a> Partition<'a> {
             rail.add(row, column, value(place));
         }
         for piece in &self.pieces {
-            piece.condense(value, &mut rail);
+            piece.condense(value, |row, column, value| rail.add(row, column, value));
         }
         rail
     }
 
-    /// The rail's factor, and its inverse in the band.
+    /// The inverse of the rail with all that hangs on it.
     #[inline(always)]
-    pub(super) fn inverted(&self, omega: impl Fn(usize) -> f64) -> (Banded, Banded) {
-        let mut rail = self.rail(&self.dynamic_stiffness(omega));
-        rail.factor();
-        let mut inverse = Banded::zeros(self.rail_dofs, self.width);
-        rail.selected_inverse(&mut inverse);
-        (rail, inverse)
+    pub(super) fn inverted(&self, omega: impl Fn(usize) -> f64) -> Inverse {
+        Inverse::new(self.rail(&self.dynamic_stiffness(omega)))
     }
 
+    /// The same, and the inverse of the mirrored rail.
+    #[inline(always)]
+    pub(super) fn inverted_both(&self, omega: impl Fn(usize) -> f64) -> [Inverse; 2] {
+        let rail = self.rail(&self.dynamic_stiffness(omega));
+        let mirrored = rail.mirrored();
+        [Inverse::new(rail), Inverse::new(mirrored)]
+    }
+
+    /// `nodes` are the degrees of freedom of the rail's deflection, of held nodes none.
     #[inline(always)]
     fn solve(
         &self,
         omega: impl Fn(usize) -> f64,
         nodes: &[Option<usize>],
-        seats: &[Option<usize>],
+        near: &[Near],
     ) -> Solved {
-        let (rail, inverse) = self.inverted(omega);
+        // From a seat on, a column of the inverse is one of the mirrored matrix, up to its diagonal.
+        let (inverse, mirrored) = if near.is_empty() {
+            (self.inverted(omega), None)
+        } else {
+            let [inverse, mirrored] = self.inverted_both(omega);
+            (inverse, Some(mirrored))
+        };
         let free = |dof: &Option<usize>| dof.map_or(Lane::default(), |dof| inverse.diagonal(dof));
         let direct = nodes.iter().map(free).collect();
-        let column = |seat: &Option<usize>| {
-            let mut column = vec![Lane::default(); self.rail_dofs];
-            if let Some(seat) = *seat {
-                column[seat] = Lane::real(1.0);
-                rail.forward(&mut column, seat);
-                rail.backward(&mut column);
-            }
-            nodes.iter().map(|dof| dof.map_or(Lane::default(), |dof| column[dof])).collect()
+        let mut work = vec![Lane::default(); self.rail_dofs];
+        let of_seat = |near: &Near| match &mirrored {
+            Some(mirrored) => near.receptances(nodes, [&inverse, mirrored], &mut work),
+            None => Vec::new(),
         };
-        Solved { direct, from_seats: seats.iter().map(column).collect() }
+        let from_seats = near.iter().map(of_seat).collect();
+        Solved { direct, from_seats }
     }
-}
-
-impl Piece {
-    fn touch(&mut self, rail_dof: usize, local_row: usize, place: usize) {
-        match self.touched.iter_mut().find(|(dof, _)| *dof == rail_dof) {
-            Some((_, entries)) => entries.push((local_row, place)),
-            None => self.touched.push((rail_dof, vec![(local_row, place)])),
-        }
-    }
-
-    /// How far apart the rail's degrees of freedom are that it joins.
-    fn reach(&self) -> usize {
-        let dofs = self.touched.iter().map(|(dof, _)| *dof);
-        dofs.clone().max().unwrap_or(0) - dofs.min().unwrap_or(0)
-    }
-
-    /// Adds `-A_rp A_pp⁻¹ A_pr` to the rail.
-    #[inline(always)]
-    fn condense(&self, value: &impl Fn(usize) -> Lane, rail: &mut Banded) {
-        let mut own = Banded::zeros(self.dofs.len(), self.width);
-        for &(row, column, place) in &self.inner {
-            own.add(row, column, value(place));
-        }
-        own.factor();
-        let solved = self.touched.iter().map(|(_, entries)| {
-            let mut column = vec![Lane::default(); self.dofs.len()];
-            for &(row, place) in entries {
-                column[row] = column[row] + value(place);
-            }
-            let first = entries.iter().map(|&(row, _)| row).min().unwrap_or(0);
-            own.forward(&mut column, first);
-            column
-        });
-        let solved: Vec<Vec<Lane>> = solved.collect();
-        for (a, left) in solved.iter().enumerate() {
-            for (b, right) in solved.iter().enumerate().take(a + 1) {
-                let mut sum = Lane::default();
-                for (row, (x, y)) in left.iter().zip(right).enumerate() {
-                    sum = sum - *x * *y * own.inverse_pivot(row);
-                }
-                let (row, column) = (self.touched[a].0, self.touched[b].0);
-                rail.add(row.max(column), row.min(column), sum);
-            }
-        }
-    }
-}
-
-/// Groups of degrees of freedom off the rail that hang together, those next to the rail last.
-fn pieces(matrices: &Matrices, rail_dofs: usize) -> Vec<Piece> {
-    let mut seen = vec![false; matrices.size()];
-    let mut pieces = Vec::new();
-    for start in rail_dofs..matrices.size() {
-        if seen[start] {
-            continue;
-        }
-        seen[start] = true;
-        let mut dofs = vec![start];
-        let mut next = 0;
-        while next < dofs.len() {
-            let row = dofs[next];
-            next += 1;
-            for place in matrices.row_starts()[row]..matrices.row_starts()[row + 1] {
-                let column = matrices.columns()[place];
-                if column >= rail_dofs && !seen[column] {
-                    seen[column] = true;
-                    dofs.push(column);
-                }
-            }
-        }
-        // Sleepers count from the rail seat outwards, so that descending numbers end next to it.
-        dofs.sort_unstable_by(|a, b| b.cmp(a));
-        pieces.push(Piece { dofs, width: 0, inner: Vec::new(), touched: Vec::new() });
-    }
-    pieces
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
     use crate::extension::ExtensionInstance;
-    use crate::frequency::{Place, receptance};
+    use crate::frequency::{ReceptancePoint, receptance};
     use crate::model::{Mesh, Support};
     use tracktwin_parameters::{ParameterSet, TrackDesign};
 
-    const SPANS: usize = 9;
+    pub(in crate::frequency) const SPANS: usize = 9;
 
     pub(in crate::frequency) fn track() -> TrackModel {
+        track_with(&[])
+    }
+
+    /// The same with further extensions.
+    pub(in crate::frequency) fn track_with(further: &[ExtensionInstance]) -> TrackModel {
         let supports = (1..SPANS)
             .map(|sleeper| {
                 let nominal = Support::from(&ParameterSet::nominal());
@@ -291,8 +274,11 @@ pub(super) mod tests {
             .collect::<Vec<_>>();
         let (design, mesh) = (TrackDesign::v_track(), Mesh::uniform(SPANS, 4, 4));
         let bolts = ExtensionInstance::new("sleeper_bolt").with("stiffness_N_per_m", 3e7);
-        let bolts = bolts.on([2, 5]).build(&design, SPANS).unwrap();
-        TrackModel::build(&design, &mesh, &supports, &[bolts]).unwrap()
+        let extensions: Vec<_> = std::iter::once(&bolts.on([2, 5]))
+            .chain(further)
+            .map(|extension| extension.build(&design, SPANS).unwrap())
+            .collect();
+        TrackModel::build(&design, &mesh, &supports, &extensions).unwrap()
     }
 
     #[test]
@@ -300,17 +286,18 @@ pub(super) mod tests {
         let track = track();
         // More than one group of lanes, and one that is not full.
         let frequencies: Vec<f64> = (0..11).map(|k| 60.0 * 1.5_f64.powi(k)).collect();
-        let fast = RailReceptances::new(&track, &frequencies, true);
+        let fast = RailReceptances::new(&track, &frequencies, Some(200));
         let layout = track.layout();
         let seat = layout.sleepers()[3].position_m;
         for node in [5, 16, 30] {
-            let place = Place::Rail(layout.rail_nodes_m()[node]);
+            let place = ReceptancePoint::Rail(layout.rail_nodes_m()[node]);
             let direct = receptance(&track, place, place, &frequencies).unwrap();
-            let cross = receptance(&track, Place::Rail(seat), place, &frequencies).unwrap();
+            let cross =
+                receptance(&track, ReceptancePoint::Rail(seat), place, &frequencies).unwrap();
             for index in 0..frequencies.len() {
                 let errors = [
                     fast.direct[index][node] - direct[index],
-                    fast.from_seats[index][3][node] - cross[index],
+                    fast.from_seats[index][3].values[node] - cross[index],
                 ];
                 // Two eliminations without and with pivoting: rounding, amplified by the condition.
                 for error in errors {
@@ -326,7 +313,7 @@ pub(super) mod tests {
         let of = |support: Support| {
             let mesh = Mesh::uniform(2, 4, 8);
             let track = TrackModel::build(&TrackDesign::v_track(), &mesh, &[support], &[]).unwrap();
-            let direct = RailReceptances::new(&track, &frequencies, false).direct;
+            let direct = RailReceptances::new(&track, &frequencies, None).direct;
             (direct, seat_stiffness(&track, &frequencies))
         };
         let support = Support::from(&ParameterSet::nominal());

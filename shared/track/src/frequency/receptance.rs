@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 /// Where the track is struck or its motion observed, both positive downwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Place {
+pub enum ReceptancePoint {
     /// The rail at this position along the track in m.
     Rail(f64),
     /// The rail seat of the sleeper of this index, from 0.
@@ -26,7 +26,7 @@ pub enum FrequencyError {
     #[error("{place:?} is not on this track of {length_m} m and {sleepers} sleepers")]
     OffTrack {
         /// The place.
-        place: Place,
+        place: ReceptancePoint,
         /// Length of the track in m.
         length_m: f64,
         /// How many sleepers it has.
@@ -51,14 +51,16 @@ pub enum FrequencyError {
 /// [`FrequencyError`] names the place or frequency that does not fit.
 pub fn receptance(
     model: &TrackModel,
-    excite: Place,
-    observe: Place,
+    excite: ReceptancePoint,
+    observe: ReceptancePoint,
     frequencies_hz: &[f64],
 ) -> Result<Vec<Complex64>, FrequencyError> {
     let force = port(model, excite)?;
     let motion = port(model, observe)?;
     let local = match excite {
-        Place::Rail(x_m) if excite == observe => model.layout().rail_point(x_m).local_flexibility,
+        ReceptancePoint::Rail(x_m) if excite == observe => {
+            model.layout().rail_point(x_m).local_flexibility
+        }
         _ => 0.0,
     };
     let dynamic_stiffness = DynamicStiffness::new(model.matrices());
@@ -71,16 +73,18 @@ pub fn receptance(
 }
 
 /// The relative motion that a force at the place works on.
-fn port(model: &TrackModel, place: Place) -> Result<Port, FrequencyError> {
+fn port(model: &TrackModel, place: ReceptancePoint) -> Result<Port, FrequencyError> {
     let layout = model.layout();
     let (length_m, sleepers) = (layout.length_m(), layout.sleepers());
     let sleeper = |index: usize| sleepers.get(index).map(|sleeper| (index, sleeper));
     let found = match place {
-        Place::Rail(x_m) => (0.0..=length_m).contains(&x_m).then(|| layout.rail_port(x_m)),
-        Place::SleeperSeat(index) => {
+        ReceptancePoint::Rail(x_m) => {
+            (0.0..=length_m).contains(&x_m).then(|| layout.rail_port(x_m))
+        }
+        ReceptancePoint::SleeperSeat(index) => {
             sleeper(index).map(|(index, sleeper)| layout.sleeper_port(index, sleeper.seat_node))
         }
-        Place::SleeperTip(index) => {
+        ReceptancePoint::SleeperTip(index) => {
             sleeper(index).map(|(index, sleeper)| layout.sleeper_port(index, sleeper.tip_node()))
         }
     };

@@ -1,13 +1,29 @@
 //! The rail's receptances as values.
 
 use rustfft::num_complex::Complex64;
+use std::ops::Range;
 
 /// Receptances of the rail at a set of frequencies, in m/N.
 #[derive(Clone, Debug)]
 pub struct RailReceptances {
     /// Direct receptance of every rail node: `[frequency][node]`, zero where the rail is held.
     pub direct: Vec<Vec<Complex64>>,
-    /// From a force at each rail seat to every rail node: `[frequency][sleeper][node]`; empty
-    /// unless asked for.
-    pub from_seats: Vec<Vec<Vec<Complex64>>>,
+    /// From a force at each rail seat to the nodes near it: `[frequency][sleeper]`; empty unless asked for.
+    pub from_seats: Vec<Vec<SeatReceptances>>,
+}
+
+/// Receptances from a rail seat to the rail nodes near it, in m/N.
+#[derive(Clone, Debug)]
+pub struct SeatReceptances {
+    /// The first of these nodes.
+    pub first: usize,
+    /// Its value and those of the nodes after it, zero where the rail is held.
+    pub values: Vec<Complex64>,
+}
+
+impl SeatReceptances {
+    /// At these nodes.
+    pub fn at(&self, nodes: Range<usize>) -> &[Complex64] {
+        &self.values[nodes.start - self.first..nodes.end - self.first]
+    }
 }

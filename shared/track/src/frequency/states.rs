@@ -65,9 +65,11 @@ impl States {
             }
         }
         for (line, seats) in mixed.from_seats.iter_mut().enumerate() {
-            for (seat, nodes) in seats.iter_mut().enumerate() {
-                for (node, receptance) in nodes.iter_mut().enumerate() {
-                    *receptance = mix(node, &|state| state.from_seats[line][seat][node]);
+            for (seat, near) in seats.iter_mut().enumerate() {
+                for (index, receptance) in near.values.iter_mut().enumerate() {
+                    let value =
+                        |state: &RailReceptances| state.from_seats[line][seat].values[index];
+                    *receptance = mix(near.first + index, &value);
                 }
             }
         }
@@ -195,7 +197,7 @@ mod tests {
     }
 
     fn direct(model: &TrackModel) -> Vec<Complex64> {
-        RailReceptances::new(model, &[400.0], true).direct.remove(0)
+        RailReceptances::new(model, &[400.0], None).direct.remove(0)
     }
 
     #[test]

@@ -64,6 +64,11 @@ pub(super) fn solve(
     let mut motions = guess;
     let mut error = residual(&motions);
     for _ in 0..STEPS_MAX {
+        if error.amax() == 0.0 {
+            // Nothing resists, as gaps that stay open.
+            let forces = forces(resistances, &motions);
+            return Some((motions, forces));
+        }
         let step = jacobian(resistances, compliance, &motions).lu().solve(&-&error)?;
         let mut length = 1.0;
         let mut next = &motions + &step;

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 /// [`PassError`] if the pass leaves the track, or the track or its surface makes no sense.
 pub fn pass(model: &TrackModel, pass: &Pass, surface: &Surface) -> Result<PassRecord, PassError> {
     pass.check(model)?;
-    let mut motion = Motion::start(model, pass, surface)?;
+    let mut motion = NewmarkState::start(model, pass, surface)?;
     let mut record = PassRecord::start(pass, motion.force_n);
     for step in 1..=pass.steps() {
         motion.advance(pass.position_m(step), &heights_m(model, pass, surface, step))?;
@@ -44,7 +44,7 @@ struct Resisting<'a> {
 }
 
 /// Vehicle and track on their way.
-struct Motion<'a> {
+struct NewmarkState<'a> {
     model: &'a TrackModel,
     contact: HertzContact,
     local_flexibility: bool,
@@ -71,7 +71,7 @@ struct FreeMotion {
     free: Vec<f64>,
 }
 
-impl<'a> Motion<'a> {
+impl<'a> NewmarkState<'a> {
     fn start(model: &'a TrackModel, pass: &Pass, surface: &Surface) -> Result<Self, PassError> {
         let dt = pass.time_step_s;
         let matrices = model.matrices();
@@ -288,14 +288,14 @@ mod tests {
         let (model, pass) = (track(6, 4), over_spans(2.0, 4.0));
         let surface = Surface::rough(1, 3.0, 1.0);
         let matrices = model.matrices();
-        let mut motion = Motion::start(&model, &pass, &surface).unwrap();
+        let mut motion = NewmarkState::start(&model, &pass, &surface).unwrap();
         let quadratic = |values: &[f64], x: &[f64]| -> f64 {
             matrices.product(values, x).iter().zip(x).map(|(f, x)| f * x).sum()
         };
-        let part = |motion: &Motion, pick: fn(&Kinematics) -> f64| -> Vec<f64> {
+        let part = |motion: &NewmarkState, pick: fn(&Kinematics) -> f64| -> Vec<f64> {
             motion.track.iter().map(pick).collect()
         };
-        let energy = |motion: &Motion| {
+        let energy = |motion: &NewmarkState| {
             0.5 * quadratic(matrices.mass(), &part(motion, |dof| dof.velocity))
                 + 0.5 * quadratic(matrices.stiffness(), &part(motion, |dof| dof.displacement))
         };

@@ -66,7 +66,7 @@ pub(crate) fn training() -> Result<Vec<Line>, Error> {
     let (trained, cost) = once(|| train(&set, &options, &|_| ()));
     let trained = trained?;
     let models: Vec<_> = trained.groups().iter().flat_map(ModelGroup::models).collect();
-    let mean = |score: fn(&tracktwin_surrogate::Score) -> f64| {
+    let mean = |score: fn(&tracktwin_surrogate::ModelScore) -> f64| {
         100.0 * models.iter().map(|model| score(&model.score)).sum::<f64>() / models.len() as f64
     };
     let [folds, test, coverage] =

@@ -3,7 +3,7 @@
 use super::finding::{probability, seen};
 use super::notes::{lost, one_speed, shown};
 use super::{ONE_PASS_MAX, ONE_SPEED_MAX, verdict};
-use crate::outcome::{Diagnosis, FORMAT, Fit, Hypothesis, Levels, Location, Score, Scores};
+use crate::outcome::{Diagnosis, FORMAT, FitScores, Hypothesis, Levels, Location, Score, Scores};
 use crate::prepared_recording::PreparationError;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Inspection;
@@ -105,11 +105,11 @@ fn hypothesis(
 }
 
 /// Variance explained by the wheel orders, on all blocks and on withheld ones.
-fn fit(recording: &Recording, comb: Option<&Comb>) -> Fit {
+fn fit(recording: &Recording, comb: Option<&Comb>) -> FitScores {
     let Some(comb) = comb else {
         let none = Scores { in_sample: Score { score: 0.0 }, held_out: None };
         let score = "nothing was fitted".to_owned();
-        return Fit { score, before: none, after: none, held_out_gain_nats: BTreeMap::new() };
+        return FitScores { score, before: none, after: none, held_out_gain_nats: BTreeMap::new() };
     };
     let blocks = comb.blocks.len() as f64;
     let mean = |of: fn(&CombBlock) -> f64| Score {
@@ -119,7 +119,7 @@ fn fit(recording: &Recording, comb: Option<&Comb>) -> Fit {
     let [from_hz, to_hz] = comb.band_hz;
     let speed = recording.speeds_km_h().first().copied().unwrap_or_default();
     let nats = held_out.gain_nats * held_out.blocks as f64;
-    Fit {
+    FitScores {
         score: format!(
             "share of the variance between {from_hz:.0} and {to_hz:.0} Hz that a comb of lines \
              explains: one between the teeth of the wheel's, then the wheel's own; withheld was \

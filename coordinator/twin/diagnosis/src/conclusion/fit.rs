@@ -4,7 +4,7 @@ use super::Evidence;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::estimate::Estimate;
-use crate::outcome::{BeforeAfter, Fit, Hypothesis, Levels, Score, Scores, SleeperValues};
+use crate::outcome::{BeforeAfter, FitScores, Hypothesis, Levels, Score, Scores, SleeperValues};
 use crate::quantity::{Common, Own};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -52,7 +52,7 @@ impl Evidence<'_> {
         })
     }
 
-    pub(super) fn fit(&self) -> Fit {
+    pub(super) fn fit(&self) -> FitScores {
         let search = self.search;
         let in_sample = |calibration: &Calibration| {
             let count = calibration.residual.len() as f64;
@@ -70,7 +70,7 @@ impl Evidence<'_> {
                 *gains.entry(format!("{:.0}", 3.6 * speed)).or_insert(0.0) += gain;
             }
         }
-        Fit {
+        FitScores {
             score: "mean log predictive density per band and sleeper, nats".to_owned(),
             before: Scores { in_sample: in_sample(&search.baseline), held_out: held_out(0) },
             after: Scores { in_sample: in_sample(&search.last), held_out: held_out(1) },

@@ -13,7 +13,7 @@ pub use self::alone::passes_alone;
 use crate::calibration::CalibrationError;
 use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, meet};
 use crate::prepared_recording::PreparedRecording;
-use crate::search::Search;
+use crate::search::SearchOutcome;
 use crate::sentence::sentence;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Inspection;
@@ -50,7 +50,7 @@ pub struct Evidence<'a> {
     /// Inspection of the passes alone.
     pub inspection: &'a Inspection,
     /// Result of the search with the model.
-    pub search: &'a Search,
+    pub search: &'a SearchOutcome,
 }
 
 impl Evidence<'_> {

@@ -24,7 +24,7 @@ impl Forward {
     /// As [`Forward::log_power`].
     pub fn allow_beyond(&mut self, values: &DVector<f64>) -> Result<(), ModelError> {
         let transfer = self.transfer(values, &[], false)?;
-        self.by_further_wheels = Some(Arc::clone(transfer.by_further_wheels()));
+        self.further_wheels = Some(Arc::clone(transfer.further_wheels()));
         let plain = self.levels(&transfer, values);
         let ends = ENDS_SPANS.into_par_iter().map(|spans| {
             let ended = self.with_ends(spans).log_power(values, &[])?;

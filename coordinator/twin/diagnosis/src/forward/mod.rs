@@ -10,8 +10,10 @@ mod supports;
 
 pub use derivatives::Linearised;
 
+use self::supports::NEIGHBOURS;
 use crate::bands::Bands;
 use crate::baseline::Unknowns;
+use crate::further_wheels::FurtherWheels;
 use crate::profile::Shape;
 use crate::quantity::Own;
 use crate::section::{Section, Window};
@@ -19,6 +21,7 @@ use crate::transfer::Transfer;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 use tracktwin_track::extension::Extension;
 use tracktwin_track::model::{ModelError, Roughness, TrackModel};
@@ -41,9 +44,8 @@ pub struct Forward {
     /// Changes of the log powers by what lies beyond the sleepers compared, a column for each unknown
     /// of [`Unknowns::beyond`]; zero until [`Forward::allow_beyond`].
     beyond: DMatrix<f64>,
-    /// What the further wheels multiply the power by, `[line][node]`; none until
-    /// [`Forward::allow_beyond`].
-    by_further_wheels: Option<Arc<Vec<Vec<f64>>>>,
+    /// What the further wheels do; none until [`Forward::allow_beyond`].
+    further_wheels: Option<Arc<FurtherWheels>>,
     /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
     windows: Vec<Vec<Vec<Window>>>,
     /// Spectrum of the surface at level one in m2/Hz at each speed and line.
@@ -83,7 +85,7 @@ impl Forward {
             noise_density,
             wheel_starts_m,
             beyond,
-            by_further_wheels: None,
+            further_wheels: None,
             windows,
             surface,
         }
@@ -121,9 +123,20 @@ impl Forward {
 
     /// The same from a transfer.
     pub(crate) fn levels(&self, transfer: &Transfer, values: &DVector<f64>) -> DVector<f64> {
+        self.levels_at(transfer, values, 0..self.section.sleepers)
+    }
+
+    /// The same at these sleepers.
+    pub(crate) fn levels_at(
+        &self,
+        transfer: &Transfer,
+        values: &DVector<f64>,
+        sleepers: Range<usize>,
+    ) -> DVector<f64> {
         let excitation = self.excitation(transfer, values);
-        let mut all = DVector::zeros(self.count());
-        self.fill(&mut all, |sleeper, speed, band| {
+        let first = sleepers.start * self.per_sleeper();
+        let mut all = DVector::zeros(sleepers.len() * self.per_sleeper());
+        self.fill(&mut all, first, |sleeper, speed, band| {
             let scale = self.scale(values, sleeper, speed);
             let power = scale * self.power(transfer, &excitation[speed], (sleeper, speed, band));
             let floor = power + self.noise(speed, band);
@@ -131,7 +144,8 @@ impl Forward {
             self.response(values, band) + mean(shapes, |shape| (floor + shape).ln())
         });
         let beyond = self.unknowns.beyond();
-        all + &self.beyond * values.rows(beyond.start, beyond.len())
+        let changes = self.beyond.rows(first, all.len());
+        all + changes * values.rows(beyond.start, beyond.len())
     }
 
     /// The transfer of a baseline with extensions: those of a known one of the same baseline and
@@ -155,9 +169,15 @@ impl Forward {
         (sleeper, rest / self.bands.count(), rest % self.bands.count())
     }
 
-    fn fill(&self, all: &mut DVector<f64>, value: impl Fn(usize, usize, usize) -> f64 + Sync) {
-        all.as_mut_slice().par_iter_mut().enumerate().for_each(|(row, entry)| {
-            let (sleeper, speed, band) = self.place(row);
+    /// Fills rows from `first` on.
+    fn fill(
+        &self,
+        rows: &mut DVector<f64>,
+        first: usize,
+        value: impl Fn(usize, usize, usize) -> f64 + Sync,
+    ) {
+        rows.as_mut_slice().par_iter_mut().enumerate().for_each(|(row, entry)| {
+            let (sleeper, speed, band) = self.place(first + row);
             *entry = value(sleeper, speed, band);
         });
     }
@@ -173,13 +193,43 @@ impl Forward {
         from_seats: bool,
     ) -> Result<Transfer, ModelError> {
         let model = self.model(values, extensions)?;
-        let transfer = Transfer::new(
-            model,
-            self.bands.lines_hz(),
-            from_seats,
-            self.by_further_wheels.as_ref(),
-        );
+        let reach = from_seats.then(|| self.reach_nodes());
+        let transfer =
+            Transfer::new(model, self.bands.lines_hz(), reach, self.further_wheels.as_ref());
         Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
+    }
+
+    /// The transfer that [`Forward::transfer_beside`] is quick from.
+    ///
+    /// # Errors
+    /// As [`Forward::log_power`].
+    pub(crate) fn transfer_to_vary(
+        &self,
+        values: &DVector<f64>,
+        extensions: &[Arc<dyn Extension>],
+    ) -> Result<Transfer, ModelError> {
+        let transfer = self.transfer(values, extensions, false)?;
+        Ok(transfer.with_known_rail(self.bands.lines_hz(), self.reach_nodes()))
+    }
+
+    /// The compared sleepers at which something from here to there, in spacings from the first of them,
+    /// is felt.
+    pub(crate) fn felt_at(&self, [from, to]: [f64; 2]) -> Range<usize> {
+        let design = &self.section.track.design;
+        let furthest_m = design.wheel.further_wheels_m.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let reach = NEIGHBOURS as f64 + furthest_m / design.sleeper.spacing_m;
+        let count = self.section.sleepers;
+        let first = (from - reach).floor().max(0.0) as usize;
+        let end = ((to + reach).ceil().max(0.0) as usize + 1).min(count);
+        first.min(end)..end
+    }
+
+    /// Nodes on either side of a rail seat up to the last one in the window of a sleeper that it is felt
+    /// at.
+    fn reach_nodes(&self) -> usize {
+        let windows = self.windows.iter().flatten().flatten();
+        let widest = windows.map(|window| window.shares.len()).max().unwrap_or(0);
+        (NEIGHBOURS + 1) * self.section.node_above(0) + widest
     }
 
     fn model(
@@ -206,7 +256,7 @@ impl Forward {
         band: usize,
     ) -> Vec<f64> {
         let wheel = transfer.wheel.get(speed).map_or(&[][..], Vec::as_slice);
-        if transfer.rail.is_none() && wheel.is_empty() {
+        if transfer.rail.is_none() && transfer.rail_elsewhere.is_empty() && wheel.is_empty() {
             return vec![0.0];
         }
         let weights = self.bands.weights(band);
@@ -214,19 +264,26 @@ impl Forward {
         let powers: Vec<_> =
             weights.iter().map(|&(line, _)| transfer.mean_power(window, line)).collect();
         let speed_m_s = self.speeds_m_s[speed];
-        let power = |shape: &Shape| {
+        let seat_node = self.section.seat_node(sleeper);
+        let power = |shape: &Shape, share: &dyn Fn(usize) -> f64| {
             let lines = weights.iter().zip(&powers);
             let of_line = |(&(line, weight), power): (&(usize, f64), &f64)| {
                 let frequency_hz = self.bands.lines_hz()[line];
-                weight * power * shape.density(sleeper, speed_m_s, frequency_hz)
+                share(line) * weight * power * shape.density(sleeper, speed_m_s, frequency_hz)
             };
             lines.map(of_line).sum::<f64>()
         };
-        let rail = transfer.rail.as_ref().map_or(0.0, power);
+        let further = transfer.further_wheels();
+        let own = |line: usize| further.own_share(line, seat_node);
+        let power_elsewhere = |(wheel, shape): &(usize, Shape)| {
+            power(shape, &|line| further.share(*wheel, line, seat_node))
+        };
+        let rail = transfer.rail.as_ref().map_or(0.0, |shape| power(shape, &own))
+            + transfer.rail_elsewhere.iter().map(power_elsewhere).sum::<f64>();
         if wheel.is_empty() {
             return vec![rail];
         }
-        wheel.iter().map(|wheel| rail + power(wheel)).collect()
+        wheel.iter().map(|wheel| rail + power(wheel, &own)).collect()
     }
 
     /// Density of the surface at every line, at level one with the baseline's spectrum, in m2/Hz:

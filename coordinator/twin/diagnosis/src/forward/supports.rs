@@ -70,6 +70,9 @@ impl FromSleeper {
         let first = (0..section.sleepers).find(is_near).unwrap_or(section.sleepers);
         let near =
             first..(first..section.sleepers).take_while(is_near).last().map_or(first, |c| c + 1);
+        if near.is_empty() {
+            return Self { near, changes: Vec::new() };
+        }
         let nodes = nodes(forward, near.clone());
         let changes = pulp::Arch::new().dispatch(|| {
             let by_line = by_line(transfer, variations, in_track, &nodes);
@@ -93,7 +96,7 @@ fn by_line(
     for (index, changes) in changes.chunks_exact_mut(nodes.len().max(1)).enumerate() {
         let (line, value) = (index / VARIED, index % VARIED);
         let varied = variations[value][line][in_track];
-        let roots = &transfer.by_seat(line, in_track)[nodes.clone()];
+        let roots = transfer.by_seat(line, in_track, nodes.clone());
         for (change, root) in changes.iter_mut().zip(roots) {
             *change = (root * root * varied).re;
         }

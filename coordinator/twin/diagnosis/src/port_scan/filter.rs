@@ -30,12 +30,16 @@ pub(super) struct Filter {
 
 impl Filter {
     /// None where a precision is not positive definite.
-    pub(super) fn new(trace: Trace, current: &Calibration) -> Option<Self> {
+    pub(super) fn new(
+        trace: Trace,
+        current: &Calibration,
+        jacobian_transposed: &DMatrix<f64>,
+    ) -> Option<Self> {
         let columns = &trace.columns;
         // What the baseline imitates is taken out of columns and residual.
-        let shared = current.jacobian.tr_mul(columns);
+        let shared = jacobian_transposed * columns;
         let imitated = current.precision.solve(&shared);
-        let square = columns.tr_mul(columns) - shared.tr_mul(&imitated);
+        let square = columns.transpose() * columns - shared.transpose() * &imitated;
         let posterior = |prior: Prior| {
             let precision = Cholesky::new(&square + &prior.precision)?;
             Some((prior, precision))

@@ -69,7 +69,8 @@ impl PortScan {
         let bumps = Bumps::over(problem.forward.bands.lines_hz());
         let mut traces = traces(problem, current, &bumps)?;
         traces.retain(|trace| is_one(&trace.place));
-        let filter = |trace| Filter::new(trace, current);
+        let jacobian_transposed = current.jacobian.transpose();
+        let filter = |trace| Filter::new(trace, current, &jacobian_transposed);
         let filters = traces.into_par_iter().filter_map(filter).collect();
         Ok(Self { filters, centres_hz: bumps.centres_hz })
     }

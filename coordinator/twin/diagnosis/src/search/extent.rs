@@ -9,14 +9,14 @@ const REACH_SPANS: f64 = 2.0;
 
 /// From where to where, in spacings from the first sleeper compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Extent {
+pub(crate) struct Extent {
     from: f64,
     to: f64,
 }
 
 impl Extent {
     /// Where a candidate is.
-    pub(super) fn of(candidate: &Candidate, section: &Section) -> Self {
+    pub(crate) fn of(candidate: &Candidate, section: &Section) -> Self {
         match (&candidate.extension.sleepers, candidate.extension.x_m) {
             (Some(sleepers), _) => Self::of_sleepers(sleepers, section),
             (None, Some(x_m)) => {
@@ -51,6 +51,11 @@ impl Extent {
     /// Where it is felt.
     pub(super) fn with_reach(self) -> Self {
         Self { from: self.from - REACH_SPANS, to: self.to + REACH_SPANS }
+    }
+
+    /// From where to where.
+    pub(crate) const fn spacings(self) -> [f64; 2] {
+        [self.from, self.to]
     }
 
     pub(super) fn length(self) -> f64 {

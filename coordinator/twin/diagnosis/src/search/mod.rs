@@ -14,16 +14,16 @@ mod speed_disagreement;
 mod testing;
 mod threshold;
 
+pub(crate) use extent::Extent;
 pub(crate) use probability::Probabilities;
 
-use self::extent::Extent;
 use self::fit::retuned;
 use self::limits::FALSE_ALARM;
 use self::round::{Setting, accepted_candidate, is_consistent_across_speeds, is_predicted};
 use self::threshold::EvidenceThreshold;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
-use crate::held_out::Score;
+use crate::held_out::HeldOutScore;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
 use crate::patch_scan::{Fixed, Patch};
@@ -108,7 +108,7 @@ impl Round {
 
 /// What was found.
 #[derive(Clone, Debug)]
-pub struct Search {
+pub struct SearchOutcome {
     /// The re-tuned baseline.
     pub baseline: Calibration,
     /// The baseline with all accepted extensions.
@@ -168,13 +168,13 @@ pub fn search(
     start: DVector<f64>,
     all: &[Candidate],
     progress: &(dyn Fn(Stage, f64) + Sync),
-) -> Result<Search, CalibrationError> {
+) -> Result<SearchOutcome, CalibrationError> {
     progress(Stage::Baseline, 0.0);
     let setting = Setting::new(prepared, null);
     let observation = setting.observe(|_| false)?;
     let plain = Problem { forward: &prepared.forward, observation: &observation, candidates: &[] };
     let baseline = plain.calibrate(start)?;
-    let mut search = Search {
+    let mut search = SearchOutcome {
         last: baseline.clone(),
         baseline,
         accepted: Vec::new(),
@@ -206,7 +206,7 @@ pub fn search(
     Ok(search)
 }
 
-fn log_densities(scores: &[Score]) -> Vec<f64> {
+fn log_densities(scores: &[HeldOutScore]) -> Vec<f64> {
     scores.iter().map(|score| score.log_density).collect()
 }
 
@@ -219,7 +219,7 @@ impl Round {
     }
 }
 
-impl Search {
+impl SearchOutcome {
     /// Waves on the rail that the baseline's residual shows, as candidates.
     fn waves(&self, setting: &Setting<'_>) -> Vec<Candidate> {
         let forward = &setting.prepared.forward;

@@ -3,7 +3,7 @@
 use super::extent::Extent;
 use super::limits::FALSE_ALARM;
 use super::threshold::is_local_shape;
-use super::{Round, Search};
+use super::{Round, SearchOutcome};
 use crate::candidate::Candidate;
 use crate::port_scan::{PortPlace, PortScan, UnknownElement};
 use crate::section::Section;
@@ -16,7 +16,7 @@ const LEFT: f64 = 0.1;
 /// which grow with the effect.
 const LEFT_UNDER_LOAD: f64 = 1.0 / 3.0;
 
-impl Search {
+impl SearchOutcome {
     /// Takes the last names back as long as what is left at their place speaks against them.
     pub(super) fn retract_names(&mut self, section: &Section) {
         let Some(last) = self.rounds.last().filter(|last| !last.accepted) else { return };

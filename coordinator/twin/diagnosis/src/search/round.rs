@@ -10,7 +10,7 @@ use super::threshold::{EvidenceThreshold, is_local_shape};
 use super::{Fitted, Round, Stage};
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
-use crate::held_out::Score;
+use crate::held_out::HeldOutScore;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
 use crate::patch_scan::{Fixed, Patch, PatchScan};
@@ -42,18 +42,13 @@ pub(super) struct Setting<'a> {
     pub(super) prepared: &'a PreparedRecording,
     pub(super) log_power: DVector<f64>,
     pub(super) covariance: DMatrix<f64>,
-    /// Differences of null simulations, less their offset.
+    /// Differences of null simulations, as they scatter in recordings.
     pub(super) nulls: Vec<DVector<f64>>,
 }
 
 impl<'a> Setting<'a> {
     pub(super) fn new(prepared: &'a PreparedRecording, null: &NullModel) -> Self {
-        let offset = null.offset_of(prepared.forward.section.sleepers);
-        let nulls = null
-            .differences
-            .iter()
-            .map(|difference| DVector::from_column_slice(difference) - &offset)
-            .collect();
+        let nulls = null.drawn(prepared.forward.bands.count(), &prepared.pass_variance);
         let (log_power, covariance) =
             (prepared.expected_log_power(null), prepared.covariance(null));
         Self { prepared, log_power, covariance, nulls }
@@ -72,7 +67,7 @@ impl<'a> Setting<'a> {
         &self,
         candidates: &[Candidate],
         start: &DVector<f64>,
-    ) -> Result<Vec<Score>, CalibrationError> {
+    ) -> Result<Vec<HeldOutScore>, CalibrationError> {
         let forward = &self.prepared.forward;
         let speeds = forward.speeds_m_s.len();
         if speeds < 2 {

@@ -10,6 +10,10 @@ use std::ops::Range;
 /// Sleepers of the shortest run; pairs are screened as they are.
 const SHORTEST: usize = 3;
 
+/// Sleepers of the longest run of a kind that the wheel's load decides about: over more of them the rail
+/// sinks until gaps close.
+const LONGEST_UNDER_LOAD: usize = 5;
+
 /// By how much a run must gain more than the kind at a single place to be tried.
 const BETTER: f64 = 1.2;
 
@@ -79,17 +83,19 @@ impl Singles<'_> {
     fn best_run(&self, current: &Calibration) -> Option<(f64, Range<usize>)> {
         let sleepers: Vec<usize> = self.templates.keys().copied().collect();
         let mut best: Option<(f64, Range<usize>)> = None;
+        let longest =
+            if self.candidate.is_under_load() { LONGEST_UNDER_LOAD } else { sleepers.len() };
         for (index, &first) in sleepers.iter().enumerate() {
-            let mut change = DVector::zeros(current.residual.len());
-            for (length, &sleeper) in (1..).zip(&sleepers[index..]) {
+            let mut sum = Sum::none(current);
+            for (length, &sleeper) in (1..=longest).zip(&sleepers[index..]) {
                 if sleeper != first + length - 1 {
                     break;
                 }
-                change += &self.templates[&sleeper].change;
+                sum.add(self.templates[&sleeper]);
                 if length < SHORTEST {
                     continue;
                 }
-                let gain = gain(&change, current);
+                let gain = sum.gain(current);
                 if best.as_ref().is_none_or(|(known, _)| gain > *known) {
                     best = Some((gain, first..sleeper + 1));
                 }
@@ -99,11 +105,30 @@ impl Singles<'_> {
     }
 }
 
-/// Nats that a trace of free size gains in the residual, as [`Template::along`].
-fn gain(change: &DVector<f64>, current: &Calibration) -> f64 {
-    let projected_gradient = current.jacobian.tr_mul(change);
-    let square = change.norm_squared()
-        - projected_gradient.dot(&current.precision.solve(&projected_gradient));
-    let along = change.dot(&current.residual).max(0.0);
-    0.5 * along.powi(2) / square.max(f64::MIN_POSITIVE)
+/// Sum of traces: all that is asked of it but its length is linear in them.
+struct Sum {
+    change: DVector<f64>,
+    projected_gradient: DVector<f64>,
+    imitation: DVector<f64>,
+}
+
+impl Sum {
+    fn none(current: &Calibration) -> Self {
+        let none = DVector::zeros(current.values.len());
+        let change = DVector::zeros(current.residual.len());
+        Self { change, projected_gradient: none.clone(), imitation: none }
+    }
+
+    fn add(&mut self, template: &Template) {
+        self.change += &template.change;
+        self.projected_gradient += &template.projected_gradient;
+        self.imitation += &template.imitation;
+    }
+
+    /// Nats that a trace of free size gains in the residual, as [`Template::along`].
+    fn gain(&self, current: &Calibration) -> f64 {
+        let square = self.change.norm_squared() - self.projected_gradient.dot(&self.imitation);
+        let along = self.change.dot(&current.residual).max(0.0);
+        0.5 * along.powi(2) / square.max(f64::MIN_POSITIVE)
+    }
 }

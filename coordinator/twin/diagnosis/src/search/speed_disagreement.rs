@@ -4,12 +4,12 @@ use super::chance::squares;
 use super::limits::FALSE_ALARM;
 use super::probability::EVIDENCE_TEMPERING;
 use super::round::Setting;
-use super::{Round, Search};
+use super::{Round, SearchOutcome};
 use crate::calibration::{CalibrationError, Problem};
 use tracktwin_inspection::median;
 use tracktwin_number::probability;
 
-impl Search {
+impl SearchOutcome {
     /// Compares what was found with a track of its own for each speed, and takes it back if that is
     /// surely better: what stays where it is, all speeds pass.
     pub(super) fn compare_speeds(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {

@@ -23,7 +23,7 @@ pub(super) struct Bounds {
 
 /// The best point inside bounds.
 #[derive(Clone, Debug)]
-pub(super) struct Fit {
+pub(super) struct BoundedFit {
     /// Mapped parameters.
     pub(super) unit: Vec<f64>,
     /// Weighted sum of squares that is left.
@@ -60,7 +60,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] when numbers are not finite.
-    pub(super) fn solve(&self, bounds: &Bounds, start: &[f64]) -> Result<Fit, Error> {
+    pub(super) fn solve(&self, bounds: &Bounds, start: &[f64]) -> Result<BoundedFit, Error> {
         let mut unit = bounds.clamp(start);
         let mut expected = self.coordinates.expected(&unit);
         let mut chi_square = self.chi_square(&expected);
@@ -85,7 +85,7 @@ impl Problem<'_> {
                 break;
             }
         }
-        Ok(Fit { unit, chi_square })
+        Ok(BoundedFit { unit, chi_square })
     }
 
     fn chi_square(&self, expected: &Expected) -> f64 {

@@ -15,7 +15,7 @@ mod null;
 use crate::{Error, TrainingSet};
 use coordinates::Coordinates;
 use faer::{Mat, MatRef};
-use fit::{Bounds, Fit, Problem};
+use fit::{BoundedFit, Bounds, Problem};
 use null::Null;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -24,7 +24,7 @@ use std::sync::{Mutex, PoisonError};
 use tracktwin_parameters::Parameter;
 
 /// An end that the best fit goes beyond, and the fit there.
-type Push = ((usize, Side), Fit);
+type Push = ((usize, Side), BoundedFit);
 
 /// Library entries from which a fit starts.
 const STARTS: usize = 3;
@@ -143,7 +143,7 @@ impl Domain {
         // An end that leaves most of what is too much is no explanation.
         let left = limit + LEFT_MOST * (best.chi_square - limit).max(0.0);
         let explains =
-            |fit: &Fit| best.chi_square - fit.chi_square > needed && fit.chi_square < left;
+            |fit: &BoundedFit| best.chi_square - fit.chi_square > needed && fit.chi_square < left;
         let beyond = further
             .filter(|(_, fit)| explains(fit))
             .map(|((axis, side), _)| Beyond { parameter: self.varied[axis], side });
@@ -162,11 +162,11 @@ impl Domain {
         mean: &'a [f64],
         windows: usize,
         bounds: &Bounds,
-    ) -> Result<(Problem<'a>, Fit), Error> {
+    ) -> Result<(Problem<'a>, BoundedFit), Error> {
         let coefficients = self.coordinates.polynomial.coefficients();
         let typical = coefficients as f64 / self.entries.nrows() as f64;
         let problem = self.problem(mean, windows, typical);
-        let mut best: Option<Fit> = None;
+        let mut best: Option<BoundedFit> = None;
         for start in self.nearest(mean, STARTS, |_| true) {
             let fit = problem.solve(bounds, &start)?;
             if best.as_ref().is_none_or(|best| fit.chi_square < best.chi_square) {
@@ -214,7 +214,7 @@ impl Domain {
         &self,
         problem: &Problem<'_>,
         bounds: &Bounds,
-        best: &Fit,
+        best: &BoundedFit,
         nowhere: bool,
     ) -> Result<Option<Push>, Error> {
         let mut found: Option<Push> = None;

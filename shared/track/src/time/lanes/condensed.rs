@@ -13,7 +13,7 @@ use super::block::{Block, LANES};
 use super::state::State;
 use crate::model::{HertzContact, Layout, TrackModel};
 use crate::time::{Pass, PassError};
-use motion::{Motion, NodeState, Station};
+use motion::{CondensedState, NodeState, Station};
 use rail::{Factor, Node, NodeRows, node_dofs, node_rows};
 use std::ops::Range;
 pub(in crate::time::lanes) use substructure::Hanging;
@@ -66,7 +66,7 @@ impl Solver {
         hanging: [&Hanging; LANES],
         pass: &Pass,
         height_m: Block,
-    ) -> Result<Motion, PassError> {
+    ) -> Result<CondensedState, PassError> {
         let (dt, station) = (pass.time_step_s, &self.stations[0]);
         let wheel = &models[0].vehicle().wheel;
         let contact = HertzContact::new(models[0].design());
@@ -79,7 +79,7 @@ impl Solver {
         // At rest a step changes nothing; it says what the supports push with.
         let mut pushed = vec![Node::default(); rest.len()];
         supports.advance(&rest, &mut pushed);
-        Ok(Motion {
+        Ok(CondensedState {
             contact,
             load: Block::splat(wheel.load_n),
             wheel_compliance: Block::splat(dt * dt / (4.0 * wheel.mass_kg)),

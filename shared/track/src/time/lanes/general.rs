@@ -13,7 +13,7 @@ use super::block::{Block, LANES};
 use crate::model::TrackModel;
 use crate::time::{Pass, PassError};
 use elimination::Elimination;
-use motion::{Motion, Station};
+use motion::{LaneState, Station};
 
 /// What cases on one pattern have in common.
 pub(super) struct Solver {
@@ -38,7 +38,7 @@ impl Solver {
         heights_m: &[Block],
     ) -> Result<Vec<Block>, PassError> {
         let motion =
-            Motion::start(&self.elimination, &self.stations[0], models, pass, heights_m[0])?;
+            LaneState::start(&self.elimination, &self.stations[0], models, pass, heights_m[0])?;
         Ok(motion.run(&self.stations[1..], &heights_m[1..]))
     }
 }

@@ -48,7 +48,7 @@ pub(super) struct NodeState {
 /// Eight wheels on eight tracks.
 ///
 /// Nodes of the rail count from 1; the places before and behind them stand for nothing.
-pub(super) struct Motion {
+pub(super) struct CondensedState {
     pub(super) contact: HertzContact,
     pub(super) load: Block,
     /// Deflection of the wheel alone under a unit force in a step, `dt² / 4 m`.
@@ -67,7 +67,7 @@ pub(super) struct Motion {
     pub(super) solution: Vec<Node>,
 }
 
-impl Motion {
+impl CondensedState {
     /// Contact forces at the start and at every following station, over surfaces of the given
     /// heights in m; with the widest vectors that the machine has.
     pub(super) fn run(self, stations: &[Station], heights_m: &[Block]) -> Vec<Block> {
@@ -204,7 +204,7 @@ fn loaded(free: [Node; 2], unit: [Node; 2], force: Block) -> [Node; 2] {
 
 /// A whole pass, compiled once for every instruction set.
 struct Run<'a> {
-    motion: Motion,
+    motion: CondensedState,
     stations: &'a [Station],
     heights_m: &'a [Block],
 }

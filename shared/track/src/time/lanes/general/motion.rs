@@ -49,7 +49,7 @@ impl Station {
 }
 
 /// Eight wheels on eight tracks.
-pub(super) struct Motion {
+pub(super) struct LaneState {
     contact: HertzContact,
     load: Block,
     /// Deflection of the wheel alone under a unit force in a step, `dt² / 4 m`.
@@ -64,7 +64,7 @@ pub(super) struct Motion {
     unit: Vec<Block>,
 }
 
-impl Motion {
+impl LaneState {
     /// The wheels at rest at the first station, over surfaces of the given heights.
     pub(super) fn start(
         elimination: &Elimination,
@@ -182,7 +182,7 @@ fn dynamic_stiffness(
 
 /// A whole pass, compiled once for every instruction set.
 struct Run<'a> {
-    motion: Motion,
+    motion: LaneState,
     stations: &'a [Station],
     heights_m: &'a [Block],
 }

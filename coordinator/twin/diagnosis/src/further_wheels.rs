@@ -1,0 +1,108 @@
+//! What further wheels on the rail do to the power that the first one records.
+//!
+//! With `a_1` and `a_2` what gives way at each contact and `b` the rail between them, the forces are
+//! `F = -A^-1 r`, `A = [[a_1, b], [b, a_2]]`, so that of a rough surface
+//! `|F_1|^2 = (|a_2|^2 + |b|^2) / |a_1 a_2 - b^2|^2 S`: what the wheels meet at one time is the same surface
+//! a distance apart, whose phase turns many times within a band. The second term is what the other wheel
+//! meets: over a defect of the rail it comes from elsewhere. Several further wheels are taken one by one,
+//! each rigid and of the first one's mass and load.
+//! Source: T. X. Wu and D. J. Thompson, Vehicle System Dynamics 34 (2001).
+
+use rustfft::num_complex::Complex64;
+use std::f64::consts::TAU;
+use tracktwin_track::frequency::{receptances_ahead, shares};
+use tracktwin_track::model::TrackModel;
+
+/// What all of them do.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FurtherWheels {
+    /// By what they multiply the power, `[line][node]`; empty for a single wheel.
+    gains: Vec<Vec<f64>>,
+    /// Part of the power that comes from what each of them meets, `[wheel][line][node]`.
+    parts: Vec<Vec<Vec<f64>>>,
+}
+
+impl FurtherWheels {
+    /// Of a model's wheels. `hertz` is the contact stiffness in N/m, `direct` the rail's receptance in m/N and
+    /// `stiffness` that of contact, rail and vehicle in series in N/m, both `[line][node]`.
+    pub(crate) fn new(
+        model: &TrackModel,
+        lines_hz: &[f64],
+        hertz: f64,
+        direct: &[Vec<Complex64>],
+        stiffness: &[Vec<Complex64>],
+    ) -> Self {
+        let mut all = Self::default();
+        for &distance_m in &model.vehicle().further_wheels_m {
+            let one = OneWheel { model, hertz, distance_m };
+            let (gains, parts): (Vec<_>, Vec<_>) =
+                one.gains_and_parts(lines_hz, direct, stiffness).into_iter().unzip();
+            all.parts.push(parts);
+            if all.gains.is_empty() {
+                all.gains = gains;
+                continue;
+            }
+            for (all, gain) in all.gains.iter_mut().flatten().zip(gains.into_iter().flatten()) {
+                *all *= gain;
+            }
+        }
+        all
+    }
+
+    /// By what they multiply the power, line by line; none for a single wheel.
+    pub(crate) fn gains(&self) -> impl Iterator<Item = &f64> {
+        self.gains.iter().flatten()
+    }
+
+    /// Part of the power at a node that comes from what a further wheel meets.
+    pub(crate) fn share(&self, wheel: usize, line: usize, node: usize) -> f64 {
+        self.parts[wheel][line][node]
+    }
+
+    /// Part of the power at a node that comes from what the first wheel meets.
+    pub(crate) fn own_share(&self, line: usize, node: usize) -> f64 {
+        1.0 - self.parts.iter().map(|parts| parts[line][node]).sum::<f64>()
+    }
+}
+
+/// A wheel so far ahead of the first one (negative: behind).
+struct OneWheel<'a> {
+    model: &'a TrackModel,
+    hertz: f64,
+    distance_m: f64,
+}
+
+impl OneWheel<'_> {
+    /// Gain of the power, and the part of it that comes from what this wheel meets, at each node: a pair a
+    /// line.
+    fn gains_and_parts(
+        &self,
+        lines_hz: &[f64],
+        direct: &[Vec<Complex64>],
+        stiffness: &[Vec<Complex64>],
+    ) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let between = receptances_ahead(self.model, lines_hz, self.distance_m);
+        let nodes_m = self.model.layout().rail_nodes_m();
+        let there: Vec<_> =
+            nodes_m.iter().map(|x_m| shares(nodes_m, x_m + self.distance_m)).collect();
+        let of_line = |line: usize| {
+            let omega = TAU * lines_hz[line];
+            let mass_kg = self.model.vehicle().wheel.mass_kg;
+            let wheel = 1.0 / self.hertz - 1.0 / (mass_kg * omega * omega);
+            let of_node = |(node, there): (usize, &Vec<(usize, f64)>)| {
+                if there.is_empty() {
+                    return (1.0, 0.0);
+                }
+                let rail: Complex64 =
+                    there.iter().map(|&(other, share)| share * direct[line][other]).sum();
+                let (first, second) = (stiffness[line][node].inv(), wheel + rail);
+                let between = between[line][node];
+                let [own, other] = [second.norm_sqr(), between.norm_sqr()];
+                let shared = (first * second - between * between).norm_sqr();
+                (first.norm_sqr() * (own + other) / shared, other / (own + other))
+            };
+            there.iter().enumerate().map(of_node).unzip()
+        };
+        (0..lines_hz.len()).map(of_line).collect()
+    }
+}
