@@ -66,30 +66,17 @@ impl Filter {
         self.trace.columns.tr_mul(residual) - self.imitated.tr_mul(projected_gradient)
     }
 
-    /// What the bumps explain with the heights that are most probable by the widest prior, in nats.
-    pub(super) fn explained(
-        &self,
-        residual: &DVector<f64>,
-        projected_gradient: &DVector<f64>,
-    ) -> f64 {
-        let along = self.along(residual, projected_gradient);
-        self.priors.last().map_or(0.0, |(_, precision)| 0.5 * along.dot(&precision.solve(&along)))
-    }
-
-    /// Log evidence averaged over the priors, and the bumps' most probable heights; in a residual whose
-    /// squares are larger by a factor than they should be.
+    /// Log evidence averaged over the priors, and the bumps' most probable heights.
     pub(super) fn evidence(
         &self,
         residual: &DVector<f64>,
         projected_gradient: &DVector<f64>,
-        excess: f64,
     ) -> (f64, DVector<f64>) {
         let along = self.along(residual, projected_gradient);
         let of_prior = |(prior, precision): &(Prior, Cholesky<f64, Dyn>)| {
             let heights = precision.solve(&along);
-            let explained = 0.5 * along.dot(&heights) / excess;
-            let log_evidence =
-                explained - 0.5 * precision.ln_determinant() + prior.half_ln_determinant;
+            let log_evidence = 0.5 * along.dot(&heights) - 0.5 * precision.ln_determinant()
+                + prior.half_ln_determinant;
             (log_evidence, heights)
         };
         let mut all: Vec<_> = self.priors.iter().map(of_prior).collect();

@@ -20,7 +20,6 @@ use crate::calibration::{Calibration, CalibrationError, Problem};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
-use tracktwin_inspection::median;
 
 /// Evidence for an unknown dynamic stiffness.
 #[derive(Clone, Debug)]
@@ -39,9 +38,6 @@ pub struct UnknownElement {
 pub struct PortScan {
     filters: Vec<Filter>,
     centres_hz: Vec<f64>,
-    /// By how much more an unknown explains at most places of the recording than where nothing is left
-    /// out: what the model lacks everywhere is no effect at a place.
-    excess: f64,
 }
 
 impl PortScan {
@@ -76,35 +72,7 @@ impl PortScan {
         let jacobian_transposed = current.jacobian.transpose();
         let filter = |trace| Filter::new(trace, current, &jacobian_transposed);
         let filters = traces.into_par_iter().filter_map(filter).collect();
-        Ok(Self { filters, centres_hz: bumps.centres_hz, excess: 1.0 })
-    }
-
-    /// The same for recordings in which an unknown explains so many times as much at most places.
-    pub(crate) fn with_excess(self, excess: f64) -> Self {
-        Self { excess, ..self }
-    }
-
-    /// What an unknown explains under a single rail seat, in nats: the median over the seats.
-    pub(crate) fn typical(
-        &self,
-        residual: &DVector<f64>,
-        projected_gradient: &DVector<f64>,
-    ) -> f64 {
-        let is_single = |filter: &&Filter| matches!(&filter.trace.place, PortPlace::Seats(seats) if seats.len() == 1);
-        let singles = self.filters.par_iter().filter(is_single);
-        median(singles.map(|filter| filter.explained(residual, projected_gradient)).collect())
-    }
-
-    /// The greatest evidence in nats in a residual that scatters as it should.
-    pub(crate) fn greatest(
-        &self,
-        residual: &DVector<f64>,
-        projected_gradient: &DVector<f64>,
-    ) -> Option<f64> {
-        let filters = self.filters.par_iter();
-        filters
-            .map(|filter| filter.evidence(residual, projected_gradient, 1.0).0)
-            .max_by(f64::total_cmp)
+        Ok(Self { filters, centres_hz: bumps.centres_hz })
     }
 
     /// The best port for a whitened residual; `projected_gradient` is its product with the baseline's
@@ -125,8 +93,8 @@ impl PortScan {
         is_one: impl Fn(&PortPlace) -> bool + Sync,
     ) -> Option<UnknownElement> {
         let filters = self.filters.par_iter().filter(|filter| is_one(&filter.trace.place));
-        let evidence = |filter: &Filter| filter.evidence(residual, projected_gradient, self.excess);
-        let found: Vec<_> = filters.map(|filter| (filter, evidence(filter))).collect();
+        let found: Vec<_> =
+            filters.map(|filter| (filter, filter.evidence(residual, projected_gradient))).collect();
         let best = found.into_iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let (filter, (log_evidence, heights)) = best?;
         Some(UnknownElement {

@@ -1,6 +1,6 @@
 //! One search for an effect: screened, refined, held out, accepted or not.
 
-use super::chance::{Null, excess, tail_probability, whitened};
+use super::chance::{excess, tail_probability, whitened};
 use super::fit::fit;
 use super::limits::REFINED_PER_KIND;
 use super::outlier_starts::{Far, OutlierStarts};
@@ -20,7 +20,6 @@ use crate::screen::{Template, templates};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use tracktwin_inspection::median;
 use tracktwin_number::floored;
 
 /// Logarithm of power by which a patch must differ to be seen in a picture of the residual: 1.5 dB.
@@ -163,13 +162,8 @@ impl<'a> Setting<'a> {
             .iter()
             .map(|template| (template.log_evidence(&current.residual, &current.gradient), template))
             .collect();
-        let nulls = whitened(&self.nulls, problem.observation, current);
         let ports = PortScan::new(problem, current)?;
-        let typical = |null: &Null| ports.typical(&null.residual, &null.projected_gradient);
-        let usual = median(nulls.iter().map(typical).collect());
-        let excess = ports.typical(&current.residual, &current.gradient) / usual;
-        let ports = ports.with_excess(excess.max(1.0));
-        let mut round = self.alarm(&nulls, current, &screened, &ports);
+        let mut round = self.alarm(problem, current, &screened, &ports);
         round.unseen = unseen(templates.iter().map(|template| {
             let kind = all[template.candidate].kind.physics;
             (kind, template.at_strengths(&current.residual, &current.gradient))
@@ -187,22 +181,23 @@ impl<'a> Setting<'a> {
     /// How probable the greatest evidence among candidates and ports is if nothing is left out.
     fn alarm(
         &self,
-        nulls: &[Null],
+        problem: &Problem<'_>,
         current: &Calibration,
         screened: &[(f64, &Template)],
         ports: &PortScan,
     ) -> Round {
         let highest = screened.iter().map(|(evidence, _)| *evidence).fold(f64::MIN, f64::max);
-        let excess = excess(current, nulls, self.prepared.forward.section.sleepers);
-        let p_value = tail_probability(nulls, highest / excess, |residual, projected_gradient| {
+        let nulls = whitened(&self.nulls, problem.observation, current);
+        let excess = excess(current, &nulls, self.prepared.forward.section.sleepers);
+        let p_value = tail_probability(&nulls, highest / excess, |residual, projected_gradient| {
             let evidence =
                 screened.iter().map(|(_, t)| t.log_evidence(residual, projected_gradient));
             Some(evidence.fold(f64::MIN, f64::max))
         });
         let port = ports.best(&current.residual, &current.gradient);
         let port_p_value = port.as_ref().map_or(1.0, |port| {
-            tail_probability(nulls, port.log_evidence, |residual, projected_gradient| {
-                ports.greatest(residual, projected_gradient)
+            tail_probability(&nulls, port.log_evidence / excess, |residual, projected_gradient| {
+                ports.best(residual, projected_gradient).map(|port| port.log_evidence)
             })
         });
         // The better of two tests.

@@ -162,7 +162,6 @@ fn a_squat_under_the_other_wheel_is_felt_as_in_time() {
         10.0 * (other / own).log10()
     });
     let expected: Vec<f64> = expected.collect();
-    assert!(expected.iter().all(|level| (-30.0..-3.0).contains(level)), "{expected:?}");
     // One event each, of which the blow is followed by the ringing of the track.
     assert!(rms_difference(&in_time, &expected) < 3.0, "{in_time:?} {expected:?}");
 }
