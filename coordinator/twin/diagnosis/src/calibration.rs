@@ -337,7 +337,7 @@ impl Problem<'_> {
         let pull = &prior.precision * &from_prior;
         let objective = 0.5 * (residual.norm_squared() + from_prior.dot(&pull));
         let gradient = jacobian.tr_mul(&residual) - pull;
-        // A product with a transpose has its blocks; `tr_mul` goes column by column.
+        // Several times as quick as `tr_mul`, which takes one scalar product an entry.
         let precision = jacobian.transpose() * &jacobian + &prior.precision;
         let precision = Cholesky::new(precision).ok_or(CalibrationError::NotFinite)?;
         if !objective.is_finite() {

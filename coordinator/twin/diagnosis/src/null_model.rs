@@ -294,3 +294,33 @@ fn windows(section: &Section, pass: &Pass) -> Vec<Option<Range<usize>>> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drawn_differences_scatter_as_the_covariance_says() {
+        let (per_sleeper, sleepers) = (4, 40);
+        let mut random = ChaCha8Rng::seed_from_u64(99);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        // Neighbouring rows hang together; the mean is none.
+        let mut sleeper = || {
+            let common = normal();
+            (0..per_sleeper).map(|row| 1.0 + 0.2 * common + 0.1 * normal() * row as f64).collect()
+        };
+        let differences: Vec<Vec<f64>> = (0..100)
+            .map(|_| (0..sleepers).flat_map(|_| -> Vec<f64> { sleeper() }).collect())
+            .collect();
+        let null = NullModel { per_sleeper, differences };
+        let pass_variance = DVector::from_vec(vec![0.05, 0.1, 0.2, 0.05]);
+        let expected = null.covariance(2, &pass_variance);
+        let drawn = null.drawn(2, &pass_variance);
+        let differences = drawn.iter().map(|it| it.as_slice().to_vec());
+        let drawn = NullModel { per_sleeper, differences: differences.collect() };
+        let error = drawn.simulated_covariance() - &expected;
+        // Four thousand draws leave some per cent to chance.
+        assert!(error.amax() < 0.08 * expected.amax(), "{error} {expected}");
+        assert!(drawn.offset().amax() < 0.03, "{}", drawn.offset());
+    }
+}

@@ -69,10 +69,8 @@ fn squares(
             let offset_m = f64::from(sample) * step_m;
             let height_m = height_m(offset_m);
             // Most of a track is flat.
-            Complex64::from(match height_m {
-                0.0 => 0.0,
-                _ => window(offset_m / spacing_m) * height_m,
-            })
+            let weight = if height_m == 0.0 { 0.0 } else { window(offset_m / spacing_m) };
+            Complex64::from(weight * height_m)
         })
         .collect();
     let highest = samples.iter().map(|height| height.re.abs()).fold(0.0, f64::max);

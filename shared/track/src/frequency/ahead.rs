@@ -1,12 +1,11 @@
 //! The rail's receptances between two places a fixed distance apart, for two wheels that may stand
 //! anywhere.
 
-use super::lane::{LANES, Lane};
+use super::lane::{LANES, Lane, omega};
 use super::rail::Partition;
 use crate::model::TrackModel;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
-use std::f64::consts::TAU;
 
 /// Receptances in m/N between every rail node and the place so far ahead of it (negative: behind):
 /// `[frequency][node]`, zero where that is not on the rail. Between nodes they are interpolated.
@@ -26,8 +25,7 @@ pub fn receptances_ahead(
         })
         .collect();
     let chunks = frequencies_hz.par_chunks(LANES).flat_map_iter(|chunk| {
-        let omega = |lane: usize| TAU * chunk[lane.min(chunk.len() - 1)];
-        let lanes = pulp::Arch::new().dispatch(|| partition.between(omega, &pairs));
+        let lanes = pulp::Arch::new().dispatch(|| partition.between(omega(chunk), &pairs));
         (0..chunk.len()).map(move |lane| lanes.iter().map(|value| value.get(lane)).collect())
     });
     chunks.collect()

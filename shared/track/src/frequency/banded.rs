@@ -134,10 +134,11 @@ impl Inverse {
         Self { factor: matrix, band }
     }
 
-    /// An entry on the diagonal.
+    /// The entries on the diagonal at these rows, zero where there is none.
     #[inline(always)]
-    pub(super) fn diagonal(&self, row: usize) -> Lane {
-        self.band.diagonal(row)
+    pub(super) fn direct(&self, rows: &[Option<usize>]) -> Vec<Lane> {
+        let at = |row: &Option<usize>| row.map_or(Lane::default(), |row| self.band.diagonal(row));
+        rows.iter().map(at).collect()
     }
 
     /// The entries of a column from row `first` down to its diagonal: left in these places of `work`,

@@ -2,10 +2,17 @@
 
 use rustfft::num_complex::Complex64;
 use std::array;
+use std::f64::consts::TAU;
 use std::ops::{Add, Mul, Sub};
 
 /// Frequencies that are solved side by side: the width of an AVX-512 register.
 pub(super) const LANES: usize = 8;
+
+/// Angular frequency in rad/s in each lane of at most [`LANES`] frequencies in Hz: the last one repeats.
+#[inline(always)]
+pub(super) fn omega(frequencies_hz: &[f64]) -> impl Fn(usize) -> f64 {
+    move |lane| TAU * frequencies_hz[lane.min(frequencies_hz.len() - 1)]
+}
 
 /// The same complex quantity at [`LANES`] frequencies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -5,14 +5,13 @@
 //! place after the other, on the same matrices.
 
 use super::banded::{Banded, Inverse};
-use super::lane::{LANES, Lane};
+use super::lane::{LANES, Lane, omega};
 use super::piece::{Piece, pieces};
 use super::receptances::{RailReceptances, SeatReceptances};
 use super::states::States;
 use crate::model::{Matrices, TrackModel};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// How the matrices of a track come apart into the rail and what hangs on it.
@@ -46,8 +45,7 @@ impl RailReceptances {
     ) -> Self {
         let partition = Partition::new(model);
         let layout = model.layout();
-        let nodes: Vec<_> =
-            (0..layout.rail_nodes_m().len()).map(|node| layout.rail_node_dofs(node)[0]).collect();
+        let nodes = deflections(model);
         let seats = layout.sleepers().iter().map(|sleeper| sleeper.rail_node);
         let near = |seat: usize, reach: usize| Near {
             seat,
@@ -58,14 +56,20 @@ impl RailReceptances {
         let solved: Vec<_> = frequencies_hz
             .par_chunks(LANES)
             .map(|chunk| {
-                let omega = |lane: usize| TAU * chunk[lane.min(chunk.len() - 1)];
-                let lanes = pulp::Arch::new().dispatch(|| partition.solve(omega, &nodes, &near));
+                let solve = || partition.solve(omega(chunk), &nodes, &near);
+                let lanes = pulp::Arch::new().dispatch(solve);
                 (0..chunk.len()).map(|lane| lanes.unpack(lane, &near)).collect::<Vec<_>>()
             })
             .collect();
         let (direct, from_seats) = solved.into_iter().flatten().unzip();
         Self { direct, from_seats }
     }
+}
+
+/// Degrees of freedom of the deflection of every rail node, of held nodes none.
+pub(super) fn deflections(model: &TrackModel) -> Vec<Option<usize>> {
+    let layout = model.layout();
+    (0..layout.rail_nodes_m().len()).map(|node| layout.rail_node_dofs(node)[0]).collect()
 }
 
 /// Dynamic stiffness in N/m that acts on the rail's deflection at each rail seat, rail elements and
@@ -80,9 +84,8 @@ pub fn seat_stiffness(model: &TrackModel, frequencies_hz: &[f64]) -> Vec<Vec<Com
     let seats: Vec<_> =
         sleepers.map(|sleeper| layout.rail_node_dofs(sleeper.rail_node)[0]).collect();
     let chunks = frequencies_hz.par_chunks(LANES).flat_map_iter(|chunk| {
-        let omega = |lane: usize| TAU * chunk[lane.min(chunk.len() - 1)];
-        let rail =
-            pulp::Arch::new().dispatch(|| partition.rail(&partition.dynamic_stiffness(omega)));
+        let rail = pulp::Arch::new()
+            .dispatch(|| partition.rail(&partition.dynamic_stiffness(omega(chunk))));
         let at = |seat: &Option<usize>| seat.map_or(Lane::default(), |seat| rail.diagonal(seat));
         let lanes: Vec<Lane> = seats.iter().map(at).collect();
         (0..chunk.len()).map(move |lane| lanes.iter().map(|value| value.get(lane)).collect())
@@ -222,7 +225,7 @@ impl<'a> Partition<'a> {
         [Inverse::new(rail), Inverse::new(mirrored)]
     }
 
-    /// `nodes` are the degrees of freedom of the rail's deflection, of held nodes none.
+    /// `nodes` are the [`deflections`].
     #[inline(always)]
     fn solve(
         &self,
@@ -237,8 +240,7 @@ impl<'a> Partition<'a> {
             let [inverse, mirrored] = self.inverted_both(omega);
             (inverse, Some(mirrored))
         };
-        let free = |dof: &Option<usize>| dof.map_or(Lane::default(), |dof| inverse.diagonal(dof));
-        let direct = nodes.iter().map(free).collect();
+        let direct = inverse.direct(nodes);
         let mut work = vec![Lane::default(); self.rail_dofs];
         let of_seat = |near: &Near| match &mirrored {
             Some(mirrored) => near.receptances(nodes, [&inverse, mirrored], &mut work),

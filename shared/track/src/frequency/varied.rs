@@ -4,9 +4,9 @@
 //! receptances follow from the known ones without a solution of the whole track.
 
 use super::banded::Inverse;
-use super::lane::{LANES, Lane};
+use super::lane::{LANES, Lane, omega};
 use super::piece::Piece;
-use super::rail::Partition;
+use super::rail::{Partition, deflections};
 use super::receptances::RailReceptances;
 use super::states::States;
 use crate::model::{Matrices, TrackModel};
@@ -14,7 +14,6 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Most degrees of freedom of the rail that may change: with more of them a whole solution is as quick.
@@ -44,14 +43,18 @@ struct Difference<'a> {
 impl KnownRail {
     /// Solves a track, on its own matrices: with force laws as they are under a wheel above them.
     pub fn new(model: &TrackModel, frequencies_hz: &[f64]) -> Self {
-        let partition = Partition::new(model);
-        let inverses = frequencies_hz.par_chunks(LANES).map(|chunk| {
-            let omega = omega(chunk);
-            pulp::Arch::new().dispatch(|| partition.inverted_both(omega))
+        let (partition, nodes) = (Partition::new(model), deflections(model));
+        let solved = frequencies_hz.par_chunks(LANES).map(|chunk| {
+            let inverses = pulp::Arch::new().dispatch(|| partition.inverted_both(omega(chunk)));
+            let direct = inverses[0].direct(&nodes);
+            let of_lane = |lane: usize| direct.iter().map(|value| value.get(lane)).collect();
+            let direct: Vec<Vec<Complex64>> = (0..chunk.len()).map(of_lane).collect();
+            (inverses, direct)
         });
+        let (inverses, direct): (Vec<_>, Vec<_>) = solved.unzip();
         Self {
-            inverses: inverses.collect(),
-            direct: RailReceptances::of_matrices(model, frequencies_hz, None).direct,
+            inverses,
+            direct: direct.into_iter().flatten().collect(),
             frequencies_hz: frequencies_hz.to_vec(),
             model: model.clone(),
         }
@@ -78,9 +81,7 @@ impl KnownRail {
         if difference.dofs.is_empty() {
             return self.direct.clone();
         }
-        let layout = model.layout();
-        let dofs: Vec<_> =
-            (0..layout.rail_nodes_m().len()).map(|node| layout.rail_node_dofs(node)[0]).collect();
+        let dofs = deflections(model);
         let near = difference.near(&dofs, reach);
         let chunks = self.frequencies_hz.par_chunks(LANES).zip(&self.inverses).enumerate();
         let changed = chunks.flat_map_iter(|(index, (chunk, inverses))| {
@@ -101,11 +102,6 @@ impl KnownRail {
         });
         changed.collect()
     }
-}
-
-/// Angular frequency in each lane of a group; the last ones repeat.
-fn omega(chunk: &[f64]) -> impl Fn(usize) -> f64 {
-    move |lane: usize| TAU * chunk[lane.min(chunk.len() - 1)]
 }
 
 /// Adds `changes` to the dynamic stiffness at some degrees of freedom: what is direct falls by the diagonal of
@@ -188,10 +184,9 @@ impl<'a> Difference<'a> {
     /// The nodes up to so many from what is touched.
     fn near(&self, dofs: &[Option<usize>], reach: usize) -> Range<usize> {
         let (from, to) = (self.dofs[0], self.dofs[self.dofs.len() - 1]);
-        let is_before = |dof: &Option<usize>| dof.is_none_or(|dof| dof < from);
-        let first = dofs.iter().position(|dof| !is_before(dof)).unwrap_or(0);
-        let is_up_to = |dof: &Option<usize>| dof.is_some_and(|dof| dof <= to);
-        let last = dofs.iter().rposition(is_up_to).unwrap_or(dofs.len() - 1);
+        let first = dofs.iter().position(|dof| dof.is_some_and(|dof| dof >= from)).unwrap_or(0);
+        let last = dofs.iter().rposition(|dof| dof.is_some_and(|dof| dof <= to));
+        let last = last.unwrap_or(dofs.len() - 1);
         first.min(last).saturating_sub(reach)..(first.max(last) + reach + 1).min(dofs.len())
     }
 

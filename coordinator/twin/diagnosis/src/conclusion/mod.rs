@@ -18,6 +18,7 @@ use crate::sentence::sentence;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::PassDefect;
+use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{EffectFamily, Kind};
 
@@ -30,6 +31,10 @@ const ONE_PASS_MAX: f64 = 0.9;
 
 /// Greatest probability of anything: the model that it rests on may be wrong.
 const MODEL_MAX: f64 = 0.97;
+
+/// Greatest probability of something unknown on a track on which error rates were not measured: of four
+/// unknowns on recordings of a line one was right (docs/diagnosis-examples.md).
+const UNMEASURED_UNKNOWN_MAX: f64 = 0.5;
 
 /// Share of a family's probability that the name has which the passes alone suggest.
 const NAMED_SHARE: f64 = 0.65;
@@ -64,6 +69,9 @@ impl Evidence<'_> {
         let most = self.probability_max();
         for hypothesis in &mut hypotheses {
             hypothesis.probability = hypothesis.probability.min(most);
+            if hypothesis.physics == UNKNOWN && !self.has_measured_rates() {
+                hypothesis.probability = hypothesis.probability.min(UNMEASURED_UNKNOWN_MAX);
+            }
         }
         let fitted: Vec<&str> =
             self.search.accepted.iter().map(|candidate| candidate.kind.physics).collect();
@@ -100,6 +108,11 @@ impl Evidence<'_> {
             loss_of_contact: self.inspection.loss_of_contact.clone(),
             notes,
         })
+    }
+
+    /// Whether error rates of diagnoses were measured on this track (docs/trial.md).
+    fn has_measured_rates(&self) -> bool {
+        self.prepared.forward.section.track.design == TrackDesign::v_track()
     }
 
     /// As sure as the recording lets anybody be.

@@ -213,7 +213,7 @@ impl Forward {
     }
 
     /// The compared sleepers at which something from here to there, in spacings from the first of them,
-    /// is felt.
+    /// is felt, under any of the description's wheels.
     pub(crate) fn felt_at(&self, [from, to]: [f64; 2]) -> Range<usize> {
         let design = &self.section.track.design;
         let furthest_m = design.wheel.further_wheels_m.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
