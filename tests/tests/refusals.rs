@@ -339,6 +339,6 @@ fn diagnosis_of_v_track() -> serde_json::Value {
         "fit": {"score": "", "before": scores, "after": scores, "held_out_gain_nats": {}},
         "track": [sleeper(1), sleeper(2), sleeper(3)],
         "levels": {"frequency_Hz": [], "speeds_km_h": [], "measured_dB": [], "before_dB": [],
-                   "after_dB": [], "scatter_dB": []},
+                   "after_dB": [], "scatter_dB": [[1.0, null]]},
     })
 }

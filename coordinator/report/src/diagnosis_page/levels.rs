@@ -25,14 +25,15 @@ pub(super) fn predicted(levels: &Levels, side: Side, at: [usize; 3]) -> Option<f
     of(table, at)
 }
 
-/// Measured less predicted level in dB.
+/// Measured less predicted level in dB; none where they are not compared.
 pub(super) fn difference(levels: &Levels, side: Side, at: [usize; 3]) -> Option<f64> {
+    scatter(levels, at[0], at[2])?;
     Some(measured(levels, at)? - predicted(levels, side, at)?)
 }
 
-/// Scatter to expect in dB of one level at a speed in a band.
+/// Scatter to expect in dB of one level at a speed in a band; none where it is not compared.
 pub(super) fn scatter(levels: &Levels, speed: usize, band: usize) -> Option<f64> {
-    levels.scatter_db.get(speed)?.get(band).copied().filter(|sd| sd.is_finite() && *sd > 0.0)
+    levels.scatter_db.get(speed)?.get(band).copied()?.filter(|sd| *sd > 0.0)
 }
 
 fn of(table: &[Vec<Vec<f64>>], [speed, sleeper, band]: [usize; 3]) -> Option<f64> {
@@ -90,8 +91,28 @@ pub(super) fn mismatch_norm(diagnosis: &Diagnosis, sleeper: usize) -> f64 {
 
 /// The middle one of the scatters in dB; none without any.
 pub(super) fn usual_scatter(levels: &Levels) -> Option<f64> {
-    let mut all: Vec<f64> =
-        levels.scatter_db.iter().flatten().copied().filter(|sd| sd.is_finite()).collect();
+    let mut all: Vec<f64> = levels.scatter_db.iter().flatten().copied().flatten().collect();
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_that_are_not_compared_count_nowhere() {
+        let levels = Levels {
+            frequency_hz: vec![100.0, 200.0, 4000.0],
+            speeds_km_h: vec![40.0],
+            measured_db: vec![vec![vec![11.0, 9.0, -20.0]]],
+            before_db: vec![vec![vec![10.0, 10.0, 0.0]]],
+            after_db: vec![vec![vec![10.0, 10.0, 0.0]]],
+            scatter_db: vec![vec![Some(2.0), Some(2.0), None]],
+        };
+        let cells = || (0..3).map(|band| [0, 0, band]);
+        assert_eq!(rms(&levels, Side::Before, cells()), Some(1.0));
+        assert_eq!(difference(&levels, Side::After, [0, 0, 2]), None);
+        assert_eq!(measured(&levels, [0, 0, 2]), Some(-20.0));
+    }
 }

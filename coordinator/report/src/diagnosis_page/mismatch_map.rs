@@ -227,6 +227,13 @@ fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
             digits(db, 2)
         )
     });
+    let is_left_out = diagnosis.levels.scatter_db.iter().flatten().any(Option::is_none);
+    let left_out = if is_left_out {
+        " Some bands stay white at all sleepers: their waves are short against the contact patch, \
+         and they are not compared."
+    } else {
+        ""
+    };
     let sides = with.map_or_else(
         || {
             " The prediction is that of the track model with a separate stiffness at every sleeper."
@@ -244,7 +251,7 @@ fn caption(diagnosis: &Diagnosis, with: Option<&str>) -> String {
     } else {
         " Frames mark the mismatches listed below."
     };
-    format!("{shown}{sides}{scatter}{boxes}")
+    format!("{shown}{sides}{scatter}{left_out}{boxes}")
 }
 
 fn mismatches(diagnosis: &Diagnosis) -> Markup {

@@ -49,7 +49,7 @@ fn levels(effect_db: impl Fn(At) -> f64) -> Levels {
         measured_db: table(|at| track(at) + effect_db(at) + scattered(at)),
         before_db: table(track),
         after_db: table(|at| track(at) + effect_db(at)),
-        scatter_db: vec![vec![SCATTER_DB; BANDS]; SPEEDS_KM_H.len()],
+        scatter_db: vec![vec![Some(SCATTER_DB); BANDS]; SPEEDS_KM_H.len()],
     }
 }
 

@@ -218,7 +218,7 @@ pub struct Levels {
     /// Predicted with what was named.
     #[serde(rename = "after_dB")]
     pub after_db: Vec<Vec<Vec<f64>>>,
-    /// Scatter to expect of one log power, `[speed][band]`.
+    /// Scatter to expect of one log power, `[speed][band]`; none where it is not compared.
     #[serde(rename = "scatter_dB")]
-    pub scatter_db: Vec<Vec<f64>>,
+    pub scatter_db: Vec<Vec<Option<f64>>>,
 }

@@ -272,7 +272,8 @@ fn cells_inside(diagnosis: &Diagnosis) -> bool {
     speeds.into_iter().all(|((measured, before), scatter)| {
         measured.iter().zip(before).all(|(measured, before)| {
             let cells = measured.iter().zip(before).zip(scatter);
-            cells.into_iter().all(|((m, b), sd)| (m - b).abs() <= CELL_DEVIATIONS * sd)
+            let is_inside = |m: f64, b: f64, sd: f64| (m - b).abs() <= CELL_DEVIATIONS * sd;
+            cells.into_iter().all(|((m, b), sd)| sd.is_none_or(|sd| is_inside(*m, *b, sd)))
         })
     })
 }

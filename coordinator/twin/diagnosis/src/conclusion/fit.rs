@@ -39,8 +39,9 @@ impl Evidence<'_> {
         };
         let scatter = |speed: usize| {
             let first = speed * forward.bands.count();
-            let of_band = |band| DECIBEL * self.search.deviation[first + band];
-            (0..forward.bands.count()).map(of_band).collect()
+            let deviations = self.search.deviation.rows(first, forward.bands.count());
+            let in_db = |deviation: &f64| deviation.is_finite().then_some(DECIBEL * deviation);
+            deviations.iter().map(in_db).collect()
         };
         Ok(Levels {
             frequency_hz: forward.bands.centres_hz().to_vec(),

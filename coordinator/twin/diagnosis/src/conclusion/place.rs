@@ -97,9 +97,10 @@ impl Evidence<'_> {
         let sleepers = loud(&by_sleeper);
         let bands = loud(&by_band);
         let mut sum = (0.0, 0.0);
-        for (measured, before) in levels.measured_db.iter().zip(&levels.before_db) {
+        let speeds = levels.measured_db.iter().zip(&levels.before_db).zip(&levels.scatter_db);
+        for ((measured, before), scatter) in speeds {
             for sleeper in sleepers.clone() {
-                for band in bands.clone() {
+                for band in bands.clone().filter(|&band| scatter[band].is_some()) {
                     sum.0 += (measured[sleeper][band] - before[sleeper][band]).powi(2);
                     sum.1 += 1.0;
                 }
