@@ -13,6 +13,9 @@ use tracktwin_track::model::ModelError;
 /// Gauss-Newton steps; five suffice where the track is not far from the catalogue's.
 const STEPS_MAX: usize = 10;
 
+/// Steps after which the linearisation tells how far a search may come.
+const FIRST_STEPS: usize = 3;
+
 /// Largest change of a logarithm in one step: further the linearisation does not carry.
 const STEP_MAX: f64 = 0.7;
 
@@ -73,6 +76,22 @@ pub struct Calibration {
     pub objective: f64,
     /// Logarithm of the evidence, up to a constant of the observation alone.
     pub log_evidence: f64,
+}
+
+/// A search that was interrupted.
+#[derive(Clone, Debug)]
+pub(crate) struct Descent {
+    /// Where it is.
+    pub(crate) state: Calibration,
+    /// Whether it came to its end.
+    has_ended: bool,
+}
+
+impl Calibration {
+    /// The objective at the minimum that the derivatives at these values predict, in nats.
+    pub(crate) fn predicted_objective(&self) -> f64 {
+        self.objective - 0.5 * self.precision.solve(&self.gradient).dot(&self.gradient)
+    }
 }
 
 /// Ranges of the last values; all others are free.
@@ -162,6 +181,28 @@ impl Problem<'_> {
         self.calibrate_among(start, &Ranges { first, each })
     }
 
+    /// The first steps of [`Problem::calibrate`].
+    ///
+    /// # Errors
+    /// As [`Problem::calibrate`].
+    pub(crate) fn begin(&self, start: DVector<f64>) -> Result<Descent, CalibrationError> {
+        let prior = self.prior();
+        let state = self.linearise(&prior, &start)?;
+        self.descend(&prior, &Ranges::default(), state, FIRST_STEPS)
+    }
+
+    /// The remaining steps of [`Problem::calibrate`].
+    ///
+    /// # Errors
+    /// As [`Problem::calibrate`].
+    pub(crate) fn go_on(&self, begun: Descent) -> Result<Calibration, CalibrationError> {
+        if begun.has_ended {
+            return Ok(begun.state);
+        }
+        let steps = STEPS_MAX - FIRST_STEPS;
+        Ok(self.descend(&self.prior(), &Ranges::default(), begun.state, steps)?.state)
+    }
+
     fn calibrate_among(
         &self,
         start: DVector<f64>,
@@ -170,31 +211,45 @@ impl Problem<'_> {
         let prior = self.prior();
         let mut values = start;
         ranges.confine(&mut values);
-        let mut state = self.linearise(&prior, &values)?;
-        for _ in 0..STEPS_MAX {
+        let state = self.linearise(&prior, &values)?;
+        Ok(self.descend(&prior, ranges, state, STEPS_MAX)?.state)
+    }
+
+    /// Goes on from a state, for so many steps at most.
+    fn descend(
+        &self,
+        prior: &Prior,
+        ranges: &Ranges,
+        mut state: Calibration,
+        steps: usize,
+    ) -> Result<Descent, CalibrationError> {
+        for _ in 0..steps {
             let mut step = ranges.step(&state).ok_or(CalibrationError::NotFinite)?;
             let longest = step.amax();
             if longest > STEP_MAX {
                 step *= STEP_MAX / longest;
             }
-            let mut objective = self.objective_or_infinity(&prior, &(&values + &step));
+            let objective_after =
+                |step: &DVector<f64>| self.objective_or_infinity(prior, &(&state.values + step));
+            let mut objective = objective_after(&step);
             while objective > state.objective && step.amax() > STEP_MIN {
                 step *= 0.5;
-                objective = self.objective_or_infinity(&prior, &(&values + &step));
+                objective = objective_after(&step);
             }
             let gain = state.objective - objective;
             if gain <= 0.0 {
-                break;
+                return Ok(Descent { state, has_ended: true });
             }
-            values += step;
             // At the edge of what makes a track there are no derivatives.
-            let Ok(next) = self.linearise(&prior, &values) else { break };
+            let Ok(next) = self.linearise(prior, &(&state.values + step)) else {
+                return Ok(Descent { state, has_ended: true });
+            };
             state = next;
             if gain < TOLERANCE {
-                break;
+                return Ok(Descent { state, has_ended: true });
             }
         }
-        Ok(state)
+        Ok(Descent { state, has_ended: false })
     }
 
     /// Values to start from: those of a baseline and a candidate's trial.

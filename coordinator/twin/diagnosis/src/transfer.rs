@@ -40,18 +40,10 @@ pub(crate) struct Transfer {
 
 impl Transfer {
     /// Works it out for a model at these lines in Hz, with what derivatives need so many nodes on either
-    /// side of each rail seat, if `reach` says so. `further_wheels` is what the design's further wheels do,
-    /// if that is known.
-    pub(crate) fn new(
-        model: TrackModel,
-        lines_hz: &[f64],
-        reach: Option<usize>,
-        further_wheels: Option<&Arc<FurtherWheels>>,
-    ) -> Self {
+    /// side of each rail seat, if `reach` says so.
+    pub(crate) fn new(model: TrackModel, lines_hz: &[f64], reach: Option<usize>) -> Self {
         let RailReceptances { direct, from_seats } = RailReceptances::new(&model, lines_hz, reach);
-        let has_wheels = model.vehicle().further_wheels_m == model.design().wheel.further_wheels_m;
-        let known = further_wheels.filter(|_| has_wheels).map(Arc::clone);
-        Self::on_rail(model, lines_hz, Arc::new(direct), known).with_seats(from_seats)
+        Self::on_rail(model, lines_hz, Arc::new(direct), None).with_seats(from_seats)
     }
 
     /// With receptances from the rail seats in m/N, `[line][sleeper]`.

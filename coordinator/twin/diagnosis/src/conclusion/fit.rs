@@ -5,6 +5,7 @@ use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
 use crate::estimate::Estimate;
 use crate::outcome::{BeforeAfter, FitScores, Hypothesis, Levels, Score, Scores, SleeperValues};
+use crate::port_scan::UnknownElement;
 use crate::quantity::{Common, Own};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -53,7 +54,7 @@ impl Evidence<'_> {
         })
     }
 
-    pub(super) fn fit(&self) -> FitScores {
+    pub(super) fn fit(&self, hypotheses: &[Hypothesis]) -> FitScores {
         let search = self.search;
         let in_sample = |calibration: &Calibration| {
             let count = calibration.residual.len() as f64;
@@ -66,8 +67,17 @@ impl Evidence<'_> {
         };
         let speeds = &self.prepared.forward.speeds_m_s;
         let mut gains = BTreeMap::new();
-        for round in search.rounds.iter().filter(|round| round.accepted) {
-            for (speed, gain) in speeds.iter().zip(&round.held_out_gain) {
+        let is_accepted = |unknown: &UnknownElement| {
+            let port = Some(unknown.place.name());
+            hypotheses.iter().any(|it| it.accepted && it.port.as_deref() == port)
+        };
+        for round in &search.rounds {
+            let gain = match round.accepted {
+                true => &round.held_out_gain[..],
+                false if round.port.as_ref().is_some_and(is_accepted) => &round.unknown_gain[..],
+                false => &[],
+            };
+            for (speed, gain) in speeds.iter().zip(gain) {
                 *gains.entry(format!("{:.0}", 3.6 * speed)).or_insert(0.0) += gain;
             }
         }

@@ -85,7 +85,7 @@ impl Evidence<'_> {
             hypotheses.clear();
         }
         let levels = self.levels()?;
-        let fit = self.fit();
+        let fit = self.fit(&hypotheses);
         let bias_removed = self.bias_removed(&hypotheses);
         let count = self.prepared.forward.section.sleepers;
         let sleepers: Vec<String> = (0..count).map(|sleeper| self.id(sleeper)).collect();

@@ -48,10 +48,10 @@ impl Evidence<'_> {
                 best.candidate.kind.physics
             ));
         }
-        if round.port_differs_between_speeds {
+        if !round.unknown_is_predictive() {
             return Some(format!(
-                "A significant residual remains{place} (probability by chance {}), but no two \
-                     speeds show it there; a fixed cause would appear at every speed.",
+                "A significant residual remains{place} (probability by chance {}), but it does \
+                     not predict a speed that is held out; a fixed cause would appear at every speed.",
                 chance(round.p_value)
             ));
         }

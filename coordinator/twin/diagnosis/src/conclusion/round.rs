@@ -33,7 +33,7 @@ impl Evidence<'_> {
         let alone = first && !round.accepted;
         let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
         let others = family.max(nothing);
-        let is_there = alone && !round.port_differs_between_speeds;
+        let is_there = alone && round.unknown_is_predictive();
         let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
         // Something is there, but the names that come near failed on withheld speeds.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();

@@ -17,15 +17,12 @@ const STEP: f64 = 0.25;
 
 impl Forward {
     /// Lets the track end at any of the distances that it may end at, and its next sleepers be held as
-    /// they may be: what that changes is taken from a track of these values, and so is what the further
-    /// wheels do.
+    /// they may be: what that changes is taken from a track of these values.
     ///
     /// # Errors
     /// As [`Forward::log_power`].
     pub fn allow_beyond(&mut self, values: &DVector<f64>) -> Result<(), ModelError> {
-        let transfer = self.transfer(values, &[], false)?;
-        self.further_wheels = Some(Arc::clone(transfer.further_wheels()));
-        let plain = self.levels(&transfer, values);
+        let plain = self.log_power(values, &[])?;
         let ends = ENDS_SPANS.into_par_iter().map(|spans| {
             let ended = self.with_ends(spans).log_power(values, &[])?;
             Ok(ended - &plain)

@@ -13,7 +13,6 @@ pub use derivatives::Linearised;
 use self::supports::NEIGHBOURS;
 use crate::bands::Bands;
 use crate::baseline::Unknowns;
-use crate::further_wheels::FurtherWheels;
 use crate::profile::Shape;
 use crate::quantity::Own;
 use crate::section::{Section, Window};
@@ -44,8 +43,6 @@ pub struct Forward {
     /// Changes of the log powers by what lies beyond the sleepers compared, a column for each unknown
     /// of [`Unknowns::beyond`]; zero until [`Forward::allow_beyond`].
     beyond: DMatrix<f64>,
-    /// What the further wheels do; none until [`Forward::allow_beyond`].
-    further_wheels: Option<Arc<FurtherWheels>>,
     /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
     windows: Vec<Vec<Vec<Window>>>,
     /// Spectrum of the surface at level one in m2/Hz at each speed and line.
@@ -85,7 +82,6 @@ impl Forward {
             noise_density,
             wheel_starts_m,
             beyond,
-            further_wheels: None,
             windows,
             surface,
         }
@@ -194,8 +190,7 @@ impl Forward {
     ) -> Result<Transfer, ModelError> {
         let model = self.model(values, extensions)?;
         let reach = from_seats.then(|| self.reach_nodes());
-        let transfer =
-            Transfer::new(model, self.bands.lines_hz(), reach, self.further_wheels.as_ref());
+        let transfer = Transfer::new(model, self.bands.lines_hz(), reach);
         Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
     }
 

@@ -19,7 +19,7 @@ pub(crate) use probability::Probabilities;
 
 use self::fit::retuned;
 use self::limits::FALSE_ALARM;
-use self::round::{Setting, accepted_candidate, is_consistent_across_speeds, is_predicted};
+use self::round::{Setting, accepted_candidate, is_predicted, unknown_is_predicted};
 use self::threshold::EvidenceThreshold;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
@@ -87,9 +87,9 @@ pub struct Round {
     /// What an unknown dynamic stiffness at the place of the last name before explains, where no more
     /// is accepted.
     pub unknown_residual: Option<UnknownElement>,
-    /// Whether no two speeds have evidence for it, each alone, nor all together more than one of them;
-    /// asked where nothing is named.
-    pub port_differs_between_speeds: bool,
+    /// Gain of an unknown dynamic stiffness on each speed held out, in nats, its place chosen without that
+    /// speed; asked in the first search where nothing is named.
+    pub unknown_gain: Vec<f64>,
     /// Gain of the best on each speed held out, in nats.
     pub held_out_gain: Vec<f64>,
     /// Whether the best was accepted.
@@ -103,6 +103,11 @@ impl Round {
     /// Whether such evidence is rarer, where nothing is left out, than a false alarm may be.
     pub fn is_significant(&self) -> bool {
         self.p_value <= FALSE_ALARM
+    }
+
+    /// Whether an unknown dynamic stiffness predicts speeds that were held out.
+    pub fn unknown_is_predictive(&self) -> bool {
+        unknown_is_predicted(&self.unknown_gain)
     }
 }
 
@@ -193,7 +198,6 @@ pub fn search(
         && search.search_round(&setting, all, &mut densities, progress)?
     {}
     search.retract_names(&prepared.forward.section);
-    search.test_each_speed(&setting)?;
     search.compare_speeds(&setting)?;
     let with = Problem {
         forward: &prepared.forward,
@@ -283,6 +287,9 @@ impl SearchOutcome {
         if !found_another {
             round.unknown_residual = self.unknown_residual(&ports, &forward.section);
         }
+        if !found_another && accepted.is_empty() && round.is_significant() {
+            round.unknown_gain = setting.unknown_gains(&ports, &self.last)?;
+        }
         self.rounds.push(round);
         Ok(found_another)
     }
@@ -326,19 +333,6 @@ impl SearchOutcome {
             densities.push(log_densities(&scores[0]));
         }
         Ok(gains)
-    }
-
-    /// Asks every speed alone for what has no name.
-    fn test_each_speed(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
-        let Some(first) = self.rounds.first_mut().filter(|first| !first.accepted) else {
-            return Ok(());
-        };
-        if let Some(port) = first.port.as_ref().filter(|_| first.is_significant()) {
-            let alone = setting.unknown_alone(&port.place, &self.baseline.values)?;
-            first.port_differs_between_speeds =
-                !is_consistent_across_speeds(port.log_evidence, &alone);
-        }
-        Ok(())
     }
 
     /// The unknown that the best candidate of a search is compared with. Beside what is accepted it is

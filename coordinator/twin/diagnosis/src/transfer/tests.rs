@@ -74,7 +74,7 @@ fn expected_db(models: [TrackModel; 2], centres_hz: &[f64], seen: Range<usize>) 
         .iter()
         .flat_map(|hz| (0..8).map(move |k| hz * 2_f64.powf((f64::from(k) - 3.5) / 24.0)))
         .collect();
-    let [alone, with] = models.map(|model| Transfer::new(model, &lines_hz, None, None).power);
+    let [alone, with] = models.map(|model| Transfer::new(model, &lines_hz, None).power);
     let turn = |index: usize| TAU * (index as f64 + 0.5) / seen.len() as f64;
     let share = |index: usize| (1.0 - turn(index).cos()).powi(2);
     let of_line = |line: &Vec<f64>| -> f64 {
@@ -143,7 +143,7 @@ fn a_squat_under_the_other_wheel_is_felt_as_in_time() {
         .iter()
         .flat_map(|hz| (0..8).map(move |k| hz * 2_f64.powf((f64::from(k) - 3.5) / 24.0)))
         .collect();
-    let transfer = Transfer::new(model.clone(), &lines_hz, None, None).with_shapes(&section, &[]);
+    let transfer = Transfer::new(model.clone(), &lines_hz, None).with_shapes(&section, &[]);
     let (_, elsewhere) = &transfer.rail_elsewhere[0];
     let power = |line: usize, sleeper: usize, shape: &Shape, share: f64| {
         let density = shape.density(sleeper, 2.8, lines_hz[line]);
@@ -184,7 +184,7 @@ fn a_gap_that_closes_under_a_near_wheel_changes_the_power_as_in_time() {
 #[test]
 fn a_wheel_beyond_the_rail_changes_nothing() {
     let lines_hz = [500.0, 2000.0];
-    let [alone, with] = [None, Some(second_wheel(10.0))]
-        .map(|e| Transfer::new(track(e), &lines_hz, None, None).power);
+    let [alone, with] =
+        [None, Some(second_wheel(10.0))].map(|e| Transfer::new(track(e), &lines_hz, None).power);
     assert_eq!(alone, with);
 }
