@@ -29,6 +29,7 @@ mod signals;
 mod simulate;
 mod status;
 mod stop;
+mod stream;
 mod track;
 mod train;
 mod trial;
@@ -77,6 +78,8 @@ enum Command {
     Train(train::Arguments),
     /// Estimate the track parameters at every sleeper from a recording.
     Evaluate(evaluate::Arguments),
+    /// Estimate the track parameters at every sleeper while a pass is recorded.
+    Stream(stream::Arguments),
     /// Measure coverage and false alarms of the evaluation on simulated tracks.
     Coverage(coverage::Arguments),
     /// Find where a recording differs from the track model, and which left-out physics explains it.
@@ -164,6 +167,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Extend(arguments) => extend::run(arguments),
         Command::Trial(arguments) => asynchronously(trial::run(arguments)),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
+        Command::Stream(arguments) => asynchronously(stream::run(arguments)),
         Command::Coverage(arguments) => asynchronously(coverage::run(arguments)),
         Command::Reproduce(arguments) => asynchronously(reproduce::run(arguments)),
         Command::Import(arguments) => import::run(&arguments),

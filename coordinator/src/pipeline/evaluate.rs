@@ -2,7 +2,7 @@
 
 use crate::pipeline;
 use crate::pipeline::train::TrainingError;
-use tracktwin_evaluation::{Domains, Error, Evaluation, Twin};
+use tracktwin_evaluation::{Domains, Error, Evaluation, Stream, Twin};
 use tracktwin_experiment::Experiment;
 use tracktwin_library::{Library, LibraryError};
 use tracktwin_parameters::{ParameterSet, TrackDesign};
@@ -82,13 +82,24 @@ impl Evaluator {
     /// # Errors
     /// Those of [`tracktwin_evaluation::evaluate`].
     pub fn evaluate(&self, recording: &Recording) -> Result<Evaluation, Error> {
-        let twin = Twin {
+        tracktwin_evaluation::evaluate(recording, &self.twin())
+    }
+
+    /// Evaluation of samples while they are recorded, by models and selector.
+    ///
+    /// # Errors
+    /// Those of [`Stream::new`].
+    pub fn stream<'a>(&'a self, section: &'a Recording) -> Result<Stream<'a>, Error> {
+        Stream::new(section, self.twin())
+    }
+
+    const fn twin(&self) -> Twin<'_> {
+        Twin {
             extractor: &self.extractor,
             models: &self.models,
             library: &self.set,
             domains: &self.domains,
-        };
-        tracktwin_evaluation::evaluate(recording, &twin)
+        }
     }
 }
 

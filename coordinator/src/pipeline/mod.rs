@@ -14,5 +14,6 @@ pub mod models;
 pub mod null_models;
 pub mod provenance;
 pub mod reproduce;
+pub mod stream;
 pub mod train;
 pub mod trial;

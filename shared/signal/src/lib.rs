@@ -7,6 +7,7 @@
 
 mod features;
 pub mod recording;
+pub mod samples;
 mod signal;
 mod squeeze;
 mod transform;

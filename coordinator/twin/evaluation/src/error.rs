@@ -59,6 +59,21 @@ pub enum Error {
         /// Why not.
         source: FeatureError,
     },
+    /// The sample rate of a stream is too low for the features of the models.
+    #[error("recording.json: sample_rate_Hz: {0}")]
+    Rate(FeatureError),
+    /// The samples of a stream come at another rate than declared.
+    #[error(
+        "time_s: the samples come at {} Hz, but recording.json states {} Hz in sample_rate_Hz",
+        rounded(*observed_hz, 6),
+        rounded(*declared_hz, 6)
+    )]
+    OtherSampleRate {
+        /// Sample rate in Hz by the times of the samples.
+        observed_hz: f64,
+        /// Sample rate in Hz that the recording states.
+        declared_hz: f64,
+    },
     /// No sleeper has a window at any speed.
     #[error("no sleeper of the recording {recording} has a window inside a pass")]
     NothingToEvaluate {

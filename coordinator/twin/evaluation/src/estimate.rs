@@ -81,7 +81,7 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
     })
 }
 
-fn check_features(twin: &Twin<'_>) -> Result<(), Error> {
+pub(crate) fn check_features(twin: &Twin<'_>) -> Result<(), Error> {
     let offered = serde_json::to_value(twin.extractor.definition()).unwrap_or_default();
     let trained_on = twin.models.feature_definition();
     if *trained_on == offered {
@@ -91,7 +91,10 @@ fn check_features(twin: &Twin<'_>) -> Result<(), Error> {
 }
 
 /// Estimates for every one of the sleepers, in their order.
-fn estimates(sleepers: &[SleeperFeatures], models: &Trained) -> Result<Vec<Estimates>, Error> {
+pub(crate) fn estimates(
+    sleepers: &[SleeperFeatures],
+    models: &Trained,
+) -> Result<Vec<Estimates>, Error> {
     let speeds = models.speeds_km_h();
     let mut out: Vec<BTreeMap<_, Vec<Estimate>>> = vec![BTreeMap::new(); sleepers.len()];
     let complete = |sleeper: &SleeperFeatures| sleeper.speeds.len() == speeds.len();
@@ -149,7 +152,8 @@ fn combine(estimates: &[Estimate]) -> Estimate {
     Estimate { mean: mean / total, sd: (estimates.len() as f64 / total).sqrt() }
 }
 
-fn evaluated(
+/// The record of a sleeper from its features and estimates.
+pub(crate) fn evaluated(
     recording: &Recording,
     twin: &Twin<'_>,
     matcher: &mut Matcher<'_>,

@@ -11,6 +11,7 @@ mod evaluation;
 mod files;
 mod matches;
 mod outside;
+mod stream;
 #[cfg(test)]
 mod testing;
 mod unevenness;
@@ -25,5 +26,6 @@ pub use evaluation::{
 };
 pub use matches::MATCHES;
 pub use outside::{BeyondEnd, Domains, OutsideLibrary};
+pub use stream::{Evaluated, Outcome, Reason, Row, Stream};
 pub use unevenness::Unevenness;
 pub use windows::{SleeperFeatures, SpeedFeatures, features};

@@ -95,56 +95,112 @@ pub(crate) fn judge(
     library: &TrainingSet,
     domains: &Domains,
 ) -> Result<Vec<DomainTest>, Error> {
+    let mut tests = vec![DomainTest::default(); sleepers.len()];
+    let by_speeds = by_speeds(sleepers);
+    let groups = by_speeds.len();
+    for (speeds, members) in by_speeds {
+        let windows = Windows::of(sleepers, members, domains.of(library, &speeds)?)?;
+        for size in windows.sizes() {
+            for first in 0..=windows.whole.len() - size {
+                let judgement = windows.judge(first, size, groups)?;
+                for &index in windows.held(first, size) {
+                    tests[index].take(&judgement, size);
+                }
+            }
+        }
+    }
+    Ok(tests)
+}
+
+/// The test of the last sleeper only, as [`judge`] does it.
+///
+/// # Errors
+/// Errors of [`Domain`].
+pub(crate) fn judge_last(
+    sleepers: &[SleeperFeatures],
+    library: &TrainingSet,
+    domains: &Domains,
+) -> Result<DomainTest, Error> {
+    let mut test = DomainTest::default();
+    let by_speeds = by_speeds(sleepers);
+    let groups = by_speeds.len();
+    let last = sleepers.len().wrapping_sub(1);
+    for (speeds, members) in by_speeds {
+        if members.last() != Some(&last) {
+            continue;
+        }
+        let windows = Windows::of(sleepers, members, domains.of(library, &speeds)?)?;
+        for size in windows.sizes() {
+            let first = windows.whole.len() - size;
+            if windows.held(first, size).last() == Some(&last) {
+                test.take(&windows.judge(first, size, groups)?, size);
+            }
+        }
+    }
+    Ok(test)
+}
+
+/// The sleepers by their speeds.
+fn by_speeds(sleepers: &[SleeperFeatures]) -> BTreeMap<Vec<usize>, Vec<usize>> {
     let mut by_speeds: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
     for (index, sleeper) in sleepers.iter().enumerate() {
         let key = sleeper.speeds.iter().map(|known| known.speed).collect();
         by_speeds.entry(key).or_default().push(index);
     }
-    let mut tests = vec![DomainTest::default(); sleepers.len()];
-    let groups = by_speeds.len();
-    for (speeds, members) in by_speeds {
-        let domain = domains.of(library, &speeds)?;
-        judge_alike(sleepers, &members, &domain, groups, &mut tests)?;
-    }
-    Ok(tests)
+    by_speeds
 }
 
-/// Judges the sleepers that have the same speeds.
-fn judge_alike(
-    sleepers: &[SleeperFeatures],
-    members: &[usize],
-    domain: &Domain,
-    groups: usize,
-    tests: &mut [DomainTest],
-) -> Result<(), Error> {
-    let whole: Vec<usize> =
-        members.iter().copied().filter(|&index| is_whole(&sleepers[index])).collect();
-    let coordinates = whole
-        .iter()
-        .map(|&index| {
-            let speeds = &sleepers[index].speeds;
-            let observed: Vec<f64> =
-                speeds.iter().flat_map(|known| known.log_power.iter().copied()).collect();
-            domain.coordinates(&observed)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    let mut sizes: Vec<usize> =
-        SIZES.into_iter().filter(|&size| size < whole.len()).chain([whole.len()]).collect();
-    sizes.retain(|&size| size > 0);
-    for &size in &sizes {
-        let windows = whole.len() + 1 - size;
-        let probability = FALSE_RATE / (groups * sizes.len() * windows) as f64;
-        for first in 0..windows {
-            let mean = mean(&coordinates[first..first + size]);
-            let judgement = domain.judge(&mean, size, probability)?;
-            let all = size == whole.len();
-            let held = if all { members } else { &whole[first..first + size] };
-            for &index in held {
-                tests[index].take(&judgement, size);
-            }
-        }
+/// Running windows over the sleepers that have the same speeds.
+struct Windows {
+    domain: Arc<Domain>,
+    members: Vec<usize>,
+    /// The members whose own windows are complete.
+    whole: Vec<usize>,
+    /// Coordinates of each of these.
+    coordinates: Vec<Vec<f64>>,
+}
+
+impl Windows {
+    fn of(
+        sleepers: &[SleeperFeatures],
+        members: Vec<usize>,
+        domain: Arc<Domain>,
+    ) -> Result<Self, Error> {
+        let whole: Vec<usize> =
+            members.iter().copied().filter(|&index| is_whole(&sleepers[index])).collect();
+        let coordinates = whole
+            .iter()
+            .map(|&index| {
+                let speeds = &sleepers[index].speeds;
+                let observed: Vec<f64> =
+                    speeds.iter().flat_map(|known| known.log_power.iter().copied()).collect();
+                domain.coordinates(&observed)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { domain, members, whole, coordinates })
     }
-    Ok(())
+
+    /// Sleepers in a window, in ascending order; the last size is the whole track.
+    fn sizes(&self) -> Vec<usize> {
+        let count = self.whole.len();
+        let mut sizes: Vec<usize> =
+            SIZES.into_iter().filter(|&size| size < count).chain([count]).collect();
+        sizes.retain(|&size| size > 0);
+        sizes
+    }
+
+    /// Judges the window of `size` sleepers that begins with the `first`; `groups` sets of speeds share
+    /// the rate of false alarms.
+    fn judge(&self, first: usize, size: usize, groups: usize) -> Result<Judgement, Error> {
+        let windows = self.whole.len() + 1 - size;
+        let probability = FALSE_RATE / (groups * self.sizes().len() * windows) as f64;
+        Ok(self.domain.judge(&mean(&self.coordinates[first..first + size]), size, probability)?)
+    }
+
+    /// The sleepers that a window speaks of.
+    fn held(&self, first: usize, size: usize) -> &[usize] {
+        if size == self.whole.len() { &self.members } else { &self.whole[first..first + size] }
+    }
 }
 
 fn is_whole(sleeper: &SleeperFeatures) -> bool {

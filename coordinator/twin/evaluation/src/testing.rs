@@ -45,8 +45,13 @@ fn window_samples(speed_km_h: f64) -> usize {
 
 /// A recording of seven sleepers, SN0 at the very beginning; a pass a speed.
 pub(crate) fn recording(level: f64, speeds_km_h: &[f64]) -> Recording {
+    long_recording(level, speeds_km_h, 7)
+}
+
+/// The same of any number of sleepers.
+pub(crate) fn long_recording(level: f64, speeds_km_h: &[f64], sleepers: u32) -> Recording {
     let pass = |(number, &speed_km_h): (usize, &f64)| {
-        let samples = window_samples(speed_km_h) * 6;
+        let samples = window_samples(speed_km_h) * (sleepers as usize - 1);
         let seed = 5000 + number as u32;
         let step_m = speed_km_h / 3.6 / RATE_HZ;
         Pass {
@@ -63,7 +68,7 @@ pub(crate) fn recording(level: f64, speeds_km_h: &[f64]) -> Recording {
         sample_rate_hz: RATE_HZ,
         channel: String::new(),
         passes: speeds_km_h.iter().enumerate().map(pass).collect(),
-        sleepers: (0..7).map(sleeper).collect(),
+        sleepers: (0..sleepers).map(sleeper).collect(),
         nominal: serde_json::Map::new(),
         spacing_m: 0.125,
         doubts: Vec::new(),

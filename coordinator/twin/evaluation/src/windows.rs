@@ -2,8 +2,8 @@
 
 use crate::{Error, Flag};
 use rayon::prelude::*;
-use tracktwin_signal::Extractor;
-use tracktwin_signal::recording::Recording;
+use tracktwin_signal::recording::{Recording, SleeperWindow};
+use tracktwin_signal::{Extractor, FeatureError, Signal};
 
 /// Relative difference between a pass's speed and a model's within which they are one speed.
 ///
@@ -65,13 +65,16 @@ pub(crate) fn speed_index(
     speed_km_h: f64,
     known: &[f64],
 ) -> Result<usize, Error> {
-    known.iter().position(|speed| (speed_km_h / speed - 1.0).abs() <= SPEED_TOLERANCE).ok_or_else(
-        || Error::UnknownSpeed {
-            recording: recording.name.clone(),
-            speed_km_h,
-            known: known.to_vec(),
-        },
-    )
+    speed_among(speed_km_h, known).ok_or_else(|| Error::UnknownSpeed {
+        recording: recording.name.clone(),
+        speed_km_h,
+        known: known.to_vec(),
+    })
+}
+
+/// Place among the `known` speeds in km/h of the one that this speed is, if any.
+pub(crate) fn speed_among(speed_km_h: f64, known: &[f64]) -> Option<usize> {
+    known.iter().position(|speed| (speed_km_h / speed - 1.0).abs() <= SPEED_TOLERANCE)
 }
 
 fn sleeper_features(
@@ -80,36 +83,58 @@ fn sleeper_features(
     speed_of_pass: &[usize],
     sleeper: usize,
 ) -> Result<SleeperFeatures, Error> {
-    let mut speeds: Vec<SpeedFeatures> = Vec::new();
-    let mut flags = Vec::new();
-    for (pass, &speed) in speed_of_pass.iter().enumerate() {
-        let Some(window) = recording.window(pass, sleeper) else { continue };
-        let signal = &recording.passes[pass].signal;
-        let margin_s = MARGIN_SHARE * extractor.definition().margin_s;
-        let margin = (margin_s * signal.sample_rate_hz()) as usize;
-        if recording.window_share(pass, sleeper) < COMPLETE_SHARE {
-            flags.push(Flag::IncompleteWindow);
-        }
-        if window.start < margin || window.end + margin > signal.len() {
-            flags.push(Flag::ShortMargin);
-        }
-        let log_power = extractor
-            .extract(signal, window)
-            .map_err(|source| Error::Features {
-                file: recording.passes[pass].file.clone(),
+    let mut features = SleeperFeatures::none(sleeper);
+    let window = recording.sleeper_window(sleeper);
+    for (pass, &speed) in recording.passes.iter().zip(speed_of_pass) {
+        features.take(extractor, window, &pass.position_m, &pass.signal, speed).map_err(
+            |source| Error::Features {
+                file: pass.file.clone(),
                 sleeper: recording.sleepers[sleeper].id.clone(),
                 source,
-            })?
-            .log_power;
-        match speeds.iter_mut().find(|known| known.speed == speed) {
-            Some(known) => known.add(&log_power),
-            None => speeds.push(SpeedFeatures { speed, passes: 1, log_power }),
-        }
+            },
+        )?;
     }
-    speeds.sort_by_key(|known| known.speed);
-    flags.sort_unstable();
-    flags.dedup();
-    Ok(SleeperFeatures { sleeper, speeds, flags })
+    Ok(features)
+}
+
+impl SleeperFeatures {
+    /// Of a sleeper before any pass.
+    pub(crate) const fn none(sleeper: usize) -> Self {
+        Self { sleeper, speeds: Vec::new(), flags: Vec::new() }
+    }
+
+    /// Takes the window of a pass with these positions in m and this signal, at the speed with this
+    /// place among the models' speeds; false if the pass covers too little of it.
+    ///
+    /// # Errors
+    /// [`FeatureError`].
+    pub(crate) fn take(
+        &mut self,
+        extractor: &Extractor,
+        window: SleeperWindow,
+        position_m: &[f64],
+        signal: &Signal,
+        speed: usize,
+    ) -> Result<bool, FeatureError> {
+        let Some(samples) = window.samples(position_m) else { return Ok(false) };
+        let margin_s = MARGIN_SHARE * extractor.definition().margin_s;
+        let margin = (margin_s * signal.sample_rate_hz()) as usize;
+        if window.share(position_m) < COMPLETE_SHARE {
+            self.flags.push(Flag::IncompleteWindow);
+        }
+        if samples.start < margin || samples.end + margin > signal.len() {
+            self.flags.push(Flag::ShortMargin);
+        }
+        self.flags.sort_unstable();
+        self.flags.dedup();
+        let log_power = extractor.extract(signal, samples)?.log_power;
+        match self.speeds.iter_mut().find(|known| known.speed == speed) {
+            Some(known) => known.add(&log_power),
+            None => self.speeds.push(SpeedFeatures { speed, passes: 1, log_power }),
+        }
+        self.speeds.sort_by_key(|known| known.speed);
+        Ok(true)
+    }
 }
 
 impl SpeedFeatures {

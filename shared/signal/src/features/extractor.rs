@@ -130,6 +130,12 @@ impl Extractor {
         &self.definition
     }
 
+    /// Samples of a signal at this rate in Hz, on either side of a window, that its features depend
+    /// on.
+    pub fn margin_samples(&self, sample_rate_hz: f64) -> usize {
+        in_samples(self.definition.margin_s, sample_rate_hz)
+    }
+
     /// Frequencies of the voices in Hz, descending.
     pub(super) fn voices_hz(&self) -> &[f64] {
         &self.voices_hz
@@ -227,7 +233,7 @@ impl Extractor {
         window: &Range<usize>,
     ) -> Result<Stretch, FeatureError> {
         self.check(signal, window)?;
-        let margin = in_samples(self.definition.margin_s, signal.sample_rate_hz());
+        let margin = self.margin_samples(signal.sample_rate_hz());
         Ok(Stretch::new(signal, window, margin))
     }
 
@@ -247,7 +253,14 @@ impl Extractor {
         if start >= end || end > signal.len() {
             return Err(FeatureError::Window { start, end, samples: signal.len() });
         }
-        let sample_rate_hz = signal.sample_rate_hz();
+        self.check_rate(signal.sample_rate_hz())
+    }
+
+    /// Refuses signals at a rate in Hz that does not hold the highest frequency.
+    ///
+    /// # Errors
+    /// [`FeatureError::SampleRate`].
+    pub fn check_rate(&self, sample_rate_hz: f64) -> Result<(), FeatureError> {
         let needed_hz = SAMPLES_A_PERIOD * self.definition.highest_hz;
         if sample_rate_hz < needed_hz {
             return Err(FeatureError::SampleRate { sample_rate_hz, needed_hz });

@@ -5,6 +5,7 @@ use super::error::{Fault, RecordingError};
 use super::manifest::{FILE_NAME, Manifest, PassEntry};
 use super::odometer::Odometer;
 use super::sleeper::Sleeper;
+use super::window::SleeperWindow;
 use super::{check, limits, parquet_file, quiet};
 use crate::Signal;
 use serde_json::{Map, Value};
@@ -12,11 +13,6 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use tracktwin_files::{FileName, FilesError, Kind, Names, Output, inside};
 use tracktwin_number::significant;
-
-/// Least part of a sleeper's window that a pass must cover to say something about the sleeper.
-///
-/// The sleepers at a recording's two ends have half a window, give or take the odometer's drift.
-const WINDOW_SHARE_MIN: f64 = 0.4;
 
 /// Axle-box accelerations of one vehicle over one stretch of track, in several passes.
 #[derive(Clone, Debug)]
@@ -100,6 +96,32 @@ impl Recording {
         Ok(recording)
     }
 
+    /// What the `recording.json` in the folder `path` states, without passes, which it need not have:
+    /// sample rate, sleepers and track, for samples that come in another way.
+    ///
+    /// # Errors
+    /// The first error: its file, its field and the remedy.
+    pub fn without_passes(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
+        let folder = path.as_ref();
+        if folder.is_file() {
+            return Err(RecordingError::new(folder, "recording", Fault::NoFolder));
+        }
+        let manifest_path = folder.join(FILE_NAME);
+        let manifest = Manifest::read_without_passes(&manifest_path)?;
+        limits::manifest(&manifest_path, &manifest)?;
+        let spacing_m = spacing(&manifest_path, &manifest)?;
+        Ok(Self {
+            name: name_of(folder),
+            sample_rate_hz: manifest.sample_rate_hz,
+            channel: manifest.channel,
+            passes: Vec::new(),
+            sleepers: manifest.sleepers,
+            nominal: manifest.nominal,
+            spacing_m,
+            doubts: Vec::new(),
+        })
+    }
+
     /// Writes the recording as a folder: `recording.json` and one Parquet file a pass.
     ///
     /// Accelerations are stored in single precision, times count from zero. The folder has the
@@ -132,22 +154,17 @@ impl Recording {
     ///
     /// None where the pass covers less than two fifths of that window.
     pub fn window(&self, pass: usize, sleeper: usize) -> Option<Range<usize>> {
-        if self.window_share(pass, sleeper) < WINDOW_SHARE_MIN {
-            return None;
-        }
-        let positions = &self.passes[pass].position_m;
-        let [from, to] = self.window_ends(sleeper);
-        let start = positions.partition_point(|&position| position < from);
-        let end = positions.partition_point(|&position| position <= to);
-        (start < end).then_some(start..end)
+        self.sleeper_window(sleeper).samples(&self.passes[pass].position_m)
     }
 
     /// Which part of the sleeper's window the pass covers, 0 to 1.
     pub fn window_share(&self, pass: usize, sleeper: usize) -> f64 {
-        let positions = &self.passes[pass].position_m;
-        let [from, to] = self.window_ends(sleeper);
-        let covered = to.min(positions[positions.len() - 1]) - from.max(positions[0]);
-        (covered / self.spacing_m).clamp(0.0, 1.0)
+        self.sleeper_window(sleeper).share(&self.passes[pass].position_m)
+    }
+
+    /// The window of sleeper `sleeper` (index into [`Recording::sleepers`]) along the track.
+    pub fn sleeper_window(&self, sleeper: usize) -> SleeperWindow {
+        SleeperWindow::around(self.sleepers[sleeper].x_m, self.spacing_m)
     }
 
     /// The speeds of the passes in km/h, ascending, each once.
@@ -171,12 +188,6 @@ impl Recording {
     /// Median distance of neighbouring sleepers in m; none with fewer than two.
     pub fn median_distance_m(&self) -> Option<f64> {
         median_distance_m(&self.sleepers)
-    }
-
-    /// Begin and end in m of the sleeper's window.
-    fn window_ends(&self, sleeper: usize) -> [f64; 2] {
-        let x = self.sleepers[sleeper].x_m;
-        [x - 0.5 * self.spacing_m, x + 0.5 * self.spacing_m]
     }
 
     fn check_sleepers(&self, manifest: &Path) -> Result<(), RecordingError> {

@@ -32,6 +32,15 @@ pub(super) struct PassEntry {
 impl Manifest {
     /// Reads and checks the file at `path`.
     pub(super) fn read(path: &Path) -> Result<Self, RecordingError> {
+        Self::of_file(path, true)
+    }
+
+    /// The same, but for its passes, which may be missing.
+    pub(super) fn read_without_passes(path: &Path) -> Result<Self, RecordingError> {
+        Self::of_file(path, false)
+    }
+
+    fn of_file(path: &Path, with_passes: bool) -> Result<Self, RecordingError> {
         let fail = |fault| RecordingError::new(path, "file", fault);
         if !path.is_file() {
             return Err(fail(Fault::NoSuchFile));
@@ -40,16 +49,17 @@ impl Manifest {
         let text = tracktwin_files::read_text(path).map_err(unreadable)?;
         let root: Value = serde_json::from_str(&text)
             .map_err(|error| fail(Fault::NotJson { reason: error.to_string() }))?;
-        Self::parse(&Fields { path, place: String::new(), value: &root })
+        Self::parse(&Fields { path, place: String::new(), value: &root }, with_passes)
     }
 
-    fn parse(root: &Fields<'_>) -> Result<Self, RecordingError> {
+    fn parse(root: &Fields<'_>, with_passes: bool) -> Result<Self, RecordingError> {
         let format = root.text("format", "\"aba-recording/1\"")?;
         if format != FORMAT {
             let fault = Fault::WrongFormat { found: format!("\"{format}\""), expected: FORMAT };
             return Err(root.fault("format", fault));
         }
-        let passes = root.list("passes", "a list of {file, speed_km_h}")?;
+        let expected = "a list of {file, speed_km_h}";
+        let passes = if with_passes { root.list("passes", expected)? } else { Vec::new() };
         // An empty list means that their positions are unknown; then the spacing is required.
         let none_known = root.get("sleepers").and_then(Value::as_array).is_some_and(Vec::is_empty);
         let sleepers =

@@ -20,8 +20,10 @@ mod sleeper;
 #[cfg(test)]
 mod tests;
 mod track;
+mod window;
 
 pub use error::{Fault, RecordingError};
 pub use folder::{Pass, Recording};
 pub use sleeper::Sleeper;
 pub use track::{OtherTrack, StatedTrack, compare_designs, nominal};
+pub use window::SleeperWindow;

@@ -101,6 +101,16 @@ fn fields_that_users_add_are_passed_over() {
 }
 
 #[test]
+fn what_recording_json_states_is_read_without_passes() {
+    let folder = folder(|root| drop(root.as_object_mut().unwrap().remove("passes")));
+    assert!(complaint(folder.path()).contains("passes"));
+    let (section, expected) = (Recording::without_passes(folder.path()).unwrap(), recording());
+    assert_eq!((section.passes.len(), section.sleepers), (0, expected.sleepers));
+    assert_eq!((section.sample_rate_hz, section.spacing_m), (RATE_HZ, 0.125));
+    assert_eq!(section.nominal, expected.nominal);
+}
+
+#[test]
 fn a_window_holds_the_samples_within_half_a_spacing() {
     let recording = recording();
     let window = recording.window(0, 1).unwrap();

@@ -1,0 +1,202 @@
+//! `tracktwin stream`: estimates of the track parameters while a pass is recorded.
+
+use super::library_url::LibraryUrl;
+use super::{OrInput, Stop, println_stderr, write_stdout};
+use crate::pipeline::compute::compute;
+use crate::pipeline::evaluate::Evaluator;
+use crate::pipeline::stream::{Streamed, StreamingError, run as stream_rows};
+use anyhow::{Context, anyhow};
+use clap::{Args, ValueEnum};
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use tracktwin_evaluation::{Row, check_recording};
+use tracktwin_signal::recording::Recording;
+use tracktwin_signal::samples::{Framing, SampleReader};
+use tracktwin_surrogate::Trained;
+
+/// Bytes that are read at once: some ten milliseconds of samples at 100 kHz.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// Arguments of `stream`.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  recorder | tracktwin stream section --models out/models --library sqlite:out/library.sqlite
+  tracktwin stream section --models out/models --library sqlite:out/library.sqlite \\
+      --listen 127.0.0.1:7790 --to 127.0.0.1:7791
+
+Samples as csv: the first line names the columns position_m, acceleration_m_s2 and, if known, time_s;
+a line per sample; an empty value or NaN is a missing sample. As binary: records of three
+little-endian 64-bit numbers, time_s (NaN: not known), position_m, acceleration_m_s2.
+
+Rows are lines of JSON, one per sleeper, with the fields of the sleepers in evaluation.json, or with
+the reason why there are no estimates. The time per sleeper is printed on standard error at the end.
+
+Exit codes: 0 done, 1 done, but the estimates of most sleepers are not valid, or there are none, 2
+wrong input, 3 failure.")]
+pub(super) struct Arguments {
+    /// Folder with the `recording.json` of the section of track: sample rate, sleepers and track; it
+    /// needs no passes.
+    section: PathBuf,
+    /// Folder of trained models, written by `train` or `run`.
+    #[arg(long, value_name = "DIR")]
+    models: PathBuf,
+    #[command(flatten)]
+    library: LibraryUrl,
+    /// File or pipe to read samples from [default: standard input].
+    #[arg(long, value_name = "FILE")]
+    input: Option<PathBuf>,
+    /// Address, as IP:PORT, at which one TCP connection is awaited that sends samples; plain text,
+    /// without a password.
+    #[arg(long, value_name = "ADDR", conflicts_with = "input")]
+    listen: Option<SocketAddr>,
+    /// Format of the samples.
+    #[arg(long, value_enum, default_value_t = Format::Csv)]
+    format: Format,
+    /// Send rows to this TCP address, as HOST:PORT, instead of standard output.
+    #[arg(long, value_name = "ADDR")]
+    to: Option<String>,
+}
+
+/// Formats of samples on the command line.
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    /// Lines of CSV.
+    Csv,
+    /// Records of three little-endian 64-bit numbers.
+    Binary,
+}
+
+impl Format {
+    const fn framing(self) -> Framing {
+        match self {
+            Self::Csv => Framing::Csv,
+            Self::Binary => Framing::Binary,
+        }
+    }
+}
+
+pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
+    let Arguments { section, models, library, input, listen, format, to } = arguments;
+    let section = open(&section)?;
+    let library = library.open_whole().await?;
+    let models = Trained::load(&models)
+        .with_context(|| {
+            format!("{}: no models found; create them with `tracktwin train`", models.display())
+        })
+        .or_input()?;
+    let evaluator = Evaluator::new(models, &library).await.map_err(super::evaluate::stop)?;
+    check_recording(&section, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
+    let mut rows = Rows::open(to.as_deref())?;
+    let streamed = compute(|| -> Result<Streamed, Stop> {
+        let stream = evaluator.stream(&section).or_input()?;
+        // Models are ready before a sender may connect: what it sends is read at once.
+        let (name, input) = samples(input, listen)?;
+        let mut reader = SampleReader::new(input, format.framing());
+        let ended = stream_rows(&mut reader, stream, &mut |row| rows.write(row));
+        ended.map_err(|error| stop(&name, &error))
+    })?;
+    rows.end()?;
+    conclude(&streamed)
+}
+
+/// What a recording states of the section.
+fn open(folder: &Path) -> Result<Recording, Stop> {
+    let section = Recording::without_passes(folder).or_input()?;
+    if section.sleepers.is_empty() {
+        return Err(Stop::Input(anyhow!(
+            "{}/recording.json: sleepers: the list is empty; add the positions of the sleepers",
+            folder.display()
+        )));
+    }
+    Ok(section)
+}
+
+/// Where samples come from, and its name for errors.
+fn samples(
+    input: Option<PathBuf>,
+    listen: Option<SocketAddr>,
+) -> Result<(String, Box<dyn BufRead>), Stop> {
+    if let Some(address) = listen {
+        let failed = || format!("--listen {address}");
+        let listener = TcpListener::bind(address).with_context(failed)?;
+        println_stderr(&format!("waiting for samples at {}", listener.local_addr()?));
+        let (connection, sender) = listener.accept().with_context(failed)?;
+        let reader = BufReader::with_capacity(BUFFER_BYTES, connection);
+        return Ok((sender.to_string(), Box::new(reader)));
+    }
+    let Some(path) = input else {
+        let reader = BufReader::with_capacity(BUFFER_BYTES, std::io::stdin());
+        return Ok(("standard input".to_owned(), Box::new(reader)));
+    };
+    let name = path.display().to_string();
+    let file = File::open(&path).with_context(|| name.clone()).or_input()?;
+    Ok((name, Box::new(BufReader::with_capacity(BUFFER_BYTES, file))))
+}
+
+/// Where rows go.
+enum Rows {
+    Stdout,
+    Tcp { connection: TcpStream, name: String, error: Option<std::io::Error> },
+}
+
+impl Rows {
+    fn open(to: Option<&str>) -> Result<Self, Stop> {
+        let Some(name) = to else { return Ok(Self::Stdout) };
+        let connection = TcpStream::connect(name).with_context(|| format!("--to {name}"))?;
+        Ok(Self::Tcp { connection, name: name.to_owned(), error: None })
+    }
+
+    /// Writes a row at once; breaks when nobody reads any more.
+    fn write(&mut self, row: &Row) -> ControlFlow<()> {
+        let line = row.to_json() + "\n";
+        let is_read = match self {
+            Self::Stdout => write_stdout(line.as_bytes()),
+            Self::Tcp { connection, error, .. } => {
+                *error = connection.write_all(line.as_bytes()).err();
+                error.is_none()
+            }
+        };
+        if is_read { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    }
+
+    /// A receiver that ends the connection has read enough; any other error is a failure.
+    fn end(self) -> Result<(), Stop> {
+        match self {
+            Self::Tcp { name, error: Some(error), .. }
+                if !matches!(error.kind(), ErrorKind::BrokenPipe | ErrorKind::ConnectionReset) =>
+            {
+                Err(Stop::Failure(anyhow!("--to {name}: {error}")))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Garbage is wrong input; a source that fails is a failure.
+fn stop(name: &str, error: &StreamingError) -> Stop {
+    let is_failure = matches!(error, StreamingError::Samples(samples) if !samples.is_wrong_input());
+    let error = anyhow!("{name}: {error}");
+    if is_failure { Stop::Failure(error) } else { Stop::Input(error) }
+}
+
+/// Prints what was computed and how fast.
+fn conclude(streamed: &Streamed) -> Result<(), Stop> {
+    let Streamed { rows, evaluated, outside, computing, longest, .. } = *streamed;
+    if streamed.is_left {
+        return Ok(());
+    }
+    if streamed.is_cut {
+        println_stderr("the stream ends inside a line or record, which is left out");
+    }
+    let each_ms = 1e3 * computing.as_secs_f64() / evaluated.max(1) as f64;
+    let longest_ms = 1e3 * longest.as_secs_f64();
+    println_stderr(&format!(
+        "{evaluated} of {rows} sleepers evaluated, {outside} outside the library; {each_ms:.1} ms \
+         each, at most {longest_ms:.1} ms after the last sample"
+    ));
+    if streamed.is_negative() { Err(Stop::Negative) } else { Ok(()) }
+}

@@ -1,0 +1,278 @@
+//! Evaluation of samples while they are recorded, sleeper by sleeper.
+//!
+//! A feature depends on the samples of its window and a margin on either side, and on nothing
+//! else. So a sleeper is evaluated when its right margin is complete, from the samples from its
+//! left margin on: the features are those of the whole pass to the bit. A gap or a sample that is
+//! not finite ends a pass and begins another one, as if a recording had two passes.
+
+mod recent;
+mod row;
+mod segment;
+#[cfg(test)]
+mod tests;
+
+pub use row::{Evaluated, Outcome, Reason, Row};
+
+use crate::estimate::check_features;
+use crate::windows::{SPEED_TOLERANCE, speed_among};
+use crate::{Error, SleeperFeatures, Twin};
+use recent::Recent;
+use segment::Segment;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use tracktwin_signal::recording::{Recording, SleeperWindow};
+use tracktwin_signal::samples::Sample;
+
+/// Share of a margin from which its speed is compared with that of the window.
+const PART_MIN: f64 = 0.25;
+/// Share of the slowest model's speed below which a window is not waited for.
+const SLOWEST: f64 = 0.9;
+/// Relative difference between the declared sample rate and that of the times; as in recordings.
+const RATE_TOLERANCE: f64 = 1e-3;
+
+/// Evaluates the sleepers of a section of track in the order in which a wheel rolls over them.
+///
+/// Memory is bounded by the window of the slowest model and two margins, and by a few sleepers.
+pub struct Stream<'a> {
+    section: &'a Recording,
+    twin: Twin<'a>,
+    /// Samples of a margin.
+    margin: usize,
+    /// Samples that a window and its margins have at most.
+    capacity: usize,
+    segment: Segment,
+    /// Place of the first sleeper without a row.
+    next: usize,
+    /// Where its window ends among the samples of the segment, once the wheel has passed it.
+    end: Option<usize>,
+    /// Sleepers that earlier segments cover in part.
+    open: BTreeMap<usize, Open>,
+    recent: Recent<'a>,
+}
+
+/// A sleeper that has no row yet.
+struct Open {
+    features: SleeperFeatures,
+    /// Why a segment gave no features.
+    reason: Option<Reason>,
+}
+
+impl<'a> Stream<'a> {
+    /// A stream over the sleepers of `section`, whose passes do not matter. Prepares the models of every
+    /// speed: the first row takes no longer than the others.
+    ///
+    /// # Errors
+    /// [`Error::OtherFeatures`], [`Error::NoModel`], [`Error::Surrogate`], or [`Error::Rate`] when
+    /// the sample rate of the section is too low for the features.
+    pub fn new(section: &'a Recording, twin: Twin<'a>) -> Result<Self, Error> {
+        check_features(&twin)?;
+        twin.models.belongs_to(&twin.library.library_digest)?;
+        let rate_hz = section.sample_rate_hz;
+        twin.extractor.check_rate(rate_hz).map_err(Error::Rate)?;
+        let speeds_km_h = twin.models.speeds_km_h();
+        let slowest_m_s = speeds_km_h.iter().copied().fold(f64::INFINITY, f64::min) / 3.6;
+        let fastest_m_s = speeds_km_h.iter().copied().fold(0.0, f64::max) / 3.6;
+        let margin = twin.extractor.margin_samples(rate_hz);
+        let window = (section.spacing_m / (SLOWEST * slowest_m_s) * rate_hz).ceil() as usize;
+        Ok(Self {
+            section,
+            twin,
+            margin,
+            capacity: window + 2 * (margin + 1),
+            segment: Segment::new(rate_hz, fastest_m_s),
+            next: 0,
+            end: None,
+            open: BTreeMap::new(),
+            recent: Recent::new(twin, section)?,
+        })
+    }
+
+    /// Samples that are held at most.
+    pub const fn samples_max(&self) -> usize {
+        2 * self.capacity
+    }
+
+    /// Samples behind a sleeper's window that are waited for before it is evaluated.
+    pub const fn margin_samples(&self) -> usize {
+        self.margin
+    }
+
+    /// Takes the next sample; the rows of the sleepers that it completes.
+    ///
+    /// # Errors
+    /// [`Error::OtherSampleRate`], or what features, models and library report.
+    pub fn push(&mut self, sample: &Sample) -> Result<Vec<Row>, Error> {
+        let mut rows = Vec::new();
+        if self.next == self.section.sleepers.len() {
+            return Ok(rows);
+        }
+        if let Some(reason) = self.segment.interruption(sample) {
+            self.interrupt(reason, &mut rows)?;
+            self.segment.restart(reason);
+            self.end = None;
+            if reason == Reason::NotFinite {
+                return Ok(rows);
+            }
+        }
+        self.segment.push(sample);
+        while self.is_ready() {
+            self.take(self.next, None)?;
+            rows.push(self.row()?);
+        }
+        if self.segment.len() == self.samples_max() {
+            self.make_room(&mut rows)?;
+        }
+        Ok(rows)
+    }
+
+    /// Ends the stream; the rows of all sleepers that have none.
+    ///
+    /// # Errors
+    /// As [`Self::push`].
+    pub fn finish(mut self) -> Result<Vec<Row>, Error> {
+        let mut rows = Vec::new();
+        self.interrupt(Reason::NotCovered, &mut rows)?;
+        while self.next < self.section.sleepers.len() {
+            rows.push(self.row()?);
+        }
+        Ok(rows)
+    }
+
+    fn window(&self, sleeper: usize) -> Option<SleeperWindow> {
+        (sleeper < self.section.sleepers.len()).then(|| self.section.sleeper_window(sleeper))
+    }
+
+    /// Whether the segment has all samples that the next sleeper's features depend on.
+    fn is_ready(&mut self) -> bool {
+        let Some(window) = self.window(self.next) else { return false };
+        let positions = self.segment.position_m();
+        if self.end.is_none() && positions.last().is_some_and(|last| *last > window.to_m) {
+            self.end = Some(positions.partition_point(|position| *position <= window.to_m));
+        }
+        // A segment that begins behind the window has nothing of it.
+        self.end.is_some_and(|end| end == 0 || positions.len() >= end + self.margin)
+    }
+
+    /// Takes what the segment has of every window that it has begun, at its end; rows of those that it has
+    /// passed.
+    fn interrupt(&mut self, reason: Reason, rows: &mut Vec<Row>) -> Result<(), Error> {
+        let Some(&last_m) = self.segment.position_m().last() else { return Ok(()) };
+        let mut sleeper = self.next;
+        while self.window(sleeper).is_some_and(|window| window.from_m <= last_m) {
+            self.take(sleeper, Some(reason))?;
+            sleeper += 1;
+        }
+        while self.window(self.next).is_some_and(|window| window.to_m < last_m) {
+            rows.push(self.row()?);
+        }
+        Ok(())
+    }
+
+    /// Takes the features of a sleeper from the segment, which something may have `cut`.
+    fn take(&mut self, sleeper: usize, cut: Option<Reason>) -> Result<(), Error> {
+        let window = self.section.sleeper_window(sleeper);
+        let Self { segment, twin, open, .. } = self;
+        let open = open.entry(sleeper).or_insert_with(|| Open::new(sleeper));
+        let Some(samples) = window.samples(segment.position_m()) else {
+            open.reason = open.reason.or(cut).or(segment.after());
+            return Ok(());
+        };
+        check_rate(segment, self.section.sample_rate_hz)?;
+        let known = twin.models.speeds_km_h();
+        match speed(segment, samples, self.margin, known) {
+            Err(reason) => open.reason = Some(reason),
+            Ok(speed) => {
+                let (positions, signal) = (segment.position_m(), segment.signal());
+                let taken = open.features.take(twin.extractor, window, positions, &signal, speed);
+                taken.map_err(|source| Error::Features {
+                    file: "of the stream".to_owned(),
+                    sleeper: self.section.sleepers[sleeper].id.clone(),
+                    source,
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The row of the next sleeper.
+    fn row(&mut self) -> Result<Row, Error> {
+        let sleeper = self.next;
+        let open = self.open.remove(&sleeper).unwrap_or_else(|| Open::new(sleeper));
+        self.next += 1;
+        self.end = None;
+        if !open.features.speeds.is_empty() {
+            let evaluated = self.recent.evaluate(self.section, open.features)?;
+            return Ok(Row::new(Outcome::Evaluated(Box::new(evaluated))));
+        }
+        let place = &self.section.sleepers[sleeper];
+        Ok(Row::new(Outcome::Unevaluated {
+            id: place.id.clone(),
+            x_m: place.x_m,
+            reason: open.reason.unwrap_or(Reason::NotCovered),
+        }))
+    }
+
+    /// Drops samples that no window needs; gives up windows that take too long.
+    fn make_room(&mut self, rows: &mut Vec<Row>) -> Result<(), Error> {
+        loop {
+            let positions = self.segment.position_m();
+            let first = match self.window(self.next) {
+                Some(window) => positions.partition_point(|position| *position < window.from_m),
+                None => positions.len(),
+            };
+            // One more than the margin: the share of the window is that of the whole segment.
+            self.segment.drop_first(first.saturating_sub(self.margin + 1));
+            self.end = None;
+            let held = self.segment.len();
+            if held <= self.capacity {
+                return Ok(());
+            }
+            let speed_km_h = self.segment.speed_km_h(held - self.capacity..held);
+            let next = self.next;
+            let open = self.open.entry(next).or_insert_with(|| Open::new(next));
+            open.reason = Some(Reason::OtherSpeed { speed_km_h });
+            rows.push(self.row()?);
+        }
+    }
+}
+
+impl Open {
+    const fn new(sleeper: usize) -> Self {
+        Self { features: SleeperFeatures::none(sleeper), reason: None }
+    }
+}
+
+/// Place among the `known` speeds of the one that window and margins were passed at, if one only.
+fn speed(
+    segment: &Segment,
+    samples: Range<usize>,
+    margin: usize,
+    known: &[f64],
+) -> Result<usize, Reason> {
+    let before = samples.start.saturating_sub(margin)..samples.start;
+    let after = samples.end..(samples.end + margin).min(segment.len());
+    let whole = before.start..after.end;
+    let is_long = |part: &Range<usize>| part.len() as f64 >= PART_MIN * margin as f64;
+    let parts = [before, after].into_iter().filter(is_long).chain([samples.clone()]);
+    let speeds = parts.map(|part| segment.speed_km_h(part)).filter(|speed| !speed.is_nan());
+    let ends = |[low, high]: [f64; 2], speed: f64| [low.min(speed), high.max(speed)];
+    let [low, high] = speeds.fold([f64::INFINITY, 0.0], ends);
+    if high > (1.0 + 2.0 * SPEED_TOLERANCE) * low {
+        return Err(Reason::SpeedChanges { speeds_km_h: [low, high] });
+    }
+    let speed_km_h = segment.speed_km_h(whole);
+    let speed = speed_among(speed_km_h, known).ok_or(Reason::OtherSpeed { speed_km_h })?;
+    if segment.is_coarse(samples) { Err(Reason::CoarsePosition) } else { Ok(speed) }
+}
+
+/// Refuses times that contradict the declared sample rate in Hz.
+fn check_rate(segment: &Segment, declared_hz: f64) -> Result<(), Error> {
+    match segment.observed_rate_hz() {
+        Some((observed_hz, uncertainty))
+            if (observed_hz / declared_hz - 1.0).abs() > RATE_TOLERANCE.max(uncertainty) =>
+        {
+            Err(Error::OtherSampleRate { observed_hz, declared_hz })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,182 @@
+//! The uninterrupted samples that windows still need.
+
+use super::Reason;
+use std::ops::Range;
+use tracktwin_signal::Signal;
+use tracktwin_signal::samples::Sample;
+
+/// Sample intervals by which the time between two samples may differ from one.
+const TIME_TOLERANCE: f64 = 0.5;
+/// Times the highest speed of the models beyond which a position jumps, and the least jump in m; as in
+/// recordings.
+const JUMP: f64 = 5.0;
+const JUMP_M: f64 = 0.01;
+
+/// Samples without a gap. The first ones are dropped when no window needs them any more.
+pub(super) struct Segment {
+    sample_rate_hz: f64,
+    /// Longest step of the position from sample to sample in m.
+    step_max_m: f64,
+    position_m: Vec<f64>,
+    acceleration_m_s2: Vec<f64>,
+    /// Times in s of the first sample, dropped or not, and of the last one.
+    time_s: [f64; 2],
+    /// Samples, dropped or not.
+    count: u64,
+    /// What interrupted the stream before the segment.
+    after: Option<Reason>,
+}
+
+impl Segment {
+    /// Without samples; speeds of the models are at most `fastest_m_s`.
+    pub(super) fn new(sample_rate_hz: f64, fastest_m_s: f64) -> Self {
+        Self {
+            sample_rate_hz,
+            step_max_m: JUMP * fastest_m_s / sample_rate_hz + JUMP_M,
+            position_m: Vec::new(),
+            acceleration_m_s2: Vec::new(),
+            time_s: [f64::NAN; 2],
+            count: 0,
+            after: None,
+        }
+    }
+
+    /// Positions in m.
+    pub(super) fn position_m(&self) -> &[f64] {
+        &self.position_m
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.position_m.len()
+    }
+
+    /// What interrupted the stream before the segment, if anything.
+    pub(super) const fn after(&self) -> Option<Reason> {
+        self.after
+    }
+
+    /// Why a sample does not follow the last one; none for the first.
+    pub(super) fn interruption(&self, sample: &Sample) -> Option<Reason> {
+        if !(sample.position_m.is_finite() && sample.acceleration_m_s2.is_finite()) {
+            return Some(Reason::NotFinite);
+        }
+        let step_m = sample.position_m - self.position_m.last()?;
+        let intervals = (sample.time_s - self.time_s[1]) * self.sample_rate_hz;
+        // Where a time is not known, the difference is NaN.
+        if (intervals - 1.0).abs() > TIME_TOLERANCE || step_m > self.step_max_m {
+            Some(Reason::Gap)
+        } else if step_m < 0.0 {
+            Some(Reason::RunsBack)
+        } else {
+            None
+        }
+    }
+
+    /// Ends the segment; the next one is empty.
+    pub(super) fn restart(&mut self, after: Reason) {
+        self.position_m.clear();
+        self.acceleration_m_s2.clear();
+        self.count = 0;
+        self.after = Some(after);
+    }
+
+    /// Takes the next sample, which is finite.
+    pub(super) fn push(&mut self, sample: &Sample) {
+        if self.count == 0 {
+            self.time_s[0] = sample.time_s;
+        }
+        self.time_s[1] = sample.time_s;
+        self.count += 1;
+        self.position_m.push(sample.position_m);
+        self.acceleration_m_s2.push(sample.acceleration_m_s2);
+    }
+
+    /// Drops the first samples.
+    pub(super) fn drop_first(&mut self, count: usize) {
+        self.position_m.drain(..count);
+        self.acceleration_m_s2.drain(..count);
+    }
+
+    /// The samples as a signal.
+    pub(super) fn signal(&self) -> Signal {
+        Signal::new(self.sample_rate_hz, self.acceleration_m_s2.clone())
+            .expect("samples are finite, and there is one")
+    }
+
+    /// Mean speed over some samples in km/h; NaN for fewer than two.
+    pub(super) fn speed_km_h(&self, samples: Range<usize>) -> f64 {
+        let intervals = samples.len() as f64 - 1.0;
+        let positions = &self.position_m[samples];
+        match positions {
+            [first, .., last] => 3.6 * (last - first) / intervals * self.sample_rate_hz,
+            _ => f64::NAN,
+        }
+    }
+
+    /// Sample rate in Hz by the times of the segment, if these are known, and its relative
+    /// uncertainty.
+    pub(super) fn observed_rate_hz(&self) -> Option<(f64, f64)> {
+        let intervals = self.count.saturating_sub(1) as f64;
+        let rate_hz = intervals / (self.time_s[1] - self.time_s[0]);
+        rate_hz.is_finite().then_some((rate_hz, 2.0 / intervals))
+    }
+
+    /// Whether positions advance in steps longer than a sample interval.
+    pub(super) fn is_coarse(&self, samples: Range<usize>) -> bool {
+        let pairs = self.position_m[samples].windows(2);
+        let count = pairs.len();
+        2 * pairs.filter(|pair| pair[1] != pair[0]).count() <= count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 1000.0;
+
+    fn sample(index: u32, change: impl Fn(&mut Sample)) -> Sample {
+        let time_s = f64::from(index) / RATE_HZ;
+        let mut sample = Sample { time_s, position_m: 2.0 * time_s, acceleration_m_s2: 1.0 };
+        change(&mut sample);
+        sample
+    }
+
+    fn segment() -> Segment {
+        let mut segment = Segment::new(RATE_HZ, 2.0);
+        (0..100).for_each(|index| segment.push(&sample(index, |_| ())));
+        segment
+    }
+
+    #[test]
+    fn what_follows_a_sample_is_no_interruption_and_what_does_not_is_named() {
+        let segment = segment();
+        let found = |change: &dyn Fn(&mut Sample)| segment.interruption(&sample(100, change));
+        assert_eq!(found(&|_| ()), None);
+        assert_eq!(found(&|it| it.time_s = f64::NAN), None);
+        assert_eq!(found(&|it| it.time_s += 1e-3), Some(Reason::Gap));
+        assert_eq!(found(&|it| it.time_s -= 1e-3), Some(Reason::Gap));
+        assert_eq!(found(&|it| it.position_m += 0.05), Some(Reason::Gap));
+        assert_eq!(found(&|it| it.position_m -= 0.05), Some(Reason::RunsBack));
+        assert_eq!(found(&|it| it.position_m = f64::NAN), Some(Reason::NotFinite));
+        assert_eq!(found(&|it| it.acceleration_m_s2 = f64::INFINITY), Some(Reason::NotFinite));
+    }
+
+    #[test]
+    fn speed_and_rate_are_those_of_the_samples() {
+        let mut segment = segment();
+        segment.drop_first(50);
+        assert_eq!(segment.len(), 50);
+        assert!((segment.speed_km_h(0..50) - 7.2).abs() < 1e-9);
+        let (rate_hz, uncertainty) = segment.observed_rate_hz().unwrap();
+        assert!((rate_hz - RATE_HZ).abs() < 1e-6 && (uncertainty - 2.0 / 99.0).abs() < 1e-12);
+        assert!(!segment.is_coarse(0..50) && segment.speed_km_h(3..4).is_nan());
+        segment.restart(Reason::Gap);
+        assert_eq!((segment.observed_rate_hz(), segment.after()), (None, Some(Reason::Gap)));
+        for index in 0..100 {
+            segment
+                .push(&sample(index, |it| it.position_m = (50.0 * it.position_m).floor() / 50.0));
+        }
+        assert!(segment.is_coarse(0..100));
+    }
+}
