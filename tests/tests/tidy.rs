@@ -30,6 +30,7 @@ const BORDERS: &[(&str, &[&str])] = &[
     ("tracktwin-diagnosis", OUTSIDE_THE_TWIN),
     ("tracktwin-diagnosis", &["tracktwin-inversion", "tracktwin-surrogate"]),
     ("tracktwin-inversion", OUTSIDE_THE_TWIN),
+    ("tracktwin-hammer", OUTSIDE_THE_TWIN),
     // What tests the twin may not be the twin.
     (
         "tracktwin-reference-simulator",

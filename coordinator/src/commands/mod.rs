@@ -14,6 +14,7 @@ mod diagnose;
 mod evaluate;
 mod extend;
 mod files;
+mod hammer;
 mod import;
 mod inspect;
 mod library;
@@ -74,6 +75,9 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Compute the receptance of the track by frequency (hammer test).
     Receptance(receptance::Arguments),
+    /// Estimate the stiffness under every sleeper from a hammer test, or simulate one.
+    #[command(subcommand)]
+    Hammer(hammer::Action),
     /// Train Gaussian-process models on a library that has at least 200 finished cases.
     Train(train::Arguments),
     /// Estimate the track parameters at every sleeper from a recording.
@@ -162,6 +166,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Check(arguments) => check::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Receptance(arguments) => receptance::run(&arguments),
+        Command::Hammer(action) => hammer::run(&action),
         Command::Train(arguments) => asynchronously(train::run(arguments)),
         Command::Diagnose(arguments) => asynchronously(diagnose::run(arguments)),
         Command::Extend(arguments) => extend::run(arguments),

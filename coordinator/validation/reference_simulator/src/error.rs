@@ -67,6 +67,20 @@ pub enum TruthError {
         /// Where in m.
         position_m: f64,
     },
+    /// A place that is struck is not on the rail.
+    #[error("{x_m} m is not on the track of {length_m} m")]
+    OffTrack {
+        /// The place in m.
+        x_m: f64,
+        /// Length of the track in m.
+        length_m: f64,
+    },
+    /// A hidden effect that receptances do not hold.
+    #[error("the receptance of a track with {physics} is not known")]
+    NoReceptance {
+        /// Name of the effect.
+        physics: &'static str,
+    },
     /// The recording cannot be written.
     #[error("{0}")]
     Files(#[from] FilesError),

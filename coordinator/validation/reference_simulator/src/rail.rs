@@ -8,7 +8,7 @@ use crate::vtrack::{
 use std::f64::consts::PI;
 
 /// Modal damping over critical damping: half a structural loss factor of 0.2 %, that of steel.
-const DAMPING_RATIO: f64 = 1e-3;
+pub(crate) const DAMPING_RATIO: f64 = 1e-3;
 /// Distance in m beyond which the cut modes say nothing that matters, and over which they fade.
 const REACH_M: f64 = 0.25;
 const FADE_M: f64 = 0.05;

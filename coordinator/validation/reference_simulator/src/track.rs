@@ -180,7 +180,7 @@ fn sleepers(scene: &Scene, step_s: f64) -> Vec<Sleeper> {
 }
 
 /// How a sleeper is held, and what its crack leaves of its bending stiffness.
-fn bed(scene: &Scene, index: usize, truth: &SleeperTruth) -> (Bed, f64) {
+pub(crate) fn bed(scene: &Scene, index: usize, truth: &SleeperTruth) -> (Bed, f64) {
     let mut bed = Bed {
         bending: truth.sleeper_ei_n_m2,
         stiffness: truth.ballast_stiffness_n_m,
@@ -203,12 +203,12 @@ fn bed(scene: &Scene, index: usize, truth: &SleeperTruth) -> (Bed, f64) {
 }
 
 /// Whether an effect is at a sleeper: named, or everywhere.
-fn concerns(hidden: &Hidden, index: usize) -> bool {
+pub(crate) fn concerns(hidden: &Hidden, index: usize) -> bool {
     hidden.sleepers().is_none_or(|sleepers| sleepers.contains(&index))
 }
 
 /// The railpad over a sleeper.
-fn railpad(scene: &Scene, index: usize, step_s: f64) -> Law {
+pub(crate) fn railpad(scene: &Scene, index: usize, step_s: f64) -> Law {
     let mut law = Law {
         stiffness: scene.sleepers[index].railpad_stiffness_n_m,
         damping: scene.railpad_damping_n_s_m,

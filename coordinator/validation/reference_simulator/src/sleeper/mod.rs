@@ -8,7 +8,7 @@ mod ritz;
 use self::gap::Gap;
 use self::ritz::{TERMS, energies, gauss_points, legendre, nominal_bending};
 use crate::system::LinearSystem;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
 
 /// Modes kept: rigid motion and bending up to 12 kHz. The others give way statically.
 pub(crate) const MODES: usize = 5;
@@ -118,12 +118,8 @@ impl SleeperModes {
     pub(crate) fn on(&self, bed: &Bed, step_s: f64) -> Sleeper {
         let scale = bed.bending / nominal_bending();
         let layers = usize::from(bed.layer.is_some());
-        let dofs = MODES + layers;
-        let mut matrices = self.matrices(bed, scale, dofs);
-        if let Some(layer) = bed.layer {
-            self.add_layer(bed, layer, &mut matrices);
-        }
-        let [mass, damping, stiffness] = matrices;
+        let [mass, damping, stiffness] = self.held(bed);
+        let dofs = mass.nrows();
         let mut seat = self.seat.clone();
         seat.resize(dofs, 0.0);
         let seat_column = DVector::from_vec(seat.clone());
@@ -148,6 +144,30 @@ impl SleeperModes {
                 weights: self.weights.clone(),
             }),
         }
+    }
+
+    /// Displacement of the rail seat in m per unit harmonic force on it at an angular frequency in
+    /// rad/s, in the convention `exp(+i w t)`, of a sleeper that carries no wheel.
+    pub(crate) fn seat_receptance(&self, bed: &Bed, omega: f64) -> Complex<f64> {
+        let [mass, damping, stiffness] = self.held(bed);
+        let elastic = stiffness - mass * (omega * omega);
+        let matrix = elastic.zip_map(&damping, |k, c| Complex::new(k, omega * c));
+        let mut force = DVector::zeros(matrix.nrows());
+        for (force, seat) in force.iter_mut().zip(&self.seat) {
+            *force = Complex::from(*seat);
+        }
+        let moved = matrix.lu().solve(&force).expect("a damped sleeper has a receptance");
+        moved.dot(&force) + self.seat_residual / (bed.bending / nominal_bending())
+    }
+
+    /// Mass, damping and stiffness of a sleeper on its bed.
+    fn held(&self, bed: &Bed) -> [DMatrix<f64>; 3] {
+        let scale = bed.bending / nominal_bending();
+        let mut matrices = self.matrices(bed, scale, MODES + usize::from(bed.layer.is_some()));
+        if let Some(layer) = bed.layer {
+            self.add_layer(bed, layer, &mut matrices);
+        }
+        matrices
     }
 
     /// Mass, damping and stiffness of sleeper, ballast and bolt; room for further ones.

@@ -1,0 +1,316 @@
+//! The fit of a track to the receptances of a hammer test.
+
+use crate::forward::{Forward, PointResidual};
+use crate::layout::{Layout, LayoutError};
+use crate::measured::PointReceptance;
+use crate::unknowns::{Quantity, Unknowns};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use tracktwin_parameters::Track;
+use tracktwin_track::model::ModelError;
+
+/// Values of one octave that count as one where the track model errs: its errors are alike over a
+/// third of an octave, of eight values (see `PER_OCTAVE`).
+const ALIKE: f64 = 8.0;
+
+/// Standard deviation in nats by which the model errs at a frequency, before the test and at least:
+/// 0.4 dB, by which two simulators of one track differ.
+const MODEL_ERROR: f64 = 0.05;
+
+/// Rounds in which the model's error and the unevenness are learned.
+const ROUNDS: usize = 4;
+
+/// Most steps of a fit, its first damping, and the fall of the objective in nats that ends it.
+const STEPS_MAX: usize = 30;
+const DAMPING: f64 = 1e-2;
+const DAMPING_MAX: f64 = 1e8;
+const CONVERGED: f64 = 1e-3;
+
+/// Starts of the means of railpad and ballast stiffness, in standard deviations of the prior.
+const STARTS: [f64; 3] = [-1.0, 0.0, 1.0];
+/// Most steps of a fit of even track, which only chooses a start: from about so many receptances, and
+/// from one of so many frequencies.
+const START_STEPS: usize = 8;
+const START_POINTS: usize = 8;
+const START_LINES: usize = 4;
+
+/// Why nothing was fitted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// The struck places do not make a layout.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// The track model breaks down.
+    #[error("the track model cannot be built: {0}")]
+    Model(#[from] ModelError),
+    /// The normal equations have no solution.
+    #[error("the fit does not converge: a receptance or a derivative is not finite")]
+    NotFinite,
+}
+
+/// A track that explains a hammer test.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    pub(crate) layout: Layout,
+    pub(crate) unknowns: Unknowns,
+    pub(crate) values: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Standard deviation of the model's error in nats, as the test tells.
+    pub(crate) model_error: f64,
+    /// Mean square of the whitened residuals of each point.
+    point_misfits: Vec<(f64, f64)>,
+}
+
+/// Fits the track: every sleeper near a struck place has its own values.
+///
+/// `sleeper_at_m` is the place of a sleeper, in the coordinates of the receptances.
+///
+/// # Errors
+/// [`FitError`] for receptances that do not belong to one stretch of track or that break the fit.
+pub fn fit(
+    track: &Track,
+    sleeper_at_m: f64,
+    points: &[PointReceptance],
+) -> Result<Fitted, FitError> {
+    let struck_m = points.iter().map(|point| point.position_m);
+    let layout = Layout::new(&track.design, sleeper_at_m, struck_m)?;
+    let forward = Forward::new(&track.design, layout, points);
+    let mut unknowns = Unknowns::new(&track.prior, forward.layout().own());
+    let mut model_error = MODEL_ERROR;
+    let mut values = best_start(&forward, &unknowns)?;
+    let mut covariance = DMatrix::zeros(0, 0);
+    for round in 0..=ROUNDS {
+        let solved = Solve { forward: &forward, unknowns: &unknowns, model_error }.minimise(
+            values,
+            STEPS_MAX,
+            |_| true,
+        )?;
+        values = solved.values;
+        covariance = solved.covariance;
+        if round < ROUNDS {
+            model_error = error_of_model(&forward, &unknowns, &values)?;
+            unknowns.learn(&values, &covariance.diagonal());
+        }
+    }
+    let misfits = misfits(&forward, &unknowns, &values, model_error)?;
+    Ok(Fitted {
+        layout: forward.layout().clone(),
+        unknowns,
+        values,
+        covariance,
+        model_error,
+        point_misfits: misfits,
+    })
+}
+
+/// The best fit of an even track from several starts: receptances have resonances, so the
+/// objective has several minima.
+fn best_start(forward: &Forward<'_>, unknowns: &Unknowns) -> Result<DVector<f64>, FitError> {
+    let every = forward.points.len().div_ceil(START_POINTS).max(1);
+    let thinned = |point: &PointReceptance| {
+        point.kept(&(0..point.values.len()).step_by(START_LINES).collect::<Vec<_>>())
+    };
+    let points: Vec<PointReceptance> = forward.points.iter().step_by(every).map(thinned).collect();
+    let forward = &Forward::new(forward.design(), forward.layout().clone(), &points);
+    // An even track explains an uneven one only so far.
+    let solve = Solve { forward, unknowns, model_error: 4.0 * MODEL_ERROR };
+    let mut best: Option<Solved> = None;
+    for railpad in STARTS {
+        for ballast in STARTS {
+            let mut start = unknowns.start();
+            let moved =
+                [(Quantity::RailpadStiffness, railpad), (Quantity::BallastStiffness, ballast)];
+            for (of, way) in moved {
+                start[Unknowns::mean(of)] += way * unknowns.prior_deviation(of);
+            }
+            let solved = solve.minimise(start, START_STEPS, |it| it < Quantity::COUNT)?;
+            if best.as_ref().is_none_or(|best| solved.objective < best.objective) {
+                best = Some(solved);
+            }
+        }
+    }
+    Ok(best.expect("there are starts").values)
+}
+
+/// Reciprocal variances of a point's residuals, as its rows.
+fn weights(point: &PointReceptance, model_error: f64) -> DVector<f64> {
+    let lines = point.values.len();
+    let of = |row: usize, _| {
+        let measured = point.deviation(row % lines);
+        (measured * measured + ALIKE * model_error * model_error).recip()
+    };
+    DVector::from_fn(2 * lines, of)
+}
+
+/// The model's error in nats that makes the mean square of the whitened residuals one, at least
+/// that before the test.
+fn error_of_model(
+    forward: &Forward<'_>,
+    unknowns: &Unknowns,
+    values: &DVector<f64>,
+) -> Result<f64, FitError> {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (residual, point) in forward.residuals(unknowns, values)?.iter().zip(forward.points) {
+        let lines = point.values.len();
+        for (row, value) in residual.iter().enumerate() {
+            sum += value * value - point.deviation(row % lines).powi(2);
+            count += 1.0;
+        }
+    }
+    Ok((sum / f64::max(count, 1.0)).max(MODEL_ERROR * MODEL_ERROR).sqrt())
+}
+
+/// Place of each point in m and the mean square of its residuals over their expected one.
+fn misfits(
+    forward: &Forward<'_>,
+    unknowns: &Unknowns,
+    values: &DVector<f64>,
+    model_error: f64,
+) -> Result<Vec<(f64, f64)>, FitError> {
+    let residuals = forward.residuals(unknowns, values)?;
+    let of = |(residual, point): (&DVector<f64>, &PointReceptance)| {
+        let lines = point.values.len();
+        let expected =
+            |row: usize| point.deviation(row % lines).powi(2) + model_error * model_error;
+        let squares = residual.iter().enumerate().map(|(row, value)| value * value / expected(row));
+        (point.position_m, squares.sum::<f64>() / residual.len().max(1) as f64)
+    };
+    Ok(residuals.iter().zip(forward.points).map(of).collect())
+}
+
+/// One least-squares problem.
+struct Solve<'a> {
+    forward: &'a Forward<'a>,
+    unknowns: &'a Unknowns,
+    model_error: f64,
+}
+
+/// Where a problem has its minimum.
+struct Solved {
+    values: DVector<f64>,
+    objective: f64,
+    /// Covariance of the posterior, Gaussian about the minimum (Laplace).
+    covariance: DMatrix<f64>,
+}
+
+impl Solve<'_> {
+    /// Half the sum of squares of the whitened residuals and of the prior's.
+    fn objective(&self, values: &DVector<f64>) -> Result<f64, FitError> {
+        let residuals = self.forward.residuals(self.unknowns, values)?;
+        let data: f64 = residuals
+            .iter()
+            .zip(self.forward.points)
+            .map(|(residual, point)| {
+                let weights = weights(point, self.model_error);
+                residual.iter().zip(weights.iter()).map(|(r, w)| r * r * w).sum::<f64>()
+            })
+            .sum();
+        let from_prior = values - self.unknowns.start();
+        let prior: f64 = from_prior
+            .iter()
+            .zip(self.unknowns.precision().iter())
+            .map(|(x, precision)| x * x * precision)
+            .sum();
+        Ok(0.5 * (data + prior))
+    }
+
+    /// Minimises over the unknowns that are `free`, by the Levenberg-Marquardt method.
+    fn minimise(
+        &self,
+        mut values: DVector<f64>,
+        steps: usize,
+        free: impl Fn(usize) -> bool,
+    ) -> Result<Solved, FitError> {
+        let mut objective = self.objective(&values)?;
+        let mut damping = DAMPING;
+        let (mut matrix, mut slope) = self.normal(&values, &free)?;
+        for _ in 0..steps {
+            let mut fall = None;
+            while fall.is_none() && damping < DAMPING_MAX {
+                let mut damped = matrix.clone();
+                for row in 0..damped.nrows() {
+                    damped[(row, row)] *= 1.0 + damping;
+                }
+                let step = Cholesky::new(damped).ok_or(FitError::NotFinite)?.solve(&slope);
+                let tried = &values + step;
+                let found = self.objective(&tried)?;
+                if found < objective {
+                    fall = Some(objective - found);
+                    (values, objective) = (tried, found);
+                    damping *= 0.2;
+                } else {
+                    damping *= 5.0;
+                }
+            }
+            (matrix, slope) = self.normal(&values, &free)?;
+            if fall.is_none_or(|fall| fall < CONVERGED) {
+                break;
+            }
+        }
+        let factor = Cholesky::new(matrix).ok_or(FitError::NotFinite)?;
+        if !objective.is_finite() {
+            return Err(FitError::NotFinite);
+        }
+        Ok(Solved { values, objective, covariance: factor.inverse() })
+    }
+
+    /// Matrix and right-hand side of the normal equations; unknowns that are not free stay.
+    fn normal(
+        &self,
+        values: &DVector<f64>,
+        free: impl Fn(usize) -> bool,
+    ) -> Result<(DMatrix<f64>, DVector<f64>), FitError> {
+        let precision = self.unknowns.precision();
+        let mut slope = (self.unknowns.start() - values).component_mul(&precision);
+        let mut matrix = DMatrix::from_diagonal(&precision);
+        let linearised = self.forward.linearised(self.unknowns, values)?;
+        for (point, measured) in linearised.iter().zip(self.forward.points) {
+            let PointResidual { residual, jacobian, unknowns } = point;
+            let roots = weights(measured, self.model_error).map(f64::sqrt);
+            let mut whitened = jacobian.clone();
+            for mut column in whitened.column_iter_mut() {
+                column.component_mul_assign(&roots);
+            }
+            let information = whitened.tr_mul(&whitened);
+            let pull = whitened.tr_mul(&residual.component_mul(&roots));
+            for (a, &row) in unknowns.iter().enumerate() {
+                slope[row] += pull[a];
+                for (b, &column) in unknowns.iter().enumerate() {
+                    matrix[(row, column)] += information[(a, b)];
+                }
+            }
+        }
+        for held in (0..slope.len()).filter(|it| !free(*it)) {
+            slope[held] = 0.0;
+            matrix.row_mut(held).fill(0.0);
+            matrix.column_mut(held).fill(0.0);
+            matrix[(held, held)] = 1.0;
+        }
+        Ok((matrix, slope))
+    }
+}
+
+impl Fitted {
+    /// Logarithm of a quantity at the reported sleeper `index`, and its standard deviation.
+    pub(crate) fn logarithm(&self, of: Quantity, index: usize) -> (f64, f64) {
+        let (mean, own) = (Unknowns::mean(of), self.unknowns.at(of, Layout::own_index(index)));
+        let covariance = &self.covariance;
+        let variance =
+            covariance[(mean, mean)] + covariance[(own, own)] + 2.0 * covariance[(mean, own)];
+        (self.values[mean] + self.values[own], variance.max(0.0).sqrt())
+    }
+
+    /// Standard deviation of what a quantity differs by at the reported sleeper `index`, over that
+    /// before the test.
+    pub(crate) fn own_share(&self, of: Quantity, index: usize) -> f64 {
+        let own = self.unknowns.at(of, Layout::own_index(index));
+        self.covariance[(own, own)].max(0.0).sqrt() / self.unknowns.unevenness[of as usize]
+    }
+
+    /// Mean misfit of the points that belong to the reported sleeper `index`; none if it has none.
+    pub(crate) fn misfit(&self, index: usize) -> Option<f64> {
+        let of = self.point_misfits.iter();
+        let near = of.filter(|(x_m, _)| self.layout.near(*x_m).any(|it| it == index));
+        let (sum, count) = near.fold((0.0, 0), |(sum, count), (_, it)| (sum + it, count + 1));
+        (count > 0).then(|| sum / f64::from(count))
+    }
+}

@@ -1,0 +1,252 @@
+//! What the track model predicts of a hammer test: logarithms of receptances and their derivatives.
+
+use crate::layout::Layout;
+use crate::measured::PointReceptance;
+use crate::unknowns::{Quantity, Unknowns};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use tracktwin_parameters::TrackDesign;
+use tracktwin_track::frequency::{RailReceptances, SeatReceptances, seat_stiffness, shares};
+use tracktwin_track::model::{Mesh, ModelError, Support, TrackModel};
+
+/// Elements of a half sleeper.
+const SLEEPER_ELEMENTS: usize = 6;
+/// Rail nodes on either side of a rail seat at which a change of its support is felt: ten spans.
+const REACH: usize = 80;
+/// Step of a logarithm for the derivatives of a support.
+const STEP: f64 = 1e-4;
+
+/// A hammer test and the track that is fitted to it.
+pub(crate) struct Forward<'a> {
+    design: &'a TrackDesign,
+    layout: Layout,
+    /// The fitted receptances.
+    pub(crate) points: &'a [PointReceptance],
+    /// All their frequencies in Hz, ascending, and where those of each point stand among them.
+    frequencies_hz: Vec<f64>,
+    places: Vec<Vec<usize>>,
+}
+
+/// Residuals of one point with their derivatives.
+///
+/// Rows: real parts of all frequencies, then imaginary parts. A residual is the logarithm of the
+/// measured receptance over the predicted one: its real part is that of the magnitudes in nats, its
+/// imaginary part the difference of the phases in rad.
+pub(crate) struct PointResidual {
+    pub(crate) residual: DVector<f64>,
+    /// Derivatives of the predicted logarithm, a column for each of `unknowns`.
+    pub(crate) jacobian: DMatrix<f64>,
+    pub(crate) unknowns: Vec<usize>,
+}
+
+impl<'a> Forward<'a> {
+    pub(crate) fn new(
+        design: &'a TrackDesign,
+        layout: Layout,
+        points: &'a [PointReceptance],
+    ) -> Self {
+        let mut frequencies_hz: Vec<f64> =
+            points.iter().flat_map(|point| &point.frequencies_hz).copied().collect();
+        frequencies_hz.sort_by(f64::total_cmp);
+        frequencies_hz.dedup();
+        let place = |hz: &f64| frequencies_hz.partition_point(|other| other < hz);
+        let places =
+            points.iter().map(|point| point.frequencies_hz.iter().map(place).collect()).collect();
+        Self { design, layout, points, frequencies_hz, places }
+    }
+
+    pub(crate) const fn design(&self) -> &'a TrackDesign {
+        self.design
+    }
+
+    pub(crate) const fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    fn model(&self, supports: &[Support]) -> Result<TrackModel, ModelError> {
+        let mesh =
+            Mesh { rail_elements: self.layout.rail_elements(), sleeper_elements: SLEEPER_ELEMENTS };
+        TrackModel::build(self.design, &mesh, supports, &[])
+    }
+
+    fn supports(&self, unknowns: &Unknowns, values: &DVector<f64>) -> Vec<Support> {
+        unknowns.supports(values, self.layout.spans() - 1, Layout::first_own())
+    }
+
+    /// Residuals without derivatives, of each point in turn.
+    pub(crate) fn residuals(
+        &self,
+        unknowns: &Unknowns,
+        values: &DVector<f64>,
+    ) -> Result<Vec<DVector<f64>>, ModelError> {
+        let model = self.model(&self.supports(unknowns, values))?;
+        let rail = RailReceptances::new(&model, &self.frequencies_hz, None);
+        let nodes_m = model.layout().rail_nodes_m();
+        let of = |(point, places): (&PointReceptance, &Vec<usize>)| {
+            let nodes = shares(nodes_m, point.position_m - self.layout.origin_m());
+            let predicted = |&place: &usize| direct(&rail.direct[place], &nodes);
+            residual(point, places.iter().map(predicted))
+        };
+        Ok(self.points.iter().zip(&self.places).map(of).collect())
+    }
+
+    /// Residuals and derivatives of each point in turn.
+    ///
+    /// A change `dZ` of the dynamic stiffness at a rail seat changes a point receptance `a` by
+    /// `-a_s^2 dZ`, where `a_s` is the receptance between seat and point.
+    pub(crate) fn linearised(
+        &self,
+        unknowns: &Unknowns,
+        values: &DVector<f64>,
+    ) -> Result<Vec<PointResidual>, ModelError> {
+        let supports = self.supports(unknowns, values);
+        let model = self.model(&supports)?;
+        let variations = self.variations(&model, &supports)?;
+        let rail = RailReceptances::new(&model, &self.frequencies_hz, Some(REACH));
+        let nodes_m = model.layout().rail_nodes_m();
+        let of = |(point, places): (&PointReceptance, &Vec<usize>)| {
+            let nodes = shares(nodes_m, point.position_m - self.layout.origin_m());
+            self.point(point, places, &nodes, &rail, &variations, unknowns)
+        };
+        Ok(self.points.iter().zip(&self.places).map(of).collect())
+    }
+
+    /// Derivatives of the dynamic stiffness of each support by the logarithm of each quantity:
+    /// `[quantity][frequency][sleeper]`.
+    fn variations(
+        &self,
+        model: &TrackModel,
+        supports: &[Support],
+    ) -> Result<Vec<Vec<Vec<Complex64>>>, ModelError> {
+        let plain = seat_stiffness(model, &self.frequencies_hz);
+        let of = |quantity: Quantity| {
+            let mut varied = supports.to_vec();
+            varied.iter_mut().for_each(|support| *quantity.of(support) *= STEP.exp());
+            let mut changed = seat_stiffness(&self.model(&varied)?, &self.frequencies_hz);
+            for (changed, plain) in changed.iter_mut().flatten().zip(plain.iter().flatten()) {
+                *changed = (*changed - plain) / STEP;
+            }
+            Ok(changed)
+        };
+        Quantity::ALL.into_iter().map(of).collect()
+    }
+
+    fn point(
+        &self,
+        point: &PointReceptance,
+        places: &[usize],
+        nodes: &[(usize, f64)],
+        rail: &RailReceptances,
+        variations: &[Vec<Vec<Complex64>>],
+        unknowns: &Unknowns,
+    ) -> PointResidual {
+        let seats = &rail.from_seats[0];
+        let reaches = |seat: &SeatReceptances| {
+            let inside = seat.first..seat.first + seat.values.len();
+            nodes.iter().all(|(node, _)| inside.contains(node))
+        };
+        let near: Vec<usize> = (0..seats.len()).filter(|&it| reaches(&seats[it])).collect();
+        let own =
+            |seat: usize| seat.checked_sub(Layout::first_own()).filter(|it| *it < unknowns.own);
+        let owners: Vec<usize> = near.iter().copied().filter_map(own).collect();
+        let first_owner = owners.first().copied().unwrap_or_default();
+        let columns: Vec<usize> = Quantity::ALL
+            .into_iter()
+            .map(Unknowns::mean)
+            .chain(
+                Quantity::ALL
+                    .into_iter()
+                    .flat_map(|of| owners.iter().map(move |&owner| unknowns.at(of, owner))),
+            )
+            .collect();
+        let lines = places.len();
+        let mut jacobian = DMatrix::zeros(2 * lines, columns.len());
+        for (line, &place) in places.iter().enumerate() {
+            let predicted = direct(&rail.direct[place], nodes);
+            for &seat in &near {
+                let receptances = &rail.from_seats[place][seat];
+                let at = |&(node, share): &(usize, f64)| {
+                    receptances.values[node - receptances.first] * share
+                };
+                let between: Complex64 = nodes.iter().map(at).sum();
+                let gain = -between * between / predicted;
+                for (quantity, variation) in variations.iter().enumerate() {
+                    let derivative = gain * variation[place][seat];
+                    let mut add = |column: usize| {
+                        jacobian[(line, column)] += derivative.re;
+                        jacobian[(lines + line, column)] += derivative.im;
+                    };
+                    add(quantity);
+                    if let Some(owner) = own(seat) {
+                        add(Quantity::COUNT + quantity * owners.len() + owner - first_owner);
+                    }
+                }
+            }
+        }
+        let predicted = places.iter().map(|&place| direct(&rail.direct[place], nodes));
+        PointResidual { residual: residual(point, predicted), jacobian, unknowns: columns }
+    }
+}
+
+/// The direct receptance at a place between nodes.
+fn direct(line: &[Complex64], nodes: &[(usize, f64)]) -> Complex64 {
+    nodes.iter().map(|&(node, share)| line[node] * share).sum()
+}
+
+fn residual(
+    point: &PointReceptance,
+    predicted: impl ExactSizeIterator<Item = Complex64>,
+) -> DVector<f64> {
+    let lines = predicted.len();
+    let mut residual = DVector::zeros(2 * lines);
+    for (line, (measured, predicted)) in point.values.iter().zip(predicted).enumerate() {
+        let logarithm = (measured / predicted).ln();
+        residual[line] = logarithm.re;
+        residual[lines + line] = logarithm.im;
+    }
+    residual
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_parameters::Prior;
+
+    #[test]
+    fn derivatives_are_differences() {
+        let design = TrackDesign::v_track();
+        let at = |position_m: f64| PointReceptance {
+            position_m,
+            frequencies_hz: vec![150.0, 320.0, 700.0, 1100.0, 2500.0],
+            values: vec![Complex64::new(1e-8, -1e-8); 5],
+            coherence: None,
+            hits: None,
+        };
+        let points = [at(1.0), at(1.0625), at(1.17)];
+        let struck = points.iter().map(|point| point.position_m);
+        let layout = Layout::new(&design, 1.0, struck).unwrap();
+        let forward = Forward::new(&design, layout, &points);
+        let unknowns = Unknowns::new(&Prior::v_track(), forward.layout().own());
+        let values = unknowns.start();
+        let linearised = forward.linearised(&unknowns, &values).unwrap();
+        let step = 1e-4;
+        let mut moved = vec![Unknowns::mean(Quantity::RailpadDamping)];
+        moved.extend(Quantity::ALL.map(|of| unknowns.at(of, 1)));
+        moved.extend(
+            [Quantity::BallastStiffness, Quantity::SleeperBendingStiffness].map(Unknowns::mean),
+        );
+        for unknown in moved {
+            let mut other = values.clone();
+            other[unknown] += step;
+            let residuals = forward.residuals(&unknowns, &other).unwrap();
+            for (residual, point) in residuals.iter().zip(&linearised) {
+                let column = point.unknowns.iter().position(|it| *it == unknown).unwrap();
+                let expected = (&point.residual - residual) / step;
+                let error = (point.jacobian.column(column) - &expected).amax();
+                // A mean changes the supports beyond the reach too.
+                let tolerance = if unknown < Quantity::COUNT { 0.03 } else { 3e-4 };
+                assert!(error < tolerance, "{unknown}: {error} {expected}");
+            }
+        }
+    }
+}

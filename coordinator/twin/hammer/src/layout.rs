@@ -1,0 +1,156 @@
+//! Which sleepers are estimated, and the stretch of track that is modelled around them.
+
+use tracktwin_parameters::TrackDesign;
+
+/// Most sleepers of a hammer test that are estimated at once.
+pub const SLEEPERS_MAX: usize = 300;
+
+/// Spans beside the estimated sleepers on either side: what the ends of the model reflect has died
+/// out when it returns.
+const MARGIN: usize = 40;
+
+/// Distance in sleeper spacings up to which a sleeper belongs to a struck place: midspan and a bit.
+const NEAR: f64 = 0.6;
+
+/// Sleepers beside the reported ones that have values of their own.
+const BESIDE: i64 = 1;
+
+/// A stretch of track: sleepers by their number, counted from the one whose place is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// Distance of neighbouring sleepers in m.
+    pub spacing_m: f64,
+    /// Place of sleeper 0 in m.
+    pub sleeper_at_m: f64,
+    /// Number of the first sleeper that is reported, and how many are.
+    pub first: i64,
+    /// How many sleepers are reported.
+    pub reported: usize,
+}
+
+/// Why there is no layout.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LayoutError {
+    /// Nothing was struck.
+    #[error("no receptance is left to be fitted")]
+    Nothing,
+    /// Struck places lie too far apart.
+    #[error(
+        "the receptances lie at {from_m} to {to_m} m, over {sleepers} sleepers; evaluate at most \
+         {SLEEPERS_MAX} sleepers at once"
+    )]
+    TooLong {
+        /// First place in m.
+        from_m: f64,
+        /// Last place in m.
+        to_m: f64,
+        /// Sleepers between them.
+        sleepers: i64,
+    },
+}
+
+impl Layout {
+    /// The sleepers near places in m that were struck, on a track with a sleeper at `sleeper_at_m`.
+    ///
+    /// # Errors
+    /// [`LayoutError`] when there are no places or they lie too far apart.
+    pub fn new(
+        design: &TrackDesign,
+        sleeper_at_m: f64,
+        struck_m: impl Iterator<Item = f64> + Clone,
+    ) -> Result<Self, LayoutError> {
+        let spacing_m = design.sleeper.spacing_m;
+        let from_m = struck_m.clone().fold(f64::INFINITY, f64::min);
+        let to_m = struck_m.fold(f64::NEG_INFINITY, f64::max);
+        if !(from_m.is_finite() && to_m.is_finite()) {
+            return Err(LayoutError::Nothing);
+        }
+        let first = ((from_m - sleeper_at_m) / spacing_m - NEAR).ceil() as i64;
+        let last = ((to_m - sleeper_at_m) / spacing_m + NEAR).floor() as i64;
+        let sleepers = last.saturating_sub(first).saturating_add(1).max(1);
+        if sleepers > SLEEPERS_MAX as i64 {
+            return Err(LayoutError::TooLong { from_m, to_m, sleepers });
+        }
+        let reported = usize::try_from(sleepers).expect("it is small and positive");
+        Ok(Self { spacing_m, sleeper_at_m, first, reported })
+    }
+
+    /// Spans of the modelled track.
+    pub(crate) fn spans(&self) -> usize {
+        self.own() + 2 * MARGIN + 1
+    }
+
+    /// Sleepers with values of their own; the others have the mean values.
+    pub(crate) const fn own(&self) -> usize {
+        self.reported + 2 * BESIDE.unsigned_abs() as usize
+    }
+
+    /// Index in the model of the first sleeper with values of its own.
+    pub(crate) const fn first_own() -> usize {
+        MARGIN
+    }
+
+    /// Place in m of the model's begin.
+    pub(crate) fn origin_m(&self) -> f64 {
+        self.place_m(self.first - BESIDE) - (MARGIN + 1) as f64 * self.spacing_m
+    }
+
+    /// Index among the sleepers with values of their own of the reported sleeper `index`.
+    pub(crate) const fn own_index(index: usize) -> usize {
+        index + BESIDE.unsigned_abs() as usize
+    }
+
+    /// Place in m of a sleeper by its number.
+    pub fn place_m(&self, number: i64) -> f64 {
+        self.sleeper_at_m + number as f64 * self.spacing_m
+    }
+
+    /// Indices of the reported sleepers that a place in m belongs to.
+    pub(crate) fn near(&self, x_m: f64) -> impl Iterator<Item = usize> + '_ {
+        let reach_m = NEAR * self.spacing_m;
+        let distance_m =
+            move |index: &usize| (self.place_m(self.first + *index as i64) - x_m).abs();
+        (0..self.reported).filter(move |index| distance_m(index) <= reach_m)
+    }
+
+    /// Rail elements of every span: fine where the rail may be struck.
+    pub(crate) fn rail_elements(&self) -> Vec<usize> {
+        let fine = MARGIN - 1..self.spans() - MARGIN + 1;
+        (0..self.spans()).map(|span| if fine.contains(&span) { 8 } else { 4 }).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout(struck_m: &[f64]) -> Result<Layout, LayoutError> {
+        Layout::new(&TrackDesign::v_track(), 1.0, struck_m.iter().copied())
+    }
+
+    #[test]
+    fn sleepers_beside_a_struck_place_are_reported() {
+        let above = layout(&[1.25]).unwrap();
+        assert_eq!((above.first, above.reported), (2, 1));
+        let between = layout(&[1.0625]).unwrap();
+        assert_eq!((between.first, between.reported), (0, 2));
+        assert_eq!(between.near(1.0625).collect::<Vec<_>>(), [0, 1]);
+        let before = layout(&[0.5, 1.0]).unwrap();
+        assert_eq!((before.first, before.reported), (-4, 5));
+    }
+
+    #[test]
+    fn the_model_covers_the_struck_places_with_a_margin() {
+        let layout = layout(&[1.0, 2.0]).unwrap();
+        let first_m = layout.origin_m() + (Layout::first_own() + 1) as f64 * layout.spacing_m;
+        assert!((first_m - 0.875).abs() < 1e-9, "{first_m}");
+        assert_eq!(layout.spans(), 11 + 80 + 1);
+        assert_eq!(layout.rail_elements().len(), layout.spans());
+    }
+
+    #[test]
+    fn nothing_and_too_much_are_refused() {
+        assert_eq!(layout(&[]), Err(LayoutError::Nothing));
+        assert!(layout(&[0.0, 1e4]).unwrap_err().to_string().contains("at most 300"));
+    }
+}

@@ -1,0 +1,206 @@
+//! Receptances as they were measured, and the part of them that is fitted.
+
+use num_complex::Complex64;
+use tracktwin_parameters::TrackDesign;
+
+/// Least coherence of a value that is fitted.
+pub const COHERENCE_MIN: f64 = 0.9;
+
+/// Lowest and highest frequency in Hz that is fitted on a track of V-Track's lengths: above 4 kHz the
+/// paper's model and measurement differ (Shen et al. 2023, Fig. 9). On a track whose lengths are
+/// larger by a ratio both are lower by it.
+const USUAL_HZ: [f64; 2] = [100.0, 4000.0];
+
+/// Frequencies that are fitted in an octave.
+const PER_OCTAVE: f64 = 24.0;
+
+/// A point receptance of the rail: force and displacement at one place, positive in one direction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointReceptance {
+    /// Place along the track in m.
+    pub position_m: f64,
+    /// Frequencies in Hz, ascending and positive.
+    pub frequencies_hz: Vec<f64>,
+    /// Displacement per unit force in m/N at each of them, in the convention `exp(+i w t)`.
+    pub values: Vec<Complex64>,
+    /// Coherence of force and response at each of them, 0 to 1; none where it is not known.
+    pub coherence: Option<Vec<f64>>,
+    /// Hits that were averaged; none where it is not known.
+    pub hits: Option<usize>,
+}
+
+/// Which frequencies are fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Selection {
+    /// Lowest and highest in Hz.
+    pub range_hz: [f64; 2],
+    /// Least coherence.
+    pub coherence: f64,
+}
+
+/// What is fitted of all measured receptances, and what was left out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Selected {
+    /// Receptances at the fitted frequencies.
+    pub points: Vec<PointReceptance>,
+    /// What to keep in mind, in sentences.
+    pub notes: Vec<String>,
+}
+
+impl Selection {
+    /// The usual range on a track of this design.
+    pub fn usual(design: &TrackDesign) -> Self {
+        let ratio = design.length_ratio();
+        Self { range_hz: USUAL_HZ.map(|hz| hz / ratio), coherence: COHERENCE_MIN }
+    }
+}
+
+impl PointReceptance {
+    /// Whether more than half of the values gain energy: the imaginary part of a point receptance is
+    /// negative, so force and response have opposite directions.
+    pub fn is_turned(&self) -> bool {
+        let gaining = self.values.iter().filter(|value| value.im > 0.0).count();
+        2 * gaining > self.values.len()
+    }
+
+    /// Standard deviation of the logarithm's real and imaginary part at a frequency that the
+    /// coherence tells: `sqrt((1 - g) / (2 g n))` for the coherence `g` of `n` hits (Bendat and
+    /// Piersol, *Random Data*, 4th ed., section 9.1); zero where it is not known.
+    pub(crate) fn deviation(&self, index: usize) -> f64 {
+        let Some(coherence) = self.coherence.as_ref().map(|it| it[index]) else { return 0.0 };
+        let hits = self.hits.unwrap_or(1).max(1) as f64;
+        ((1.0 - coherence) / (2.0 * coherence * hits)).max(0.0).sqrt()
+    }
+
+    /// The values of these indices.
+    pub(crate) fn kept(&self, indices: &[usize]) -> Self {
+        Self {
+            position_m: self.position_m,
+            frequencies_hz: indices.iter().map(|&index| self.frequencies_hz[index]).collect(),
+            values: indices.iter().map(|&index| self.values[index]).collect(),
+            coherence: self
+                .coherence
+                .as_ref()
+                .map(|all| indices.iter().map(|&index| all[index]).collect()),
+            hits: self.hits,
+        }
+    }
+}
+
+/// Selects what is fitted: inside the range, coherent, and at most 24 frequencies an octave, those
+/// nearest to equal steps of the logarithm.
+///
+/// Points without such a frequency are left out. Notes say what was left out.
+pub fn select(points: &[PointReceptance], selection: &Selection) -> Selected {
+    let [low, high] = selection.range_hz;
+    let mut notes = Vec::new();
+    let (mut inside, mut incoherent, mut unknown) = (0, 0, 0);
+    let mut kept_points = Vec::new();
+    for point in points {
+        let count = point.frequencies_hz.len();
+        let in_range = |&index: &usize| (low..=high).contains(&point.frequencies_hz[index]);
+        let range: Vec<usize> = (0..count).filter(in_range).collect();
+        let is_coherent = |&index: &usize| {
+            point.coherence.as_ref().is_none_or(|all| all[index] >= selection.coherence)
+        };
+        let coherent: Vec<usize> = range.iter().copied().filter(is_coherent).collect();
+        inside += range.len();
+        incoherent += range.len() - coherent.len();
+        unknown += usize::from(point.coherence.is_none());
+        let kept = nearest(&point.frequencies_hz, &coherent, selection.range_hz);
+        if kept.is_empty() {
+            notes.push(format!(
+                "The receptance at {} m has no coherent value from {low:.0} to {high:.0} Hz and is \
+                 left out.",
+                point.position_m
+            ));
+        } else {
+            kept_points.push(point.kept(&kept));
+        }
+    }
+    if incoherent > 0 {
+        notes.push(format!(
+            "{incoherent} of {inside} values are left out: their coherence is below {}.",
+            selection.coherence
+        ));
+    }
+    if unknown > 0 {
+        notes.push(format!(
+            "The coherence of {unknown} of {} receptances is not known (it takes several hits): \
+             none of their values is left out.",
+            points.len()
+        ));
+    }
+    Selected { points: kept_points, notes }
+}
+
+/// Of these indices those whose frequencies are nearest to equal steps of the logarithm.
+fn nearest(frequencies_hz: &[f64], indices: &[usize], [low, high]: [f64; 2]) -> Vec<usize> {
+    let steps = ((high / low).log2() * PER_OCTAVE).floor().max(0.0) as usize;
+    let mut kept = Vec::new();
+    for step in 0..=steps {
+        let wanted = low * (step as f64 / PER_OCTAVE).exp2();
+        let distance = |index: usize| (frequencies_hz[index] / wanted).log2().abs();
+        let best = indices.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+        // Only what lies nearer to this step than to the next ones.
+        let best = best.filter(|&index| distance(index) <= 0.5 / PER_OCTAVE);
+        if best.is_some_and(|index| kept.last() != Some(&index)) {
+            kept.extend(best);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(count: usize) -> PointReceptance {
+        PointReceptance {
+            position_m: 1.0,
+            frequencies_hz: (1..=count).map(|k| 10.0 * k as f64).collect(),
+            values: vec![Complex64::new(1e-8, -1e-9); count],
+            coherence: Some(vec![0.99; count]),
+            hits: Some(5),
+        }
+    }
+
+    #[test]
+    fn incoherent_values_are_left_out_and_it_is_said() {
+        let mut point = point(400);
+        point.coherence.as_mut().unwrap()[20..40].fill(0.5);
+        let selection = Selection::usual(&TrackDesign::v_track());
+        let Selected { points, notes } = select(&[point], &selection);
+        let incoherent = |hz: &f64| (205.0..405.0).contains(hz);
+        assert!(!points[0].frequencies_hz.iter().any(incoherent));
+        assert!(notes[0].starts_with("20 of 391 values"), "{notes:?}");
+        // 5.3 octaves, less the one that is missing; lines 10 Hz apart are fewer at the low end.
+        assert!((80..128).contains(&points[0].values.len()), "{}", points[0].values.len());
+    }
+
+    #[test]
+    fn a_point_without_any_coherent_value_is_named() {
+        let mut bad = point(100);
+        bad.coherence.as_mut().unwrap().fill(0.1);
+        let selection = Selection::usual(&TrackDesign::v_track());
+        let Selected { points, notes } = select(&[bad, point(100)], &selection);
+        assert_eq!(points.len(), 1);
+        assert!(notes[0].contains("at 1 m"), "{notes:?}");
+    }
+
+    #[test]
+    fn a_response_against_the_force_is_noticed() {
+        let mut point = point(10);
+        assert!(!point.is_turned());
+        point.values.iter_mut().for_each(|value| *value = -*value);
+        assert!(point.is_turned());
+    }
+
+    #[test]
+    fn a_coherence_is_a_deviation() {
+        // Half of the power of a single hit is noise: as large as the signal, half of it in phase.
+        let mut point = PointReceptance { hits: Some(1), ..point(1) };
+        point.coherence = Some(vec![0.5]);
+        assert!((point.deviation(0) - 0.5_f64.sqrt()).abs() < 1e-12);
+    }
+}

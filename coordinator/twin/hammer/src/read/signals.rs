@@ -1,0 +1,240 @@
+//! Tables of signals: force and acceleration of several hits, averaged to a receptance.
+
+use super::{ReadError, ReadFault, Rows};
+use crate::PointReceptance;
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+use std::f64::consts::TAU;
+
+/// The column that only tables of signals have.
+pub(super) const TIME: &str = "time_s";
+
+/// Columns; the number of the hit need not be there.
+const COLUMNS: &[&str] = &["position_m", TIME, "force_N", "acceleration_m_s2", "hit"];
+const REQUIRED: usize = 4;
+
+/// Least samples of a hit.
+const SAMPLES_MIN: usize = 64;
+/// Greatest relative difference of the mean time steps of two hits.
+const UNEVEN_MAX: f64 = 1e-3;
+/// Relative difference of a time step from the usual one that is a gap: written times are rounded.
+const GAP: f64 = 0.5;
+
+/// One hit.
+struct Hit {
+    position_m: f64,
+    number: Option<f64>,
+    /// Line of its first sample.
+    line: u64,
+    times_s: Vec<f64>,
+    force_n: Vec<f64>,
+    acceleration_m_s2: Vec<f64>,
+}
+
+/// Reads the hits and averages those of one place that follow each other. A hit begins where the
+/// time starts again, or where its number or the place changes.
+pub(super) fn read(text: &str) -> Result<Vec<PointReceptance>, ReadError> {
+    let mut hits: Vec<Hit> = Vec::new();
+    Rows::new(text, COLUMNS, REQUIRED)?.each(|line, row| {
+        let &[Some(position_m), Some(time_s), Some(force_n), Some(acceleration), number] = row
+        else {
+            unreachable!("the columns are there")
+        };
+        let goes_on = |hit: &Hit| {
+            let is_later = hit.times_s.last().is_some_and(|last| time_s > *last);
+            is_later && hit.position_m == position_m && hit.number == number
+        };
+        if !hits.last().is_some_and(goes_on) {
+            hits.push(Hit {
+                position_m,
+                number,
+                line,
+                times_s: Vec::new(),
+                force_n: Vec::new(),
+                acceleration_m_s2: Vec::new(),
+            });
+        }
+        let hit = hits.last_mut().expect("one was added");
+        hit.times_s.push(time_s);
+        hit.force_n.push(force_n);
+        hit.acceleration_m_s2.push(acceleration);
+        Ok(())
+    })?;
+    if hits.is_empty() {
+        let remedy = "write a row a sample below the names of the columns";
+        return Err(ReadError { line: 1, fault: ReadFault::Nothing { remedy } });
+    }
+    hits.chunk_by(|a, b| a.position_m == b.position_m).map(average).collect()
+}
+
+/// The receptance of several hits: `H1 = G_fa / G_ff` summed over the hits, divided by `-w^2`, with
+/// the coherence `|G_fa|^2 / (G_ff G_aa)` (Bendat and Piersol, *Random Data*, 4th ed., section 6.1).
+///
+/// A hit is transformed as a whole, without a window: its record begins and ends at rest.
+fn average(hits: &[Hit]) -> Result<PointReceptance, ReadError> {
+    let step_s = step(hits)?;
+    let samples = hits.iter().map(|hit| hit.force_n.len()).min().unwrap_or_default();
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(samples);
+    let spectrum = |signal: &[f64]| {
+        let mean = signal[..samples].iter().sum::<f64>() / samples as f64;
+        let mut input: Vec<f64> = signal[..samples].iter().map(|value| value - mean).collect();
+        let mut output = transform.make_output_vec();
+        transform.process(&mut input, &mut output).expect("the lengths are the plan's");
+        output
+    };
+    let lines = samples / 2 + 1;
+    let (mut force, mut response) = (vec![0.0; lines], vec![0.0; lines]);
+    let mut cross = vec![Complex64::ZERO; lines];
+    for hit in hits {
+        let (f, a) = (spectrum(&hit.force_n), spectrum(&hit.acceleration_m_s2));
+        for line in 0..lines {
+            force[line] += f[line].norm_sqr();
+            response[line] += a[line].norm_sqr();
+            cross[line] += f[line].conj() * a[line];
+        }
+    }
+    if force[1..].iter().all(|power| *power == 0.0) {
+        return Err(ReadError { line: hits[0].line, fault: ReadFault::NoForce });
+    }
+    let mut point = PointReceptance {
+        position_m: hits[0].position_m,
+        frequencies_hz: Vec::new(),
+        values: Vec::new(),
+        // The coherence of a single hit is one, whatever its noise.
+        coherence: (hits.len() > 1).then(Vec::new),
+        hits: Some(hits.len()),
+    };
+    // The mean and the highest line of a real signal say nothing.
+    let usable = (1..lines.saturating_sub(1)).filter(|&it| force[it] > 0.0 && response[it] > 0.0);
+    for line in usable {
+        let frequency_hz = line as f64 / (samples as f64 * step_s);
+        let omega = TAU * frequency_hz;
+        point.frequencies_hz.push(frequency_hz);
+        point.values.push(cross[line] / force[line] / (-omega * omega));
+        if let Some(coherence) = &mut point.coherence {
+            let value = cross[line].norm_sqr() / (force[line] * response[line]);
+            coherence.push(value.min(1.0));
+        }
+    }
+    Ok(point)
+}
+
+/// The time step of the hits in s, which is one.
+fn step(hits: &[Hit]) -> Result<f64, ReadError> {
+    let mut first = None;
+    for hit in hits {
+        let samples = hit.times_s.len();
+        if samples < SAMPLES_MIN {
+            let fault = ReadFault::ShortHit { samples, least: SAMPLES_MIN };
+            return Err(ReadError { line: hit.line, fault });
+        }
+        let steps = || hit.times_s.windows(2).map(|pair| pair[1] - pair[0]);
+        let mut sorted: Vec<f64> = steps().collect();
+        sorted.sort_by(f64::total_cmp);
+        let usual_s = sorted[sorted.len() / 2];
+        let is_gap = |step_s: f64| (step_s / usual_s - 1.0).abs() > GAP;
+        if let Some((line, step_s)) = (hit.line + 1..).zip(steps()).find(|it| is_gap(it.1)) {
+            return Err(ReadError { line, fault: ReadFault::UnevenTime { step_s, usual_s } });
+        }
+        let mean_s = (hit.times_s[samples - 1] - hit.times_s[0]) / (samples - 1) as f64;
+        let first_s = *first.get_or_insert(mean_s);
+        if (mean_s / first_s - 1.0).abs() > UNEVEN_MAX {
+            let fault = ReadFault::UnevenTime { step_s: mean_s, usual_s: first_s };
+            return Err(ReadError { line: hit.line, fault });
+        }
+    }
+    Ok(first.expect("there is a hit"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write as _;
+
+    const STEP_S: f64 = 1e-3;
+    const SAMPLES: usize = 1024;
+
+    /// Signals of an oscillator `m a + c v + k u = f` of 1 kg, hit so many times, with noise of a
+    /// sine that no two hits share.
+    fn signals(hits: usize, noise: f64) -> String {
+        let (m, c, k) = (1.0, 20.0, 1e4);
+        let mut text = "position_m,time_s,force_N,acceleration_m_s2\n".to_owned();
+        for hit in 0..hits {
+            let mut random = hit as u64 + 1;
+            let fine = 50;
+            let (mut u, mut v) = (0.0, 0.0);
+            for sample in 0..SAMPLES {
+                let time = sample as f64 * STEP_S;
+                // Half a sine squared of 20 ms: nothing above 100 Hz.
+                let force = |time: f64| {
+                    if time < 0.02 {
+                        (TAU / 0.04 * time).sin().powi(2) * (1.0 + hit as f64)
+                    } else {
+                        0.0
+                    }
+                };
+                let acceleration = (force(time) - c * v - k * u) / m;
+                random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                let disturbed = noise * ((random >> 40) as f64 / f64::from(1 << 24) - 0.5);
+                let (f, a) = (force(time), acceleration + disturbed);
+                writeln!(text, "2.5,{time},{f},{a}").unwrap();
+                for part in 0..fine {
+                    let step = STEP_S / f64::from(fine);
+                    let now = time + f64::from(part) * step;
+                    v += step * (force(now) - c * v - k * u) / m;
+                    u += step * v;
+                }
+            }
+        }
+        text
+    }
+
+    #[test]
+    fn an_oscillator_has_its_receptance_and_full_coherence() {
+        let points = read(&signals(3, 0.0)).unwrap();
+        let [point] = &points[..] else { panic!("{}", points.len()) };
+        assert_eq!((point.position_m, point.hits), (2.5, Some(3)));
+        let lines = point.frequencies_hz.iter().zip(&point.values).enumerate();
+        for (index, (hz, value)) in lines.filter(|(_, (hz, _))| (5.0..50.0).contains(*hz)) {
+            let omega = TAU * hz;
+            let exact = Complex64::new(1e4 - omega * omega, 20.0 * omega).inv();
+            assert!((value / exact - 1.0).norm() < 0.03, "{hz} Hz: {value} {exact}");
+            assert!(point.coherence.as_ref().unwrap()[index] > 1.0 - 1e-9);
+        }
+        assert!(!point.is_turned());
+    }
+
+    #[test]
+    fn noise_lowers_the_coherence_where_the_hammer_is_weak() {
+        let points = read(&signals(6, 0.01)).unwrap();
+        let coherence = points[0].coherence.as_ref().unwrap();
+        let at = |hz: f64| {
+            let index = points[0].frequencies_hz.partition_point(|other| *other < hz);
+            coherence[index..index + 20].iter().sum::<f64>() / 20.0
+        };
+        assert!(at(16.0) > 0.99 && at(400.0) < 0.7, "{} {}", at(16.0), at(400.0));
+    }
+
+    #[test]
+    fn one_hit_has_no_coherence() {
+        let points = read(&signals(1, 0.0)).unwrap();
+        assert_eq!((points[0].coherence.is_none(), points[0].hits), (true, Some(1)));
+    }
+
+    #[test]
+    fn signals_that_cannot_be_averaged_are_refused_by_line() {
+        let head = "position_m,time_s,force_N,acceleration_m_s2\n";
+        let rows = |skip: f64, force: f64| {
+            (0..70).fold(head.to_owned(), |text, row| {
+                let time = f64::from(row) * 1e-3 + if row > 50 { skip } else { 0.0 };
+                format!("{text}1,{time},{},0.5\n", force * f64::from(row % 3))
+            })
+        };
+        let refused = |text: &str| read(text).unwrap_err().to_string();
+        let uneven = refused(&rows(0.5, 1.0));
+        assert!(uneven.starts_with("line 53: the time step is 0.501"), "{uneven}");
+        assert!(refused(&rows(0.0, 0.0)).contains("force of the hit is zero"));
+        assert!(refused(&format!("{head}1,0,1,1\n1,1e-3,1,1\n")).contains("2 samples"));
+        assert!(refused(head).contains("no receptance"));
+    }
+}

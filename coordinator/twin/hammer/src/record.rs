@@ -1,0 +1,232 @@
+//! What a hammer test says of a track: the record that files and pages are made of.
+
+use crate::fit::Fitted;
+use crate::unknowns::Quantity;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use tracktwin_parameters::Parameter;
+
+/// Format of `estimates.json`.
+pub const FORMAT: &str = "tracktwin-hammer/1";
+
+/// Standard deviations of a normal distribution to either end of its 90 % interval.
+const NINETY_PER_CENT: f64 = 1.645;
+
+/// Standard deviation after the test over that before below which the test tells a value.
+const RESOLVED: f64 = 0.5;
+/// The same of what a sleeper differs by from the mean.
+const OWN: f64 = 0.8;
+
+/// Mean square of a sleeper's residuals over its expectation above which the track model does not
+/// explain them.
+const MISFIT_MAX: f64 = 4.0;
+
+/// The estimates of a hammer test.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HammerRecord {
+    /// [`FORMAT`].
+    pub format: &'static str,
+    /// Version of this program.
+    pub code_version: &'static str,
+    /// Name of the track description.
+    pub track: String,
+    /// Receptances that were fitted.
+    pub receptances: usize,
+    /// Lowest and highest frequency that was fitted, in Hz.
+    #[serde(rename = "range_Hz")]
+    pub range_hz: [f64; 2],
+    /// Standard deviation by which the model errs, as the test tells, in dB.
+    #[serde(rename = "model_error_dB")]
+    pub model_error_db: f64,
+    /// Standard deviation of the logarithm of a stiffness from sleeper to sleeper, as the test tells.
+    pub unevenness: BTreeMap<Parameter, f64>,
+    /// Median and standard deviation of the logarithm before the test.
+    pub prior: BTreeMap<Parameter, [f64; 2]>,
+    /// The sleepers along the track.
+    pub sleepers: Vec<Sleeper>,
+    /// What to keep in mind, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// A sleeper and what the test says of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sleeper {
+    /// Its name.
+    pub id: String,
+    /// Its place along the track in m.
+    pub x_m: f64,
+    /// Estimates by parameter.
+    #[serde(flatten)]
+    pub estimates: BTreeMap<Parameter, Interval>,
+    /// Mean square of the residuals of its receptances over their expectation: about one where the
+    /// track model holds. None if it was not struck.
+    pub misfit: Option<f64>,
+    /// What to keep in mind about it.
+    pub flags: Vec<SleeperFlag>,
+}
+
+/// What to keep in mind about a sleeper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SleeperFlag {
+    /// No receptance was measured above it or at midspan beside it.
+    NotStruck,
+    /// The track model does not explain its receptances: the estimates are not valid.
+    Unexplained,
+}
+
+/// An estimate with its 90 % interval, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Interval {
+    /// Median of the posterior.
+    pub estimate: f64,
+    /// Ends of the 90 % interval.
+    pub lower: f64,
+    /// See `lower`.
+    pub upper: f64,
+    /// Whether the test tells it: its standard deviation is less than half of that before the test.
+    pub resolved: bool,
+    /// Whether the test tells the sleeper apart from the mean of all.
+    pub own: bool,
+}
+
+impl Interval {
+    /// Of a logarithm and its standard deviation.
+    fn new(logarithm: f64, deviation: f64) -> Self {
+        let end = |way: f64| (logarithm + way * NINETY_PER_CENT * deviation).exp();
+        Self {
+            estimate: logarithm.exp(),
+            lower: end(-1.0),
+            upper: end(1.0),
+            resolved: false,
+            own: false,
+        }
+    }
+
+    /// Standard deviation of the logarithm.
+    pub fn log_deviation(&self) -> f64 {
+        (self.upper / self.lower).ln() / (2.0 * NINETY_PER_CENT)
+    }
+}
+
+impl Sleeper {
+    /// Whether its estimates mean anything.
+    pub fn is_valid(&self) -> bool {
+        !self.flags.contains(&SleeperFlag::Unexplained)
+    }
+}
+
+impl SleeperFlag {
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NotStruck => "not_struck",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+impl HammerRecord {
+    /// Of a fitted track; `names` gives a sleeper its name by its number and its place in m.
+    pub fn new(
+        fitted: &Fitted,
+        track: &str,
+        range_hz: [f64; 2],
+        receptances: usize,
+        names: impl Fn(i64, f64) -> String,
+    ) -> Self {
+        let unknowns = &fitted.unknowns;
+        let sleepers = (0..fitted.layout.reported).map(|index| {
+            let number = fitted.layout.first + index as i64;
+            let x_m = fitted.layout.place_m(number);
+            Sleeper { id: names(number, x_m), x_m, ..fitted.sleeper(index) }
+        });
+        let sleepers: Vec<Sleeper> = sleepers.collect();
+        let unevenness = Quantity::LEARNED
+            .map(|of| (of.parameter(), unknowns.unevenness[of as usize]))
+            .into_iter()
+            .collect();
+        let prior =
+            |of: Quantity| (of.parameter(), [unknowns.median(of), unknowns.prior_deviation(of)]);
+        let mut record = Self {
+            format: FORMAT,
+            code_version: env!("CARGO_PKG_VERSION"),
+            track: track.to_owned(),
+            receptances,
+            range_hz,
+            model_error_db: 20.0 / std::f64::consts::LN_10 * fitted.model_error,
+            unevenness,
+            prior: Quantity::ALL.map(prior).into_iter().collect(),
+            sleepers,
+            notes: Vec::new(),
+        };
+        record.notes = record.sentences();
+        record
+    }
+
+    /// What the model does not explain and what the test does not tell, in sentences.
+    fn sentences(&self) -> Vec<String> {
+        let flagged = |flag: SleeperFlag| -> Vec<&str> {
+            let all = self.sleepers.iter().filter(|sleeper| sleeper.flags.contains(&flag));
+            all.map(|sleeper| sleeper.id.as_str()).collect()
+        };
+        let mut sentences = Vec::new();
+        let unexplained = flagged(SleeperFlag::Unexplained);
+        if !unexplained.is_empty() {
+            sentences.push(format!(
+                "The track model does not explain the receptances at {}: the estimates there are \
+                 not valid.",
+                unexplained.join(", ")
+            ));
+        }
+        let not_struck = flagged(SleeperFlag::NotStruck);
+        if !not_struck.is_empty() {
+            sentences.push(format!(
+                "No receptance was measured at {}: the estimates there rest on the neighbours.",
+                not_struck.join(", ")
+            ));
+        }
+        for of in Quantity::ALL.map(Quantity::parameter) {
+            let all = self.sleepers.iter().filter_map(|sleeper| sleeper.estimates.get(&of));
+            let (told, count) =
+                all.fold((0, 0), |(told, count), it| (told + usize::from(it.resolved), count + 1));
+            if told < count {
+                sentences.push(format!(
+                    "The test does not tell the {} of {} of {count} sleepers: the interval is hardly \
+                     narrower than before the test.",
+                    of.label(),
+                    count - told
+                ));
+            }
+        }
+        sentences
+    }
+}
+
+impl Fitted {
+    /// A reported sleeper without its name and place.
+    fn sleeper(&self, index: usize) -> Sleeper {
+        let estimate = |of: Quantity| {
+            let (logarithm, deviation) = self.logarithm(of, index);
+            let interval = Interval {
+                resolved: deviation < RESOLVED * self.unknowns.prior_deviation(of),
+                own: self.own_share(of, index) < OWN,
+                ..Interval::new(logarithm, deviation)
+            };
+            (of.parameter(), interval)
+        };
+        let misfit = self.misfit(index);
+        let flags = match misfit {
+            None => vec![SleeperFlag::NotStruck],
+            Some(misfit) if misfit > MISFIT_MAX => vec![SleeperFlag::Unexplained],
+            Some(_) => Vec::new(),
+        };
+        Sleeper {
+            id: String::new(),
+            x_m: 0.0,
+            estimates: Quantity::ALL.map(estimate).into_iter().collect(),
+            misfit,
+            flags,
+        }
+    }
+}

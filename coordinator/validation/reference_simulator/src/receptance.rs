@@ -1,0 +1,200 @@
+//! What a hammer test measures: receptances of the track without a wheel.
+
+use crate::hidden::Hidden;
+use crate::rail::{DAMPING_RATIO, RailModes};
+use crate::sleeper::SleeperModes;
+use crate::track::{MODES_PER_SPAN, STEP_S, bed, concerns, railpad, seat_m};
+use crate::{Scene, TruthError};
+use nalgebra::{Complex, DMatrix, DVector};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// Point receptances in m/N of the rail at some places in m: `[place][frequency]`, in the convention
+/// `exp(+i w t)`.
+///
+/// Modes of rail and sleepers are those of the passes, solved in the frequency domain. No wheel
+/// stands on the track: a railpad that stiffens with load has its stiffness under the toe load, and
+/// a sleeper above a gap has no ballast.
+///
+/// # Errors
+/// [`TruthError`] for a scene that cannot be, a place off the rail, or an effect that adds
+/// something to the rail beside its seats.
+pub fn receptance(
+    scene: &Scene,
+    places_m: &[f64],
+    frequencies_hz: &[f64],
+) -> Result<Vec<Vec<Complex<f64>>>, TruthError> {
+    scene.check()?;
+    let length_m = scene.length_m();
+    if let Some(&x_m) = places_m.iter().find(|x_m| !(0.0..=length_m).contains(*x_m)) {
+        return Err(TruthError::OffTrack { x_m, length_m });
+    }
+    if let Some(hidden) = scene.left_out.iter().find(|hidden| adds_beside_seats(hidden)) {
+        return Err(TruthError::NoReceptance { physics: hidden.physics() });
+    }
+    let track = Struck::new(scene);
+    let mut receptances = vec![Vec::with_capacity(frequencies_hz.len()); places_m.len()];
+    for &frequency_hz in frequencies_hz {
+        let values = track.at(TAU * frequency_hz, places_m);
+        for (receptances, value) in receptances.iter_mut().zip(values) {
+            receptances.push(value);
+        }
+    }
+    Ok(receptances)
+}
+
+/// Whether an effect acts on the rail at other places than the seats, or between two of them.
+const fn adds_beside_seats(hidden: &Hidden) -> bool {
+    matches!(
+        hidden,
+        Hidden::RailJoint { .. }
+            | Hidden::FasteningClamp { .. }
+            | Hidden::RailAbsorber { .. }
+            | Hidden::LinkedSleepers { .. }
+    )
+}
+
+/// A track that a hammer strikes.
+struct Struck<'a> {
+    scene: &'a Scene,
+    rail: RailModes,
+    /// Modes of sleepers by the bits of what their crack leaves of the bending stiffness.
+    modes: BTreeMap<u64, SleeperModes>,
+}
+
+impl<'a> Struck<'a> {
+    fn new(scene: &'a Scene) -> Self {
+        let rail = RailModes::new(scene.length_m(), MODES_PER_SPAN * scene.spans);
+        let mut modes = BTreeMap::new();
+        for (index, truth) in scene.sleepers.iter().enumerate() {
+            let (_, crack) = bed(scene, index, truth);
+            modes.entry(crack.to_bits()).or_insert_with(|| SleeperModes::new(crack));
+        }
+        Self { scene, rail, modes }
+    }
+
+    /// Point receptances at an angular frequency in rad/s.
+    ///
+    /// With the receptances `R` of the free rail and the supports' dynamic stiffness `Z`, the
+    /// supports push with `p`, `(1 / Z + R) p = r`, where `r` stands between seats and place.
+    fn at(&self, omega: f64, places_m: &[f64]) -> Vec<Complex<f64>> {
+        let seats = self.scene.sleepers.len();
+        let gains = self.gains(omega);
+        let between = self.between_seats(&gains);
+        let mut matrix = DMatrix::from_fn(seats, seats, |a, b| {
+            between.difference[a.abs_diff(b)] - between.sum[a + b]
+        });
+        for seat in 0..seats {
+            matrix[(seat, seat)] += self.support(seat, omega);
+        }
+        let factor = matrix.lu();
+        let of = |&x_m: &f64| {
+            let free = |other_m: f64| self.free(&gains, x_m, other_m);
+            let to_seats = DVector::from_fn(seats, |seat, _| free(seat_m(seat)));
+            let pushed = factor.solve(&to_seats).expect("damped supports push in one way");
+            free(x_m) - to_seats.dot(&pushed)
+        };
+        places_m.iter().map(of).collect()
+    }
+
+    /// Receptance of each mode of the free rail in m/N.
+    fn gains(&self, omega: f64) -> Vec<Complex<f64>> {
+        let modes = self.rail.frequencies.iter().zip(&self.rail.masses);
+        let gain = |(own, mass): (&f64, &f64)| {
+            let damping = 2.0 * DAMPING_RATIO * own * omega;
+            (Complex::new(own * own - omega * omega, damping) * *mass).inv()
+        };
+        modes.map(gain).collect()
+    }
+
+    /// Receptance of the free rail between two places.
+    fn free(&self, gains: &[Complex<f64>], a_m: f64, b_m: f64) -> Complex<f64> {
+        let modes = self.rail.wave_numbers.iter().zip(gains);
+        let sum: Complex<f64> =
+            modes.map(|(k, gain)| gain * ((k * a_m).sin() * (k * b_m).sin())).sum();
+        sum + self.rail.residual_flexibility(a_m - b_m)
+    }
+
+    /// The same between all seats: `sin a sin b = (cos (a - b) - cos (a + b)) / 2`.
+    fn between_seats(&self, gains: &[Complex<f64>]) -> BetweenSeats {
+        let wave = |distance_m: f64| -> Complex<f64> {
+            let modes = self.rail.wave_numbers.iter().zip(gains);
+            modes.map(|(k, gain)| gain * (0.5 * (k * distance_m).cos())).sum()
+        };
+        let seats = self.scene.sleepers.len();
+        let apart = |seats: usize| seat_m(seats) - seat_m(0);
+        let residual = |seats: usize| self.rail.residual_flexibility(apart(seats));
+        BetweenSeats {
+            difference: (0..seats).map(|it| wave(apart(it)) + residual(it)).collect(),
+            sum: (0..2 * seats).map(|it| wave(apart(it) + 2.0 * seat_m(0))).collect(),
+        }
+    }
+
+    /// What a support gives way in m/N: railpad and sleeper in series.
+    fn support(&self, seat: usize, omega: f64) -> Complex<f64> {
+        let (bed, crack) = bed(self.scene, seat, &self.scene.sleepers[seat]);
+        let law = railpad(self.scene, seat, STEP_S);
+        let softer = law.power.map_or(1.0, |it| (it.toe_n / it.nominal_n).powf(it.exponent));
+        let mut stiffness = Complex::new(softer * law.stiffness, omega * law.damping);
+        for hidden in self.scene.left_out.iter().filter(|hidden| concerns(hidden, seat)) {
+            if let Hidden::FrequencyDependentRailpad { stiffness_ratio, relaxation_time_s } = hidden
+            {
+                let turn = Complex::new(0.0, omega * relaxation_time_s);
+                stiffness += turn / (turn + 1.0) * (stiffness_ratio * law.stiffness);
+            }
+        }
+        stiffness.inv() + self.modes[&crack.to_bits()].seat_receptance(&bed, omega)
+    }
+}
+
+/// Receptances between seats in m/N, by the difference and by the sum of their numbers.
+struct BetweenSeats {
+    difference: Vec<Complex<f64>>,
+    sum: Vec<Complex<f64>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::testing::NOMINAL;
+    use crate::vtrack::SPACING_M;
+
+    #[test]
+    fn a_static_force_meets_the_stiffness_of_a_beam_on_an_elastic_foundation() {
+        // Soft supports: Winkler 1867, `1 / (8 E I beta^3)`, and shear.
+        let soft = crate::SleeperTruth { ballast_stiffness_n_m: 2e5, ..NOMINAL };
+        let scene = Scene::uniform(120, soft);
+        let place_m = 60.0 * SPACING_M;
+        let found = receptance(&scene, &[place_m], &[0.1]).unwrap()[0][0].re;
+        let bending = crate::rail::cross_section().bending;
+        let per_length: f64 = 1.0 / (1.0 / 1.5e8 + 1.0 / 2e5) / SPACING_M;
+        let beta = (per_length / (4.0 * bending)).powf(0.25);
+        let exact = 1.0 / (8.0 * bending * beta.powi(3));
+        assert!((found / exact - 1.0).abs() < 0.02, "{found} {exact}");
+    }
+
+    #[test]
+    fn a_railpad_that_stiffens_with_load_is_softer_under_a_hammer() {
+        let mut scene = Scene::uniform(40, NOMINAL);
+        let at = |scene: &Scene| receptance(scene, &[20.0 * SPACING_M], &[800.0]).unwrap()[0][0];
+        let linear = at(&scene);
+        scene.left_out.push(Hidden::LoadDependentRailpad {
+            exponent: 0.5,
+            reference_load_n: 3000.0,
+            toe_load_n: 1000.0,
+        });
+        let halved = crate::SleeperTruth { railpad_stiffness_n_m: 0.75e8, ..NOMINAL };
+        let softer = at(&Scene::uniform(40, halved));
+        assert!((at(&scene) / softer - Complex::from(1.0)).norm() < 1e-9);
+        assert!((linear / softer - Complex::from(1.0)).norm() > 0.05);
+    }
+
+    #[test]
+    fn what_receptances_do_not_hold_is_refused() {
+        let mut scene = Scene::uniform(40, NOMINAL);
+        assert!(receptance(&scene, &[9.0], &[100.0]).unwrap_err().to_string().contains("9 m"));
+        scene.left_out.push(Hidden::LinkedSleepers { sleepers: [3, 4], stiffness_n_per_m: 1e7 });
+        let refused = receptance(&scene, &[2.0], &[100.0]).unwrap_err().to_string();
+        assert!(refused.contains("linked_sleepers"), "{refused}");
+    }
+}
