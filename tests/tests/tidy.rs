@@ -37,6 +37,10 @@ const BORDERS: &[(&str, &[&str])] = &[
         &["tracktwin-track", "tracktwin-diagnosis", "tracktwin-worker"],
     ),
     (
+        "tracktwin-ring",
+        &["tracktwin-library", "tracktwin-farm", "tracktwin-worker", "tracktwin-report"],
+    ),
+    (
         "tracktwin-report",
         &["tracktwin-library", "tracktwin-farm", "tracktwin-worker", "tonic", "sqlx"],
     ),

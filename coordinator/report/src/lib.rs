@@ -12,6 +12,7 @@ mod map_picture;
 mod models_page;
 mod receptance;
 mod reproduction_page;
+mod ring_page;
 mod spectrum_picture;
 mod track_picture;
 
@@ -23,6 +24,7 @@ pub use inversion_page::{inversion_chart, inversion_page};
 pub use models_page::models_page;
 pub use receptance::{ReceptanceCurve, receptance_chart};
 pub use reproduction_page::reproduction_page;
+pub use ring_page::ring_page;
 pub use track_picture::evaluation_chart;
 
 /// What an estimate of railpad stiffness is, for a reader who knows railpads from a test bench.

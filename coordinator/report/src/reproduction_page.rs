@@ -85,7 +85,7 @@ fn table(compared: &Compared) -> Markup {
 }
 
 /// The verdict with a mark, so that it does not hang on colour alone.
-fn verdict(verdict: ClaimVerdict) -> Markup {
+pub(crate) fn verdict(verdict: ClaimVerdict) -> Markup {
     let (mark, colour) = match verdict {
         ClaimVerdict::Reproduced => ("✓", "var(--c)"),
         ClaimVerdict::Differs => ("✗", "var(--b)"),
@@ -94,7 +94,7 @@ fn verdict(verdict: ClaimVerdict) -> Markup {
     html! { strong style=(format!("color:{colour}")) { (mark) " " (verdict.label()) } }
 }
 
-fn chart(picture: &Picture) -> String {
+pub(crate) fn chart(picture: &Picture) -> String {
     let points = || picture.curves.iter().flat_map(reach);
     let x = match &picture.names[..] {
         [(first, _), .., (last, _)] => Axis::linear(&picture.x.label, first - 0.5, last + 0.5),
@@ -112,6 +112,7 @@ fn chart(picture: &Picture) -> String {
     for (index, curve) in picture.curves.iter().enumerate() {
         draw(&mut chart, CLASSES[index % CLASSES.len()], curve, [index, bars]);
     }
+    picture.marks.iter().for_each(|&place| chart.vertical(place));
     legend(&mut chart, picture);
     if !picture.names.is_empty() {
         chart.name_x(picture.names.clone());
@@ -145,6 +146,7 @@ fn draw(chart: &mut Chart, class: &'static str, curve: &Curve, [index, bars]: [u
         Style::Line => chart.line(class, points),
         Style::Truth => chart.line("ink", points),
         Style::Dots => chart.dots("a pale", 1.6, &curve.points),
+        Style::Points => chart.dots(class, 3.4, &curve.points),
         Style::Band(half) => {
             let sides = points.clone().zip(half).map(|((x, y), half)| (x, y - half, y + half));
             chart.band(class, &sides.collect::<Vec<_>>());

@@ -23,6 +23,7 @@ fn picture(styles: Vec<Style>) -> Picture {
         y: scale("k_p in MN/m"),
         curves: styles.into_iter().map(curve).collect(),
         names: Vec::new(),
+        marks: Vec::new(),
         wide: true,
     }
 }

@@ -25,6 +25,7 @@ mod numbers;
 mod progress;
 mod receptance;
 mod reproduce;
+mod ring;
 mod run;
 mod signals;
 mod simulate;
@@ -94,6 +95,8 @@ enum Command {
     Trial(trial::Arguments),
     /// Compare the results with the paper's, figure by figure.
     Reproduce(reproduce::Arguments),
+    /// Record the paper's test ring with known truth, evaluate it and check the paper's statements.
+    Ring(ring::Arguments),
     /// Convert CSV, Parquet, NumPy or MATLAB files to a recording.
     Import(import::Arguments),
     /// Check a recording and list its content, defects and possible uses.
@@ -175,6 +178,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Stream(arguments) => asynchronously(stream::run(arguments)),
         Command::Coverage(arguments) => asynchronously(coverage::run(arguments)),
         Command::Reproduce(arguments) => asynchronously(reproduce::run(arguments)),
+        Command::Ring(arguments) => asynchronously(ring::run(arguments)),
         Command::Import(arguments) => import::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Library(question) => asynchronously(library::run(question)),

@@ -14,6 +14,7 @@ pub mod models;
 pub mod null_models;
 pub mod provenance;
 pub mod reproduce;
+pub mod ring;
 pub mod stream;
 pub mod train;
 pub mod trial;

@@ -3,8 +3,9 @@
 use crate::TruthError;
 use crate::chain::{measure, turn};
 use crate::pass::{self, Drive};
+use crate::rough_rail::BAND_M;
 use crate::scene::Scene;
-use crate::surface::{Irregularity, WheelAngle};
+use crate::surface::{Irregularity, WAVES_M, WheelAngle};
 use crate::track::{Track, seat_m};
 use crate::vtrack::{self, SPACING_M};
 use rand_chacha::ChaCha12Rng;
@@ -89,9 +90,20 @@ fn one_pass(
     })
 }
 
+/// First stream of the rough rails' band; those of passes are far below.
+const BAND_STREAMS: u64 = 1 << 32;
+
 /// An irregularity of a scene: 0 for the one that all passes share.
 fn irregularity(scene: &Scene, number: u64) -> Irregularity {
-    Irregularity::draw(scene.irregularity_level, scene.length_m(), &mut stream(scene, number))
+    let drawn = |waves_m, stream_number| {
+        let random = &mut stream(scene, stream_number);
+        Irregularity::draw(scene.irregularity_level, scene.length_m(), waves_m, random)
+    };
+    let everywhere = drawn(WAVES_M, number);
+    if scene.rough_rails.is_empty() {
+        return everywhere;
+    }
+    everywhere.roughened(&scene.rough_rails, &drawn(BAND_M, BAND_STREAMS + number))
 }
 
 /// Random numbers of a scene: every stream is independent of the others.

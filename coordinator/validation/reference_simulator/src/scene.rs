@@ -22,6 +22,9 @@ pub struct Scene {
     pub seed: u64,
     /// Level of the irregularity in 1e-4 m2 rad/m (eq. B.6).
     pub irregularity_level: f64,
+    /// Rails whose surface is rougher; everywhere else it is that of the level above.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rough_rails: Vec<RoughRail>,
     /// Every sleeper, `spans - 1` of them; sleeper `i`, from 0, stands at `(i + 1)` spacings.
     pub sleepers: Vec<SleeperTruth>,
     /// Damping of each railpad in N s/m.
@@ -54,6 +57,19 @@ pub struct SleeperTruth {
     /// Bending stiffness `EI_s` of the sleeper in N m2.
     #[serde(rename = "sleeper_EI_N_m2")]
     pub sleeper_ei_n_m2: f64,
+}
+
+/// A stretch of the rail with a rougher surface.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct RoughRail {
+    /// From where to where in m.
+    pub x_m: [f64; 2],
+    /// Power of all waves over that of the scene's level.
+    pub level_factor: f64,
+    /// Power of waves from 0.9 to 5.2 mm over that of eq. B.6 at this rail's level, from 1 up. At
+    /// 13 km/h these waves give frequencies from 700 to 4000 Hz (paper, section 5.1 and Fig. 21).
+    pub band_factor: f64,
 }
 
 /// One run of the wheel over the track.
@@ -114,6 +130,7 @@ impl Scene {
             spans,
             seed: 1,
             irregularity_level: 3.0,
+            rough_rails: Vec::new(),
             sleepers: vec![sleeper; spans.saturating_sub(1)],
             railpad_damping_n_s_m: 6e3,
             ballast_damping_n_s_m: 900.0,
@@ -156,6 +173,11 @@ impl Scene {
         positive("railpad_damping_N_s_m", self.railpad_damping_n_s_m)?;
         positive("ballast_damping_N_s_m", self.ballast_damping_n_s_m)?;
         not_negative("irregularity_level", self.irregularity_level)?;
+        for rail in &self.rough_rails {
+            positive("rough_rails.level_factor", rail.level_factor)?;
+            not_negative("rough_rails.band_factor - 1", rail.band_factor - 1.0)?;
+            positive("rough_rails.x_m[1] - x_m[0]", rail.x_m[1] - rail.x_m[0])?;
+        }
         self.chain.check()?;
         self.left_out.iter().try_for_each(|hidden| self.check_place(hidden))
     }
@@ -252,6 +274,13 @@ mod tests {
                 scene.left_out.push(bolt);
             })
             .contains("sleeper_bolt")
+        );
+        assert!(
+            refused(|scene| {
+                let smoother = RoughRail { x_m: [1.0, 2.0], level_factor: 1.0, band_factor: 0.5 };
+                scene.rough_rails.push(smoother);
+            })
+            .contains("band_factor")
         );
         assert!(Scene::uniform(20, NOMINAL).check().is_ok());
     }

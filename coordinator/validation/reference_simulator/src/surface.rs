@@ -15,6 +15,8 @@ const LEVEL_UNIT: f64 = 1e-4;
 /// Shortest and longest wavelength in m.
 const SHORTEST_M: f64 = 0.25e-3;
 const LONGEST_M: f64 = 1.0;
+/// All wavelengths in m.
+pub(crate) const WAVES_M: [f64; 2] = [SHORTEST_M, LONGEST_M];
 /// Knots on the shortest wave: cubics through heights and slopes are within 1e-3 of it.
 const KNOTS_PER_WAVE: f64 = 8.0;
 /// Wavelengths over which a corrugation grows and fades.
@@ -23,21 +25,27 @@ const FADE_WAVES: f64 = 2.0;
 /// Random irregularity along a track, positive downwards.
 #[derive(Clone, Debug)]
 pub(crate) struct Irregularity {
-    step_m: f64,
+    pub(crate) step_m: f64,
     /// Height in m and slope at every knot.
-    knots: Vec<[f64; 2]>,
+    pub(crate) knots: Vec<[f64; 2]>,
 }
 
 /// One-sided density of eq. B.6 at level one in m2/(rad/m).
-fn density(wave_number: f64) -> f64 {
+pub(crate) fn density(wave_number: f64) -> f64 {
     let (square, cutoff) = (wave_number.powi(2), CUTOFF_RAD_M.powi(2));
     FACTOR * LEVEL_UNIT * cutoff / ((square + cutoff) * square)
 }
 
 impl Irregularity {
-    /// Filtered noise with the spectrum of eq. B.6 at a level, on at least `length_m`: every
-    /// harmonic has a Gaussian sine and cosine, so that its power is random too.
-    pub(crate) fn draw(level: f64, length_m: f64, random: &mut ChaCha12Rng) -> Self {
+    /// Filtered noise with the spectrum of eq. B.6 at a level, on at least `length_m`, of the waves
+    /// `waves_m` from the shortest to the longest: every harmonic has a Gaussian sine and cosine, so
+    /// that its power is random too.
+    pub(crate) fn draw(
+        level: f64,
+        length_m: f64,
+        waves_m: [f64; 2],
+        random: &mut ChaCha12Rng,
+    ) -> Self {
         let step_m = SHORTEST_M / KNOTS_PER_WAVE;
         let count = ((length_m / step_m).ceil() as usize).next_power_of_two();
         let first = TAU / (count as f64 * step_m);
@@ -46,7 +54,7 @@ impl Irregularity {
         for index in 1..count / 2 {
             let wave_number = index as f64 * first;
             let [cosine, sine]: [f64; 2] = [0; 2].map(|_| StandardNormal.sample(random));
-            if (TAU / LONGEST_M..=TAU / SHORTEST_M).contains(&wave_number) {
+            if (TAU / waves_m[1]..=TAU / waves_m[0]).contains(&wave_number) {
                 // The inverse transform adds the mirrored half: twice the real part.
                 let amplitude = 0.5 * (level * density(wave_number) * first).sqrt();
                 heights[index] = amplitude * Complex64::new(cosine, sine);
@@ -142,7 +150,7 @@ mod tests {
     use rand_chacha::rand_core::SeedableRng;
 
     fn drawn(seed: u64) -> Irregularity {
-        Irregularity::draw(3.0, 5.0, &mut ChaCha12Rng::seed_from_u64(seed))
+        Irregularity::draw(3.0, 5.0, WAVES_M, &mut ChaCha12Rng::seed_from_u64(seed))
     }
 
     #[test]

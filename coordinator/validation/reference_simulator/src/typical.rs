@@ -72,6 +72,7 @@ impl Scene {
             spans: SPANS,
             seed,
             irregularity_level: within(LEVEL, random),
+            rough_rails: Vec::new(),
             sleepers,
             railpad_damping_n_s_m: within(RAILPAD_DAMPING, random),
             ballast_damping_n_s_m: within(BALLAST_DAMPING, random),

@@ -13,6 +13,8 @@ pub struct Picture {
     pub curves: Vec<Curve>,
     /// Names at places of the horizontal axis, in place of numbers.
     pub names: Vec<(f64, String)>,
+    /// Places of the horizontal axis with a thin vertical line.
+    pub marks: Vec<f64>,
     /// Whether it takes the page's width.
     pub wide: bool,
 }
@@ -46,8 +48,10 @@ pub enum Style {
     Truth,
     /// As a line with a band of this half-width about it.
     Band(Vec<f64>),
-    /// As dots.
+    /// As many small dots.
     Dots,
+    /// As a few larger dots.
+    Points,
     /// As bars from zero.
     Bars,
 }
@@ -64,8 +68,8 @@ impl Scale {
 
 impl Picture {
     pub(crate) fn new(title: impl Into<String>, x: Scale, y: Scale) -> Self {
-        let (curves, names) = (Vec::new(), Vec::new());
-        Self { title: title.into(), x, y, curves, names, wide: false }
+        let (curves, names, marks) = (Vec::new(), Vec::new(), Vec::new());
+        Self { title: title.into(), x, y, curves, names, marks, wide: false }
     }
 
     /// The same with a curve more.

@@ -1,0 +1,131 @@
+//! Parts of a ring's recording: laps, speeds, and sections of sleepers.
+
+use std::fmt::{Display, Formatter};
+use std::ops::Range;
+use tracktwin_signal::Signal;
+use tracktwin_signal::recording::{Pass, Recording};
+
+/// Sleepers of a section that is diagnosed at once, and those that two neighbouring ones share.
+const LENGTH: usize = 30;
+const OVERLAP: usize = 6;
+/// Spans of the passes that are kept beyond a section.
+const BESIDE: f64 = 3.0;
+
+/// Some of the passes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Part {
+    /// All.
+    All,
+    /// The passes of a lap, from 1: one at each speed.
+    Lap(usize),
+    /// The passes of a speed in km/h.
+    Speed(f64),
+}
+
+impl Part {
+    /// Its folder.
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::All => "all".to_owned(),
+            Self::Lap(lap) => format!("lap-{lap}"),
+            Self::Speed(speed_km_h) => format!("{speed_km_h}kmh"),
+        }
+    }
+
+    /// The recording with these passes only.
+    pub(super) fn of(&self, recording: &Recording) -> Recording {
+        let mut some = recording.clone();
+        match *self {
+            Self::All => {}
+            Self::Lap(lap) => {
+                let mut seen = Vec::new();
+                some.passes.retain(|pass| {
+                    seen.push(pass.speed_km_h);
+                    seen.iter().filter(|speed| **speed == pass.speed_km_h).count() == lap
+                });
+            }
+            Self::Speed(speed_km_h) => some.passes.retain(|pass| pass.speed_km_h == speed_km_h),
+        }
+        some
+    }
+}
+
+impl Display for Part {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::All => f.write_str("all passes"),
+            Self::Lap(lap) => write!(f, "lap {lap}"),
+            Self::Speed(speed_km_h) => write!(f, "{speed_km_h} km/h"),
+        }
+    }
+}
+
+/// Sections of about equal length that cover so many sleepers.
+pub(super) fn sections(sleepers: usize) -> Vec<Range<usize>> {
+    if sleepers <= LENGTH {
+        return vec![0..sleepers];
+    }
+    let count = (sleepers - OVERLAP).div_ceil(LENGTH - OVERLAP);
+    let first = |number: usize| number * (sleepers - LENGTH) / (count - 1);
+    (0..count).map(|number| first(number)..first(number) + LENGTH).collect()
+}
+
+/// The recording of some of its sleepers: passes end a few spans beyond them.
+pub(super) fn cut(recording: &Recording, sleepers: Range<usize>) -> Recording {
+    let kept = recording.sleepers[sleepers].to_vec();
+    let beside_m = (0.5 + BESIDE) * recording.spacing_m;
+    let ends = kept.iter().map(|sleeper| sleeper.x_m);
+    let [from_m, to_m] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x_m| {
+        [low.min(x_m - beside_m), high.max(x_m + beside_m)]
+    });
+    let shortened = |pass: &Pass| {
+        let first = pass.position_m.iter().position(|x_m| *x_m >= from_m).unwrap_or(0);
+        let last = pass.position_m.iter().rposition(|x_m| *x_m <= to_m);
+        let range = first..last.map_or(first, |last| last + 1);
+        let samples = pass.signal.samples()[range.clone()].to_vec();
+        let signal = Signal::new(pass.signal.sample_rate_hz(), samples);
+        Pass {
+            signal: signal.expect("a part of a signal is one"),
+            position_m: pass.position_m[range].to_vec(),
+            ..pass.clone()
+        }
+    };
+    let passes = recording.passes.iter().map(shortened).collect();
+    Recording { passes, sleepers: kept, ..recording.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_ring::{Plan, Ring, Stretch};
+
+    #[test]
+    fn sections_cover_all_sleepers_and_overlap() {
+        assert_eq!(sections(13), [0..13]);
+        for sleepers in [31, 54, 55, 100] {
+            let all = sections(sleepers);
+            assert_eq!((all[0].start, all.last().unwrap().end), (0, sleepers));
+            assert!(all.windows(2).all(|pair| pair[1].start + OVERLAP <= pair[0].end), "{all:?}");
+        }
+        assert_eq!(sections(100).len(), 4);
+    }
+
+    #[test]
+    fn a_lap_has_a_pass_of_each_speed_and_a_section_its_sleepers() {
+        let stretch = Stretch { first: 86, last: 92 };
+        let plan = Plan::new(1, 2, vec![10.0, 13.0], stretch).unwrap();
+        let recording = Ring::new(plan).record().unwrap();
+        let lap = Part::Lap(2).of(&recording);
+        assert_eq!(lap.speeds_km_h(), [10.0, 13.0]);
+        assert_eq!(lap.passes[0].signal, recording.passes[2].signal);
+        assert_eq!(Part::Speed(13.0).of(&recording).passes.len(), 2);
+        let section = cut(&recording, 1..3);
+        assert_eq!(section.sleepers[0].id, "SN87");
+        let positions = &section.passes[0].position_m;
+        let first_m = section.sleepers[0].x_m - 3.5 * recording.spacing_m;
+        assert!(
+            (positions[0] - first_m).abs() < 1e-3
+                && positions.len() == section.passes[0].signal.len()
+        );
+    }
+}

@@ -1,0 +1,145 @@
+//! Estimates against the truth: error, interval, and place. The paper had no truth to compare with.
+
+use crate::estimates::{holds, median};
+use crate::statement::{Found, Statement, percent};
+use crate::{Estimated, Method, Study};
+use tracktwin_number::rounded;
+use tracktwin_parameters::Parameter;
+
+/// Largest median of the absolute error of the logarithm.
+const ERROR: f64 = 0.15;
+/// Least share of truths inside the 90 % interval.
+const HOLDS: f64 = 0.8;
+/// Sleepers by which estimates may be shifted against the truth.
+const SHIFTS: [isize; 3] = [-1, 0, 1];
+
+/// Parameters whose truth is a number of each sleeper.
+const COMPARED: [Parameter; 2] = [Parameter::RailpadStiffness, Parameter::BallastStiffness];
+
+pub(crate) fn statements(study: &Study, method: Method, estimated: &Estimated) -> Vec<Statement> {
+    let mut all = Vec::new();
+    for parameter in COMPARED {
+        let label = parameter.label();
+        all.push(Statement::of(
+            ("truth", method),
+            [
+                &format!("The {label} is accurate"),
+                "the truth at every valid sleeper",
+                "median of the absolute error of the logarithm at most 0.15",
+            ],
+            error(study, estimated, parameter),
+        ));
+        all.push(Statement::of(
+            ("truth", method),
+            [
+                &format!("The 90 % interval of the {label} holds the truth"),
+                "90 % of the valid sleepers",
+                "at least 80 % of the valid sleepers",
+            ],
+            interval(study, estimated, parameter),
+        ));
+    }
+    all.push(Statement::of(
+        ("section 5.3", method),
+        [
+            "Railpad stiffness is not shifted along the track",
+            "shifted by one sleeper in places",
+            "correlation with the truth larger than with the truth of the next sleeper on either side",
+        ],
+        shift(study, estimated),
+    ));
+    all
+}
+
+/// Estimate and truth at every valid sleeper.
+fn pairs<'a>(
+    study: &'a Study,
+    estimated: &'a Estimated,
+    parameter: Parameter,
+) -> impl Iterator<Item = (tracktwin_evaluation::Estimate, f64)> + 'a {
+    study
+        .truth
+        .sleepers
+        .iter()
+        .filter_map(move |it| Some((estimated.valid(&it.id, parameter)?, it.values[&parameter])))
+}
+
+fn error(study: &Study, estimated: &Estimated, parameter: Parameter) -> Option<Found> {
+    let errors = pairs(study, estimated, parameter).map(|(of, truth)| (of.mean / truth).ln());
+    let errors: Vec<f64> = errors.collect();
+    let median_error = median(errors.iter().map(|error| error.abs()))?;
+    let bias = median(errors.iter().copied())?;
+    let text = format!(
+        "{} at {} of {} sleepers; median of the error {}",
+        rounded(median_error, 2),
+        errors.len(),
+        study.truth.sleepers.len(),
+        rounded(bias, 2)
+    );
+    Some(Found::new(median_error <= ERROR, text))
+}
+
+fn interval(study: &Study, estimated: &Estimated, parameter: Parameter) -> Option<Found> {
+    let held: Vec<bool> =
+        pairs(study, estimated, parameter).map(|(of, truth)| holds(of, truth)).collect();
+    let count = held.iter().filter(|held| **held).count();
+    let share = count as f64 / held.len() as f64;
+    let text = || format!("{} ({count} of {})", percent(share), held.len());
+    (!held.is_empty()).then(|| Found::new(share >= HOLDS, text()))
+}
+
+fn shift(study: &Study, estimated: &Estimated) -> Option<Found> {
+    let parameter = Parameter::RailpadStiffness;
+    let sleepers = &study.truth.sleepers;
+    let with = |shift: isize| {
+        let pairs = sleepers.iter().enumerate().filter_map(|(index, it)| {
+            let other = sleepers.get(index.checked_add_signed(shift)?)?;
+            let found = estimated.any(&it.id, parameter)?.mean;
+            Some((found.ln(), other.values[&parameter].ln()))
+        });
+        correlation(&pairs.collect::<Vec<_>>())
+    };
+    let [before, own, behind] = SHIFTS.map(with);
+    let (before, own, behind) = (before?, own?, behind?);
+    let text = format!(
+        "correlation {own:.2} with the sleeper itself, {before:.2} and {behind:.2} with its neighbours"
+    );
+    Some(Found::new(own > before && own > behind, text))
+}
+
+/// Correlation of pairs; none where one side does not vary.
+pub(crate) fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
+    let count = pairs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+    let (x, y) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+        pairs.iter().map(|pair| of(pair.0 - x, pair.1 - y)).sum()
+    };
+    let correlation = sum(&|a, b| a * b) / (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
+    correlation.is_finite().then_some(correlation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{estimated, study};
+    use tracktwin_reproduction::ClaimVerdict;
+
+    #[test]
+    fn the_truth_is_accurate_inside_its_interval_and_in_place() {
+        let study = study();
+        let truth = estimated(&study, |_, _, truth| (truth, 0.1 * truth));
+        let all = statements(&study, Method::Inversion, &truth);
+        assert!(all.iter().all(|it| it.verdict == ClaimVerdict::Reproduced), "{all:#?}");
+        assert!(all[0].found.starts_with("0 at 100 of 100"), "{}", all[0].found);
+    }
+
+    #[test]
+    fn estimates_half_as_large_again_are_neither() {
+        let study = study();
+        let wrong = estimated(&study, |_, _, truth| (1.5 * truth, 0.1 * truth));
+        let all = statements(&study, Method::Inversion, &wrong);
+        assert!(all[..4].iter().all(|it| it.verdict == ClaimVerdict::Differs), "{all:#?}");
+        assert_eq!(correlation(&[(1.0, 2.0), (1.0, 3.0)]), None);
+    }
+}

@@ -1,0 +1,146 @@
+//! Estimates along the ring, read from the `evaluation.json` of any method.
+
+use crate::RingError;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use tracktwin_evaluation::{Estimate, Estimates};
+use tracktwin_parameters::Parameter;
+
+/// Standard deviations between the mean and an end of the 90 % interval.
+pub(crate) const WIDTH_90: f64 = 1.645;
+
+/// Estimates of one sleeper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SleeperEstimates {
+    /// Whether the method calls them valid.
+    pub valid: bool,
+    /// Mean and standard deviation.
+    pub values: Estimates,
+}
+
+/// Estimates of one method from one set of passes, by the name of the sleeper.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Estimated {
+    sleepers: BTreeMap<String, SleeperEstimates>,
+}
+
+impl Estimated {
+    /// Reads the text of an `evaluation.json`.
+    ///
+    /// # Errors
+    /// [`RingError`] for a text that is no evaluation.
+    pub fn read(text: &str) -> Result<Self, RingError> {
+        Self::from_sleepers(text, |sleeper| Some(sleeper))
+    }
+
+    /// Reads the estimates of the model selector; none where the method has no selector.
+    ///
+    /// # Errors
+    /// [`RingError`] for a text that is no evaluation.
+    pub fn read_selector(text: &str) -> Result<Option<Self>, RingError> {
+        let estimated = Self::from_sleepers(text, |sleeper| sleeper.get("selector"))?;
+        Ok((!estimated.sleepers.is_empty()).then_some(estimated))
+    }
+
+    fn from_sleepers(
+        text: &str,
+        part: impl Fn(&Value) -> Option<&Value>,
+    ) -> Result<Self, RingError> {
+        let document: Value = serde_json::from_str(text)?;
+        let sleepers = document["sleepers"].as_array().ok_or(RingError::NoSleepers)?;
+        let read = |sleeper: &Value| {
+            let flags = sleeper["flags"].as_array();
+            let outside = flags.is_some_and(|of| of.iter().any(|it| it == "outside_library"));
+            let values = estimates(part(sleeper)?);
+            let id = sleeper["id"].as_str()?.to_owned();
+            Some((id, SleeperEstimates { valid: !outside, values }))
+        };
+        Ok(Self { sleepers: sleepers.iter().filter_map(read).collect() })
+    }
+
+    /// The estimates of a sleeper.
+    pub fn sleeper(&self, id: &str) -> Option<&SleeperEstimates> {
+        self.sleepers.get(id)
+    }
+
+    /// The estimate of a parameter at a sleeper, valid or not.
+    pub fn any(&self, id: &str, parameter: Parameter) -> Option<Estimate> {
+        self.sleeper(id)?.values.get(&parameter).copied()
+    }
+
+    /// The same where it is valid.
+    pub fn valid(&self, id: &str, parameter: Parameter) -> Option<Estimate> {
+        let sleeper = self.sleeper(id)?;
+        sleeper.values.get(&parameter).copied().filter(|_| sleeper.valid)
+    }
+}
+
+fn estimates(sleeper: &Value) -> Estimates {
+    let of = |parameter: &Parameter| {
+        let value = sleeper.get(parameter.name())?;
+        let estimate = Estimate { mean: value["mean"].as_f64()?, sd: value["sd"].as_f64()? };
+        Some((*parameter, estimate))
+    };
+    Parameter::ALL.iter().filter_map(of).collect()
+}
+
+/// Whether a value lies in the 90 % interval of an estimate.
+pub(crate) fn holds(estimate: Estimate, value: f64) -> bool {
+    (estimate.mean - value).abs() <= WIDTH_90 * estimate.sd
+}
+
+/// Whether two estimates agree: their difference lies in its own 90 % interval.
+pub(crate) fn agree(one: Estimate, other: Estimate) -> bool {
+    (one.mean - other.mean).abs() <= WIDTH_90 * one.sd.hypot(other.sd)
+}
+
+/// Median of some values; none of none.
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    let count = values.len();
+    match count {
+        0 => None,
+        _ if count % 2 == 1 => Some(values[count / 2]),
+        _ => Some(0.5 * (values[count / 2 - 1] + values[count / 2])),
+    }
+}
+
+/// Mean of some values; none of none.
+pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), it| (sum + it, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"{"sleepers": [
+        {"id": "SN1", "x_m": 0.0, "railpad_stiffness_N_m": {"mean": 8e7, "sd": 1e7}, "flags": []},
+        {"id": "SN2", "x_m": 0.1, "railpad_stiffness_N_m": {"mean": 9e7, "sd": 1e7},
+         "flags": ["outside_library"],
+         "selector": {"railpad_stiffness_N_m": {"mean": 7e7, "sd": 2e7}, "mape": [0.1]}}]}"#;
+
+    #[test]
+    fn an_evaluation_is_read_with_what_is_not_valid() {
+        let estimated = Estimated::read(TEXT).unwrap();
+        let railpad = Parameter::RailpadStiffness;
+        assert_eq!(estimated.valid("SN1", railpad).unwrap().mean, 8e7);
+        assert_eq!(estimated.valid("SN2", railpad), None);
+        assert_eq!(estimated.any("SN2", railpad).unwrap().sd, 1e7);
+        assert_eq!(estimated.any("SN3", railpad), None);
+        let selector = Estimated::read_selector(TEXT).unwrap().unwrap();
+        assert_eq!(selector.any("SN2", railpad).unwrap().mean, 7e7);
+        assert!(Estimated::read("{}").is_err() && Estimated::read("[").is_err());
+    }
+
+    #[test]
+    fn two_estimates_agree_within_the_interval_of_their_difference() {
+        let estimate = |mean| Estimate { mean, sd: 3.0 };
+        assert!(agree(estimate(10.0), estimate(16.9)) && !agree(estimate(10.0), estimate(17.1)));
+        assert!(holds(estimate(10.0), 14.9) && !holds(estimate(10.0), 15.0));
+        assert_eq!(median([3.0, 1.0, 2.0, 9.0]), Some(2.5));
+        assert_eq!((median([]), mean([]), mean([1.0, 2.0])), (None, None, Some(1.5)));
+    }
+}

@@ -1,0 +1,33 @@
+//! A replica of the test ring of the source paper (Shen et al. 2023), recorded by the reference
+//! simulator, and the paper's statements about the ring beside what evaluations of it give.
+//!
+//! Owns the description of the ring ([`Ring`], [`Plan`]), its truth, the statements with their
+//! tolerances and the table of all sleepers. Leaves to others who evaluates and diagnoses the
+//! recording, where files are kept, and how a page looks.
+
+mod compared;
+mod diagnosed;
+mod error;
+mod estimates;
+mod methods;
+mod pictures;
+mod plan;
+mod repeated;
+mod ring;
+mod spectra;
+mod statement;
+mod structures;
+mod study;
+mod surface_statements;
+mod table;
+#[cfg(test)]
+mod testing;
+
+pub use diagnosed::Diagnoses;
+pub use error::RingError;
+pub use estimates::{Estimated, SleeperEstimates};
+pub use plan::{Plan, SLEEPERS, Stretch};
+pub use ring::{Joint, Ring, SleeperTruth, Truth};
+pub use spectra::RailSpectra;
+pub use statement::Statement;
+pub use study::{FORMAT, Method, Study};
