@@ -137,7 +137,7 @@ fn command(arguments: &Arguments) -> String {
         arguments.sleepers
     );
     if let Some(models) = &arguments.models {
-        command += &format!(" --models {} --library URL", models.display());
+        command = format!("{command} --models {} --library URL", models.display());
     }
     if arguments.diagnose {
         command += " --diagnose";

@@ -185,9 +185,9 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// As [`Problem::calibrate`].
-    pub(crate) fn begin(&self, start: DVector<f64>) -> Result<Descent, CalibrationError> {
+    pub(crate) fn begin(&self, start: &DVector<f64>) -> Result<Descent, CalibrationError> {
         let prior = self.prior();
-        let state = self.linearise(&prior, &start)?;
+        let state = self.linearise(&prior, start)?;
         self.descend(&prior, &Ranges::default(), state, FIRST_STEPS)
     }
 

@@ -106,7 +106,7 @@ impl<'a> Forward<'a> {
         let nodes_m = model.layout().rail_nodes_m();
         let of = |(point, places): (&PointReceptance, &Vec<usize>)| {
             let nodes = shares(nodes_m, point.position_m - self.layout.origin_m());
-            self.point(point, places, &nodes, &rail, &variations, unknowns)
+            Self::point(point, places, &nodes, &rail, &variations, unknowns)
         };
         Ok(self.points.iter().zip(&self.places).map(of).collect())
     }
@@ -121,7 +121,9 @@ impl<'a> Forward<'a> {
         let plain = seat_stiffness(model, &self.frequencies_hz);
         let of = |quantity: Quantity| {
             let mut varied = supports.to_vec();
-            varied.iter_mut().for_each(|support| *quantity.of(support) *= STEP.exp());
+            for support in &mut varied {
+                *quantity.of(support) *= STEP.exp();
+            }
             let mut changed = seat_stiffness(&self.model(&varied)?, &self.frequencies_hz);
             for (changed, plain) in changed.iter_mut().flatten().zip(plain.iter().flatten()) {
                 *changed = (*changed - plain) / STEP;
@@ -132,7 +134,6 @@ impl<'a> Forward<'a> {
     }
 
     fn point(
-        &self,
         point: &PointReceptance,
         places: &[usize],
         nodes: &[(usize, f64)],

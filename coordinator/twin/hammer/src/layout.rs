@@ -68,10 +68,8 @@ impl Layout {
         let first = ((from_m - sleeper_at_m) / spacing_m - NEAR).ceil() as i64;
         let last = ((to_m - sleeper_at_m) / spacing_m + NEAR).floor() as i64;
         let sleepers = last.saturating_sub(first).saturating_add(1).max(1);
-        if sleepers > SLEEPERS_MAX as i64 {
-            return Err(LayoutError::TooLong { from_m, to_m, sleepers });
-        }
-        let reported = usize::try_from(sleepers).expect("it is small and positive");
+        let reported = usize::try_from(sleepers).ok().filter(|count| *count <= SLEEPERS_MAX);
+        let reported = reported.ok_or(LayoutError::TooLong { from_m, to_m, sleepers })?;
         Ok(Self { spacing_m, sleeper_at_m, first, reported })
     }
 
@@ -108,9 +106,9 @@ impl Layout {
     /// Indices of the reported sleepers that a place in m belongs to.
     pub(crate) fn near(&self, x_m: f64) -> impl Iterator<Item = usize> + '_ {
         let reach_m = NEAR * self.spacing_m;
-        let distance_m =
-            move |index: &usize| (self.place_m(self.first + *index as i64) - x_m).abs();
-        (0..self.reported).filter(move |index| distance_m(index) <= reach_m)
+        let numbers = (0..self.reported).zip(self.first..);
+        let is_near = move |number: i64| (self.place_m(number) - x_m).abs() <= reach_m;
+        numbers.filter_map(move |(index, number)| is_near(number).then_some(index))
     }
 
     /// Rail elements of every span: fine where the rail may be struck.

@@ -136,8 +136,8 @@ impl HammerRecord {
         names: impl Fn(i64, f64) -> String,
     ) -> Self {
         let unknowns = &fitted.unknowns;
-        let sleepers = (0..fitted.layout.reported).map(|index| {
-            let number = fitted.layout.first + index as i64;
+        let numbers = (0..fitted.layout.reported).zip(fitted.layout.first..);
+        let sleepers = numbers.map(|(index, number)| {
             let x_m = fitted.layout.place_m(number);
             Sleeper { id: names(number, x_m), x_m, ..fitted.sleeper(index) }
         });

@@ -68,11 +68,8 @@ pub(super) fn fit(
         .into_par_iter()
         .filter_map(|begun| {
             let is_rival = begun.may_come_near(best, current);
-            let fitted = if is_rival {
-                begun.to_its_end(problem, current)
-            } else {
-                Ok(begun.given_up(current))
-            };
+            let fitted =
+                if is_rival { begun.finish(problem, current) } else { Ok(begun.given_up(current)) };
             counted();
             fitted.ok()
         })
@@ -138,7 +135,7 @@ impl<'t> Begun<'t> {
         let mut start: Vec<f64> = start.iter().copied().collect();
         start.extend(candidate.logarithms(&candidate.trials[template.trial]));
         let start = DVector::from_vec(start);
-        let descent = Problem { candidates: &candidates, ..*problem }.begin(start.clone())?;
+        let descent = Problem { candidates: &candidates, ..*problem }.begin(&start)?;
         Ok(Self { template, candidates, start, descent })
     }
 
@@ -158,7 +155,7 @@ impl<'t> Begun<'t> {
     }
 
     /// The fit, in its parameters' ranges if it would end far beyond.
-    fn to_its_end(
+    fn finish(
         self,
         problem: &Problem<'_>,
         current: &Calibration,
@@ -204,7 +201,7 @@ pub(super) fn retuned(
     let mut best: Option<Calibration> = None;
     for fitted in fitted.iter().take(RESTARTS) {
         let values = fitted.calibration.values.rows(0, current.values.len()).into_owned();
-        let begun = problem.begin(values)?;
+        let begun = problem.begin(&values)?;
         let known = best.as_ref().unwrap_or(current).objective;
         if begun.state.predicted_objective() > (1.0 + DOUBT) * known {
             continue;

@@ -14,20 +14,20 @@ const ROUNDING: f64 = 1e-9;
 struct Models {
     extractor: Extractor,
     library: TrainingSet,
-    models: Trained,
+    trained: Trained,
     domains: Domains,
 }
 
 impl Models {
     fn new() -> Self {
         let library = testing::library();
-        let models = testing::models(&library);
-        Self { extractor: testing::extractor(), library, models, domains: Domains::default() }
+        let trained = testing::models(&library);
+        Self { extractor: testing::extractor(), library, trained, domains: Domains::default() }
     }
 
     fn twin(&self) -> Twin<'_> {
-        let Self { extractor, library, models, domains } = self;
-        Twin { extractor, models, library, domains }
+        let Self { extractor, library, trained, domains } = self;
+        Twin { extractor, models: trained, library, domains }
     }
 
     fn rows(&self, section: &Recording, samples: &[Sample]) -> Vec<Row> {

@@ -10,7 +10,7 @@ use tracktwin_reference_simulator::{SPACING_M, Scene, SleeperTruth, receptance};
 
 /// Spans of a track, and its struck sleepers in the middle.
 const SPANS: usize = 100;
-pub const STRUCK: Range<usize> = 40..61;
+pub(crate) const STRUCK: Range<usize> = 40..61;
 
 /// Hits that are averaged, and the noise of one over the receptance.
 const HITS: usize = 5;
@@ -18,7 +18,7 @@ const NOISE: f64 = 0.05;
 
 /// A track whose stiffness varies by `scatter` from sleeper to sleeper: the sleepers of an uneven
 /// track of 40 spans, repeated.
-pub fn scene(seed: u64, scatter: f64) -> Scene {
+pub(crate) fn scene(seed: u64, scatter: f64) -> Scene {
     let uneven = Scene::uneven(seed, scatter);
     let sleepers: Vec<SleeperTruth> =
         uneven.sleepers.iter().copied().cycle().take(SPANS - 1).collect();
@@ -26,7 +26,7 @@ pub fn scene(seed: u64, scatter: f64) -> Scene {
 }
 
 /// Place in m of a sleeper of the scene.
-pub fn seat_m(sleeper: usize) -> f64 {
+pub(crate) fn seat_m(sleeper: usize) -> f64 {
     (sleeper + 1) as f64 * SPACING_M
 }
 
@@ -36,7 +36,7 @@ fn frequencies_hz() -> Vec<f64> {
 }
 
 /// Receptances above the struck sleepers and at midspan behind them, with noise and coherence.
-pub fn strike(scene: &Scene) -> Vec<PointReceptance> {
+pub(crate) fn strike(scene: &Scene) -> Vec<PointReceptance> {
     let halves = 2 * STRUCK.start..2 * STRUCK.end;
     let places_m: Vec<f64> = halves.map(|half| 0.5 * half as f64 * SPACING_M + SPACING_M).collect();
     let frequencies_hz = frequencies_hz();
