@@ -77,6 +77,13 @@ pub(crate) struct PatchScan {
 }
 
 impl Patch {
+    /// Gain in nats of this patch in log predictive density on what was held out when `before` was found:
+    /// the same patch without that.
+    pub(crate) fn gain_over(&self, before: &Self) -> f64 {
+        let toward = |patch: &Self| 0.5 * patch.deviations.powi(2) * patch.height.signum();
+        (toward(self) - toward(before)) * before.height.signum()
+    }
+
     /// The waves that a patch of one wavelength would be, as a candidate; none for a patch of one
     /// frequency. `level` is the irregularity level that the waves add to.
     pub(crate) fn as_waves(&self, section: &Section, level: f64) -> Option<Candidate> {
@@ -118,7 +125,7 @@ impl PatchScan {
         &self,
         residual: &DVector<f64>,
         projected_gradient: &DVector<f64>,
-        is_one: impl Fn(Fixed) -> bool + Sync,
+        is_one: impl Fn(Fixed, &Range<usize>) -> bool + Sync,
     ) -> Option<Patch> {
         let each = residual.len() / self.sleepers;
         let dots: Vec<Vec<f64>> = self
@@ -137,7 +144,8 @@ impl PatchScan {
             let is_surface = matches!(self.shapes[filter.shape].fixed, Fixed::Wavelength(_));
             (if is_surface { deviations } else { deviations.abs() }, along)
         };
-        let allowed = self.filters.par_iter().filter(|it| is_one(self.shapes[it.shape].fixed));
+        let is_allowed = |it: &&Filter| is_one(self.shapes[it.shape].fixed, &it.sleepers);
+        let allowed = self.filters.par_iter().filter(is_allowed);
         let scored = allowed.map(|filter| (score(filter), filter));
         let ((deviations, along), filter) = scored.max_by(|a, b| a.0.0.total_cmp(&b.0.0))?;
         let peak = RATIO.ln();

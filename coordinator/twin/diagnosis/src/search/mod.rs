@@ -130,7 +130,7 @@ pub struct SearchOutcome {
     /// own than by one track with all that was found; negative where all speeds passed the same track.
     pub speed_disagreement: f64,
     /// What the final model does not explain, though an eye would see it, and the probability to see as
-    /// much if nothing is left out.
+    /// much if nothing is left out; none where it does not predict speeds that were held out.
     pub patch: Option<(Patch, f64)>,
     /// Log density of each speed when it is held out, in nats a log power: baseline, extended.
     pub held_out: [f64; 2],
@@ -204,7 +204,12 @@ pub fn search(
         observation: &search.observation,
         candidates: &search.accepted,
     };
-    search.patch = setting.patch(&with, &search.last, |_| true);
+    search.patch = setting.patch(&with, &search.last, |_, _| true);
+    if search.patch.as_ref().is_some_and(|(_, p_value)| *p_value <= FALSE_ALARM)
+        && !unknown_is_predicted(&setting.patch_gains(&with, &search.last)?)
+    {
+        search.patch = None;
+    }
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / prepared.forward.count() as f64;
     search.held_out = [mean(&densities[0]), mean(&densities[search.accepted.len()])];
     Ok(search)
@@ -228,7 +233,7 @@ impl SearchOutcome {
     fn waves(&self, setting: &Setting<'_>) -> Vec<Candidate> {
         let forward = &setting.prepared.forward;
         let problem = Problem { forward, observation: &self.observation, candidates: &[] };
-        let is_wave = |fixed| matches!(fixed, Fixed::Wavelength(_));
+        let is_wave = |fixed, _: &_| matches!(fixed, Fixed::Wavelength(_));
         let found = setting.patch(&problem, &self.baseline, is_wave);
         let level = self.baseline.values[forward.unknowns.level().start].exp();
         let wave = found

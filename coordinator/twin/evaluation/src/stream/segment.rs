@@ -116,7 +116,7 @@ impl Segment {
     /// Sample rate in Hz by the times of the segment, if these are known, and its relative
     /// uncertainty.
     pub(super) fn observed_rate_hz(&self) -> Option<(f64, f64)> {
-        let intervals = self.count.saturating_sub(1) as f64;
+        let intervals = self.count.checked_sub(1).filter(|count| *count > 0)? as f64;
         let rate_hz = intervals / (self.time_s[1] - self.time_s[0]);
         rate_hz.is_finite().then_some((rate_hz, 2.0 / intervals))
     }
