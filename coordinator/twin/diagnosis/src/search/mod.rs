@@ -1,6 +1,7 @@
 //! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
 
 mod chance;
+mod everywhere;
 mod extent;
 mod fit;
 mod limits;

@@ -1,6 +1,7 @@
 //! One search for an effect: screened, refined, held out, accepted or not.
 
 use super::chance::{excess, tail_probability, whitened};
+use super::everywhere::everywhere;
 use super::fit::fit;
 use super::limits::REFINED_PER_KIND;
 use super::outlier_starts::{Far, OutlierStarts};
@@ -221,7 +222,7 @@ impl<'a> Setting<'a> {
         if round.is_significant() {
             let outlier_starts = OutlierStarts::new(problem, far, all)?;
             let mut starts =
-                starts(problem, current, all, &templates, screened, threshold, hopeless);
+                starts(problem, current, all, &templates, screened, threshold, hopeless)?;
             starts.extend(outlier_starts.starts());
             round.fitted = fit(problem, current, all, starts, progress);
         }
@@ -353,7 +354,7 @@ fn starts<'t>(
     screened: Vec<(f64, &'t Template)>,
     threshold: EvidenceThreshold<'_>,
     hopeless: &[&str],
-) -> Vec<(&'t Template, DVector<f64>)> {
+) -> Result<Vec<(&'t Template, DVector<f64>)>, CalibrationError> {
     let mut chosen = choose(screened, all, &current.residual);
     chosen.retain(|template| {
         threshold.may_be_reached(&all[template.candidate], template.along(&current.residual))
@@ -361,25 +362,11 @@ fn starts<'t>(
     let mut starts: Vec<(&Template, DVector<f64>)> =
         chosen.into_iter().map(|template| (template, current.values.clone())).collect();
     if !problem.candidates.iter().all(is_local_shape) {
-        return starts;
+        return Ok(starts);
     }
-    // The baseline imitates what is everywhere by values far from the track's.
     let typical = problem.forward.unknowns.with_typical(&current.values);
-    let mut everywhere = everywhere(templates, all, &current.residual);
-    everywhere.retain(|template| !hopeless.contains(&all[template.candidate].kind.physics));
+    let may_be = |candidate: &Candidate| !hopeless.contains(&candidate.kind.physics);
+    let everywhere = everywhere(problem, &typical, all, templates, may_be)?;
     starts.extend(everywhere.into_iter().map(|template| (template, typical.clone())));
-    starts
-}
-
-/// Of each candidate that is everywhere the trial that points best along the residual.
-fn everywhere<'t>(
-    templates: &'t [Template],
-    all: &[Candidate],
-    residual: &DVector<f64>,
-) -> Vec<&'t Template> {
-    let best = |number: usize| {
-        let trials = templates.iter().filter(|template| template.candidate == number);
-        trials.max_by(|a, b| a.along(residual).total_cmp(&b.along(residual)))
-    };
-    (0..all.len()).filter(|number| all[*number].is_everywhere()).filter_map(best).collect()
+    Ok(starts)
 }

@@ -1,0 +1,51 @@
+//! Trials from which fits of what is everywhere begin: on a typical track, for the fitted baseline imitates
+//! what is everywhere by values far from the track's.
+
+use crate::calibration::{CalibrationError, Problem};
+use crate::candidate::Candidate;
+use crate::screen::Template;
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+/// Of each candidate that is everywhere and one of `may_be`, the trial that explains the recording best
+/// together with a linear change of a track with the values `typical`.
+///
+/// # Errors
+/// [`CalibrationError`] when the values make no track.
+pub(super) fn everywhere<'t>(
+    problem: &Problem<'_>,
+    typical: &DVector<f64>,
+    all: &[Candidate],
+    templates: &'t [Template],
+    may_be: impl Fn(&Candidate) -> bool,
+) -> Result<Vec<&'t Template>, CalibrationError> {
+    let Problem { forward, observation, .. } = *problem;
+    let is_one = |candidate: &Candidate| candidate.is_everywhere() && may_be(candidate);
+    let trials: Vec<&Template> =
+        templates.iter().filter(|template| is_one(&all[template.candidate])).collect();
+    if trials.is_empty() {
+        return Ok(Vec::new());
+    }
+    let track = problem.at(typical)?;
+    let accepted = problem.extensions(typical)?;
+    let known = forward.transfer(typical, &accepted, false)?;
+    let plain = forward.levels(&known, typical);
+    let section = &forward.section;
+    let objective = |template: &&'t Template| {
+        let candidate = &all[template.candidate];
+        let extension = section.in_model(&candidate.with(&candidate.trials[template.trial]));
+        let built = extension.build(&section.track.design, section.spans()).ok()?;
+        let extensions = [&accepted[..], &[built]].concat();
+        let transfer = forward.transfer_beside(&known, typical, &extensions).ok()?;
+        let change = observation.whiten(&(forward.levels(&transfer, typical) - &plain));
+        let change = observation.fitted(&change);
+        let gradient = &track.gradient - track.jacobian.tr_mul(&change);
+        let residual = &track.residual - change;
+        let explained = gradient.dot(&track.precision.solve(&gradient));
+        Some((template.candidate, 0.5 * (residual.norm_squared() - explained), *template))
+    };
+    let mut tried: Vec<_> = trials.par_iter().filter_map(objective).collect();
+    tried.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    tried.dedup_by_key(|(candidate, ..)| *candidate);
+    Ok(tried.into_iter().map(|(.., template)| template).collect())
+}
