@@ -179,11 +179,12 @@ impl<'a> Forward<'a> {
             let predicted = direct(&rail.direct[place], nodes);
             for &seat in &near {
                 let receptances = &rail.from_seats[place][seat];
-                let at = |&(node, share): &(usize, f64)| {
-                    receptances.values[node - receptances.first] * share
+                // As the point receptance is taken between two nodes.
+                let square = |&(node, share): &(usize, f64)| {
+                    let between = receptances.values[node - receptances.first];
+                    share * between * between
                 };
-                let between: Complex64 = nodes.iter().map(at).sum();
-                let gain = -between * between / predicted;
+                let gain = -nodes.iter().map(square).sum::<Complex64>() / predicted;
                 for (quantity, variation) in variations.iter().enumerate() {
                     let derivative = gain * variation[place][seat];
                     let mut add = |column: usize| {

@@ -164,7 +164,12 @@ mod tests {
         // Soft supports are a foundation of stiffness `k` a length. A beam with bending stiffness `B` and
         // shear stiffness `S` gives way by the integral of `(1 + a q^2) / (B q^4 + k a q^2 + k)`,
         // `a = B / S`, over all wave numbers `q`, divided by two pi (Winkler 1867; Timoshenko 1921).
-        let soft = crate::SleeperTruth { ballast_stiffness_n_m: 2e5, ..NOMINAL };
+        let soft = crate::SleeperTruth {
+            ballast_stiffness_n_m: 2e5,
+            // Stiff: the foundation does not bend.
+            sleeper_ei_n_m2: 1e8,
+            ..NOMINAL
+        };
         let scene = Scene::uniform(120, soft);
         let place_m = 60.0 * SPACING_M;
         let found = receptance(&scene, &[place_m], &[0.1]).unwrap()[0][0].re;
