@@ -32,8 +32,8 @@ const ONE_PASS_MAX: f64 = 0.9;
 /// Greatest probability of anything: the model that it rests on may be wrong.
 const MODEL_MAX: f64 = 0.97;
 
-/// Greatest probability of something unknown on a track on which error rates were not measured: of four
-/// unknowns on recordings of a line one was right (docs/diagnosis-examples.md).
+/// Greatest probability of something unknown on a track on which error rates were not measured: of two
+/// unknowns on recordings of a line one was at the right place (docs/diagnosis-examples.md).
 const UNMEASURED_UNKNOWN_MAX: f64 = 0.5;
 
 /// Share of a family's probability that the name has which the passes alone suggest.

@@ -73,18 +73,9 @@ impl<'a> Setting<'a> {
         start: &DVector<f64>,
     ) -> Result<Vec<HeldOutScore>, CalibrationError> {
         let forward = &self.prepared.forward;
-        let speeds = forward.speeds_m_s.len();
-        if speeds < 2 {
-            return Ok(Vec::new());
-        }
-        (0..speeds)
-            .into_par_iter()
-            .map(|speed| {
-                let observation = self.observe(|row| row / forward.bands.count() == speed)?;
-                let problem = Problem { forward, observation: &observation, candidates };
-                problem.held_out(start.clone())
-            })
-            .collect()
+        self.without_each_speed(|observation| {
+            Problem { forward, observation, candidates }.held_out(start.clone())
+        })
     }
 
     /// Gain in nats on each speed, held out in turn, of something unknown at the place that the other speeds
@@ -97,25 +88,17 @@ impl<'a> Setting<'a> {
         current: &Calibration,
     ) -> Result<Vec<f64>, CalibrationError> {
         let forward = &self.prepared.forward;
-        let speeds = forward.speeds_m_s.len();
-        if speeds < 2 {
-            return Ok(Vec::new());
-        }
-        (0..speeds)
-            .into_par_iter()
-            .map(|speed| {
-                let observation = self.observe(|row| row / forward.bands.count() == speed)?;
-                let problem = Problem { forward, observation: &observation, candidates: &[] };
-                let others = problem.at(&current.values)?;
-                let scan = PortScan::new(&problem, &others)?;
-                let Some(best) = scan.best(&others.residual, &others.gradient) else {
-                    return Ok(f64::NEG_INFINITY);
-                };
+        self.without_each_speed(|observation| {
+            let problem = Problem { forward, observation, candidates: &[] };
+            let others = problem.at(&current.values)?;
+            let best = PortScan::new(&problem, &others)?.best(&others.residual, &others.gradient);
+            let gain = best.and_then(|best| {
                 let is_best = |place: &PortPlace| *place == best.place;
-                let all = ports.best_where(&current.residual, &current.gradient, is_best);
-                Ok(all.map_or(f64::NEG_INFINITY, |all| all.log_evidence - best.log_evidence))
-            })
-            .collect()
+                let all = ports.best_where(&current.residual, &current.gradient, is_best)?;
+                Some(all.log_evidence - best.log_evidence)
+            });
+            Ok(gain.unwrap_or(f64::NEG_INFINITY))
+        })
     }
 
     /// The patch of the residual that stands out most, with the probability to see as much if nothing is
@@ -147,29 +130,34 @@ impl<'a> Setting<'a> {
         problem: &Problem<'_>,
         current: &Calibration,
     ) -> Result<Vec<f64>, CalibrationError> {
+        let all = PatchScan::new(problem, current);
+        self.without_each_speed(|observation| {
+            let without = Problem { observation, ..*problem };
+            let others = without.at(&current.values)?;
+            let scan = PatchScan::new(&without, &others);
+            let best = scan.best(&others.residual, &others.gradient, |_, _| true);
+            let gain = best.and_then(|best| {
+                let is_best = |fixed, sleepers: &Range<usize>| {
+                    fixed == best.fixed && *sleepers == best.sleepers
+                };
+                let with = all.best(&current.residual, &current.gradient, is_best)?;
+                Some(with.gain_over(&best))
+            });
+            Ok(gain.unwrap_or(f64::NEG_INFINITY))
+        })
+    }
+
+    /// What follows without each speed, which is held out; nothing with a single speed.
+    fn without_each_speed<T: Send>(
+        &self,
+        of: impl Fn(&Observation) -> Result<T, CalibrationError> + Sync,
+    ) -> Result<Vec<T>, CalibrationError> {
         let forward = &self.prepared.forward;
         let speeds = forward.speeds_m_s.len();
-        if speeds < 2 {
-            return Ok(Vec::new());
-        }
-        let all = PatchScan::new(problem, current);
-        (0..speeds)
+        let held_out = if speeds < 2 { 0..0 } else { 0..speeds };
+        held_out
             .into_par_iter()
-            .map(|speed| {
-                let observation = self.observe(|row| row / forward.bands.count() == speed)?;
-                let without = Problem { observation: &observation, ..*problem };
-                let others = without.at(&current.values)?;
-                let scan = PatchScan::new(&without, &others);
-                let best = scan.best(&others.residual, &others.gradient, |_, _| true);
-                let gain = best.and_then(|best| {
-                    let is_best = |fixed, sleepers: &Range<usize>| {
-                        fixed == best.fixed && *sleepers == best.sleepers
-                    };
-                    let with = all.best(&current.residual, &current.gradient, is_best)?;
-                    Some(with.gain_over(&best))
-                });
-                Ok(gain.unwrap_or(f64::NEG_INFINITY))
-            })
+            .map(|speed| of(&self.observe(|row| row / forward.bands.count() == speed)?))
             .collect()
     }
 
