@@ -3,7 +3,7 @@
 use crate::capital;
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, Shown, figure, page, sheet, significant};
-use tracktwin_hammer::{Beside, HammerRecord, Interval, Loaded, Sleeper};
+use tracktwin_hammer::{Beside, HammerRecord, Interval, Loaded, NINETY_PER_CENT, Sleeper};
 use tracktwin_parameters::Parameter;
 
 /// Rows of the picture, as in the paper; bending stiffness follows where the test tells it.
@@ -27,14 +27,14 @@ pub fn hammer_page(
         } @else {
             (notes(record))
         }
-        @if let Some((_, compared)) = loaded {
+        @if let Some((_, compared)) = loaded.filter(|(_, compared)| !compared.is_empty()) {
             h2 { "Without load and under the wheel" }
             @for compared in compared { p { (capital(&compared.sentence())) } }
         }
         h2 { "Along the track" }
         (figure(&charts(record, loaded.map(|it| it.0)), "Estimate at every sleeper with its 90 % interval (paper, Fig. 23). Hollow dots: not valid, the track model does not explain the receptances. Dashed grey: evaluation of a recording, under the load of the wheel."))
         h2 { "Estimates" }
-        p.note { "Estimate with its 90 % interval. In brackets: the test does not tell the value, the interval is hardly narrower than before the test. Rows in italics are not valid. Misfit: mean square of the residuals over its expectation. Railpad stiffness is that without the load of a wheel." }
+        p.note { "Estimate with its 90 % interval. In brackets: the test does not tell the value, the interval is more than half as wide as before the test. Rows in italics are not valid. Misfit: mean square of the residuals over its expectation. Railpad stiffness is that without the load of a wheel." }
         div.scroll { (table(record)) }
         h2 { "Provenance" }
         (provenance(record, loaded.map(|it| it.0), command))
@@ -99,7 +99,8 @@ fn chart(record: &HammerRecord, loaded: Option<&Loaded>, parameter: Parameter) -
     let places = || record.sleepers.iter().map(|sleeper| sleeper.x_m);
     let (first, last) = (places().fold(f64::MAX, f64::min), places().fold(f64::MIN, f64::max));
     // Ends of a 90 % interval, as those of the hammer test.
-    let under_load = |[mean, sd]: [f64; 2]| (mean / shown.divisor, 1.645 * sd / shown.divisor);
+    let under_load =
+        |[mean, sd]: [f64; 2]| (mean / shown.divisor, NINETY_PER_CENT * sd / shown.divisor);
     let behind: Vec<(f64, f64, f64)> = loaded
         .iter()
         .flat_map(|loaded| &loaded.sleepers)

@@ -92,11 +92,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         return by_inversion(&recording, &track, &out, force, json).await;
     };
     let library = open_whole(&library).await?;
-    let models = Trained::load(&models)
-        .with_context(|| {
-            format!("{}: no models found; create them with `tracktwin train`", models.display())
-        })
-        .or_input()?;
+    let models = load_models(&models)?;
     let beside = method.is_none();
     let evaluation = evaluate(&recording, &library, models, &out, force, beside).await?;
     if json {
@@ -170,7 +166,7 @@ async fn invert(
 }
 
 /// The command line without passwords.
-fn command() -> String {
+pub(super) fn command() -> String {
     let arguments = std::env::args().skip(1).map(|argument| without_password(&argument));
     std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
@@ -208,6 +204,13 @@ fn inversion_summary(inversion: &Inversion, folder: &Path) -> Value {
 /// The recording in a folder.
 pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
     let recording = Recording::open(folder).or_input()?;
+    check_sleepers(folder, &recording)?;
+    usable(&recording)?;
+    Ok(recording)
+}
+
+/// Refuses a recording without sleepers, read from this folder.
+pub(super) fn check_sleepers(folder: &Path, recording: &Recording) -> Result<(), Stop> {
     if recording.sleepers.is_empty() {
         return Err(Stop::Input(anyhow!(
             "{}/recording.json: sleepers: the list is empty; add the positions of the sleepers, \
@@ -215,8 +218,16 @@ pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
             folder.display()
         )));
     }
-    usable(&recording)?;
-    Ok(recording)
+    Ok(())
+}
+
+/// The trained models in a folder.
+pub(super) fn load_models(folder: &Path) -> Result<Trained, Stop> {
+    Trained::load(folder)
+        .with_context(|| {
+            format!("{}: no models found; create them with `tracktwin train`", folder.display())
+        })
+        .or_input()
 }
 
 /// Checks that an evaluation can be written into a folder.

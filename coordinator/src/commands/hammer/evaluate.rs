@@ -1,6 +1,7 @@
 //! `tracktwin hammer evaluate`: estimates from the files of a hammer test.
 
-use crate::commands::files::{Force, check, make_folder, read_text};
+use crate::commands::evaluate::command;
+use crate::commands::files::{Force, check, make_folder, read as read_bytes, read_text};
 use crate::commands::numbers::number;
 use crate::commands::track::TrackChoice;
 use crate::commands::{OrInput, Stop, print_json, println_stderr, println_stdout};
@@ -10,11 +11,11 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_hammer::{
-    Beside, FitError, HammerRecord, Loaded, Nodes, PointReceptance, Selected, Selection, beside,
-    fit, read, select,
+    Beside, FitError, Fitted, HammerRecord, Layout, Loaded, Nodes, PointReceptance, Selected,
+    Selection, beside, fit, read, select,
 };
-use tracktwin_parameters::Quantity;
 use tracktwin_parameters::quantity::{FREQUENCY, PLACE};
+use tracktwin_parameters::{Quantity, Track};
 
 const PAGE: &str = "report.html";
 const PICTURE: &str = "stiffness.svg";
@@ -22,6 +23,10 @@ const NAMES: [&str; 4] = [PAGE, PICTURE, "estimates.csv", "estimates.json"];
 
 /// Endings of the files that are read in a folder.
 const ENDINGS: [&str; 3] = ["csv", "uff", "unv"];
+
+/// What is said where the evaluation beside the hammer test has nothing to compare.
+const NONE_COMPARED: &str =
+    "No sleeper has valid estimates by hammer test and evaluation: they are not compared.";
 
 /// Coherence, gamma squared.
 const COHERENCE: Quantity = Quantity::new("coherence", "", [0.0, 1.0], [0.8, 0.99]);
@@ -44,8 +49,8 @@ Force and response are positive in the same direction; units are those of the SI
 The stiffness is that without the load of a wheel. With --aba it is shown beside the stiffness
 under the wheel.
 
-Exit codes: 0 done, 1 done, but the estimates of most sleepers are not valid (see the last lines of
-the output), 2 wrong input, 3 failure.")]
+Exit codes: 0 done, 1 done, but the estimates of half of the struck sleepers or more are not valid
+(see the last lines of the output), 2 wrong input, 3 failure.")]
 pub(in crate::commands) struct Arguments {
     /// Files of the hammer test, or folders whose .csv, .uff and .unv files are read.
     #[arg(required = true, value_name = "FILE")]
@@ -101,27 +106,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     for note in &notes {
         println_stderr(note);
     }
+    if let Some(loaded) = &loaded {
+        check_places(&track, arguments.sleeper, &points, loaded)?;
+    }
     make_folder(out)?;
     let fitted = fit(&track, arguments.sleeper, &points).map_err(|error| match error {
-        FitError::Layout(_) => Stop::Input(error.into()),
+        FitError::Layout(_) | FitError::Turned { .. } | FitError::Repeated { .. } => {
+            Stop::Input(error.into())
+        }
         failed => Stop::Failure(failed.into()),
     })?;
     let spacing_m = track.design.sleeper.spacing_m;
-    let name = |number: i64, x_m: f64| {
-        let known = loaded.as_ref().and_then(|loaded| loaded.at(x_m, spacing_m));
-        known.map_or_else(|| format!("SN{number}"), |sleeper| sleeper.id.clone())
-    };
-    let mut record =
-        HammerRecord::new(&fitted, &track.name, selection.range_hz, points.len(), name);
-    let said = record.notes.clone();
-    record.notes.splice(0..0, notes);
+    let mut record = record(&fitted, &track, &selection, points.len(), loaded.as_ref());
     let compared = loaded.as_ref().map(|loaded| beside(&record, loaded, spacing_m));
     if compared.as_ref().is_some_and(Vec::is_empty) {
-        return Err(Stop::Input(anyhow!(
-            "--aba: no sleeper of the evaluation stands where one of the hammer test does; give \
-             both the same positions"
-        )));
+        record.notes.push(NONE_COMPARED.to_owned());
     }
+    let said = record.notes.clone();
+    record.notes.splice(0..0, notes);
     let beside = loaded.as_ref().zip(compared.as_deref());
     write(&record, beside, out, *force)?;
     if arguments.json {
@@ -129,8 +131,49 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     } else {
         print(&record, &said, compared.as_deref().unwrap_or_default(), out);
     }
+    conclude(&record)
+}
+
+/// A negative result if half of the struck sleepers or more have no valid estimates.
+fn conclude(record: &HammerRecord) -> Result<(), Stop> {
+    let struck = record.sleepers.iter().filter(|sleeper| sleeper.misfit.is_some()).count();
     let invalid = record.sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
-    if 2 * invalid >= record.sleepers.len() { Err(Stop::Negative) } else { Ok(()) }
+    if 2 * invalid >= struck { Err(Stop::Negative) } else { Ok(()) }
+}
+
+/// That the evaluation has a sleeper where one of the hammer test stands, before anything is fitted.
+fn check_places(
+    track: &Track,
+    sleeper_at_m: f64,
+    points: &[PointReceptance],
+    loaded: &Loaded,
+) -> Result<(), Stop> {
+    let struck_m = points.iter().map(|point| point.position_m);
+    let layout = Layout::new(&track.design, sleeper_at_m, struck_m).or_input()?;
+    let mut places_m =
+        (layout.first..).take(layout.reported).map(|number| layout.place_m(number));
+    if places_m.any(|x_m| loaded.at(x_m, layout.spacing_m).is_some()) {
+        return Ok(());
+    }
+    Err(Stop::Input(anyhow!(
+        "--aba: no sleeper of the evaluation stands where one of the hammer test does; give both the \
+         same positions"
+    )))
+}
+
+/// The record of a fit, with the names that the evaluation has for the sleepers.
+fn record(
+    fitted: &Fitted,
+    track: &Track,
+    selection: &Selection,
+    receptances: usize,
+    loaded: Option<&Loaded>,
+) -> HammerRecord {
+    let name = |number: i64, x_m: f64| {
+        let known = loaded.and_then(|loaded| loaded.at(x_m, track.design.sleeper.spacing_m));
+        known.map_or_else(|| format!("SN{number}"), |sleeper| sleeper.id.clone())
+    };
+    HammerRecord::new(fitted, &track.name, selection.range_hz, receptances, name)
 }
 
 /// All receptances of the files, in their order.
@@ -139,13 +182,20 @@ fn points(arguments: &Arguments) -> Result<Vec<PointReceptance>, Stop> {
     let mut points = Vec::new();
     for path in &arguments.files {
         for file in files(path)? {
-            let text = read_text(&file).or_input()?;
+            let text = text(read_bytes(&file).or_input()?);
             let of_file =
                 read(&text, &nodes).map_err(|error| anyhow!("{}: {error}", file.display()));
             points.extend(of_file.or_input()?);
         }
     }
     Ok(points)
+}
+
+/// What a file says: where it is not UTF-8, question marks for all that is not ASCII, as in remarks in
+/// Latin-1 and in binary data.
+fn text(bytes: Vec<u8>) -> String {
+    let ascii = |byte: &u8| if byte.is_ascii() { char::from(*byte) } else { '?' };
+    String::from_utf8(bytes).unwrap_or_else(|error| error.as_bytes().iter().map(ascii).collect())
 }
 
 /// The file, or those of a folder in the order of their names.
@@ -196,9 +246,7 @@ fn write(
     folder: &Path,
     force: Force,
 ) -> Result<(), FilesError> {
-    let command: Vec<String> = std::env::args().skip(1).collect();
-    let page =
-        tracktwin_report::hammer_page(record, beside, &format!("tracktwin {}", command.join(" ")));
+    let page = tracktwin_report::hammer_page(record, beside, &command());
     let mut output = Output::begin(folder, Kind::Results, force.force)?;
     output.add(&FileName::new(PAGE)?, page.as_bytes())?;
     let picture = tracktwin_report::hammer_chart(record, beside.map(|it| it.0));
@@ -226,4 +274,15 @@ fn summary(record: &HammerRecord, compared: &[Beside], folder: &Path) -> serde_j
         "under_load": compared.iter().map(Beside::sentence).collect::<Vec<_>>(),
         "report": folder.join(PAGE).display().to_string(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_utf_8_is_read_as_far_as_it_is_ascii() {
+        assert_eq!(text(b"Gleis \xfcber M\xfchle".to_vec()), "Gleis ?ber M?hle");
+        assert_eq!(text("\u{fc}ber".as_bytes().to_vec()), "\u{fc}ber");
+    }
 }

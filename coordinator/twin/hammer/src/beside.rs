@@ -1,6 +1,6 @@
 //! Stiffness without load, from a hammer test, beside that under a wheel, from an evaluation.
 
-use crate::record::HammerRecord;
+use crate::record::{HammerRecord, NINETY_PER_CENT};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
@@ -15,12 +15,18 @@ const BEYOND_CHANCE: f64 = 3.0;
 /// Distance in m up to which two sleepers are one, as a share of the spacing.
 const SAME_PLACE: f64 = 0.25;
 
-/// Ends of a 90 % interval in standard deviations.
-const NINETY_PER_CENT: f64 = 1.645;
+/// Format of the file of an evaluation.
+const FORMAT: &str = "tracktwin-evaluation/1";
+
+/// Flags of sleepers whose estimates are not compared: not valid, or not those of a pressed contact.
+const NOT_COMPARED: [&str; 2] = ["outside_library", "loss_of_contact"];
+/// Flag of sleepers whose railpad stiffness is only a lower bound.
+const LOWER_BOUND: &str = "railpad_at_least";
 
 /// The estimates of an evaluation, read from `evaluation.json`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Loaded {
+    format: String,
     /// Name of the recording.
     pub recording: String,
     /// Its sleepers.
@@ -47,6 +53,12 @@ pub enum BesideError {
     /// The file is not one of `evaluate`.
     #[error("not a file of `tracktwin evaluate`: {0}")]
     Format(#[from] serde_json::Error),
+    /// The file has another format.
+    #[error("the format is `{found}`, not `{FORMAT}`; evaluate the recording again")]
+    OtherFormat {
+        /// Its format.
+        found: String,
+    },
 }
 
 /// One parameter without load beside itself under load.
@@ -61,15 +73,25 @@ pub struct Beside {
     /// Value under load over that without load, mean of the logarithms over the sleepers, and the
     /// ends of its 90 % interval; the errors of neighbouring sleepers count as one.
     pub ratio: [f64; 3],
+    /// Whether the mean differs from one beyond chance.
+    pub mean_differs: bool,
+    /// Whether what differs beyond chance is stiffer under load: the mean, or else those sleepers on
+    /// average.
+    pub is_stiffer: bool,
 }
 
 impl Loaded {
     /// Reads the text of an `evaluation.json`.
     ///
     /// # Errors
-    /// [`BesideError`] with the error of the parser.
+    /// [`BesideError`] with the error of the parser or with the other format.
     pub fn parse(text: &str) -> Result<Self, BesideError> {
-        Ok(serde_json::from_str(text)?)
+        let loaded: Self = serde_json::from_str(text)?;
+        if loaded.format == FORMAT {
+            Ok(loaded)
+        } else {
+            Err(BesideError::OtherFormat { found: loaded.format })
+        }
     }
 
     /// The sleeper at a place in m, on a track of this spacing in m.
@@ -81,9 +103,14 @@ impl Loaded {
 }
 
 impl LoadedSleeper {
-    /// Mean and standard deviation of a parameter; none where the evaluation is not valid.
+    /// Mean and standard deviation of a parameter; none where the evaluation is not valid, where the
+    /// wheel lost contact, and for a railpad stiffness that is a lower bound.
     pub fn estimate(&self, parameter: Parameter) -> Option<[f64; 2]> {
-        if self.flags.iter().any(|flag| flag == "outside_library") {
+        let is_bound = parameter == Parameter::RailpadStiffness;
+        let is_left_out = |flag: &String| {
+            NOT_COMPARED.contains(&flag.as_str()) || (is_bound && flag == LOWER_BOUND)
+        };
+        if self.flags.iter().any(is_left_out) {
             return None;
         }
         let field = self.fields.get(&parameter.to_string())?;
@@ -104,6 +131,7 @@ pub fn beside(record: &HammerRecord, loaded: &Loaded, spacing_m: f64) -> Vec<Bes
     let of = |parameter: Parameter| {
         let mut differ = Vec::new();
         let (mut difference, mut variance, mut sleepers) = (0.0, 0.0, 0_usize);
+        let mut of_differing = 0.0;
         for sleeper in record.sleepers.iter().filter(|sleeper| sleeper.is_valid()) {
             let other = loaded.at(sleeper.x_m, spacing_m).and_then(|it| it.logarithm(parameter));
             let (Some([under_load, sd]), Some(without)) =
@@ -118,6 +146,7 @@ pub fn beside(record: &HammerRecord, loaded: &Loaded, spacing_m: f64) -> Vec<Bes
             sleepers += 1;
             if change.abs() > BEYOND_CHANCE * both {
                 differ.push(sleeper.id.clone());
+                of_differing += change;
             }
         }
         (sleepers > 0).then(|| {
@@ -125,7 +154,9 @@ pub fn beside(record: &HammerRecord, loaded: &Loaded, spacing_m: f64) -> Vec<Bes
             let (mean, deviation) = (difference / count, (variance / count).sqrt());
             let end = |way: f64| (mean + way * NINETY_PER_CENT * deviation).exp();
             let ratio = [mean.exp(), end(-1.0), end(1.0)];
-            Beside { parameter, sleepers, differ, ratio }
+            let mean_differs = mean.abs() > BEYOND_CHANCE * deviation;
+            let is_stiffer = if mean_differs { mean > 0.0 } else { of_differing > 0.0 };
+            Beside { parameter, sleepers, differ, ratio, mean_differs, is_stiffer }
         })
     };
     COMPARED.into_iter().filter_map(of).collect()
@@ -134,8 +165,12 @@ pub fn beside(record: &HammerRecord, loaded: &Loaded, spacing_m: f64) -> Vec<Bes
 impl Beside {
     /// Whether both differ at more sleepers than chance allows, or in the mean.
     pub fn differs(&self) -> bool {
-        let [_, low, high] = self.ratio;
-        self.differ.len() > 1 + self.sleepers / 50 || low > 1.0 || high < 1.0
+        self.sleepers_differ() || self.mean_differs
+    }
+
+    /// Whether both differ at more sleepers than chance allows.
+    fn sleepers_differ(&self) -> bool {
+        self.differ.len() > 1 + self.sleepers / 50
     }
 
     /// The comparison in a sentence.
@@ -150,16 +185,85 @@ impl Beside {
         if !self.differs() {
             return format!("{numbers}; the difference may be chance.");
         }
-        let places = match self.differ.as_slice() {
-            [] => "in the mean".to_owned(),
-            all => format!("at {}", all.join(", ")),
+        let at = || format!("at {}", self.differ.join(", "));
+        let places = match (self.mean_differs, self.sleepers_differ()) {
+            (true, true) => format!("in the mean and {}", at()),
+            (true, false) => "in the mean".to_owned(),
+            (false, _) => at(),
         };
-        let reason = if ratio > 1.0 {
-            "railpads stiffen with load, and the load of the wheel closes gaps that the hammer leaves \
-             open"
-        } else {
-            "load does not soften railpads or ballast: check both measurements and the track file"
+        format!("{numbers}; beyond chance {places}; possible reason: {}.", self.reason())
+    }
+
+    /// Why both may differ.
+    const fn reason(&self) -> &'static str {
+        let is_railpad = matches!(self.parameter, Parameter::RailpadStiffness);
+        match (is_railpad, self.is_stiffer) {
+            (true, true) => "railpads stiffen with load",
+            (false, true) => "the load of the wheel closes gaps below sleepers",
+            (true, false) => {
+                "an error in one of the measurements or in the track file, for load does not soften \
+                 railpads"
+            }
+            (false, false) => {
+                "an error in one of the measurements or in the track file, for load does not soften \
+                 ballast"
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn loaded(format: &str, flags: &str) -> Result<Loaded, BesideError> {
+        let stiffness = r#"{"mean": 1e8, "sd": 1e7}"#;
+        Loaded::parse(&format!(
+            r#"{{"format": "{format}", "recording": "ride", "sleepers": [{{"id": "A", "x_m": 1.0,
+            "railpad_stiffness_N_m": {stiffness}, "ballast_stiffness_N_m": {stiffness},
+            "flags": [{flags}]}}]}}"#
+        ))
+    }
+
+    #[test]
+    fn flags_say_which_estimates_are_compared() {
+        for (flags, railpad, ballast) in [
+            ("", true, true),
+            (r#""at_edge_of_range""#, true, true),
+            (r#""railpad_at_least""#, false, true),
+            (r#""loss_of_contact""#, false, false),
+            (r#""outside_library""#, false, false),
+        ] {
+            let loaded = loaded(FORMAT, flags).unwrap();
+            let sleeper = loaded.at(1.01, 0.125).unwrap();
+            let is_there = |parameter| sleeper.estimate(parameter).is_some();
+            assert_eq!(is_there(Parameter::RailpadStiffness), railpad, "{flags}");
+            assert_eq!(is_there(Parameter::BallastStiffness), ballast, "{flags}");
+        }
+    }
+
+    #[test]
+    fn another_format_is_refused() {
+        let refused = loaded("tracktwin-evaluation/9", "").unwrap_err().to_string();
+        assert!(refused.contains("evaluation/9"), "{refused}");
+    }
+
+    #[test]
+    fn a_sentence_says_where_both_differ_and_a_reason_of_the_parameter() {
+        let ballast = Beside {
+            parameter: Parameter::BallastStiffness,
+            sleepers: 20,
+            differ: vec!["A".into(), "B".into()],
+            ratio: [1.1, 0.9, 1.3],
+            mean_differs: false,
+            is_stiffer: true,
         };
-        format!("{numbers}; beyond chance {places}: {reason}.")
+        let sentence = ballast.sentence();
+        assert!(ballast.differs() && sentence.contains("chance at A, B;"), "{sentence}");
+        assert!(sentence.ends_with("gaps below sleepers."), "{sentence}");
+        let mean = Beside { differ: vec!["A".into()], mean_differs: true, ..ballast };
+        assert!(mean.sentence().contains("beyond chance in the mean;"), "{}", mean.sentence());
+        let chance = Beside { differ: vec!["A".into()], ..ballast };
+        assert!(chance.sentence().ends_with("may be chance."), "{}", chance.sentence());
     }
 }

@@ -8,13 +8,19 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use tracktwin_parameters::Track;
 use tracktwin_track::model::ModelError;
 
-/// Values of one octave that count as one where the track model errs: its errors are alike over a
-/// third of an octave, of eight values (see `PER_OCTAVE`).
+/// Neighbouring values that count as one where the model errs: its errors are alike over a third of
+/// an octave.
 const ALIKE: f64 = 8.0;
 
 /// Standard deviation in nats by which the model errs at a frequency, before the test and at least:
 /// 0.4 dB, by which two simulators of one track differ.
 const MODEL_ERROR: f64 = 0.05;
+/// The same at most where misfits are judged: 1.7 dB. Beyond it the track model is called wrong,
+/// whatever the residuals tell.
+const MODEL_ERROR_MAX: f64 = 0.2;
+
+/// Distance in m within which two receptances are of one place.
+const SAME_PLACE_M: f64 = 1e-3;
 
 /// Rounds in which the model's error and the unevenness are learned.
 const ROUNDS: usize = 4;
@@ -39,6 +45,26 @@ pub enum FitError {
     /// The struck places do not make a layout.
     #[error(transparent)]
     Layout(#[from] LayoutError),
+    /// The response is against the force.
+    #[error(
+        "the receptance at {position_m} m gains energy (its imaginary part is positive): force and \
+         response have opposite directions; change the sign of one"
+    )]
+    Turned {
+        /// Its place in m.
+        position_m: f64,
+    },
+    /// Two receptances of one place.
+    #[error(
+        "two receptances have one place, {first_m} m and {second_m} m: each would count as \
+         independent; average the hits at a place in one table"
+    )]
+    Repeated {
+        /// Place of one in m.
+        first_m: f64,
+        /// Place of the other in m.
+        second_m: f64,
+    },
     /// The track model breaks down.
     #[error("the track model cannot be built: {0}")]
     Model(#[from] ModelError),
@@ -65,12 +91,14 @@ pub struct Fitted {
 /// `sleeper_at_m` is the place of a sleeper, in the coordinates of the receptances.
 ///
 /// # Errors
-/// [`FitError`] for receptances that do not belong to one stretch of track or that break the fit.
+/// [`FitError`] for receptances that do not belong to one stretch of track, gain energy, have one
+/// place or break the fit.
 pub fn fit(
     track: &Track,
     sleeper_at_m: f64,
     points: &[PointReceptance],
 ) -> Result<Fitted, FitError> {
+    check(points)?;
     let struck_m = points.iter().map(|point| point.position_m);
     let layout = Layout::new(&track.design, sleeper_at_m, struck_m)?;
     let forward = Forward::new(&track.design, layout, points);
@@ -91,7 +119,7 @@ pub fn fit(
             unknowns.learn(&values, &covariance.diagonal());
         }
     }
-    let misfits = misfits(&forward, &unknowns, &values, model_error)?;
+    let misfits = misfits(&forward, &unknowns, &values, model_error.min(MODEL_ERROR_MAX))?;
     Ok(Fitted {
         layout: forward.layout().clone(),
         unknowns,
@@ -100,6 +128,19 @@ pub fn fit(
         model_error,
         point_misfits: misfits,
     })
+}
+
+/// That force and response have one direction and every receptance its own place.
+fn check(points: &[PointReceptance]) -> Result<(), FitError> {
+    if let Some(turned) = points.iter().find(|point| point.is_turned()) {
+        return Err(FitError::Turned { position_m: turned.position_m });
+    }
+    let mut places_m: Vec<f64> = points.iter().map(|point| point.position_m).collect();
+    places_m.sort_by(f64::total_cmp);
+    match places_m.windows(2).find(|pair| pair[1] - pair[0] < SAME_PLACE_M) {
+        Some(pair) => Err(FitError::Repeated { first_m: pair[0], second_m: pair[1] }),
+        None => Ok(()),
+    }
 }
 
 /// The best fit of an even track from several starts: receptances have resonances, so the
@@ -232,7 +273,8 @@ impl Solve<'_> {
                 }
                 let step = Cholesky::new(damped).ok_or(FitError::NotFinite)?.solve(&slope);
                 let tried = &values + step;
-                let found = self.objective(&tried)?;
+                // A track that cannot be built is no better one.
+                let found = self.objective(&tried).unwrap_or(f64::INFINITY);
                 if found < objective {
                     fall = Some(objective - found);
                     (values, objective) = (tried, found);
@@ -241,8 +283,9 @@ impl Solve<'_> {
                     damping *= 5.0;
                 }
             }
+            let Some(fall) = fall else { break };
             (matrix, slope) = self.normal(&values, &free)?;
-            if fall.is_none_or(|fall| fall < CONVERGED) {
+            if fall < CONVERGED {
                 break;
             }
         }
@@ -312,5 +355,38 @@ impl Fitted {
         let near = of.filter(|(x_m, _)| self.layout.near(*x_m).any(|it| it == index));
         let (sum, count) = near.fold((0.0, 0), |(sum, count), (_, it)| (sum + it, count + 1));
         (count > 0).then(|| sum / f64::from(count))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_complex::Complex64;
+    use tracktwin_parameters::Preset;
+
+    fn refused(points: &[PointReceptance]) -> String {
+        fit(&Preset::VTrack.track(), 0.0, points).unwrap_err().to_string()
+    }
+
+    fn point(position_m: f64, im: f64) -> PointReceptance {
+        PointReceptance {
+            position_m,
+            frequencies_hz: vec![100.0, 200.0],
+            values: vec![Complex64::new(1e-8, im); 2],
+            coherence: None,
+            hits: None,
+        }
+    }
+
+    #[test]
+    fn a_response_against_the_force_is_refused() {
+        let message = refused(&[point(1.0, -1e-9), point(2.0, 1e-9)]);
+        assert!(message.starts_with("the receptance at 2 m gains energy"), "{message}");
+    }
+
+    #[test]
+    fn two_receptances_of_one_place_are_refused() {
+        let message = refused(&[point(1.5, -1e-9), point(3.0, -1e-9), point(1.5005, -1e-9)]);
+        assert!(message.contains("1.5 m and 1.5005 m"), "{message}");
     }
 }

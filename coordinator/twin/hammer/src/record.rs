@@ -10,7 +10,7 @@ use tracktwin_parameters::Parameter;
 pub const FORMAT: &str = "tracktwin-hammer/1";
 
 /// Standard deviations of a normal distribution to either end of its 90 % interval.
-const NINETY_PER_CENT: f64 = 1.645;
+pub const NINETY_PER_CENT: f64 = 1.645;
 
 /// Standard deviation after the test over that before below which the test tells a value.
 const RESOLVED: f64 = 0.5;
@@ -192,8 +192,8 @@ impl HammerRecord {
                 all.fold((0, 0), |(told, count), it| (told + usize::from(it.resolved), count + 1));
             if told < count {
                 sentences.push(format!(
-                    "The test does not tell the {} of {} of {count} sleepers: the interval is hardly \
-                     narrower than before the test.",
+                    "The test does not tell the {} of {} of {count} sleepers: the interval is more than \
+                     half as wide as before the test.",
                     of.label(),
                     count - told
                 ));

@@ -71,7 +71,8 @@ impl HammerTest {
     /// With the noise that remains after averaging, and its coherence.
     fn measured(&self, position_m: f64, exact: &[Complex64], half: usize) -> PointReceptance {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        random.set_stream(half as u64);
+        // Stream 0 of the seed draws the unevenness.
+        random.set_stream(1 + half as u64);
         let deviation = self.noise / (self.hits as f64).sqrt();
         let noisy = |value: &Complex64| {
             let mut normal = || StandardNormal.sample(&mut random);

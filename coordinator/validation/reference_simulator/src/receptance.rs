@@ -32,10 +32,10 @@ pub fn receptance(
     if let Some(hidden) = scene.left_out.iter().find(|hidden| adds_beside_seats(hidden)) {
         return Err(TruthError::NoReceptance { physics: hidden.physics() });
     }
-    let track = Struck::new(scene);
+    let track = Struck::new(scene, places_m);
     let mut receptances = vec![Vec::with_capacity(frequencies_hz.len()); places_m.len()];
     for &frequency_hz in frequencies_hz {
-        let values = track.at(TAU * frequency_hz, places_m);
+        let values = track.at(TAU * frequency_hz);
         for (receptances, value) in receptances.iter_mut().zip(values) {
             receptances.push(value);
         }
@@ -54,47 +54,111 @@ const fn adds_beside_seats(hidden: &Hidden) -> bool {
     )
 }
 
-/// A track that a hammer strikes.
+/// A track that a hammer strikes: all of it that no frequency changes.
 struct Struck<'a> {
     scene: &'a Scene,
     rail: RailModes,
     /// Modes of sleepers by the bits of what their crack leaves of the bending stiffness.
     modes: BTreeMap<u64, SleeperModes>,
+    /// Deflection of every mode of the rail at every seat.
+    seats: Vec<Vec<f64>>,
+    /// Between two seats, by the difference and by the sum of their numbers:
+    /// `sin a sin b = (cos (a - b) - cos (a + b)) / 2`.
+    difference: Vec<Wave>,
+    sum: Vec<Wave>,
+    places: Vec<Place>,
+}
+
+/// Half the cosine of every mode of the rail, and what the modes leave out in m/N.
+struct Wave {
+    halves: Vec<f64>,
+    residual: f64,
+}
+
+/// A place that is struck.
+struct Place {
+    /// Deflection of every mode of the rail.
+    shape: Vec<f64>,
+    /// What the modes leave out of the receptance to every seat, in m/N.
+    residuals: Vec<f64>,
+}
+
+impl Wave {
+    fn new(rail: &RailModes, distance_m: f64, residual: f64) -> Self {
+        let halves = rail.wave_numbers.iter().map(|k| 0.5 * (k * distance_m).cos()).collect();
+        Self { halves, residual }
+    }
+
+    /// Its share of a receptance in m/N.
+    fn receptance(&self, gains: &[Complex<f64>]) -> Complex<f64> {
+        let modes = self.halves.iter().zip(gains);
+        modes.map(|(half, gain)| gain * *half).sum::<Complex<f64>>() + self.residual
+    }
+}
+
+/// Receptance of the free rail in m/N between two places, by the deflections of its modes there and
+/// what they leave out.
+fn free(gains: &[Complex<f64>], a: &[f64], b: &[f64], residual: f64) -> Complex<f64> {
+    let modes = a.iter().zip(b).zip(gains);
+    modes.map(|((a, b), gain)| gain * (a * b)).sum::<Complex<f64>>() + residual
 }
 
 impl<'a> Struck<'a> {
-    fn new(scene: &'a Scene) -> Self {
+    fn new(scene: &'a Scene, places_m: &[f64]) -> Self {
         let rail = RailModes::new(scene.length_m(), MODES_PER_SPAN * scene.spans);
         let mut modes = BTreeMap::new();
         for (index, truth) in scene.sleepers.iter().enumerate() {
             let (_, crack) = bed(scene, index, truth);
             modes.entry(crack.to_bits()).or_insert_with(|| SleeperModes::new(crack));
         }
-        Self { scene, rail, modes }
+        let seats = scene.sleepers.len();
+        let apart_m = |seats: usize| seat_m(seats) - seat_m(0);
+        let difference = |apart: usize| {
+            Wave::new(&rail, apart_m(apart), rail.residual_flexibility(apart_m(apart)))
+        };
+        let sum = |numbers: usize| Wave::new(&rail, apart_m(numbers) + 2.0 * seat_m(0), 0.0);
+        let place = |&x_m: &f64| {
+            let residual = |seat: usize| rail.residual_flexibility(x_m - seat_m(seat));
+            Place { shape: rail.deflections(x_m), residuals: (0..seats).map(residual).collect() }
+        };
+        Self {
+            scene,
+            modes,
+            seats: (0..seats).map(|seat| rail.deflections(seat_m(seat))).collect(),
+            difference: (0..seats).map(difference).collect(),
+            sum: (0..2 * seats).map(sum).collect(),
+            places: places_m.iter().map(place).collect(),
+            rail,
+        }
     }
 
     /// Point receptances at an angular frequency in rad/s.
     ///
     /// With the receptances `R` of the free rail and the supports' dynamic stiffness `Z`, the
     /// supports push with `p`, `(1 / Z + R) p = r`, where `r` stands between seats and place.
-    fn at(&self, omega: f64, places_m: &[f64]) -> Vec<Complex<f64>> {
-        let seats = self.scene.sleepers.len();
+    fn at(&self, omega: f64) -> Vec<Complex<f64>> {
+        let seats = self.seats.len();
         let gains = self.gains(omega);
-        let between = self.between_seats(&gains);
-        let mut matrix = DMatrix::from_fn(seats, seats, |a, b| {
-            between.difference[a.abs_diff(b)] - between.sum[a + b]
-        });
+        let of = |waves: &[Wave]| -> Vec<Complex<f64>> {
+            waves.iter().map(|wave| wave.receptance(&gains)).collect()
+        };
+        let (difference, sum) = (of(&self.difference), of(&self.sum));
+        let mut matrix =
+            DMatrix::from_fn(seats, seats, |a, b| difference[a.abs_diff(b)] - sum[a + b]);
         for seat in 0..seats {
             matrix[(seat, seat)] += self.support(seat, omega);
         }
         let factor = matrix.lu();
-        let of = |&x_m: &f64| {
-            let free = |other_m: f64| self.free(&gains, x_m, other_m);
-            let to_seats = DVector::from_fn(seats, |seat, _| free(seat_m(seat)));
+        let of = |place: &Place| {
+            let Place { shape, residuals } = place;
+            let to_seats = DVector::from_fn(seats, |seat, _| {
+                free(&gains, shape, &self.seats[seat], residuals[seat])
+            });
             let pushed = factor.solve(&to_seats).expect("damped supports push in one way");
-            free(x_m) - to_seats.dot(&pushed)
+            let own = free(&gains, shape, shape, self.rail.residual_flexibility(0.0));
+            own - to_seats.dot(&pushed)
         };
-        places_m.iter().map(of).collect()
+        self.places.iter().map(of).collect()
     }
 
     /// Receptance of each mode of the free rail in m/N.
@@ -105,29 +169,6 @@ impl<'a> Struck<'a> {
             (Complex::new(own * own - omega * omega, damping) * *mass).inv()
         };
         modes.map(gain).collect()
-    }
-
-    /// Receptance of the free rail between two places.
-    fn free(&self, gains: &[Complex<f64>], a_m: f64, b_m: f64) -> Complex<f64> {
-        let modes = self.rail.wave_numbers.iter().zip(gains);
-        let sum: Complex<f64> =
-            modes.map(|(k, gain)| gain * ((k * a_m).sin() * (k * b_m).sin())).sum();
-        sum + self.rail.residual_flexibility(a_m - b_m)
-    }
-
-    /// The same between all seats: `sin a sin b = (cos (a - b) - cos (a + b)) / 2`.
-    fn between_seats(&self, gains: &[Complex<f64>]) -> BetweenSeats {
-        let wave = |distance_m: f64| -> Complex<f64> {
-            let modes = self.rail.wave_numbers.iter().zip(gains);
-            modes.map(|(k, gain)| gain * (0.5 * (k * distance_m).cos())).sum()
-        };
-        let seats = self.scene.sleepers.len();
-        let apart = |seats: usize| seat_m(seats) - seat_m(0);
-        let residual = |seats: usize| self.rail.residual_flexibility(apart(seats));
-        BetweenSeats {
-            difference: (0..seats).map(|it| wave(apart(it)) + residual(it)).collect(),
-            sum: (0..2 * seats).map(|it| wave(apart(it) + 2.0 * seat_m(0))).collect(),
-        }
     }
 
     /// What a support gives way in m/N: railpad and sleeper in series.
@@ -145,12 +186,6 @@ impl<'a> Struck<'a> {
         }
         stiffness.inv() + self.modes[&crack.to_bits()].seat_receptance(&bed, omega)
     }
-}
-
-/// Receptances between seats in m/N, by the difference and by the sum of their numbers.
-struct BetweenSeats {
-    difference: Vec<Complex<f64>>,
-    sum: Vec<Complex<f64>>,
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Why a file of a hammer test is refused.
 
+use tracktwin_parameters::QuantityError;
+
 /// A line that cannot be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: {fault}")]
@@ -35,6 +37,15 @@ pub enum ReadFault {
         /// Names of all columns.
         known: String,
     },
+    /// Two columns have one name.
+    #[error("column `{name}` is there twice; leave one out")]
+    RepeatedColumn {
+        /// Their name.
+        name: String,
+    },
+    /// A position that cannot be.
+    #[error(transparent)]
+    Place(#[from] QuantityError),
     /// A text stands where a number must stand.
     #[error("{column}: `{text}` is not a finite number")]
     Number {
@@ -80,20 +91,14 @@ pub enum ReadFault {
     /// A hit without force.
     #[error("the force of the hit is zero; check the channel of the hammer")]
     NoForce,
+    /// A hit without response.
+    #[error("the acceleration of all hits is zero; check the channel of the sensor")]
+    NoResponse,
     /// A file without a receptance.
     #[error("the file holds no receptance; {remedy}")]
     Nothing {
         /// What to do.
         remedy: &'static str,
-    },
-    /// The response is against the force.
-    #[error(
-        "the receptance at {position_m} m gains energy (its imaginary part is positive): force and \
-         response have opposite directions; change the sign of one"
-    )]
-    Turned {
-        /// Its place in m.
-        position_m: f64,
     },
     /// The file ends within a dataset.
     #[error("the file ends within dataset {dataset}; export it again")]

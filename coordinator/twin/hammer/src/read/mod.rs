@@ -14,24 +14,23 @@ use std::collections::BTreeMap;
 pub type Nodes = BTreeMap<u64, f64>;
 
 /// The point receptances that a file holds, by its content: a universal file begins with `-1`, a
-/// table with the names of its columns.
+/// table with the names of its columns, behind comments.
 ///
 /// # Errors
 /// [`ReadError`] names the line and what is wrong with it.
 pub fn read(text: &str, nodes: &Nodes) -> Result<Vec<PointReceptance>, ReadError> {
-    let first = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
-    let points = if first == "-1" {
-        universal::read(text, nodes)?
+    // A mark of the byte order is no part of the text.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let says = |line: &&str| !line.is_empty() && !line.starts_with('#');
+    let first = text.lines().map(str::trim).find(says).unwrap_or_default();
+    if first == "-1" {
+        // Fields stand in columns of one byte a letter.
+        universal::read(&text.replace(|letter: char| !letter.is_ascii(), "?"), nodes)
     } else if first.split(',').any(|name| name.trim() == signals::TIME) {
-        signals::read(text)?
+        signals::read(text)
     } else {
-        table::read(text)?
-    };
-    if let Some(turned) = points.iter().find(|point| point.is_turned()) {
-        let position_m = turned.position_m;
-        return Err(ReadError { line: 1, fault: ReadFault::Turned { position_m } });
+        table::read(text)
     }
-    Ok(points)
 }
 
 /// Columns of a table by their names, and its rows.
@@ -43,7 +42,7 @@ struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// Reads the names: the first `required` of `names` must be there, and no others.
+    /// Reads the names: the first `required` of `names` must be there, and no others, each once.
     fn new(
         text: &'a str,
         names: &'static [&'static str],
@@ -59,6 +58,10 @@ impl<'a> Rows<'a> {
         if let Some(name) = heads.iter().find(|name| !names.contains(name)) {
             let (name, known) = (name.to_owned(), known());
             return Err(at(1, ReadFault::UnknownColumn { name, known }));
+        }
+        let is_repeated = |name: &&str| heads.iter().filter(|head| head == name).count() > 1;
+        if let Some(name) = heads.iter().find(is_repeated) {
+            return Err(at(1, ReadFault::RepeatedColumn { name: name.to_owned() }));
         }
         let places: Vec<Option<usize>> =
             names.iter().map(|name| heads.iter().position(|head| head == *name)).collect();
@@ -95,4 +98,33 @@ fn at(line: u64) -> impl Fn(ReadFault) -> ReadError {
 fn number(text: &str, column: &'static str) -> Result<f64, ReadFault> {
     let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
     value.ok_or_else(|| ReadFault::Number { column, text: text.chars().take(40).collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kind_of_a_file_is_told_behind_comments_and_a_mark_of_the_byte_order() {
+        let refused = |text: &str| read(text, &Nodes::new()).unwrap_err().fault;
+        let head = "time_s,position_m,force_N,acceleration_m_s2\n";
+        for before in ["", "\u{feff}", "# a comment\n", "\u{feff}# a comment\n\n"] {
+            // One sample: known as a table of signals.
+            let fault = refused(&format!("{before}{head}0,1,1,1\n"));
+            assert!(matches!(fault, ReadFault::ShortHit { .. }), "{before:?}: {fault:?}");
+        }
+        assert_eq!(refused("\u{feff}    -1\n    58b     1\n"), ReadFault::Binary);
+    }
+
+    #[test]
+    fn positions_that_cannot_be_and_repeated_columns_are_refused() {
+        let refused = |text: &str| read(text, &Nodes::new()).unwrap_err().to_string();
+        let table = "position_m,frequency_Hz,receptance_real_m_N,receptance_imag_m_N";
+        let message = refused(&format!("{table}\n2e7,100,2e-8,-1e-9\n"));
+        assert!(message.starts_with("line 2: 2e7 m is not a valid position"), "{message}");
+        let signals = "position_m,time_s,force_N,acceleration_m_s2\n-2e7,0,1,1\n";
+        assert!(refused(signals).contains("it can be -1e7 to 1e7 m"), "{}", refused(signals));
+        let message = refused(&format!("{table},position_m\n1,100,2e-8,-1e-9,1\n"));
+        assert!(message.contains("`position_m` is there twice"), "{message}");
+    }
 }

@@ -5,6 +5,7 @@ use crate::PointReceptance;
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
+use tracktwin_parameters::quantity::PLACE;
 
 /// The column that only tables of signals have.
 pub(super) const TIME: &str = "time_s";
@@ -40,6 +41,7 @@ pub(super) fn read(text: &str) -> Result<Vec<PointReceptance>, ReadError> {
         else {
             unreachable!("the columns are there")
         };
+        PLACE.check(position_m)?;
         let goes_on = |hit: &Hit| {
             let is_later = hit.times_s.last().is_some_and(|last| time_s > *last);
             is_later && hit.position_m == position_m && hit.number == number
@@ -96,6 +98,9 @@ fn average(hits: &[Hit]) -> Result<PointReceptance, ReadError> {
     if force[1..].iter().all(|power| *power == 0.0) {
         return Err(ReadError { line: hits[0].line, fault: ReadFault::NoForce });
     }
+    if cross[1..].iter().all(|product| *product == Complex64::ZERO) {
+        return Err(ReadError { line: hits[0].line, fault: ReadFault::NoResponse });
+    }
     let mut point = PointReceptance {
         position_m: hits[0].position_m,
         frequencies_hz: Vec::new(),
@@ -104,9 +109,11 @@ fn average(hits: &[Hit]) -> Result<PointReceptance, ReadError> {
         coherence: (hits.len() > 1).then(Vec::new),
         hits: Some(hits.len()),
     };
-    // The mean and the highest line of a real signal say nothing.
-    let usable = (1..lines.saturating_sub(1)).filter(|&it| force[it] > 0.0 && response[it] > 0.0);
-    for line in usable {
+    // The mean and the highest line of a real signal say nothing, nor does a line without product.
+    let is_usable = |line: &usize| {
+        force[*line] > 0.0 && response[*line] > 0.0 && cross[*line] != Complex64::ZERO
+    };
+    for line in (1..lines.saturating_sub(1)).filter(is_usable) {
         let frequency_hz = line as f64 / (samples as f64 * step_s);
         let omega = TAU * frequency_hz;
         point.frequencies_hz.push(frequency_hz);
@@ -234,6 +241,7 @@ mod tests {
         let uneven = refused(&rows(0.5, 1.0));
         assert!(uneven.starts_with("line 53: the time step is 0.501"), "{uneven}");
         assert!(refused(&rows(0.0, 0.0)).contains("force of the hit is zero"));
+        assert!(refused(&rows(0.0, 1.0)).contains("acceleration of all hits is zero"));
         assert!(refused(&format!("{head}1,0,1,1\n1,1e-3,1,1\n")).contains("2 samples"));
         assert!(refused(head).contains("no receptance"));
     }

@@ -3,6 +3,7 @@
 use super::{ReadError, ReadFault, Rows};
 use crate::PointReceptance;
 use num_complex::Complex64;
+use tracktwin_parameters::quantity::PLACE;
 
 /// Columns; coherence and number of hits need not be there.
 const COLUMNS: &[&str] = &[
@@ -23,6 +24,7 @@ pub(super) fn read(text: &str) -> Result<Vec<PointReceptance>, ReadError> {
         else {
             unreachable!("the columns are there")
         };
+        PLACE.check(position_m)?;
         if frequency_hz <= 0.0 {
             return Err(value("frequency_Hz", frequency_hz, "above 0"));
         }

@@ -9,6 +9,7 @@ use crate::PointReceptance;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use tracktwin_parameters::quantity::PLACE;
 
 /// Function types of dataset 58.
 const FREQUENCY_RESPONSE: i64 = 4;
@@ -151,6 +152,7 @@ impl Dataset<'_> {
             let (text, line) = self.line(index)?;
             let node = whole(text, [0, 10], "node", line)?;
             let x_m = real(text, [40, 53], "x of the node", line)?;
+            PLACE.check(x_m).map_err(|error| ReadError { line, fault: error.into() })?;
             nodes.insert(u64::try_from(node).map_err(|_| bad("node", &text[..10], line))?, x_m);
         }
         Ok(())
@@ -196,6 +198,11 @@ impl Dataset<'_> {
         if kind == FREQUENCY_RESPONSE {
             for (value, hz) in values.iter_mut().zip(&frequencies_hz) {
                 *value *= sign * Complex64::new(0.0, TAU * hz).powi(scale);
+                if *value == Complex64::ZERO {
+                    let form = "a receptance other than zero";
+                    let fault = ReadFault::Value { column: "value", value: 0.0, form };
+                    return Err(ReadError { line, fault });
+                }
             }
         }
         Ok(Function { line, kind, nodes, frequencies_hz, values, averages })

@@ -78,6 +78,22 @@ fn what_the_model_does_not_hold_leaves_distant_sleepers_explained() {
 }
 
 #[test]
+fn a_wrong_track_explains_no_sleeper() {
+    let mut track = Preset::VTrack.track();
+    // Nine times the mass of the rail that is struck.
+    track.design.rail = Preset::Concrete60E1.track().design.rail;
+    let selection = Selection::usual(&track.design);
+    let points = select(&strike(&scene(7, 0.05))[..8], &selection).points;
+    let fitted = fit(&track, 0.0, &points).unwrap();
+    let name = |number: i64, _| format!("SN{number}");
+    let record = HammerRecord::new(&fitted, &track.name, selection.range_hz, points.len(), name);
+    let struck = record.sleepers.iter().filter(|sleeper| sleeper.misfit.is_some()).count();
+    let invalid = record.sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
+    assert!(2 * invalid > struck, "{:?}", record.sleepers);
+    assert!(record.model_error_db > 1.8, "{}", record.model_error_db);
+}
+
+#[test]
 fn railpads_that_stiffen_with_load_are_softer_under_the_hammer() {
     let mut scene = scene(5, 0.05);
     scene.left_out.push(Hidden::LoadDependentRailpad {
@@ -99,7 +115,10 @@ fn railpads_that_stiffen_with_load_are_softer_under_the_hammer() {
             )
         })
         .collect();
-    let text = format!(r#"{{"recording": "ride", "sleepers": [{}]}}"#, sleepers.join(","));
+    let text = format!(
+        r#"{{"format": "tracktwin-evaluation/1", "recording": "ride", "sleepers": [{}]}}"#,
+        sleepers.join(",")
+    );
     let loaded = Loaded::parse(&text).unwrap();
     let [railpad, ballast] = &beside(&record, &loaded, 0.125)[..] else { panic!("two compared") };
     // (3000 N / 750 N)^0.5.

@@ -111,6 +111,7 @@ fn a_bad_file_is_refused_by_line() {
             "the file ends within",
         ),
         ("-7.89568E-03", "-7.8x568E-03", "value: `-7.8x568E-03`"),
+        (" 2.37500E+00", " 2.37500E+08", "line 3: 2.375e8 m is not a valid position"),
     ] {
         let message = change(from, to);
         assert!(message.contains(words), "{words}: {message}");
