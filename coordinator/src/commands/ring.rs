@@ -29,7 +29,7 @@ Examples:
   tracktwin ring --out ring
   tracktwin ring --out part --sleepers 84-100 --laps 1
 
-Exit codes: 0 every statement holds, 1 some do not, 2 wrong input, 3 failure.")]
+Exit codes: 0 no statement differs, 1 one or more differ, 2 wrong input, 3 failure.")]
 pub(super) struct Arguments {
     /// Output folder.
     #[arg(long, value_name = "DIR")]
@@ -77,7 +77,11 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         (_, url) => open_or_create(&url.unwrap_or_else(own)).await?,
     };
     let models = match trained {
-        Some(trained) => Some(Evaluator::new(trained, &library).await.map_err(evaluate::stop)?),
+        Some(trained) => {
+            let evaluator = Evaluator::new(trained, &library).await.map_err(evaluate::stop)?;
+            evaluator.models().belongs_to(&evaluator.set().library_digest).or_input()?;
+            Some(evaluator)
+        }
         None => None,
     };
     let ring = Ring::new(plan);

@@ -9,6 +9,7 @@ use tracktwin_inversion::Inversion;
 use tracktwin_library::Library;
 use tracktwin_parameters::{Parameter, Preset};
 use tracktwin_reference_simulator::{Scene, SleeperTruth, TruthError, simulate};
+use tracktwin_ring::correlation;
 
 /// Standard deviation of the logarithm from sleeper to sleeper.
 const SCATTER: [f64; 3] = [0.05, 0.15, 0.3];
@@ -58,7 +59,8 @@ pub struct InversionScore {
     pub median_log_error: f64,
     /// Share of truths inside the 90 % interval.
     pub holds_90: f64,
-    /// Correlation of estimates and truths along a track, in the logarithm, mean over the tracks.
+    /// Correlation of estimates and truths along a track, in the logarithm, mean over the tracks
+    /// where both vary.
     pub correlation: f64,
 }
 
@@ -120,7 +122,7 @@ impl Scores {
                 *self.held.entry(parameter).or_default() += usize::from(holds);
                 pairs.push((estimate.mean.ln(), truth.ln()));
             }
-            self.correlations.entry(parameter).or_default().push(correlation(&pairs));
+            self.correlations.entry(parameter).or_default().extend(correlation(&pairs));
         }
     }
 
@@ -145,26 +147,4 @@ impl Scores {
 /// Number of the sleeper of this name: `SN` and its number.
 fn number(id: &str) -> usize {
     id.trim_start_matches("SN").parse().expect("the reference simulator numbers its sleepers")
-}
-
-fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let count = pairs.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
-    let (x, y) = (mean(|pair| pair.0), mean(|pair| pair.1));
-    let sum =
-        |of: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|p| of(p.0 - x, p.1 - y)).sum::<f64>();
-    sum(&|a, b| a * b) / (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::correlation;
-
-    #[test]
-    fn values_in_proportion_correlate_and_opposite_ones_do_the_contrary() {
-        let pairs = [(1.0, 2.0), (2.0, 4.0), (4.0, 8.0)];
-        assert!((correlation(&pairs) - 1.0).abs() < 1e-12);
-        let opposite = pairs.map(|(x, y)| (x, -y));
-        assert!((correlation(&opposite) + 1.0).abs() < 1e-12);
-    }
 }

@@ -3,7 +3,7 @@
 use std::fmt::{Display, Formatter};
 use std::ops::Range;
 use tracktwin_signal::Signal;
-use tracktwin_signal::recording::{Pass, Recording};
+use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 
 /// Sleepers of a section that is diagnosed at once, and those that two neighbouring ones share.
 const LENGTH: usize = 30;
@@ -33,20 +33,40 @@ impl Part {
     }
 
     /// The recording with these passes only.
-    pub(super) fn of(&self, recording: &Recording) -> Recording {
-        let mut some = recording.clone();
-        match *self {
-            Self::All => {}
+    pub(super) fn of(self, recording: &Recording) -> Recording {
+        let passes = self.passes(recording).into_iter().cloned().collect();
+        with(recording, passes, recording.sleepers.clone())
+    }
+
+    /// These passes.
+    fn passes(self, recording: &Recording) -> Vec<&Pass> {
+        let all = recording.passes.iter();
+        match self {
+            Self::All => all.collect(),
             Self::Lap(lap) => {
                 let mut seen = Vec::new();
-                some.passes.retain(|pass| {
+                let is_of_lap = |pass: &&Pass| {
                     seen.push(pass.speed_km_h);
                     seen.iter().filter(|speed| **speed == pass.speed_km_h).count() == lap
-                });
+                };
+                all.filter(is_of_lap).collect()
             }
-            Self::Speed(speed_km_h) => some.passes.retain(|pass| pass.speed_km_h == speed_km_h),
+            Self::Speed(speed_km_h) => all.filter(|pass| pass.speed_km_h == speed_km_h).collect(),
         }
-        some
+    }
+}
+
+/// The recording with other passes and sleepers.
+fn with(recording: &Recording, passes: Vec<Pass>, sleepers: Vec<Sleeper>) -> Recording {
+    Recording {
+        name: recording.name.clone(),
+        sample_rate_hz: recording.sample_rate_hz,
+        channel: recording.channel.clone(),
+        passes,
+        sleepers,
+        nominal: recording.nominal.clone(),
+        spacing_m: recording.spacing_m,
+        doubts: recording.doubts.clone(),
     }
 }
 
@@ -68,8 +88,8 @@ pub(super) fn sections(sleepers: usize) -> Vec<Range<usize>> {
     (0..count).map(|number| first(number)..first(number) + length).collect()
 }
 
-/// The recording of some of its sleepers: passes end a few spans beyond them.
-pub(super) fn cut(recording: &Recording, sleepers: Range<usize>) -> Recording {
+/// The recording of a part and some of its sleepers: passes end a few spans beyond them.
+pub(super) fn cut(recording: &Recording, part: Part, sleepers: Range<usize>) -> Recording {
     let kept = recording.sleepers[sleepers].to_vec();
     let beside_m = (0.5 + BESIDE) * recording.spacing_m;
     let ends = kept.iter().map(|sleeper| sleeper.x_m);
@@ -83,13 +103,15 @@ pub(super) fn cut(recording: &Recording, sleepers: Range<usize>) -> Recording {
         let samples = pass.signal.samples()[range.clone()].to_vec();
         let signal = Signal::new(pass.signal.sample_rate_hz(), samples);
         Pass {
+            file: pass.file.clone(),
+            speed_km_h: pass.speed_km_h,
             signal: signal.expect("a part of a signal is one"),
             position_m: pass.position_m[range].to_vec(),
-            ..pass.clone()
+            contact_loss_share: pass.contact_loss_share,
         }
     };
-    let passes = recording.passes.iter().map(shortened).collect();
-    Recording { passes, sleepers: kept, ..recording.clone() }
+    let passes = part.passes(recording).into_iter().map(shortened).collect();
+    with(recording, passes, kept)
 }
 
 #[cfg(test)]
@@ -116,7 +138,7 @@ mod tests {
         assert_eq!(lap.speeds_km_h(), [10.0, 13.0]);
         assert_eq!(lap.passes[0].signal, recording.passes[2].signal);
         assert_eq!(Part::Speed(13.0).of(&recording).passes.len(), 2);
-        let section = cut(&recording, 1..3);
+        let section = cut(&recording, Part::All, 1..3);
         assert_eq!(section.sleepers[0].id, "SN87");
         let positions = &section.passes[0].position_m;
         let first_m = section.sleepers[0].x_m - 3.5 * recording.spacing_m;

@@ -18,7 +18,7 @@ pub fn check_folder(folder: &Path, force: bool) -> Result<(), FilesError> {
         return Ok(());
     }
     let mut paths = PARTS.iter().chain(&[SEALS]).map(|name| folder.join(name));
-    match paths.find(|path| is_taken(path)) {
+    match paths.find(|path| Trial::is_taken(path)) {
         Some(path) => Err(FilesError::Foreign { path }),
         None => Ok(()),
     }
@@ -33,12 +33,11 @@ impl Trial {
         }
         Ok(())
     }
-}
-
-/// Whether a path is a file, or a folder with something in it.
-fn is_taken(path: &Path) -> bool {
-    match path.read_dir() {
-        Ok(mut entries) => entries.next().is_some(),
-        Err(_) => path.symlink_metadata().is_ok(),
+    /// Whether a path is a file, or a folder with something in it.
+    pub(in crate::pipeline) fn is_taken(path: &Path) -> bool {
+        match path.read_dir() {
+            Ok(mut entries) => entries.next().is_some(),
+            Err(_) => path.symlink_metadata().is_ok(),
+        }
     }
 }

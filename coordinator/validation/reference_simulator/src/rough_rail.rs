@@ -35,7 +35,7 @@ impl Irregularity {
     }
 }
 
-/// What a rail's surface counts at a place, 0 to 1, and the slope of that in 1/m.
+/// Weight of a rail's own surface at a place, 0 to 1, and its slope in 1/m.
 fn share([from_m, to_m]: [f64; 2], x_m: f64) -> [f64; 2] {
     let (since, until) = (x_m - from_m, to_m - x_m);
     let (inside, way) = if since < until { (since, 1.0) } else { (until, -1.0) };

@@ -16,7 +16,7 @@ const UNKNOWN: f64 = 0.288_675;
 
 /// Estimates must be surer than this share of the range to be called correct: twice as sure as who
 /// only knows the range. Others agree with anything.
-const SURE: f64 = 0.5 * UNKNOWN;
+pub const SURE: f64 = 0.5 * UNKNOWN;
 
 /// Estimates beside the truth.
 pub(crate) struct Agreement {

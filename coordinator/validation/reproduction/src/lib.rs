@@ -24,6 +24,7 @@ mod test_errors;
 #[cfg(test)]
 mod testing;
 
+pub use agreement::SURE;
 pub use error::Error;
 pub use example::{EvaluatedExample, Example, examples};
 pub use figure::Figure;

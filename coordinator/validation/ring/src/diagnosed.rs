@@ -46,8 +46,13 @@ struct Structure {
 
 impl Structure {
     fn is_named(&self, accepted: &[Accepted]) -> bool {
-        let at_place = |it: &Accepted| it.sleepers.iter().any(|id| self.sleepers.contains(id));
-        accepted.iter().any(|it| it.physics == self.physics && at_place(it))
+        accepted.iter().any(|it| self.is(it))
+    }
+
+    /// Whether this is its kind, at one of its sleepers.
+    fn is(&self, accepted: &Accepted) -> bool {
+        let here = |id: &String| self.sleepers.contains(id);
+        accepted.physics == self.physics && accepted.sleepers.iter().any(here)
     }
 }
 
@@ -103,7 +108,11 @@ pub(crate) fn statements(study: &Study) -> Vec<Statement> {
         of("sleeper_bolt", ["Each lap names bolts", "in every lap, at a sleeper with bolts"], 1.0),
         Statement::of(
             ("section 5.2", Method::Diagnosis),
-            ["Nothing else is named", "-", "no kind that the ring does not have, in any lap"],
+            [
+                "Nothing else is named",
+                "-",
+                "no kind that the ring does not have, and none at a wrong sleeper, in any lap",
+            ],
             Some(others(study, &all)),
         ),
     ]
@@ -125,9 +134,12 @@ fn named(study: &Study, some: &[&Structure], least: f64) -> Found {
 }
 
 fn others(study: &Study, all: &[Structure]) -> Found {
-    let known = |physics: &str| all.iter().any(|structure| structure.physics == physics);
+    // A known kind without a place is at no wrong one.
+    let placeless =
+        |it: &Accepted, of: &Structure| it.sleepers.is_empty() && it.physics == of.physics;
+    let known = |it: &Accepted| all.iter().any(|of| of.is(it) || placeless(it, of));
     let accepted = (1..).zip(&study.diagnoses.laps).flat_map(|(lap, accepted)| {
-        let others = accepted.iter().filter(|it| !known(&it.physics));
+        let others = accepted.iter().filter(|it| !known(it));
         others.map(move |it| format!("lap {lap}: {} {}", it.physics, it.sleepers.join(" ")))
     });
     let texts: Vec<_> = accepted.map(|text| text.trim_end().to_owned()).collect();
@@ -166,6 +178,6 @@ mod tests {
         let all = statements(&study);
         assert!(all.iter().all(|it| it.verdict == ClaimVerdict::Differs), "{all:#?}");
         assert_eq!(all[0].found, "lap 1: 4 of 4, lap 2: 0 of 4");
-        assert_eq!(all[4].found, "lap 2: squat");
+        assert_eq!(all[4].found, "lap 2: missing_railpad SN90, lap 2: squat");
     }
 }

@@ -11,11 +11,11 @@ pub(crate) const WIDTH_90: f64 = 1.645;
 
 /// Estimates of one sleeper.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SleeperEstimates {
+struct SleeperEstimates {
     /// Whether the method calls them valid.
-    pub valid: bool,
+    valid: bool,
     /// Mean and standard deviation.
-    pub values: Estimates,
+    values: Estimates,
 }
 
 /// Estimates of one method from one set of passes, by the name of the sleeper.
@@ -59,17 +59,17 @@ impl Estimated {
     }
 
     /// The estimates of a sleeper.
-    pub fn sleeper(&self, id: &str) -> Option<&SleeperEstimates> {
+    fn sleeper(&self, id: &str) -> Option<&SleeperEstimates> {
         self.sleepers.get(id)
     }
 
     /// The estimate of a parameter at a sleeper, valid or not.
-    pub fn any(&self, id: &str, parameter: Parameter) -> Option<Estimate> {
+    pub(crate) fn any(&self, id: &str, parameter: Parameter) -> Option<Estimate> {
         self.sleeper(id)?.values.get(&parameter).copied()
     }
 
     /// The same where it is valid.
-    pub fn valid(&self, id: &str, parameter: Parameter) -> Option<Estimate> {
+    pub(crate) fn valid(&self, id: &str, parameter: Parameter) -> Option<Estimate> {
         let sleeper = self.sleeper(id)?;
         sleeper.values.get(&parameter).copied().filter(|_| sleeper.valid)
     }
@@ -82,6 +82,12 @@ fn estimates(sleeper: &Value) -> Estimates {
         Some((*parameter, estimate))
     };
     Parameter::ALL.iter().filter_map(of).collect()
+}
+
+/// Standard deviation of an estimate as a share of the parameter's range.
+pub(crate) fn sd_share(estimate: Estimate, parameter: Parameter) -> f64 {
+    let [low, high] = parameter.range();
+    estimate.sd / (high - low)
 }
 
 /// Whether a value lies in the 90 % interval of an estimate.
@@ -110,6 +116,18 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), it| (sum + it, count + 1));
     (count > 0).then(|| sum / f64::from(count))
+}
+
+/// Correlation of pairs; none where one side does not vary.
+pub fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
+    let count = pairs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+    let (x, y) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+        pairs.iter().map(|pair| of(pair.0 - x, pair.1 - y)).sum()
+    };
+    let correlation = sum(&|a, b| a * b) / (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
+    correlation.is_finite().then_some(correlation)
 }
 
 #[cfg(test)]
@@ -142,5 +160,14 @@ mod tests {
         assert!(holds(estimate(10.0), 14.9) && !holds(estimate(10.0), 15.0));
         assert_eq!(median([3.0, 1.0, 2.0, 9.0]), Some(2.5));
         assert_eq!((median([]), mean([]), mean([1.0, 2.0])), (None, None, Some(1.5)));
+    }
+
+    #[test]
+    fn values_in_proportion_correlate_and_opposite_ones_do_the_contrary() {
+        let pairs = [(1.0, 2.0), (2.0, 4.0), (4.0, 8.0)];
+        assert!((correlation(&pairs).unwrap() - 1.0).abs() < 1e-12);
+        let opposite = pairs.map(|(x, y)| (x, -y));
+        assert!((correlation(&opposite).unwrap() + 1.0).abs() < 1e-12);
+        assert_eq!(correlation(&[(1.0, 2.0), (1.0, 3.0)]), None);
     }
 }

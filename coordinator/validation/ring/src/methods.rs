@@ -1,8 +1,8 @@
 //! Methods beside each other (paper, section 5.1).
 
-use crate::compared::correlation;
-use crate::estimates::{agree, median};
-use crate::statement::{Found, Statement, percent};
+use crate::estimates::{agree, correlation, median, sd_share};
+use crate::parameters::{ALONG, STIFFNESSES};
+use crate::statement::{Found, Statement, each, percent};
 use crate::{Estimated, Method, Study};
 use tracktwin_number::rounded;
 use tracktwin_parameters::Parameter;
@@ -12,45 +12,32 @@ const DIFFERENCE: f64 = 0.1;
 /// Least share of sleepers at which inversion and Gaussian processes agree.
 const AGREE: f64 = 0.8;
 
-/// The parameters of the paper's Fig. 20.
-const SHOWN: [Parameter; 4] = [
-    Parameter::IrregularityLevel,
-    Parameter::RailpadStiffness,
-    Parameter::SleeperBendingStiffness,
-    Parameter::BallastStiffness,
-];
-
 pub(crate) fn statements(study: &Study) -> Vec<Statement> {
     let Some(processes) = study.by(Method::GaussianProcesses) else { return Vec::new() };
     let mut all = Vec::new();
     if let Some(selector) = study.by(Method::Selector) {
-        for parameter in SHOWN {
-            all.push(Statement::of(
-                ("Fig. 20", Method::GaussianProcesses),
-                [
-                    &format!(
-                        "Gaussian processes and model selector agree about the {}",
-                        parameter.label()
-                    ),
-                    "the general trends are in good agreement",
-                    "median difference at most a tenth of the range of Table D1",
-                ],
-                trend(study, [processes, selector], parameter),
-            ));
-        }
+        all.extend(each(
+            ("Fig. 20", Method::GaussianProcesses),
+            &ALONG,
+            |label| format!("Gaussian processes and model selector agree about the {label}"),
+            [
+                "the general trends are in good agreement",
+                "median difference at most a tenth of the range of Table D1",
+            ],
+            |parameter| trend(study, [processes, selector], parameter),
+        ));
     }
     if let Some(inversion) = study.by(Method::Inversion) {
-        for parameter in [Parameter::RailpadStiffness, Parameter::BallastStiffness] {
-            all.push(Statement::of(
-                ("section 5.1", Method::Inversion),
-                [
-                    &format!("Inversion and Gaussian processes agree about the {}", parameter.label()),
-                    "-",
-                    "difference inside its 90 % interval at 80 % of the sleepers that both call valid",
-                ],
-                agreement(study, [inversion, processes], parameter),
-            ));
-        }
+        all.extend(each(
+            ("section 5.1", Method::Inversion),
+            &STIFFNESSES,
+            |label| format!("Inversion and Gaussian processes agree about the {label}"),
+            [
+                "-",
+                "difference inside its 90 % interval at 80 % of the sleepers that both call valid",
+            ],
+            |parameter| agreement(study, [inversion, processes], parameter),
+        ));
     }
     all
 }
@@ -70,28 +57,50 @@ fn trend(study: &Study, [one, other]: [&Estimated; 2], parameter: Parameter) -> 
     Some(Found::new(difference <= DIFFERENCE, text))
 }
 
-/// Share of the sleepers at which two evaluations agree, over those that both call valid.
+/// Whether two evaluations agree at enough of the sleepers that both call valid.
 pub(crate) fn agreement(
     study: &Study,
-    [one, other]: [&Estimated; 2],
+    both: [&Estimated; 2],
     parameter: Parameter,
 ) -> Option<Found> {
-    let (agreed, count) = agreed(study, [one, other], parameter);
-    let share = agreed as f64 / count as f64;
-    let text = || format!("{} ({agreed} of {count})", percent(share));
-    (count > 0).then(|| Found::new(share >= AGREE, text()))
+    let mut agreed = Tally::default();
+    agreed.add(study, both, parameter);
+    agreed.found(AGREE, "")
 }
 
-/// At how many sleepers two evaluations agree, of how many that both call valid.
-pub(crate) fn agreed(
-    study: &Study,
-    [one, other]: [&Estimated; 2],
-    parameter: Parameter,
-) -> (usize, usize) {
-    let both = study.truth.sleepers.iter().filter_map(|it| {
-        Some(agree(one.valid(&it.id, parameter)?, other.valid(&it.id, parameter)?))
-    });
-    both.fold((0, 0), |(agreed, count), it| (agreed + usize::from(it), count + 1))
+/// At how many sleepers evaluations agree, of those that both of a pair call valid.
+#[derive(Default)]
+pub(crate) struct Tally {
+    agreed: usize,
+    count: usize,
+    /// Standard deviations of all compared estimates, as shares of the parameter's range.
+    sds: Vec<f64>,
+}
+
+impl Tally {
+    /// Adds a pair of evaluations.
+    pub(crate) fn add(
+        &mut self,
+        study: &Study,
+        [one, other]: [&Estimated; 2],
+        parameter: Parameter,
+    ) {
+        for sleeper in &study.truth.sleepers {
+            let both = [one, other].map(|it| it.valid(&sleeper.id, parameter));
+            let [Some(one), Some(other)] = both else { continue };
+            self.count += 1;
+            self.agreed += usize::from(agree(one, other));
+            self.sds.extend([one, other].map(|it| sd_share(it, parameter)));
+        }
+    }
+
+    /// Whether they agree at this share of the sleepers at least; none where none was compared.
+    pub(crate) fn found(self, least: f64, remark: &str) -> Option<Found> {
+        let Self { agreed, count, sds } = self;
+        let share = agreed as f64 / count as f64;
+        let text = || format!("{} ({agreed} of {count}{remark})", percent(share));
+        (count > 0).then(|| Found::new(share >= least, text()).if_sure(sds))
+    }
 }
 
 #[cfg(test)]

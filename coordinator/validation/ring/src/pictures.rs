@@ -1,21 +1,11 @@
 //! Pictures of the ring like the paper's Figs. 20, 21, 22 and 24.
 
 use crate::estimates::{WIDTH_90, mean};
+use crate::parameters::{ALONG, OWN};
 use crate::{Estimated, Method, RailSpectra, SleeperTruth, Study};
 use tracktwin_evaluation::Estimate;
 use tracktwin_parameters::Parameter;
 use tracktwin_reproduction::{Curve, Picture, Scale, Style};
-
-/// Parameters of Fig. 20, in its order.
-const ALONG: [Parameter; 4] = [
-    Parameter::IrregularityLevel,
-    Parameter::RailpadStiffness,
-    Parameter::SleeperBendingStiffness,
-    Parameter::BallastStiffness,
-];
-/// Those of Fig. 24, which each sleeper has of its own.
-const OWN: [Parameter; 3] =
-    [Parameter::IrregularityLevel, Parameter::RailpadStiffness, Parameter::BallastStiffness];
 
 /// Sleepers of the moving average of the ballast stiffness (paper, section 5.2).
 const AVERAGED: usize = 10;

@@ -6,7 +6,7 @@ use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
 /// Sleepers of the ring (paper, section 2.1).
-pub const SLEEPERS: usize = 100;
+pub(crate) const SLEEPERS: usize = 100;
 
 /// Fewest sleepers that can be evaluated (`docs/inversion.md`, limits).
 const LEAST: usize = 6;
@@ -30,11 +30,6 @@ impl Stretch {
     /// Sleepers in it.
     pub const fn sleepers(self) -> usize {
         self.last + 1 - self.first
-    }
-
-    /// Whether a sleeper is in it.
-    pub const fn holds(self, number: usize) -> bool {
-        self.first <= number && number <= self.last
     }
 }
 
@@ -107,7 +102,6 @@ mod tests {
     fn a_stretch_is_read_as_it_is_written_and_refused_beyond_the_ring() {
         let stretch: Stretch = "86-98".parse().unwrap();
         assert_eq!((stretch.sleepers(), stretch.to_string().as_str()), (13, "86-98"));
-        assert!(stretch.holds(86) && stretch.holds(98) && !stretch.holds(85));
         for wrong in ["", "86", "a-b", "0-20", "90-101", "20-10", "1-5"] {
             assert!(wrong.parse::<Stretch>().is_err(), "{wrong}");
         }

@@ -1,64 +1,54 @@
 //! Repeated laps and speeds (paper, section 5.4 and Figs. 22 and 24).
 
-use crate::methods::{agreed, agreement};
-use crate::statement::{Found, Statement, percent};
+use crate::methods::{Tally, agreement};
+use crate::parameters::OWN;
+use crate::statement::{Found, Statement, each};
 use crate::{Method, Study};
 use tracktwin_parameters::Parameter;
 
 /// Least share of sleepers and pairs of laps that agree: their intervals are of 90 %.
 const LAPS_AGREE: f64 = 0.9;
 
-/// The parameters of the paper's Fig. 24.
-const SHOWN: [Parameter; 3] =
-    [Parameter::IrregularityLevel, Parameter::RailpadStiffness, Parameter::BallastStiffness];
-
 pub(crate) fn statements(study: &Study) -> Vec<Statement> {
     let mut all = Vec::new();
-    for parameter in SHOWN {
-        if study.laps.len() > 1 {
-            all.push(Statement::of(
-                ("Fig. 22", Method::Inversion),
-                [
-                    &format!("Laps agree about the {}", parameter.label()),
-                    "repeated measurements agree",
-                    "difference of two laps inside its 90 % interval at 90 % of the valid sleepers",
-                ],
-                laps(study, parameter),
-            ));
-        }
-        all.extend(speeds(study, parameter));
+    if study.laps.len() > 1 {
+        all.extend(each(
+            ("Fig. 22", Method::Inversion),
+            &OWN,
+            |label| format!("Laps agree about the {label}"),
+            [
+                "repeated measurements agree",
+                "difference of two laps inside its 90 % interval at 90 % of the valid sleepers",
+            ],
+            |parameter| laps(study, parameter),
+        ));
+    }
+    // Every lower speed beside the highest one.
+    let Some(((fastest, by_fastest), slower)) = study.speeds.split_last() else { return all };
+    for (speed, by_speed) in slower {
+        all.extend(each(
+            ("Fig. 24", Method::Inversion),
+            &OWN,
+            |label| format!("{speed} and {fastest} km/h agree about the {label}"),
+            [
+                "13 and 10 km/h agree; at 7 km/h stiffnesses deviate in places",
+                "difference inside its 90 % interval at 80 % of the valid sleepers",
+            ],
+            |parameter| agreement(study, [by_speed, by_fastest], parameter),
+        ));
     }
     all
 }
 
 fn laps(study: &Study, parameter: Parameter) -> Option<Found> {
     let laps = &study.laps;
-    let pairs =
-        (0..laps.len()).flat_map(|one| (one + 1..laps.len()).map(move |other| (one, other)));
-    let counts = pairs.map(|(one, other)| agreed(study, [&laps[one], &laps[other]], parameter));
-    let (yes, count) = counts.fold((0, 0), |all, it| (all.0 + it.0, all.1 + it.1));
-    let share = yes as f64 / count as f64;
-    let text = || format!("{} ({yes} of {count}, {} laps)", percent(share), laps.len());
-    (count > 0).then(|| Found::new(share >= LAPS_AGREE, text()))
-}
-
-/// Every lower speed beside the highest one.
-fn speeds(study: &Study, parameter: Parameter) -> Vec<Statement> {
-    let Some(((fastest, by_fastest), slower)) = study.speeds.split_last() else {
-        return Vec::new();
-    };
-    let compared = slower.iter().map(|(speed, by_speed)| {
-        Statement::of(
-            ("Fig. 24", Method::Inversion),
-            [
-                &format!("{speed} and {fastest} km/h agree about the {}", parameter.label()),
-                "13 and 10 km/h agree; at 7 km/h stiffnesses deviate in places",
-                "difference inside its 90 % interval at 80 % of the valid sleepers",
-            ],
-            agreement(study, [by_speed, by_fastest], parameter),
-        )
-    });
-    compared.collect()
+    let mut agreed = Tally::default();
+    for (index, one) in laps.iter().enumerate() {
+        for other in &laps[index + 1..] {
+            agreed.add(study, [one, other], parameter);
+        }
+    }
+    agreed.found(LAPS_AGREE, &format!(", {} laps", laps.len()))
 }
 
 #[cfg(test)]
@@ -76,7 +66,8 @@ mod tests {
         study.laps = vec![same.clone(), same.clone(), other.clone()];
         study.speeds = vec![(7.0, other), (10.0, same.clone()), (13.0, same)];
         let all = statements(&study);
-        let verdicts: Vec<_> = all[..3].iter().map(|it| it.verdict).collect();
+        // Of each parameter: laps, 7 km/h, 10 km/h.
+        let verdicts: Vec<_> = all.iter().step_by(3).map(|it| it.verdict).collect();
         let (yes, no) = (ClaimVerdict::Reproduced, ClaimVerdict::Differs);
         // Of three pairs of laps one agrees.
         assert_eq!((verdicts, all.len()), (vec![no, no, yes], 9));

@@ -185,10 +185,11 @@ impl Ring {
         let (clamp, missing_railpad) = (CLAMPS.contains(&number), number == MISSING_RAILPAD);
         let rail = rail(number);
         let level = if is_rough(rail) { ROUGH_LEVEL * LEVEL } else { LEVEL };
-        let railpad = match (clamp, missing_railpad) {
-            (_, true) => MISSING_N_M,
-            (true, false) => railpad + CLAMP_N_M,
-            (false, false) => railpad,
+        // The simulator scales the damping with the stiffness that remains of a missing railpad.
+        let (railpad, railpad_damping) = match (clamp, missing_railpad) {
+            (_, true) => (MISSING_N_M, RAILPAD_DAMPING_N_S_M * MISSING_N_M / railpad),
+            (true, false) => (railpad + CLAMP_N_M, RAILPAD_DAMPING_N_S_M),
+            (false, false) => (railpad, RAILPAD_DAMPING_N_S_M),
         };
         let beside = |joint: &&Joint| joint.after == number || joint.after + 1 == number;
         SleeperTruth {
@@ -202,7 +203,7 @@ impl Ring {
             bolt: number != UNBOLTED,
             values: BTreeMap::from([
                 (Parameter::RailpadStiffness, railpad),
-                (Parameter::RailpadDamping, RAILPAD_DAMPING_N_S_M),
+                (Parameter::RailpadDamping, railpad_damping),
                 (Parameter::BallastStiffness, ballast),
                 (Parameter::BallastDamping, BALLAST_DAMPING_N_S_M),
                 (Parameter::SleeperBendingStiffness, BENDING_N_M2),
@@ -310,7 +311,7 @@ fn joints(numbers: &[usize]) -> impl Iterator<Item = Hidden> + '_ {
     })
 }
 
-/// Stretches of the scene under rails 1 and 3; the outer ones reach to the track's ends.
+/// Stretches of the scene under rails 1 and 3; the outer ones end half a span before the track's ends.
 fn rough_rails(numbers: &[usize]) -> Vec<RoughRail> {
     let mut rails = Vec::new();
     let mut first = 0;
@@ -349,6 +350,8 @@ mod tests {
         assert_eq!(special(|it| it.missing_railpad), ["SN91"]);
         assert_eq!(special(|it| !it.bolt), ["SN94"]);
         assert!(truth.gaps.contains(&94));
+        let damping = |index: usize| truth.sleepers[index].values[&Parameter::RailpadDamping];
+        assert!((500.0..1000.0).contains(&damping(90)) && damping(89) == RAILPAD_DAMPING_N_S_M);
         // The irregularity of rail 1 was measured between SN91 and SN96.
         assert!(truth.sleepers[90..96].iter().all(|it| it.rail == 1) && rail(12) == 1);
         assert_eq!([rail(13), rail(38), rail(63), rail(87), rail(88)], [2, 3, 4, 4, 1]);

@@ -1,8 +1,11 @@
 //! A statement about the ring: what the paper says, what an evaluation gives, and the verdict.
 
 use crate::Method;
+use crate::estimates::median;
 use serde::Serialize;
-use tracktwin_reproduction::ClaimVerdict;
+use tracktwin_number::rounded;
+use tracktwin_parameters::Parameter;
+use tracktwin_reproduction::{ClaimVerdict, SURE};
 
 /// One statement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -25,13 +28,29 @@ pub struct Statement {
 
 /// What is found of a statement; none where the ring has nothing to decide it by.
 pub(crate) struct Found {
-    pub(crate) text: String,
-    pub(crate) within: bool,
+    text: String,
+    verdict: ClaimVerdict,
 }
 
 impl Found {
     pub(crate) fn new(within: bool, text: impl Into<String>) -> Self {
-        Self { text: text.into(), within }
+        let verdict = if within { ClaimVerdict::Reproduced } else { ClaimVerdict::Differs };
+        Self { text: text.into(), verdict }
+    }
+
+    /// The same, undecided where estimates agree that are not sure; `sds` are their standard
+    /// deviations as shares of the parameter's range.
+    pub(crate) fn if_sure(mut self, sds: impl IntoIterator<Item = f64>) -> Self {
+        if let Some(sd) = median(sds)
+            && sd > SURE
+            && self.verdict == ClaimVerdict::Reproduced
+        {
+            self.verdict = ClaimVerdict::CannotTell;
+            let (text, sd) = (self.text, rounded(sd, 2));
+            self.text =
+                format!("{text}; median standard deviation {sd} of the range, too wide to decide");
+        }
+        self
     }
 }
 
@@ -42,11 +61,7 @@ impl Statement {
         [claim, expected, tolerance]: [&str; 3],
         found: Option<Found>,
     ) -> Self {
-        let verdict = match &found {
-            None => ClaimVerdict::CannotTell,
-            Some(Found { within: true, .. }) => ClaimVerdict::Reproduced,
-            Some(_) => ClaimVerdict::Differs,
-        };
+        let verdict = found.as_ref().map_or(ClaimVerdict::CannotTell, |found| found.verdict);
         let nothing = || "nothing here to decide it by".to_owned();
         Self {
             figure,
@@ -60,7 +75,35 @@ impl Statement {
     }
 }
 
+/// A statement for each of some parameters; `claim` gets the parameter's label.
+pub(crate) fn each(
+    source: (&'static str, Method),
+    parameters: &[Parameter],
+    claim: impl Fn(&str) -> String,
+    [expected, tolerance]: [&str; 2],
+    found: impl Fn(Parameter) -> Option<Found>,
+) -> Vec<Statement> {
+    let of = |&parameter: &Parameter| {
+        let claim = claim(parameter.label());
+        Statement::of(source, [&claim, expected, tolerance], found(parameter))
+    };
+    parameters.iter().map(of).collect()
+}
+
 /// A share in per cent, `87 %`.
 pub(crate) fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn estimates_that_are_not_sure_cannot_agree_but_can_differ() {
+        let verdict = |within: bool, sd: f64| Found::new(within, "80 %").if_sure([sd]).verdict;
+        assert_eq!(verdict(true, 0.1), ClaimVerdict::Reproduced);
+        assert_eq!(verdict(true, 0.2), ClaimVerdict::CannotTell);
+        assert_eq!(verdict(false, 0.2), ClaimVerdict::Differs);
+    }
 }

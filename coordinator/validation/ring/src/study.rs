@@ -10,7 +10,7 @@ use serde::Serialize;
 use tracktwin_reproduction::{ClaimVerdict, Picture};
 
 /// The format of `ring.json`.
-pub const FORMAT: &str = "tracktwin-ring/1";
+const FORMAT: &str = "tracktwin-ring/1";
 
 /// What estimates come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -95,7 +95,7 @@ impl Study {
     }
 
     /// Estimates of a method from all passes.
-    pub fn by(&self, method: Method) -> Option<&Estimated> {
+    pub(crate) fn by(&self, method: Method) -> Option<&Estimated> {
         self.methods.iter().find(|(of, _)| *of == method).map(|(_, estimated)| estimated)
     }
 
