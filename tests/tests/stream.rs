@@ -235,6 +235,16 @@ fn what_does_not_fit_the_models_is_refused_before_samples_are_read() {
     let answer = run(PROGRAM, &[&["stream", &section][..], &with].concat());
     assert_eq!(answer.code, Some(2));
     assert!(answer.err.contains("600 kg"), "{}", answer.err);
-    let answer = prepared.command(&["--input", "/no/such/file"]).output().unwrap();
-    assert_eq!(answer.status.code(), Some(2));
+    let folder = prepared.path("ride");
+    let wrong: [&[&str]; 5] = [
+        &["--input", "/no/such/file"],
+        &["--input", &folder],
+        &["--to", "localhost"],
+        &["--listen", "0.0.0.0:0"],
+        &["--insecure"],
+    ];
+    for further in wrong {
+        let answer = prepared.command(further).output().unwrap();
+        assert_eq!(answer.status.code(), Some(2), "{further:?}");
+    }
 }

@@ -1,5 +1,6 @@
 //! `tracktwin stream`: estimates of the track parameters while a pass is recorded.
 
+use super::evaluate::{check_sleepers, load_models};
 use super::library_url::LibraryUrl;
 use super::{OrInput, Stop, println_stderr, write_stdout};
 use crate::pipeline::compute::compute;
@@ -8,17 +9,20 @@ use crate::pipeline::stream::{Streamed, StreamingError, run as stream_rows};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Write as _};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tracktwin_evaluation::{Row, check_recording};
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::samples::{Framing, SampleReader};
-use tracktwin_surrogate::Trained;
 
 /// Bytes that are read at once: some ten milliseconds of samples at 100 kHz.
 const BUFFER_BYTES: usize = 1 << 16;
+
+/// A connection that sends nothing for this time counts as closed.
+const SILENCE: Duration = Duration::from_secs(30);
 
 /// Arguments of `stream`.
 #[derive(Args)]
@@ -35,8 +39,7 @@ little-endian 64-bit numbers, time_s (NaN: not known), position_m, acceleration_
 Rows are lines of JSON, one per sleeper, with the fields of the sleepers in evaluation.json, or with
 the reason why there are no estimates. The time per sleeper is printed on standard error at the end.
 
-Exit codes: 0 done, 1 done, but the estimates of most sleepers are not valid, or there are none, 2
-wrong input, 3 failure.")]
+Exit codes: 0 done, 1 done, but most sleepers have no valid estimates, 2 wrong input, 3 failure.")]
 pub(super) struct Arguments {
     /// Folder with the `recording.json` of the section of track: sample rate, sleepers and track; it
     /// needs no passes.
@@ -50,14 +53,17 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
     /// Address, as IP:PORT, at which one TCP connection is awaited that sends samples; plain text,
-    /// without a password.
+    /// without a password. A connection that is silent for 30 s counts as closed.
     #[arg(long, value_name = "ADDR", conflicts_with = "input")]
     listen: Option<SocketAddr>,
+    /// Allow --listen at an address that other machines can reach, on a trusted network.
+    #[arg(long, requires = "listen")]
+    insecure: bool,
     /// Format of the samples.
     #[arg(long, value_enum, default_value_t = Format::Csv)]
     format: Format,
     /// Send rows to this TCP address, as HOST:PORT, instead of standard output.
-    #[arg(long, value_name = "ADDR")]
+    #[arg(long, value_name = "ADDR", value_parser = host_and_port)]
     to: Option<String>,
 }
 
@@ -80,14 +86,11 @@ impl Format {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { section, models, library, input, listen, format, to } = arguments;
+    let Arguments { section, models, library, input, listen, insecure, format, to } = arguments;
+    listen.filter(|_| !insecure).map_or(Ok(()), check_address)?;
     let section = open(&section)?;
     let library = library.open_whole().await?;
-    let models = Trained::load(&models)
-        .with_context(|| {
-            format!("{}: no models found; create them with `tracktwin train`", models.display())
-        })
-        .or_input()?;
+    let models = load_models(&models)?;
     let evaluator = Evaluator::new(models, &library).await.map_err(super::evaluate::stop)?;
     check_recording(&section, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     let mut rows = Rows::open(to.as_deref())?;
@@ -106,13 +109,29 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
 /// What a recording states of the section.
 fn open(folder: &Path) -> Result<Recording, Stop> {
     let section = Recording::without_passes(folder).or_input()?;
-    if section.sleepers.is_empty() {
-        return Err(Stop::Input(anyhow!(
-            "{}/recording.json: sleepers: the list is empty; add the positions of the sleepers",
-            folder.display()
-        )));
-    }
+    check_sleepers(folder, &section)?;
     Ok(section)
+}
+
+/// Refuses to listen where other machines can connect.
+fn check_address(address: SocketAddr) -> Result<(), Stop> {
+    if address.ip().is_loopback() {
+        return Ok(());
+    }
+    Err(Stop::Input(anyhow!(
+        "--listen: {address} is reachable from other machines, but requires no certificate and no \
+         password; use 127.0.0.1, or use --insecure on a trusted network"
+    )))
+}
+
+/// Checks that a text has the form HOST:PORT.
+fn host_and_port(text: &str) -> Result<String, &'static str> {
+    match text.rsplit_once(':') {
+        Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok() => {
+            Ok(text.to_owned())
+        }
+        _ => Err("give HOST:PORT, such as 127.0.0.1:7791"),
+    }
 }
 
 /// Where samples come from, and its name for errors.
@@ -125,7 +144,8 @@ fn samples(
         let listener = TcpListener::bind(address).with_context(failed)?;
         println_stderr(&format!("waiting for samples at {}", listener.local_addr()?));
         let (connection, sender) = listener.accept().with_context(failed)?;
-        let reader = BufReader::with_capacity(BUFFER_BYTES, connection);
+        connection.set_read_timeout(Some(SILENCE)).with_context(failed)?;
+        let reader = BufReader::with_capacity(BUFFER_BYTES, Sender(connection));
         return Ok((sender.to_string(), Box::new(reader)));
     }
     let Some(path) = input else {
@@ -133,8 +153,28 @@ fn samples(
         return Ok(("standard input".to_owned(), Box::new(reader)));
     };
     let name = path.display().to_string();
+    if path.is_dir() {
+        return Err(Stop::Input(anyhow!("--input {name}: is a folder; give a file or a pipe")));
+    }
     let file = File::open(&path).with_context(|| name.clone()).or_input()?;
     Ok((name, Box::new(BufReader::with_capacity(BUFFER_BYTES, file))))
+}
+
+/// A connection that sends samples. It ends at a silence of [`SILENCE`] as if it were closed.
+struct Sender(TcpStream);
+
+impl Read for Sender {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        match self.0.read(buffer) {
+            // Systems differ in how they name a timeout.
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                let seconds = SILENCE.as_secs();
+                println_stderr(&format!("no samples for {seconds} s: the stream counts as ended"));
+                Ok(0)
+            }
+            read => read,
+        }
+    }
 }
 
 /// Where rows go.
@@ -146,7 +186,10 @@ enum Rows {
 impl Rows {
     fn open(to: Option<&str>) -> Result<Self, Stop> {
         let Some(name) = to else { return Ok(Self::Stdout) };
-        let connection = TcpStream::connect(name).with_context(|| format!("--to {name}"))?;
+        let failed = || format!("--to {name}");
+        let connection = TcpStream::connect(name).with_context(failed)?;
+        // Rows are short and are sent one by one.
+        connection.set_nodelay(true).with_context(failed)?;
         Ok(Self::Tcp { connection, name: name.to_owned(), error: None })
     }
 
@@ -196,7 +239,33 @@ fn conclude(streamed: &Streamed) -> Result<(), Stop> {
     let longest_ms = 1e3 * longest.as_secs_f64();
     println_stderr(&format!(
         "{evaluated} of {rows} sleepers evaluated, {outside} outside the library; {each_ms:.1} ms \
-         each, at most {longest_ms:.1} ms after the last sample"
+         of computation each, at most {longest_ms:.1} ms for the rows of one sample"
     ));
     if streamed.is_negative() { Err(Stop::Negative) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_that_others_reach_is_refused_with_the_remedy() {
+        assert!(check_address("127.0.0.1:7790".parse().unwrap()).is_ok());
+        assert!(check_address("[::1]:7790".parse().unwrap()).is_ok());
+        for address in ["0.0.0.0:7790", "10.0.0.7:7790"] {
+            let Err(Stop::Input(error)) = check_address(address.parse().unwrap()) else {
+                panic!("{address}");
+            };
+            let text = error.to_string();
+            assert!(text.contains(address) && text.contains("--insecure"), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_receiver_needs_a_host_and_a_port() {
+        assert!(["localhost:1", "[::1]:65535"].iter().all(|text| host_and_port(text).is_ok()));
+        for text in ["localhost", ":7791", "localhost:", "localhost:70000", "127.0.0.1"] {
+            assert!(host_and_port(text).is_err(), "{text}");
+        }
+    }
 }

@@ -15,9 +15,9 @@ pub struct Streamed {
     pub evaluated: usize,
     /// Those of them outside the library.
     pub outside: usize,
-    /// Time by the clock in which these were computed.
+    /// Time by the clock of the computation of all rows.
     pub computing: Duration,
-    /// The longest time between the last sample that a row needs and the row.
+    /// The longest computation of the rows that one sample completes, by the clock.
     pub longest: Duration,
     /// The stream ended inside a line or a record.
     pub is_cut: bool,
@@ -37,10 +37,10 @@ pub enum StreamingError {
 }
 
 impl Streamed {
-    /// Whether the stream as a whole has no answer: most sleepers with estimates are outside the library,
-    /// or none has any.
+    /// Whether the stream as a whole has no answer: most sleepers have no estimates or are outside the
+    /// library.
     pub const fn is_negative(&self) -> bool {
-        self.evaluated == 0 || 2 * self.outside > self.evaluated
+        2 * (self.evaluated - self.outside) < self.rows
     }
 
     /// Counts rows and hands them on.
@@ -100,4 +100,18 @@ pub fn run(
     // Whether anybody reads the last rows makes no difference any more.
     let _ = streamed.write(&rows, write);
     Ok(streamed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_has_no_answer_if_most_sleepers_have_no_valid_estimates() {
+        let is_negative = |rows, evaluated, outside| {
+            Streamed { rows, evaluated, outside, ..Streamed::default() }.is_negative()
+        };
+        assert!(!is_negative(10, 10, 0) && !is_negative(10, 7, 2));
+        assert!(is_negative(10, 6, 2) && is_negative(10, 4, 0) && is_negative(10, 0, 0));
+    }
 }

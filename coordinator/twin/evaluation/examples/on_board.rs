@@ -137,11 +137,14 @@ fn csv(rate_hz: f64, speed_km_h: f64, spacing_m: f64) -> String {
     text
 }
 
-/// CPU seconds of this thread so far.
+/// CPU seconds of all threads of this process so far.
 fn cpu_s() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    let nanoseconds = text.split(' ').next().and_then(|count| count.parse::<f64>().ok());
-    nanoseconds.unwrap_or_default() * 1e-9
+    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let nanoseconds = tasks.filter_map(|task| {
+        let text = std::fs::read_to_string(task.path().join("schedstat")).ok()?;
+        text.split(' ').next()?.parse::<f64>().ok()
+    });
+    nanoseconds.sum::<f64>() * 1e-9
 }
 
 /// A line of this process's `status`, in kB.

@@ -2,7 +2,8 @@
 
 use crate::{Error, Flag};
 use rayon::prelude::*;
-use tracktwin_signal::recording::{Recording, SleeperWindow};
+use std::ops::Range;
+use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureError, Signal};
 
 /// Relative difference between a pass's speed and a model's within which they are one speed.
@@ -86,13 +87,14 @@ fn sleeper_features(
     let mut features = SleeperFeatures::none(sleeper);
     let window = recording.sleeper_window(sleeper);
     for (pass, &speed) in recording.passes.iter().zip(speed_of_pass) {
-        features.take(extractor, window, &pass.position_m, &pass.signal, speed).map_err(
-            |source| Error::Features {
-                file: pass.file.clone(),
-                sleeper: recording.sleepers[sleeper].id.clone(),
-                source,
-            },
-        )?;
+        let Some(samples) = window.samples(&pass.position_m) else { continue };
+        let share = window.share(&pass.position_m);
+        let taken = features.take(extractor, share, samples, &pass.signal, speed);
+        taken.map_err(|source| Error::Features {
+            file: pass.file.clone(),
+            sleeper: recording.sleepers[sleeper].id.clone(),
+            source,
+        })?;
     }
     Ok(features)
 }
@@ -103,23 +105,22 @@ impl SleeperFeatures {
         Self { sleeper, speeds: Vec::new(), flags: Vec::new() }
     }
 
-    /// Takes the window of a pass with these positions in m and this signal, at the speed with this
-    /// place among the models' speeds; false if the pass covers too little of it.
+    /// Takes the window of a pass with this signal, which covers this share of the window with these
+    /// samples, at the speed with this place among the models' speeds.
     ///
     /// # Errors
     /// [`FeatureError`].
     pub(crate) fn take(
         &mut self,
         extractor: &Extractor,
-        window: SleeperWindow,
-        position_m: &[f64],
+        share: f64,
+        samples: Range<usize>,
         signal: &Signal,
         speed: usize,
-    ) -> Result<bool, FeatureError> {
-        let Some(samples) = window.samples(position_m) else { return Ok(false) };
+    ) -> Result<(), FeatureError> {
         let margin_s = MARGIN_SHARE * extractor.definition().margin_s;
         let margin = (margin_s * signal.sample_rate_hz()) as usize;
-        if window.share(position_m) < COMPLETE_SHARE {
+        if share < COMPLETE_SHARE {
             self.flags.push(Flag::IncompleteWindow);
         }
         if samples.start < margin || samples.end + margin > signal.len() {
@@ -133,7 +134,7 @@ impl SleeperFeatures {
             None => self.speeds.push(SpeedFeatures { speed, passes: 1, log_power }),
         }
         self.speeds.sort_by_key(|known| known.speed);
-        Ok(true)
+        Ok(())
     }
 }
 

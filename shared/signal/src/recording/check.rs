@@ -9,7 +9,7 @@ use std::path::Path;
 /// Relative difference allowed between the declared sample rate and that of `time_s`.
 ///
 /// Clocks of recorders are off by parts in a hundred thousand; a wrong rate is off by much more.
-const RATE_TOLERANCE: f64 = 1e-3;
+pub const RATE_TOLERANCE: f64 = 1e-3;
 /// Relative difference of a declared step from the median one below which it is the one expected.
 const STEP_TOLERANCE: f64 = 0.5;
 /// Relative difference allowed between nominal speed and mean speed of a pass.

@@ -3,7 +3,7 @@
 use super::error::Fault;
 
 /// Deviation of a single time step, in sample intervals, that rounded times may show.
-const STEP_TOLERANCE: f64 = 0.5;
+pub const STEP_TOLERANCE: f64 = 0.5;
 /// Sample intervals by which a stamp may be off where its clock trembles.
 const JITTER_MAX: f64 = 1.0;
 /// Sample intervals from which on steps of the clock are coarse: a repeated row makes steps of one.

@@ -58,13 +58,7 @@ impl Recording {
     /// The first error: its file, its field and the remedy.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let folder = path.as_ref();
-        if folder.is_file() {
-            return Err(RecordingError::new(folder, "recording", Fault::NoFolder));
-        }
-        let manifest_path = folder.join(FILE_NAME);
-        let manifest = Manifest::read(&manifest_path)?;
-        limits::manifest(&manifest_path, &manifest)?;
-        let spacing_m = spacing(&manifest_path, &manifest)?;
+        let (manifest_path, manifest, spacing_m) = stated(folder, Manifest::read)?;
         let mut passes = Vec::with_capacity(manifest.passes.len());
         let mut doubts = Vec::new();
         for index in 0..manifest.passes.len() {
@@ -78,16 +72,8 @@ impl Recording {
         // Simulated passes without noise repeat to the bit, so a copy is no fault of the folder.
         let copies = check::copies(paths.iter().map(PathBuf::as_path).zip(samples));
         doubts.extend(copies.iter().map(|copy| format!("doubt: {copy}")));
-        let mut recording = Self {
-            name: name_of(folder),
-            sample_rate_hz: manifest.sample_rate_hz,
-            channel: manifest.channel,
-            passes,
-            sleepers: manifest.sleepers,
-            nominal: manifest.nominal,
-            spacing_m,
-            doubts,
-        };
+        let stated = Self::of_manifest(folder, manifest, spacing_m);
+        let mut recording = Self { passes, doubts, ..stated };
         recording.check_sleepers(&manifest_path)?;
         let gain_known = recording.gain_known();
         let quiet = recording.passes.iter().filter_map(|pass| quiet::doubt(pass, gain_known));
@@ -103,14 +89,13 @@ impl Recording {
     /// The first error: its file, its field and the remedy.
     pub fn without_passes(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let folder = path.as_ref();
-        if folder.is_file() {
-            return Err(RecordingError::new(folder, "recording", Fault::NoFolder));
-        }
-        let manifest_path = folder.join(FILE_NAME);
-        let manifest = Manifest::read_without_passes(&manifest_path)?;
-        limits::manifest(&manifest_path, &manifest)?;
-        let spacing_m = spacing(&manifest_path, &manifest)?;
-        Ok(Self {
+        let (_, manifest, spacing_m) = stated(folder, Manifest::read_without_passes)?;
+        Ok(Self::of_manifest(folder, manifest, spacing_m))
+    }
+
+    /// What the manifest of a folder states, without passes.
+    fn of_manifest(folder: &Path, manifest: Manifest, spacing_m: f64) -> Self {
+        Self {
             name: name_of(folder),
             sample_rate_hz: manifest.sample_rate_hz,
             channel: manifest.channel,
@@ -119,7 +104,7 @@ impl Recording {
             nominal: manifest.nominal,
             spacing_m,
             doubts: Vec::new(),
-        })
+        }
     }
 
     /// Writes the recording as a folder: `recording.json` and one Parquet file a pass.
@@ -235,6 +220,21 @@ impl Recording {
             nominal: self.nominal.clone(),
         }
     }
+}
+
+/// The manifest of a folder, checked: its path, its content and the spacing of the sleepers in m.
+fn stated(
+    folder: &Path,
+    read: impl Fn(&Path) -> Result<Manifest, RecordingError>,
+) -> Result<(PathBuf, Manifest, f64), RecordingError> {
+    if folder.is_file() {
+        return Err(RecordingError::new(folder, "recording", Fault::NoFolder));
+    }
+    let path = folder.join(FILE_NAME);
+    let manifest = read(&path)?;
+    limits::manifest(&path, &manifest)?;
+    let spacing_m = spacing(&path, &manifest)?;
+    Ok((path, manifest, spacing_m))
 }
 
 /// Where a pass lies: in the recording's folder, and nowhere else.

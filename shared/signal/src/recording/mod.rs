@@ -22,8 +22,11 @@ mod tests;
 mod track;
 mod window;
 
+pub use check::RATE_TOLERANCE;
+pub use clock::STEP_TOLERANCE as TIME_STEP_TOLERANCE;
 pub use error::{Fault, RecordingError};
 pub use folder::{Pass, Recording};
+pub use odometer::{JUMP, JUMP_M};
 pub use sleeper::Sleeper;
 pub use track::{OtherTrack, StatedTrack, compare_designs, nominal};
 pub use window::SleeperWindow;

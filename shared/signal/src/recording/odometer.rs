@@ -12,9 +12,10 @@ const STEPS_MIN: usize = 4;
 /// Share of the usual speed below which a wheel is at rest, and the shortest time of rest in s.
 const STANDING: f64 = 0.1;
 const STANDING_S: f64 = 0.2;
-/// Times the usual speed above which a position jumps, and the least jump in m.
-const JUMP: f64 = 5.0;
-const JUMP_M: f64 = 0.01;
+/// Times the usual speed above which a position jumps.
+pub const JUMP: f64 = 5.0;
+/// The least jump of a position in m.
+pub const JUMP_M: f64 = 0.01;
 /// Share of a pass's length by which a restarted position falls back.
 const RESTART: f64 = 0.5;
 /// Longest step as a share of the sleeper spacing that separates sleepers.

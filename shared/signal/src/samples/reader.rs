@@ -10,6 +10,9 @@ const RECORD_BYTES: usize = 24;
 /// Characters of the input that an error repeats.
 const SHOWN: usize = 40;
 
+/// What some programs write before the first line of a text in UTF-8.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
 /// The columns, in the order of a binary record.
 const NAMES: [&str; 3] = ["time_s", "position_m", "acceleration_m_s2"];
 
@@ -76,7 +79,10 @@ impl<R: BufRead> SampleReader<R> {
     fn next_of_csv(&mut self) -> Result<Option<Sample>, SamplesError> {
         while self.next_line()? {
             let text = String::from_utf8_lossy(&self.line);
-            let text = text.trim();
+            let mut text = text.trim();
+            if self.number == 1 {
+                text = text.trim_start_matches(BYTE_ORDER_MARK).trim_start();
+            }
             if text.is_empty() || text.starts_with('#') {
                 continue;
             }
@@ -207,6 +213,15 @@ mod tests {
             samples.iter().map(|it| (it.position_m, it.acceleration_m_s2)).collect();
         assert_eq!(pairs, [(0.25, 1.5), (0.5, -20.0)]);
         assert!(samples.iter().all(|it| it.time_s.is_nan()));
+    }
+
+    #[test]
+    fn a_byte_order_mark_before_the_first_line_is_passed_over() {
+        for before in ["", "# of a recorder\n"] {
+            let text = format!("\u{feff}{before}position_m,acceleration_m_s2\n1,2\n");
+            let (samples, error, _) = read(text.as_bytes(), Framing::Csv);
+            assert_eq!((samples.len(), error), (1, None), "{before}");
+        }
     }
 
     #[test]

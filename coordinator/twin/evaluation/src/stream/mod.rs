@@ -20,15 +20,13 @@ use recent::Recent;
 use segment::Segment;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use tracktwin_signal::recording::{Recording, SleeperWindow};
+use tracktwin_signal::recording::{RATE_TOLERANCE, Recording, SleeperWindow};
 use tracktwin_signal::samples::Sample;
 
 /// Share of a margin from which its speed is compared with that of the window.
 const PART_MIN: f64 = 0.25;
 /// Share of the slowest model's speed below which a window is not waited for.
 const SLOWEST: f64 = 0.9;
-/// Relative difference between the declared sample rate and that of the times; as in recordings.
-const RATE_TOLERANCE: f64 = 1e-3;
 
 /// Evaluates the sleepers of a section of track in the order in which a wheel rolls over them.
 ///
@@ -59,7 +57,8 @@ struct Open {
 
 impl<'a> Stream<'a> {
     /// A stream over the sleepers of `section`, whose passes do not matter. Prepares the models of every
-    /// speed: the first row takes no longer than the others.
+    /// speed, so that no row waits for them. Plans of transforms are made with the rows: the first
+    /// row with a length of samples takes longer.
     ///
     /// # Errors
     /// [`Error::OtherFeatures`], [`Error::NoModel`], [`Error::Surrogate`], or [`Error::Rate`] when
@@ -92,11 +91,6 @@ impl<'a> Stream<'a> {
         2 * self.capacity
     }
 
-    /// Samples behind a sleeper's window that are waited for before it is evaluated.
-    pub const fn margin_samples(&self) -> usize {
-        self.margin
-    }
-
     /// Takes the next sample; the rows of the sleepers that it completes.
     ///
     /// # Errors
@@ -106,6 +100,8 @@ impl<'a> Stream<'a> {
         if self.next == self.section.sleepers.len() {
             return Ok(rows);
         }
+        let rate_hz = self.section.sample_rate_hz;
+        check_rate(self.segment.count_time(sample.time_s), rate_hz)?;
         if let Some(reason) = self.segment.interruption(sample) {
             self.interrupt(reason, &mut rows)?;
             self.segment.restart(reason);
@@ -149,23 +145,31 @@ impl<'a> Stream<'a> {
         if self.end.is_none() && positions.last().is_some_and(|last| *last > window.to_m) {
             self.end = Some(positions.partition_point(|position| *position <= window.to_m));
         }
-        // A segment that begins behind the window has nothing of it.
-        self.end.is_some_and(|end| end == 0 || positions.len() >= end + self.margin)
+        // Also where the segment begins behind the window: one wrong position must not pass sleepers.
+        self.end.is_some_and(|end| positions.len() >= end + self.margin)
     }
 
-    /// Takes what the segment has of every window that it has begun, at its end; rows of those that it has
-    /// passed.
+    /// Takes what the segment has of every window that it has a part of, at its end; rows of those that
+    /// it has passed. Windows that lie before the segment wait for the next one.
     fn interrupt(&mut self, reason: Reason, rows: &mut Vec<Row>) -> Result<(), Error> {
-        let Some(&last_m) = self.segment.position_m().last() else { return Ok(()) };
-        let mut sleeper = self.next;
+        let [Some(&first_m), Some(&last_m)] = self.segment.ends_m() else { return Ok(()) };
+        let mut sleeper = self.next + self.count_before(first_m);
         while self.window(sleeper).is_some_and(|window| window.from_m <= last_m) {
             self.take(sleeper, Some(reason))?;
             sleeper += 1;
         }
-        while self.window(self.next).is_some_and(|window| window.to_m < last_m) {
+        let is_passed = |window: SleeperWindow| (first_m..last_m).contains(&window.to_m);
+        while self.window(self.next).is_some_and(is_passed) {
             rows.push(self.row()?);
         }
         Ok(())
+    }
+
+    /// Sleepers without a row whose windows end before a position in m.
+    fn count_before(&self, position_m: f64) -> usize {
+        let left = &self.section.sleepers[self.next..];
+        let spacing_m = self.section.spacing_m;
+        left.partition_point(|it| SleeperWindow::around(it.x_m, spacing_m).to_m < position_m)
     }
 
     /// Takes the features of a sleeper from the segment, which something may have `cut`.
@@ -177,13 +181,13 @@ impl<'a> Stream<'a> {
             open.reason = open.reason.or(cut).or(segment.after());
             return Ok(());
         };
-        check_rate(segment, self.section.sample_rate_hz)?;
+        check_rate(segment.observed_rate_hz(), self.section.sample_rate_hz)?;
         let known = twin.models.speeds_km_h();
-        match speed(segment, samples, self.margin, known) {
+        match speed(segment, &samples, self.margin, known) {
             Err(reason) => open.reason = Some(reason),
             Ok(speed) => {
-                let (positions, signal) = (segment.position_m(), segment.signal());
-                let taken = open.features.take(twin.extractor, window, positions, &signal, speed);
+                let (share, signal) = (window.share(segment.position_m()), segment.signal());
+                let taken = open.features.take(twin.extractor, share, samples, &signal, speed);
                 taken.map_err(|source| Error::Features {
                     file: "of the stream".to_owned(),
                     sleeper: self.section.sleepers[sleeper].id.clone(),
@@ -198,6 +202,7 @@ impl<'a> Stream<'a> {
     fn row(&mut self) -> Result<Row, Error> {
         let sleeper = self.next;
         let open = self.open.remove(&sleeper).unwrap_or_else(|| Open::new(sleeper));
+        let reason = open.reason.or_else(|| self.reason_before()).unwrap_or(Reason::NotCovered);
         self.next += 1;
         self.end = None;
         if !open.features.speeds.is_empty() {
@@ -205,11 +210,13 @@ impl<'a> Stream<'a> {
             return Ok(Row::new(Outcome::Evaluated(Box::new(evaluated))));
         }
         let place = &self.section.sleepers[sleeper];
-        Ok(Row::new(Outcome::Unevaluated {
-            id: place.id.clone(),
-            x_m: place.x_m,
-            reason: open.reason.unwrap_or(Reason::NotCovered),
-        }))
+        Ok(Row::new(Outcome::Unevaluated { id: place.id.clone(), x_m: place.x_m, reason }))
+    }
+
+    /// What interrupted the stream before the segment, if the next window lies before the segment.
+    fn reason_before(&self) -> Option<Reason> {
+        let [Some(first_m), _] = self.segment.ends_m() else { return None };
+        self.segment.after().filter(|_| self.count_before(*first_m) > 0)
     }
 
     /// Drops samples that no window needs; gives up windows that take too long.
@@ -245,7 +252,7 @@ impl Open {
 /// Place among the `known` speeds of the one that window and margins were passed at, if one only.
 fn speed(
     segment: &Segment,
-    samples: Range<usize>,
+    samples: &Range<usize>,
     margin: usize,
     known: &[f64],
 ) -> Result<usize, Reason> {
@@ -262,12 +269,13 @@ fn speed(
     }
     let speed_km_h = segment.speed_km_h(whole);
     let speed = speed_among(speed_km_h, known).ok_or(Reason::OtherSpeed { speed_km_h })?;
-    if segment.is_coarse(samples) { Err(Reason::CoarsePosition) } else { Ok(speed) }
+    if segment.is_coarse(samples.clone()) { Err(Reason::CoarsePosition) } else { Ok(speed) }
 }
 
-/// Refuses times that contradict the declared sample rate in Hz.
-fn check_rate(segment: &Segment, declared_hz: f64) -> Result<(), Error> {
-    match segment.observed_rate_hz() {
+/// Refuses a sample rate in Hz by the times, given with its relative uncertainty, that contradicts the
+/// declared one.
+fn check_rate(observed: Option<(f64, f64)>, declared_hz: f64) -> Result<(), Error> {
+    match observed {
         Some((observed_hz, uncertainty))
             if (observed_hz / declared_hz - 1.0).abs() > RATE_TOLERANCE.max(uncertainty) =>
         {

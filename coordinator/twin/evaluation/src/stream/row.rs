@@ -60,7 +60,7 @@ pub enum Reason {
         /// Mean speed over the window and its margins in km/h.
         speed_km_h: f64,
     },
-    /// The speed differs between window and margins by more than two speeds of one model may.
+    /// The speeds of window and margins differ by more than 4 %.
     SpeedChanges {
         /// The lowest and the highest of the three in km/h.
         speeds_km_h: [f64; 2],

@@ -3,14 +3,13 @@
 use super::Reason;
 use std::ops::Range;
 use tracktwin_signal::Signal;
+use tracktwin_signal::recording::{JUMP, JUMP_M, TIME_STEP_TOLERANCE};
 use tracktwin_signal::samples::Sample;
 
-/// Sample intervals by which the time between two samples may differ from one.
-const TIME_TOLERANCE: f64 = 0.5;
-/// Times the highest speed of the models beyond which a position jumps, and the least jump in m; as in
-/// recordings.
-const JUMP: f64 = 5.0;
-const JUMP_M: f64 = 0.01;
+/// Sample intervals by which a step of the times differs from one where the rate is another one, and
+/// how many such steps in a row tell this rate.
+const UNEVEN: f64 = 0.25;
+const UNEVEN_STEPS: u32 = 100;
 
 /// Samples without a gap. The first ones are dropped when no window needs them any more.
 pub(super) struct Segment {
@@ -23,6 +22,10 @@ pub(super) struct Segment {
     time_s: [f64; 2],
     /// Samples, dropped or not.
     count: u64,
+    /// Steps of the times in a row, in all segments, that differ from one sample interval by more than
+    /// [`UNEVEN`], and the time in s before them.
+    uneven: u32,
+    uneven_from_s: f64,
     /// What interrupted the stream before the segment.
     after: Option<Reason>,
 }
@@ -37,6 +40,8 @@ impl Segment {
             acceleration_m_s2: Vec::new(),
             time_s: [f64::NAN; 2],
             count: 0,
+            uneven: 0,
+            uneven_from_s: f64::NAN,
             after: None,
         }
     }
@@ -44,6 +49,11 @@ impl Segment {
     /// Positions in m.
     pub(super) fn position_m(&self) -> &[f64] {
         &self.position_m
+    }
+
+    /// The first and the last of them, if any.
+    pub(super) fn ends_m(&self) -> [Option<&f64>; 2] {
+        [self.position_m.first(), self.position_m.last()]
     }
 
     pub(super) fn len(&self) -> usize {
@@ -61,15 +71,42 @@ impl Segment {
             return Some(Reason::NotFinite);
         }
         let step_m = sample.position_m - self.position_m.last()?;
-        let intervals = (sample.time_s - self.time_s[1]) * self.sample_rate_hz;
+        let intervals = self.intervals(sample.time_s);
         // Where a time is not known, the difference is NaN.
-        if (intervals - 1.0).abs() > TIME_TOLERANCE || step_m > self.step_max_m {
+        if (intervals - 1.0).abs() > TIME_STEP_TOLERANCE || step_m > self.step_max_m {
             Some(Reason::Gap)
         } else if step_m < 0.0 {
             Some(Reason::RunsBack)
         } else {
             None
         }
+    }
+
+    /// Counts the next sample's time, before it is pushed: sample rate in Hz by the last times and its
+    /// relative uncertainty, where [`UNEVEN_STEPS`] in a row are not those of the declared rate.
+    pub(super) fn count_time(&mut self, time_s: f64) -> Option<(f64, f64)> {
+        let intervals = self.intervals(time_s);
+        // Repeated times are those of a coarse clock; they say nothing of the rate.
+        let is_uneven = intervals > 0.0 && (intervals - 1.0).abs() > UNEVEN;
+        if self.position_m.is_empty() || !is_uneven {
+            self.uneven = 0;
+            return None;
+        }
+        if self.uneven == 0 {
+            self.uneven_from_s = self.time_s[1];
+        }
+        self.uneven += 1;
+        if self.uneven < UNEVEN_STEPS {
+            return None;
+        }
+        self.uneven = 0;
+        let steps = f64::from(UNEVEN_STEPS);
+        Some((steps / (time_s - self.uneven_from_s), 2.0 / steps))
+    }
+
+    /// Sample intervals from the last sample to this time in s.
+    fn intervals(&self, time_s: f64) -> f64 {
+        (time_s - self.time_s[1]) * self.sample_rate_hz
     }
 
     /// Ends the segment; the next one is empty.
@@ -160,6 +197,31 @@ mod tests {
         assert_eq!(found(&|it| it.position_m -= 0.05), Some(Reason::RunsBack));
         assert_eq!(found(&|it| it.position_m = f64::NAN), Some(Reason::NotFinite));
         assert_eq!(found(&|it| it.acceleration_m_s2 = f64::INFINITY), Some(Reason::NotFinite));
+    }
+
+    #[test]
+    fn a_rate_is_told_by_many_uneven_steps_in_a_row_and_not_by_a_gap_or_a_coarse_clock() {
+        for (factor, expected_hz) in [(2.0, 500.0), (0.5, 2000.0)] {
+            let mut segment = Segment::new(RATE_HZ, 2.0);
+            let told = (0..101).find_map(|index| {
+                let sample = sample(index, |it| it.time_s *= factor);
+                let told = segment.count_time(sample.time_s);
+                segment.restart(Reason::Gap);
+                segment.push(&sample);
+                told
+            });
+            let (rate_hz, uncertainty) = told.unwrap();
+            assert!((rate_hz / expected_hz - 1.0).abs() < 1e-9 && uncertainty == 0.02);
+        }
+        let mut segment = segment();
+        assert_eq!(segment.count_time(7.0), None);
+        let coarse = (0..1000).find_map(|index| {
+            let sample = sample(index, |it| it.time_s = f64::from(index / 7 * 7) / RATE_HZ);
+            let told = segment.count_time(sample.time_s);
+            segment.push(&sample);
+            told
+        });
+        assert_eq!(coarse, None);
     }
 
     #[test]

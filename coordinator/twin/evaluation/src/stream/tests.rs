@@ -196,6 +196,42 @@ fn gaps_and_missing_samples_end_a_pass_and_begin_another() {
 }
 
 #[test]
+fn one_wrong_position_costs_no_sleeper_away_from_it() {
+    let models = Models::new();
+    let recording = testing::long_recording(3.0, &[13.0], 30);
+    let whole = samples(&recording.passes[0]);
+    let count = whole.len();
+    // The first sample, and one near the beginning of a window; the track is 3.6 m long.
+    for at in [0, 3000] {
+        let mut stretches = vec![0..at, at + 1..count];
+        stretches.retain(|stretch| !stretch.is_empty());
+        let batch = models.batch(&cut(&recording, &stretches));
+        for wrong_m in [1e9, 2.0, -1e9] {
+            let mut samples = whole.clone();
+            samples[at].position_m = wrong_m;
+            let rows = models.rows(&recording, &samples);
+            assert!(rows.iter().all(|row| reason(row).is_none()), "{at} {wrong_m}");
+            assert_all_same(&rows, &batch);
+        }
+    }
+}
+
+#[test]
+fn a_stream_that_ends_behind_a_jump_says_so_of_the_sleepers_before_it() {
+    let models = Models::new();
+    let recording = testing::long_recording(3.0, &[13.0], 30);
+    let mut samples = samples(&recording.passes[0]);
+    samples.truncate(3001);
+    samples[3000].position_m = 2.0;
+    let rows = models.rows(&recording, &samples);
+    // SN16 has its place there.
+    for (index, row) in rows.iter().enumerate().skip(9) {
+        let expected = if index < 16 { Reason::Gap } else { Reason::NotCovered };
+        assert_eq!(reason(row), Some(expected), "SN{index}");
+    }
+}
+
+#[test]
 fn a_stream_that_ends_early_gives_the_numbers_of_what_there_is() {
     let models = Models::new();
     let recording = testing::long_recording(3.0, &[10.0], 20);
@@ -283,6 +319,14 @@ fn times_of_another_rate_and_a_rate_too_low_are_refused() {
     });
     let text = refused.unwrap().to_string();
     assert!(text.starts_with("time_s: the samples come at 8333.33 Hz"), "{text}");
+    // Steps of two sample intervals are gaps, each of them.
+    let mut stream = Stream::new(&recording, models.twin()).unwrap();
+    let refused = samples(&recording.passes[0]).iter_mut().take(101).find_map(|sample| {
+        sample.time_s *= 2.0;
+        stream.push(sample).err()
+    });
+    let text = refused.unwrap().to_string();
+    assert!(text.starts_with("time_s: the samples come at 5000 Hz"), "{text}");
     let slow = Recording { sample_rate_hz: 2000.0, ..recording };
     let text = Stream::new(&slow, models.twin()).err().unwrap().to_string();
     assert!(text.contains("2000 Hz is too low") && text.contains("2500 Hz"), "{text}");
