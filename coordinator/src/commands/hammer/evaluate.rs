@@ -150,8 +150,7 @@ fn check_places(
 ) -> Result<(), Stop> {
     let struck_m = points.iter().map(|point| point.position_m);
     let layout = Layout::new(&track.design, sleeper_at_m, struck_m).or_input()?;
-    let mut places_m =
-        (layout.first..).take(layout.reported).map(|number| layout.place_m(number));
+    let mut places_m = (layout.first..).take(layout.reported).map(|number| layout.place_m(number));
     if places_m.any(|x_m| loaded.at(x_m, layout.spacing_m).is_some()) {
         return Ok(());
     }

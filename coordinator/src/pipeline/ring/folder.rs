@@ -64,9 +64,8 @@ impl RingStudy<'_> {
             let text = serde_json::to_string_pretty(&terms).expect("a plan is plain JSON");
             return Ok(replace(&path, text.as_bytes())?);
         };
-        let known: Terms = serde_json::from_str(&text).map_err(|source| {
-            RingStudyError::Terms { path: path.display().to_string(), source }
-        })?;
+        let known: Terms = serde_json::from_str(&text)
+            .map_err(|source| RingStudyError::Terms { path: path.display().to_string(), source })?;
         if known == terms {
             return Ok(());
         }
