@@ -281,20 +281,31 @@ impl Problem<'_> {
         let mut varied = self.under_load();
         varied.extend(baseline..values.len());
         let has_laws = self.candidates.iter().any(Candidate::is_under_load);
+        let column = |index: usize| -> Result<DVector<f64>, CalibrationError> {
+            let mut varied = values.clone();
+            varied[index] += VARIATION;
+            if has_laws {
+                let extensions = self.extensions(&varied)?;
+                let is_own = index >= baseline;
+                let elsewhere =
+                    self.forward.with_laws_of(&transfer, [values, &varied], &extensions, is_own)?;
+                if let Some(elsewhere) = elsewhere {
+                    let change = (elsewhere - &log_power) / VARIATION;
+                    return Ok(if is_own { change } else { jacobian.column(index) + change });
+                }
+            }
+            let changed = if has_laws {
+                self.predict(&varied)?
+            } else {
+                let extensions = self.extensions(&varied)?;
+                let beside = self.forward.transfer_beside(&transfer, &varied, &extensions)?;
+                self.forward.levels(&beside, &varied)
+            };
+            Ok((changed - &log_power) / VARIATION)
+        };
         let columns: Vec<_> = varied
             .into_par_iter()
-            .map(|index| {
-                let mut varied = values.clone();
-                varied[index] += VARIATION;
-                let changed = if index < baseline || has_laws {
-                    self.predict(&varied)?
-                } else {
-                    let extensions = self.extensions(&varied)?;
-                    let beside = self.forward.transfer_beside(&transfer, &varied, &extensions)?;
-                    self.forward.levels(&beside, &varied)
-                };
-                Ok((index, (changed - &log_power) / VARIATION))
-            })
+            .map(|index| Ok((index, column(index)?)))
             .collect::<Result<_, CalibrationError>>()?;
         for (index, column) in columns {
             jacobian.set_column(index, &column);

@@ -7,7 +7,7 @@ use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
-use tracktwin_track::frequency::{KnownRail, RailReceptances, SeatReceptances};
+use tracktwin_track::frequency::{KnownRail, RailReceptances, SeatReceptances, StateReceptances};
 use tracktwin_track::model::{HertzContact, TrackModel};
 
 /// What a track with its extensions makes of the surface, at all lines of the spectrum and all
@@ -36,14 +36,18 @@ pub(crate) struct Transfer {
     /// What the receptances of tracks that differ a little follow from, and up to how many nodes from
     /// what differs; none until [`Transfer::with_known_rail`].
     known_rail: Option<Arc<(KnownRail, usize)>>,
+    /// Receptances in each state that force laws give the track, if they do.
+    by_state: Option<Arc<StateReceptances>>,
 }
 
 impl Transfer {
     /// Works it out for a model at these lines in Hz, with what derivatives need so many nodes on either
     /// side of each rail seat, if `reach` says so.
     pub(crate) fn new(model: TrackModel, lines_hz: &[f64], reach: Option<usize>) -> Self {
-        let RailReceptances { direct, from_seats } = RailReceptances::new(&model, lines_hz, reach);
-        Self::on_rail(model, lines_hz, Arc::new(direct), None).with_seats(from_seats)
+        let RailReceptances { direct, from_seats, by_state } =
+            RailReceptances::new(&model, lines_hz, reach);
+        let on_rail = Self::on_rail(model, lines_hz, Arc::new(direct), None);
+        Self { by_state, ..on_rail }.with_seats(from_seats)
     }
 
     /// With receptances from the rail seats in m/N, `[line][sleeper]`.
@@ -88,6 +92,19 @@ impl Transfer {
         Self::on_rail(model, lines_hz, direct, further)
     }
 
+    /// The same where force laws take hold as they do in a model that differs little; none where there is
+    /// no law, or where they take hold in another way.
+    pub(crate) fn with_laws_of(&self, model: TrackModel, lines_hz: &[f64]) -> Option<Self> {
+        let direct = self.by_state.as_ref()?.direct_where(&model)?;
+        let further = Some(Arc::clone(&self.further_wheels));
+        Some(Self::on_rail(model, lines_hz, Arc::new(direct), further))
+    }
+
+    /// Whether a model with the same laws differs in nothing but where they take hold.
+    pub(crate) fn has_states_of(&self, model: &TrackModel) -> bool {
+        self.by_state.as_ref().is_some_and(|by_state| by_state.has_states_of(model))
+    }
+
     /// Source: docs/diagnosis.md, eq. 2, 3: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.
     fn on_rail(
         model: TrackModel,
@@ -129,6 +146,7 @@ impl Transfer {
             direct,
             model,
             known_rail: None,
+            by_state: None,
         }
     }
 

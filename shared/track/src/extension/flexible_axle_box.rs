@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "flexible_axle_box",
-    summary: "part of the unsprung mass, with the sensor, is held to the wheel by a spring",
+    summary: "part of the unsprung mass, such as the axle box, is held to the wheel by a spring",
     family: EffectFamily::Vehicle,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
@@ -22,48 +22,67 @@ pub(super) const KIND: Kind = Kind {
         KindParameter::new("damping_N_s_per_m", "N s/m", "damping between wheel and axle box")
             .ranges([5e2, 2e4], [1e4, 5e5], 3e3)
             .bound(Bound::NotNegative),
+        KindParameter::new(
+            SENSOR_ON_WHEEL,
+            "1",
+            "1 where the sensor moves with the wheel, 0 where it moves with the axle box",
+        )
+        .ranges([0.0, 1.0], [0.0, 1.0], 0.0)
+        .bound(Bound::NotNegative)
+        .or(0.0),
     ],
     look_alikes: &["rail_cross_section", "sensor_mount_resonance"],
     would_separate: "a tap test on wheel and axle box, or a second sensor",
-    screening: Screening::tried(&[Family::new(
-        Places::Everywhere,
-        &["mass_kg", "stiffness_N_per_m", "damping_N_s_per_m"],
-        // Resonances a tenth apart, for they are sharp.
-        Trials::Grid(&[
-            &[2.0, 6.0, 15.0],
-            &[
-                5e7, 6.2e7, 7.6e7, 9.4e7, 1.2e8, 1.4e8, 1.8e8, 2.2e8, 2.7e8, 3.3e8, 4.1e8, 5e8,
-                6.2e8, 7.6e8, 9.4e8,
-            ],
-            &[2e3],
-        ]),
-    )]),
+    screening: Screening::tried(&[
+        Family::new(Places::Everywhere, FREE, TRIALS),
+        Family::new(Places::Everywhere, FREE, TRIALS).held(&[(SENSOR_ON_WHEEL, 1.0)]),
+    ]),
     build: |inputs| {
         let total = inputs.design.wheel.mass_kg;
         let box_kg = inputs.value("mass_kg");
         if box_kg >= total {
             return Err(inputs.refuse("mass_kg", "less than the unsprung mass"));
         }
+        let sensor_on_wheel = inputs.value(SENSOR_ON_WHEEL);
+        if sensor_on_wheel != 0.0 && sensor_on_wheel != 1.0 {
+            return Err(inputs.refuse(SENSOR_ON_WHEEL, "0 or 1"));
+        }
         Ok(Arc::new(FlexibleAxleBox {
             box_kg,
             stiffness_n_m: inputs.value("stiffness_N_per_m"),
             damping_n_s_m: inputs.value("damping_N_s_per_m"),
+            sensor_on_wheel: sensor_on_wheel == 1.0,
         }))
     },
 };
 
+const SENSOR_ON_WHEEL: &str = "sensor_on_wheel";
+
+const FREE: &[&str] = &["mass_kg", "stiffness_N_per_m", "damping_N_s_per_m"];
+
+/// Resonances a tenth apart, for they are sharp.
+const TRIALS: Trials = Trials::Grid(&[
+    &[2.0, 6.0, 15.0],
+    &[
+        5e7, 6.2e7, 7.6e7, 9.4e7, 1.2e8, 1.4e8, 1.8e8, 2.2e8, 2.7e8, 3.3e8, 4.1e8, 5e8, 6.2e8,
+        7.6e8, 9.4e8,
+    ],
+    &[2e3],
+]);
+
 /// Two masses `m_1 + m_2 = m_w` with a spring between, the contact on the first and the sensor on
-/// the second.
+/// one of them.
 ///
 /// Their relative motion `r = u_1 - u_2` is an oscillator of its own, of the reduced mass
 /// `mu = m_1 m_2 / m_w`, driven by `-mu F / m_1`. In terms of `q = -r m_2 / m_w`, by which the
-/// contact gives way, all its coefficients are multiplied by `(m_w / m_2)²`; the sensor feels
-/// `u_c + q m_1 / m_2`.
+/// contact gives way, all its coefficients are multiplied by `(m_w / m_2)²`; a sensor on the second
+/// feels `u_c + q m_1 / m_2`, one on the first `u_c - q`.
 #[derive(Debug)]
 struct FlexibleAxleBox {
     box_kg: f64,
     stiffness_n_m: f64,
     damping_n_s_m: f64,
+    sensor_on_wheel: bool,
 }
 
 impl Extension for FlexibleAxleBox {
@@ -75,7 +94,7 @@ impl Extension for FlexibleAxleBox {
             mass_kg: scale * wheel_kg * self.box_kg / total_kg,
             damping_n_s_m: scale * self.damping_n_s_m,
             stiffness_n_m: scale * self.stiffness_n_m,
-            sensed: wheel_kg / self.box_kg,
+            sensed: if self.sensor_on_wheel { -1.0 } else { wheel_kg / self.box_kg },
         });
     }
 }
@@ -94,7 +113,9 @@ mod tests {
         let (stiffness, damping) = (4e8, 3e3);
         let axle_box = instance("flexible_axle_box").with("mass_kg", BOX_KG);
         let axle_box = axle_box.with("stiffness_N_per_m", stiffness);
-        let model = track(&[axle_box.with("damping_N_s_per_m", damping)]);
+        let axle_box = axle_box.with("damping_N_s_per_m", damping);
+        let on_wheel = track(&[axle_box.clone().with("sensor_on_wheel", 1.0)]);
+        let on_box = track(&[axle_box]);
         for frequency_hz in [50.0, 700.0, 1100.0, 3000.0] {
             let omega = TAU * frequency_hz;
             let spring = Complex64::new(stiffness, omega * damping);
@@ -103,13 +124,15 @@ mod tests {
                 (spring - WHEEL_KG * omega * omega, spring - BOX_KG * omega * omega);
             let determinant = wheel * axle - spring * spring;
             let (wheel_up, axle_down) = (axle / determinant, -spring / determinant);
-            let sensed = -omega * omega * axle_down;
-            let vehicle = model.vehicle();
-            // Rounding, amplified where both masses nearly cancel.
-            let error = (vehicle.receptance(omega) - wheel_up).norm() / wheel_up.norm();
-            assert!(error < 1e-9, "{frequency_hz} Hz: {error}");
-            let error = (vehicle.acceleration_per_force(omega) - sensed).norm() / sensed.norm();
-            assert!(error < 1e-9, "{frequency_hz} Hz: {error}");
+            for (model, motion) in [(&on_box, axle_down), (&on_wheel, -wheel_up)] {
+                let (vehicle, sensed) = (model.vehicle(), -omega * omega * motion);
+                // Rounding, amplified where both masses nearly cancel.
+                let error = (vehicle.receptance(omega) - wheel_up).norm() / wheel_up.norm();
+                assert!(error < 1e-9, "{frequency_hz} Hz: {error}");
+                let error =
+                    (vehicle.acceleration_per_force(omega) - sensed).norm() / sensed.norm();
+                assert!(error < 1e-9, "{frequency_hz} Hz: {error}");
+            }
         }
     }
 

@@ -134,6 +134,11 @@ impl Inverse {
         Self { factor: matrix, band }
     }
 
+    /// Rows of the matrix.
+    pub(super) const fn size(&self) -> usize {
+        self.factor.size
+    }
+
     /// The entries on the diagonal at these rows, zero where there is none.
     #[inline(always)]
     pub(super) fn direct(&self, rows: &[Option<usize>]) -> Vec<Lane> {

@@ -9,6 +9,7 @@
 
 mod ahead;
 mod banded;
+mod by_state;
 mod lane;
 mod peaks;
 mod piece;
@@ -19,6 +20,7 @@ mod states;
 mod varied;
 
 pub use ahead::{receptances_ahead, shares};
+pub use by_state::StateReceptances;
 pub use peaks::{Peak, peaks};
 pub use rail::seat_stiffness;
 pub use receptance::{FrequencyError, ReceptancePoint, receptance};

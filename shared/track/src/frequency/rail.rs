@@ -30,10 +30,9 @@ impl RailReceptances {
     ///
     /// Solves `K + i w C - w^2 M` on the model's own matrices, in the convention `exp(+i w t)`.
     pub fn new(model: &TrackModel, frequencies_hz: &[f64], reach: Option<usize>) -> Self {
-        let of = |track: &TrackModel| Self::of_matrices(track, frequencies_hz, reach);
         match States::new(model) {
-            Some(states) => states.mix(of),
-            None => of(model),
+            Some(states) => states.receptances(frequencies_hz, reach),
+            None => Self::of_matrices(model, frequencies_hz, reach),
         }
     }
 
@@ -44,15 +43,8 @@ impl RailReceptances {
         reach: Option<usize>,
     ) -> Self {
         let partition = Partition::new(model);
-        let layout = model.layout();
         let nodes = deflections(model);
-        let seats = layout.sleepers().iter().map(|sleeper| sleeper.rail_node);
-        let near = |seat: usize, reach: usize| Near {
-            seat,
-            nodes: seat.saturating_sub(reach)..(seat + reach + 1).min(nodes.len()),
-        };
-        let near: Vec<Near> =
-            reach.map_or(Vec::new(), |reach| seats.map(|seat| near(seat, reach)).collect());
+        let near = reach.map_or(Vec::new(), |reach| near_seats(model, reach));
         let solved: Vec<_> = frequencies_hz
             .par_chunks(LANES)
             .map(|chunk| {
@@ -62,8 +54,19 @@ impl RailReceptances {
             })
             .collect();
         let (direct, from_seats) = solved.into_iter().flatten().unzip();
-        Self { direct, from_seats }
+        Self { direct, from_seats, by_state: None }
     }
+}
+
+/// Every rail seat with the nodes up to so many from it.
+pub(super) fn near_seats(model: &TrackModel, reach: usize) -> Vec<Near> {
+    let layout = model.layout();
+    let count = layout.rail_nodes_m().len();
+    let near = |seat: usize| Near {
+        seat,
+        nodes: seat.saturating_sub(reach)..(seat + reach + 1).min(count),
+    };
+    layout.sleepers().iter().map(|sleeper| near(sleeper.rail_node)).collect()
 }
 
 /// Degrees of freedom of the deflection of every rail node, of held nodes none.
@@ -94,9 +97,9 @@ pub fn seat_stiffness(model: &TrackModel, frequencies_hz: &[f64]) -> Vec<Vec<Com
 }
 
 /// A rail seat's node, and the nodes near it.
-struct Near {
-    seat: usize,
-    nodes: Range<usize>,
+pub(super) struct Near {
+    pub(super) seat: usize,
+    pub(super) nodes: Range<usize>,
 }
 
 impl Near {
@@ -130,13 +133,33 @@ impl Near {
 }
 
 /// What is known at [`LANES`] frequencies.
-struct Solved {
+pub(super) struct Solved {
     direct: Vec<Lane>,
     from_seats: Vec<Vec<Lane>>,
 }
 
 impl Solved {
-    fn unpack(&self, lane: usize, near: &[Near]) -> (Vec<Complex64>, Vec<SeatReceptances>) {
+    /// From a seat on, a column of the inverse is one of the mirrored matrix, up to its diagonal.
+    #[inline(always)]
+    pub(super) fn new(
+        inverse: &Inverse,
+        mirrored: Option<&Inverse>,
+        nodes: &[Option<usize>],
+        near: &[Near],
+    ) -> Self {
+        let mut work = vec![Lane::default(); inverse.size()];
+        let of_seat = |near: &Near| match mirrored {
+            Some(mirrored) => near.receptances(nodes, [inverse, mirrored], &mut work),
+            None => Vec::new(),
+        };
+        Self { direct: inverse.direct(nodes), from_seats: near.iter().map(of_seat).collect() }
+    }
+
+    pub(super) fn unpack(
+        &self,
+        lane: usize,
+        near: &[Near],
+    ) -> (Vec<Complex64>, Vec<SeatReceptances>) {
         let values = |lanes: &Vec<Lane>| lanes.iter().map(|value| value.get(lane)).collect();
         let of_seat = |(lanes, near): (&Vec<Lane>, &Near)| SeatReceptances {
             first: near.nodes.start,
@@ -233,21 +256,11 @@ impl<'a> Partition<'a> {
         nodes: &[Option<usize>],
         near: &[Near],
     ) -> Solved {
-        // From a seat on, a column of the inverse is one of the mirrored matrix, up to its diagonal.
-        let (inverse, mirrored) = if near.is_empty() {
-            (self.inverted(omega), None)
-        } else {
-            let [inverse, mirrored] = self.inverted_both(omega);
-            (inverse, Some(mirrored))
-        };
-        let direct = inverse.direct(nodes);
-        let mut work = vec![Lane::default(); self.rail_dofs];
-        let of_seat = |near: &Near| match &mirrored {
-            Some(mirrored) => near.receptances(nodes, [&inverse, mirrored], &mut work),
-            None => Vec::new(),
-        };
-        let from_seats = near.iter().map(of_seat).collect();
-        Solved { direct, from_seats }
+        if near.is_empty() {
+            return Solved::new(&self.inverted(omega), None, nodes, near);
+        }
+        let [inverse, mirrored] = self.inverted_both(omega);
+        Solved::new(&inverse, Some(&mirrored), nodes, near)
     }
 }
 

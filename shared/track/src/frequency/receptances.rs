@@ -1,7 +1,9 @@
 //! The rail's receptances as values.
 
+use super::by_state::StateReceptances;
 use rustfft::num_complex::Complex64;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Receptances of the rail at a set of frequencies, in m/N.
 #[derive(Clone, Debug)]
@@ -10,6 +12,8 @@ pub struct RailReceptances {
     pub direct: Vec<Vec<Complex64>>,
     /// From a force at each rail seat to the nodes near it: `[frequency][sleeper]`; empty unless asked for.
     pub from_seats: Vec<Vec<SeatReceptances>>,
+    /// Those of each state that force laws give the track; none where there is only one.
+    pub by_state: Option<Arc<StateReceptances>>,
 }
 
 /// Receptances from a rail seat to the rail nodes near it, in m/N.

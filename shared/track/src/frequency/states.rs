@@ -4,6 +4,7 @@ use super::receptances::RailReceptances;
 use crate::model::{ForceLaw, TrackModel};
 use crate::time::StaticSolution;
 use rustfft::num_complex::Complex64;
+use std::ops::Range;
 
 /// Halvings of the way between two nodes by which it is found where a law takes hold: a place is
 /// then known to a millionth of the way.
@@ -13,17 +14,21 @@ const HALVINGS: usize = 20;
 const REACH_SPANS: f64 = 4.0;
 
 /// Which force laws take hold.
-type Hold = Vec<bool>;
+pub(super) type Hold = Vec<bool>;
 
 /// A track as it is to small motions while the wheel stands at each node of its rail.
 ///
 /// Ballast under a gap carries the sleeper while the wheel is near enough to press it down, and does
 /// not while it is further away. A law that takes hold is what it is under a wheel above it.
 pub(super) struct States {
-    /// The track in each of its states.
-    tracks: Vec<TrackModel>,
+    /// The track in each of its states; first that in which it is while the wheel is far away.
+    pub(super) tracks: Vec<TrackModel>,
+    /// Which laws take hold in each of them.
+    pub(super) holds: Vec<Hold>,
     /// Shares of the states in the half bays about each node: `[node][state]`.
-    shares: Vec<Vec<f64>>,
+    pub(super) shares: Vec<Vec<f64>>,
+    /// The nodes near the laws: beyond them the track is in the state that it has at their ends.
+    pub(super) near: Range<usize>,
 }
 
 impl States {
@@ -37,7 +42,8 @@ impl States {
             Some(solution.tangents(x_m)?.iter().map(|tangent| tangent.stiffness > 0.0).collect())
         };
         let nodes_m = model.layout().rail_nodes_m();
-        let at_nodes = at_nodes(model, &hold_at)?;
+        let near = near(model);
+        let at_nodes = at_nodes(nodes_m, &near, &hold_at)?;
         let above: Hold = model.force_laws().iter().map(holds_above).collect();
         if at_nodes.iter().all(|hold| *hold == above) {
             return None;
@@ -46,16 +52,13 @@ impl States {
         let tracks = holds.iter().map(|hold| in_state(model, hold, &solution, nodes_m, &at_nodes));
         let tracks = tracks.collect::<Option<Vec<_>>>()?;
         let shares = shares(nodes_m, &stretches, tracks.len());
-        Some(Self { tracks, shares })
+        Some(Self { tracks, holds: holds.into_iter().cloned().collect(), shares, near })
     }
 
     /// Receptances at each node of the track in the state that it has while the wheel is there.
     pub(super) fn mix(&self, of: impl Fn(&TrackModel) -> RailReceptances) -> RailReceptances {
         let states: Vec<RailReceptances> = self.tracks.iter().map(of).collect();
-        let mut mixed = RailReceptances {
-            direct: states[0].direct.clone(),
-            from_seats: states[0].from_seats.clone(),
-        };
+        let mut mixed = states[0].clone();
         let mix = |node: usize, value: &dyn Fn(&RailReceptances) -> Complex64| -> Complex64 {
             self.shares[node].iter().zip(&states).map(|(share, state)| share * value(state)).sum()
         };
@@ -77,18 +80,26 @@ impl States {
     }
 }
 
-/// Which laws hold while the wheel stands at each node; beyond the reach of all laws as at its end.
-fn at_nodes(model: &TrackModel, hold_at: &impl Fn(f64) -> Option<Hold>) -> Option<Vec<Hold>> {
+/// The nodes within the reach of a law.
+fn near(model: &TrackModel) -> Range<usize> {
     let reach_m = REACH_SPANS * model.design().sleeper.spacing_m;
     let laws_m = || model.force_laws().iter().map(|law| law.place_m);
     let from_m = laws_m().fold(f64::INFINITY, f64::min) - reach_m;
     let to_m = laws_m().fold(f64::NEG_INFINITY, f64::max) + reach_m;
     let nodes_m = model.layout().rail_nodes_m();
     let first = nodes_m.partition_point(|x_m| *x_m < from_m);
-    let last = nodes_m.partition_point(|x_m| *x_m <= to_m).max(first + 1) - 1;
+    first..nodes_m.partition_point(|x_m| *x_m <= to_m).max(first + 1)
+}
+
+/// Which laws hold while the wheel stands at each node; beyond the nodes near them as at their end.
+fn at_nodes(
+    nodes_m: &[f64],
+    near: &Range<usize>,
+    hold_at: &impl Fn(f64) -> Option<Hold>,
+) -> Option<Vec<Hold>> {
     let within: Vec<Hold> =
-        nodes_m[first..=last].iter().map(|&x_m| hold_at(x_m)).collect::<Option<_>>()?;
-    let node = |node: usize| within[node.clamp(first, last) - first].clone();
+        nodes_m[near.clone()].iter().map(|&x_m| hold_at(x_m)).collect::<Option<_>>()?;
+    let node = |node: usize| within[node.clamp(near.start, near.end - 1) - near.start].clone();
     Some((0..nodes_m.len()).map(node).collect())
 }
 

@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Most degrees of freedom of the rail that may change: with more of them a whole solution is as quick.
-const CHANGED_MAX: usize = 12;
+pub(super) const CHANGED_MAX: usize = 12;
 
 /// A track whose receptances are known.
 pub struct KnownRail {
@@ -29,7 +29,7 @@ pub struct KnownRail {
 }
 
 /// What a track has in place of what the known one has.
-struct Difference<'a> {
+pub(super) struct Difference<'a> {
     known: Partition<'a>,
     other: Partition<'a>,
     /// Numbers of the pieces that the other track lacks, and of those that it has instead.
@@ -37,7 +37,7 @@ struct Difference<'a> {
     /// Numbers of the rail's own entries that differ.
     rail: Vec<usize>,
     /// Degrees of freedom of the rail that are touched, in order.
-    dofs: Vec<usize>,
+    pub(super) dofs: Vec<usize>,
 }
 
 impl KnownRail {
@@ -66,6 +66,7 @@ impl KnownRail {
         let of = |track: &TrackModel| RailReceptances {
             direct: self.of_matrices(track, reach),
             from_seats: Vec::new(),
+            by_state: None,
         };
         match States::new(model) {
             Some(states) => states.mix(of).direct,
@@ -104,6 +105,19 @@ impl KnownRail {
     }
 }
 
+/// `(1 + Z A)^-1 Z` of changes `Z` of the dynamic stiffness at some degrees of freedom and the receptances
+/// `A` between them.
+pub(super) fn resisted(
+    changes: &DMatrix<Complex64>,
+    at_dofs: &DMatrix<Complex64>,
+) -> DMatrix<Complex64> {
+    let count = changes.nrows();
+    let resisting = DMatrix::identity(count, count) + changes * at_dofs;
+    // A track that gives way without bound makes no receptances: so they are said to be none.
+    let none = || DMatrix::from_element(count, count, Complex64::new(f64::NAN, 0.0));
+    resisting.lu().solve(changes).unwrap_or_else(none)
+}
+
 /// Adds `changes` to the dynamic stiffness at some degrees of freedom: what is direct falls by the diagonal of
 /// `B (1 + Z A)^-1 Z B'`, with the changes `Z`, the receptances `A` between these degrees of freedom and `B`
 /// from them to each node.
@@ -114,11 +128,7 @@ fn lower(
     at_nodes: &DMatrix<Complex64>,
 ) {
     let count = changes.nrows();
-    let resisting = DMatrix::identity(count, count) + changes * at_dofs;
-    // A track that gives way without bound makes no receptances: so they are said to be none.
-    let resisted = resisting.lu().solve(changes);
-    let none = || DMatrix::from_element(count, count, Complex64::new(f64::NAN, 0.0));
-    let resisted = resisted.unwrap_or_else(none);
+    let resisted = resisted(changes, at_dofs);
     for (node, direct) in direct.iter_mut().enumerate() {
         let row = at_nodes.row(node);
         for a in 0..count {
@@ -130,16 +140,16 @@ fn lower(
 }
 
 /// Columns of the known inverse, one a degree of freedom that is touched.
-struct Columns {
+pub(super) struct Columns {
     /// Between these degrees of freedom.
-    at_dofs: DMatrix<Lane>,
+    pub(super) at_dofs: DMatrix<Lane>,
     /// At the nodes near them, a row a node.
-    at_nodes: DMatrix<Lane>,
+    pub(super) at_nodes: DMatrix<Lane>,
 }
 
 impl<'a> Difference<'a> {
     /// None where the tracks' rails do not have entries in the same places.
-    fn new(known: &'a TrackModel, other: &'a TrackModel) -> Option<Self> {
+    pub(super) fn new(known: &'a TrackModel, other: &'a TrackModel) -> Option<Self> {
         let [known, other] = [known, other].map(Partition::new);
         let places = |it: &Partition<'_>| -> Vec<(usize, usize)> {
             it.rail.iter().map(|&(row, column, _)| (row, column)).collect()
@@ -192,7 +202,7 @@ impl<'a> Difference<'a> {
 
     /// Changes of the dynamic stiffness between the degrees of freedom that are touched.
     #[inline(always)]
-    fn changes(&self, omega: &impl Fn(usize) -> f64) -> DMatrix<Lane> {
+    pub(super) fn changes(&self, omega: &impl Fn(usize) -> f64) -> DMatrix<Lane> {
         let count = self.dofs.len();
         let mut changes = DMatrix::from_element(count, count, Lane::default());
         let place = |dof: usize| self.dofs.binary_search(&dof).expect("it is touched");
@@ -218,8 +228,9 @@ impl<'a> Difference<'a> {
         changes
     }
 
+    /// Columns of the inverse of the known rail, the second of these that of the mirrored one.
     #[inline(always)]
-    fn columns(
+    pub(super) fn columns(
         &self,
         [inverse, mirrored]: &[Inverse; 2],
         dofs: &[Option<usize>],

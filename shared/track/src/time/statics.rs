@@ -43,21 +43,36 @@ impl<'a> Statics<'a> {
         Ok(track)
     }
 
+    /// Motion in m at each force law under a load at a place of the rail.
+    ///
+    /// By Maxwell's reciprocity, without a solution of the track: a load at the place moves a law as a
+    /// force of the law moves the place.
+    fn law_motions(&self, load_n: f64, x_m: f64) -> Option<Vec<f64>> {
+        let place = self.model.layout().rail_point(x_m);
+        let free = self.units.iter().map(|unit| load_n * place.deflection(unit));
+        let (motions, _) = self.resisted(&DVector::from_iterator(self.units.len(), free))?;
+        Some(motions.iter().copied().collect())
+    }
+
     /// Lets the force laws push back on displacements that were found without them.
     fn resist(&self, track: &mut [f64]) -> Option<()> {
         let laws = self.model.force_laws();
         if laws.is_empty() {
             return Some(());
         }
-        let resistance = |law| Resistance::Law(law, Kinematics::default(), None);
-        let resistances: Vec<_> = laws.iter().map(resistance).collect();
         let motions = laws.iter().map(|law| law.port.motion(track));
-        let free = DVector::from_iterator(laws.len(), motions);
-        let (_, forces) = coupled::solve(&resistances, &self.compliance, &free, free.clone())?;
+        let (_, forces) = self.resisted(&DVector::from_iterator(laws.len(), motions))?;
         for (unit, force) in self.units.iter().zip(&forces) {
             track.iter_mut().zip(unit).for_each(|(dof, unit)| *dof -= force * unit);
         }
         Some(())
+    }
+
+    /// Motions in m at the force laws, and their forces in N, from the motions without them.
+    fn resisted(&self, free: &DVector<f64>) -> Option<(DVector<f64>, DVector<f64>)> {
+        let resistance = |law| Resistance::Law(law, Kinematics::default(), None);
+        let resistances: Vec<_> = self.model.force_laws().iter().map(resistance).collect();
+        coupled::solve(&resistances, &self.compliance, free, free.clone())
     }
 }
 
@@ -73,13 +88,12 @@ impl<'a> StaticSolution<'a> {
     /// Spring and damper that each force law is to a small motion while the wheel stands there.
     pub(crate) fn tangents(&self, x_m: f64) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
-        let track = statics.under(statics.model.vehicle().wheel.load_n, &[x_m]).ok()?;
-        let tangent = |law: &ForceLaw| {
-            let Reaction { stiffness, damping, .. } =
-                law.law.reaction(law.port.motion(&track), 0.0);
+        let motions = statics.law_motions(statics.model.vehicle().wheel.load_n, x_m)?;
+        let tangent = |(law, motion_m): (&ForceLaw, &f64)| {
+            let Reaction { stiffness, damping, .. } = law.law.reaction(*motion_m, 0.0);
             SpringDamper { stiffness, damping }
         };
-        Some(statics.model.force_laws().iter().map(tangent).collect())
+        Some(statics.model.force_laws().iter().zip(&motions).map(tangent).collect())
     }
 
     /// The same for each law while the wheel stands above it.

@@ -159,6 +159,27 @@ impl Forward {
         Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
     }
 
+    /// Log powers where force laws take hold as they do with varied values, and nothing else varies; none
+    /// where that is not known from the transfer. With `whole`, nothing else may vary.
+    ///
+    /// # Errors
+    /// As [`Forward::log_power`].
+    pub(crate) fn with_laws_of(
+        &self,
+        known: &Transfer,
+        [values, varied]: [&DVector<f64>; 2],
+        extensions: &[Arc<dyn Extension>],
+        whole: bool,
+    ) -> Result<Option<DVector<f64>>, ModelError> {
+        let model = self.model(varied, extensions)?;
+        if whole && !known.has_states_of(&model) {
+            return Ok(None);
+        }
+        let transfer = known.with_laws_of(model, self.bands.lines_hz());
+        let with_shapes = |it: Transfer| it.with_shapes(&self.section, &self.wheel_starts_m);
+        Ok(transfer.map(with_shapes).map(|transfer| self.levels(&transfer, values)))
+    }
+
     /// Sleeper, speed and band of a row.
     pub fn place(&self, row: usize) -> (usize, usize, usize) {
         let (sleeper, rest) = (row / self.per_sleeper(), row % self.per_sleeper());

@@ -33,20 +33,12 @@ pub(super) struct Coordinates {
     /// by, and what the polynomial can't follow; d values.
     pub(super) discrepancy: Vec<f64>,
     pub(super) polynomial: Polynomial,
-    /// Coefficients x d.
+    /// Of the leading directions, which parameters move: coefficients x leading.
     coefficients: Mat<f64>,
+    /// From the leading directions to coordinates: leading x d.
+    pub(super) from_leading: Mat<f64>,
     /// `(B' B)⁻¹` of the regression, coefficients x coefficients.
     inverse_normal: Mat<f64>,
-}
-
-/// What is expected of parameters, and how sure that is.
-pub(super) struct Expected {
-    /// d values.
-    pub(super) mean: Vec<f64>,
-    /// Its variance in every coordinate: the regression's leverage there.
-    pub(super) variance: f64,
-    /// Derivatives by the mapped parameters, p x d.
-    pub(super) slopes: Mat<f64>,
 }
 
 impl Coordinates {
@@ -82,10 +74,10 @@ impl Coordinates {
             between.self_adjoint_eigen(Side::Lower).map_err(|_| Error::NoEigenvalues { size })?;
         let turned = eigen.U().to_owned();
         let leading = whitening.leading;
-        let told = coefficients * whitening.projection.subcols(0, leading);
+        let coefficients = coefficients * whitening.projection.subcols(0, leading);
         let projection = &whitening.projection * &turned;
-        let coefficients = told * turned.subrows(0, leading);
-        let residuals = centred * &projection - &basis * &coefficients;
+        let from_leading = turned.subrows(0, leading).to_owned();
+        let residuals = centred * &projection - &basis * &coefficients * &from_leading;
         let unit = polynomial.unit(parameters.as_ref());
         let lack_of_fit = lack_of_fit(&residuals, &unit, basis.ncols());
         let simulators = eigen.S().column_vector().iter().map(|value| value.max(0.0));
@@ -98,6 +90,7 @@ impl Coordinates {
             discrepancy: simulators.zip(lack_of_fit).map(|(a, b)| a + b).collect(),
             polynomial,
             coefficients,
+            from_leading,
             inverse_normal,
         })
     }
@@ -114,18 +107,49 @@ impl Coordinates {
         self.speeds * self.bins
     }
 
-    /// Expected value at mapped parameters, with linear extrapolation beyond their ranges.
-    pub(super) fn expected(&self, unit: &[f64]) -> Expected {
-        let inside: Vec<f64> = unit.iter().map(|value| value.clamp(-1.0, 1.0)).collect();
-        let row = MatRef::from_row_major_slice(&inside, 1, inside.len());
-        let basis = self.polynomial.basis(row);
-        let slopes = self.polynomial.slopes(&inside) * &self.coefficients;
-        let beyond = Mat::from_fn(1, unit.len(), |_, j| unit[j] - inside[j]);
-        let mean = &basis * &self.coefficients + beyond * &slopes;
-        let leverage = &basis * &self.inverse_normal * basis.transpose();
-        let mean = mean.row(0).iter().copied().collect();
-        Expected { mean, variance: leverage[(0, 0)], slopes }
+    /// Expected coordinates at mapped parameters, with linear extrapolation beyond their ranges.
+    pub(super) fn expected(&self, unit: &[f64]) -> Vec<f64> {
+        let leading = self.expected_leading(unit);
+        let row = MatRef::from_row_major_slice(&leading, 1, leading.len());
+        (row * &self.from_leading).row(0).iter().copied().collect()
     }
+
+    /// The same in the leading directions: in all others the expectation is zero.
+    pub(super) fn expected_leading(&self, unit: &[f64]) -> Vec<f64> {
+        let inside = inside(unit);
+        let mut mean: Vec<f64> =
+            (self.basis(&inside) * &self.coefficients).row(0).iter().copied().collect();
+        if inside != unit {
+            let slopes = self.slopes(unit);
+            for (axis, (value, inside)) in unit.iter().zip(&inside).enumerate() {
+                let slopes = slopes.row(axis);
+                mean.iter_mut()
+                    .zip(slopes.iter())
+                    .for_each(|(m, slope)| *m += (value - inside) * slope);
+            }
+        }
+        mean
+    }
+
+    /// Derivatives of the leading directions by the mapped parameters, p x leading.
+    pub(super) fn slopes(&self, unit: &[f64]) -> Mat<f64> {
+        self.polynomial.slopes(&inside(unit)) * &self.coefficients
+    }
+
+    /// Variance of the expectation in every coordinate: the regression's leverage there.
+    pub(super) fn variance(&self, unit: &[f64]) -> f64 {
+        let basis = self.basis(&inside(unit));
+        (&basis * &self.inverse_normal * basis.transpose())[(0, 0)]
+    }
+
+    fn basis(&self, inside: &[f64]) -> Mat<f64> {
+        self.polynomial.basis(MatRef::from_row_major_slice(inside, 1, inside.len()))
+    }
+}
+
+/// Mapped parameters, those beyond their ranges at the ends of these.
+fn inside(unit: &[f64]) -> Vec<f64> {
+    unit.iter().map(|value| value.clamp(-1.0, 1.0)).collect()
 }
 
 /// The narrowest bands whose scatter half of the library's entries can determine.

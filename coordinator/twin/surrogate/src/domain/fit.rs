@@ -1,6 +1,6 @@
 //! The parameters, within bounds, whose expected coordinates are nearest to those observed.
 
-use super::coordinates::{Coordinates, Expected};
+use super::coordinates::Coordinates;
 use crate::Error;
 use crate::cholesky::Cholesky;
 use faer::Mat;
@@ -47,14 +47,30 @@ impl Bounds {
     }
 }
 
-/// Observed coordinates and the precision of each.
+/// Observed coordinates and the precision of each, as seen from the leading directions `l`:
+/// chi-square is `square - 2 pull' l + l' metric l`.
 pub(super) struct Problem<'a> {
-    pub(super) coordinates: &'a Coordinates,
-    pub(super) observed: &'a [f64],
-    pub(super) precision: Vec<f64>,
+    coordinates: &'a Coordinates,
+    square: f64,
+    pull: Vec<f64>,
+    metric: Mat<f64>,
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    pub(super) fn new(coordinates: &'a Coordinates, observed: &[f64], precision: &[f64]) -> Self {
+        let from_leading = &coordinates.from_leading;
+        let (leading, d) = (from_leading.nrows(), from_leading.ncols());
+        let weighted = Mat::from_fn(leading, d, |l, k| from_leading[(l, k)] * precision[k]);
+        let pull = (0..leading).map(|l| (0..d).map(|k| weighted[(l, k)] * observed[k]).sum());
+        let pairs = observed.iter().zip(precision);
+        Self {
+            coordinates,
+            square: pairs.map(|(observed, precision)| precision * observed * observed).sum(),
+            pull: pull.collect(),
+            metric: &weighted * from_leading.transpose(),
+        }
+    }
+
     /// Levenberg's and Marquardt's descent from `start`; parameters at a bound that would leave it
     /// are held.
     ///
@@ -62,20 +78,18 @@ impl Problem<'_> {
     /// [`Error::NotPositiveDefinite`] when numbers are not finite.
     pub(super) fn solve(&self, bounds: &Bounds, start: &[f64]) -> Result<BoundedFit, Error> {
         let mut unit = bounds.clamp(start);
-        let mut expected = self.coordinates.expected(&unit);
-        let mut chi_square = self.chi_square(&expected);
+        let mut left = self.left(&unit);
         let mut damping = DAMPING[0];
         for _ in 0..STEPS_MAX {
-            let (slope, curvature) = self.descent(&expected);
+            let (slope, curvature) = self.descent(&unit, &left);
             let mut gain = None;
             while damping < DAMPING_MAX && gain.is_none() {
                 let step = step(&unit, &slope, &curvature, damping, bounds)?;
                 let tried = bounds.clamp(&sum(&unit, &step));
-                let at_tried = self.coordinates.expected(&tried);
-                let left = self.chi_square(&at_tried);
-                if left < chi_square {
-                    gain = Some(chi_square - left);
-                    (unit, expected, chi_square) = (tried, at_tried, left);
+                let at_tried = self.left(&tried);
+                if at_tried.chi_square < left.chi_square {
+                    gain = Some(left.chi_square - at_tried.chi_square);
+                    (unit, left) = (tried, at_tried);
                     damping = (0.1 * damping).max(DAMPING[1]);
                 } else {
                     damping *= 10.0;
@@ -85,24 +99,34 @@ impl Problem<'_> {
                 break;
             }
         }
-        Ok(BoundedFit { unit, chi_square })
+        Ok(BoundedFit { unit, chi_square: left.chi_square })
     }
 
-    fn chi_square(&self, expected: &Expected) -> f64 {
-        let pairs = self.observed.iter().zip(&expected.mean).zip(&self.precision);
-        pairs.map(|((observed, mean), precision)| precision * (observed - mean).powi(2)).sum()
+    fn left(&self, unit: &[f64]) -> Left {
+        let mean = self.coordinates.expected_leading(unit);
+        let count = mean.len();
+        let of_row = |l: usize| (0..count).map(|k| self.metric[(l, k)] * mean[k]).sum::<f64>();
+        let residual: Vec<f64> = (0..count).map(|l| self.pull[l] - of_row(l)).collect();
+        let both = mean.iter().zip(self.pull.iter().zip(&residual));
+        let explained: f64 = both.map(|(mean, (pull, residual))| mean * (pull + residual)).sum();
+        Left { residual, chi_square: self.square - explained }
     }
 
     /// Half the negative slope of chi-square, and half its curvature without second derivatives.
-    fn descent(&self, expected: &Expected) -> (Vec<f64>, Mat<f64>) {
-        let Expected { mean, slopes, .. } = expected;
-        let (p, d) = (slopes.nrows(), slopes.ncols());
-        let weighted = Mat::from_fn(p, d, |axis, k| slopes[(axis, k)] * self.precision[k]);
-        let residual = |k: usize| self.observed[k] - mean[k];
-        let slope =
-            (0..p).map(|axis| (0..d).map(|k| weighted[(axis, k)] * residual(k)).sum()).collect();
-        (slope, &weighted * slopes.transpose())
+    fn descent(&self, unit: &[f64], left: &Left) -> (Vec<f64>, Mat<f64>) {
+        let slopes = self.coordinates.slopes(unit);
+        let along = |axis: usize| {
+            slopes.row(axis).iter().zip(&left.residual).map(|(slope, left)| slope * left).sum()
+        };
+        ((0..unit.len()).map(along).collect(), &slopes * &self.metric * slopes.transpose())
     }
+}
+
+/// What a point leaves of the observation.
+struct Left {
+    /// Half the negative slope of chi-square by the leading directions.
+    residual: Vec<f64>,
+    chi_square: f64,
 }
 
 /// The damped step; what a bound holds back stays.

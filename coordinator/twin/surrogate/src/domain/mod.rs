@@ -139,7 +139,8 @@ impl Domain {
         let misfit = best.chi_square / limit;
         // Few tracks of a library lie at an end, so that ends share no probability.
         let needed = gain_needed(probability, windows);
-        let further = self.push(&problem, &bounds, &best, misfit > 1.0)?;
+        let nowhere = (misfit > 1.0).then_some(mean);
+        let further = self.push(&problem, &bounds, &best, nowhere)?;
         // An end that leaves most of what is too much is no explanation.
         let left = limit + LEFT_MOST * (best.chi_square - limit).max(0.0);
         let explains =
@@ -157,12 +158,12 @@ impl Domain {
     }
 
     /// The best fit inside the library, and the problem with the precision that holds there.
-    fn inside<'a>(
-        &'a self,
-        mean: &'a [f64],
+    fn inside(
+        &self,
+        mean: &[f64],
         windows: usize,
         bounds: &Bounds,
-    ) -> Result<(Problem<'a>, BoundedFit), Error> {
+    ) -> Result<(Problem<'_>, BoundedFit), Error> {
         let coefficients = self.coordinates.polynomial.coefficients();
         let typical = coefficients as f64 / self.entries.nrows() as f64;
         let problem = self.problem(mean, windows, typical);
@@ -174,16 +175,16 @@ impl Domain {
             }
         }
         let at = best.map_or_else(|| vec![0.0; self.varied.len()], |fit| fit.unit);
-        let problem = self.problem(mean, windows, self.coordinates.expected(&at).variance);
+        let problem = self.problem(mean, windows, self.coordinates.variance(&at));
         let fit = problem.solve(bounds, &at)?;
         Ok((problem, fit))
     }
 
-    fn problem<'a>(&'a self, observed: &'a [f64], windows: usize, emulator: f64) -> Problem<'a> {
+    fn problem(&self, observed: &[f64], windows: usize, emulator: f64) -> Problem<'_> {
         let scatter = 1.0 / windows as f64 + emulator;
-        let precision =
-            self.coordinates.discrepancy.iter().map(|between| 1.0 / (scatter + between)).collect();
-        Problem { coordinates: &self.coordinates, observed, precision }
+        let between = self.coordinates.discrepancy.iter();
+        let precision: Vec<f64> = between.map(|between| 1.0 / (scatter + between)).collect();
+        Problem::new(&self.coordinates, observed, &precision)
     }
 
     /// Mapped parameters of the `count` entries, of those that count, whose coordinates are nearest.
@@ -203,30 +204,33 @@ impl Domain {
                 (terms.map(|((a, b), weight)| weight * (a - b).powi(2)).sum(), entry)
             })
             .collect();
+        if count < near.len() {
+            near.select_nth_unstable_by(count, |a, b| a.0.total_cmp(&b.0));
+            near.truncate(count);
+        }
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        near.truncate(count);
         near.iter().map(|&(_, entry)| self.unit.row(entry).iter().copied().collect()).collect()
     }
 
     /// The end behind which chi-square falls most, with the fit there; of the ends that the best
-    /// fit lies at, or of all where features fit nowhere inside.
+    /// fit lies at, or of all where the coordinates fit `nowhere` inside.
     fn push(
         &self,
         problem: &Problem<'_>,
         bounds: &Bounds,
         best: &BoundedFit,
-        nowhere: bool,
+        nowhere: Option<&[f64]>,
     ) -> Result<Option<Push>, Error> {
         let mut found: Option<Push> = None;
         for axis in 0..self.varied.len() {
             for side in [Side::Low, Side::High] {
-                if !nowhere && towards(side, best.unit[axis]) < 1.0 - AT_END {
+                if nowhere.is_none() && towards(side, best.unit[axis]) < 1.0 - AT_END {
                     continue;
                 }
                 let mut starts = vec![best.unit.clone()];
-                if nowhere {
+                if let Some(observed) = nowhere {
                     let near = |entry| towards(side, self.unit[(entry, axis)]) > NEAR_END;
-                    starts.extend(self.nearest(problem.observed, 1, near));
+                    starts.extend(self.nearest(observed, 1, near));
                 }
                 for start in starts {
                     let (further, start) = beyond(bounds, &start, axis, side);

@@ -37,8 +37,8 @@ impl Null {
         for case in 0..test.len() {
             let at: Vec<f64> = unit.row(case).iter().copied().collect();
             let expected = coordinates.expected(&at);
-            expected.mean.iter().enumerate().for_each(|(k, mean)| residuals[(case, k)] -= mean);
-            variances.push(expected.variance);
+            expected.iter().enumerate().for_each(|(k, mean)| residuals[(case, k)] -= mean);
+            variances.push(coordinates.variance(&at));
         }
         Ok(Self { residuals, variances, discrepancy: coordinates.discrepancy })
     }
