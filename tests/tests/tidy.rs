@@ -37,6 +37,10 @@ const BORDERS: &[(&str, &[&str])] = &[
         &["tracktwin-track", "tracktwin-diagnosis", "tracktwin-worker"],
     ),
     (
+        "tracktwin-second-simulator",
+        &["tracktwin-track", "tracktwin-diagnosis", "tracktwin-worker"],
+    ),
+    (
         "tracktwin-ring",
         &["tracktwin-library", "tracktwin-farm", "tracktwin-worker", "tracktwin-report"],
     ),
@@ -58,6 +62,7 @@ const OUTSIDE_THE_TWIN: &[&str] = &[
     "tracktwin-report",
     "tracktwin-trial",
     "tracktwin-reference-simulator",
+    "tracktwin-second-simulator",
     "tokio",
 ];
 

@@ -1,0 +1,65 @@
+//! A second simulator of axle-box acceleration over V-Track, with hidden physics.
+//!
+//! A blind trial is worth what its truths do not share with the twin. This simulator has the scenes, effects
+//! and errors of `tracktwin_reference_simulator` as data, and assumptions of its own:
+//!
+//! | Part | Assumption |
+//! |---|---|
+//! | rail | Timoshenko beam by finite differences on a staggered grid, 12 cells a span; damping of bending alone, 0.06 % of critical at 1 kHz; free ends three spans beyond the scene, where about half of a wave is swallowed |
+//! | half sleeper | 8 rigid bars with hinges and shear between them; ballast at four points; bending damping 0.16 % of critical at 1 kHz |
+//! | time | generalised-alpha scheme, 10 us, spectral radius 0.8 |
+//! | contact | Hertzian with exponent 3/2 and loss of contact, of crossed cylinders (65 and 60 mm); a point, without patch |
+//! | irregularity | white noise through two filters of first order; waves beyond 2 m fade; of a pass's power the share `unrepeated` is its own |
+//! | rough rail | driving noise of another level; further noise through a band of fourth-order filters |
+//! | rig | rail seats off by 1 mm (2 at most), railpad damping by 10 %, wheel and contact by 1 % at most, wheel orders 1 to 4 of up to 4 um / order |
+//! | channel | a shelf of up to 0.2 dB; noise below 5 Hz of half the white noise's size |
+//! | odometer | error drawn every 0.7 m, cosines between |
+//!
+//! | Hidden effect | Assumption |
+//! |---|---|
+//! | `rail_joint` | two parabolas of 2.5 length scales that meet in a kink; hinges of the softened length |
+//! | `squat` | Gaussian hollow of 0.212 lengths standard deviation |
+//! | `corrugation` | wavelength drifts by 3 % over 17 waves; second harmonic of 20 % |
+//! | `wheel_flat` | `(1 - (2 u / l)^2)^2`, edges worn round |
+//! | `wheel_out_of_round` | with a tenth of its amplitude in the next order |
+//! | `fastening_clamp` | spring to the sleeper and rotation to the ground, 5 % loss at 1 kHz |
+//! | `missing_railpad` | damping falls with stiffness to the power 0.75 |
+//! | `sleeper_bolt` | half at the end, half 30 mm inside it, 5 % loss at 1 kHz |
+//! | `hanging_sleeper` | gap at each of the four points; full stiffness 20 um after closing; a fifth of the damping stays |
+//! | `subgrade_layer` | neighbouring masses share a tenth of stiffness and damping |
+//! | `flexible_axle_box` | the load acts on the box |
+//! | `frequency_dependent_railpad` | two branches of half the stiffness, 0.58 and 1.73 relaxation times |
+//! | `load_dependent_railpad` | `k_p` at reference and toe load together; damping follows stiffness |
+//! | `rail_cross_section` | two resonances: 85 % of the compliance in the first, 15 % in one 1.7 times as high |
+//! | `sensor_mount_resonance` | oscillator by the bilinear transform |
+//! | `clipping`, `gain_error`, `position_error` | as stated; the limit comes after gain and steps |
+//! | `electrical_hum` | with a third harmonic of 15 % |
+//! | `rail_absorber` | at the nearest node, up to 5 mm off |
+//! | `cracked_sleeper` | 20 mm of the whole sleeper, centred under the rail |
+//! | `linked_sleepers` | 5 % loss at 1 kHz; 400 MN/m at most |
+//! | `wheel_mode` | mode of the free wheel: the hub moves against the rim by the ratio of modal mass to wheel |
+
+#![cfg_attr(test, expect(clippy::unwrap_used, reason = "in a test a panic is the report"))]
+
+mod band;
+mod biquad;
+mod body;
+mod chain;
+mod contact;
+mod defect;
+mod element;
+mod limits;
+mod nuisance;
+mod pass;
+mod rail;
+mod random;
+mod record;
+mod scheme;
+mod seat;
+mod sleeper;
+mod surface;
+mod system;
+mod track;
+mod vehicle;
+
+pub use record::{record, simulate};
