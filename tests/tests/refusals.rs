@@ -155,6 +155,10 @@ fn a_trial_s_seals_that_cannot_be_read_are_left_as_they_are() {
     fs::remove_file(out.join("trial.json")).unwrap();
     fs::create_dir(out.join("trial.json")).unwrap();
     assert_stopped(3, "trial.json");
+    // Nor one that an earlier program began, whose cases are others.
+    fs::remove_dir(out.join("trial.json")).unwrap();
+    fs::write(out.join("trial.json"), r#"{"seed": 1, "code_version": "0.2.0"}"#).unwrap();
+    assert_stopped(2, "format 1");
 }
 
 #[test]

@@ -36,10 +36,7 @@ const BORDERS: &[(&str, &[&str])] = &[
         "tracktwin-reference-simulator",
         &["tracktwin-track", "tracktwin-diagnosis", "tracktwin-worker"],
     ),
-    (
-        "tracktwin-second-simulator",
-        &["tracktwin-track", "tracktwin-diagnosis", "tracktwin-worker"],
-    ),
+    ("tracktwin-second-simulator", &["tracktwin-track", "tracktwin-diagnosis", "tracktwin-worker"]),
     (
         "tracktwin-ring",
         &["tracktwin-library", "tracktwin-farm", "tracktwin-worker", "tracktwin-report"],

@@ -108,10 +108,11 @@ pub struct TrialAnswer {
 }
 
 impl TrialRecord {
-    /// Seed and hash of the program: nodes whose programs differ don't share a trial.
+    /// Seed and hash of the program: nodes whose programs differ don't share a trial. The number is
+    /// the format of its cases.
     pub fn id(&self) -> String {
         let hash = crate::provenance::id(
-            "tracktwin trial 1",
+            "tracktwin trial 2",
             &[&self.seed.to_string(), &self.code_version, &self.model_hash],
         );
         format!("{}-{}", self.seed, &hash[..HASH_DIGITS])

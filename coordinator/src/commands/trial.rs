@@ -146,7 +146,9 @@ fn check_models(evaluator: &Evaluator) -> anyhow::Result<()> {
 
 fn stop(error: TrialError) -> Stop {
     match error {
-        TrialError::Other { .. } | TrialError::Seal(_) => Stop::Input(error.into()),
+        TrialError::Other { .. } | TrialError::OtherFormat { .. } | TrialError::Seal(_) => {
+            Stop::Input(error.into())
+        }
         TrialError::Files(ref reason) if reason.is_wrong_input() => Stop::Input(error.into()),
         TrialError::Library(ref reason) if reason.is_wrong_input() => Stop::Input(error.into()),
         _ => Stop::Failure(error.into()),

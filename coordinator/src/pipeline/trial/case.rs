@@ -123,7 +123,7 @@ impl Trial {
             let unfinished = folder.with_extension("unfinished");
             let _ = std::fs::remove_dir_all(&unfinished);
             let plan = tracktwin_trial::plan(self.seed, number);
-            compute(|| tracktwin_reference_simulator::record(&plan.scene, &unfinished))?;
+            compute(|| plan.making.record(&plan.scene, &unfinished))?;
             std::fs::rename(&unfinished, &folder).map_err(|source| file(&folder, source))?;
         }
         Ok(Recording::open(folder)?)

@@ -25,7 +25,7 @@ use tracktwin_files::{FileName, FilesError, Kind, Output, replace};
 use tracktwin_library::{Library, LibraryError, TrialRecord};
 use tracktwin_reference_simulator::TruthError;
 use tracktwin_signal::recording::RecordingError;
-use tracktwin_trial::{CaseScore, SealError, Seals, Summary};
+use tracktwin_trial::{CaseScore, FORMAT, Making, SealError, Seals, Summary, plan};
 
 /// File that identifies the trial of the folder.
 const TERMS: &str = "trial.json";
@@ -72,8 +72,15 @@ pub struct Trial {
 /// Identity of a folder's trial.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Terms {
+    /// The first format did not state it.
+    #[serde(default = "first_format")]
+    format: u32,
     seed: u64,
     code_version: String,
+}
+
+const fn first_format() -> u32 {
+    1
 }
 
 /// Why a trial ends before its time.
@@ -91,6 +98,17 @@ pub enum TrialError {
         seed: u64,
         /// Version of the program that began it.
         version: String,
+    },
+    /// The folder holds a trial whose cases are others.
+    #[error(
+        "{folder}: contains a trial of format {format}, whose cases are others than those of this \
+             program (format {FORMAT}); use another --out, or the program that began it"
+    )]
+    OtherFormat {
+        /// The folder.
+        folder: String,
+        /// Format of the trial there.
+        format: u32,
     },
     /// The library fails, or refuses.
     #[error(transparent)]
@@ -193,7 +211,7 @@ impl Trial {
         self.begin_folder()?;
         let mut seals = Seals::default();
         for number in 0..self.cases {
-            let content = text(&tracktwin_trial::plan(self.seed, number).scene);
+            let content = text(&plan(self.seed, number));
             seals.seal(&sealed(number), content.as_bytes());
             let truth = self.folder.join(sealed(number));
             if !truth.try_exists().map_err(|source| file(&truth, source))? {
@@ -280,7 +298,9 @@ impl Trial {
     }
 
     fn sum_up(&self, scores: &[CaseScore]) -> Result<Summary, TrialError> {
-        let summary = Summary::new(self.cases, scores);
+        let makings: Vec<Making> =
+            (0..self.cases).map(|number| plan(self.seed, number).making).collect();
+        let summary = Summary::new(&makings, scores);
         let line = |score| serde_json::to_string(score).expect("plain data is plain JSON") + "\n";
         let lines: String = scores.iter().map(line).collect();
         let tables = format!(
@@ -301,18 +321,19 @@ impl Trial {
     /// Makes sure that the folder's trial is this one.
     fn begin_folder(&self) -> Result<(), TrialError> {
         let path = self.folder.join(TERMS);
-        let terms = Terms { seed: self.seed, code_version: CODE_VERSION.to_owned() };
+        let code_version = CODE_VERSION.to_owned();
+        let terms = Terms { format: FORMAT, seed: self.seed, code_version };
         let Some(content) = read_if_there(&path)? else { return write(&path, &terms) };
         let known: Terms = serde_json::from_slice(&content)
             .map_err(|source| TrialError::Json { path: path.display().to_string(), source })?;
         if known == terms {
             return Ok(());
         }
-        Err(TrialError::Other {
-            folder: self.folder.display().to_string(),
-            seed: known.seed,
-            version: known.code_version,
-        })
+        let folder = self.folder.display().to_string();
+        if known.format != FORMAT {
+            return Err(TrialError::OtherFormat { folder, format: known.format });
+        }
+        Err(TrialError::Other { folder, seed: known.seed, version: known.code_version })
     }
 
     /// Writes the seals down, or makes sure that they are those that were; gives their digest.

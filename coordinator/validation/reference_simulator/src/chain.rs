@@ -3,7 +3,7 @@
 use crate::filter::halve_rate;
 use crate::hidden::Hidden;
 use crate::pass::Driven;
-use crate::scene::Chain;
+use crate::scene::{Chain, Scene};
 use crate::system::LinearSystem;
 use rand_chacha::ChaCha12Rng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
@@ -21,15 +21,14 @@ pub(crate) struct Measured {
     pub(crate) position_m: Vec<f64>,
 }
 
-/// What a chain with its faults records of pass number `pass` between two places in m.
+/// What a scene's chain with its faults records of pass number `pass`.
 pub(crate) fn measure(
-    chain: &Chain,
-    left_out: &[Hidden],
+    scene: &Scene,
     pass: usize,
     driven: &Driven,
-    [from_m, to_m]: [f64; 2],
     random: &mut ChaCha12Rng,
 ) -> Measured {
+    let Scene { left_out, chain, nuisances, recorded_m: [from_m, to_m], .. } = scene;
     let faults: Vec<&Hidden> = left_out.iter().filter(|hidden| concerns(hidden, pass)).collect();
     let felt = faults.iter().fold(driven.acceleration_m_s2.clone(), |felt, fault| match fault {
         Hidden::SensorMountResonance { frequency_hz, damping_ratio } => {
@@ -39,9 +38,14 @@ pub(crate) fn measure(
     });
     let step_s = 2.0 * driven.time_step_s;
     let positions: Vec<f64> = driven.position_m.iter().step_by(2).copied().collect();
-    let first = positions.partition_point(|&x_m| x_m < from_m);
-    let last = positions.partition_point(|&x_m| x_m <= to_m);
-    let mut samples = halve_rate(&felt)[first..last].to_vec();
+    let first = positions.partition_point(|&x_m| x_m < *from_m);
+    let last = positions.partition_point(|&x_m| x_m <= *to_m);
+    let mut samples = halve_rate(&felt);
+    if let Some(response) = nuisances.response {
+        samples = response.of(&samples, step_s);
+    }
+    let mut samples = samples[first..last].to_vec();
+    nuisances.add_slow_noise(&mut samples, step_s, random);
     record(chain, &faults, &mut samples, step_s, random);
     let mut position_m = positions[first..last].to_vec();
     wander(chain.wander_m, &mut position_m, random);
@@ -144,6 +148,7 @@ pub(crate) fn turn(random: &mut ChaCha12Rng) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::testing::NOMINAL;
     use rand_chacha::rand_core::SeedableRng;
 
     fn random() -> ChaCha12Rng {
@@ -161,8 +166,13 @@ mod tests {
         }
     }
 
+    fn scene(chain: Chain, left_out: &[Hidden]) -> Scene {
+        let left_out = left_out.to_vec();
+        Scene { chain, left_out, recorded_m: [1.1, 1.6], ..Scene::uniform(20, NOMINAL) }
+    }
+
     fn measured(left_out: &[Hidden], pass: usize, value: impl Fn(f64) -> f64) -> Measured {
-        measure(&Chain::ideal(), left_out, pass, &driven(value), [1.1, 1.6], &mut random())
+        measure(&scene(Chain::ideal(), left_out), pass, &driven(value), &mut random())
     }
 
     fn rms(values: &[f64]) -> f64 {
@@ -223,7 +233,7 @@ mod tests {
     #[test]
     fn noise_steps_and_wander_are_as_large_as_the_chain_says() {
         let chain = Chain::default();
-        let record = measure(&chain, &[], 0, &driven(|_| 0.0), [1.1, 1.6], &mut random());
+        let record = measure(&scene(chain, &[]), 0, &driven(|_| 0.0), &mut random());
         let samples = &record.acceleration_m_s2;
         assert!((rms(samples) / 0.05 - 1.0).abs() < 0.03);
         assert!(samples.iter().all(|value| (value / 0.005 - (value / 0.005).round()).abs() < 1e-6));

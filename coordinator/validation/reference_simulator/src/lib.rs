@@ -6,11 +6,13 @@
 //! diagnosis finds what is hidden is left to those who diagnose. Method and checks:
 //! `docs/reference-simulator.md`.
 
+mod assumptions;
 mod chain;
 mod contact;
 mod error;
 mod filter;
 mod hidden;
+mod nuisances;
 mod pass;
 mod pass_state;
 mod port;
@@ -31,8 +33,10 @@ mod typical;
 mod vehicle;
 mod vtrack;
 
+pub use assumptions::{Assumptions, JointDip, SquatHollow, Void, Waves};
 pub use error::TruthError;
 pub use hidden::Hidden;
+pub use nuisances::{Nuisances, Response, WheelOrder};
 pub use pass::{Drive, Driven, drive};
 pub use receptance::receptance;
 pub use record::{record, simulate};

@@ -1,10 +1,10 @@
 //! One pass of the wheel: from rest at its start to its end.
 
+use crate::TruthError;
 use crate::pass_state::PassState;
 use crate::scene::Scene;
 use crate::surface::{WheelAngle, shapes};
 use crate::track::Track;
-use crate::{Hidden, TruthError};
 use std::f64::consts::PI;
 
 /// Time in s over which the surface grows from nothing, so that the wheel begins without a jump.
@@ -47,19 +47,19 @@ pub fn drive(
     height_m: impl Fn(f64) -> f64,
 ) -> Result<Driven, TruthError> {
     scene.check()?;
-    run(&Track::new(scene), &scene.left_out, drive, height_m)
+    run(&Track::new(scene), scene, drive, height_m)
 }
 
 /// The same over a track that is made already.
 pub(crate) fn run(
     track: &Track,
-    left_out: &[Hidden],
+    scene: &Scene,
     drive: &Drive,
     height_m: impl Fn(f64) -> f64,
 ) -> Result<Driven, TruthError> {
     let step_s = track.step_s;
     let steps = ((drive.end_m - drive.start_m) / (drive.speed_m_s * step_s)).floor() as usize;
-    let felt = |x_m: f64| height_m(x_m) + shapes(left_out, drive.angle, x_m);
+    let felt = |x_m: f64| height_m(x_m) + shapes(scene, drive.angle, x_m);
     let first_m = felt(drive.start_m);
     let mut state = PassState::at_rest(track, drive.start_m);
     let mut driven = Driven {

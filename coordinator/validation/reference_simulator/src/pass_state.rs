@@ -2,7 +2,6 @@
 //!
 //! Owns the order in which a step is solved; what the ports do is `ports`'.
 
-use crate::contact;
 use crate::ports::PortState;
 use crate::rail_state::RailState;
 use crate::rest::Rest;
@@ -39,7 +38,7 @@ impl<'a> PassState<'a> {
         let rest = Rest::under_wheel(track, x_m);
         let ports = PortState::at_rest(track, &rest, x_m);
         let states = track.vehicle.contact.len();
-        let wheel_m = rest.wheel_m();
+        let wheel_m = rest.wheel_m;
         let gain = track.vehicle.system.gain(0);
         Self {
             track,
@@ -86,7 +85,7 @@ impl<'a> PassState<'a> {
         let rail_m = modes_m - self.ports.beside_wheel();
         let overlap_m = self.wheel_m + dot(&vehicle.contact, next) - rail_m - height_m;
         let compliance = self.given + given + self.track.local;
-        let force_n = contact::force(overlap_m, compliance)?;
+        let force_n = self.track.contact.force(overlap_m, compliance)?;
         vehicle.system.push(0, force_n, next);
         self.vehicle.swap(0, 1);
         Some(force_n)

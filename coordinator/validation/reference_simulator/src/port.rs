@@ -13,7 +13,10 @@ const REACH_M: f64 = 0.25;
 /// Terms of its sum over kept modes.
 const TERMS: usize = 30;
 
-/// Force of a port by its compression `y`: `k y + c y'`, more with a branch or a load's law.
+/// Most branches of a port.
+pub(crate) const BRANCHES: usize = 3;
+
+/// Force of a port by its compression `y`: `k y + c y'`, more with branches or a load's law.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Law {
     /// `k` in N/m and `c` in N s/m, for a rotation N m/rad and N m s/rad.
@@ -21,8 +24,8 @@ pub(crate) struct Law {
     pub(crate) damping: f64,
     /// Static flexibility in m/N of rail and sleeper at the port that their modes leave out.
     pub(crate) residual: f64,
-    /// A spring and a damper in series beside it.
-    pub(crate) branch: Option<Branch>,
+    /// Springs and dampers in series beside it: two of a hidden effect, one of the nuisances.
+    pub(crate) branches: [Branch; BRANCHES],
     /// A stiffness that grows with the load.
     pub(crate) power: Option<PowerLaw>,
     /// Whether it carries nothing at rest.
@@ -31,8 +34,11 @@ pub(crate) struct Law {
 
 /// A Maxwell branch of stiffness `k_1` and relaxation time `tau`, exact where `y` is linear over a
 /// step `h`: `s_1 = e s_0 + g (y_1 - y_0)`, `e = exp(-h / tau)`, `g = k_1 tau (1 - e) / h`.
-#[derive(Clone, Copy, Debug)]
+/// The default is none.
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Branch {
+    pub(crate) stiffness: f64,
+    pub(crate) relaxation_time_s: f64,
     pub(crate) kept: f64,
     pub(crate) gain: f64,
 }
@@ -40,7 +46,20 @@ pub(crate) struct Branch {
 impl Branch {
     pub(crate) fn new(stiffness: f64, relaxation_time_s: f64, step_s: f64) -> Self {
         let kept = (-step_s / relaxation_time_s).exp();
-        Self { kept, gain: stiffness * relaxation_time_s * (1.0 - kept) / step_s }
+        let gain = stiffness * relaxation_time_s * (1.0 - kept) / step_s;
+        Self { stiffness, relaxation_time_s, kept, gain }
+    }
+}
+
+impl Law {
+    /// Whether its force follows from more than compression and rate at the moment.
+    pub(crate) fn has_memory(&self) -> bool {
+        self.power.is_some() || self.gain() > 0.0
+    }
+
+    /// What all branches add to the stiffness within a step, in N/m.
+    pub(crate) fn gain(&self) -> f64 {
+        self.branches.iter().map(|branch| branch.gain).sum()
     }
 }
 

@@ -1,6 +1,6 @@
 //! The forces of all ports during a step: railpads, clamps, joints and absorbers.
 
-use crate::port::Behind;
+use crate::port::{BRANCHES, Behind, Law};
 use crate::rail_state::RailState;
 use crate::rest::Rest;
 use crate::system::dot;
@@ -38,8 +38,8 @@ pub(crate) struct PortState {
 struct Follow {
     /// In m, now and a step before.
     compressions: [Vec<f64>; 2],
-    /// Force of the Maxwell branches in N.
-    branches: Vec<f64>,
+    /// Forces of the Maxwell branches in N.
+    branches: Vec<[f64; BRANCHES]>,
 }
 
 impl PortState {
@@ -56,7 +56,7 @@ impl PortState {
             forces
         };
         let pushes: Vec<Vec<f64>> = (0..ports).map(inputs).collect();
-        let follows = track.laws.iter().any(|law| law.branch.is_some() || law.power.is_some());
+        let follows = track.laws.iter().any(Law::has_memory);
         let mut state = Self {
             forces: rest.forces.clone(),
             earlier: pushes.iter().map(|forces| vec![0.0; forces.len()]).collect(),
@@ -65,7 +65,7 @@ impl PortState {
             links: [vec![0.0; track.seats()], vec![0.0; track.seats()]],
             follow: follows.then(|| Follow {
                 compressions: [rest.compressions.clone(), rest.compressions.clone()],
-                branches: vec![0.0; ports],
+                branches: vec![[0.0; BRANCHES]; ports],
             }),
             lines: vec![0.0; ports],
             beside_m: vec![0.0; ports],
@@ -124,9 +124,8 @@ impl PortState {
         let mut force = law.stiffness * compression + law.damping * rate;
         if let Some(follow) = &self.follow {
             let [now, before] = [&follow.compressions[0], &follow.compressions[1]];
-            if let Some(branch) = law.branch {
-                force +=
-                    branch.gain * (compression - now[port]) + branch.kept * follow.branches[port];
+            for (branch, held_n) in law.branches.iter().zip(&follow.branches[port]) {
+                force += branch.gain * (compression - now[port]) + branch.kept * held_n;
             }
             if let Some(power) = law.power {
                 let next = 2.0 * now[port] - before[port];
@@ -267,9 +266,9 @@ impl PortState {
             let law = &track.laws[port];
             let given = law.residual * self.forces[port];
             let now = self.rail[0][port] - behind + self.beside_m[port] - given;
-            if let Some(branch) = law.branch {
-                let change = now - follow.compressions[1][port];
-                follow.branches[port] = branch.kept * follow.branches[port] + branch.gain * change;
+            let change = now - follow.compressions[1][port];
+            for (branch, held_n) in law.branches.iter().zip(&mut follow.branches[port]) {
+                *held_n = branch.kept * *held_n + branch.gain * change;
             }
             follow.compressions[0][port] = now;
         }

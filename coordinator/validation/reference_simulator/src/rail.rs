@@ -7,8 +7,6 @@ use crate::vtrack::{
 };
 use std::f64::consts::PI;
 
-/// Modal damping over critical damping: half a structural loss factor of 0.2 %, that of steel.
-pub(crate) const DAMPING_RATIO: f64 = 1e-3;
 /// Distance in m beyond which the cut modes say nothing that matters, and over which they fade.
 const REACH_M: f64 = 0.25;
 const FADE_M: f64 = 0.05;
@@ -114,11 +112,11 @@ impl RailModes {
         terms.map(|((mass, own), (a, b))| a * b / (mass * (own * own - omega * omega))).sum()
     }
 
-    /// One oscillator a mode.
-    pub(crate) fn oscillators(&self, step_s: f64) -> Vec<LinearSystem> {
+    /// One oscillator a mode, by its damping over critical damping and the time step in s.
+    pub(crate) fn oscillators(&self, damping_ratio: f64, step_s: f64) -> Vec<LinearSystem> {
         let modes = self.masses.iter().zip(&self.frequencies);
         let oscillator = |(&mass, &omega): (&f64, &f64)| {
-            let damping = 2.0 * DAMPING_RATIO * mass * omega;
+            let damping = 2.0 * damping_ratio * mass * omega;
             LinearSystem::oscillator(mass, damping, mass * omega * omega, step_s)
         };
         modes.map(oscillator).collect()

@@ -1,9 +1,9 @@
 //! What a hammer test measures: receptances of the track without a wheel.
 
 use crate::hidden::Hidden;
-use crate::rail::{DAMPING_RATIO, RailModes};
+use crate::rail::RailModes;
 use crate::sleeper::SleeperModes;
-use crate::track::{MODES_PER_SPAN, STEP_S, bed, concerns, railpad, seat_m};
+use crate::track::{STEP_S, bed, railpad, seat_m};
 use crate::{Scene, TruthError};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::BTreeMap;
@@ -105,11 +105,12 @@ fn free(gains: &[Complex<f64>], a: &[f64], b: &[f64], residual: f64) -> Complex<
 
 impl<'a> Struck<'a> {
     fn new(scene: &'a Scene, places_m: &[f64]) -> Self {
-        let rail = RailModes::new(scene.length_m(), MODES_PER_SPAN * scene.spans);
+        let rail = RailModes::new(scene.length_m(), scene.assumptions.modes_per_span * scene.spans);
         let mut modes = BTreeMap::new();
         for (index, truth) in scene.sleepers.iter().enumerate() {
             let (_, crack) = bed(scene, index, truth);
-            modes.entry(crack.to_bits()).or_insert_with(|| SleeperModes::new(crack));
+            let made = || SleeperModes::new(crack, scene.nuisances.sleeper_mass_factor);
+            modes.entry(crack.to_bits()).or_insert_with(made);
         }
         let seats = scene.sleepers.len();
         let apart_m = |seats: usize| seat_m(seats) - seat_m(0);
@@ -165,7 +166,7 @@ impl<'a> Struck<'a> {
     fn gains(&self, omega: f64) -> Vec<Complex<f64>> {
         let modes = self.rail.frequencies.iter().zip(&self.rail.masses);
         let gain = |(own, mass): (&f64, &f64)| {
-            let damping = 2.0 * DAMPING_RATIO * own * omega;
+            let damping = 2.0 * self.scene.assumptions.steel_damping_ratio * own * omega;
             (Complex::new(own * own - omega * omega, damping) * *mass).inv()
         };
         modes.map(gain).collect()
@@ -177,12 +178,9 @@ impl<'a> Struck<'a> {
         let law = railpad(self.scene, seat, STEP_S);
         let softer = law.power.map_or(1.0, |it| (it.toe_n / it.nominal_n).powf(it.exponent));
         let mut stiffness = Complex::new(softer * law.stiffness, omega * law.damping);
-        for hidden in self.scene.left_out.iter().filter(|hidden| concerns(hidden, seat)) {
-            if let Hidden::FrequencyDependentRailpad { stiffness_ratio, relaxation_time_s } = hidden
-            {
-                let turn = Complex::new(0.0, omega * relaxation_time_s);
-                stiffness += turn / (turn + 1.0) * (stiffness_ratio * law.stiffness);
-            }
+        for branch in &law.branches {
+            let turn = Complex::new(0.0, omega * branch.relaxation_time_s);
+            stiffness += turn / (turn + 1.0) * branch.stiffness;
         }
         stiffness.inv() + self.modes[&crack.to_bits()].seat_receptance(&bed, omega)
     }

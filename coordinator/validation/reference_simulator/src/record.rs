@@ -76,9 +76,8 @@ fn one_pass(
     };
     let own = irregularity(scene, 2 * number as u64 + 1);
     let surface = shared.blend(&own, scene.chain.unrepeated);
-    let driven = pass::run(track, &scene.left_out, &drive, |x_m| surface.height(x_m))?;
-    let measured =
-        measure(&scene.chain, &scene.left_out, number, &driven, scene.recorded_m, &mut random);
+    let driven = pass::run(track, scene, &drive, |x_m| surface.height(x_m))?;
+    let measured = measure(scene, number, &driven, &mut random);
     let signal = Signal::new(measured.sample_rate_hz, measured.acceleration_m_s2)
         .expect("a pass whose forces are finite is");
     Ok(Pass {
@@ -97,7 +96,8 @@ const BAND_STREAMS: u64 = 1 << 32;
 fn irregularity(scene: &Scene, number: u64) -> Irregularity {
     let drawn = |waves_m, stream_number| {
         let random = &mut stream(scene, stream_number);
-        Irregularity::draw(scene.irregularity_level, scene.length_m(), waves_m, random)
+        let (level, nuisances) = (scene.irregularity_level, &scene.nuisances);
+        Irregularity::draw(level, scene.length_m(), waves_m, nuisances, random)
     };
     let everywhere = drawn(WAVES_M, number);
     if scene.rough_rails.is_empty() {
@@ -152,7 +152,7 @@ fn nominal() -> Map<String, Value> {
 mod tests {
     use super::*;
     use crate::scene::testing::NOMINAL;
-    use crate::{Chain, Hidden, PassPlan};
+    use crate::{Assumptions, Chain, Hidden, Nuisances, PassPlan, Response, WheelOrder};
 
     fn short() -> Scene {
         let passes = [13.0, 13.0, 10.0].map(|speed_km_h| PassPlan { speed_km_h }).into();
@@ -184,6 +184,36 @@ mod tests {
         assert_eq!(names, expected);
         let manifest = std::fs::read_to_string(folder.path().join("recording.json")).unwrap();
         assert!(!manifest.contains("bolt") && !manifest.contains("seed"));
+    }
+
+    #[test]
+    fn nuisances_and_other_assumptions_change_a_recording_little() {
+        let mut varied = short();
+        varied.assumptions = Assumptions {
+            modes_per_span: 8,
+            steel_damping_ratio: 2e-3,
+            relaxation_branches: 2,
+            ..Assumptions::default()
+        };
+        varied.nuisances = Nuisances {
+            railpad_exponent: 0.15,
+            railpad_relaxation: 0.15,
+            patch_half_length_m: 5e-5,
+            wheel_orders: [WheelOrder { amplitude_m: 2e-6, angle_rad: 1.0 }; 4],
+            response: Some(Response { ripple: 0.03, period_hz: 8e3 }),
+            slow_noise_m_s2: 0.1,
+            wheel_mass_factor: 0.98,
+            contact_factor: 1.02,
+            sleeper_mass_factor: 1.02,
+            ..Nuisances::default()
+        };
+        let rms = |scene: &Scene| {
+            let samples = simulate(scene).unwrap().passes.remove(0).signal.samples().to_vec();
+            let power: f64 = samples.iter().map(|value| value * value).sum();
+            (power / samples.len() as f64).sqrt()
+        };
+        let [plain, varied] = [short(), varied].map(|scene| rms(&scene));
+        assert!(plain != varied && (varied / plain).ln().abs() < 0.15, "{plain} {varied}");
     }
 
     #[test]

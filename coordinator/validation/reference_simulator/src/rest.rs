@@ -1,6 +1,5 @@
 //! The track at rest under the standing wheel: where a pass begins.
 
-use crate::contact;
 use crate::track::Track;
 use crate::vtrack::WHEEL_LOAD_N;
 use nalgebra::{DMatrix, DVector};
@@ -17,8 +16,8 @@ pub(crate) struct Rest {
     /// Force of every port in N and its compression in m.
     pub(crate) forces: Vec<f64>,
     pub(crate) compressions: Vec<f64>,
-    /// Displacement of the contact point in m.
-    pub(crate) contact_m: f64,
+    /// Height of the wheel's centre in m.
+    pub(crate) wheel_m: f64,
 }
 
 impl Rest {
@@ -49,12 +48,8 @@ impl Rest {
         let modes: f64 = wheel.iter().zip(&amplitudes).map(|(shape, q)| shape * q).sum();
         let others: f64 = beside.iter().zip(&forces).map(|(line, p)| line * p).sum();
         let contact_m = modes + WHEEL_LOAD_N * rail.residual_flexibility(0.0) - others;
-        Self { amplitudes, loads, forces, compressions, contact_m }
-    }
-
-    /// Where the wheel's centre stands, in m, above which the rail is at `contact_m`.
-    pub(crate) fn wheel_m(&self) -> f64 {
-        self.contact_m + contact::approach(WHEEL_LOAD_N)
+        let wheel_m = contact_m + track.contact.approach(WHEEL_LOAD_N);
+        Self { amplitudes, loads, forces, compressions, wheel_m }
     }
 }
 

@@ -53,6 +53,7 @@ fn share([from_m, to_m]: [f64; 2], x_m: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::nuisances::Nuisances;
     use crate::surface::{WAVES_M, density};
     use rand_chacha::ChaCha12Rng;
     use rand_chacha::rand_core::SeedableRng;
@@ -62,7 +63,8 @@ mod tests {
 
     fn surface(seed: u64) -> Irregularity {
         let drawn = |waves_m, seed| {
-            Irregularity::draw(2.0, 4.0, waves_m, &mut ChaCha12Rng::seed_from_u64(seed))
+            let random = &mut ChaCha12Rng::seed_from_u64(seed);
+            Irregularity::draw(2.0, 4.0, waves_m, &Nuisances::default(), random)
         };
         drawn(WAVES_M, seed).roughened(&[RAIL], &drawn(BAND_M, seed + 1000))
     }

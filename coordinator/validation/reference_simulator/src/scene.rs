@@ -3,7 +3,9 @@
 //! Owns the plain data and its checks; drawing a scene is `typical`'s.
 
 use crate::TruthError;
+use crate::assumptions::Assumptions;
 use crate::hidden::Hidden;
+use crate::nuisances::Nuisances;
 use crate::vtrack::SPACING_M;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +44,12 @@ pub struct Scene {
     pub left_out: Vec<Hidden>,
     /// How it is measured.
     pub chain: Chain,
+    /// What the simulation assumes of effects, steel and modes.
+    #[serde(default, skip_serializing_if = "Assumptions::are_usual")]
+    pub assumptions: Assumptions,
+    /// Small things that are no hidden effects.
+    #[serde(default, skip_serializing_if = "Nuisances::are_none")]
+    pub nuisances: Nuisances,
 }
 
 /// One sleeper with its railpad and its ballast.
@@ -138,6 +146,8 @@ impl Scene {
             recorded_m: [6.0 * SPACING_M, length_m - 6.0 * SPACING_M],
             left_out: Vec::new(),
             chain: Chain::ideal(),
+            assumptions: Assumptions::default(),
+            nuisances: Nuisances::default(),
         }
     }
 
@@ -179,6 +189,8 @@ impl Scene {
             positive("rough_rails.x_m[1] - x_m[0]", rail.x_m[1] - rail.x_m[0])?;
         }
         self.chain.check()?;
+        self.assumptions.check()?;
+        self.nuisances.check()?;
         self.left_out.iter().try_for_each(|hidden| self.check_place(hidden))
     }
 
@@ -218,14 +230,14 @@ impl Chain {
     }
 }
 
-fn positive(field: &'static str, value: f64) -> Result<(), TruthError> {
+pub(crate) fn positive(field: &'static str, value: f64) -> Result<(), TruthError> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
     Err(TruthError::Value { field, value, form: "a positive number" })
 }
 
-fn not_negative(field: &'static str, value: f64) -> Result<(), TruthError> {
+pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<(), TruthError> {
     if value.is_finite() && value >= 0.0 {
         return Ok(());
     }
@@ -254,6 +266,13 @@ mod tests {
         let scene = Scene::uniform(20, NOMINAL);
         let text = serde_json::to_string(&scene).unwrap();
         assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), scene);
+        // A scene of an earlier program is the same file.
+        assert!(!text.contains("assumptions") && !text.contains("nuisances"), "{text}");
+        let assumptions = Assumptions { modes_per_span: 8, ..Assumptions::default() };
+        let nuisances = Nuisances { contact_factor: 1.01, ..Nuisances::default() };
+        let other = Scene { assumptions, nuisances, ..scene };
+        let text = serde_json::to_string(&other).unwrap();
+        assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), other);
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! The surface that the wheel feels: random irregularity, and the shapes that are hidden.
 
+use crate::assumptions::{Assumptions, SquatHollow};
 use crate::hidden::Hidden;
+use crate::nuisances::Nuisances;
+use crate::scene::Scene;
 use crate::vtrack::WHEEL_RADIUS_M;
 use rand_chacha::ChaCha12Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -39,11 +42,12 @@ pub(crate) fn density(wave_number: f64) -> f64 {
 impl Irregularity {
     /// Filtered noise with the spectrum of eq. B.6 at a level, on at least `length_m`, of the waves
     /// `waves_m` from the shortest to the longest: every harmonic has a Gaussian sine and cosine, so
-    /// that its power is random too.
+    /// that its power is random too. The contact patch of `nuisances` averages it.
     pub(crate) fn draw(
         level: f64,
         length_m: f64,
         waves_m: [f64; 2],
+        nuisances: &Nuisances,
         random: &mut ChaCha12Rng,
     ) -> Self {
         let step_m = SHORTEST_M / KNOTS_PER_WAVE;
@@ -56,7 +60,8 @@ impl Irregularity {
             let [cosine, sine]: [f64; 2] = [0; 2].map(|_| StandardNormal.sample(random));
             if (TAU / waves_m[1]..=TAU / waves_m[0]).contains(&wave_number) {
                 // The inverse transform adds the mirrored half: twice the real part.
-                let amplitude = 0.5 * (level * density(wave_number) * first).sqrt();
+                let amplitude = nuisances.patch(wave_number)
+                    * (0.5 * (level * density(wave_number) * first).sqrt());
                 heights[index] = amplitude * Complex64::new(cosine, sine);
                 slopes[index] = heights[index] * Complex64::new(0.0, wave_number);
             }
@@ -103,29 +108,32 @@ pub struct WheelAngle {
     pub rolled_m: f64,
 }
 
-/// Height in m, positive downwards, that hidden effects add at a place under a wheel.
-pub(crate) fn shapes(left_out: &[Hidden], angle: WheelAngle, x_m: f64) -> f64 {
-    left_out.iter().map(|hidden| shape(hidden, angle, x_m)).sum()
+/// Height in m, positive downwards, that hidden effects and the wheel's orders add at a place.
+pub(crate) fn shapes(scene: &Scene, angle: WheelAngle, x_m: f64) -> f64 {
+    let rolled_m = x_m + angle.rolled_m;
+    let hidden = scene.left_out.iter();
+    let hidden: f64 = hidden.map(|it| shape(it, &scene.assumptions, rolled_m, x_m)).sum();
+    hidden + scene.nuisances.wheel_m(rolled_m)
 }
 
-fn shape(hidden: &Hidden, angle: WheelAngle, x_m: f64) -> f64 {
-    let rolled_m = x_m + angle.rolled_m;
+fn shape(hidden: &Hidden, assumptions: &Assumptions, rolled_m: f64, x_m: f64) -> f64 {
     match hidden {
         Hidden::RailJoint { x_m: place, dip_m, length_m, .. } => {
-            dip_m * (-(x_m - middle(*place)).abs() / length_m).exp()
+            dip_m * assumptions.joint.at(x_m - middle(*place), *length_m)
         }
         Hidden::Squat { x_m: place, depth_m, length_m } => {
-            hollow(x_m - middle(*place), *depth_m, *length_m)
+            depth_m * assumptions.squat.at((x_m - middle(*place)) / length_m)
         }
         Hidden::Corrugation { x_m: stretch, wavelength_m, amplitude_m } => {
             let inside = (x_m - stretch[0]).min(stretch[1] - x_m) / (FADE_WAVES * wavelength_m);
             let fade = 0.5 * (1.0 - (PI * inside.clamp(0.0, 1.0)).cos());
-            fade * amplitude_m * (TAU * x_m / wavelength_m).sin()
+            fade * amplitude_m * assumptions.corrugation.at(x_m, *stretch, *wavelength_m)
         }
         Hidden::WheelFlat { length_m } => {
             let turn = TAU * WHEEL_RADIUS_M;
             let from_flat = (rolled_m + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
-            hollow(from_flat, length_m * length_m / (16.0 * WHEEL_RADIUS_M), *length_m)
+            let depth_m = length_m * length_m / (16.0 * WHEEL_RADIUS_M);
+            depth_m * SquatHollow::Cosine.at(from_flat / length_m)
         }
         Hidden::WheelOutOfRound { order, amplitude_m } => {
             amplitude_m * (f64::from(*order) * rolled_m / WHEEL_RADIUS_M).cos()
@@ -138,19 +146,20 @@ fn middle(place: [f64; 2]) -> f64 {
     0.5 * (place[0] + place[1])
 }
 
-/// `d/2 (1 + cos 2 pi s / l)` within half the length on both sides.
-fn hollow(from_middle_m: f64, depth_m: f64, length_m: f64) -> f64 {
-    let place = from_middle_m / length_m;
-    if place.abs() < 0.5 { 0.5 * depth_m * (1.0 + (TAU * place).cos()) } else { 0.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::testing::NOMINAL;
     use rand_chacha::rand_core::SeedableRng;
 
     fn drawn(seed: u64) -> Irregularity {
-        Irregularity::draw(3.0, 5.0, WAVES_M, &mut ChaCha12Rng::seed_from_u64(seed))
+        Irregularity::draw(
+            3.0,
+            5.0,
+            WAVES_M,
+            &Nuisances::default(),
+            &mut ChaCha12Rng::seed_from_u64(seed),
+        )
     }
 
     #[test]
@@ -199,7 +208,8 @@ mod tests {
     #[test]
     fn hidden_shapes_are_those_of_the_catalogue() {
         let at = |hidden: &Hidden, x_m: f64, rolled_m: f64| {
-            shapes(std::slice::from_ref(hidden), WheelAngle { rolled_m }, x_m)
+            let scene = Scene { left_out: vec![hidden.clone()], ..Scene::uniform(40, NOMINAL) };
+            shapes(&scene, WheelAngle { rolled_m }, x_m)
         };
         let joint = Hidden::RailJoint {
             x_m: [2.0, 2.0],
@@ -221,7 +231,22 @@ mod tests {
         assert!((at(&flat, turn, 0.0) / depth - 1.0).abs() < 1e-9);
         assert!((at(&flat, 0.5 * turn, 0.5 * turn) / depth - 1.0).abs() < 1e-9);
         assert_eq!(at(&flat, 0.5 * turn, 0.0), 0.0);
+        let round = Scene::uniform(40, NOMINAL);
+        assert_eq!(shapes(&round, WheelAngle::default(), 2.0), 0.0);
         let oval = Hidden::WheelOutOfRound { order: 2, amplitude_m: 1e-6 };
         assert!((at(&oval, 0.25 * turn, 0.0) + 1e-6).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_scene_has_the_shapes_that_it_assumes_and_the_orders_of_its_wheel() {
+        let squat = Hidden::Squat { x_m: [2.0, 2.0], depth_m: 2e-5, length_m: 6e-3 };
+        let mut scene = Scene { left_out: vec![squat], ..Scene::uniform(40, NOMINAL) };
+        scene.assumptions.squat = SquatHollow::Gaussian;
+        let at = |scene: &Scene, rolled_m: f64| shapes(scene, WheelAngle { rolled_m }, 2.003);
+        assert!((at(&scene, 0.0) - 2e-5 * (-PI).exp()).abs() < 1e-15);
+        scene.left_out.clear();
+        scene.nuisances.wheel_orders[0].amplitude_m = 1e-6;
+        let [one, opposite] = [0.0, 0.5 * TAU * WHEEL_RADIUS_M].map(|it| at(&scene, it));
+        assert!(one != 0.0 && (one + opposite).abs() < 1e-18);
     }
 }

@@ -1,20 +1,21 @@
 //! A scene's track and vehicle, ready to be driven over: modes, ports and how ports share forces.
 
+use crate::assumptions::Void;
+use crate::contact::Contact;
 use crate::hidden::Hidden;
-use crate::port::{Behind, Branch, Extra, Law, PowerLaw};
+use crate::nuisances::{REFERENCE_LOAD_N, TOE_LOAD_N};
+use crate::port::{BRANCHES, Behind, Branch, Extra, Law, PowerLaw};
 use crate::rail::RailModes;
 use crate::scene::{Scene, SleeperTruth};
 use crate::seats::SeatTransform;
 use crate::sleeper::{Bed, Sleeper, SleeperModes};
 use crate::system::LinearSystem;
 use crate::vehicle::Vehicle;
-use crate::vtrack::SPACING_M;
+use crate::vtrack::{SPACING_M, WHEEL_MASS_KG};
 use nalgebra::DMatrix;
 
 /// Time step in s; forces are linear in between, everything else is exact.
 pub(crate) const STEP_S: f64 = 5e-6;
-/// Modes of the rail to a span: the shortest wave is 42 mm long, its frequency some 40 kHz.
-pub(crate) const MODES_PER_SPAN: usize = 6;
 /// Sum of a sleeper's and its crack's bending that still counts as none: a factor this near to one.
 const SOUND: f64 = 1.0;
 
@@ -35,6 +36,7 @@ pub(crate) struct Track {
     /// Inverse of what gives every port's force by its free motion, row by row.
     pub(crate) sharing: Vec<f64>,
     pub(crate) vehicle: Vehicle,
+    pub(crate) contact: Contact,
     /// Static flexibility in m/N of the rail under a force that its modes leave out.
     pub(crate) local: f64,
 }
@@ -69,12 +71,8 @@ impl Oscillators {
 impl Track {
     /// The track of a checked scene.
     pub(crate) fn new(scene: &Scene) -> Self {
-        Self::refined(scene, STEP_S, MODES_PER_SPAN)
-    }
-
-    /// The same with another time step in s and number of modes to a span.
-    pub(crate) fn refined(scene: &Scene, step_s: f64, modes_per_span: usize) -> Self {
-        let rail = RailModes::new(scene.length_m(), modes_per_span * scene.spans);
+        let (step_s, assumptions, nuisances) = (STEP_S, &scene.assumptions, &scene.nuisances);
+        let rail = RailModes::new(scene.length_m(), assumptions.modes_per_span * scene.spans);
         let sleepers = sleepers(scene, step_s);
         let seat = |(index, sleeper): (usize, &Sleeper)| {
             let residual = rail.residual_flexibility(0.0) + sleeper.residual;
@@ -89,14 +87,19 @@ impl Track {
         behind.extend(extras.iter().map(|extra| extra.behind.clone()));
         let mut track = Self {
             step_s,
-            steps: Oscillators::new(&rail.oscillators(step_s)),
+            steps: Oscillators::new(&rail.oscillators(assumptions.steel_damping_ratio, step_s)),
             transform: SeatTransform::new(scene.spans),
             laws,
             behind,
             extras,
             links: scene.left_out.iter().filter_map(link).collect(),
             sharing: Vec::new(),
-            vehicle: Vehicle::new(&scene.left_out, step_s),
+            vehicle: Vehicle::new(
+                &scene.left_out,
+                nuisances.wheel_mass_factor * WHEEL_MASS_KG,
+                step_s,
+            ),
+            contact: Contact::new(nuisances.contact_factor),
             local: rail.residual_flexibility(0.0),
             rail,
         };
@@ -133,7 +136,7 @@ impl Track {
         let mut matrix = DMatrix::identity(ports, ports);
         for row in 0..ports {
             let law = self.laws[row];
-            let stiffness = law.stiffness + law.branch.map_or(0.0, |branch| branch.gain);
+            let stiffness = law.stiffness + law.gain();
             for column in 0..ports {
                 let reach = |gains: &[f64]| -> f64 {
                     let terms = shapes[row].iter().zip(&shapes[column]).zip(gains);
@@ -167,14 +170,11 @@ pub(crate) fn seat_m(seat: usize) -> f64 {
 
 /// All sleepers of a scene.
 fn sleepers(scene: &Scene, step_s: f64) -> Vec<Sleeper> {
-    let sound = SleeperModes::new(SOUND);
+    let modes = |crack: f64| SleeperModes::new(crack, scene.nuisances.sleeper_mass_factor);
+    let sound = modes(SOUND);
     let sleeper = |(index, truth): (usize, &SleeperTruth)| {
         let (bed, crack) = bed(scene, index, truth);
-        if crack < SOUND {
-            SleeperModes::new(crack).on(&bed, step_s)
-        } else {
-            sound.on(&bed, step_s)
-        }
+        if crack < SOUND { modes(crack).on(&bed, step_s) } else { sound.on(&bed, step_s) }
     };
     scene.sleepers.iter().enumerate().map(sleeper).collect()
 }
@@ -183,6 +183,7 @@ fn sleepers(scene: &Scene, step_s: f64) -> Vec<Sleeper> {
 pub(crate) fn bed(scene: &Scene, index: usize, truth: &SleeperTruth) -> (Bed, f64) {
     let mut bed = Bed {
         bending: truth.sleeper_ei_n_m2,
+        steel_damping_ratio: scene.assumptions.steel_damping_ratio,
         stiffness: truth.ballast_stiffness_n_m,
         damping: scene.ballast_damping_n_s_m,
         ..Bed::default()
@@ -191,7 +192,11 @@ pub(crate) fn bed(scene: &Scene, index: usize, truth: &SleeperTruth) -> (Bed, f6
     for hidden in scene.left_out.iter().filter(|hidden| concerns(hidden, index)) {
         match hidden {
             Hidden::SleeperBolt { stiffness_n_per_m, .. } => bed.bolt += stiffness_n_per_m,
-            Hidden::HangingSleeper { gap_m, .. } => bed.gap_m = Some(*gap_m),
+            Hidden::HangingSleeper { gap_m, .. } => {
+                let Void { damping_share, stays_open } = scene.assumptions.void;
+                bed.gap_m = Some(if stays_open { f64::INFINITY } else { *gap_m });
+                bed.gap_damping_share = damping_share;
+            }
             Hidden::SubgradeLayer { mass_kg, stiffness_n_per_m, damping_n_s_per_m, .. } => {
                 bed.layer = Some([*mass_kg, *stiffness_n_per_m, *damping_n_s_per_m]);
             }
@@ -203,7 +208,7 @@ pub(crate) fn bed(scene: &Scene, index: usize, truth: &SleeperTruth) -> (Bed, f6
 }
 
 /// Whether an effect is at a sleeper: named, or everywhere.
-pub(crate) fn concerns(hidden: &Hidden, index: usize) -> bool {
+fn concerns(hidden: &Hidden, index: usize) -> bool {
     hidden.sleepers().is_none_or(|sleepers| sleepers.contains(&index))
 }
 
@@ -222,8 +227,10 @@ pub(crate) fn railpad(scene: &Scene, index: usize, step_s: f64) -> Law {
             }
             Hidden::FasteningClamp { vertical_n_per_m, .. } => law.stiffness += vertical_n_per_m,
             Hidden::FrequencyDependentRailpad { stiffness_ratio, relaxation_time_s } => {
-                let stiffness = stiffness_ratio * law.stiffness;
-                law.branch = Some(Branch::new(stiffness, *relaxation_time_s, step_s));
+                let all = scene.assumptions.branches(*stiffness_ratio, *relaxation_time_s);
+                for (branch, [ratio, time_s]) in law.branches.iter_mut().zip(all) {
+                    *branch = Branch::new(ratio * law.stiffness, time_s, step_s);
+                }
             }
             Hidden::LoadDependentRailpad { exponent, reference_load_n, toe_load_n } => {
                 law.power = Some(PowerLaw {
@@ -235,6 +242,20 @@ pub(crate) fn railpad(scene: &Scene, index: usize, step_s: f64) -> Law {
             }
             _ => {}
         }
+    }
+    let nuisances = &scene.nuisances;
+    if nuisances.railpad_relaxation > 0.0 {
+        let stiffness = nuisances.railpad_relaxation * law.stiffness;
+        let time_s = nuisances.railpad_relaxation_time_s;
+        law.branches[BRANCHES - 1] = Branch::new(stiffness, time_s, step_s);
+    }
+    if law.power.is_none() && nuisances.railpad_exponent > 0.0 {
+        law.power = Some(PowerLaw {
+            stiffness: law.stiffness,
+            exponent: nuisances.railpad_exponent,
+            toe_n: TOE_LOAD_N,
+            nominal_n: TOE_LOAD_N + REFERENCE_LOAD_N,
+        });
     }
     law
 }
@@ -268,5 +289,45 @@ fn link(hidden: &Hidden) -> Option<([usize; 2], f64)> {
             Some((*sleepers, *stiffness_n_per_m))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assumptions::Assumptions;
+    use crate::nuisances::Nuisances;
+    use crate::scene::testing::NOMINAL;
+
+    #[test]
+    fn nuisances_of_a_railpad_stand_beside_what_is_hidden_in_it() {
+        let hidden =
+            Hidden::FrequencyDependentRailpad { stiffness_ratio: 0.8, relaxation_time_s: 1e-4 };
+        let nuisances =
+            Nuisances { railpad_relaxation: 0.1, railpad_exponent: 0.1, ..Nuisances::default() };
+        let two = Assumptions { relaxation_branches: 2, ..Assumptions::default() };
+        let plain = Scene { left_out: vec![hidden], ..Scene::uniform(20, NOMINAL) };
+        let varied = Scene { assumptions: two, nuisances, ..plain.clone() };
+        let branches = |scene: &Scene| railpad(scene, 3, STEP_S).branches.map(|it| it.stiffness);
+        assert_eq!(branches(&plain), [0.8 * 1.5e8, 0.0, 0.0]);
+        assert_eq!(branches(&varied), [0.4 * 1.5e8, 0.4 * 1.5e8, 0.1 * 1.5e8]);
+        let power = |scene: &Scene| railpad(scene, 3, STEP_S).power.map(|it| it.exponent);
+        assert_eq!((power(&plain), power(&varied)), (None, Some(0.1)));
+    }
+
+    #[test]
+    fn a_void_that_stays_open_has_no_ballast_but_its_share_of_the_damping() {
+        let hidden = Hidden::HangingSleeper { sleepers: vec![5], gap_m: 1e-4 };
+        let void = Void { damping_share: 0.3, stays_open: true };
+        let plain = Scene { left_out: vec![hidden], ..Scene::uniform(20, NOMINAL) };
+        let open = Assumptions { void, ..Assumptions::default() };
+        let open = Scene { assumptions: open, ..plain.clone() };
+        let of = |scene: &Scene, index: usize| {
+            let (bed, _) = bed(scene, index, &NOMINAL);
+            (bed.gap_m, bed.gap_damping_share)
+        };
+        assert_eq!(of(&plain, 5), (Some(1e-4), 0.0));
+        assert_eq!(of(&open, 5), (Some(f64::INFINITY), 0.3));
+        assert_eq!(of(&open, 6), (None, 0.0));
     }
 }

@@ -1,5 +1,7 @@
 //! Tracks as they come: means inside the ranges of Table D1, scatter, now and then a trend or step.
 
+use crate::assumptions::Assumptions;
+use crate::nuisances::Nuisances;
 use crate::scene::{Chain, PassPlan, Scene, SleeperTruth};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -83,6 +85,8 @@ impl Scene {
             recorded_m: RECORDED_M,
             left_out: Vec::new(),
             chain: Chain::default(),
+            assumptions: Assumptions::default(),
+            nuisances: Nuisances::default(),
         }
     }
 }

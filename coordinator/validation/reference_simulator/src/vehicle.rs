@@ -2,7 +2,6 @@
 
 use crate::hidden::Hidden;
 use crate::system::LinearSystem;
-use crate::vtrack::WHEEL_MASS_KG;
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
@@ -35,8 +34,8 @@ impl Series {
 }
 
 impl Vehicle {
-    /// The wheel with what is hidden in it.
-    pub(crate) fn new(left_out: &[Hidden], step_s: f64) -> Self {
+    /// A wheel of a mass in kg with what is hidden in it.
+    pub(crate) fn new(left_out: &[Hidden], wheel_kg: f64, step_s: f64) -> Self {
         let series: Vec<Series> = left_out.iter().flat_map(series_of).collect();
         let axle_box = left_out.iter().find_map(|hidden| match hidden {
             Hidden::FlexibleAxleBox { mass_kg, stiffness_n_per_m, damping_n_s_per_m } => {
@@ -47,7 +46,7 @@ impl Vehicle {
         let dofs = 1 + series.len() + usize::from(axle_box.is_some());
         let [mut mass, mut damping, mut stiffness] = [0; 3].map(|_| DMatrix::zeros(dofs, dofs));
         let mut inputs = DMatrix::zeros(dofs, 1);
-        mass[(0, 0)] = WHEEL_MASS_KG;
+        mass[(0, 0)] = wheel_kg;
         inputs[(0, 0)] = -1.0;
         let mut contact = vec![0.0; dofs];
         contact[0] = 1.0;
@@ -96,12 +95,13 @@ fn series_of(hidden: &Hidden) -> Vec<Series> {
 mod tests {
     use super::*;
     use crate::system::dot;
+    use crate::vtrack::WHEEL_MASS_KG;
 
     const STEP_S: f64 = 5e-6;
 
     /// Amplitude of contact and sensor, over force, by driving the vehicle for long enough.
     fn driven(left_out: &[Hidden], frequency_hz: f64) -> [f64; 2] {
-        let vehicle = Vehicle::new(left_out, STEP_S);
+        let vehicle = Vehicle::new(left_out, WHEEL_MASS_KG, STEP_S);
         let mut state = vec![0.0; vehicle.contact.len()];
         let mut free = state.clone();
         let (omega, steps) = (TAU * frequency_hz, 40_000);

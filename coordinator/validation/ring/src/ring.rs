@@ -8,8 +8,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
 use tracktwin_reference_simulator::{
-    Chain, Hidden, PassPlan, RoughRail, SPACING_M, Scene, SleeperTruth as SceneSleeper, TruthError,
-    simulate,
+    Assumptions, Chain, Hidden, Nuisances, PassPlan, RoughRail, SPACING_M, Scene,
+    SleeperTruth as SceneSleeper, TruthError, simulate,
 };
 use tracktwin_signal::recording::Recording;
 
@@ -283,6 +283,8 @@ impl Ring {
             recorded_m: ends.map(|span| span as f64 * SPACING_M),
             left_out,
             chain: Chain::default(),
+            assumptions: Assumptions::default(),
+            nuisances: Nuisances::default(),
         }
     }
 

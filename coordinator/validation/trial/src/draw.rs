@@ -4,19 +4,26 @@
 
 use crate::class::Class;
 use crate::effect::{self, Draw};
+use crate::making::Making;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::Distribution;
 use rand_distr::uniform::Uniform;
+use serde::Serialize;
 use tracktwin_reference_simulator::Scene;
 
-/// A case of a trial.
-#[derive(Clone, Debug, PartialEq)]
+/// Format of what is hidden and scored. Trials of another format are other trials: 2 has makings.
+pub const FORMAT: u32 = 2;
+
+/// A case of a trial: what is sealed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// Number in the trial, from 0.
     pub number: u32,
     /// What kind of case it is.
     pub class: Class,
+    /// How it is made.
+    pub making: Making,
     /// Track, passes and what is hidden.
     pub scene: Scene,
 }
@@ -33,11 +40,15 @@ const SHARES: [(Class, usize); 5] = [
 /// Cases over which the shares hold.
 const BLOCK: u32 = 40;
 
+/// First streams of a block for the makings of its classes, and for what its cases add to them; those
+/// before are of classes, effects and tracks.
+const MAKINGS: u64 = 1 << 16;
+const NUISANCES: u64 = 1 << 17;
+
 /// The case of this number in the trial of this seed.
 pub fn plan(seed: u64, number: u32) -> Plan {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Streams of their own: a block's order, and each case.
-    rng.set_stream(u64::from(number / BLOCK) << 32);
+    let mut rng = stream(seed, number / BLOCK, 0);
     let classes = shuffled(blocks(), &mut rng);
     let class = classes[(number % BLOCK) as usize];
     let before = classes[..(number % BLOCK) as usize].iter().filter(|&&c| c == class).count();
@@ -49,7 +60,27 @@ pub fn plan(seed: u64, number: u32) -> Plan {
     let level = scene.irregularity_level;
     let mut draw = Draw { level, rng: &mut rng };
     scene.left_out = wanted.map(|effect| effect(&mut draw)).collect();
-    Plan { number, class, scene }
+    let making = makings(seed, number / BLOCK, class)[before];
+    let rng = &mut stream(seed, number / BLOCK, NUISANCES + u64::from(number % BLOCK));
+    making.complete(&mut scene, &mut Draw { level, rng });
+    Plan { number, class, making, scene }
+}
+
+/// The makings of a class's cases in a block, in their order: one as often as another, but for one
+/// case, and over all classes as well.
+fn makings(seed: u64, block: u32, class: Class) -> Vec<Making> {
+    let before = SHARES.iter().take_while(|(other, _)| *other != class);
+    let first = block as usize + before.map(|(_, count)| count).sum::<usize>();
+    let count = SHARES.iter().find(|(other, _)| *other == class).map_or(0, |(_, count)| *count);
+    let turns = (first..first + count).map(|turn| Making::ALL[turn % Making::ALL.len()]);
+    shuffled(turns.collect(), &mut stream(seed, block, MAKINGS + class as u64))
+}
+
+/// Random numbers of a block.
+fn stream(seed: u64, block: u32, number: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream((u64::from(block) << 32) + number);
+    rng
 }
 
 fn blocks() -> Vec<Class> {
@@ -92,6 +123,46 @@ mod tests {
         for (class, count) in SHARES {
             assert_eq!(first.iter().filter(|&&c| c == class).count(), count, "{class:?}");
         }
+    }
+
+    #[test]
+    fn every_making_has_its_share_of_every_class_in_a_block() {
+        for block in 0..3 {
+            let plans: Vec<Plan> = (0..BLOCK).map(|n| plan(1, block * BLOCK + n)).collect();
+            let count = |making: Making, is_of: &dyn Fn(Class) -> bool| {
+                plans.iter().filter(|it| it.making == making && is_of(it.class)).count()
+            };
+            for making in Making::ALL {
+                for (class, cases) in SHARES {
+                    let share = cases / Making::ALL.len();
+                    let found = count(making, &|other| other == class);
+                    assert!((share..=share + 1).contains(&found), "{making:?} {class:?}: {found}");
+                }
+                let share = BLOCK as usize / Making::ALL.len();
+                assert!((share..=share + 1).contains(&count(making, &|_| true)));
+            }
+        }
+    }
+
+    #[test]
+    fn a_plain_case_is_a_typical_track_and_any_other_has_nuisances() {
+        for number in 0..BLOCK {
+            let Plan { class, making, scene, .. } = plan(7, number);
+            let left_out = scene.left_out.clone();
+            let typical = Scene { left_out, ..Scene::typical(scene.seed) };
+            assert_eq!(scene == typical, making == Making::Plain, "{number}");
+            assert_eq!(scene.nuisances == typical.nuisances, making == Making::Plain);
+            assert_eq!(scene.left_out.is_empty(), class == Class::Control);
+        }
+    }
+
+    #[test]
+    fn what_is_sealed_says_how_the_case_was_made() {
+        let plan = plan(1, 0);
+        let sealed = serde_json::to_value(&plan).unwrap();
+        assert_eq!(sealed["making"], plan.making.name());
+        assert_eq!(sealed["class"], plan.class.name());
+        assert_eq!(sealed["scene"]["seed"], plan.scene.seed);
     }
 
     #[test]

@@ -76,13 +76,23 @@ pub(crate) struct Draw<'a> {
 
 impl Draw<'_> {
     /// Evenly between two values, the second one out.
-    fn uniform<T: SampleUniform + PartialOrd>(&mut self, from: T, to: T) -> T {
+    pub(crate) fn uniform<T: SampleUniform + PartialOrd>(&mut self, from: T, to: T) -> T {
         Uniform::new(from, to).expect("ranges here are not empty").sample(self.rng)
     }
 
     /// Evenly in the logarithm.
     fn log_uniform(&mut self, from: f64, to: f64) -> f64 {
         self.uniform(from.ln(), to.ln()).exp()
+    }
+
+    /// Evenly within a range.
+    pub(crate) fn within(&mut self, [from, to]: [f64; 2]) -> f64 {
+        self.uniform(from, to)
+    }
+
+    /// Evenly in the logarithm within a range.
+    pub(crate) fn log_within(&mut self, [from, to]: [f64; 2]) -> f64 {
+        self.log_uniform(from, to)
     }
 
     /// A point of the rail.

@@ -1,13 +1,15 @@
 //! Blind trials: recordings with hidden physics, diagnosed without the truth, then scored.
 //!
 //! Owns what is hidden ([`Plan`]), the seals ([`Seals`]) and the scores ([`CaseScore`], [`Summary`]).
-//! The recordings come from a simulator that shares no discretisation with the diagnosis; diagnosing
-//! and files belong to the command.
+//! The recordings come from simulators that share no discretisation with the diagnosis ([`Making`]);
+//! diagnosing and files belong to the command.
 
 mod class;
 mod draw;
 mod effect;
 mod known;
+mod making;
+mod measures;
 mod paper;
 mod place;
 mod rate;
@@ -15,10 +17,12 @@ mod score;
 mod seal;
 mod summary;
 mod table;
+mod varied;
 mod visible;
 
 pub use class::Class;
-pub use draw::{Plan, orders, plan};
+pub use draw::{FORMAT, Plan, orders, plan};
+pub use making::Making;
 pub use paper::Paper;
 pub use rate::Rate;
 pub use score::{Bias, CaseScore, KnockedOut, Named, Placed, placed, score};

@@ -36,15 +36,13 @@ pub(crate) fn near(scene: &Scene, x_m: f64) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
+pub(crate) mod testing {
     use std::collections::BTreeMap;
-    use tracktwin_diagnosis::Location;
+    use tracktwin_diagnosis::{Hypothesis, Location};
 
-    #[test]
-    fn a_right_name_at_a_wrong_place_is_wrong() {
-        let hidden = Hidden::Squat { x_m: [2.5, 2.5], depth_m: 2e-5, length_m: 6e-3 };
-        let squat_at = |x_m: Option<f64>| Hypothesis {
+    /// A squat at a place in m, or nowhere.
+    pub(crate) fn hypothesis(x_m: Option<f64>) -> Hypothesis {
+        Hypothesis {
             family: Some("rail_defect".to_owned()),
             family_probability: 0.9,
             physics: "squat".to_owned(),
@@ -58,9 +56,20 @@ mod tests {
             would_separate: String::new(),
             detectability: 0.0,
             log_evidence: 0.0,
-        };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::hypothesis;
+    use super::*;
+
+    #[test]
+    fn a_right_name_at_a_wrong_place_is_wrong() {
+        let hidden = Hidden::Squat { x_m: [2.5, 2.5], depth_m: 2e-5, length_m: 6e-3 };
         let places = [Some(2.5), Some(2.6), Some(2.7), Some(1.0), None];
-        let placed = places.map(|x_m| is_placed(&hidden, &squat_at(x_m)));
+        let placed = places.map(|x_m| is_placed(&hidden, &hypothesis(x_m)));
         assert_eq!(placed, [true, true, false, false, true]);
     }
 }

@@ -3,6 +3,7 @@
 use crate::class::Class;
 use crate::draw::Plan;
 use crate::known::{is_artefact, kind};
+use crate::making::Making;
 use crate::paper::Paper;
 use crate::place::{SPACING_M, is_placed, local, near};
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,9 @@ use tracktwin_reference_simulator::{Hidden, Scene};
 
 /// Probability that the set of answers must hold together.
 const SET: f64 = 0.9;
+
+/// Probability above which a wrong member of a family is a wrong statement.
+const CERTAIN: f64 = 0.9;
 
 /// Deviations of the null simulations above which a cell is visibly anomalous.
 const CELL_DEVIATIONS: f64 = 3.5;
@@ -23,6 +27,8 @@ pub struct CaseScore {
     pub number: u32,
     /// What kind of case it is.
     pub class: Class,
+    /// How it was made.
+    pub making: Making,
     /// Result of the diagnosis.
     pub verdict: Verdict,
     /// Names that it accepted.
@@ -31,6 +37,8 @@ pub struct CaseScore {
     pub hidden: Vec<Named>,
     /// Each probability that was given, and whether it was so.
     pub probabilities: Vec<(f64, bool)>,
+    /// Whether a kind of the catalogue was stated above 90 % that is not hidden there.
+    pub wrong_member: bool,
     /// Gain on the speeds held out in nats; none where nothing was accepted.
     pub held_out_gain_nats: Option<f64>,
     /// Errors of the stiffnesses next to the effect; none where nothing was hidden.
@@ -64,6 +72,7 @@ pub struct KnockedOut {
 
 /// Result of a hidden effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an answer to a question of its own")]
 pub struct Named {
     /// What it is.
     pub physics: String,
@@ -72,6 +81,8 @@ pub struct Named {
     pub detectability: Option<f64>,
     /// Whether it is the first name.
     pub first: bool,
+    /// Whether the first name is of its family; for what the catalogue lacks, `unknown_physics`.
+    pub family_first: bool,
     /// Whether it is in the set of names that hold 90 % together.
     pub in_set: bool,
     /// Whether it was accepted, at any rank.
@@ -146,10 +157,12 @@ pub fn score(
     CaseScore {
         number: plan.number,
         class: plan.class,
+        making: plan.making,
         verdict: diagnosis.verdict,
         accepted: accepted.iter().map(|hypothesis| hypothesis.physics.clone()).collect(),
         hidden: named.map(|(hidden, &d)| becomes(hidden, d, diagnosis, &accepted)).collect(),
         probabilities: probabilities(plan.class, left_out, diagnosis),
+        wrong_member: is_member_wrong(left_out, &diagnosis.hypotheses),
         held_out_gain_nats: (gains.len() > 0).then(|| gains.sum()),
         bias: bias(&plan.scene, diagnosis),
         parameters_inside: parameters_inside(diagnosis),
@@ -194,6 +207,7 @@ fn becomes(
         physics: hidden.physics().to_owned(),
         detectability,
         first: accepted.first().is_some_and(|first| is_it(first)),
+        family_first: accepted.first().is_some_and(|first| is_family(hidden, first)),
         in_set: set(&diagnosis.hypotheses).iter().any(is_it),
         accepted: accepted.iter().any(|hypothesis| is_it(hypothesis)),
         place,
@@ -203,6 +217,30 @@ fn becomes(
 /// Whether a name is right; for what the catalogue lacks it is "unknown".
 fn is_it(hidden: &Hidden, physics: &str) -> bool {
     physics == kind(hidden).map_or(UNKNOWN, |kind| kind.physics)
+}
+
+/// Whether a name is of the family of what is hidden; for what the catalogue lacks it is "unknown".
+fn is_family(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
+    match kind(hidden) {
+        Some(kind) => hypothesis.family.as_deref() == Some(kind.family.name()),
+        None => hypothesis.physics == UNKNOWN,
+    }
+}
+
+/// Whether something hidden has a hypothesis's name and place.
+fn is_there(left_out: &[Hidden], hypothesis: &Hypothesis) -> bool {
+    let is_so =
+        |hidden: &Hidden| is_it(hidden, &hypothesis.physics) && is_placed(hidden, hypothesis);
+    left_out.iter().any(is_so)
+}
+
+/// Whether a kind is as good as certain that is not hidden where it is said to be.
+fn is_member_wrong(left_out: &[Hidden], hypotheses: &[Hypothesis]) -> bool {
+    hypotheses.iter().any(|hypothesis| {
+        hypothesis.physics != UNKNOWN
+            && hypothesis.probability > CERTAIN
+            && !is_there(left_out, hypothesis)
+    })
 }
 
 /// The most probable names that hold 90 % of all probability together.
@@ -218,14 +256,9 @@ fn set(hypotheses: &[Hypothesis]) -> &[Hypothesis] {
 
 /// Every probability given, with whether it was so; that of nothing where nothing is said.
 fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Vec<(f64, bool)> {
-    let is_there = |hypothesis: &Hypothesis| {
-        let is_so =
-            |hidden: &Hidden| is_it(hidden, &hypothesis.physics) && is_placed(hidden, hypothesis);
-        left_out.iter().any(is_so)
-    };
     let given = diagnosis.hypotheses.iter();
     let mut all: Vec<_> =
-        given.map(|hypothesis| (hypothesis.probability, is_there(hypothesis))).collect();
+        given.map(|hypothesis| (hypothesis.probability, is_there(left_out, hypothesis))).collect();
     if diagnosis.verdict == Verdict::Consistent {
         all.push((diagnosis.nothing_left_out.unwrap_or(1.0), class == Class::Control));
     }
@@ -276,4 +309,40 @@ fn cells_inside(diagnosis: &Diagnosis) -> bool {
             cells.into_iter().all(|((m, b), sd)| sd.is_none_or(|sd| is_inside(*m, *b, sd)))
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::place::testing::hypothesis;
+
+    #[test]
+    fn another_member_of_the_family_is_wrong_only_where_it_is_certain() {
+        let joint = [Hidden::RailJoint {
+            x_m: [2.5, 2.5],
+            dip_m: 1e-4,
+            length_m: 0.02,
+            bending_factor: 0.3,
+            bending_length_m: 0.025,
+        }];
+        let said = |physics: &str, probability: f64, x_m: f64| Hypothesis {
+            physics: physics.to_owned(),
+            probability,
+            ..hypothesis(Some(x_m))
+        };
+        let wrong = |it: Hypothesis| is_member_wrong(&joint, &[it]);
+        assert!(wrong(said("squat", 0.95, 2.5)) && !wrong(said("squat", 0.85, 2.5)));
+        assert!(wrong(said("rail_joint", 0.95, 1.0)) && !wrong(said("rail_joint", 0.95, 2.5)));
+        assert!(!wrong(said(UNKNOWN, 0.95, 2.5)));
+        // Its family is right all the same.
+        assert!(is_family(&joint[0], &said("squat", 0.95, 2.5)));
+        let absorber = Hidden::RailAbsorber {
+            x_m: [2.5, 2.5],
+            mass_kg: 1.0,
+            frequency_hz: 900.0,
+            damping_ratio: 0.05,
+        };
+        assert!(!is_family(&absorber, &said("squat", 0.95, 2.5)));
+        assert!(is_family(&absorber, &said(UNKNOWN, 0.95, 2.5)));
+    }
 }

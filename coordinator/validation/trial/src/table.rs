@@ -1,5 +1,6 @@
 //! A trial's outcome as a page of Markdown.
 
+use crate::making::Making;
 use crate::rate::Rate;
 use crate::score::CaseScore;
 use crate::summary::{KindRow, MeasureRow, Summary};
@@ -8,14 +9,18 @@ use std::fmt::Write;
 impl Summary {
     /// The tables, with a line a case that did not come out as it should.
     pub fn to_markdown(&self, scores: &[CaseScore]) -> String {
-        let mut page = String::from("| measure | result | target | met |\n|---|---|---|---|\n");
+        let makings: Vec<_> = self.makings.iter().map(|making| making.name()).collect();
+        let makings = makings.join(" | ");
+        let mut page = format!("| measure | all | {makings} | worst | target | met |\n|");
+        page.push_str(&"---|".repeat(self.makings.len() + 5));
+        page.push('\n');
         self.rows.iter().for_each(|row| page.push_str(&measure(row)));
         page.push_str(
             "\n| hidden | alarm | first name | placed within a sleeper | median d' | re-tuned \
              baseline looks well | paper's pipeline content |\n|---|---|---|---|---|---|---|\n",
         );
         self.kinds.iter().for_each(|kind| page.push_str(&of_kind(kind)));
-        page.push_str("\n| case | hidden (d') | said |\n|---|---|---|\n");
+        page.push_str("\n| case | making | hidden (d') | said |\n|---|---|---|---|\n");
         scores.iter().filter(|score| !score.is_right()).for_each(|score| {
             page.push_str(&case(score));
         });
@@ -24,13 +29,16 @@ impl Summary {
 }
 
 fn measure(row: &MeasureRow) -> String {
-    let MeasureRow { measure, value, goal, reached } = row;
+    let MeasureRow { measure, value, by_making, worst, goal, reached } = row;
     let reached = match reached {
         Some(true) => "reached",
         Some(false) => "**not reached**",
         None => "not measured",
     };
-    format!("| {measure} | {value} | {goal} | {reached} |\n")
+    let by_making: Vec<_> = by_making.values().map(String::as_str).collect();
+    let by_making = by_making.join(" | ");
+    let worst = worst.map_or("-", Making::name);
+    format!("| {measure} | {value} | {by_making} | {worst} | {goal} | {reached} |\n")
 }
 
 fn of_kind(row: &KindRow) -> String {
@@ -56,5 +64,5 @@ fn case(score: &CaseScore) -> String {
         format!("{}: {}", score.verdict.name(), score.accepted.join(", "))
     };
     let hidden = if hidden.is_empty() { "nothing".to_owned() } else { hidden };
-    format!("| {} | {} | {said} |\n", score.number, hidden.trim_end())
+    format!("| {} | {} | {} | {said} |\n", score.number, score.making.name(), hidden.trim_end())
 }

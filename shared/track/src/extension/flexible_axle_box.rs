@@ -129,8 +129,7 @@ mod tests {
                 // Rounding, amplified where both masses nearly cancel.
                 let error = (vehicle.receptance(omega) - wheel_up).norm() / wheel_up.norm();
                 assert!(error < 1e-9, "{frequency_hz} Hz: {error}");
-                let error =
-                    (vehicle.acceleration_per_force(omega) - sensed).norm() / sensed.norm();
+                let error = (vehicle.acceleration_per_force(omega) - sensed).norm() / sensed.norm();
                 assert!(error < 1e-9, "{frequency_hz} Hz: {error}");
             }
         }

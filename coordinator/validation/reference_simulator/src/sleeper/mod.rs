@@ -12,8 +12,6 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 /// Modes kept: rigid motion and bending up to 12 kHz. The others give way statically.
 pub(crate) const MODES: usize = 5;
-/// Modal damping over critical damping: half of a structural loss factor of 0.2 %, that of steel.
-const DAMPING_RATIO: f64 = 1e-3;
 
 /// Mass-normalised modes of a free half sleeper, symmetric about the track's symmetry plane.
 #[derive(Clone, Debug)]
@@ -37,6 +35,8 @@ pub(crate) struct SleeperModes {
 pub(crate) struct Bed {
     /// Bending stiffness in N m2.
     pub(crate) bending: f64,
+    /// Damping of steel over critical damping.
+    pub(crate) steel_damping_ratio: f64,
     /// Ballast stiffness in N/m and damping in N s/m over the whole half sleeper.
     pub(crate) stiffness: f64,
     pub(crate) damping: f64,
@@ -44,14 +44,19 @@ pub(crate) struct Bed {
     pub(crate) bolt: f64,
     /// Mass in kg, stiffness in N/m and damping in N s/m of a layer under the ballast.
     pub(crate) layer: Option<[f64; 3]>,
-    /// Gap in m below the sleeper.
+    /// Gap in m below the sleeper, and what share of the ballast's damping acts over it.
     pub(crate) gap_m: Option<f64>,
+    pub(crate) gap_damping_share: f64,
 }
 
 impl Bed {
-    /// Stiffness and damping of ballast that the sleeper never leaves: none behind a gap.
+    /// Stiffness and damping of ballast that the sleeper never leaves: a share of the damping over a
+    /// gap.
     fn held(&self) -> [f64; 2] {
-        if self.gap_m.is_some() { [0.0; 2] } else { [self.stiffness, self.damping] }
+        match self.gap_m {
+            Some(_) => [0.0, self.gap_damping_share * self.damping],
+            None => [self.stiffness, self.damping],
+        }
     }
 }
 
@@ -73,13 +78,13 @@ pub(crate) struct Sleeper {
 
 impl SleeperModes {
     /// The modes of a sleeper whose softened middle keeps `bending_factor` of its bending
-    /// stiffness, 1 for a sound one.
+    /// stiffness, 1 for a sound one, and whose mass is the nominal one times a factor.
     ///
     /// Ritz's method (Ritz 1909) with Legendre polynomials for the deflection and `x` times such
     /// for the rotation, which symmetry holds at the rail seat. A crack lets it turn there, by an
     /// angular spring `E I beta / ((1 - beta) l)`.
-    pub(crate) fn new(bending_factor: f64) -> Self {
-        let (mass, stiffness) = energies(bending_factor);
+    pub(crate) fn new(bending_factor: f64, mass_factor: f64) -> Self {
+        let (mass, stiffness) = energies(bending_factor, mass_factor);
         let factor = mass.cholesky().expect("kinetic energy is positive").l();
         let inverse = factor.clone().try_inverse().expect("a Cholesky factor is regular");
         let eigen = (&inverse * stiffness * inverse.transpose()).symmetric_eigen();
@@ -139,7 +144,7 @@ impl SleeperModes {
             gap: bed.gap_m.map(|depth_m| Gap {
                 depth_m,
                 stiffness: bed.stiffness,
-                damping: bed.damping,
+                damping: (1.0 - bed.gap_damping_share) * bed.damping,
                 along: self.along.iter().map(|shape| on_layer(shape, layers)).collect(),
                 weights: self.weights.clone(),
             }),
@@ -180,7 +185,7 @@ impl SleeperModes {
         for a in 0..MODES {
             let omega = (self.squares[a] * scale).sqrt();
             stiffness[(a, a)] += omega * omega;
-            damping[(a, a)] += 2.0 * DAMPING_RATIO * omega;
+            damping[(a, a)] += 2.0 * bed.steel_damping_ratio * omega;
             for b in 0..MODES {
                 let shared = self.mean(|shape| shape[a] * shape[b]);
                 stiffness[(a, b)] += ballast * shared + bolt * self.tip[a] * self.tip[b];
@@ -231,6 +236,7 @@ fn on_layer(shape: &[f64], layers: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assumptions::STEEL_DAMPING_RATIO;
     use crate::vtrack::{
         DENSITY_KG_M3, SLEEPER_AREA_M2, SLEEPER_HALF_LENGTH_M, SLEEPER_SECOND_MOMENT_M4,
         SLEEPER_SHEAR_COEFFICIENT, shear_modulus_pa,
@@ -239,12 +245,18 @@ mod tests {
     const STEP_S: f64 = 5e-6;
 
     fn bed() -> Bed {
-        Bed { bending: 5000.0, stiffness: 1.2e7, damping: 900.0, ..Bed::default() }
+        Bed {
+            bending: 5000.0,
+            steel_damping_ratio: STEEL_DAMPING_RATIO,
+            stiffness: 1.2e7,
+            damping: 900.0,
+            ..Bed::default()
+        }
     }
 
     #[test]
     fn frequencies_are_those_of_a_free_beam_less_what_shear_and_rotation_take() {
-        let modes = SleeperModes::new(1.0);
+        let modes = SleeperModes::new(1.0, 1.0);
         // Symmetric modes of a free slender beam of twice the length (Blevins 1979, table 8-1).
         let roots = [4.730_040_7, 10.995_607_8, 17.278_759_7];
         let inertia = DENSITY_KG_M3 * SLEEPER_AREA_M2;
@@ -262,7 +274,7 @@ mod tests {
 
     #[test]
     fn the_static_flexibility_of_a_rigid_sleeper_is_that_of_its_ballast() {
-        let sleeper = SleeperModes::new(1.0).on(&Bed { bending: 5e8, ..bed() }, STEP_S);
+        let sleeper = SleeperModes::new(1.0, 1.0).on(&Bed { bending: 5e8, ..bed() }, STEP_S);
         // A sleeper a hundred thousand times as stiff as steel; beside it stands the weak ground.
         let flexibility = sleeper.flexibility + sleeper.residual;
         assert!((flexibility * 1.2e7 - 1.0).abs() < 1e-3, "{flexibility}");
@@ -272,7 +284,7 @@ mod tests {
     fn a_sleeper_on_its_bed_sinks_as_a_beam_on_an_elastic_foundation() {
         // Hetenyi 1946: a force at the middle of a free beam of length l on a foundation k l;
         // shear adds less than a hundredth at this bending stiffness.
-        let sleeper = SleeperModes::new(1.0).on(&bed(), STEP_S);
+        let sleeper = SleeperModes::new(1.0, 1.0).on(&bed(), STEP_S);
         let per_length = 1.2e7 / SLEEPER_HALF_LENGTH_M;
         let lambda = (per_length / (4.0 * 5000.0)).powf(0.25);
         let l = 2.0 * SLEEPER_HALF_LENGTH_M * lambda;
@@ -284,7 +296,7 @@ mod tests {
 
     #[test]
     fn a_bolt_a_layer_and_a_crack_do_what_they_should_to_the_seat() {
-        let sound = SleeperModes::new(1.0);
+        let sound = SleeperModes::new(1.0, 1.0);
         let flexibility = |sleeper: &Sleeper| sleeper.flexibility + sleeper.residual;
         let plain = flexibility(&sound.on(&bed(), STEP_S));
         // A spring at the tip takes f_st² / (f_tt + 1 / k) from the flexibility of the seat.
@@ -297,13 +309,13 @@ mod tests {
         let layer = Some([3.0, 6e7, 2e3]);
         let layered = flexibility(&sound.on(&Bed { layer, ..bed() }, STEP_S));
         assert!(((layered - plain) * 6e7 - 1.0).abs() < 0.01, "{layered} {plain}");
-        let cracked = flexibility(&SleeperModes::new(0.1).on(&bed(), STEP_S));
+        let cracked = flexibility(&SleeperModes::new(0.1, 1.0).on(&bed(), STEP_S));
         assert!(cracked > 1.02 * plain, "{cracked} {plain}");
     }
 
     #[test]
     fn ballast_behind_a_gap_pushes_where_the_gap_is_closed_and_never_pulls() {
-        let modes = SleeperModes::new(1.0);
+        let modes = SleeperModes::new(1.0, 1.0);
         let sleeper = modes.on(&Bed { gap_m: Some(1e-4), ..bed() }, STEP_S);
         let gap = sleeper.gap.unwrap();
         let forces_at = |depth_m: f64, velocity_m_s: f64| {
@@ -321,8 +333,26 @@ mod tests {
     }
 
     #[test]
+    fn ballast_over_a_gap_keeps_its_share_of_the_damping_and_no_more() {
+        let modes = SleeperModes::new(1.0, 1.0);
+        let damping = |bed: &Bed| modes.held(bed)[1][(0, 0)] / modes.seat[0].powi(2);
+        let hanging = Bed { gap_m: Some(1e-4), ..bed() };
+        let shared = Bed { gap_damping_share: 0.4, ..hanging };
+        assert!(damping(&hanging).abs() < 1e-9 && (damping(&shared) - 360.0).abs() < 1e-6);
+        assert_eq!(modes.on(&shared, STEP_S).gap.unwrap().damping, 540.0);
+        assert_eq!(modes.held(&shared)[2], modes.held(&hanging)[2]);
+    }
+
+    #[test]
+    fn a_heavier_sleeper_moves_less_as_a_whole_and_bends_more_slowly() {
+        let [usual, heavy] = [1.0, 1.02].map(|factor| SleeperModes::new(1.0, factor));
+        assert!(((usual.seat[0] / heavy.seat[0]).powi(2) / 1.02 - 1.0).abs() < 1e-9);
+        assert!((usual.squares[1] / heavy.squares[1] / 1.02 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
     fn ballast_between_a_gap_and_a_layer_pushes_both() {
-        let modes = SleeperModes::new(1.0);
+        let modes = SleeperModes::new(1.0, 1.0);
         let bed = Bed { gap_m: Some(1e-4), layer: Some([3.0, 6e7, 2e3]), ..bed() };
         let sleeper = modes.on(&bed, STEP_S);
         // Where it hangs, nothing but the railpad carries it.

@@ -18,8 +18,9 @@ pub(super) const fn nominal_bending() -> f64 {
     YOUNG_PA * SLEEPER_SECOND_MOMENT_M4
 }
 
-/// Mass and stiffness of the nominal section in the polynomials' coefficients.
-pub(super) fn energies(bending_factor: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+/// Mass and stiffness of the nominal section in the polynomials' coefficients, the mass times a
+/// factor.
+pub(super) fn energies(bending_factor: f64, mass_factor: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let length = SLEEPER_HALF_LENGTH_M;
     let shear = SLEEPER_SHEAR_COEFFICIENT * shear_modulus_pa() * SLEEPER_AREA_M2;
     let cracked = bending_factor < 1.0;
@@ -54,7 +55,7 @@ pub(super) fn energies(bending_factor: f64) -> (DMatrix<f64>, DMatrix<f64>) {
         let softened = (1.0 / bending_factor - 1.0) * 0.5 * CRACK_LENGTH_M;
         stiffness[(2 * TERMS, 2 * TERMS)] += nominal_bending() / softened;
     }
-    (mass, stiffness)
+    (mass_factor * mass, stiffness)
 }
 
 /// Legendre polynomials of `2 xi - 1` for `xi` in 0..1.

@@ -1,0 +1,55 @@
+//! How a case is made: by which simulator, with what it assumes, and with which nuisances.
+
+use crate::effect::Draw;
+use crate::varied::{add_nuisances, assumptions, vary_track};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use tracktwin_reference_simulator::{Scene, TruthError};
+
+/// Making of a case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Making {
+    /// The reference simulator with the shapes of the catalogue, on a track without nuisances.
+    Plain,
+    /// The reference simulator with other shapes, modes and steel, and with nuisances.
+    Varied,
+    /// The second simulator, with shapes, laws and further nuisances of its own.
+    Second,
+}
+
+impl Making {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Varied, Self::Second];
+
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Varied => "varied",
+            Self::Second => "second",
+        }
+    }
+
+    /// Simulates a scene and writes the recording's folder.
+    ///
+    /// # Errors
+    /// [`TruthError`] where the scene cannot be or the folder cannot be written.
+    pub fn record(self, scene: &Scene, folder: &Path) -> Result<(), TruthError> {
+        match self {
+            Self::Plain | Self::Varied => tracktwin_reference_simulator::record(scene, folder),
+            Self::Second => tracktwin_second_simulator::record(scene, folder),
+        }
+    }
+
+    /// Adds what this making assumes and its nuisances.
+    pub(crate) fn complete(self, scene: &mut Scene, draw: &mut Draw<'_>) {
+        if self == Self::Varied {
+            scene.assumptions = assumptions(draw);
+            add_nuisances(scene, draw);
+        }
+        if self != Self::Plain {
+            vary_track(scene, draw);
+        }
+    }
+}
