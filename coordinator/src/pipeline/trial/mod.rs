@@ -102,7 +102,8 @@ pub enum TrialError {
     /// The folder holds a trial whose cases are others.
     #[error(
         "{folder}: contains a trial of format {format}, whose cases are others than those of this \
-             program (format {FORMAT}); use another --out, or the program that began it"
+             program (format {}); use another --out, or the program that began it",
+        FORMAT
     )]
     OtherFormat {
         /// The folder.

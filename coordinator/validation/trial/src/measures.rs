@@ -86,9 +86,9 @@ fn names(scores: &[CaseScore]) -> Vec<Measured> {
         at_least(
             "family first, of those detected, d' 6.5 and more",
             surely(|n| n.family_first),
-            0.95,
+            0.9,
         ),
-        at_least("member first, of those detected, d' 6.5 and more", surely(|n| n.first), 0.85),
+        at_least("member first, of those detected, d' 6.5 and more", surely(|n| n.first), 0.8),
         at_most(
             "wrong member stated above 90 %, of all cases",
             Rate::of(scores.iter().map(|score| score.wrong_member)),

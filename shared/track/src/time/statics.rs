@@ -89,11 +89,23 @@ impl<'a> StaticSolution<'a> {
     pub(crate) fn tangents(&self, x_m: f64) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
         let motions = statics.law_motions(statics.model.vehicle().wheel.load_n, x_m)?;
-        let tangent = |(law, motion_m): (&ForceLaw, &f64)| {
-            let Reaction { stiffness, damping, .. } = law.law.reaction(*motion_m, 0.0);
+        Some(self.tangents_at(motions.into_iter()))
+    }
+
+    /// The same by the displacements of the whole track, on whose last digits the version of the physics
+    /// rests.
+    fn tangents_by_track(&self, x_m: f64) -> Option<Vec<SpringDamper>> {
+        let Self(statics) = self;
+        let track = statics.under(statics.model.vehicle().wheel.load_n, &[x_m]).ok()?;
+        Some(self.tangents_at(statics.model.force_laws().iter().map(|law| law.port.motion(&track))))
+    }
+
+    fn tangents_at(&self, motions_m: impl Iterator<Item = f64>) -> Vec<SpringDamper> {
+        let tangent = |(law, motion_m): (&ForceLaw, f64)| {
+            let Reaction { stiffness, damping, .. } = law.law.reaction(motion_m, 0.0);
             SpringDamper { stiffness, damping }
         };
-        Some(statics.model.force_laws().iter().zip(&motions).map(tangent).collect())
+        self.0.model.force_laws().iter().zip(motions_m).map(tangent).collect()
     }
 
     /// The same for each law while the wheel stands above it.
@@ -104,7 +116,7 @@ impl<'a> StaticSolution<'a> {
         for (index, law) in statics.model.force_laws().iter().enumerate() {
             let all = match latest.take() {
                 Some((place_m, all)) if place_m == law.place_m => all,
-                _ => self.tangents(law.place_m)?,
+                _ => self.tangents_by_track(law.place_m)?,
             };
             tangents.push(all[index]);
             latest = Some((law.place_m, all));
