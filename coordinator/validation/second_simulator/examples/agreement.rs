@@ -57,9 +57,8 @@ fn main() {
         println!("    Hz   13   10    7 km/h: second over reference in dB");
         for (band, of) in ThirdOctave::all().enumerate() {
             print!("{:>6}", of.nominal_hz());
-            for speed in 0..SPEEDS.len() {
-                let ratio = powers[0][speed][band] / powers[1][speed][band];
-                print!(" {:+5.2}", 10.0 * ratio.log10());
+            for (second, reference) in powers[0].iter().zip(&powers[1]) {
+                print!(" {:+5.2}", 10.0 * (second[band] / reference[band]).log10());
             }
             println!();
         }

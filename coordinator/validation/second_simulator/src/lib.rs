@@ -39,8 +39,6 @@
 //! | `linked_sleepers` | 5 % loss at 1 kHz; 400 MN/m at most |
 //! | `wheel_mode` | mode of the free wheel: the hub moves against the rim by the ratio of modal mass to wheel |
 
-#![cfg_attr(test, expect(clippy::unwrap_used, reason = "in a test a panic is the report"))]
-
 mod band;
 mod biquad;
 mod body;
