@@ -143,6 +143,13 @@ fn table(
     );
     let place = place(diagnosis, hypothesis, kind, middle, spacing_m);
     table += &place;
+    table + &values(hypothesis, kind)
+}
+
+/// Its parameters: ranges of those that were fitted, values of those that were assumed, and typical values
+/// of all others that must be given.
+fn values(hypothesis: &Hypothesis, kind: &Kind) -> String {
+    let mut lines = String::new();
     for (name, estimate) in &hypothesis.parameters {
         let Some(parameter) = kind.parameters.iter().find(|known| known.name == name) else {
             continue;
@@ -151,20 +158,24 @@ fn table(
         let _ = if estimate.sd > 0.0 {
             let [low, high] = range(parameter, estimate);
             writeln!(
-                table,
+                lines,
                 "{name} = {{ low = {low:e}, high = {high:e}, scale = \"logarithmic\" }}"
             )
         } else {
-            writeln!(table, "{name} = {:?}", estimate.mean)
+            writeln!(lines, "{name} = {:?}", estimate.mean)
         };
     }
+    for (name, value) in &hypothesis.assumed {
+        let _ = writeln!(lines, "{name} = {value:?}");
+    }
     for parameter in kind.parameters {
-        let given = hypothesis.parameters.contains_key(parameter.name);
+        let given = hypothesis.parameters.contains_key(parameter.name)
+            || hypothesis.assumed.contains_key(parameter.name);
         if !given && parameter.default.is_none() {
-            let _ = writeln!(table, "{} = {:e}", parameter.name, parameter.typical);
+            let _ = writeln!(lines, "{} = {:e}", parameter.name, parameter.typical);
         }
     }
-    table
+    lines
 }
 
 /// Its place on the campaign's track.
@@ -203,4 +214,24 @@ fn range(parameter: &KindParameter, estimate: &Estimate) -> [f64; 2] {
     let factor = (DEVIATIONS * estimate.sd / estimate.mean).exp().clamp(FACTOR_MIN, 10.0);
     let least = parameter.v_track[1].min(parameter.real_scale[1]) * 1e-3;
     [(estimate.mean / factor).max(least), (estimate.mean * factor).max(10.0 * least)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_assumed_is_part_of_the_extension() {
+        let found = serde_json::json!({
+            "physics": "flexible_axle_box", "probability": 0.97, "accepted": true,
+            "parameters": {"mass_kg": {"mean": 10.0, "sd": 0.5}},
+            "assumed": {"sensor_on_wheel": 1.0},
+            "look_alikes": [], "would_separate": "", "detectability": 20.0, "log_evidence": 100.0,
+        });
+        let found: Hypothesis = serde_json::from_value(found).unwrap();
+        let kind = Kind::from_name(&found.physics).unwrap();
+        let lines = values(&found, kind);
+        assert!(lines.contains("sensor_on_wheel = 1.0\n"), "{lines}");
+        assert!(lines.contains("mass_kg = { low") && lines.contains("stiffness_N_per_m = 4e8"));
+    }
 }

@@ -3,13 +3,15 @@
 use super::quantity::{interval, mean};
 use super::words::{accepted, physics};
 use maud::{Markup, html};
-use tracktwin_diagnosis::{Diagnosis, Hypothesis};
+use tracktwin_diagnosis::{Diagnosis, Estimate, Hypothesis};
 use tracktwin_track::extension::{Bound, Kind, KindParameter};
 
 /// The table; nothing where nothing was accepted or what was has no parameters.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
-    let of = |hypothesis: &&Hypothesis| !hypothesis.parameters.is_empty();
-    let with: Vec<&Hypothesis> = accepted(diagnosis).filter(of).collect();
+    let has_any = |hypothesis: &&Hypothesis| {
+        !(hypothesis.parameters.is_empty() && hypothesis.assumed.is_empty())
+    };
+    let with: Vec<&Hypothesis> = accepted(diagnosis).filter(has_any).collect();
     if with.is_empty() {
         return Markup::default();
     }
@@ -29,11 +31,20 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
                             td { code { (name) } }
                         }
                     }
+                    @for (name, &value) in &hypothesis.assumed {
+                        tr {
+                            td { (physics(&hypothesis.physics)) }
+                            td.words { (meaning(known(hypothesis, name), name)) }
+                            td { (mean(name, Estimate { mean: value, sd: 0.0 })) }
+                            td { "assumed" }
+                            td { code { (name) } }
+                        }
+                    }
                 }
             }
         } }
         p.note { "Interval: two standard deviations on either side; the stiffness at every sleeper \
-             is fitted at the same time." }
+             is fitted at the same time. Assumed: a value that was tried, not fitted." }
     }
 }
 

@@ -100,6 +100,7 @@ pub(crate) fn hypothesis(physics: &str, probability: f64, would_separate: &str) 
         port: None,
         behaviour: None,
         parameters: BTreeMap::new(),
+        assumed: BTreeMap::new(),
         look_alikes: Vec::new(),
         would_separate: would_separate.to_owned(),
         detectability: 9.3 * probability,

@@ -119,12 +119,14 @@ fn what_the_passes_show_alone_is_not_said_to_improve_the_prediction() {
     let mut flat = hypothesis("wheel_flat", 0.999, "more laps");
     (flat.accepted, flat.detectability, flat.log_evidence) = (true, 0.0, 14.0);
     flat.parameters = estimates(&[("length_m", 3.1e-3, 2e-4)]);
+    flat.assumed = [("depth_m".to_owned(), 2e-5)].into();
     let page = page(
         "wheel-flat",
         &Diagnosis { verdict: Verdict::LeftOutPhysics, hypotheses: vec![flat], ..consistent() },
     );
     assert_reads(&page, &["found in the passes alone; probability by chance below 0.001"]);
     assert_reads(&page, &["The predictions on this page do not include it", "3.1 mm", "over 99 %"]);
+    assert_reads(&page, &["20.0 µm", "assumed"]);
     for claim in ["after, with", "d′ 0.0", "withheld speeds are predicted better"] {
         assert!(!page.contains(claim), "{claim}");
     }

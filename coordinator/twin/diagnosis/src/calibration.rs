@@ -284,24 +284,21 @@ impl Problem<'_> {
         let column = |index: usize| -> Result<DVector<f64>, CalibrationError> {
             let mut varied = values.clone();
             varied[index] += VARIATION;
-            if has_laws {
-                let extensions = self.extensions(&varied)?;
-                let is_own = index >= baseline;
-                let elsewhere =
-                    self.forward.with_laws_of(&transfer, [values, &varied], &extensions, is_own)?;
-                if let Some(elsewhere) = elsewhere {
-                    let change = (elsewhere - &log_power) / VARIATION;
-                    return Ok(if is_own { change } else { jacobian.column(index) + change });
-                }
-            }
-            let changed = if has_laws {
-                self.predict(&varied)?
-            } else {
-                let extensions = self.extensions(&varied)?;
+            let extensions = self.extensions(&varied)?;
+            let change = |levels: DVector<f64>| (levels - &log_power) / VARIATION;
+            if !has_laws {
                 let beside = self.forward.transfer_beside(&transfer, &varied, &extensions)?;
-                self.forward.levels(&beside, &varied)
-            };
-            Ok((changed - &log_power) / VARIATION)
+                return Ok(change(self.forward.levels(&beside, &varied)));
+            }
+            let is_own = index >= baseline;
+            let elsewhere =
+                self.forward.with_laws_of(&transfer, [values, &varied], &extensions, is_own)?;
+            Ok(match elsewhere {
+                Some(levels) if is_own => change(levels),
+                // The receptances contain all but where the laws take hold.
+                Some(levels) => jacobian.column(index) + change(levels),
+                None => change(self.forward.log_power(&varied, &extensions)?),
+            })
         };
         let columns: Vec<_> = varied
             .into_par_iter()

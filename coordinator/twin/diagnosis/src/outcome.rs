@@ -118,6 +118,9 @@ pub struct Hypothesis {
     pub behaviour: Option<Element>,
     /// Its parameters.
     pub parameters: BTreeMap<String, Estimate>,
+    /// Values of further parameters that were tried as they are, not fitted.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty", default)]
+    pub assumed: BTreeMap<String, f64>,
     /// What looks alike.
     pub look_alikes: Vec<String>,
     /// Measurement that separates it from them.

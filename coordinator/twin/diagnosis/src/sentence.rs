@@ -190,6 +190,7 @@ mod tests {
             port: None,
             behaviour: None,
             parameters: BTreeMap::new(),
+            assumed: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: String::new(),
             detectability: 9.0,

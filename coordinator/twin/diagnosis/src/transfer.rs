@@ -92,17 +92,17 @@ impl Transfer {
         Self::on_rail(model, lines_hz, direct, further)
     }
 
-    /// The same where force laws take hold as they do in a model that differs little; none where there is
-    /// no law, or where they take hold in another way.
-    pub(crate) fn with_laws_of(&self, model: TrackModel, lines_hz: &[f64]) -> Option<Self> {
-        let direct = self.by_state.as_ref()?.direct_where(&model)?;
+    /// The same where force laws take hold as they do in a model that differs little, and that may differ in
+    /// nothing else if `alike`; none where there is no law, or where they take hold in another way.
+    pub(crate) fn with_laws_of(
+        &self,
+        model: TrackModel,
+        lines_hz: &[f64],
+        alike: bool,
+    ) -> Option<Self> {
+        let direct = self.by_state.as_ref()?.direct_where(&model, alike)?;
         let further = Some(Arc::clone(&self.further_wheels));
         Some(Self::on_rail(model, lines_hz, Arc::new(direct), further))
-    }
-
-    /// Whether a model with the same laws differs in nothing but where they take hold.
-    pub(crate) fn has_states_of(&self, model: &TrackModel) -> bool {
-        self.by_state.as_ref().is_some_and(|by_state| by_state.has_states_of(model))
     }
 
     /// Source: docs/diagnosis.md, eq. 2, 3: `|H| = |a/F| / |1/k_H + alpha_r + alpha_w|`.

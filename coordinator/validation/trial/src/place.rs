@@ -52,6 +52,7 @@ pub(crate) mod testing {
             port: None,
             behaviour: None,
             parameters: BTreeMap::new(),
+            assumed: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: String::new(),
             detectability: 0.0,

@@ -24,12 +24,12 @@ pub struct StateReceptances {
     nodes: Range<usize>,
     /// Those in the first state in m/N, `[frequency][node]`.
     first: Vec<Vec<Complex64>>,
-    /// By how much those of each further state are less at these nodes: `[frequency][state - 1][node]`.
-    less: Vec<Vec<Vec<Complex64>>>,
+    /// Reduction of each further state at these nodes: `[frequency][state - 1][node]`.
+    reductions: Vec<Vec<Vec<Complex64>>>,
 }
 
-/// At one frequency by how much receptances are less in a state than in the first.
-struct Less {
+/// Reduction of receptances at one frequency: by how much they are less in a state than in the first.
+struct Reduction {
     /// Receptances from the places that change to the nodes from the first of the columns' on, a row
     /// a node.
     at_nodes: DMatrix<Complex64>,
@@ -38,7 +38,24 @@ struct Less {
     from: usize,
 }
 
-impl Less {
+/// Receptances at one frequency.
+struct Mixed {
+    direct: Vec<Complex64>,
+    from_seats: Vec<SeatReceptances>,
+    /// Direct ones in the first state.
+    first: Vec<Complex64>,
+    /// Reduction of each further state at the nodes near the laws.
+    reductions: Vec<Vec<Complex64>>,
+}
+
+impl Reduction {
+    fn new(columns: &Columns, changes: &DMatrix<Lane>, lane: usize, from: usize) -> Self {
+        let unpack = |matrix: &DMatrix<Lane>| matrix.map(|value| value.get(lane));
+        let at_nodes = unpack(&columns.at_nodes);
+        let resisted = &at_nodes * resisted(&unpack(changes), &unpack(&columns.at_dofs));
+        Self { at_nodes, resisted, from }
+    }
+
     fn between(&self, one: usize, other: usize) -> Complex64 {
         let (resisted, at) = (self.resisted.row(one - self.from), other - self.from);
         resisted.iter().zip(self.at_nodes.row(at).iter()).map(|(a, b)| a * b).sum()
@@ -53,16 +70,22 @@ impl States {
         frequencies_hz: &[f64],
         reach: Option<usize>,
     ) -> RailReceptances {
-        match self.differences() {
-            Some(differences) => {
-                let (mixed, first, less) =
-                    self.beside_the_first(&differences, frequencies_hz, reach);
-                let Self { tracks, holds, near: nodes, .. } = self;
-                let by_state = StateReceptances { tracks, holds, nodes, first, less };
-                RailReceptances { by_state: Some(Arc::new(by_state)), ..mixed }
-            }
-            None => self.mix(|track| RailReceptances::of_matrices(track, frequencies_hz, reach)),
+        let solved =
+            self.differences().map(|them| self.beside_the_first(&them, frequencies_hz, reach));
+        let Some(solved) = solved else {
+            return self.mix(|track| RailReceptances::of_matrices(track, frequencies_hz, reach));
+        };
+        let (mut direct, mut from_seats) = (Vec::new(), Vec::new());
+        let (mut first, mut reductions) = (Vec::new(), Vec::new());
+        for mixed in solved {
+            direct.push(mixed.direct);
+            from_seats.push(mixed.from_seats);
+            first.push(mixed.first);
+            reductions.push(mixed.reductions);
         }
+        let Self { tracks, holds, near: nodes, .. } = self;
+        let by_state = StateReceptances { tracks, holds, nodes, first, reductions };
+        RailReceptances { direct, from_seats, by_state: Some(Arc::new(by_state)) }
     }
 
     /// How each further state differs from the first, at the same degrees of freedom; none where that is not
@@ -84,15 +107,13 @@ impl States {
         (is_small && beyond.all(is_first)).then_some(differences)
     }
 
-    /// Receptances in the states mixed, direct ones in the first state, and by how much those of the others
-    /// are less.
-    #[expect(clippy::type_complexity, reason = "taken apart where it is called")]
+    /// Receptances at each frequency, the first state solved and the others from it.
     fn beside_the_first(
         &self,
         differences: &[Difference<'_>],
         frequencies_hz: &[f64],
         reach: Option<usize>,
-    ) -> (RailReceptances, Vec<Vec<Complex64>>, Vec<Vec<Vec<Complex64>>>) {
+    ) -> Vec<Mixed> {
         let track = &self.tracks[0];
         let (partition, dofs) = (Partition::new(track), deflections(track));
         let near = reach.map_or(Vec::new(), |reach| near_seats(track, reach));
@@ -109,23 +130,14 @@ impl States {
                 (solved, columns, changes)
             });
             let of_lane = |lane: usize| {
-                let (direct, from_seats) = solved.unpack(lane, &near);
-                let less: Vec<Less> =
-                    changes.iter().map(|it| less(&columns, it, lane, columns_at.start)).collect();
-                self.mixed(direct, from_seats, &near, &less)
+                let (first, from_seats) = solved.unpack(lane, &near);
+                let of_state = |changes| Reduction::new(&columns, changes, lane, columns_at.start);
+                let reductions: Vec<Reduction> = changes.iter().map(of_state).collect();
+                self.mixed(first, from_seats, &near, &reductions)
             };
             (0..chunk.len()).map(of_lane).collect::<Vec<_>>()
         });
-        let mut mixed =
-            RailReceptances { direct: Vec::new(), from_seats: Vec::new(), by_state: None };
-        let (mut first, mut all_less) = (Vec::new(), Vec::new());
-        for Mixed { direct, from_seats, first_direct, less } in solved.collect::<Vec<_>>() {
-            mixed.direct.push(direct);
-            mixed.from_seats.push(from_seats);
-            first.push(first_direct);
-            all_less.push(less);
-        }
-        (mixed, first, all_less)
+        solved.collect()
     }
 
     /// Receptances at one frequency, from those in the first state.
@@ -134,13 +146,13 @@ impl States {
         first: Vec<Complex64>,
         mut from_seats: Vec<SeatReceptances>,
         near: &[Near],
-        less: &[Less],
+        by_state: &[Reduction],
     ) -> Mixed {
         let mut direct = first.clone();
-        let mut all = Vec::with_capacity(less.len());
-        for (state, less) in (1..).zip(less) {
+        let mut reductions = Vec::with_capacity(by_state.len());
+        for (state, reduction) in (1..).zip(by_state) {
             let of_nodes: Vec<Complex64> =
-                self.near.clone().map(|node| less.between(node, node)).collect();
+                self.near.clone().map(|node| reduction.between(node, node)).collect();
             for (node, of_node) in self.near.clone().zip(&of_nodes) {
                 direct[node] -= self.shares[node][state] * of_node;
             }
@@ -148,63 +160,45 @@ impl States {
                 let both = seat.nodes.start.max(self.near.start)..seat.nodes.end.min(self.near.end);
                 for node in both.filter(|node| self.shares[*node][state] > 0.0) {
                     values.values[node - seat.nodes.start] -=
-                        self.shares[node][state] * less.between(seat.seat, node);
+                        self.shares[node][state] * reduction.between(seat.seat, node);
                 }
             }
-            all.push(of_nodes);
+            reductions.push(of_nodes);
         }
-        Mixed { direct, from_seats, first_direct: first, less: all }
+        Mixed { direct, from_seats, first, reductions }
     }
-}
-
-/// Receptances at one frequency.
-struct Mixed {
-    direct: Vec<Complex64>,
-    from_seats: Vec<SeatReceptances>,
-    first_direct: Vec<Complex64>,
-    less: Vec<Vec<Complex64>>,
-}
-
-fn less(columns: &Columns, changes: &DMatrix<Lane>, lane: usize, from: usize) -> Less {
-    let unpack = |matrix: &DMatrix<Lane>| matrix.map(|value| value.get(lane));
-    let at_nodes = unpack(&columns.at_nodes);
-    let resisted = &at_nodes * resisted(&unpack(changes), &unpack(&columns.at_dofs));
-    Less { at_nodes, resisted, from }
 }
 
 impl StateReceptances {
     /// Direct receptances in m/N, `[frequency][node]`, where the laws take hold as they do on another track
-    /// on the same mesh, which differs little. None where it has a state that this track does not have.
-    pub fn direct_where(&self, other: &TrackModel) -> Option<Vec<Vec<Complex64>>> {
+    /// on the same mesh, which differs little. None where it has a state that this track does not have, or,
+    /// if they must be `alike`, one with other matrices.
+    pub fn direct_where(&self, other: &TrackModel, alike: bool) -> Option<Vec<Vec<Complex64>>> {
         let other = States::new(other)?;
         let state = |hold: &Hold| self.holds.iter().position(|own| own == hold);
         let states: Vec<usize> = other.holds.iter().map(state).collect::<Option<_>>()?;
-        let beyond = (0..self.nodes.start).chain(self.nodes.end..other.shares.len());
-        let shares = |node: usize| states.iter().copied().zip(other.shares[node].iter().copied());
-        let in_first = |node: usize| shares(node).all(|(state, share)| state == 0 || share == 0.0);
-        if !{ beyond }.all(in_first) {
+        let is_alike = |(&state, track): (&usize, &TrackModel)| {
+            self.tracks[state].matrices() == track.matrices()
+        };
+        if alike && !states.iter().zip(&other.tracks).all(is_alike) {
             return None;
         }
-        let of_frequency = |(first, less): (&Vec<Complex64>, &Vec<Vec<Complex64>>)| {
+        let shares = |node: usize| states.iter().copied().zip(other.shares[node].iter().copied());
+        let in_first = |node: usize| shares(node).all(|(state, share)| state == 0 || share == 0.0);
+        let mut beyond = (0..self.nodes.start).chain(self.nodes.end..other.shares.len());
+        if !beyond.all(in_first) {
+            return None;
+        }
+        let of_frequency = |(first, reductions): (&Vec<Complex64>, &Vec<Vec<Complex64>>)| {
             let mut direct = first.clone();
             for node in self.nodes.clone() {
                 for (state, share) in shares(node).filter(|(state, _)| *state > 0) {
-                    direct[node] -= share * less[state - 1][node - self.nodes.start];
+                    direct[node] -= share * reductions[state - 1][node - self.nodes.start];
                 }
             }
             direct
         };
-        Some(self.first.iter().zip(&self.less).map(of_frequency).collect())
-    }
-
-    /// Whether another track on the same mesh is the same in each of its states: it may be in them
-    /// elsewhere.
-    pub fn has_states_of(&self, other: &TrackModel) -> bool {
-        let Some(other) = States::new(other) else { return false };
-        other.holds.iter().zip(&other.tracks).all(|(hold, track)| {
-            let own = self.holds.iter().position(|own| own == hold);
-            own.is_some_and(|own| self.tracks[own].matrices() == track.matrices())
-        })
+        Some(self.first.iter().zip(&self.reductions).map(of_frequency).collect())
     }
 }
 
@@ -259,9 +253,8 @@ mod tests {
         let by_state = known.by_state.unwrap();
         // Another gap changes nothing but where it closes.
         let other = track(1.21e-4, 1.0);
-        assert!(by_state.has_states_of(&other));
         let whole = RailReceptances::new(&other, &FREQUENCIES_HZ, None).direct;
-        let moved = by_state.direct_where(&other).unwrap();
+        let moved = by_state.direct_where(&other, true).unwrap();
         let mut furthest = 0.0_f64;
         for line in 0..FREQUENCIES_HZ.len() {
             for node in 0..whole[line].len() {
@@ -272,6 +265,8 @@ mod tests {
             }
         }
         assert!(furthest > 1e-3, "{furthest}");
-        assert!(!by_state.has_states_of(&track(1.2e-4, 1.1)));
+        let stiffer = track(1.2e-4, 1.1);
+        assert!(by_state.direct_where(&stiffer, true).is_none());
+        assert!(by_state.direct_where(&stiffer, false).is_some());
     }
 }

@@ -3,6 +3,7 @@
 use super::{Evidence, FAILED_SHARE, names};
 use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, Location, UNKNOWN};
+use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind};
 
@@ -71,6 +72,7 @@ pub(super) fn seen(finding: &Finding, kind: &Kind, location: Option<Location>) -
         port: None,
         behaviour: None,
         parameters: finding.parameters.iter().map(estimate).collect(),
+        assumed: BTreeMap::new(),
         look_alikes: names(kind),
         would_separate: kind.would_separate.to_owned(),
         detectability: 0.0,
@@ -85,7 +87,6 @@ pub(super) fn probability(finding: &Finding) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeMap;
 
     #[test]
     fn an_effect_explains_what_is_found_beside_it_and_not_what_is_found_far_away() {
@@ -100,6 +101,7 @@ mod tests {
             port: None,
             behaviour: None,
             parameters: BTreeMap::new(),
+            assumed: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: String::new(),
             detectability: 18.0,

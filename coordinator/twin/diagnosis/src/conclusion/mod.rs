@@ -212,6 +212,7 @@ fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
                 probability: (1.0 - NAMED_SHARE) * whole / others.len() as f64,
                 accepted: false,
                 parameters: BTreeMap::new(),
+                assumed: BTreeMap::new(),
                 look_alikes: names(other),
                 would_separate: other.would_separate.to_owned(),
                 ..hypothesis.clone()

@@ -43,6 +43,7 @@ impl Evidence<'_> {
             family: None,
             port: Some(port.to_owned()),
             parameters: BTreeMap::new(),
+            assumed: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: would_separate.to_owned(),
             ..seen(finding, kind, location)
@@ -84,6 +85,7 @@ impl Evidence<'_> {
             port: Some(port.to_owned()),
             behaviour: None,
             parameters: BTreeMap::from([(parameters.0.to_owned(), estimate)]),
+            assumed: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: would_separate.to_owned(),
             detectability: patch.deviations,

@@ -76,6 +76,7 @@ impl Evidence<'_> {
             port: Some(port.place.name().to_owned()),
             behaviour: behaviour.map(|behaviour| behaviour.element),
             parameters: behaviour.map_or_else(BTreeMap::new, Behaviour::named),
+            assumed: BTreeMap::new(),
             look_alikes: Vec::new(),
             would_separate: port.place.would_separate().to_owned(),
             detectability: 0.0,
@@ -118,8 +119,9 @@ impl Evidence<'_> {
             (parameter.name.to_owned(), Estimate { mean, sd: mean * deviation })
         });
         // Of whole numbers each is a candidate of its own.
-        let order = candidate.extension.parameters.get(ORDER);
-        let order = order.map(|&mean| (ORDER.to_owned(), Estimate { mean, sd: 0.0 }));
+        let mut assumed = candidate.extension.parameters.clone();
+        let order = assumed.remove(ORDER);
+        let order = order.map(|mean| (ORDER.to_owned(), Estimate { mean, sd: 0.0 }));
         Hypothesis {
             physics: candidate.kind.physics.to_owned(),
             family: Some(candidate.kind.family.name().to_owned()),
@@ -130,6 +132,7 @@ impl Evidence<'_> {
             port: None,
             behaviour: None,
             parameters: parameters.chain(order).collect(),
+            assumed,
             look_alikes: names(candidate.kind),
             would_separate: candidate.kind.would_separate.to_owned(),
             detectability: *detectability,

@@ -160,7 +160,8 @@ impl Forward {
     }
 
     /// Log powers where force laws take hold as they do with varied values, and nothing else varies; none
-    /// where that is not known from the transfer. With `whole`, nothing else may vary.
+    /// where that is not known from the transfer, or, if the tracks must be `alike`, where they differ in
+    /// more.
     ///
     /// # Errors
     /// As [`Forward::log_power`].
@@ -169,13 +170,10 @@ impl Forward {
         known: &Transfer,
         [values, varied]: [&DVector<f64>; 2],
         extensions: &[Arc<dyn Extension>],
-        whole: bool,
+        alike: bool,
     ) -> Result<Option<DVector<f64>>, ModelError> {
         let model = self.model(varied, extensions)?;
-        if whole && !known.has_states_of(&model) {
-            return Ok(None);
-        }
-        let transfer = known.with_laws_of(model, self.bands.lines_hz());
+        let transfer = known.with_laws_of(model, self.bands.lines_hz(), alike);
         let with_shapes = |it: Transfer| it.with_shapes(&self.section, &self.wheel_starts_m);
         Ok(transfer.map(with_shapes).map(|transfer| self.levels(&transfer, values)))
     }
