@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use tracktwin_track::element::SpringDamper;
 use tracktwin_track::extension::{
-    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
-    Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
+    Screening, Trials,
 };
 use tracktwin_track::model::Assembly;
 
@@ -15,7 +15,8 @@ use tracktwin_track::model::Assembly;
 pub static RAIL_ABSORBER: Kind = Kind {
     physics: "rail_absorber",
     summary: "a mass hangs under the rail on a damped spring",
-    family: EffectFamily::Rail,
+    family: EffectFamily::RailBending,
+    group: LookAlikeGroup::RailSection,
     classes: &[Class::Frequency, Class::Local],
     place: PlaceKind::Point,
     measuring_chain: false,

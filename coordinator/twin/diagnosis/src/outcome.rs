@@ -95,8 +95,8 @@ pub struct Mismatch {
 pub struct Hypothesis {
     /// Its name in the catalogue.
     pub physics: String,
-    /// The family of effects that it belongs to, which differ in name more than in what a recording
-    /// shows; none of what is unknown.
+    /// The family of effects that it belongs to, by the part of track, vehicle or measurement that differs;
+    /// `unknown_…` of what is unknown.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub family: Option<String>,
     /// Probability that something of this family is present at the place.

@@ -43,7 +43,7 @@ pub(crate) mod testing {
     /// A squat at a place in m, or nowhere.
     pub(crate) fn hypothesis(x_m: Option<f64>) -> Hypothesis {
         Hypothesis {
-            family: Some("rail_defect".to_owned()),
+            family: Some("rail_bending".to_owned()),
             family_probability: 0.9,
             physics: "squat".to_owned(),
             probability: 0.5,

@@ -315,6 +315,7 @@ fn cells_inside(diagnosis: &Diagnosis) -> bool {
 mod tests {
     use super::*;
     use crate::place::testing::hypothesis;
+    use tracktwin_track::extension::Kind;
 
     #[test]
     fn another_member_of_the_family_is_wrong_only_where_it_is_certain() {
@@ -334,8 +335,12 @@ mod tests {
         assert!(wrong(said("squat", 0.95, 2.5)) && !wrong(said("squat", 0.85, 2.5)));
         assert!(wrong(said("rail_joint", 0.95, 1.0)) && !wrong(said("rail_joint", 0.95, 2.5)));
         assert!(!wrong(said(UNKNOWN, 0.95, 2.5)));
-        // Its family is right all the same.
-        assert!(is_family(&joint[0], &said("squat", 0.95, 2.5)));
+        let of = |physics: &str| {
+            let family = Kind::from_name(physics).unwrap().family.name().to_owned();
+            Hypothesis { family: Some(family), ..said(physics, 0.95, 2.5) }
+        };
+        assert!(is_family(&joint[0], &of("rail_cross_section")));
+        assert!(!is_family(&joint[0], &of("squat")));
         let absorber = Hidden::RailAbsorber {
             x_m: [2.5, 2.5],
             mass_kg: 1.0,

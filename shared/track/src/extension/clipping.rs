@@ -1,12 +1,16 @@
 //! A sensor or converter at the end of its range.
 
-use super::{Class, EffectFamily, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
+use super::{
+    Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, Measured, PlaceKind,
+    Screening,
+};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "clipping",
     summary: "accelerations beyond a limit are recorded as the limit",
-    family: EffectFamily::MeasuringChain,
+    family: EffectFamily::Sensor,
+    group: LookAlikeGroup::MeasuringChain,
     classes: &[Class::Noise],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

@@ -1,13 +1,16 @@
 //! The contact patch, which averages the irregularity over its length.
 
-use super::{Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{
+    Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind, Screening,
+};
 use crate::model::ContactPatch;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "contact_patch_filter",
     summary: "the contact patch averages short waves of the irregularity",
-    family: EffectFamily::Contact,
+    family: EffectFamily::SurfaceWaves,
+    group: LookAlikeGroup::Contact,
     classes: &[Class::Wavelength, Class::Global, Class::Load],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

@@ -1,13 +1,17 @@
 //! Corrugation: waves of one length on the railhead.
 
-use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Screening,
+};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "corrugation",
     summary: "waves of nearly one length on the railhead",
-    family: EffectFamily::RailSurface,
+    family: EffectFamily::SurfaceWaves,
+    group: LookAlikeGroup::RailSurface,
     classes: &[Class::Wavelength, Class::Global],
     place: PlaceKind::Stretch,
     measuring_chain: false,

@@ -1,7 +1,8 @@
 //! The mains in the signal.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Kind, KindParameter, Measured, PlaceKind, Screening,
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, Measured,
+    PlaceKind, Screening,
 };
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -9,7 +10,8 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "electrical_hum",
     summary: "a tone of the electrical supply is added to the signal",
-    family: EffectFamily::MeasuringChain,
+    family: EffectFamily::Sensor,
+    group: LookAlikeGroup::MeasuringChain,
     classes: &[Class::Noise, Class::Frequency],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

@@ -1,8 +1,8 @@
 //! Clamps that hold the rail at some sleepers.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
-    Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Places, Screening, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::{Assembly, Port};
@@ -12,6 +12,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "fastening_clamp",
     summary: "clamps at some sleepers hold the rail down and against rotation",
     family: EffectFamily::Fastening,
+    group: LookAlikeGroup::Fastening,
     classes: &[Class::Frequency, Class::Local],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

@@ -1,8 +1,8 @@
 //! An axle box on a spring of its own.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
-    Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Places, Screening, Trials,
 };
 use crate::model::{ContactOscillator, Vehicle};
 use std::sync::Arc;
@@ -11,6 +11,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "flexible_axle_box",
     summary: "part of the unsprung mass, such as the axle box, is held to the wheel by a spring",
     family: EffectFamily::Vehicle,
+    group: LookAlikeGroup::Vehicle,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

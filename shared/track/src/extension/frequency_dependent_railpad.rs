@@ -1,8 +1,8 @@
 //! Railpads that are stiffer the faster they are loaded.
 
 use super::{
-    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
-    Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
+    Screening, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::Assembly;
@@ -12,6 +12,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "frequency_dependent_railpad",
     summary: "railpads that relax: stiffer at high than at low frequency",
     family: EffectFamily::Fastening,
+    group: LookAlikeGroup::Fastening,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

@@ -1,13 +1,17 @@
 //! A sensor or amplifier of wrong gain.
 
-use super::{Class, EffectFamily, Extension, Kind, KindParameter, Measured, PlaceKind, Screening};
+use super::{
+    Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, Measured, PlaceKind,
+    Screening,
+};
 use rustfft::num_complex::Complex64;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "gain_error",
     summary: "all accelerations are recorded too large or too small by one factor",
-    family: EffectFamily::MeasuringChain,
+    family: EffectFamily::Sensor,
+    group: LookAlikeGroup::MeasuringChain,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

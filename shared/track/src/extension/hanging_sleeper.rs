@@ -1,8 +1,8 @@
 //! Sleepers that hang on the rail over a void.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
-    Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Places, Screening, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::{Assembly, ForceLaw, Law, Reaction, Support};
@@ -12,6 +12,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "hanging_sleeper",
     summary: "a sleeper hangs on the rail over a gap and meets its ballast only when it closes",
     family: EffectFamily::Support,
+    group: LookAlikeGroup::Support,
     classes: &[Class::Frequency, Class::Local, Class::Load, Class::Concentrated],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

@@ -22,6 +22,8 @@ pub struct Kind {
     pub summary: &'static str,
     /// What it has in common with kinds that differ from it in little but their name.
     pub family: EffectFamily,
+    /// The kinds that it is weighed with.
+    pub group: LookAlikeGroup,
     /// What stays and what moves when speed, place or load change.
     pub classes: &'static [Class],
     /// Where it is.
@@ -40,15 +42,82 @@ pub struct Kind {
     pub build: fn(&Inputs<'_>) -> Result<Arc<dyn Extension>, InstanceError>,
 }
 
-/// Effects that differ in name more than in what a recording shows of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// What an effect is of: the part of track, vehicle or measurement that differs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EffectFamily {
+    /// Support of the sleepers: lost, soft or layered.
+    Support,
+    /// Railpads, clamps and bolts.
+    Fastening,
+    /// Bending of the rail: joint, weld, cross section.
+    RailBending,
+    /// Shape of the rail's surface at a place: squat.
+    SurfaceShape,
+    /// Waves on the rail's surface, and how the contact filters them.
+    SurfaceWaves,
+    /// The wheel's circumference.
+    Wheel,
+    /// The vehicle around the wheel.
+    Vehicle,
+    /// Sensor, mounting and recorder.
+    Sensor,
+    /// Clock and odometer.
+    Position,
+    /// Track structure that no kind in the catalogue explains.
+    UnknownStructure,
+    /// A surface of the rail that no kind explains.
+    UnknownSurface,
+    /// Something at the wheel that no kind explains.
+    UnknownWheel,
+}
+
+impl EffectFamily {
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Support => "support",
+            Self::Fastening => "fastening",
+            Self::RailBending => "rail_bending",
+            Self::SurfaceShape => "surface_shape",
+            Self::SurfaceWaves => "surface_waves",
+            Self::Wheel => "wheel",
+            Self::Vehicle => "vehicle",
+            Self::Sensor => "sensor",
+            Self::Position => "position",
+            Self::UnknownStructure => "unknown_structure",
+            Self::UnknownSurface => "unknown_surface",
+            Self::UnknownWheel => "unknown_wheel",
+        }
+    }
+
+    /// What there is if one of them is left out, for a sentence.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Support => "a support of sleepers that is lost, soft or layered",
+            Self::Fastening => "another fastening",
+            Self::RailBending => "another bending stiffness of the rail",
+            Self::SurfaceShape => "a shape of the rail's surface",
+            Self::SurfaceWaves => "waves on the rail's surface",
+            Self::Wheel => "a wheel that is not round",
+            Self::Vehicle => "something on the vehicle",
+            Self::Sensor => "a fault of sensor or recorder",
+            Self::Position => "wrong positions",
+            Self::UnknownStructure => "something in the track",
+            Self::UnknownSurface => "something on the rail's surface",
+            Self::UnknownWheel => "something at the wheel",
+        }
+    }
+}
+
+/// Kinds that a recording separates less surely than others. The diagnosis weighs them as one first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LookAlikeGroup {
     /// A defect of the rail at a place: joint, weld, squat.
     RailDefect,
     /// The rail's surface over a stretch or all along.
     RailSurface,
     /// The rail's cross section.
-    Rail,
+    RailSection,
     /// The contact of wheel and rail.
     Contact,
     /// The wheel's circumference.
@@ -63,40 +132,6 @@ pub enum EffectFamily {
     Support,
     /// Sensor, mounting, clock, odometer.
     MeasuringChain,
-}
-
-impl EffectFamily {
-    /// Its name in files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::RailDefect => "rail_defect",
-            Self::RailSurface => "rail_surface",
-            Self::Rail => "rail_section",
-            Self::Contact => "contact",
-            Self::Wheel => "wheel",
-            Self::Vehicle => "vehicle",
-            Self::Fastening => "fastening",
-            Self::HoldDown => "sleeper_hold_down",
-            Self::Support => "sleeper_support",
-            Self::MeasuringChain => "measuring_chain",
-        }
-    }
-
-    /// What there is if one of them is left out, for a sentence.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::RailDefect => "a defect of the rail",
-            Self::RailSurface => "a shape of the rail's surface",
-            Self::Rail => "another cross section of the rail",
-            Self::Contact => "another contact of wheel and rail",
-            Self::Wheel => "a wheel that is not round",
-            Self::Vehicle => "something on the vehicle",
-            Self::Fastening => "another rail fastening",
-            Self::HoldDown => "something that holds sleepers down",
-            Self::Support => "a support of sleepers that is lost, soft or layered",
-            Self::MeasuringChain => "a fault of the measuring chain",
-        }
-    }
 }
 
 /// How the trace of an effect behaves over passes: a letter of its bar-code.

@@ -1,6 +1,9 @@
 //! Railpads that are stiffer the more load they carry.
 
-use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Screening,
+};
 use crate::element::SpringDamper;
 use crate::model::{Assembly, ForceLaw, Law, Reaction};
 use std::sync::Arc;
@@ -9,6 +12,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "load_dependent_railpad",
     summary: "railpads that grow stiffer with the load that they carry",
     family: EffectFamily::Fastening,
+    group: LookAlikeGroup::Fastening,
     classes: &[Class::Frequency, Class::Global, Class::Load],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

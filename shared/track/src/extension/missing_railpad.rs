@@ -1,8 +1,8 @@
 //! Railpads that are missing or worn out.
 
 use super::{
-    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
-    Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
+    Screening, Trials,
 };
 use crate::model::{Assembly, Support};
 use std::sync::Arc;
@@ -11,6 +11,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "missing_railpad",
     summary: "a railpad is missing or has lost most of its stiffness",
     family: EffectFamily::Fastening,
+    group: LookAlikeGroup::Fastening,
     classes: &[Class::Frequency, Class::Local],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

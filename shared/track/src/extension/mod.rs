@@ -39,7 +39,7 @@ mod wheel_flat;
 mod wheel_out_of_round;
 
 pub use instance::{ExtensionInstance, Inputs, InstanceError};
-pub use kind::{Bound, Class, EffectFamily, Kind, KindParameter, PlaceKind};
+pub use kind::{Bound, Class, EffectFamily, Kind, KindParameter, LookAlikeGroup, PlaceKind};
 pub use measured::Measured;
 pub use registry::{
     CLIPPING, CORRUGATION, ELECTRICAL_HUM, GAIN_ERROR, POSITION_ERROR, RAIL_JOINT, SQUAT,

@@ -1,14 +1,16 @@
 //! An odometer that is off.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Kind, KindParameter, Measured, PlaceKind, Screening,
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, Measured,
+    PlaceKind, Screening,
 };
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "position_error",
     summary: "recorded positions are shifted or stretched",
-    family: EffectFamily::MeasuringChain,
+    family: EffectFamily::Position,
+    group: LookAlikeGroup::MeasuringChain,
     classes: &[Class::Noise],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

@@ -1,8 +1,8 @@
 //! Deformation of the rail's cross-section under the wheel.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
-    Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Places, Screening, Trials,
 };
 use crate::model::{ContactOscillator, Vehicle};
 use std::f64::consts::TAU;
@@ -11,7 +11,8 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "rail_cross_section",
     summary: "the rail's cross-section deforms under the wheel",
-    family: EffectFamily::Rail,
+    family: EffectFamily::RailBending,
+    group: LookAlikeGroup::RailSection,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

@@ -1,8 +1,8 @@
 //! A joint of the rail: a dip of its surface, a loss of its bending stiffness, or both.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
-    Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Places, Screening, Trials,
 };
 use crate::model::Assembly;
 use std::sync::Arc;
@@ -10,7 +10,8 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "rail_joint",
     summary: "a rail joint: the surface dips and the rail bends more easily",
-    family: EffectFamily::RailDefect,
+    family: EffectFamily::RailBending,
+    group: LookAlikeGroup::RailDefect,
     classes: &[Class::Frequency, Class::Wavelength, Class::Local, Class::Concentrated],
     place: PlaceKind::Point,
     measuring_chain: false,

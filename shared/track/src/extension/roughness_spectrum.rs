@@ -1,13 +1,17 @@
 //! A spectrum of the irregularity other than eq. B.6.
 
-use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Screening,
+};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     physics: "roughness_spectrum",
     summary: "an irregularity whose spectrum has another shape than eq. B.6",
-    family: EffectFamily::RailSurface,
+    family: EffectFamily::SurfaceWaves,
+    group: LookAlikeGroup::RailSurface,
     classes: &[Class::Wavelength, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

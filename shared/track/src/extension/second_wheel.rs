@@ -1,8 +1,8 @@
 //! A second wheel on the same rail.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
-    Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Places, Screening, Trials,
 };
 use crate::model::Vehicle;
 use std::sync::Arc;
@@ -23,6 +23,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "second_wheel",
     summary: "a second wheel on the same rail, which reflects waves",
     family: EffectFamily::Vehicle,
+    group: LookAlikeGroup::Vehicle,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

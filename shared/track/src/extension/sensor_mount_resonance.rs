@@ -1,8 +1,8 @@
 //! A sensor whose mounting resonates.
 
 use super::{
-    Class, EffectFamily, Extension, Family, Kind, KindParameter, Measured, PlaceKind, Places,
-    Screening, Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, Measured,
+    PlaceKind, Places, Screening, Trials,
 };
 use rustfft::num_complex::Complex64;
 use std::sync::Arc;
@@ -10,7 +10,8 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "sensor_mount_resonance",
     summary: "the sensor resonates on its mounting",
-    family: EffectFamily::MeasuringChain,
+    family: EffectFamily::Sensor,
+    group: LookAlikeGroup::MeasuringChain,
     classes: &[Class::Frequency, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: true,

@@ -1,8 +1,8 @@
 //! Bolts that hold the sleepers' ends down on the substructure.
 
 use super::{
-    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
-    Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
+    Screening, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::Assembly;
@@ -11,7 +11,8 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "sleeper_bolt",
     summary: "bolts hold the sleepers' ends down on the substructure",
-    family: EffectFamily::HoldDown,
+    family: EffectFamily::Fastening,
+    group: LookAlikeGroup::HoldDown,
     classes: &[Class::Frequency, Class::Local],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

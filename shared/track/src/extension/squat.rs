@@ -1,8 +1,8 @@
 //! A squat: a short hollow of the railhead.
 
 use super::{
-    Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places, Screening,
-    Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
+    Screening, Trials,
 };
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -10,7 +10,8 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     physics: "squat",
     summary: "a short hollow of the railhead",
-    family: EffectFamily::RailDefect,
+    family: EffectFamily::SurfaceShape,
+    group: LookAlikeGroup::RailDefect,
     classes: &[Class::Wavelength, Class::Local, Class::Concentrated],
     place: PlaceKind::Point,
     measuring_chain: false,

@@ -1,8 +1,8 @@
 //! A layer below the ballast that moves.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, PlaceKind, Places,
-    Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Places, Screening, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::Assembly;
@@ -13,6 +13,7 @@ pub(super) const KIND: Kind =
         physics: "subgrade_layer",
         summary: "the ballast rests on a mass with a spring and damper of its own",
         family: EffectFamily::Support,
+        group: LookAlikeGroup::Support,
         classes: &[Class::Frequency, Class::Global],
         place: PlaceKind::Sleepers,
         measuring_chain: false,

@@ -1,6 +1,9 @@
 //! Railpads and ballast that differ from sleeper to sleeper.
 
-use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Screening,
+};
 use crate::model::{Assembly, Support};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -11,6 +14,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "support_variation",
     summary: "railpads and ballast differ from sleeper to sleeper",
     family: EffectFamily::Support,
+    group: LookAlikeGroup::Support,
     classes: &[Class::Frequency, Class::Local],
     place: PlaceKind::Sleepers,
     measuring_chain: false,

@@ -1,6 +1,9 @@
 //! A flat of the wheel's tread.
 
-use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Screening,
+};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -8,6 +11,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "wheel_flat",
     summary: "a flat of the wheel's tread, met once a turn",
     family: EffectFamily::Wheel,
+    group: LookAlikeGroup::Wheel,
     classes: &[Class::Wavelength, Class::WheelAngle, Class::Concentrated],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

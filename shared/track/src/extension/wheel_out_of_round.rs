@@ -1,6 +1,9 @@
 //! A wheel that is not round.
 
-use super::{Bound, Class, EffectFamily, Extension, Kind, KindParameter, PlaceKind, Screening};
+use super::{
+    Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Screening,
+};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -8,6 +11,7 @@ pub(super) const KIND: Kind = Kind {
     physics: "wheel_out_of_round",
     summary: "waves around the wheel's tread",
     family: EffectFamily::Wheel,
+    group: LookAlikeGroup::Wheel,
     classes: &[Class::Wavelength, Class::WheelAngle, Class::Global],
     place: PlaceKind::Nowhere,
     measuring_chain: false,

@@ -20,7 +20,7 @@ use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::PassDefect;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::extension::{EffectFamily, Kind};
+use tracktwin_track::extension::{Kind, LookAlikeGroup};
 
 /// Greatest probability where nothing could be tested on a speed that was not fitted: structure and
 /// geometry look alike at one speed.
@@ -187,16 +187,16 @@ impl Evidence<'_> {
 }
 
 /// A shape of the rail that the passes alone show, and no fit of the model beside its siblings, tells its
-/// family more surely than its name: a joint may bend more easily, or be a dip alone.
+/// group more surely than its name: a joint may bend more easily, or be a dip alone.
 fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
     let mut siblings = Vec::new();
     for index in 0..hypotheses.len() {
         let hypothesis = &hypotheses[index];
         let kind = Kind::from_name(&hypothesis.physics);
-        let Some(kind) = kind.filter(|it| it.family == EffectFamily::RailDefect) else { continue };
+        let Some(kind) = kind.filter(|it| it.group == LookAlikeGroup::RailDefect) else { continue };
         let is_sibling = |other: &Hypothesis| {
             other.physics != hypothesis.physics
-                && other.family == hypothesis.family
+                && Kind::from_name(&other.physics).is_some_and(|it| it.group == kind.group)
                 && meet(other.location.as_ref(), hypothesis.location.as_ref())
         };
         let is_fitted = fitted.contains(&kind.physics);
@@ -204,11 +204,12 @@ fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
             continue;
         }
         let others = kind.look_alikes.iter().filter_map(|name| Kind::from_name(name));
-        let others: Vec<_> = others.filter(|other| other.family == kind.family).collect();
+        let others: Vec<_> = others.filter(|other| other.group == kind.group).collect();
         let whole = hypothesis.probability;
         for other in &others {
             siblings.push(Hypothesis {
                 physics: other.physics.to_owned(),
+                family: Some(other.family.name().to_owned()),
                 probability: (1.0 - NAMED_SHARE) * whole / others.len() as f64,
                 accepted: false,
                 parameters: BTreeMap::new(),

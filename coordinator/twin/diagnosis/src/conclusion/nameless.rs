@@ -7,7 +7,7 @@ use crate::outcome::{Hypothesis, UNKNOWN, meet};
 use crate::patch_scan::Fixed;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
-use tracktwin_track::extension::{Class, Kind};
+use tracktwin_track::extension::{Class, EffectFamily, Kind};
 
 /// Probability of such a patch by chance up to which it is reported.
 const PATCH_ALARM: f64 = 0.01;
@@ -32,15 +32,17 @@ impl Evidence<'_> {
             return;
         }
         let at_wheel = kind.classes.contains(&Class::WheelAngle);
-        let (port, would_separate) = if at_wheel {
-            ("wheel_surface", "an inspection or a profile measurement of the wheel's tread")
+        let (port, family, would_separate) = if at_wheel {
+            let tread = "an inspection or a profile measurement of the wheel's tread";
+            ("wheel_surface", EffectFamily::UnknownWheel, tread)
         } else {
-            ("rail_surface", "an inspection or a profile measurement of the rail at the place")
+            let rail = "an inspection or a profile measurement of the rail at the place";
+            ("rail_surface", EffectFamily::UnknownSurface, rail)
         };
         all.retain(|other| other.physics != UNKNOWN);
         all.push(Hypothesis {
             physics: UNKNOWN.to_owned(),
-            family: None,
+            family: Some(family.name().to_owned()),
             port: Some(port.to_owned()),
             parameters: BTreeMap::new(),
             assumed: BTreeMap::new(),
@@ -60,12 +62,14 @@ impl Evidence<'_> {
             return;
         }
         let sleepers: Vec<usize> = patch.sleepers.clone().collect();
-        let (port, would_separate) = match patch.fixed {
+        let (port, family, would_separate) = match patch.fixed {
             Fixed::Wavelength(_) => {
-                ("rail_surface", "an inspection or a profile measurement of the rail at the place")
+                let rail = "an inspection or a profile measurement of the rail at the place";
+                ("rail_surface", EffectFamily::UnknownSurface, rail)
             }
             Fixed::Frequency(_) => {
-                ("rail_seat", "a hammer test at the place, above and between the sleepers")
+                let hammer = "a hammer test at the place, above and between the sleepers";
+                ("rail_seat", EffectFamily::UnknownStructure, hammer)
             }
         };
         let parameters = match patch.fixed {
@@ -77,7 +81,7 @@ impl Evidence<'_> {
         all.retain(|known| known.physics != UNKNOWN);
         all.push(Hypothesis {
             physics: UNKNOWN.to_owned(),
-            family: None,
+            family: Some(family.name().to_owned()),
             family_probability: 1.0 - p_value,
             probability: 1.0 - p_value,
             accepted: true,

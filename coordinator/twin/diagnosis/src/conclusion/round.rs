@@ -27,12 +27,12 @@ const ORDER: &str = "order";
 impl Evidence<'_> {
     /// Fits of one search as hypotheses.
     pub(super) fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
-        let Probabilities { named, family, unknown, nothing } = round.probabilities();
+        let Probabilities { named, group, unknown, nothing } = round.probabilities();
         // What is left beside a named effect may be its model's error as well as something new.
         let first = self.search.rounds.first().is_some_and(|first| std::ptr::eq(first, round));
         let alone = first && !round.accepted;
         let is_new = if first || round.accepted { 1.0 } else { REMAINDER_PRIOR };
-        let others = family.max(nothing);
+        let others = group.max(nothing);
         let is_there = alone && round.unknown_is_predictive();
         let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
         // Something is there, but the names that come near failed on withheld speeds.
@@ -68,7 +68,7 @@ impl Evidence<'_> {
         let behaviour = port.behaviour.as_ref();
         Hypothesis {
             physics: UNKNOWN.to_owned(),
-            family: None,
+            family: Some(port.place.family().name().to_owned()),
             family_probability: probability,
             probability,
             accepted: false,

@@ -1,6 +1,7 @@
 //! Where an unknown dynamic stiffness may act.
 
 use crate::section::Section;
+use tracktwin_track::extension::EffectFamily;
 
 /// Longest period of a pattern of sleepers, in sleepers.
 const EVERY_MAX: usize = 5;
@@ -24,6 +25,14 @@ impl PortPlace {
             Self::Seats(_) => "rail_seat",
             Self::Between(_) => "between_rail_seats",
             Self::Wheel => "wheel",
+        }
+    }
+
+    /// What the unknown is of.
+    pub const fn family(&self) -> EffectFamily {
+        match self {
+            Self::Seats(_) | Self::Between(_) => EffectFamily::UnknownStructure,
+            Self::Wheel => EffectFamily::UnknownWheel,
         }
     }
 

@@ -4,7 +4,7 @@ use super::{Fitted, Round};
 use crate::port_scan::UnknownElement;
 use crate::screen::STRENGTHS;
 use std::collections::BTreeMap;
-use tracktwin_track::extension::{EffectFamily, Kind};
+use tracktwin_track::extension::{Kind, LookAlikeGroup};
 
 /// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
 pub(super) const EVIDENCE_TEMPERING: f64 = 3.0;
@@ -13,7 +13,7 @@ pub(super) const EVIDENCE_TEMPERING: f64 = 3.0;
 /// model of an effect grows with the effect.
 const INEXACT_SHARE: f64 = 1e-3;
 
-/// By how much more members of one family are tempered against each other for each nat of their
+/// By how much more look-alikes of one group are tempered against each other for each nat of their
 /// evidence: another simulator's, or nature's, void or joint is not ours, and what both lack decides.
 const MEMBER_SHARE: f64 = 0.03;
 
@@ -34,8 +34,8 @@ const NOTHING_PRIOR: f64 = 0.5;
 pub(crate) struct Probabilities {
     /// Of each candidate that was fitted.
     pub(crate) named: Vec<f64>,
-    /// Of the best candidate's family.
-    pub(crate) family: f64,
+    /// Of the best candidate's group of look-alikes.
+    pub(crate) group: f64,
     /// Of an unknown dynamic stiffness.
     pub(crate) unknown: f64,
     /// Of nothing at all.
@@ -51,7 +51,7 @@ impl Round {
 
     /// The same with this as the unknown.
     pub(super) fn against(&self, unknown: Option<&UnknownElement>) -> Probabilities {
-        let of_fitted = |fitted: &Fitted| (fitted.log_evidence, fitted.candidate.kind.family);
+        let of_fitted = |fitted: &Fitted| (fitted.log_evidence, fitted.candidate.kind.group);
         let named: Vec<_> = self.fitted.iter().map(of_fitted).collect();
         let is_linear = self.fitted.first().is_some_and(|best| best.candidate.is_linear());
         let explained_share = if is_linear { 1.0 } else { EXPLAINED_SHARE };
@@ -79,10 +79,10 @@ pub(super) fn unseen(trials: impl Iterator<Item = (&'static str, [f64; STRENGTHS
 /// Log evidences of names and of the unknown against nothing, in nats, the share of the unknown's from
 /// which the best name explains it, and the share of all names that would not be seen.
 ///
-/// Names are weighed in two steps: families against each other and against nothing by their best
+/// Names are weighed in two steps: groups of look-alikes against each other and against nothing by their best
 /// member's evidence, then the members of each.
 fn of(
-    named: &[(f64, EffectFamily)],
+    named: &[(f64, LookAlikeGroup)],
     unknown: Option<f64>,
     explained_share: f64,
     unseen: f64,
@@ -92,8 +92,8 @@ fn of(
     let temperature = EVIDENCE_TEMPERING + INEXACT_SHARE * best.max(0.0);
     let logarithms: Vec<f64> = named
         .iter()
-        .map(|&(evidence, family)| {
-            let members = || named.iter().filter(move |(_, other)| *other == family);
+        .map(|&(evidence, group)| {
+            let members = || named.iter().filter(move |(_, other)| *other == group);
             let most = members().map(|(evidence, _)| *evidence).fold(f64::NEG_INFINITY, f64::max);
             let apart = EVIDENCE_TEMPERING + MEMBER_SHARE * most.max(0.0);
             let share = |evidence: f64| ((evidence - most) / apart).exp();
@@ -116,10 +116,10 @@ fn of(
         + logarithms.iter().copied().map(weight).sum::<f64>();
     let named_share: Vec<f64> =
         logarithms.iter().map(|&logarithm| weight(logarithm) / all).collect();
-    let leading = named.first().map(|(_, family)| *family);
+    let leading = named.first().map(|(_, group)| *group);
     let of_leading = named.iter().zip(&named_share).filter(|((_, it), _)| Some(*it) == leading);
     Probabilities {
-        family: of_leading.map(|(_, share)| share).sum(),
+        group: of_leading.map(|(_, share)| share).sum(),
         named: named_share,
         unknown: weight(unknown) / all,
         nothing: weight(nothing) / all,
@@ -130,17 +130,18 @@ fn of(
 mod tests {
     use super::*;
 
-    /// Names of different families.
-    fn apart(evidences: &[f64]) -> Vec<(f64, EffectFamily)> {
-        let families = [EffectFamily::Support, EffectFamily::RailDefect, EffectFamily::Fastening];
-        evidences.iter().copied().zip(families).collect()
+    /// Names of different groups.
+    fn apart(evidences: &[f64]) -> Vec<(f64, LookAlikeGroup)> {
+        let groups =
+            [LookAlikeGroup::Support, LookAlikeGroup::RailDefect, LookAlikeGroup::Fastening];
+        evidences.iter().copied().zip(groups).collect()
     }
 
     #[test]
-    fn members_of_a_family_are_less_sure_than_the_family() {
-        let alike = [(1000.0, EffectFamily::Support), (960.0, EffectFamily::Support)];
+    fn look_alikes_are_less_sure_than_their_group() {
+        let alike = [(1000.0, LookAlikeGroup::Support), (960.0, LookAlikeGroup::Support)];
         let both = of(&alike, None, 1.0, 0.0);
-        assert!(both.family > 0.999 && both.named[0] > both.named[1]);
+        assert!(both.group > 0.999 && both.named[0] > both.named[1]);
         // Forty nats in a thousand: nothing that another void could not turn.
         assert!(both.named[1] > 0.15, "{both:?}");
         let unlike = of(&apart(&[1000.0, 960.0]), None, 1.0, 0.0);

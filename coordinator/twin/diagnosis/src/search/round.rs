@@ -269,13 +269,13 @@ pub(super) fn accepted_candidate<'r>(
     prepared: &PreparedRecording,
     threshold: EvidenceThreshold<'_>,
 ) -> Option<&'r Fitted> {
-    let Probabilities { family, unknown, .. } = round.against(competitor);
+    let Probabilities { group, unknown, .. } = round.against(competitor);
     let best = round.fitted.first()?;
     let is_shape = || {
         competitor
             .is_some_and(|competitor| is_shape_at(&competitor.place, &best.candidate, prepared))
     };
-    let leads = family > unknown || is_shape();
+    let leads = group > unknown || is_shape();
     (leads && best.log_evidence >= threshold.of(&best.candidate)).then_some(best)
 }
 
