@@ -81,6 +81,31 @@ fn a_joint_is_named_between_its_sleepers_and_unknown_there_where_it_has_no_name(
 }
 
 #[test]
+fn passes_that_were_withheld_confirm_a_joint() {
+    let folder = recorded(&["13", "10"], JOINT);
+    let (answer, diagnosis) = diagnosed(folder.path(), &["--confirm"]);
+    let diagnosis = diagnosis.unwrap();
+    assert_eq!(accepted(&diagnosis), [("rail_joint", vec!["SN11", "SN12"])]);
+    assert!(answer.out.contains("Withheld passes confirm it"), "{}", answer.out);
+    let confirmation = &diagnosis["confirmation"];
+    assert_eq!(confirmation["passes"].as_array().unwrap().len(), 2);
+    let speeds = confirmation["speeds"].as_array().unwrap();
+    assert_eq!(speeds.len(), 2);
+    let mean = |name: &str| speeds.iter().map(|speed| speed[name].as_f64().unwrap()).sum::<f64>();
+    assert!(mean("after_dB") < mean("before_dB"), "{confirmation}");
+    assert!(confirmation["gain_nats"].as_f64().unwrap() > 4.0, "{confirmation}");
+
+    // With one pass at each speed there is none to withhold.
+    let single = tempfile::tempdir().unwrap();
+    let out = single.path().join("recording").display().to_string();
+    let arguments = ["simulate", "--spans", "25", "--speed", "13", "--speed", "10", "--out", &out];
+    assert_eq!(run(PROGRAM, &arguments).code, Some(0));
+    let (answer, diagnosis) = diagnosed(single.path(), &["--confirm"]);
+    assert_eq!((answer.code, diagnosis), (Some(2), None));
+    assert!(answer.err.contains("record one more pass"), "{}", answer.err);
+}
+
+#[test]
 fn a_flat_is_named_and_unknown_on_the_tread_where_it_has_no_name() {
     let flat = "[[extension]]\nphysics = \"wheel_flat\"\nlength_m = 3e-3\n";
     let folder = recorded(&["13", "10"], flat);

@@ -6,6 +6,7 @@
 mod diagnosis_page;
 mod evaluation_page;
 mod hammer_page;
+mod improvement_page;
 mod inspection_page;
 mod inversion_page;
 mod map_picture;
@@ -19,6 +20,7 @@ mod track_picture;
 pub use diagnosis_page::{Origin, diagnosis_page};
 pub use evaluation_page::evaluation_page;
 pub use hammer_page::{hammer_chart, hammer_page};
+pub use improvement_page::{ImprovedSleeper, Improvement, improvement_page};
 pub use inspection_page::{Inspected, InspectedCurve, InspectionReport, inspection_page};
 pub use inversion_page::{inversion_chart, inversion_page};
 pub use models_page::models_page;

@@ -6,14 +6,15 @@ use super::progress::Stages;
 use super::track::TrackOption;
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline;
+use crate::pipeline::confirm::{ConfirmingError, diagnose_and_confirm};
 use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
 use crate::pipeline::provenance;
 use anyhow::Context;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use serde_json::{Value, json};
-use std::path::PathBuf;
-use tracktwin_diagnosis::{Diagnosis, Verdict, check_track};
+use std::path::{Path, PathBuf};
+use tracktwin_diagnosis::{Confirmation, ConfirmedSpeed, Diagnosis, Verdict, check_track};
 use tracktwin_experiment::CODE_VERSION;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Library, without_password};
@@ -53,12 +54,40 @@ pub(super) struct Arguments {
     track: TrackOption,
     #[command(flatten)]
     force: Force,
+    /// Withhold the last pass of each speed that has two or more, and compare these passes with simulations in
+    /// time of what was found.
+    #[arg(long)]
+    confirm: bool,
     /// Leave this kind of physics out of the catalogue; may be repeated.
     #[arg(long, value_name = "PHYSICS", value_parser = PossibleValuesParser::new(names()))]
     without: Vec<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+impl Arguments {
+    /// A diagnosis of a recording, with a library for null simulations.
+    pub(super) fn of(
+        recording: &Path,
+        library: &str,
+        out: &Path,
+        track: &TrackOption,
+        force: Force,
+        confirm: bool,
+    ) -> Self {
+        Self {
+            recording: recording.to_owned(),
+            models: None,
+            library: Some(library.to_owned()),
+            out: out.to_owned(),
+            track: track.clone(),
+            force,
+            confirm,
+            without: Vec::new(),
+            json: false,
+        }
+    }
 }
 
 /// Names of the catalogue.
@@ -68,7 +97,8 @@ fn names() -> impl Iterator<Item = &'static str> {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let origin = origin(&arguments);
-    let Arguments { recording, models, library, track, out, force, without, json } = arguments;
+    let Arguments { recording, models, library, track, out, force, confirm, without, json } =
+        arguments;
     let recording = Recording::open(&recording).or_input()?;
     check(&out, Kind::Results, force, &["report.html", "diagnosis.json"])?;
     recording.doubts.iter().for_each(|doubt| println_stderr(doubt));
@@ -91,31 +121,25 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let shown = Stages::default();
     let setting =
         Setting { track: &track, library: library.as_ref(), without: &without, shuffle: None };
-    let diagnosed = diagnose(&recording, setting, &|stage, share| shown.at(stage, share)).await;
+    let watch = |stage, share| shown.at(stage, share);
+    let diagnosed = if confirm {
+        diagnose_and_confirm(&recording, setting, &watch).await
+    } else {
+        let diagnosed = diagnose(&recording, setting, &watch).await;
+        diagnosed.map(|it| it.diagnosis).map_err(ConfirmingError::from)
+    };
     shown.end();
-    let mut diagnosis = diagnosed.map_err(stop)?.diagnosis;
+    let mut diagnosis = diagnosed.map_err(stop)?;
     diagnosis.notes.splice(..0, recording.doubts.iter().cloned().chain(assumed));
-    let document = serde_json::to_string_pretty(&diagnosis).context("a diagnosis is plain JSON")?;
-    let page = tracktwin_report::diagnosis_page(&diagnosis, &origin);
-    let mut output = Output::begin(&out, Kind::Results, force.force)?;
-    output.add(&FileName::new("report.html")?, page.as_bytes())?;
-    output.add(&FileName::new("diagnosis.json")?, document.as_bytes())?;
-    output.commit()?;
-    if let Some(library) = &library {
-        let record = provenance::diagnosis(&diagnosis, document);
-        if let Err(error) = library.record_diagnosis(record).await {
-            // The diagnosis in the folder is complete nevertheless.
-            tracing::warn!(
-                error = &error as &dyn std::error::Error,
-                "the files are complete, but the diagnosis cannot be stored in the library"
-            );
-        }
-    }
+    write(&diagnosis, &origin, &out, force, library.as_ref()).await?;
     let report = out.join("report.html").display().to_string();
     if json {
         print_json(&summary(&diagnosis, &report));
     } else {
         println_stdout(&diagnosis.sentence);
+        if confirm {
+            println_stdout(&confirmed(diagnosis.confirmation.as_ref()));
+        }
         println_stdout(&format!("report: {report}"));
     }
     match diagnosis.verdict {
@@ -124,27 +148,73 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
 }
 
+/// Writes the document and the page, and stores the document in the library.
+async fn write(
+    diagnosis: &Diagnosis,
+    origin: &Origin,
+    out: &Path,
+    force: Force,
+    library: Option<&Library>,
+) -> Result<(), Stop> {
+    let document = serde_json::to_string_pretty(diagnosis).context("a diagnosis is plain JSON")?;
+    let page = tracktwin_report::diagnosis_page(diagnosis, origin);
+    let mut output = Output::begin(out, Kind::Results, force.force)?;
+    output.add(&FileName::new("report.html")?, page.as_bytes())?;
+    output.add(&FileName::new("diagnosis.json")?, document.as_bytes())?;
+    output.commit()?;
+    if let Some(library) = library {
+        let record = provenance::diagnosis(diagnosis, document);
+        if let Err(error) = library.record_diagnosis(record).await {
+            // The diagnosis in the folder is complete nevertheless.
+            tracing::warn!(
+                error = &error as &dyn std::error::Error,
+                "the files are complete, but the diagnosis cannot be stored in the library"
+            );
+        }
+    }
+    Ok(())
+}
+
 /// The verdict, what was accepted, and the path of the report, as JSON.
 fn summary(diagnosis: &Diagnosis, report: &str) -> Value {
     let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
     json!({
         "recording": diagnosis.recording, "verdict": diagnosis.verdict,
         "sentence": diagnosis.sentence, "nothing_left_out": diagnosis.nothing_left_out,
-        "accepted": accepted.collect::<Vec<_>>(), "report": report,
+        "accepted": accepted.collect::<Vec<_>>(), "confirmation": diagnosis.confirmation,
+        "report": report,
     })
 }
 
+/// What the withheld passes say.
+fn confirmed(confirmation: Option<&Confirmation>) -> String {
+    let Some(Confirmation { speeds, gain_nats, is_confirmed, .. }) = confirmation else {
+        return "Withheld passes: nothing was accepted that a simulated pass shows.".to_owned();
+    };
+    let of_speed = |speed: &ConfirmedSpeed| {
+        let ConfirmedSpeed { speed_km_h, before_db, after_db } = speed;
+        format!("{before_db:.1} dB before and {after_db:.1} dB after at {speed_km_h:.0} km/h")
+    };
+    let speeds: Vec<String> = speeds.iter().map(of_speed).collect();
+    let verb = if *is_confirmed { "confirm" } else { "do not confirm" };
+    format!(
+        "Withheld passes {verb} it: simulations in time differ from them by {} ({gain_nats:.0} nats).",
+        speeds.join(", ")
+    )
+}
+
 /// An unsuitable recording is wrong input; everything else is a failure.
-fn stop(error: DiagnosingError) -> Stop {
+fn stop(error: ConfirmingError) -> Stop {
     match error {
-        DiagnosingError::Recording(error) => Stop::Input(error.into()),
+        ConfirmingError::Diagnosis(DiagnosingError::Recording(error)) => Stop::Input(error.into()),
+        ConfirmingError::NoPass => Stop::Input(error.into()),
         failed => Stop::Failure(failed.into()),
     }
 }
 
 /// The command that repeats the diagnosis.
 fn origin(arguments: &Arguments) -> Origin {
-    let Arguments { recording, models, library, track, out, without, .. } = arguments;
+    let Arguments { recording, models, library, track, out, confirm, without, .. } = arguments;
     let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
     command.extend(models.as_ref().map(|models| format!("--models {}", models.display())));
     let track = track.track.as_ref();
@@ -152,6 +222,7 @@ fn origin(arguments: &Arguments) -> Origin {
     let library = library.as_deref().map(without_password);
     command.extend(library.as_ref().map(|library| format!("--library {library}")));
     command.extend(without.iter().map(|physics| format!("--without {physics}")));
+    command.extend(confirm.then(|| "--confirm".to_owned()));
     command.push(format!("--out {}", out.display()));
     Origin {
         command: command.join(" "),

@@ -50,19 +50,20 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+impl Arguments {
+    /// A campaign that is extended by a diagnosis.
+    pub(super) const fn of(campaign: PathBuf, from: PathBuf, out: PathBuf, force: Force) -> Self {
+        Self { campaign, from, out: Some(out), force, json: false }
+    }
+}
+
 pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { campaign: path, from, out, force, json } = arguments;
     let text = read_text(&path).or_input()?;
     let campaign = Campaign::parse(&text, &path.display().to_string(), None).or_input()?;
     let diagnosis = diagnosis(&from).or_input()?;
     check_spacing(&path, &campaign, &diagnosis).or_input()?;
-    let accepted: Vec<_> = diagnosis
-        .hypotheses
-        .iter()
-        .filter(|hypothesis| hypothesis.accepted)
-        .filter_map(|hypothesis| Some((hypothesis, Kind::from_name(&hypothesis.physics)?)))
-        .filter(|(_, kind)| !kind.measuring_chain)
-        .collect();
+    let accepted: Vec<_> = physics(&diagnosis).collect();
     if accepted.is_empty() {
         let name = from.display();
         let verdict = format!(
@@ -91,6 +92,18 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
+/// What was accepted that belongs in a campaign, with its kinds.
+fn physics(diagnosis: &Diagnosis) -> impl Iterator<Item = (&Hypothesis, &'static Kind)> {
+    let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
+    let known = accepted.filter_map(|it| Some((it, Kind::from_name(&it.physics)?)));
+    known.filter(|(_, kind)| !kind.measuring_chain)
+}
+
+/// Whether anything was accepted that belongs in a campaign.
+pub(super) fn has_physics(diagnosis: &Diagnosis) -> bool {
+    physics(diagnosis).next().is_some()
+}
+
 /// Checks that the campaign's sleepers are spaced as the diagnosed ones.
 fn check_spacing(path: &Path, campaign: &Campaign, diagnosis: &Diagnosis) -> anyhow::Result<()> {
     let spacing_m = campaign.definition.experiment.design.sleeper.spacing_m;
@@ -107,7 +120,8 @@ fn check_spacing(path: &Path, campaign: &Campaign, diagnosis: &Diagnosis) -> any
     }
 }
 
-fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {
+/// Reads a diagnosis.
+pub(super) fn diagnosis(path: &Path) -> anyhow::Result<Diagnosis> {
     let name = path.display();
     let diagnosis: Diagnosis = serde_json::from_slice(&read(path)?).with_context(|| {
         format!("{name}: not a diagnosis; give the diagnosis.json of `tracktwin diagnose`")

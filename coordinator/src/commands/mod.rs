@@ -16,6 +16,7 @@ mod extend;
 mod files;
 mod hammer;
 mod import;
+mod improve;
 mod inspect;
 mod library;
 mod library_url;
@@ -91,6 +92,8 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Write a campaign that includes the physics found by a diagnosis.
     Extend(extend::Arguments),
+    /// Find what the track model lacks in a recording, and evaluate the recording with it.
+    Improve(improve::Arguments),
     /// Run a blind trial: hide physics in recordings, diagnose them and score the diagnoses.
     Trial(trial::Arguments),
     /// Compare the results with the paper's, figure by figure.
@@ -173,6 +176,7 @@ fn run(command: Command) -> Result<(), Stop> {
         Command::Train(arguments) => asynchronously(train::run(arguments)),
         Command::Diagnose(arguments) => asynchronously(diagnose::run(arguments)),
         Command::Extend(arguments) => extend::run(arguments),
+        Command::Improve(arguments) => asynchronously(improve::run(arguments)),
         Command::Trial(arguments) => asynchronously(trial::run(arguments)),
         Command::Evaluate(arguments) => asynchronously(evaluate::run(arguments)),
         Command::Stream(arguments) => asynchronously(stream::run(arguments)),

@@ -7,8 +7,8 @@ use crate::pipeline::compute::compute;
 use crate::pipeline::null_models::{self, NullModelError};
 use nalgebra::DVector;
 use tracktwin_diagnosis::{
-    CalibrationError, Candidate, Diagnosis, Evidence, PreparationError, PreparedRecording,
-    SearchOutcome, Stage, check_track, first_calibration, passes_alone, search,
+    CalibrationError, Candidate, Diagnosis, Evidence, NullModel, PreparationError,
+    PreparedRecording, SearchOutcome, Stage, check_track, first_calibration, passes_alone, search,
 };
 use tracktwin_inspection::{Inspection, inspect};
 use tracktwin_library::Library;
@@ -48,6 +48,8 @@ pub struct Compared {
     pub prepared: PreparedRecording,
     /// Result of the search.
     pub search: SearchOutcome,
+    /// The random variation it was compared with.
+    pub null: NullModel,
 }
 
 /// Why there is no diagnosis.
@@ -116,7 +118,7 @@ pub async fn diagnose(
     let found = compute(|| search(&prepared, &null, start, &all, &progress));
     let search = found.map_err(DiagnosingError::Search)?;
     let diagnosis = compute(|| conclude(recording, &prepared, &inspection, &search))?;
-    Ok(Diagnosed { diagnosis, compared: Some(Compared { prepared, search }) })
+    Ok(Diagnosed { diagnosis, compared: Some(Compared { prepared, search, null }) })
 }
 
 /// The track re-tuned with nothing left out, and what may differ beyond the section.

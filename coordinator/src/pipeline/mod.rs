@@ -5,6 +5,7 @@
 
 pub mod check;
 pub mod compute;
+pub mod confirm;
 pub mod coverage;
 pub mod diagnose;
 pub mod evaluate;

@@ -4,6 +4,7 @@
 //! the diagnosis' own affair.
 
 mod along;
+pub(crate) mod confirmation;
 mod fit;
 mod fitted;
 mod headline;
@@ -41,6 +42,7 @@ pub fn diagnosis_page(diagnosis: &Diagnosis, origin: &Origin) -> String {
         (fitted::section(diagnosis))
         (along::section(diagnosis))
         (fit::section(diagnosis))
+        (confirmation::section(diagnosis))
         (reproduce(diagnosis, origin))
     };
     let title = format!("Diagnosis of {}", diagnosis.recording);

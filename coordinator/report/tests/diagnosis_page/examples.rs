@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{
-    BeforeAfter, Diagnosis, Estimate, FORMAT, FitScores, Hypothesis, Levels, Location, Mismatch,
-    Score, Scores, SleeperValues, Verdict,
+    BeforeAfter, Confirmation, ConfirmedSpeed, Diagnosis, Estimate, FORMAT, FitScores, Hypothesis,
+    Levels, Location, Mismatch, Score, Scores, SleeperValues, Verdict,
 };
 
 /// As metres a second times 3.6 come out.
@@ -126,6 +126,7 @@ pub(crate) fn consistent() -> Diagnosis {
         bias_removed: BTreeMap::new(),
         track: track(|_| 1.0),
         levels: levels(|_| 0.0),
+        confirmation: None,
         loss_of_contact: None,
         notes: vec!["Below 150 Hz a level scatters by 4 dB: what acts only there may stay unseen.".to_owned()],
     }
@@ -182,6 +183,13 @@ pub(crate) fn left_out() -> Diagnosis {
         ]),
         track: track(|index| if (13..15).contains(&index) { 0.56 } else { 1.0 }),
         levels: levels(joint),
+        confirmation: Some(Confirmation {
+            passes: vec!["pass-2.parquet".to_owned()],
+            speeds: vec![ConfirmedSpeed { speed_km_h: 13.0, before_db: 3.4, after_db: 2.1 }],
+            sleepers: 5,
+            gain_nats: 41.7,
+            is_confirmed: true,
+        }),
         loss_of_contact: None,
         notes: vec!["The dip's length is hardly known apart from its depth.".to_owned()],
         ..consistent()

@@ -2,6 +2,7 @@
 //! from elsewhere. The pages are left in the target folder for a look.
 
 mod examples;
+mod improvement;
 
 use self::examples::{SLEEPERS, chain, consistent, estimates, hypothesis, left_out, unknown};
 use serde_json::Value;
@@ -65,6 +66,7 @@ fn left_out_physics_is_named_placed_measured_and_its_bias_shown() {
     assert_eq!(page.matches("class=\"line box").count(), 6);
     assert!(!page.contains("sleeper bolt"), "what is improbable is counted, not listed");
     assert_reads(&page, &["1 further hypothesis is"]);
+    assert_reads(&page, &["pass-2.parquet", "They confirm it", "by 42 nats", "3.4 dB", "2.1 dB"]);
 }
 
 #[test]

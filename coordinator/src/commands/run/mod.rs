@@ -83,6 +83,31 @@ pub(super) struct Arguments {
 }
 
 impl Arguments {
+    /// A campaign file whose models evaluate a recording.
+    pub(super) fn of(
+        campaign: PathBuf,
+        recording: &Path,
+        library: &str,
+        out: PathBuf,
+        cores: Option<NonZeroUsize>,
+        force: Force,
+    ) -> Self {
+        Self {
+            campaign: Some(campaign),
+            preset: None,
+            track: None,
+            cases: None,
+            library: Some(library.to_owned()),
+            out,
+            force,
+            no_train: false,
+            recording: Some(recording.to_owned()),
+            cores,
+            print_campaign: false,
+            json: false,
+        }
+    }
+
     /// The track that takes the place of V-Track.
     fn track(&self) -> Result<Option<Track>, Stop> {
         match (&self.track, self.preset) {
@@ -222,7 +247,7 @@ fn check(recording: &Recording, campaign: &Campaign) -> Result<(), tracktwin_eva
     check_recording(recording, &experiment.design, &experiment.speeds_km_h)
 }
 
-fn default_library(out: &Path) -> String {
+pub(super) fn default_library(out: &Path) -> String {
     format!("sqlite:{}", out.join("library.sqlite").display())
 }
 

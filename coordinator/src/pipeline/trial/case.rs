@@ -54,7 +54,7 @@ impl Trial {
         setting: Setting<'_>,
     ) -> Result<(), TrialError> {
         let before = cpu_s();
-        let (diagnosis, Compared { prepared, search }) =
+        let (diagnosis, Compared { prepared, search, .. }) =
             diagnose(number, recording, setting).await?;
         let cpu_s = cpu_s() - before;
         let record = self.written(number, "", &diagnosis)?;

@@ -10,6 +10,7 @@ mod behaviour;
 mod calibration;
 mod candidate;
 mod conclusion;
+mod confirmation;
 mod estimate;
 mod forward;
 mod further_wheels;
@@ -37,13 +38,14 @@ pub use behaviour::{Behaviour, Element};
 pub use calibration::{Calibration, CalibrationError, Problem};
 pub use candidate::{Candidate, candidates};
 pub use conclusion::{Evidence, passes_alone};
+pub use confirmation::{ConfirmationError, Confirming};
 pub use estimate::Estimate;
 pub use forward::{Forward, Linearised};
 pub use null_model::{NullError, NullModel};
 pub use observation::Observation;
 pub use outcome::{
-    BeforeAfter, Diagnosis, FORMAT, FitScores, Hypothesis, Levels, Location, Mismatch, Score,
-    Scores, SleeperValues, UNKNOWN, Verdict,
+    BeforeAfter, Confirmation, ConfirmedSpeed, Diagnosis, FORMAT, FitScores, Hypothesis, Levels,
+    Location, Mismatch, Score, Scores, SleeperValues, UNKNOWN, Verdict,
 };
 pub use patch_scan::{Fixed, Patch};
 pub use port_scan::{PortPlace, PortScan, UnknownElement};
@@ -53,4 +55,4 @@ pub use screen::{Template, templates};
 pub use search::{Fitted, Round, SearchOutcome, Stage, first_calibration, search};
 pub use section::Section;
 pub use signature::signature;
-pub use spectra::{Spectra, SpeedSpectra};
+pub use spectra::{Spectra, SpeedSpectra, are_one_speed};

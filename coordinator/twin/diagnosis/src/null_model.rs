@@ -14,7 +14,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
+use std::sync::Arc;
 use tracktwin_signal::Signal;
+use tracktwin_track::extension::Extension;
 use tracktwin_track::model::{Mesh, Roughness, Surface, TrackModel};
 use tracktwin_track::time::{self, Pass, PassError};
 
@@ -75,36 +77,9 @@ impl NullModel {
         seed: u64,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Self, NullError> {
-        let values = plain(forward, values);
-        let level = values[forward.unknowns.level().start].exp();
-        let mut quiet = forward.with_ends(SPANS_BEYOND);
-        quiet.noise_density.fill(0.0);
-        // A further wheel costs twenty times the time and hardly changes the scatter.
-        quiet.section.track.design.wheel.further_wheels_m.clear();
-        let expected = quiet.log_power(&values, &[])?;
-        let section = &quiet.section;
-        let supports = forward.unknowns.supports(section, &values);
-        let mesh = Mesh::uniform(section.spans(), ELEMENTS, SLEEPER_ELEMENTS);
-        let model = TrackModel::build(&section.track.design, &mesh, &supports, &[])?;
-        let roughness = Roughness::between(level, section.track.wavelengths_m);
-        let done = std::sync::atomic::AtomicU64::new(0);
-        let groups: Vec<u64> = (0..surfaces).step_by(AT_A_TIME as usize).collect();
-        let differences: Vec<Vec<Vec<f64>>> = groups
-            .into_par_iter()
-            .map(|first| {
-                let seeds = first..(first + AT_A_TIME).min(surfaces);
-                let surfaces: Vec<_> =
-                    seeds.map(|s| model.surface(&roughness, seed.wrapping_add(s))).collect();
-                let simulated = simulate(&quiet, &model, &surfaces)?;
-                let count =
-                    done.fetch_add(surfaces.len() as u64, std::sync::atomic::Ordering::Relaxed);
-                progress((count + surfaces.len() as u64) as f64);
-                let difference =
-                    |log_power: DVector<f64>| (log_power - &expected).as_slice().to_vec();
-                Ok(simulated.into_iter().map(difference).collect())
-            })
-            .collect::<Result<_, NullError>>()?;
-        let differences = differences.into_iter().flatten().collect();
+        let differences =
+            simulated(&without_ends(forward), values, &[], [surfaces, seed], progress)?;
+        let differences = differences.iter().map(|it| it.as_slice().to_vec()).collect();
         Ok(Self { per_sleeper: forward.per_sleeper(), differences })
     }
 
@@ -242,6 +217,52 @@ fn plain(forward: &Forward, values: &DVector<f64>) -> DVector<f64> {
     // What follows is the recording's, not the track's.
     (unknowns.spectrum().start..unknowns.count()).for_each(|index| plain[index] = 0.0);
     plain
+}
+
+/// A forward model of passes that are simulated: near ends, no noise, and the first wheel alone, for a further
+/// one costs twenty times the time and hardly changes the scatter.
+pub(crate) fn without_ends(forward: &Forward) -> Forward {
+    let mut quiet = forward.with_ends(SPANS_BEYOND);
+    quiet.noise_density.fill(0.0);
+    quiet.section.track.design.wheel.further_wheels_m.clear();
+    quiet
+}
+
+/// Simulated less expected log powers over random surfaces with the values of `values`, levels apart, which are
+/// all the mean one; `quiet` is a forward model [`without_ends`], on whose track the extensions are.
+///
+/// # Errors
+/// [`NullError`] when the simulation breaks down.
+pub(crate) fn simulated(
+    quiet: &Forward,
+    values: &DVector<f64>,
+    extensions: &[Arc<dyn Extension>],
+    [surfaces, seed]: [u64; 2],
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Vec<DVector<f64>>, NullError> {
+    let values = plain(quiet, values);
+    let level = values[quiet.unknowns.level().start].exp();
+    let expected = quiet.log_power(&values, extensions)?;
+    let section = &quiet.section;
+    let supports = quiet.unknowns.supports(section, &values);
+    let mesh = Mesh::uniform(section.spans(), ELEMENTS, SLEEPER_ELEMENTS);
+    let model = TrackModel::build(&section.track.design, &mesh, &supports, extensions)?;
+    let roughness = Roughness::between(level, section.track.wavelengths_m);
+    let done = std::sync::atomic::AtomicU64::new(0);
+    let groups: Vec<u64> = (0..surfaces).step_by(AT_A_TIME as usize).collect();
+    let differences: Vec<Vec<DVector<f64>>> = groups
+        .into_par_iter()
+        .map(|first| {
+            let seeds = first..(first + AT_A_TIME).min(surfaces);
+            let surfaces: Vec<_> =
+                seeds.map(|s| model.surface(&roughness, seed.wrapping_add(s))).collect();
+            let log_powers = simulate(quiet, &model, &surfaces)?;
+            let count = done.fetch_add(surfaces.len() as u64, std::sync::atomic::Ordering::Relaxed);
+            progress((count + surfaces.len() as u64) as f64);
+            Ok(log_powers.into_iter().map(|log_power| log_power - &expected).collect())
+        })
+        .collect::<Result<_, NullError>>()?;
+    Ok(differences.into_iter().flatten().collect())
 }
 
 /// Log powers of passes over surfaces at all speeds, in the order of [`Forward`].

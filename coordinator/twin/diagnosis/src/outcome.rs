@@ -64,11 +64,43 @@ pub struct Diagnosis {
     pub track: Vec<SleeperValues>,
     /// Measured and predicted levels.
     pub levels: Levels,
+    /// Comparison of what was accepted with passes that were withheld from the search, in the time domain;
+    /// none unless it was asked for and something accepted shows in a simulated pass.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub confirmation: Option<Confirmation>,
     /// Where the wheel loses contact with the rail; what was fitted there does not hold.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub loss_of_contact: Option<LossOfContact>,
     /// Notes.
     pub notes: Vec<String>,
+}
+
+/// A comparison with passes that were withheld from the search, by simulation in time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Confirmation {
+    /// The files of the withheld passes.
+    pub passes: Vec<String>,
+    /// How far levels and simulations differ at each speed.
+    pub speeds: Vec<ConfirmedSpeed>,
+    /// Number of sleepers compared: where what was accepted is felt.
+    pub sleepers: usize,
+    /// By how much more probable the withheld passes are with what was accepted, in nats.
+    pub gain_nats: f64,
+    /// Whether that is enough to confirm it.
+    pub is_confirmed: bool,
+}
+
+/// The withheld passes of one speed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConfirmedSpeed {
+    /// Speed in km/h.
+    pub speed_km_h: f64,
+    /// Root mean square difference of levels without what was accepted, in dB.
+    #[serde(rename = "before_dB")]
+    pub before_db: f64,
+    /// The same with it.
+    #[serde(rename = "after_dB")]
+    pub after_db: f64,
 }
 
 /// A place in space and frequency where recording and baseline differ.

@@ -1,10 +1,13 @@
 //! A recording prepared for diagnosis, or the reason why this is impossible.
 
+mod sleepers;
+
+use self::sleepers::{covered, overlapping};
 use crate::bands::Bands;
 use crate::forward::Forward;
 use crate::null_model::NullModel;
 use crate::section::Section;
-use crate::spectra::{Spectra, SpeedSpectra};
+use crate::spectra::{Spectra, SpeedSpectra, are_one_speed};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -260,6 +263,31 @@ impl PreparedRecording {
         }
     }
 
+    /// Log powers of further passes over the track of a recording that was prepared, in the same order, means
+    /// over those of a speed; none where no pass covers a sleeper at a speed.
+    pub(crate) fn log_power_of(
+        &self,
+        recording: &Recording,
+        further: &Recording,
+    ) -> Vec<Option<f64>> {
+        let forward = &self.forward;
+        let spectra = Spectra::new(further, &forward.bands);
+        let mut all = vec![None; forward.count()];
+        for (number, passes) in self.pass_numbers.iter().enumerate() {
+            let speed_km_h = recording.passes[passes[0]].speed_km_h;
+            let is_it = |speed: &&SpeedSpectra| are_one_speed(speed.speed_km_h, speed_km_h);
+            let Some(speed) = spectra.speeds.iter().find(is_it) else { continue };
+            for sleeper in 0..forward.section.sleepers {
+                let Some(mean) = speed.mean(self.first_sleeper + sleeper) else { continue };
+                let row = sleeper * forward.per_sleeper() + number * forward.bands.count();
+                for (value, mean) in all[row..].iter_mut().zip(mean) {
+                    *value = Some(mean);
+                }
+            }
+        }
+        all
+    }
+
     /// The log powers less the null model's offset: what the forward model predicts where nothing is
     /// left out.
     pub fn expected_log_power(&self, null: &NullModel) -> DVector<f64> {
@@ -310,36 +338,6 @@ fn true_speed(recording: &Recording, speed: &SpeedSpectra, [from_m, to_m]: [f64;
     speed.speed_km_h * (1.0 + SPEED_STEP * steps)
 }
 
-/// The longest run of neighbouring sleepers that every pass covers with a margin.
-fn covered(recording: &Recording) -> Range<usize> {
-    let reach_m = (0.5 + MARGIN_SPANS) * recording.spacing_m;
-    let inside = |x_m: f64| {
-        recording.passes.iter().all(|pass| {
-            let (first, last) = (pass.position_m[0], pass.position_m[pass.position_m.len() - 1]);
-            first <= x_m - reach_m && x_m + reach_m <= last
-        })
-    };
-    let mut longest = 0..0;
-    let mut start = 0;
-    for (number, sleeper) in recording.sleepers.iter().enumerate() {
-        if !inside(sleeper.x_m) {
-            start = number + 1;
-        } else if number + 1 - start > longest.len() {
-            longest = start..number + 1;
-        }
-    }
-    longest
-}
-
-/// Ranges of at most `length` that cover a range; each shares at least `overlap` with the next.
-fn overlapping(whole: Range<usize>, length: usize, overlap: usize) -> Vec<Range<usize>> {
-    let rest = whole.len().saturating_sub(length);
-    let steps = rest.div_ceil(length - overlap);
-    let length = length.min(whole.len());
-    let first = |step: usize| whole.start + (step * rest).checked_div(steps).unwrap_or(0);
-    (0..=steps).map(|step| first(step)..first(step) + length).collect()
-}
-
 fn log_power(forward: &Forward, spectra: &Spectra, first: usize) -> DVector<f64> {
     let mut all = DVector::zeros(forward.count());
     for sleeper in 0..forward.section.sleepers {
@@ -364,22 +362,4 @@ fn pass_variance(forward: &Forward, spectra: &Spectra) -> DVector<f64> {
         variance.iter().map(|value| value / count).collect::<Vec<_>>()
     };
     DVector::from_vec(known.iter().zip(&spectra.speeds).flat_map(of_speed).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::overlapping;
-
-    #[test]
-    fn sections_cover_a_track_and_overlap() {
-        for short in [3..23, 3..27] {
-            assert_eq!(overlapping(short.clone(), 24, 6), std::slice::from_ref(&short));
-        }
-        assert_eq!(overlapping(0..40, 24, 6), [0..24, 16..40]);
-        let many = overlapping(5..106, 24, 6);
-        assert_eq!((many[0].start, many[many.len() - 1].end), (5, 106));
-        for pair in many.windows(2) {
-            assert!(pair[0].end - pair[1].start >= 6, "{pair:?}");
-        }
-    }
 }

@@ -54,9 +54,7 @@ impl Spectra {
         for (pass, log_power) in powers.into_iter().enumerate() {
             let speed_km_h = recording.passes[pass].speed_km_h;
             let noise_density = noise_density(&recording.passes[pass].signal);
-            let known = speeds
-                .iter_mut()
-                .find(|known| (speed_km_h / known.speed_km_h - 1.0).abs() <= SPEED_TOLERANCE);
+            let known = speeds.iter_mut().find(|known| are_one_speed(speed_km_h, known.speed_km_h));
             match known {
                 Some(known) => {
                     known.passes.push(pass);
@@ -74,6 +72,11 @@ impl Spectra {
         speeds.sort_by(|a, b| a.speed_km_h.total_cmp(&b.speed_km_h));
         Self { speeds }
     }
+}
+
+/// Whether passes at two speeds are passes at one.
+pub fn are_one_speed(one_km_h: f64, other_km_h: f64) -> bool {
+    (one_km_h / other_km_h - 1.0).abs() <= SPEED_TOLERANCE
 }
 
 impl SpeedSpectra {

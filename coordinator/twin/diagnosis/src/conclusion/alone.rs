@@ -65,6 +65,7 @@ pub fn passes_alone(
         bias_removed: BTreeMap::new(),
         track: Vec::new(),
         levels: Levels::default(),
+        confirmation: None,
         loss_of_contact: inspection.loss_of_contact.clone(),
         notes,
     })

@@ -105,6 +105,7 @@ impl Evidence<'_> {
             bias_removed,
             track: self.track(),
             levels,
+            confirmation: None,
             loss_of_contact: self.inspection.loss_of_contact.clone(),
             notes,
         })

@@ -49,7 +49,7 @@ impl Extent {
     }
 
     /// Where it is felt.
-    pub(super) fn with_reach(self) -> Self {
+    pub(crate) fn with_reach(self) -> Self {
         Self { from: self.from - REACH_SPANS, to: self.to + REACH_SPANS }
     }
 

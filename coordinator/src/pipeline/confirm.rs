@@ -1,0 +1,102 @@
+//! Confirmation of a diagnosis in the time domain, on passes that were withheld from it.
+
+use crate::pipeline::compute::compute;
+use crate::pipeline::diagnose::{Compared, DiagnosingError, Setting, diagnose};
+use tracktwin_diagnosis::{ConfirmationError, Confirming, Diagnosis, are_one_speed};
+use tracktwin_signal::recording::Recording;
+
+/// Why nothing was confirmed or refuted.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfirmingError {
+    /// No pass can be withheld.
+    #[error(
+        "passes: no speed was passed twice; --confirm withholds the last pass of each speed that has two or \
+         more: record one more pass, or leave --confirm out"
+    )]
+    NoPass,
+    /// The passes that are left cannot be diagnosed.
+    #[error(transparent)]
+    Diagnosis(#[from] DiagnosingError),
+    /// The simulations failed.
+    #[error("the confirmation failed: {0}")]
+    Simulation(#[from] ConfirmationError),
+}
+
+/// Diagnoses a recording without the last pass of each speed that has two or more, and compares these with
+/// simulations of what was accepted. `watch` gets the current stage and the share done.
+///
+/// # Errors
+/// [`ConfirmingError`].
+pub async fn diagnose_and_confirm(
+    recording: &Recording,
+    setting: Setting<'_>,
+    watch: &(dyn Fn(&'static str, f64) + Sync),
+) -> Result<Diagnosis, ConfirmingError> {
+    let (kept, withheld) = withhold(recording).ok_or(ConfirmingError::NoPass)?;
+    let diagnosed = diagnose(&kept, setting, watch).await?;
+    let mut diagnosis = diagnosed.diagnosis;
+    if let Some(Compared { prepared, search, null }) = &diagnosed.compared {
+        watch("confirmation", 0.0);
+        let confirming = Confirming { recording: &kept, prepared, search, null };
+        let progress = |share| watch("confirmation", share);
+        diagnosis.confirmation = compute(|| confirming.with(&withheld, &progress))?;
+    }
+    Ok(diagnosis)
+}
+
+/// Whether some speed of a recording was passed twice.
+pub fn has_pass_to_withhold(recording: &Recording) -> bool {
+    withhold(recording).is_some()
+}
+
+/// A recording without the last pass of each speed that has two or more, and one of these passes alone; none
+/// where there is no such speed.
+fn withhold(recording: &Recording) -> Option<(Recording, Recording)> {
+    let passes = &recording.passes;
+    let is_of =
+        |one: usize, other: usize| are_one_speed(passes[one].speed_km_h, passes[other].speed_km_h);
+    let is_withheld = |pass: usize| {
+        let repeats = (0..pass).any(|other| is_of(pass, other));
+        repeats && !(pass + 1..passes.len()).any(|other| is_of(pass, other))
+    };
+    let (withheld, kept): (Vec<usize>, Vec<usize>) =
+        (0..passes.len()).partition(|&pass| is_withheld(pass));
+    let of = |numbers: Vec<usize>| Recording {
+        passes: numbers.into_iter().map(|pass| passes[pass].clone()).collect(),
+        ..recording.clone()
+    };
+    (!withheld.is_empty()).then(|| (of(kept), of(withheld)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracktwin_signal::Signal;
+    use tracktwin_signal::recording::Pass;
+
+    #[test]
+    fn the_last_pass_of_each_speed_that_has_two_is_withheld() {
+        let pass = |(number, speed_km_h): (usize, &f64)| Pass {
+            file: number.to_string(),
+            speed_km_h: *speed_km_h,
+            signal: Signal::new(1e3, vec![0.0; 8]).unwrap(),
+            position_m: vec![0.0; 8],
+            contact_loss_share: None,
+        };
+        let recording = |speeds: &[f64]| Recording {
+            name: "ride".to_owned(),
+            sample_rate_hz: 1e3,
+            channel: String::new(),
+            passes: speeds.iter().enumerate().map(pass).collect(),
+            sleepers: Vec::new(),
+            nominal: serde_json::Map::new(),
+            spacing_m: 0.125,
+            doubts: Vec::new(),
+        };
+        let (kept, withheld) = withhold(&recording(&[13.0, 10.0, 13.1, 7.0, 12.9])).unwrap();
+        let files = |it: &Recording| it.passes.iter().map(|it| it.file.clone()).collect::<Vec<_>>();
+        assert_eq!(files(&kept), ["0", "1", "2", "3"]);
+        assert_eq!(files(&withheld), ["4"]);
+        assert!(withhold(&recording(&[13.0, 10.0, 7.0])).is_none());
+    }
+}

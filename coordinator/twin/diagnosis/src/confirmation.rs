@@ -1,0 +1,172 @@
+//! Confirmation in the time domain, on passes that nothing was fitted to.
+//!
+//! The search predicts mean powers in the frequency domain. Here what it accepted is simulated in time at the
+//! place where it was found, contact and force laws included, and compared with passes that were withheld from
+//! the search. What simulation and expected powers differ by at the mean level is added to the prediction with
+//! the fitted levels and spectrum (docs/diagnosis.md, section 8).
+
+use crate::calibration::{Calibration, Problem};
+use crate::candidate::Candidate;
+use crate::null_model::{NullError, NullModel, simulated, without_ends};
+use crate::observation::Observation;
+use crate::outcome::{Confirmation, ConfirmedSpeed};
+use crate::prepared_recording::PreparedRecording;
+use crate::search::{Extent, SearchOutcome};
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+use tracktwin_signal::recording::Recording;
+use tracktwin_track::extension::{Class, InstanceError};
+use tracktwin_track::model::ModelError;
+
+/// Random surfaces that are simulated without and with what was accepted.
+const CONFIRMING_SURFACES: u64 = 8;
+
+/// Seed of the first.
+const SEED: u64 = 0x636f_6e66;
+
+/// Gain in nats from which withheld passes confirm what was accepted, as on a speed that is held out.
+const GAIN_MIN: f64 = 4.0;
+
+/// Decibels in a neper of power.
+const DECIBEL: f64 = 4.342_944_819_032_518;
+
+/// Why nothing was confirmed or refuted.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfirmationError {
+    /// What was accepted makes no extension.
+    #[error(transparent)]
+    Extension(#[from] InstanceError),
+    /// The fitted track cannot be built.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A simulation breaks down.
+    #[error(transparent)]
+    Simulation(#[from] NullError),
+    /// The scatter of the log powers has no inverse.
+    #[error("the null simulations give no covariance of the log powers")]
+    Covariance,
+}
+
+/// What is compared: a search on some passes of a recording, with its null model.
+pub struct Confirming<'a> {
+    /// The recording without the passes that are withheld.
+    pub recording: &'a Recording,
+    /// The same, prepared.
+    pub prepared: &'a PreparedRecording,
+    /// What the search found in them.
+    pub search: &'a SearchOutcome,
+    /// The random variation.
+    pub null: &'a NullModel,
+}
+
+impl Confirming<'_> {
+    /// Compares what was accepted with passes that were withheld; none where nothing was accepted that a
+    /// simulated pass shows at its place: faults of the chain, and the wheel, whose angle in another pass
+    /// is not known.
+    ///
+    /// # Errors
+    /// [`ConfirmationError`].
+    pub fn with(
+        &self,
+        withheld: &Recording,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Option<Confirmation>, ConfirmationError> {
+        let accepted = &self.search.accepted;
+        let is_shown = |candidate: &Candidate| {
+            let kind = candidate.kind;
+            !kind.measuring_chain && !kind.classes.contains(&Class::WheelAngle)
+        };
+        if accepted.is_empty() || !accepted.iter().all(is_shown) {
+            return Ok(None);
+        }
+        let forward = &self.prepared.forward;
+        let measured = self.prepared.log_power_of(self.recording, withheld);
+        let half = |first: f64| move |share: f64| progress(first + 0.5 * share);
+        let before = self.predicted(&[], &self.search.baseline, &half(0.0))?;
+        let after = self.predicted(accepted, &self.search.last, &half(0.5))?;
+        // What a pass does not cover counts for nothing.
+        let known = |row: usize| measured[row].is_some();
+        let of_measured = |predicted: &DVector<f64>| {
+            DVector::from_fn(predicted.len(), |row, _| measured[row].unwrap_or(predicted[row]))
+        };
+        let covariance = self.covariance_of_a_pass();
+        let square = |predicted: &DVector<f64>, rows: &Range<usize>| {
+            let observed = of_measured(predicted);
+            let observation = Observation::new(observed, &covariance, |_| false)
+                .ok_or(ConfirmationError::Covariance)?;
+            let residual = observation.residual(predicted);
+            Ok::<_, ConfirmationError>(residual.rows(rows.start, rows.len()).norm_squared())
+        };
+        let sleepers = self.sleepers();
+        let per_sleeper = forward.per_sleeper();
+        let rows = sleepers.start * per_sleeper..sleepers.end * per_sleeper;
+        let gain_nats = 0.5 * (square(&before, &rows)? - square(&after, &rows)?);
+        let difference_db = |predicted: &DVector<f64>, speed: usize| {
+            let of_speed = rows.clone().filter(|&row| forward.place(row).1 == speed && known(row));
+            let squares: Vec<f64> = of_speed
+                .map(|row| (measured[row].unwrap_or(predicted[row]) - predicted[row]).powi(2))
+                .collect();
+            DECIBEL * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+        };
+        let is_withheld =
+            |speed: &usize| rows.clone().any(|row| forward.place(row).1 == *speed && known(row));
+        let of_speed = |speed: usize| ConfirmedSpeed {
+            speed_km_h: 3.6 * forward.speeds_m_s[speed],
+            before_db: difference_db(&before, speed),
+            after_db: difference_db(&after, speed),
+        };
+        Ok(Some(Confirmation {
+            passes: withheld.passes.iter().map(|pass| pass.file.clone()).collect(),
+            speeds: (0..forward.speeds_m_s.len()).filter(is_withheld).map(of_speed).collect(),
+            sleepers: sleepers.len(),
+            gain_nats,
+            is_confirmed: gain_nats >= GAIN_MIN,
+        }))
+    }
+
+    /// Log powers of a pass in the time domain, with the fitted levels and spectrum.
+    fn predicted(
+        &self,
+        candidates: &[Candidate],
+        calibration: &Calibration,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<DVector<f64>, ConfirmationError> {
+        let (forward, observation) = (&self.prepared.forward, &self.search.observation);
+        let values = &calibration.values;
+        let extensions = Problem { forward, observation, candidates }.extensions(values)?;
+        let expected = forward.log_power(values, &extensions)?;
+        let quiet = without_ends(forward);
+        let extensions = Problem { forward: &quiet, observation, candidates }.extensions(values)?;
+        let surfaces = [CONFIRMING_SURFACES, SEED];
+        let share = |done: f64| progress(done / CONFIRMING_SURFACES as f64);
+        let simulated = simulated(&quiet, values, &extensions, surfaces, &share)?;
+        let count = simulated.len() as f64;
+        Ok(simulated.into_iter().fold(expected, |sum, difference| sum + difference / count))
+    }
+
+    /// Covariance of a sleeper's log powers in a single pass.
+    fn covariance_of_a_pass(&self) -> DMatrix<f64> {
+        let (prepared, bands) = (self.prepared, self.prepared.forward.bands.count());
+        let passes = |row: usize| prepared.pass_numbers[row / bands].len() as f64;
+        let variance = DVector::from_fn(prepared.pass_variance.len(), |row, _| {
+            prepared.pass_variance[row] * passes(row)
+        });
+        prepared.of_compared(self.null.covariance(bands, &variance))
+    }
+
+    /// The sleepers at which what was accepted is felt.
+    fn sleepers(&self) -> Range<usize> {
+        let forward = &self.prepared.forward;
+        let of = |candidate: &Candidate| {
+            if candidate.is_everywhere() {
+                return 0..forward.section.sleepers;
+            }
+            let extent = Extent::of(candidate, &forward.section).with_reach();
+            let [from, to] = extent.spacings().map(|spacings| spacings.max(0.0));
+            from.floor() as usize..(to.ceil() as usize + 1).min(forward.section.sleepers)
+        };
+        let all: Vec<Range<usize>> = self.search.accepted.iter().map(of).collect();
+        let start = all.iter().map(|range| range.start).min().unwrap_or(0);
+        start..all.iter().map(|range| range.end).max().unwrap_or(start)
+    }
+}
