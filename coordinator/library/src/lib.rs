@@ -3,6 +3,33 @@
 //! Owns the schema and every statement; no other crate contains SQL. It stores and counts; policies
 //! are arguments, such as the number of attempts after which a case is given up ([`AttemptsMax`])
 //! and the time.
+//!
+//! # Example
+//!
+//! ```
+//! use tracktwin_library::{Library, StoredArray};
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # tokio::runtime::Runtime::new()?.block_on(async {
+//! let url = format!("sqlite:{}", folder.path().join("library.sqlite").display());
+//! let library = Library::open_or_create(&url).await?;
+//! let levels = StoredArray {
+//!     key: "ride-1".to_owned(),
+//!     kind: "levels".to_owned(),
+//!     meta_json: r#"{"unit": "dB"}"#.to_owned(),
+//!     numbers: vec![12.5, 9.75],
+//! };
+//! library.store_array(levels.clone()).await?;
+//! library.close().await;
+//!
+//! let library = Library::open(&url).await?;
+//! assert_eq!(library.array("ride-1").await?, Some(levels));
+//! assert!(library.campaigns().await?.is_empty());
+//! # library.close().await;
+//! # Ok::<(), tracktwin_library::LibraryError>(())
+//! # })?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod array;
 mod attempt;

@@ -3,6 +3,42 @@
 //! Owns the [`Experiment`] (all that decides results but a case's parameters), the [`Simulation`] of
 //! cases, their [`Outcome`], and [`MODEL_HASH`], by which two programs know that their physics agree.
 //! Which cases there are is the coordinator's, how they travel the protocol's.
+//!
+//! # Example: LWPS of a simulated pass
+//!
+//! A wheel that rolls at 10 km/h over waves of 6 mm is excited at 463 Hz.
+//!
+//! ```
+//! use tracktwin_parameters::{ParameterSet, TrackDesign};
+//! use tracktwin_signal::{Extractor, FeatureDefinition, Signal};
+//! use tracktwin_track::extension::ExtensionInstance;
+//! use tracktwin_track::model::{Mesh, Roughness, Support, TrackModel};
+//! use tracktwin_track::time::{self, Pass};
+//!
+//! let (design, spans) = (TrackDesign::v_track(), 20);
+//! let supports = vec![Support::from(&ParameterSet::nominal()); spans - 1];
+//! let waves = ExtensionInstance::new("corrugation")
+//!     .at([0.0, 2.5])
+//!     .with("wavelength_m", 6e-3)
+//!     .with("amplitude_m", 5e-6)
+//!     .build(&design, spans)?;
+//! let track = TrackModel::build(&design, &Mesh::uniform(spans, 4, 8), &supports, &[waves])?;
+//! let (speed_m_s, time_step_s) = (10.0 / 3.6, 1e-5);
+//! let pass = Pass { speed_m_s, start_m: 0.6, end_m: 1.9, time_step_s, local_flexibility: true };
+//! let surface = track.surface(&Roughness::new(0.1), 1);
+//! let record = time::pass(&track, &pass, &surface)?;
+//!
+//! let signal = Signal::new(1.0 / time_step_s, record.acceleration_m_s2)?;
+//! // The window of the sleeper at 1.25 m.
+//! let sample = |x_m: f64| ((x_m - pass.start_m) / speed_m_s / time_step_s) as usize;
+//! let window = sample(1.1875)..sample(1.3125);
+//! let definition = FeatureDefinition::default();
+//! let power = Extractor::new(&definition)?.extract(&signal, window)?.log_power;
+//! let highest = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b])).unwrap();
+//! let found_hz = definition.frequencies_hz()[highest];
+//! assert!((found_hz / (speed_m_s / 6e-3) - 1.0).abs() < 0.02, "{found_hz}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod experiment;
 mod outcome;

@@ -4,6 +4,25 @@
 //! synchrosqueezed one (SSWT), the local wavelet power spectrum (LWPS) and the features of a
 //! sleeper's window. A simulated signal and a recorded one take the same road. Where a signal
 //! comes from, and what its features say about the track, is left to others.
+//!
+//! # Example: LWPS of a tone
+//!
+//! ```
+//! use std::f64::consts::TAU;
+//! use tracktwin_signal::{Extractor, FeatureDefinition, Signal};
+//!
+//! let tone = |n: u32| 3.0 * (TAU * 800.0 * f64::from(n) / 1e5).sin();
+//! let signal = Signal::new(1e5, (0..20_000).map(tone).collect())?;
+//! let definition = FeatureDefinition::default();
+//! let features = Extractor::new(&definition)?.extract(&signal, 8_000..12_000)?;
+//!
+//! // A steady tone of amplitude A has the logarithm 2 ln A in its bin.
+//! let power = &features.log_power;
+//! let highest = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b])).unwrap();
+//! assert!((definition.frequencies_hz()[highest] / 800.0 - 1.0).abs() < 0.01);
+//! assert!((power[highest] - 2.0 * 3_f64.ln()).abs() < 0.05, "{}", power[highest]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod features;
 pub mod recording;

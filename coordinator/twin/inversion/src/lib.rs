@@ -8,6 +8,35 @@
 //!
 //! Owns what is learned of the variation along the track and the record of the outcome; the forward
 //! model and the fit are the diagnosis's.
+//!
+//! # Example: stiffness of a track from a recording
+//!
+//! The bundled sample is of a simulated track whose ballast has 14 MN/m, and 8 MN/m from SN13 to SN20.
+//!
+//! ```
+//! use std::path::Path;
+//! use tracktwin_diagnosis::{NullModel, Own, first_calibration};
+//! use tracktwin_inversion::{fit, sections};
+//! use tracktwin_signal::recording::Recording;
+//!
+//! let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sample");
+//! let recording = Recording::open(&folder)?;
+//! let track = recording.stated_track().track;
+//! let mut section = sections(&recording, &track)?.remove(0);
+//! let start = first_calibration(&section)?;
+//! section.forward.allow_beyond(&start)?;
+//! let grid = NullModel::grid_values(&section.forward, &start);
+//! let null = NullModel::simulate(&section.forward, &grid, 8, 1, &|_| ())?;
+//! let fitted = fit(&section, &null, start)?;
+//!
+//! for (id, expected) in [("SN11", 14e6), ("SN15", 8e6)] {
+//!     let number = recording.sleepers.iter().position(|sleeper| sleeper.id == id).unwrap();
+//!     let compared = number - section.first_sleeper;
+//!     let found = fitted.values[fitted.unknowns.at(Own::BallastStiffness, compared)].exp();
+//!     assert!((found / expected - 1.0).abs() < 0.2, "{id}: {found} N/m");
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod along;
 mod beside;

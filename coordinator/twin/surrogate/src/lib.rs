@@ -4,6 +4,25 @@
 //! hyper-parameters found, the model selector, the error measures, and the files models live in.
 //! Leaves to others what a bin's power is (signal), where the training cases come from (library)
 //! and how windows of a recording are combined (evaluation).
+//!
+//! # Example: a Gaussian process is sure at its entries and knows nothing far away
+//!
+//! ```
+//! use faer::Mat;
+//! use tracktwin_surrogate::{Factor, Hyperparameters, distances, distances_within};
+//!
+//! let inputs = Mat::from_fn(5, 1, |i, _| i as f64);
+//! let no_mean = |rows: usize| Mat::<f64>::zeros(rows, 0);
+//! let at = Hyperparameters { length: 2.0, noise_ratio: 1e-6 };
+//! let factor = Factor::new(distances_within(inputs.as_ref()).as_ref(), no_mean(5).as_ref(), at)?;
+//!
+//! let new = Mat::from_fn(2, 1, |i, _| [2.0, 100.0][i]);
+//! let apart = distances(inputs.as_ref(), new.as_ref());
+//! let variances = factor.variances(apart.as_ref(), no_mean(2).as_ref());
+//! // In parts of the signal's variance.
+//! assert!(variances[0] < 1e-4 && (variances[1] - 1.0).abs() < 1e-3, "{variances:?}");
+//! # Ok::<(), tracktwin_surrogate::Error>(())
+//! ```
 
 mod cholesky;
 mod coarse;
