@@ -167,9 +167,9 @@ impl Library {
         self.write(Sample { campaign, worker, cases_max, now_unix_ms, lease_ms }).await
     }
 
-    /// Keeps what an auditor found; answers whose result it was about, or nothing where the audit
-    /// was not this worker's any more. Whoever is `wrong` is put into quarantine with it, for this reason:
-    /// see [`Library::flag_worker`].
+    /// Stores the finding of an auditor. Returns the worker whose result was audited, or nothing if the audit
+    /// no longer belongs to this auditor. The same write puts the worker in `wrong` into quarantine, with the
+    /// reason in `wrong`; see [`Library::flag_worker`].
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.

@@ -133,8 +133,8 @@ impl Library {
         self.write(Discard { campaign: campaign.to_owned(), indices }).await
     }
 
-    /// Takes away results of cases that have not all their passes; answers of how many cases. A copy that is at
-    /// its end leaves such where the rest could not be read.
+    /// Removes the results of cases whose passes are incomplete. Returns the number of these cases. A
+    /// completed copy of a library contains such cases if some of their rows could not be read.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read or written.

@@ -1,8 +1,8 @@
-//! The model library: campaigns, their cases, and what came out of each, in SQL.
+//! The model library: campaigns, their cases and the results of the cases, in SQL.
 //!
-//! Owns the schema and every statement; no other crate contains SQL. It stores and counts; policies
-//! are arguments, such as the number of attempts after which a case is given up ([`AttemptsMax`])
-//! and the time.
+//! This crate contains the schema and every statement; no other crate contains SQL. It stores and counts
+//! records. The caller decides on policies and passes them as arguments. Examples are the time and the number
+//! of attempts after which a case is given up ([`AttemptsMax`]).
 //!
 //! # Example
 //!

@@ -61,8 +61,8 @@ impl Library {
         self.opened.readers.close().await;
     }
 
-    /// Whether it can still be written from here: not after [`Library::close`], nor after a fault of
-    /// this program in the midst of writing, nor once the connection to its file broke.
+    /// Checks whether this process can still write to the library. It cannot after [`Library::close`], after
+    /// an internal error of the program during a write, or after the connection to the file was lost.
     ///
     /// # Errors
     /// Why not: [`LibraryError::Closed`] or [`LibraryError::Lost`]. A restart is required.
@@ -113,8 +113,8 @@ impl Library {
         self.write(CheckWritable).await
     }
 
-    /// Finds out whether the database is whole, so that nothing is added to one that isn't: with `SQLite` by
-    /// reading the file once; a server looks at what it reads itself.
+    /// Checks whether the database is intact, so that nothing is added to a damaged one. With `SQLite` it
+    /// reads the file once. A PostgreSQL server checks the pages that it reads by itself.
     ///
     /// # Errors
     /// [`LibraryError::Malformed`] when it is not.

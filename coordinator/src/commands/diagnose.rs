@@ -54,8 +54,8 @@ pub(super) struct Arguments {
     track: TrackOption,
     #[command(flatten)]
     force: Force,
-    /// Withhold the last pass of each speed that has two or more, and compare these passes with simulations in
-    /// time of what was found.
+    /// Withhold the last pass of each speed that has two or more passes; compare these passes with time-domain
+    /// simulations without and with the physics found.
     #[arg(long)]
     confirm: bool,
     /// Leave this kind of physics out of the catalogue; may be repeated.

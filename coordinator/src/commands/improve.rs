@@ -24,11 +24,11 @@ const CASES_EACH: &str = "400";
 Example:
   tracktwin improve ride --out better
 
-The steps: `diagnose` (with --confirm if a speed was passed twice), a campaign of the recording's track, `extend`,
-then `run` for the campaign without and with what was found. In the output folder: diagnosis/,
-campaign/, before/, after/, improvement.json and report.html, a page with the estimates before and
-after. Two campaigns of 400 cases take about ten minutes on two cores. Repeat the command to
-continue an interrupted campaign.
+The steps: `diagnose` (with --confirm if a speed was passed twice), a campaign of the recording's
+track, `extend`, then `run` for the campaign without and with the physics found. In the output
+folder: diagnosis/, campaign/, before/, after/, improvement.json and report.html, a page with the
+estimates before and after. Two campaigns of 250 cases took five minutes on two cores. Repeat the
+command to continue an interrupted campaign.
 
 Exit codes: 0 done, or nothing was left out; 1 what was found belongs in no campaign, or withheld
 passes do not confirm it; 2 wrong input; 3 failure or interruption.")]

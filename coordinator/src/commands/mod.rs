@@ -92,7 +92,7 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Write a campaign that includes the physics found by a diagnosis.
     Extend(extend::Arguments),
-    /// Find what the track model lacks in a recording, and evaluate the recording with it.
+    /// Find physics that the track model lacks, add it to the model, and evaluate the recording again.
     Improve(improve::Arguments),
     /// Run a blind trial: hide physics in recordings, diagnose them and score the diagnoses.
     Trial(trial::Arguments),

@@ -1,9 +1,9 @@
 //! Signals, their wavelet transforms and the features taken from them.
 //!
-//! Owns the checked signal, recordings in files, the continuous wavelet transform (CWT), the
-//! synchrosqueezed one (SSWT), the local wavelet power spectrum (LWPS) and the features of a
-//! sleeper's window. A simulated signal and a recorded one take the same road. Where a signal
-//! comes from, and what its features say about the track, is left to others.
+//! This crate contains the checked signal, recordings in files, the continuous wavelet transform (CWT), the
+//! synchrosqueezed wavelet transform (SSWT), the local wavelet power spectrum (LWPS) and the features of a
+//! sleeper's window. It processes simulated and recorded signals in the same way. Other crates simulate
+//! signals and derive properties of the track from the features.
 //!
 //! # Example: LWPS of a tone
 //!

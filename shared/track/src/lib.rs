@@ -1,7 +1,7 @@
 //! Finite-element model of wheel and track.
 //!
-//! Owns the elements, the assembled track, what may be added to it and how a wheel runs over it.
-//! Signals and features made of the results are `tracktwin-signal`'s.
+//! This crate contains the elements, the assembled track, its extensions and the simulation of a wheel that
+//! runs over it. The crate `tracktwin-signal` computes signals and features from the results.
 //!
 //! Convention: one rail, half sleepers; displacement, load and irregularity positive **downwards**.
 //!

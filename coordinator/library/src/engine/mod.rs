@@ -1,7 +1,8 @@
-//! Two databases behind one face: statements, rows, connections, and the tasks that write.
+//! Common interface to two databases: statements, rows, connections, and the tasks that write.
 //!
-//! Owns what differs between `SQLite` and PostgreSQL, so that the tables' modules write each
-//! statement once, with `$1` for its first value; both databases understand that. Knows no table.
+//! This module handles the differences between `SQLite` and PostgreSQL. The modules of the tables therefore
+//! write each statement once, with `$1` for its first value; both databases accept this. The module does not
+//! depend on any table.
 
 mod clock;
 mod connection;

@@ -65,11 +65,11 @@ pub struct Held {
 }
 
 impl Library {
-    /// Hands out waiting cases of a campaign that is running, the first first. There are none for a
-    /// worker in quarantine.
+    /// Leases waiting cases of a running campaign to a worker, in ascending order of index. A worker in
+    /// quarantine gets no cases.
     ///
-    /// Expired leases end, and cases waiting again are found, several times per lease duration, and
-    /// always before an empty lease is returned.
+    /// Several times per lease duration, and always before it returns no lease, the function ends expired
+    /// leases and searches for cases that wait again.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.

@@ -1,8 +1,9 @@
-//! The re-tuned baseline: all parameters that may vary before physics is called left out.
+//! The re-tuned baseline: all parameters that are free before the diagnosis reports left-out physics.
 //!
-//! Every sleeper has its own ballast, railpad and irregularity level, the surface its own spectrum,
-//! every speed its own gain; the sensor is flat to two per cent, and the ends of the track and the
-//! supports beyond are unknown. Every extension is compared with this baseline.
+//! Ballast, railpad and irregularity level are free at every sleeper. The spectrum of the surface and the
+//! gain of every speed are free. The frequency response of the sensor is flat to two per cent. The ends of
+//! the track and the supports beyond the section are unknown. The diagnosis compares every extension with
+//! this baseline.
 
 use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;
@@ -200,12 +201,12 @@ impl Unknowns {
         self.gains().start + speed
     }
 
-    /// What the sensor makes of power, at its knots.
+    /// The response of the sensor to power, at its knots.
     pub fn response(&self) -> Range<usize> {
         self.gains().end..self.gains().end + self.response_knots.len()
     }
 
-    /// How much of what each of the track's possible ends changes is there.
+    /// Weights of the changes due to each possible end of the track.
     pub fn ends(&self) -> Range<usize> {
         self.response().end..self.response().end + ENDS_SPANS.len()
     }

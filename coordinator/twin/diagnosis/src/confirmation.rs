@@ -2,8 +2,8 @@
 //!
 //! The search predicts mean powers in the frequency domain. Here what it accepted is simulated in time at the
 //! place where it was found, contact and force laws included, and compared with passes that were withheld from
-//! the search. What simulation and expected powers differ by at the mean level is added to the prediction with
-//! the fitted levels and spectrum (docs/diagnosis.md, section 8).
+//! the search. The prediction uses the fitted levels and spectrum. The difference between simulated and
+//! expected powers at the mean level is added to it (docs/diagnosis.md, section 8).
 
 use crate::calibration::{Calibration, Problem};
 use crate::candidate::Candidate;

@@ -1,11 +1,11 @@
 //! What further wheels on the rail do to the power that the first one records.
 //!
-//! With `a_1` and `a_2` what gives way at each contact and `b` the rail between them, the forces are
-//! `F = -A^-1 r`, `A = [[a_1, b], [b, a_2]]`, so that of a rough surface
-//! `|F_1|^2 = (|a_2|^2 + |b|^2) / |a_1 a_2 - b^2|^2 S`: what the wheels meet at one time is the same surface
-//! a distance apart, whose phase turns many times within a band. The second term is what the other wheel
-//! meets: over a defect of the rail it comes from elsewhere. Several further wheels are taken one by one,
-//! each rigid and of the first one's mass and load.
+//! `a_1` and `a_2` are the receptances at the contacts, and `b` is the receptance of the rail between them.
+//! The contact forces are `F = -A^-1 r`, `A = [[a_1, b], [b, a_2]]`. For a rough surface they give `|F_1|^2 =
+//! (|a_2|^2 + |b|^2) / |a_1 a_2 - b^2|^2 S`: both wheels run on the same surface, a fixed distance apart, and
+//! the phase between them turns many times within a band. The second term comes from the surface under the
+//! other wheel; at a defect of the rail this is another place. The model treats several further wheels one by
+//! one, each as a rigid wheel with the mass and load of the first.
 //! Source: T. X. Wu and D. J. Thompson, Vehicle System Dynamics 34 (2001).
 
 use rustfft::num_complex::Complex64;

@@ -1,8 +1,10 @@
-//! Where simulation and recording differ, what physics was left out, and what including it gains.
+//! Diagnosis: differences between simulation and recording, left-out physics, and the gain from its
+//! inclusion.
 //!
-//! Owns baseline, null model, detection, names and their acceptance. Pure: recordings and null
-//! simulations come in as values, a diagnosis goes out. The catalogue of physics is the track
-//! model's; pages and files are left to others.
+//! This crate contains the baseline, the null model, the detection, the hypotheses and their acceptance. Its
+//! functions have no side effects: recordings and null simulations are input values, and a diagnosis is the
+//! result. The crate of the track model contains the catalogue of physics. Other crates write pages and
+//! files.
 
 mod bands;
 mod baseline;

@@ -1,8 +1,8 @@
-//! What differs from the model without a name: patches of the residual that keep their wavelength or
-//! their frequency at all speeds.
+//! Differences from the model that no kind explains: patches of the residual with a constant wavelength or a
+//! constant frequency at all speeds.
 //!
-//! A patch is a band at neighbouring sleepers that is louder, or in frequency also quieter, than the
-//! re-tuned model predicts. Whoever looks at the residual as a picture sees the same.
+//! In a patch, the power of a band at neighbouring sleepers is higher than the re-tuned model predicts. In a
+//! patch of constant frequency it may also be lower. Such patches are visible in a plot of the residual.
 
 use crate::bands::{CENTRE_RAD, gain};
 use crate::calibration::{Calibration, Problem};

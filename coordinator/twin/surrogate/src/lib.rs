@@ -1,11 +1,11 @@
 //! Surrogates of the track model: from a feature vector back to the track's parameters.
 //!
-//! Owns Gaussian processes with the exponential kernel, how their inputs are scaled and their
-//! hyper-parameters found, the model selector, the error measures, and the files models live in.
-//! Leaves to others what a bin's power is (signal), where the training cases come from (library)
-//! and how windows of a recording are combined (evaluation).
+//! This crate contains Gaussian processes with the exponential kernel, the scaling of their inputs, the fit
+//! of their hyper-parameters, the model selector, the error measures and the files of the models. Other
+//! crates define the power of a bin (signal), store the training cases (library) and combine the windows of a
+//! recording (evaluation).
 //!
-//! # Example: a Gaussian process is sure at its entries and knows nothing far away
+//! # Example: the variance is small at the training entries and equals the signal variance far away
 //!
 //! ```
 //! use faer::Mat;

@@ -158,10 +158,10 @@ impl Extractor {
 
     /// The features of a window of samples.
     ///
-    /// Of the signal on either side, at most [`FeatureDefinition::margin_s`] is used; what lies
-    /// farther away does not matter, so a whole pass or a stretch of it give the same features.
-    /// The mean of what is used is taken out, and it fades to zero over the last quarter of each
-    /// margin. Where the signal ends earlier, the margin is what there is of it.
+    /// The transform uses a margin of at most [`FeatureDefinition::margin_s`] on either side of the window.
+    /// Samples farther away have no influence, so a whole pass and a part of it give the same features. The
+    /// function subtracts the mean of the samples used and tapers the signal to zero over the last quarter of
+    /// each margin. If the signal ends earlier, the margin is shorter.
     ///
     /// # Errors
     /// [`FeatureError::Window`] and [`FeatureError::SampleRate`].

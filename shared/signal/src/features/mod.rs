@@ -1,7 +1,7 @@
 //! Features of a sleeper's window: its LWPS and its levels in one-third octaves.
 //!
-//! Owns the definition of the features and their extraction; the sleeper's window, and what
-//! becomes of several passes, is the caller's.
+//! This module defines and extracts the features. The caller selects the window of the sleeper and combines
+//! several passes.
 
 mod band;
 mod definition;

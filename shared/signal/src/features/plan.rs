@@ -1,10 +1,11 @@
 //! How the voices of a stretch are computed: what depends on lengths and the sample rate alone.
 //!
-//! A high voice sees little around the window and a low one has little bandwidth. Voices go
-//! octave by octave: each octave takes a circle just long enough for its lowest voice, one Fourier
-//! transform of the signal on it, and per voice an inverse transform at the wanted instants only,
-//! whose length the instants decide: frequencies beyond it fold onto lower ones, which is exact at
-//! the instants.
+//! A voice of high frequency depends on a short stretch around the window. A voice of low frequency has a
+//! small bandwidth. The plan therefore processes the voices by octave. For each octave, it uses a circular
+//! buffer that is just long enough for the lowest voice. It computes one Fourier transform of the signal per
+//! octave, and one inverse transform per voice at the required instants only. The number of instants gives
+//! the length of the inverse transform. Higher frequencies alias onto lower ones; the values at the instants
+//! are still exact.
 
 use super::{FeatureDefinition, stretch::Stretch};
 use crate::wavelet::Morlet;

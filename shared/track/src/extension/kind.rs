@@ -251,8 +251,8 @@ pub struct KindParameter {
     pub default: Option<f64>,
     /// Which values make sense at all.
     pub bound: Bound,
-    /// Logarithm of a value over the end of its range up to which it may still be this kind's: what
-    /// is further off acts alike and is something else.
+    /// Tolerance outside the range: the largest natural logarithm of the ratio between a value and the end of
+    /// its range. A value further outside has a similar effect but belongs to another kind.
     pub slack: f64,
 }
 
@@ -277,8 +277,9 @@ impl KindParameter {
         if length_ratio < REAL_RATIO { self.v_track } else { self.real_scale }
     }
 
-    /// What a value on V-Track becomes on such a track: as far from the ends of the range in logarithms.
-    /// A value that is zero, and one of a range that holds zero, grows as the range's end.
+    /// Scales a value from V-Track to a track whose lengths are `length_ratio` times V-Track's. The value
+    /// keeps its relative position between the ends of the range, in logarithms. If the value is zero, or if
+    /// the range contains zero, it scales with the upper end of the range.
     pub fn scaled(&self, value: f64, length_ratio: f64) -> f64 {
         let (from, to) = (self.v_track, self.range(length_ratio));
         if from == to {

@@ -1,8 +1,8 @@
 //! Physics beyond the paper's model: one definition for both solvers, the library and the report.
 //!
 //! Owns the trait, the registry of kinds and one file a kind. An extension adds itself to the
-//! [`TrackModel`](crate::model::TrackModel); solvers read the model and know no kind. Which
-//! extension explains a recording is the diagnosis's business.
+//! [`TrackModel`](crate::model::TrackModel). Solvers read the model and do not depend on the kinds. The
+//! diagnosis decides which extension explains a recording.
 
 mod instance;
 mod kind;
@@ -79,12 +79,12 @@ pub trait Extension: Debug + Send + Sync {
         1.0
     }
 
-    /// What the measuring chain makes of a harmonic acceleration at a frequency in Hz: recorded
-    /// over true amplitude.
+    /// Transfer function of the measuring chain for a harmonic acceleration at a frequency in Hz: ratio of
+    /// recorded to true amplitude.
     fn sensor_transfer(&self, _frequency_hz: f64) -> Complex64 {
         Complex64::ONE
     }
 
-    /// Does to a pass what the measuring chain does to it.
+    /// Applies the effect of the measuring chain to a pass.
     fn measure(&self, _measured: &mut Measured) {}
 }

@@ -1,8 +1,8 @@
 //! The rail's receptances everywhere at once, for a wheel that may stand at any node.
 //!
-//! Whatever hangs on the rail is condensed onto it, piece by piece: what is left is a narrow band,
-//! whose inverse is taken only where it is asked for. A hundred times faster than solving for one
-//! place after the other, on the same matrices.
+//! The solver condenses the parts connected to the rail onto the rail, one after the other. A matrix of small
+//! bandwidth remains. The solver computes only the required entries of its inverse. This is a hundred times
+//! faster than a separate solution for each place with the same matrices.
 
 use super::banded::{Banded, Inverse};
 use super::lane::{LANES, Lane, omega};

@@ -1,4 +1,4 @@
-//! Force laws take hold or not, by where the wheel stands.
+//! Force laws that are active or inactive, depending on the position of the wheel.
 
 use super::receptances::RailReceptances;
 use crate::model::{ForceLaw, TrackModel};
@@ -16,10 +16,10 @@ const REACH_SPANS: f64 = 4.0;
 /// Which force laws take hold.
 pub(super) type Hold = Vec<bool>;
 
-/// A track as it is to small motions while the wheel stands at each node of its rail.
+/// The track linearised for small motions, with the wheel at each node of the rail.
 ///
-/// Ballast under a gap carries the sleeper while the wheel is near enough to press it down, and does
-/// not while it is further away. A law that takes hold is what it is under a wheel above it.
+/// Ballast under a gap supports the sleeper only if the wheel is near enough to close the gap. An active law
+/// has the linearisation that it has under a wheel directly above it.
 pub(super) struct States {
     /// The track in each of its states; first that in which it is while the wheel is far away.
     pub(super) tracks: Vec<TrackModel>,

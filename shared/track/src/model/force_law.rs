@@ -32,8 +32,8 @@ pub struct ForceLaw {
     pub port: Port,
     /// Where along the track it acts, in m: a wheel there loads it most.
     pub place_m: f64,
-    /// What the matrices hold in its place: while the track is put together what its extension
-    /// put there, afterwards the law's slopes under the standing wheel.
+    /// Linear terms that represent the law in the matrices. During assembly they are the terms of its
+    /// extension, afterwards the slopes of the law under the standing wheel.
     pub linear: SpringDamper,
     /// The law itself.
     pub law: Arc<dyn Law>,

@@ -1,6 +1,6 @@
 //! The track as equations of motion: geometry, supports, contact, assembled matrices.
 //!
-//! Time and frequency are the solvers'; physics beyond the paper is an [`Extension`]'s.
+//! The solvers treat time and frequency. An [`Extension`] adds physics beyond the paper.
 //!
 //! [`Extension`]: crate::extension::Extension
 

@@ -17,8 +17,8 @@ use tracktwin_parameters::TrackDesign;
 /// sleeper `i` (from 0) stands at `(i + 1) × spacing`, and none stands at the ends. Source: paper,
 /// 2.4.1, Appendices B and C.
 ///
-/// What an extension adds that no matrix holds is asked of the model, not of the extension: force
-/// laws, height of the surface, spectrum of its roughness, vehicle, sensor.
+/// The matrices do not contain every contribution of an extension. The model, not the extension, provides the
+/// others: force laws, height of the surface, spectrum of its roughness, vehicle, sensor.
 #[derive(Clone, Debug)]
 pub struct TrackModel {
     design: TrackDesign,
@@ -204,13 +204,13 @@ impl TrackModel {
         roughness.shaped_surface(seed, self.layout.length_m(), gain)
     }
 
-    /// What the measuring chain makes of a harmonic acceleration at a frequency in Hz: recorded
-    /// over true amplitude.
+    /// Transfer function of the measuring chain for a harmonic acceleration at a frequency in Hz: ratio of
+    /// recorded to true amplitude.
     pub fn sensor_transfer(&self, frequency_hz: f64) -> Complex64 {
         self.extensions.iter().map(|extension| extension.sensor_transfer(frequency_hz)).product()
     }
 
-    /// Makes of true acceleration and position what the measuring chain would have recorded.
+    /// Replaces the true acceleration and position by those that the measuring chain would have recorded.
     pub fn measure(&self, measured: &mut Measured) {
         for extension in &self.extensions {
             extension.measure(measured);

@@ -1,14 +1,14 @@
-//! What rolls over the track and what the sensor on it feels.
+//! The vehicle on the track, and the acceleration that its sensor measures.
 
 use rustfft::num_complex::Complex64;
 use tracktwin_parameters::Wheel;
 
 /// A wheel, whatever moves with it, and further wheels on the same rail.
 ///
-/// Parts that hang on the wheel by springs, and parts of the rail that give way under the contact
-/// wherever it is, move independently of everything else once their motion is split into the
-/// wheel's as a whole and oscillators that the contact force drives. The approach of the contact
-/// is `u_wheel - q_1 - q_2 ... - u_rail - z`.
+/// Springs connect some parts to the wheel. Some parts of the rail deform under the contact at every place.
+/// The model separates the motion of these parts into two: the motion of the wheel as a whole, and
+/// oscillators that the contact force drives. These motions are not coupled to anything else. The approach of
+/// the contact is `u_wheel - q_1 - q_2 ... - u_rail - z`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vehicle {
     /// Mass and load of the wheel with all that it carries.

@@ -1,7 +1,7 @@
-//! What lies beyond the sleepers compared: where the track ends, and how its next sleepers are held.
+//! The track beyond the sleepers compared: the position of its ends, and the supports of the next sleepers.
 //!
-//! Nobody sees them, and the first and last sleepers compared feel them. What they change is worked
-//! out once, on a track of typical values, and is linear from there on.
+//! No measurement shows them, but they affect the first and last sleepers compared. The forward model
+//! computes their effect once, on a track with typical values. Afterwards it treats the effect as linear.
 
 use super::Forward;
 use crate::baseline::{ENDS_SPANS, Outer};

@@ -38,7 +38,7 @@ pub struct Linearised {
     pub log_power: DVector<f64>,
     /// A row for each of them, a column for each unknown.
     pub jacobian: DMatrix<f64>,
-    /// What they are predicted by.
+    /// The transfer from which they are predicted.
     pub(crate) transfer: Transfer,
 }
 

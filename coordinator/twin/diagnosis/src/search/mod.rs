@@ -127,8 +127,8 @@ pub struct SearchOutcome {
     pub observation: Observation,
     /// Scatter to expect of each log power of a sleeper.
     pub deviation: DVector<f64>,
-    /// By how many nats the recording is explained better if each speed has a track and a surface of its
-    /// own than by one track with all that was found; negative where all speeds passed the same track.
+    /// Gain of a model with a separate track and surface for each speed, in nats, over a model of one track
+    /// with all accepted physics. It is negative if all speeds passed the same track.
     pub speed_disagreement: f64,
     /// What the final model does not explain, though an eye would see it, and the probability to see as
     /// much if nothing is left out; none where it does not predict speeds that were held out.

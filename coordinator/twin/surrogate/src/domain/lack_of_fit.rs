@@ -10,10 +10,10 @@ const NEIGHBOURS: usize = 2;
 /// Variances of the error of what is expected, d values, from what is left over (`residuals`, n x d,
 /// of scatter one) of entries with these mapped parameters (`unit`, n x p).
 ///
-/// The scatter of two entries is independent, but what the polynomial can't follow is nearly the same
-/// for neighbours in the parameters: the mean product of their residuals is its variance. Fitting
-/// `coefficients` numbers to the same entries has taken some of it away; as much as their share of the
-/// entries is given back in every coordinate, which is more than enough where nothing was fitted.
+/// The scatter of two entries is independent, but their lack of fit is nearly the same if their parameters
+/// are close. The mean product of their residuals is therefore the variance of the lack of fit. The fit of
+/// `coefficients` numbers to the same entries reduces this variance. The function therefore adds the ratio of
+/// `coefficients` to entries in every coordinate; this is more than enough where nothing was fitted.
 pub(super) fn lack_of_fit(residuals: &Mat<f64>, unit: &Mat<f64>, coefficients: usize) -> Vec<f64> {
     let (n, d) = (residuals.nrows(), residuals.ncols());
     let step = n.div_ceil(PROBES_MAX).max(1);

@@ -1,10 +1,10 @@
-//! Where the library can speak: whether features are such as one of its tracks can have.
+//! Domain check: tests whether a track of the library can produce the observed features.
 //!
-//! A forward emulator is made of the library itself: the expected features are a polynomial in the
-//! parameters, the scatter of one window is what the polynomial leaves. Observed features are
-//! fitted inside the library's ranges, and two questions are asked of the best fit. Is what it
-//! leaves larger than what the library's own cases leave? And does it become much smaller when one
-//! parameter may go beyond one end of its range?
+//! The check builds a forward emulator from the library. The expected features are a polynomial in the
+//! parameters; the residuals of the polynomial give the scatter of one window. The check fits the parameters
+//! to the observed features within the ranges of the library. It then asks two questions about the best fit.
+//! Is its residual larger than the residuals of the library's own cases? Does the residual become much
+//! smaller if one parameter may exceed one end of its range?
 
 mod coordinates;
 mod discrepancy;
