@@ -189,7 +189,8 @@ fn summary(diagnosis: &Diagnosis, report: &str) -> Value {
 /// What the withheld passes say.
 fn confirmed(confirmation: Option<&Confirmation>) -> String {
     let Some(Confirmation { speeds, gain_nats, is_confirmed, .. }) = confirmation else {
-        return "Withheld passes: nothing was accepted that a simulated pass shows.".to_owned();
+        return "Withheld passes were not compared: nothing was accepted, or a wheel defect or a fault of the measuring chain."
+            .to_owned();
     };
     let of_speed = |speed: &ConfirmedSpeed| {
         let ConfirmedSpeed { speed_km_h, before_db, after_db } = speed;

@@ -5,11 +5,13 @@ use super::numbers::{cores, count};
 use super::track::TrackOption;
 use super::{OrInput, Stop, diagnose, extend, println_stderr, println_stdout, run as campaign};
 use crate::pipeline::confirm::has_pass_to_withhold;
+use crate::pipeline::lack::check_for_training;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Confirmation, Diagnosis};
+use tracktwin_farm::campaign::Campaign;
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_report::{Improvement, improvement_page};
@@ -60,6 +62,11 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     check(&out, Kind::Results, force, &["report.html", "improvement.json"])?;
     make_folder(&out)?;
     let library = library.unwrap_or_else(|| campaign::default_library(&out));
+    // What no campaign can serve is refused before the diagnosis, which takes minutes.
+    let plain = write_campaign(&out.join("campaign"), &recording, &track, cases, force)?;
+    let checked = Campaign::read(&plain, None).or_input()?;
+    check_for_training(&checked).or_input()?;
+    campaign::check(&recording, &checked).or_input()?;
 
     println_stderr("1 of 4: diagnosis");
     let confirm = has_pass_to_withhold(&recording);
@@ -79,7 +86,6 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
 
     println_stderr("2 of 4: campaign of the track without what was found");
-    let plain = write_campaign(&out.join("campaign"), &recording, &track, cases, force)?;
     let evaluated = |campaign: PathBuf, out: PathBuf| {
         campaign::Arguments::of(campaign, &path, &library, out, cores, force)
     };

@@ -46,26 +46,31 @@ pub async fn diagnose_and_confirm(
 
 /// Whether some speed of a recording was passed twice.
 pub fn has_pass_to_withhold(recording: &Recording) -> bool {
-    withhold(recording).is_some()
+    !withheld(recording).is_empty()
+}
+
+/// Numbers of the last pass of each speed that has two or more.
+fn withheld(recording: &Recording) -> Vec<usize> {
+    let passes = &recording.passes;
+    let is_of =
+        |one: usize, other: usize| are_one_speed(passes[one].speed_km_h, passes[other].speed_km_h);
+    let is_last = |&pass: &usize| {
+        let repeats = (0..pass).any(|other| is_of(pass, other));
+        repeats && !(pass + 1..passes.len()).any(|other| is_of(pass, other))
+    };
+    (0..passes.len()).filter(is_last).collect()
 }
 
 /// A recording without the last pass of each speed that has two or more, and one of these passes alone; none
 /// where there is no such speed.
 fn withhold(recording: &Recording) -> Option<(Recording, Recording)> {
-    let passes = &recording.passes;
-    let is_of =
-        |one: usize, other: usize| are_one_speed(passes[one].speed_km_h, passes[other].speed_km_h);
-    let is_withheld = |pass: usize| {
-        let repeats = (0..pass).any(|other| is_of(pass, other));
-        repeats && !(pass + 1..passes.len()).any(|other| is_of(pass, other))
+    let last = withheld(recording);
+    let of = |is_withheld: bool| {
+        let passes = recording.passes.iter().enumerate();
+        let wanted = passes.filter(|(pass, _)| last.contains(pass) == is_withheld);
+        Recording { passes: wanted.map(|(_, pass)| pass.clone()).collect(), ..recording.clone() }
     };
-    let (withheld, kept): (Vec<usize>, Vec<usize>) =
-        (0..passes.len()).partition(|&pass| is_withheld(pass));
-    let of = |numbers: Vec<usize>| Recording {
-        passes: numbers.into_iter().map(|pass| passes[pass].clone()).collect(),
-        ..recording.clone()
-    };
-    (!withheld.is_empty()).then(|| (of(kept), of(withheld)))
+    (!last.is_empty()).then(|| (of(false), of(true)))
 }
 
 #[cfg(test)]

@@ -32,6 +32,8 @@ pub(crate) fn section(diagnosis: &Diagnosis) -> Markup {
             }
         } }
         p.note { "Difference: root mean square of measured minus simulated level over bands and sleepers. One \
-             pass varies at random by some decibels, so that the difference does not come to zero." }
+             pass varies at random by some decibels, so that the difference does not come to zero. Withheld passes \
+             run over the same surface: they show that the finding repeats, not that this surface does not \
+             imitate it by chance. Speeds that were held out test that." }
     }
 }

@@ -242,7 +242,10 @@ fn sample_for(campaign: &Campaign, out: &Path, force: Force) -> Result<Option<Re
 }
 
 /// Whether models of the campaign can evaluate the recording.
-fn check(recording: &Recording, campaign: &Campaign) -> Result<(), tracktwin_evaluation::Error> {
+pub(super) fn check(
+    recording: &Recording,
+    campaign: &Campaign,
+) -> Result<(), tracktwin_evaluation::Error> {
     let experiment = &campaign.definition.experiment;
     check_recording(recording, &experiment.design, &experiment.speeds_km_h)
 }

@@ -3,7 +3,7 @@
 //! The search predicts mean powers in the frequency domain. Here what it accepted is simulated in time at the
 //! place where it was found, contact and force laws included, and compared with passes that were withheld from
 //! the search. The prediction uses the fitted levels and spectrum. The difference between simulated and
-//! expected powers at the mean level is added to it (docs/diagnosis.md, section 8).
+//! expected powers at the mean level is added to it (docs/diagnosis.md, section 9).
 
 use crate::calibration::{Calibration, Problem};
 use crate::candidate::Candidate;
@@ -11,7 +11,8 @@ use crate::null_model::{NullError, NullModel, simulated, without_ends};
 use crate::observation::Observation;
 use crate::outcome::{Confirmation, ConfirmedSpeed};
 use crate::prepared_recording::PreparedRecording;
-use crate::search::{Extent, SearchOutcome};
+use crate::search::{Extent, HELD_OUT_MIN, SearchOutcome};
+use crate::spectra::DECIBEL;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use tracktwin_signal::recording::Recording;
@@ -23,12 +24,6 @@ const CONFIRMING_SURFACES: u64 = 8;
 
 /// Seed of the first.
 const SEED: u64 = 0x636f_6e66;
-
-/// Gain in nats from which withheld passes confirm what was accepted, as on a speed that is held out.
-const GAIN_MIN: f64 = 4.0;
-
-/// Decibels in a neper of power.
-const DECIBEL: f64 = 4.342_944_819_032_518;
 
 /// Why nothing was confirmed or refuted.
 #[derive(Debug, thiserror::Error)]
@@ -85,42 +80,41 @@ impl Confirming<'_> {
         let before = self.predicted(&[], &self.search.baseline, &half(0.0))?;
         let after = self.predicted(accepted, &self.search.last, &half(0.5))?;
         // What a pass does not cover counts for nothing.
-        let known = |row: usize| measured[row].is_some();
-        let of_measured = |predicted: &DVector<f64>| {
-            DVector::from_fn(predicted.len(), |row, _| measured[row].unwrap_or(predicted[row]))
+        let difference = |predicted: &DVector<f64>| {
+            let of_row = |row: usize| measured[row].map_or(0.0, |value| value - predicted[row]);
+            DVector::from_fn(predicted.len(), |row, _| of_row(row))
         };
+        let [before, after] = [difference(&before), difference(&after)];
         let covariance = self.covariance_of_a_pass();
-        let square = |predicted: &DVector<f64>, rows: &Range<usize>| {
-            let observed = of_measured(predicted);
-            let observation = Observation::new(observed, &covariance, |_| false)
-                .ok_or(ConfirmationError::Covariance)?;
-            let residual = observation.residual(predicted);
-            Ok::<_, ConfirmationError>(residual.rows(rows.start, rows.len()).norm_squared())
-        };
-        let sleepers = self.sleepers();
-        let per_sleeper = forward.per_sleeper();
+        let observation = Observation::new(DVector::zeros(before.len()), &covariance, |_| false)
+            .ok_or(ConfirmationError::Covariance)?;
+        let (sleepers, per_sleeper) = (self.sleepers(), forward.per_sleeper());
         let rows = sleepers.start * per_sleeper..sleepers.end * per_sleeper;
-        let gain_nats = 0.5 * (square(&before, &rows)? - square(&after, &rows)?);
-        let difference_db = |predicted: &DVector<f64>, speed: usize| {
-            let of_speed = rows.clone().filter(|&row| forward.place(row).1 == speed && known(row));
-            let squares: Vec<f64> = of_speed
-                .map(|row| (measured[row].unwrap_or(predicted[row]) - predicted[row]).powi(2))
-                .collect();
-            DECIBEL * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+        let square =
+            |difference| observation.whiten(difference).rows(rows.start, rows.len()).norm_squared();
+        let gain_nats = 0.5 * (square(&before) - square(&after));
+        let at_speed = |speed: usize| {
+            let is_seen = |row: &usize| forward.place(*row).1 == speed && measured[*row].is_some();
+            rows.clone().filter(is_seen).collect::<Vec<_>>()
         };
-        let is_withheld =
-            |speed: &usize| rows.clone().any(|row| forward.place(row).1 == *speed && known(row));
-        let of_speed = |speed: usize| ConfirmedSpeed {
-            speed_km_h: 3.6 * forward.speeds_m_s[speed],
-            before_db: difference_db(&before, speed),
-            after_db: difference_db(&after, speed),
+        let in_db = |difference: &DVector<f64>, rows: &[usize]| {
+            let squares: f64 = rows.iter().map(|&row| difference[row].powi(2)).sum();
+            DECIBEL * (squares / rows.len() as f64).sqrt()
+        };
+        let of_speed = |speed: usize| {
+            let rows = at_speed(speed);
+            (!rows.is_empty()).then(|| ConfirmedSpeed {
+                speed_km_h: 3.6 * forward.speeds_m_s[speed],
+                before_db: in_db(&before, &rows),
+                after_db: in_db(&after, &rows),
+            })
         };
         Ok(Some(Confirmation {
             passes: withheld.passes.iter().map(|pass| pass.file.clone()).collect(),
-            speeds: (0..forward.speeds_m_s.len()).filter(is_withheld).map(of_speed).collect(),
+            speeds: (0..forward.speeds_m_s.len()).filter_map(of_speed).collect(),
             sleepers: sleepers.len(),
             gain_nats,
-            is_confirmed: gain_nats >= GAIN_MIN,
+            is_confirmed: gain_nats >= HELD_OUT_MIN,
         }))
     }
 

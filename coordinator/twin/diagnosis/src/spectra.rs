@@ -12,6 +12,9 @@ use tracktwin_signal::recording::Recording;
 /// changes no faster than its bandwidth.
 const INSTANTS_PER_PERIOD: f64 = 5.0;
 
+/// Decibels in a neper of power.
+pub(crate) const DECIBEL: f64 = 4.342_944_819_032_518;
+
 /// Relative difference within which two passes have one speed.
 const SPEED_TOLERANCE: f64 = 0.02;
 

@@ -20,7 +20,7 @@ pub struct Kind {
     pub physics: &'static str,
     /// What it is, in a sentence without a full stop.
     pub summary: &'static str,
-    /// What it has in common with kinds that differ from it in little but their name.
+    /// The part of track, vehicle or measurement that it belongs to.
     pub family: EffectFamily,
     /// The kinds that it is weighed with.
     pub group: LookAlikeGroup,

@@ -7,12 +7,10 @@ use crate::estimate::Estimate;
 use crate::outcome::{BeforeAfter, FitScores, Hypothesis, Levels, Score, Scores, SleeperValues};
 use crate::port_scan::UnknownElement;
 use crate::quantity::{Common, Own};
+use crate::spectra::DECIBEL;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-
-/// Decibels in a neper of power.
-const DECIBEL: f64 = 4.342_944_819_032_518;
 
 impl Evidence<'_> {
     pub(super) fn problem<'p>(&'p self, candidates: &'p [Candidate]) -> Problem<'p> {

@@ -16,6 +16,7 @@ mod testing;
 mod threshold;
 
 pub(crate) use extent::Extent;
+pub(crate) use limits::HELD_OUT_MIN;
 pub(crate) use probability::Probabilities;
 
 use self::fit::retuned;
