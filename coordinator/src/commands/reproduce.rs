@@ -33,6 +33,7 @@ The paper: Shen et al. 2023, Mechanical Systems and Signal Processing 204, 11073
   fig17   example: levels of irregularity (likewise)
   fig18   example: bending stiffness of the sleepers (likewise)
   fig19   example: stiffness reduced at a few sleepers (likewise)
+  fig25   Gaussian processes and other regressions (needs models)
 
 Commands that fill a library for all figures and compare the results:
 
@@ -41,7 +42,7 @@ Commands that fill a library for all figures and compare the results:
 
 Exit codes: 0 no row differs, 1 a row differs, 2 wrong input, 3 failure.")]
 pub(super) struct Arguments {
-    /// Figures of the paper, `fig9` to `fig19` [default: all available].
+    /// Figures of the paper, such as `fig14` [default: all available].
     #[arg(value_name = "FIGURE")]
     figures: Vec<String>,
     #[command(flatten)]

@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 use tracktwin_experiment::Experiment;
 use tracktwin_parameters::{Parameter, ParameterSet, TrackDesign};
 use tracktwin_reproduction::{
-    Compared, Error, EvaluatedExample, Example, Figure, Results, SPEED_KM_H, Source,
+    Compared, Error, EvaluatedExample, Example, Figure, Predictions, Results, SPEED_KM_H, Source,
 };
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_signal::{FeatureSet, Signal};
-use tracktwin_surrogate::{Trained, TrainingSet};
+use tracktwin_surrogate::{Tested, Trained, TrainingSet};
 use tracktwin_track::model::{Mesh, Roughness, Support, Surface, TrackModel};
 use tracktwin_track::time;
 
@@ -88,18 +88,23 @@ pub fn compared(
 ) -> Result<Option<Compared>, ReproducingError> {
     Ok(match (figure.source(), evaluator) {
         (Source::Results(compare), _) => Some(compare(results)?),
-        (Source::Models | Source::Examples(_), None) => None,
-        (Source::Models, Some(evaluator)) => Some(test_errors(results.set, evaluator.models())?),
+        (Source::Models(_) | Source::Examples(_), None) => None,
+        (Source::Models(compare), Some(evaluator)) => {
+            let models = evaluator.models();
+            let tested = &tested(results.set, models)?;
+            Some(compare(&Predictions { results, models, tested })?)
+        }
         (Source::Examples(compare), Some(evaluator)) => {
             Some(compare(&evaluated(evaluator, recordings)?))
         }
     })
 }
 
-fn test_errors(set: &TrainingSet, models: &Trained) -> Result<Compared, ReproducingError> {
+/// True and predicted values by the global feature at the paper's speed; none without its models.
+fn tested(set: &TrainingSet, models: &Trained) -> Result<Vec<Tested>, ReproducingError> {
     let single = models.group(&[SPEED_KM_H], FeatureSet::Gf.name());
     let tested = single.map(|group| train::tested_by(set, models, group)).transpose()?;
-    Ok(tracktwin_reproduction::test_errors(models, &tested.unwrap_or_default())?)
+    Ok(tested.unwrap_or_default())
 }
 
 /// Evaluations of the examples' recordings.

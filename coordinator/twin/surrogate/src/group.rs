@@ -115,16 +115,30 @@ impl ModelGroup {
     /// # Errors
     /// [`Error::Shape`] when an observation has another number of bins.
     pub fn predict(&self, observations: &[Vec<f64>]) -> Result<Vec<Vec<Prediction>>, Error> {
+        let (means, sds) = self.predict_features(self.features(observations)?.as_ref())?;
+        Ok((0..observations.len()).map(|t| self.in_units(&means, &sds, t)).collect())
+    }
+
+    /// What the processes read of every one of the `observations` (as for [`Self::predict`]): the
+    /// features after the input map, m numbers each.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when an observation has another number of bins.
+    pub fn inputs_of(&self, observations: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Error> {
+        let inputs = self.input_map.apply(self.features(observations)?.as_ref());
+        Ok(inputs.row_iter().map(|row| row.iter().copied().collect()).collect())
+    }
+
+    /// The group's columns of the `observations`, t x d.
+    fn features(&self, observations: &[Vec<f64>]) -> Result<Mat<f64>, Error> {
         let width = self.key.speeds_km_h.len() * self.bins;
         if let Some(odd) = observations.iter().find(|observed| observed.len() != width) {
             return Err(Error::Shape { what: "observed bins", expected: width, found: odd.len() });
         }
         let d = self.key.columns.len();
-        let features = Mat::from_fn(observations.len(), self.key.speeds_km_h.len() * d, |t, j| {
+        Ok(Mat::from_fn(observations.len(), self.key.speeds_km_h.len() * d, |t, j| {
             observations[t][j / d * self.bins + self.key.columns.start + j % d]
-        });
-        let (means, sds) = self.predict_features(features.as_ref())?;
-        Ok((0..observations.len()).map(|t| self.in_units(&means, &sds, t)).collect())
+        }))
     }
 
     /// Means and standard deviations (both t x p) on the [0, 1] scale for `features` (t x d).

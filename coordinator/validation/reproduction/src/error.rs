@@ -59,6 +59,16 @@ pub enum Error {
         /// The parameter's symbol.
         symbol: &'static str,
     },
+    /// A regression beside the Gaussian processes cannot be fitted.
+    #[error("{figure}: {method}: {message}; use a library with more cases")]
+    Regression {
+        /// The figure.
+        figure: Figure,
+        /// The regression.
+        method: &'static str,
+        /// What its crate reports.
+        message: String,
+    },
     /// The track cannot be built.
     #[error(transparent)]
     Model(#[from] tracktwin_track::model::ModelError),

@@ -76,7 +76,12 @@ pub fn examples(figure: Figure) -> Vec<Example> {
                 example(format!("{count} of nine reduced"), &of)
             })
             .collect(),
-        Figure::Fig9 | Figure::Fig10 | Figure::Fig12 | Figure::Fig13 | Figure::Fig14 => Vec::new(),
+        Figure::Fig9
+        | Figure::Fig10
+        | Figure::Fig12
+        | Figure::Fig13
+        | Figure::Fig14
+        | Figure::Fig25 => Vec::new(),
     }
 }
 

@@ -24,11 +24,13 @@ pub enum Figure {
     Fig18,
     /// Numerical example: stiffness reduced at one, three and five sleepers.
     Fig19,
+    /// Gaussian processes beside other regressions.
+    Fig25,
 }
 
 impl Figure {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Fig9,
         Self::Fig10,
         Self::Fig12,
@@ -38,6 +40,7 @@ impl Figure {
         Self::Fig17,
         Self::Fig18,
         Self::Fig19,
+        Self::Fig25,
     ];
 
     /// The name used at every border.
@@ -52,6 +55,7 @@ impl Figure {
             Self::Fig17 => "fig17",
             Self::Fig18 => "fig18",
             Self::Fig19 => "fig19",
+            Self::Fig25 => "fig25",
         }
     }
 
@@ -67,6 +71,7 @@ impl Figure {
             Self::Fig17 => "Example: levels of irregularity",
             Self::Fig18 => "Example: bending stiffness of the sleepers",
             Self::Fig19 => "Example: stiffness reduced at a few sleepers",
+            Self::Fig25 => "Gaussian processes and other regressions",
         }
     }
 }

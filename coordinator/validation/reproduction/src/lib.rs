@@ -6,6 +6,8 @@
 
 mod agreement;
 mod average;
+mod bound;
+mod compared_regressions;
 mod error;
 mod example;
 mod figure;
@@ -13,6 +15,7 @@ mod local_change;
 mod one_parameter;
 mod picture;
 mod receptance;
+mod regression;
 mod row;
 mod selector;
 mod sensitivity;
@@ -30,6 +33,5 @@ pub use example::{EvaluatedExample, Example, examples};
 pub use figure::Figure;
 pub use picture::{Curve, Picture, Scale, Style};
 pub use row::{ClaimRow, ClaimVerdict, Compared, FORMAT, Provenance, Reproduction};
-pub use source::{Results, Source};
+pub use source::{Predictions, Results, Source};
 pub use spectrum::SPEED_KM_H;
-pub use test_errors::{Tested, test_errors};

@@ -72,6 +72,25 @@ impl Picture {
         Self { title: title.into(), x, y, curves, names, marks, wide: false }
     }
 
+    /// A wide chart of bars from zero: at each of the `places` a bar a kind, with `values` in the
+    /// order of the places.
+    pub(crate) fn bars(
+        title: impl Into<String>,
+        y: &str,
+        places: &[&str],
+        kinds: impl IntoIterator<Item = (String, Vec<f64>)>,
+    ) -> Self {
+        let mut picture = Self::new(title, Scale::linear(""), Scale::linear(y));
+        picture.wide = true;
+        for (name, values) in kinds {
+            let points = values.into_iter().enumerate().map(|(at, value)| (at as f64, value));
+            picture = picture.with(name, Style::Bars, points.collect());
+        }
+        let places = places.iter().enumerate();
+        picture.names = places.map(|(at, &place)| (at as f64, place.to_owned())).collect();
+        picture
+    }
+
     /// The same with a curve more.
     #[must_use]
     pub(crate) fn with(

@@ -1,5 +1,6 @@
 //! What each figure is drawn from, and by what.
 
+use crate::compared_regressions::compared_regressions;
 use crate::error::Error;
 use crate::example::EvaluatedExample;
 use crate::figure::Figure;
@@ -11,8 +12,9 @@ use crate::selector::selector;
 use crate::sensitivity::sensitivity;
 use crate::speed::speed;
 use crate::step::step;
+use crate::test_errors::test_errors;
 use tracktwin_parameters::TrackDesign;
-use tracktwin_surrogate::TrainingSet;
+use tracktwin_surrogate::{Tested, Trained, TrainingSet};
 
 /// What a figure is drawn from.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +22,7 @@ pub enum Source {
     /// The track and the results of a library.
     Results(fn(&Results<'_>) -> Result<Compared, Error>),
     /// Trained models and the results that none of them has seen.
-    Models,
+    Models(fn(&Predictions<'_>) -> Result<Compared, Error>),
     /// What trained models say of simulated passes.
     Examples(fn(&[EvaluatedExample]) -> Compared),
 }
@@ -38,6 +40,16 @@ pub struct Results<'a> {
     pub seed: u64,
 }
 
+/// Trained models, and what they predict for cases that none of them has seen.
+pub struct Predictions<'a> {
+    /// The results that the models were trained and tested on.
+    pub results: &'a Results<'a>,
+    /// The models.
+    pub models: &'a Trained,
+    /// True and predicted values by the global feature at 13 km/h, each in the parameter's unit.
+    pub tested: &'a [Tested],
+}
+
 impl Figure {
     /// What it is drawn from.
     pub const fn source(self) -> Source {
@@ -46,17 +58,18 @@ impl Figure {
             Self::Fig10 => Source::Results(|of| speed(of.set, of.wavelet_centre_rad)),
             Self::Fig12 => Source::Results(|of| sensitivity(of.set)),
             Self::Fig13 => Source::Results(|of| selector(of.set, of.seed)),
-            Self::Fig14 => Source::Models,
+            Self::Fig14 => Source::Models(|of| test_errors(of.models, of.tested)),
             Self::Fig16 => Source::Examples(step),
             Self::Fig17 => Source::Examples(irregularity),
             Self::Fig18 => Source::Examples(bending_stiffness),
             Self::Fig19 => Source::Examples(local_change),
+            Self::Fig25 => Source::Models(|of| compared_regressions(of.results, of.models)),
         }
     }
 
     /// Whether it asks trained models.
     pub const fn needs_models(self) -> bool {
-        matches!(self.source(), Source::Models | Source::Examples(_))
+        matches!(self.source(), Source::Models(_) | Source::Examples(_))
     }
 
     /// Whether it is one of the numerical examples, whose passes are simulated.
