@@ -4,7 +4,7 @@ use super::files::{Force, check, make_folder};
 use super::library::{CHOOSE_REMEDY, choose};
 use super::library_url::LibraryUrl;
 use super::progress::{Progress, TrainingBar};
-use super::{OrInput, Stop, evaluate, print_json, println_stdout};
+use super::{OrInput, Stop, evaluate, print_json, println_stderr, println_stdout};
 use crate::pipeline;
 use crate::pipeline::compute::compute;
 use crate::pipeline::evaluate::Evaluator;
@@ -52,7 +52,7 @@ pub(super) struct Arguments {
     out: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// Folder of models trained on this library [default: train models in OUT/models].
+    /// Folder of models trained on this library [default: OUT/models, trained when needed].
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
     /// Id or name of the campaign; required if the library holds several.
@@ -84,7 +84,11 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let models = match given {
         Some(models) => Some(models),
         None if needed => {
-            Some(train(&library, &campaign, &out.join("models"), arguments.force).await?)
+            let folder = out.join("models");
+            match kept(&library, &campaign, &folder).await? {
+                Some(models) => Some(models),
+                None => Some(train(&library, &campaign, &folder, arguments.force).await?),
+            }
         }
         None => None,
     };
@@ -97,6 +101,21 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         print(&reproduction, out);
     }
     if reproduction.count(ClaimVerdict::Differs) > 0 { Err(Stop::Negative) } else { Ok(()) }
+}
+
+/// Models of the library as it is now, if an earlier call trained some in this folder.
+async fn kept(
+    library: &Library,
+    campaign: &CampaignRecord,
+    folder: &Path,
+) -> Result<Option<Trained>, Stop> {
+    let Ok(models) = Trained::load(folder) else { return Ok(None) };
+    let digest = library.digest(&campaign.id).await?;
+    let fit = models.campaign() == campaign.id && models.belongs_to(&digest).is_ok();
+    if fit {
+        println_stderr(&format!("models: those of {} are used again", folder.display()));
+    }
+    Ok(fit.then_some(models))
 }
 
 /// Trains models of the campaign when none were given.
