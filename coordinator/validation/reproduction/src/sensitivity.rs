@@ -18,8 +18,9 @@ const GROUPS: usize = 5;
 /// the rest.
 const MOST: f64 = 0.9;
 
-/// The paper's "approximately 1000 Hz" with its rounding: the next figure of one digit is 2000.
-const BALLAST_BELOW_HZ: f64 = 1500.0;
+/// Frequencies in Hz that the paper's "approximately 1000 Hz" may stand for: those that with one
+/// digit are 1000.
+const BALLAST_BELOW_HZ: [f64; 2] = [950.0, 1500.0];
 
 /// What the paper evaluates, and what it calls without effect.
 const TOLD: [Parameter; 4] =
@@ -173,13 +174,19 @@ fn below(compared: &mut Compared, set: &TrainingSet, effects: &[Effect]) {
         sum >= MOST * all
     });
     let limit_hz = reached.map_or(f64::INFINITY, |bin| set.frequencies_hz[bin]);
+    // What even an effect that ends at the paper's frequency would have on a logarithmic axis.
+    let lowest_hz = set.frequencies_hz[0];
+    let [least, most] = BALLAST_BELOW_HZ.map(|end| lowest_hz * (end / lowest_hz).powf(MOST));
     compared.row(
         "Ballast stiffness acts below approximately 1000 Hz",
         ["< 1000 Hz".to_owned(), format!("{:.0} % below {limit_hz:.0} Hz", 100.0 * MOST)],
-        ClaimVerdict::of(limit_hz <= BALLAST_BELOW_HZ),
+        ClaimVerdict::of((least..=most).contains(&limit_hz)),
         format!(
-            "frequency below which nine tenths of the groups' variance lie, against 1000 Hz with \
-             its rounding, {BALLAST_BELOW_HZ} Hz"
+            "frequency below which nine tenths of the groups' variance lie; an even effect that \
+             ends at {} to {} Hz, what 1000 Hz with one digit may stand for, has them below \
+             {least:.0} to {most:.0} Hz. A lower limit means that the ballast acts at the lower \
+             end of the paper's range only",
+            BALLAST_BELOW_HZ[0], BALLAST_BELOW_HZ[1]
         ),
     );
 }
@@ -226,7 +233,7 @@ mod tests {
 
     /// As the paper has it: railpads saturate, ballast below 1000 Hz, the level everywhere.
     fn paper(set: &ParameterSet, frequency_hz: f64) -> f64 {
-        let ballast = if frequency_hz < 900.0 { 2.5 * share(set, BallastStiffness) } else { 0.0 };
+        let ballast = if frequency_hz < 1000.0 { 2.5 * share(set, BallastStiffness) } else { 0.0 };
         let pad = 1.0 - (-4.0 * share(set, RailpadStiffness)).exp();
         3.0 * share(set, IrregularityLevel)
             + ballast
@@ -251,6 +258,16 @@ mod tests {
         let found = verdicts(&sensitivity(&set).unwrap());
         assert_eq!((found[0], found[1], found[2]), (Differs, Differs, Differs));
         assert_eq!(found[4..], [Differs, Differs]);
+    }
+
+    #[test]
+    fn ballast_that_acts_at_the_lowest_frequencies_only_differs() {
+        let set = library(&[13.0], 400, |_, set, frequency_hz| {
+            let low = if frequency_hz < 400.0 { 2.5 * share(set, BallastStiffness) } else { 0.0 };
+            paper(set, frequency_hz.max(1000.0)) + low
+        });
+        let compared = sensitivity(&set).unwrap();
+        assert_eq!(verdicts(&compared)[2], Differs, "{:#?}", compared.rows[2]);
     }
 
     #[test]
