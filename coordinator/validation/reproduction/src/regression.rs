@@ -109,10 +109,18 @@ fn support_vectors(
     targets: &[f64],
     tested: &[Vec<f64>],
 ) -> Result<Vec<f64>, Failed> {
+    let columns = inputs[0].len();
+    // smartcore 0.7.0 cuts every row to as many numbers as there are rows. Copies of all cases,
+    // each with its part of the box constraint, are the same machine.
+    let copies = columns.div_ceil(inputs.len());
     let scale = interquartile_range(targets) / NORMAL_IQR;
-    let kernel = Kernels::rbf().with_gamma(1.0 / inputs[0].len() as f64);
-    let settings = SVRParameters::default().with_c(scale).with_eps(0.1 * scale).with_kernel(kernel);
-    let (inputs, targets, tested) = (matrix(inputs)?, targets.to_vec(), matrix(tested)?);
+    let kernel = Kernels::rbf().with_gamma(1.0 / columns as f64);
+    let settings = SVRParameters::default()
+        .with_c(scale / copies as f64)
+        .with_eps(0.1 * scale)
+        .with_kernel(kernel);
+    let (inputs, targets) = (matrix(&vec![inputs; copies].concat())?, targets.repeat(copies));
+    let tested = matrix(tested)?;
     SVR::fit(&inputs, &targets, &settings)?.predict(&tested)
 }
 
@@ -160,6 +168,20 @@ mod tests {
         // A constant has about 0.17. The insensitive zone of the SVM is 0.03 wide on either side.
         assert!(tree < 0.06 && svm < 0.03, "{tree} {svm}");
         assert!(bagged < 0.8 * tree, "{bagged} {tree}");
+    }
+
+    #[test]
+    fn a_support_vector_machine_of_more_inputs_than_cases_is_the_same() {
+        let ((inputs, targets), (tested, _)) = (cases(0..60), cases(60..90));
+        let repeated =
+            |rows: &[Vec<f64>]| rows.iter().map(|row| row.repeat(40)).collect::<Vec<_>>();
+        let svm = Regression::SupportVectors;
+        let few = svm.predict(&inputs, &targets, &tested).unwrap();
+        let many = svm.predict(&repeated(&inputs), &targets, &repeated(&tested)).unwrap();
+        // The kernel's scale grows with the number of inputs. The solver stops at 1e-3.
+        for (few, many) in few.iter().zip(&many) {
+            assert!((few - many).abs() < 5e-3, "{few} {many}");
+        }
     }
 
     #[test]
