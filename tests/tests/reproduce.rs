@@ -52,8 +52,8 @@ fn figures_of_a_small_library_come_as_rows_and_a_page() {
     assert_eq!(printed, serde_json::from_str::<Value>(&text).unwrap());
     assert_eq!((&printed["rows"][0]["figure"], answer.code), (&"fig9".into(), Some(1)));
 
-    refused(&reproduce(&["fig11"], &path("none")), &["`fig11`", "fig9, fig10"]);
-    refused(&reproduce(&["fig16"], &path("none")), &["24 spans", "omit fig16"]);
+    refused(&reproduce(&["fig20"], &path("none")), &["`fig20`", "fig9, fig10"]);
+    refused(&reproduce(&["fig16"], &path("none")), &["24 spans", "fig15 to fig19"]);
     refused(&reproduce(&["fig14"], &path("few")), &["60", "200"]);
     assert!(!folder.path().join("none").exists());
 }

@@ -96,12 +96,17 @@ impl<'a> Stretch<'a> {
         let y = Axis::logarithmic("frequency in Hz", rows[0], rows[rows.len() - 1]);
         let title = format!("{title} in dB, darkest {DEPTH_DB} dB below the strongest");
         let mut chart = self.chart(&title, SIZE[1], y);
-        if let Some(image) = image(map) {
-            chart.image(&format!("data:image/png;base64,{}", BASE64_STANDARD.encode(image)));
+        if let Some(address) = address(map) {
+            chart.image(&address);
         }
         self.mark_sleepers(&mut chart);
         chart.into_svg()
     }
+}
+
+/// The map as a picture in a `data:` address.
+pub(crate) fn address(map: &TimeFrequencyMap) -> Option<String> {
+    Some(format!("data:image/png;base64,{}", BASE64_STANDARD.encode(image(map)?)))
 }
 
 /// The map as PNG, the highest frequency on top.

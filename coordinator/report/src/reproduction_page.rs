@@ -1,5 +1,6 @@
 //! The paper's results beside this program's.
 
+use crate::map_picture::address;
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, figure, page};
 use tracktwin_reproduction::{ClaimVerdict, Compared, Curve, Picture, Reproduction, Scale, Style};
@@ -96,8 +97,11 @@ pub(crate) fn verdict(verdict: ClaimVerdict) -> Markup {
 
 pub(crate) fn chart(picture: &Picture) -> String {
     let points = || picture.curves.iter().flat_map(reach);
-    let x = match &picture.names[..] {
-        [(first, _), .., (last, _)] => Axis::linear(&picture.x.label, first - 0.5, last + 0.5),
+    let map = picture.curves.iter().find(|curve| matches!(curve.style, Style::Map(_)));
+    let x = match (&picture.names[..], map.map(|map| &map.points[..])) {
+        ([(first, _), .., (last, _)], _) => Axis::linear(&picture.x.label, first - 0.5, last + 0.5),
+        // A map fills its frame.
+        (_, Some([first, .., last])) => Axis::linear(&picture.x.label, first.0, last.0),
         _ => axis(&picture.x, points().map(|point| point.0)),
     };
     let bars = picture.curves.iter().filter(|curve| curve.style == Style::Bars).count();
@@ -145,6 +149,12 @@ fn draw(chart: &mut Chart, class: &'static str, curve: &Curve, [index, bars]: [u
     match &curve.style {
         Style::Line => chart.line(class, points),
         Style::Truth => chart.line("ink", points),
+        Style::Thin => chart.line("thin b", points),
+        Style::Map(map) => {
+            if let Some(address) = address(map) {
+                chart.image(&address);
+            }
+        }
         Style::Dots => chart.dots("a pale", 1.6, &curve.points),
         Style::Points => chart.dots(class, 3.4, &curve.points),
         Style::Band(half) => {

@@ -6,6 +6,7 @@ use tracktwin_reproduction::{
     ClaimRow, ClaimVerdict, Compared, Curve, Figure, Picture, Provenance, Reproduction, Scale,
     Style,
 };
+use tracktwin_signal::TimeFrequencyMap;
 
 fn row(claim: &str, verdict: ClaimVerdict) -> ClaimRow {
     let text = |what: &str| format!("{what} of {claim}");
@@ -68,6 +69,26 @@ fn the_page_shows_every_row_with_its_verdict_and_every_picture() {
     assert_eq!(page.matches("<polygon").count(), 1);
     assert_eq!(page.matches("<circle").count(), 9);
     assert!(page.contains("tracktwin reproduce fig17 --library"));
+}
+
+#[test]
+fn a_map_fills_its_frame_and_many_thin_lines_have_one_style() {
+    let map = TimeFrequencyMap {
+        times_s: vec![0.0, 1.0],
+        frequencies_hz: vec![100.0, 200.0],
+        magnitudes: vec![1.0, 0.5, 0.1, 0.2],
+    };
+    let corners = vec![(2.0, 100.0), (3.0, 200.0)];
+    let mut shown = picture(vec![Style::Thin, Style::Thin]);
+    shown.curves = vec![Curve { name: String::new(), style: Style::Map(map), points: corners }];
+    shown.marks = vec![2.0, 3.0];
+    let mut reproduction = reproduction();
+    reproduction.figures[0].pictures = vec![shown, picture(vec![Style::Thin, Style::Thin])];
+    let page = reproduction_page(&reproduction);
+    assert!(page.contains("data:image/png;base64,"));
+    // Left and right edge of the frame of 774 px.
+    assert!(page.contains("M0.0 0V") && page.contains("M774.0 0V"), "{page}");
+    assert_eq!(page.matches("line thin b").count(), 2);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::files::{Force, check, make_folder};
 use super::library::{CHOOSE_REMEDY, choose};
 use super::library_url::LibraryUrl;
-use super::progress::{Progress, TrainingBar};
+use super::progress::{Progress, Stages, TrainingBar};
 use super::{OrInput, Stop, evaluate, print_json, println_stderr, println_stdout};
 use crate::pipeline;
 use crate::pipeline::compute::compute;
@@ -16,7 +16,9 @@ use std::path::{Path, PathBuf};
 use tracktwin_experiment::Experiment;
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
-use tracktwin_reproduction::{ClaimVerdict, Compared, Figure, Provenance, Reproduction, Results};
+use tracktwin_reproduction::{
+    ClaimVerdict, Compared, Figure, Provenance, Recordings, Reproduction, Results,
+};
 use tracktwin_surrogate::{Trained, TrainingSet};
 
 /// Arguments of `reproduce`.
@@ -24,6 +26,8 @@ use tracktwin_surrogate::{Trained, TrainingSet};
 #[command(after_long_help = "\
 The paper: Shen et al. 2023, Mechanical Systems and Signal Processing 204, 110730.
 
+  fig2    acceleration, CWT and SSWT of five bays (passes are simulated)
+  fig3    spectra at six sleepers (likewise)
   fig9    receptance peaks of the nominal track
   fig10   spectra at several speeds
   fig12   sensitivity of the spectra to each parameter
@@ -206,20 +210,19 @@ fn compare(
     material: &Material,
 ) -> Result<Reproduction, ReproducingError> {
     let set = material.set();
-    let mut examples = if figures.iter().any(|figure| figure.is_example()) {
-        let mut progress = Progress::begin("examples", 0, experiment.speeds_km_h.len() as u64);
-        let recordings = pipeline::reproduce::recordings(figures, experiment, &mut |done| {
-            progress.at(done as u64, "");
+    let mut examples = if figures.iter().any(|figure| figure.needs_passes()) {
+        let stages = Stages::default();
+        let recordings = tracktwin_reproduction::recordings(figures, experiment, &mut |share| {
+            stages.at("examples", share);
         })?;
-        progress.end();
+        stages.end();
         recordings
     } else {
-        std::collections::BTreeMap::new()
+        Recordings::new()
     };
     let evaluator = material.evaluator();
     let results = Results {
-        design: &experiment.design,
-        wavelet_centre_rad: experiment.features.wavelet_centre_rad,
+        experiment,
         set,
         seed: evaluator.map_or(SEED, |evaluator| evaluator.models().split_seed()),
     };

@@ -78,7 +78,7 @@ impl Agreement {
 }
 
 /// How many of `total` normal estimates may lie beyond, before chance is no longer the reason.
-fn allowed(total: usize) -> usize {
+pub(crate) fn allowed(total: usize) -> usize {
     // Binomial distribution, term by term.
     let n = total as f64;
     let mut term = (1.0 - BEYOND).powf(n);
@@ -93,11 +93,16 @@ fn allowed(total: usize) -> usize {
     count
 }
 
-/// Truth and estimates of a parameter along an example.
-pub(crate) fn picture(told: &EvaluatedExample, parameter: Parameter) -> Picture {
+/// What values of a parameter are divided by in pictures, and the unit that they have then.
+pub(crate) fn unit(parameter: Parameter) -> (f64, String) {
     let divisor = if parameter.range()[1] >= 1e6 { 1e6 } else { 1.0 };
     let unit = if divisor > 1.0 { "MN/m".to_owned() } else { parameter.unit().to_owned() };
-    let unit = unit.replace("1e-4", "10⁻⁴").replace("m2", "m²");
+    (divisor, unit.replace("1e-4", "10⁻⁴").replace("m2", "m²"))
+}
+
+/// Truth and estimates of a parameter along an example.
+pub(crate) fn picture(told: &EvaluatedExample, parameter: Parameter) -> Picture {
+    let (divisor, unit) = unit(parameter);
     let numbers = 1..=told.sleepers.len();
     let estimates = || numbers.clone().map(|at| (at as f64, told.estimate(at, parameter)));
     let truth =

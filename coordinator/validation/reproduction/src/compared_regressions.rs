@@ -50,7 +50,7 @@ pub(crate) fn compared_regressions(
     ] {
         let mut errors = vec![(PROCESSES, processes.clone())];
         errors.extend(halves.errors_of_others(&trained, &tested)?);
-        let errors = Errors { inputs, by_method: errors };
+        let errors = Errors { inputs, trained: halves.trained, by_method: errors };
         errors.most_accurate(&mut compared, PROCESSES, RailpadStiffness);
         errors.most_accurate(&mut compared, Regression::BaggedTrees.name(), BallastStiffness);
         errors.others(&mut compared);
@@ -174,6 +174,8 @@ fn standardised([mut trained, mut tested]: [Vec<Vec<f64>>; 2]) -> [Vec<Vec<f64>>
 /// Absolute errors of all regressions from the same inputs.
 struct Errors {
     inputs: &'static str,
+    /// Number of training cases.
+    trained: usize,
     by_method: Vec<MethodErrors>,
 }
 
@@ -202,9 +204,11 @@ impl Errors {
             format!("Most accurate of four regressions for {}, from {}", of.symbol(), self.inputs),
             [method.to_owned(), self.list(of)],
             all(others.map(better)),
-            "errors of the same test cases, against each of the others beyond two standard errors; \
-             the paper's four were trained with default settings and 5000 cases, ours with \
-             MATLAB's for the other three",
+            format!(
+                "errors of the same test cases, against each of the others beyond two standard \
+                 errors; {}, the paper's methods had 5000 each and default settings",
+                cap(self.trained)
+            ),
         );
     }
 
@@ -276,6 +280,7 @@ fn uncertainty(compared: &mut Compared, group: &ModelGroup) {
 mod tests {
     use super::*;
     use crate::testing::{library, random};
+    use tracktwin_experiment::Experiment;
     use tracktwin_parameters::{ParameterSet, TrackDesign};
     use tracktwin_surrogate::{FeatureColumns, TrainOptions, TrainingSet, train};
 
@@ -284,9 +289,8 @@ mod tests {
         let columns = feature.bins(&set.frequencies_hz);
         let features = vec![FeatureColumns { name: feature.name().to_owned(), columns }];
         let models = train(set, &TrainOptions::new(features), &|_| ()).unwrap();
-        let design = TrackDesign::v_track();
-        let seed = models.split_seed();
-        let results = Results { design: &design, wavelet_centre_rad: 6.0, set, seed };
+        let experiment = Experiment::new(TrackDesign::v_track());
+        let results = Results { experiment: &experiment, set, seed: models.split_seed() };
         compared_regressions(&results, &models).unwrap()
     }
 

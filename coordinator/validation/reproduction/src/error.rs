@@ -72,6 +72,26 @@ pub enum Error {
     /// The track cannot be built.
     #[error(transparent)]
     Model(#[from] tracktwin_track::model::ModelError),
+    /// A pass over an example cannot be simulated.
+    #[error("an example's pass: {0}")]
+    Pass(#[from] tracktwin_track::time::PassError),
+    /// Its acceleration or its surface is no signal.
+    #[error("an example: {0}")]
+    Signal(#[from] tracktwin_signal::SignalError),
+    /// A surface is too short for its spectrum.
+    #[error("the spectrum of a surface: {0}")]
+    Spectrum(#[from] tracktwin_signal::WelchError),
+    /// A signal has no features of this kind.
+    #[error(transparent)]
+    Features(#[from] tracktwin_signal::FeatureError),
+    /// A pass does not reach a sleeper.
+    #[error("{figure}: the pass does not cover sleeper {sleeper}")]
+    NotCovered {
+        /// The figure.
+        figure: Figure,
+        /// Number of the sleeper, from 1.
+        sleeper: usize,
+    },
     /// It has no receptance.
     #[error(transparent)]
     Frequency(#[from] tracktwin_track::frequency::FrequencyError),

@@ -1,4 +1,5 @@
-//! The tracks of the paper's numerical examples (section 4), and their evaluations.
+//! The tracks of the paper's numerical examples (section 4) and the nominal track, and their
+//! evaluations.
 
 use crate::{Error, Figure};
 use Parameter::{BallastStiffness, IrregularityLevel, RailpadStiffness, SleeperBendingStiffness};
@@ -30,6 +31,9 @@ const BENDING_N_M2: [f64; 3] = [4000.0, 5000.0, 6000.0];
 /// section 4).
 const ELEMENTS_M: [f64; 2] = [0.3e-3, 6.3e-3];
 
+/// Surfaces over which the nominal track is passed in Fig. 3.
+const NOMINAL: usize = 8;
+
 /// Sleepers, from 1, at which stiffness is reduced in Fig. 19.
 pub(crate) const REDUCED: [std::ops::RangeInclusive<usize>; 3] = [4..=4, 4..=6, 5..=9];
 
@@ -42,6 +46,8 @@ pub struct Example {
     pub name: String,
     /// The parameters at each sleeper.
     pub sleepers: Vec<ParameterSet>,
+    /// Seed of the surface; the examples of section 4 have different ones.
+    pub seed: u64,
 }
 
 /// The examples of a figure, a column each; none for figures that have none.
@@ -50,8 +56,21 @@ pub fn examples(figure: Figure) -> Vec<Example> {
         figure,
         name,
         sleepers: (1..=SLEEPERS).map(of).collect(),
+        seed: 0,
     };
-    match figure {
+    let first_seed = match figure {
+        Figure::Fig17 => 4,
+        Figure::Fig18 => 7,
+        Figure::Fig19 => 10,
+        Figure::Fig2 | Figure::Fig3 => 13,
+        _ => 1,
+    };
+    let seeds = first_seed..;
+    let nominal = |at| example(format!("nominal {at}"), &|_| ParameterSet::nominal());
+    let examples: Vec<Example> = match figure {
+        // Fig. 2 shows the first pass of Fig. 3.
+        Figure::Fig2 => vec![nominal(1)],
+        Figure::Fig3 => (1..=NOMINAL).map(nominal).collect(),
         Figure::Fig16 => (1..=3)
             .map(|to| example(format!("A0 to A{to}"), &|at| set(if at <= 4 { 0 } else { to })))
             .collect(),
@@ -82,7 +101,8 @@ pub fn examples(figure: Figure) -> Vec<Example> {
         | Figure::Fig13
         | Figure::Fig14
         | Figure::Fig25 => Vec::new(),
-    }
+    };
+    examples.into_iter().zip(seeds).map(|(example, seed)| Example { seed, ..example }).collect()
 }
 
 /// The nominal track with railpads and ballast of a row of Table 4.1.
@@ -172,6 +192,9 @@ mod tests {
         assert_eq!((soft, local.name.as_str()), (3, "3 of nine reduced"));
         assert_eq!(examples(Figure::Fig17)[0].sleepers[8][IrregularityLevel], 2.0);
         assert!(examples(Figure::Fig12).is_empty());
+        let seeds = Figure::ALL[2..].iter().flat_map(|&figure| examples(figure));
+        assert!(seeds.map(|example| example.seed).eq(1..=12));
+        assert_eq!(examples(Figure::Fig2)[0].seed, examples(Figure::Fig3)[0].seed);
     }
 
     #[test]

@@ -6,6 +6,10 @@ use std::str::FromStr;
 /// A figure of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Figure {
+    /// A stretch of acceleration with its CWT and SSWT.
+    Fig2,
+    /// LWPS at six sleepers.
+    Fig3,
     /// Receptance of the nominal track.
     Fig9,
     /// LWPS at several speeds.
@@ -30,7 +34,9 @@ pub enum Figure {
 
 impl Figure {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
+        Self::Fig2,
+        Self::Fig3,
         Self::Fig9,
         Self::Fig10,
         Self::Fig12,
@@ -46,6 +52,8 @@ impl Figure {
     /// The name used at every border.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Fig2 => "fig2",
+            Self::Fig3 => "fig3",
             Self::Fig9 => "fig9",
             Self::Fig10 => "fig10",
             Self::Fig12 => "fig12",
@@ -62,6 +70,8 @@ impl Figure {
     /// What it shows.
     pub const fn title(self) -> &'static str {
         match self {
+            Self::Fig2 => "Acceleration, CWT and SSWT of five bays",
+            Self::Fig3 => "Spectra at six sleepers",
             Self::Fig9 => "Receptance of the nominal track",
             Self::Fig10 => "Spectra at several speeds",
             Self::Fig12 => "Sensitivity of the spectra to each parameter",
@@ -108,7 +118,7 @@ mod tests {
         for figure in Figure::ALL {
             assert_eq!(figure.name().parse(), Ok(figure));
         }
-        let message = "fig11".parse::<Figure>().unwrap_err();
-        assert!(message.contains("`fig11`") && message.contains("fig9, fig10"), "{message}");
+        let message = "fig20".parse::<Figure>().unwrap_err();
+        assert!(message.contains("`fig20`") && message.contains("fig9, fig10"), "{message}");
     }
 }

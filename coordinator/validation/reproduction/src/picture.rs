@@ -1,5 +1,7 @@
 //! Pictures as plain data; how they look is the page's.
 
+use tracktwin_signal::TimeFrequencyMap;
+
 /// A chart: curves over two axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
@@ -46,6 +48,8 @@ pub enum Style {
     Line,
     /// As a line in the colour of the text: what is true.
     Truth,
+    /// As a thin line, one of many of the same kind.
+    Thin,
     /// As a line with a band of this half-width about it.
     Band(Vec<f64>),
     /// As many small dots.
@@ -54,6 +58,8 @@ pub enum Style {
     Points,
     /// As bars from zero.
     Bars,
+    /// As a map of magnitudes in dB; the points are its lower left and its upper right corner.
+    Map(TimeFrequencyMap),
 }
 
 impl Scale {

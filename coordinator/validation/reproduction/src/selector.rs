@@ -13,10 +13,10 @@ use tracktwin_surrogate::{Selector, Split, TrainingSet, mape};
 const SIZES: [usize; 7] = [100, 200, 500, 1000, 2000, 5000, 10_000];
 
 /// Cases of the test half that stand for measurements: the paper averages over 100 sleepers.
-const MEASURED: usize = 200;
+pub(crate) const MEASURED: usize = 200;
 
 /// The paper's feature vectors, the global one first.
-const FEATURES: [FeatureSet; 5] =
+pub(crate) const FEATURES: [FeatureSet; 5] =
     [FeatureSet::Gf, FeatureSet::Lf1, FeatureSet::Lf2, FeatureSet::Lf3, FeatureSet::Lf4];
 
 /// The paper's MAPE of the global feature at 100 and at 10,000 model instances, in per cent.

@@ -2,9 +2,11 @@
 
 use crate::compared_regressions::compared_regressions;
 use crate::error::Error;
-use crate::example::EvaluatedExample;
+use crate::example::{EvaluatedExample, examples};
+use crate::example_track::RecordedExample;
 use crate::figure::Figure;
 use crate::local_change::local_change;
+use crate::local_spectra::local_spectra;
 use crate::one_parameter::{bending_stiffness, irregularity};
 use crate::receptance::{hammer_tests, receptance};
 use crate::row::Compared;
@@ -13,27 +15,28 @@ use crate::sensitivity::sensitivity;
 use crate::speed::speed;
 use crate::step::step;
 use crate::test_errors::test_errors;
-use tracktwin_parameters::TrackDesign;
+use crate::time_frequency::time_frequency;
+use tracktwin_experiment::Experiment;
 use tracktwin_surrogate::{Tested, Trained, TrainingSet};
 
 /// What a figure is drawn from.
 #[derive(Clone, Copy, Debug)]
 pub enum Source {
-    /// The track and the results of a library.
+    /// The experiment and the results of a library.
     Results(fn(&Results<'_>) -> Result<Compared, Error>),
     /// Trained models and the results that none of them has seen.
     Models(fn(&Predictions<'_>) -> Result<Compared, Error>),
-    /// What trained models say of simulated passes.
+    /// Simulated passes over examples.
+    Passes(fn(&Experiment, &[RecordedExample]) -> Result<Compared, Error>),
+    /// What trained models estimate from simulated passes.
     Examples(fn(&[EvaluatedExample]) -> Compared),
 }
 
 /// A library's results, and how they were made.
 #[derive(Debug)]
 pub struct Results<'a> {
-    /// Rail, sleepers, wheel.
-    pub design: &'a TrackDesign,
-    /// Centre of the wavelet in rad.
-    pub wavelet_centre_rad: f64,
+    /// Track, vehicle and features of the cases.
+    pub experiment: &'a Experiment,
     /// The results.
     pub set: &'a TrainingSet,
     /// Decides which half of them is searched.
@@ -54,8 +57,14 @@ impl Figure {
     /// What it is drawn from.
     pub const fn source(self) -> Source {
         match self {
-            Self::Fig9 => Source::Results(|of| Ok(receptance(&hammer_tests(of.design)?))),
-            Self::Fig10 => Source::Results(|of| speed(of.set, of.wavelet_centre_rad)),
+            Self::Fig2 => Source::Passes(time_frequency),
+            Self::Fig3 => Source::Passes(local_spectra),
+            Self::Fig9 => {
+                Source::Results(|of| Ok(receptance(&hammer_tests(&of.experiment.design)?)))
+            }
+            Self::Fig10 => {
+                Source::Results(|of| speed(of.set, of.experiment.features.wavelet_centre_rad))
+            }
             Self::Fig12 => Source::Results(|of| sensitivity(of.set)),
             Self::Fig13 => Source::Results(|of| selector(of.set, of.seed)),
             Self::Fig14 => Source::Models(|of| test_errors(of.models, of.tested)),
@@ -72,21 +81,26 @@ impl Figure {
         matches!(self.source(), Source::Models(_) | Source::Examples(_))
     }
 
-    /// Whether it is one of the numerical examples, whose passes are simulated.
-    pub const fn is_example(self) -> bool {
-        matches!(self.source(), Source::Examples(_))
+    /// Whether it needs simulated passes over tracks of its own.
+    pub fn needs_passes(self) -> bool {
+        !examples(self).is_empty()
+    }
+
+    /// Whether a campaign's track must be long enough for an example.
+    pub fn needs_example_track(self) -> bool {
+        self.needs_passes()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::examples;
 
     #[test]
-    fn figures_that_are_drawn_from_examples_are_those_that_have_some() {
+    fn figures_that_are_drawn_from_passes_are_those_that_have_examples() {
         for figure in Figure::ALL {
-            assert_eq!(examples(figure).is_empty(), !figure.is_example(), "{figure}");
+            let passes = matches!(figure.source(), Source::Passes(_) | Source::Examples(_));
+            assert_eq!(passes, figure.needs_passes(), "{figure}");
         }
     }
 }

@@ -15,7 +15,7 @@ const PROMINENCE_DB: f64 = 1.0;
 
 /// Peaks nearer than this share of their frequency are one to the transform: the standard
 /// deviation over frequency of the power of a Morlet wavelet centred at `centre_rad`.
-fn resolution(centre_rad: f64) -> f64 {
+pub(crate) fn resolution(centre_rad: f64) -> f64 {
     1.0 / (SQRT_2 * centre_rad)
 }
 
