@@ -28,6 +28,7 @@ The paper: Shen et al. 2023, Mechanical Systems and Signal Processing 204, 11073
 
   fig2    acceleration, CWT and SSWT of five bays (passes are simulated)
   fig3    spectra at six sleepers (likewise)
+  fig8    power spectrum of the irregularity
   fig9    receptance peaks of the nominal track
   fig10   spectra at several speeds
   fig12   sensitivity of the spectra to each parameter

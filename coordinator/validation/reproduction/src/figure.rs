@@ -10,6 +10,8 @@ pub enum Figure {
     Fig2,
     /// LWPS at six sleepers.
     Fig3,
+    /// Power spectral density of the irregularity.
+    Fig8,
     /// Receptance of the nominal track.
     Fig9,
     /// LWPS at several speeds.
@@ -34,9 +36,10 @@ pub enum Figure {
 
 impl Figure {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Fig2,
         Self::Fig3,
+        Self::Fig8,
         Self::Fig9,
         Self::Fig10,
         Self::Fig12,
@@ -54,6 +57,7 @@ impl Figure {
         match self {
             Self::Fig2 => "fig2",
             Self::Fig3 => "fig3",
+            Self::Fig8 => "fig8",
             Self::Fig9 => "fig9",
             Self::Fig10 => "fig10",
             Self::Fig12 => "fig12",
@@ -72,6 +76,7 @@ impl Figure {
         match self {
             Self::Fig2 => "Acceleration, CWT and SSWT of five bays",
             Self::Fig3 => "Spectra at six sleepers",
+            Self::Fig8 => "Power spectrum of the irregularity",
             Self::Fig9 => "Receptance of the nominal track",
             Self::Fig10 => "Spectra at several speeds",
             Self::Fig12 => "Sensitivity of the spectra to each parameter",

@@ -12,6 +12,7 @@ mod error;
 mod example;
 mod example_track;
 mod figure;
+mod irregularity_spectrum;
 mod local_change;
 mod local_spectra;
 mod one_parameter;

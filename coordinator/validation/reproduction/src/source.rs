@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::example::{EvaluatedExample, examples};
 use crate::example_track::RecordedExample;
 use crate::figure::Figure;
+use crate::irregularity_spectrum::irregularity_spectrum;
 use crate::local_change::local_change;
 use crate::local_spectra::local_spectra;
 use crate::one_parameter::{bending_stiffness, irregularity};
@@ -59,6 +60,7 @@ impl Figure {
         match self {
             Self::Fig2 => Source::Passes(time_frequency),
             Self::Fig3 => Source::Passes(local_spectra),
+            Self::Fig8 => Source::Results(|of| irregularity_spectrum(of.experiment)),
             Self::Fig9 => {
                 Source::Results(|of| Ok(receptance(&hammer_tests(&of.experiment.design)?)))
             }
