@@ -31,6 +31,7 @@ The paper: Shen et al. 2023, Mechanical Systems and Signal Processing 204, 11073
   fig8    power spectrum of the irregularity
   fig9    receptance peaks of the nominal track
   fig10   spectra at several speeds
+  fig11   best matches of the model selector
   fig12   sensitivity of the spectra to each parameter
   fig13   model selector and the size of the library
   fig14   errors of the models on the test half (needs models)

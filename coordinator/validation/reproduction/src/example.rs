@@ -98,6 +98,7 @@ pub fn examples(figure: Figure) -> Vec<Example> {
         Figure::Fig8
         | Figure::Fig9
         | Figure::Fig10
+        | Figure::Fig11
         | Figure::Fig12
         | Figure::Fig13
         | Figure::Fig14

@@ -16,6 +16,8 @@ pub enum Figure {
     Fig9,
     /// LWPS at several speeds.
     Fig10,
+    /// The model selector's best matches.
+    Fig11,
     /// Sensitivity of the LWPS to each parameter.
     Fig12,
     /// The model selector's error by size of the library.
@@ -36,12 +38,13 @@ pub enum Figure {
 
 impl Figure {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Fig2,
         Self::Fig3,
         Self::Fig8,
         Self::Fig9,
         Self::Fig10,
+        Self::Fig11,
         Self::Fig12,
         Self::Fig13,
         Self::Fig14,
@@ -60,6 +63,7 @@ impl Figure {
             Self::Fig8 => "fig8",
             Self::Fig9 => "fig9",
             Self::Fig10 => "fig10",
+            Self::Fig11 => "fig11",
             Self::Fig12 => "fig12",
             Self::Fig13 => "fig13",
             Self::Fig14 => "fig14",
@@ -79,6 +83,7 @@ impl Figure {
             Self::Fig8 => "Power spectrum of the irregularity",
             Self::Fig9 => "Receptance of the nominal track",
             Self::Fig10 => "Spectra at several speeds",
+            Self::Fig11 => "Best matches of the model selector",
             Self::Fig12 => "Sensitivity of the spectra to each parameter",
             Self::Fig13 => "Model selector and the size of the library",
             Self::Fig14 => "Errors of the models on the test half",

@@ -6,6 +6,7 @@
 
 mod agreement;
 mod average;
+mod best_matches;
 mod bound;
 mod compared_regressions;
 mod error;

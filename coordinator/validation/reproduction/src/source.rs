@@ -1,5 +1,6 @@
 //! What each figure is drawn from, and by what.
 
+use crate::best_matches::best_matches;
 use crate::compared_regressions::compared_regressions;
 use crate::error::Error;
 use crate::example::{EvaluatedExample, examples};
@@ -67,6 +68,7 @@ impl Figure {
             Self::Fig10 => {
                 Source::Results(|of| speed(of.set, of.experiment.features.wavelet_centre_rad))
             }
+            Self::Fig11 => Source::Results(|of| best_matches(of.set, of.seed)),
             Self::Fig12 => Source::Results(|of| sensitivity(of.set)),
             Self::Fig13 => Source::Results(|of| selector(of.set, of.seed)),
             Self::Fig14 => Source::Models(|of| test_errors(of.models, of.tested)),
