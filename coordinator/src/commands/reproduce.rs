@@ -35,6 +35,7 @@ The paper: Shen et al. 2023, Mechanical Systems and Signal Processing 204, 11073
   fig12   sensitivity of the spectra to each parameter
   fig13   model selector and the size of the library
   fig14   errors of the models on the test half (needs models)
+  fig15   tracks of the examples
   fig16   example: a step in railpad and ballast (needs models; passes are simulated)
   fig17   example: levels of irregularity (likewise)
   fig18   example: bending stiffness of the sleepers (likewise)

@@ -102,6 +102,7 @@ pub fn examples(figure: Figure) -> Vec<Example> {
         | Figure::Fig12
         | Figure::Fig13
         | Figure::Fig14
+        | Figure::Fig15
         | Figure::Fig25 => Vec::new(),
     };
     examples.into_iter().zip(seeds).map(|(example, seed)| Example { seed, ..example }).collect()

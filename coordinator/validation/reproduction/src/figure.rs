@@ -24,6 +24,8 @@ pub enum Figure {
     Fig13,
     /// The models' errors on the test half.
     Fig14,
+    /// The tracks of the numerical examples.
+    Fig15,
     /// Numerical example: a step in railpad and ballast.
     Fig16,
     /// Numerical example: levels of irregularity.
@@ -38,7 +40,7 @@ pub enum Figure {
 
 impl Figure {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Fig2,
         Self::Fig3,
         Self::Fig8,
@@ -48,6 +50,7 @@ impl Figure {
         Self::Fig12,
         Self::Fig13,
         Self::Fig14,
+        Self::Fig15,
         Self::Fig16,
         Self::Fig17,
         Self::Fig18,
@@ -67,6 +70,7 @@ impl Figure {
             Self::Fig12 => "fig12",
             Self::Fig13 => "fig13",
             Self::Fig14 => "fig14",
+            Self::Fig15 => "fig15",
             Self::Fig16 => "fig16",
             Self::Fig17 => "fig17",
             Self::Fig18 => "fig18",
@@ -87,6 +91,7 @@ impl Figure {
             Self::Fig12 => "Sensitivity of the spectra to each parameter",
             Self::Fig13 => "Model selector and the size of the library",
             Self::Fig14 => "Errors of the models on the test half",
+            Self::Fig15 => "Tracks of the examples",
             Self::Fig16 => "Example: a step in railpad and ballast",
             Self::Fig17 => "Example: levels of irregularity",
             Self::Fig18 => "Example: bending stiffness of the sleepers",

@@ -12,6 +12,7 @@ mod compared_regressions;
 mod error;
 mod example;
 mod example_track;
+mod example_tracks;
 mod figure;
 mod irregularity_spectrum;
 mod local_change;

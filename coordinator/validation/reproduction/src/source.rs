@@ -5,6 +5,7 @@ use crate::compared_regressions::compared_regressions;
 use crate::error::Error;
 use crate::example::{EvaluatedExample, examples};
 use crate::example_track::RecordedExample;
+use crate::example_tracks::example_tracks;
 use crate::figure::Figure;
 use crate::irregularity_spectrum::irregularity_spectrum;
 use crate::local_change::local_change;
@@ -72,6 +73,7 @@ impl Figure {
             Self::Fig12 => Source::Results(|of| sensitivity(of.set)),
             Self::Fig13 => Source::Results(|of| selector(of.set, of.seed)),
             Self::Fig14 => Source::Models(|of| test_errors(of.models, of.tested)),
+            Self::Fig15 => Source::Results(|of| example_tracks(of.experiment)),
             Self::Fig16 => Source::Examples(step),
             Self::Fig17 => Source::Examples(irregularity),
             Self::Fig18 => Source::Examples(bending_stiffness),
@@ -92,7 +94,7 @@ impl Figure {
 
     /// Whether a campaign's track must be long enough for an example.
     pub fn needs_example_track(self) -> bool {
-        self.needs_passes()
+        self.needs_passes() || self == Self::Fig15
     }
 }
 
