@@ -58,6 +58,36 @@ fn figures_of_a_small_library_come_as_rows_and_a_page() {
     assert!(!folder.path().join("none").exists());
 }
 
+#[test]
+fn models_that_an_earlier_call_trained_are_used_again_while_the_library_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let library = format!("sqlite:{}", path("library.sqlite"));
+    let simulate = |cases: &str| {
+        // Fewest cases that models are trained on.
+        let campaign = CAMPAIGN.replace("cases = 60", cases).replace("[7, 13]", "[13]");
+        fs::write(path("campaign.toml"), campaign).unwrap();
+        let arguments = ["run", &path("campaign.toml"), "--no-train", "--library", &library];
+        let answer = run(PROGRAM, &[&arguments[..], &["--out", &path("out")]].concat());
+        assert_eq!(answer.code, Some(0), "{}", answer.err);
+    };
+    let reproduce = || {
+        let out = path("reproduction");
+        let answer = run(PROGRAM, &["reproduce", "fig14", "--library", &library, "--out", &out]);
+        // Two hundred coarse cases do not reach the paper's errors.
+        assert_eq!(answer.code, Some(1), "{}", answer.err);
+        answer
+    };
+    simulate("cases = 200");
+    let (first, again) = (reproduce(), reproduce());
+    assert!(first.err.contains("training: done") && !first.err.contains("used again"));
+    assert!(again.err.contains("used again") && !again.err.contains("training"), "{}", again.err);
+    assert_eq!(first.out, again.out);
+    simulate("cases = 210");
+    let grown = reproduce();
+    assert!(grown.err.contains("training: done"), "{}", grown.err);
+}
+
 /// One line on standard error with all of `words`, and exit code 2.
 fn refused(answer: &system_tests::Answer, words: &[&str]) {
     assert_eq!(answer.code, Some(2), "{}", answer.err);
