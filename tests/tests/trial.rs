@@ -1,11 +1,21 @@
 //! A blind trial is shared by nodes, loses nothing when one of them dies, and goes on where a
 //! diagnosis breaks down.
 
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use system_tests::{run, until};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
+
+/// Puts the recordings of two cases where a trial looks for them: it does not record them again.
+fn record(out: &Path, [spans, passes]: [&str; 2]) {
+    for case in ["0000", "0001"] {
+        let recording = out.join("recordings").join(case).display().to_string();
+        let short = ["simulate", "--spans", spans, "--speed", "13", "--passes", passes];
+        assert_eq!(run(PROGRAM, &[&short[..], &["--out", &recording]].concat()).code, Some(0));
+    }
+}
 
 #[test]
 fn a_node_that_is_killed_loses_its_case_to_another_and_each_case_has_one_answer() {
@@ -13,10 +23,13 @@ fn a_node_that_is_killed_loses_its_case_to_another_and_each_case_has_one_answer(
     let path = |name: &str| folder.path().join(name).display().to_string();
     let library = format!("sqlite:{}", path("library.sqlite"));
     let arguments = |out: &str| {
-        let options = ["trial", "--cases", "2", "--seed", "6174", "--discard-recordings"];
+        let options = ["trial", "--cases", "2", "--seed", "6174", "--force"];
         let places = ["--library".to_owned(), library.clone(), "--out".to_owned(), path(out)];
         options.map(str::to_owned).into_iter().chain(places).collect::<Vec<_>>()
     };
+    for out in ["first", "second"] {
+        record(&folder.path().join(out), ["25", "2"]);
+    }
     let begun = |out: &str| -> Child {
         let mut node = Command::new(PROGRAM);
         node.args(arguments(out)).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
@@ -67,13 +80,8 @@ fn a_node_that_is_killed_loses_its_case_to_another_and_each_case_has_one_answer(
 fn a_case_whose_diagnosis_breaks_down_is_named_at_the_end_and_stops_no_other() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("trial");
-    // What is there already is not recorded again: one pass over 17 spans, too short to diagnose.
-    for case in ["0000", "0001"] {
-        let recording = out.join("recordings").join(case).display().to_string();
-        let short =
-            ["simulate", "--spans", "17", "--speed", "13", "--passes", "1", "--out", &recording];
-        assert_eq!(run(PROGRAM, &short).code, Some(0));
-    }
+    // Too short to diagnose.
+    record(&out, ["17", "1"]);
     let out_text = out.display().to_string();
     let answer = run(PROGRAM, &["trial", "--cases", "2", "--out", &out_text, "--force"]);
     assert_eq!(answer.code, Some(3), "{}", answer.err);

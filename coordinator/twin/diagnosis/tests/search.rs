@@ -7,10 +7,12 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use tracktwin_diagnosis::{
-    Bands, Fixed, Forward, NullModel, PortPlace, PreparedRecording, SearchOutcome, Section,
-    candidates, search,
+    Bands, Evidence, Fixed, Forward, NullModel, PortPlace, PreparedRecording, SearchOutcome,
+    Section, Verdict, candidates, search,
 };
+use tracktwin_inspection::Inspection;
 use tracktwin_parameters::TrackDesign;
+use tracktwin_signal::recording::{Recording, Sleeper};
 use tracktwin_track::extension::ExtensionInstance;
 
 const SLEEPERS: usize = 7;
@@ -130,6 +132,46 @@ fn a_bolt_under_one_sleeper_is_named_at_its_place_and_its_stiffness_found() {
     // Two speeds and one scatter of 0.15 nats: a factor of two at most.
     assert!((1.5e7..6e7).contains(&stiffness), "{stiffness}");
     assert!(found.held_out[1] > found.held_out[0]);
+}
+
+#[test]
+fn a_name_that_is_taken_back_leaves_something_unknown_of_its_family_at_its_place() {
+    let bolt = ExtensionInstance::new("sleeper_bolt").on([3]).with("stiffness_N_per_m", 3e7);
+    let (prepared, null) = recorded(1, Some(bolt));
+    let mut search = search_for(&prepared, &null, |_| true);
+    assert_eq!(search.accepted.len(), 1, "{:?}", search.rounds);
+    // As if more were left there than the name may leave.
+    search.accepted.clear();
+    search.last = search.baseline.clone();
+    search.rounds.truncate(1);
+    search.rounds[0].accepted = false;
+    search.rounds[0].remainder = Some(20.0);
+    let sleeper =
+        |number: usize| Sleeper { id: format!("SN{number}"), x_m: 1.0 + 0.125 * number as f64 };
+    let recording = Recording {
+        name: "bolt".to_owned(),
+        sample_rate_hz: 1e5,
+        channel: String::new(),
+        passes: Vec::new(),
+        sleepers: (0..SLEEPERS).map(sleeper).collect(),
+        nominal: serde_json::Map::new(),
+        spacing_m: 0.125,
+        doubts: Vec::new(),
+    };
+    let inspection = Inspection::default();
+    let evidence = Evidence {
+        recording: &recording,
+        prepared: &prepared,
+        inspection: &inspection,
+        search: &search,
+    };
+    let diagnosis = evidence.conclude().unwrap();
+    assert_eq!(diagnosis.verdict, Verdict::UnknownPhysics);
+    let found = &diagnosis.hypotheses[0];
+    assert!(found.accepted && found.physics == "unknown_physics", "{found:?}");
+    assert_eq!(found.family.as_deref(), Some("fastening"));
+    assert_eq!(found.location.as_ref().unwrap().sleepers, ["SN3"]);
+    assert!(diagnosis.notes.iter().any(|note| note.contains("something similar")));
 }
 
 #[test]

@@ -35,9 +35,11 @@ impl Evidence<'_> {
         let others = group.max(nothing);
         let is_there = alone && round.unknown_is_predictive();
         let is_port = is_there && round.port_p_value <= PORT_ALARM && unknown > others;
-        // Something is there, but the names that come near failed on withheld speeds.
+        // Something is there, but the names that come near failed on speeds that were held out, or the best,
+        // which predicted them, leaves too much at its place.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
-        let unnamed = is_there && !is_port && nothing < NOTHING_LEFT;
+        let taken_back = round.fitted.first().filter(|_| round.remainder.is_some());
+        let unnamed = is_there && !is_port && (taken_back.is_some() || nothing < NOTHING_LEFT);
         let (kept, unknown) =
             if unnamed { (FAILED_SHARE, unknown + failed) } else { (is_new, unknown) };
         let mut hypotheses: Vec<Hypothesis> = round
@@ -51,10 +53,21 @@ impl Evidence<'_> {
             .collect();
         if let Some(port) = &round.port {
             let unknown = unknown * if alone { 1.0 } else { REMAINDER_PRIOR };
+            let nameless = self.without_name(port, unknown);
+            // What explains most of it is of its family, at its place.
+            let (family, location) = match taken_back.filter(|_| alone) {
+                Some(best) => (
+                    Some(best.candidate.kind.family.name().to_owned()),
+                    self.location_of(&best.candidate),
+                ),
+                None => (nameless.family.clone(), nameless.location.clone()),
+            };
             hypotheses.push(Hypothesis {
                 accepted: is_port || unnamed,
                 look_alikes: if unnamed { nearest(round) } else { Vec::new() },
-                ..self.without_name(port, unknown)
+                family,
+                location,
+                ..nameless
             });
         }
         if round.accepted {

@@ -26,7 +26,7 @@ const EACH_TEST: f64 = FALSE_ALARMS / 9.0;
 const AROUND_BLOW: f64 = 0.4;
 
 /// Result of an inspection.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Inspection {
     /// Findings: chain first, then wheel, then the rail's surface.
     pub findings: Vec<Finding>,
