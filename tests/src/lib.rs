@@ -1,4 +1,4 @@
-//! What the tests of the whole program share: starting it, stopping it, reading what it says.
+//! Common parts of the tests of the whole program: starting and stopping it, and reading its output.
 
 mod made_up;
 mod process;
@@ -9,35 +9,35 @@ pub use test_needs::free_port;
 
 use std::process::{Command, Output};
 
-/// Of a campaign where what is tested is the farm: a coarse, short model.
+/// Part of a campaign file for tests of the farm: a coarse, short model.
 pub const COARSE_MODEL: &str = "seed = 5\nspeeds_km_h = [13]\n\
      [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n";
 
-/// What a finished program said.
+/// Output of a program that has ended.
 pub struct Answer {
-    /// Its exit code; none if a signal ended it.
+    /// Exit code; `None` if a signal ended the program.
     pub code: Option<i32>,
-    /// Its standard output.
+    /// Text of standard output.
     pub out: String,
-    /// Its standard error.
+    /// Text of standard error.
     pub err: String,
 }
 
 impl Answer {
-    /// What it wrote to standard output.
+    /// Returns the text of standard output.
     ///
     /// # Panics
-    /// When it failed.
+    /// Panics if the program did not succeed.
     pub fn succeeded(self) -> String {
         assert_eq!(self.code, Some(0), "{}", self.err);
         self.out
     }
 }
 
-/// Runs the program at `program` with these arguments, to its end.
+/// Runs the program at the path `program` with these arguments, and waits for its end.
 ///
 /// # Panics
-/// When the program can't be started.
+/// Panics if the program cannot be started.
 pub fn run(program: &str, arguments: &[&str]) -> Answer {
     let Output { status, stdout, stderr } =
         Command::new(program).args(arguments).output().expect("the program starts");

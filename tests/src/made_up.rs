@@ -1,6 +1,6 @@
-//! A kind of physics that the catalogue lacks, defined as an extension's file defines one.
+//! A kind of physics that the catalogue lacks. It is defined like a kind in an extension's file.
 //!
-//! The reference simulator hides it as an effect that the twin does not know.
+//! The reference simulator simulates it as a hidden extension that is unknown to the twin.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -1,21 +1,21 @@
-//! Programs that run while a test goes on.
+//! Programs that run in parallel to a test.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// How often is looked whether something has happened.
+/// Interval of checking a condition.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// A process that ends with its handle.
+/// A process that is killed when this value is dropped.
 pub struct Process(Child);
 
 impl Process {
-    /// Starts a program; what it says to standard error is passed on under this name, so that a
-    /// failed test tells it.
+    /// Starts a program. Its standard error is printed with the prefix `name`, so that it appears in the
+    /// output of a failed test.
     ///
     /// # Panics
-    /// When it can't be started.
+    /// Panics if the program cannot be started.
     pub fn start(command: &mut Command, name: &'static str) -> Self {
         let command = command.stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = command.spawn().expect("the program starts");
@@ -29,20 +29,20 @@ impl Process {
         Self(child)
     }
 
-    /// Sends a signal by its name.
+    /// Sends a signal, given by its name.
     ///
     /// # Panics
-    /// When it can't be sent.
+    /// Panics if the signal cannot be sent.
     pub fn signal(&self, name: &str) {
         let pid = self.0.id().to_string();
         let sent = Command::new("kill").args([&format!("-{name}"), &pid]).status();
         assert!(sent.expect("kill starts").success());
     }
 
-    /// A TCP port on which it listens, once there is one.
+    /// A TCP port on which the process listens; `None` if there is none yet.
     ///
     /// # Panics
-    /// When the system doesn't say.
+    /// Panics if the system does not provide this information.
     pub fn port(&self) -> Option<u16> {
         let proc = |what: &str| format!("/proc/{}/{what}", self.0.id());
         let files = std::fs::read_dir(proc("fd")).expect("it runs").flatten();
@@ -58,23 +58,23 @@ impl Process {
         })
     }
 
-    /// Ends it at once (SIGKILL).
+    /// Kills the process (SIGKILL).
     pub fn kill(self) {
         drop(self);
     }
 
-    /// Whether it runs.
+    /// Whether the process is running.
     ///
     /// # Panics
-    /// When the system doesn't say.
+    /// Panics if the system does not provide this information.
     pub fn runs(&mut self) -> bool {
         self.0.try_wait().expect("it is this process's").is_none()
     }
 
-    /// Waits for its end.
+    /// Waits for the end of the process.
     ///
     /// # Panics
-    /// When it has not ended in time.
+    /// Panics if the process does not end in time.
     pub fn ended(&mut self, within: Duration) -> ExitStatus {
         until("it ends", within, || !self.runs());
         self.0.wait().expect("it is this process's")
@@ -88,10 +88,10 @@ impl Drop for Process {
     }
 }
 
-/// Waits until something happens.
+/// Waits until a condition is true.
 ///
 /// # Panics
-/// When it has not happened in time.
+/// Panics if the condition does not become true in time.
 pub fn until(what: &str, within: Duration, mut happened: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !happened() {

@@ -1,4 +1,4 @@
-//! Simulated levels against those of a simulator that shares no code with this project.
+//! Comparison of simulated levels with those of a simulator that shares no code with this project.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -11,24 +11,25 @@ use tracktwin_signal::{PowerSpectrum, Signal};
 use tracktwin_track::model::{Mesh, Roughness, Support, Surface, TrackModel};
 use tracktwin_track::time::{Pass, passes};
 
-/// Spans before the reference's window for the run-in.
+/// Number of spans for the run-in, before the window of the reference.
 const RUN_IN_SPANS: f64 = 5.0;
-/// Time step on V-Track and on the line, where it gives the reference's bins of 6.25 Hz: at the resonance of
-/// wheel and track, levels of one-third octaves depend on them.
+/// Time step on V-Track and on the line. On the line it gives the reference's bins of 6.25 Hz. Near the
+/// resonance of wheel and track, one-third-octave levels depend on the bins.
 const TIME_STEP_S: f64 = 1e-5;
 const LINE_TIME_STEP_S: f64 = 1.0 / 102_400.0;
-/// Segment of the reference's Welch analysis.
+/// Length of a segment in the reference's Welch analysis, in samples.
 const SEGMENT: usize = 16_384;
-/// Below it the analysis window smears the wheel-on-track resonance (the reference's README).
+/// Lowest compared frequency. Below it, the analysis window smears the wheel-on-track resonance (README of
+/// the reference).
 const LOWEST_HZ: f64 = 124.0;
-/// Bands of the line that the reference means, in Hz.
+/// Range of the bands compared on the line, in Hz.
 const LINE_HZ: [f64; 2] = [39.0, 4100.0];
-/// Wavelengths of the line's surface in m.
+/// Range of the wavelengths of the line's surface, in m.
 const LINE_WAVELENGTHS_M: [f64; 2] = [2e-3, 3.0];
-/// What two good programs may differ by, in dB; two standard errors of both come on top.
+/// Allowed difference of two correct programs in dB, in addition to two standard errors of both.
 const TOLERANCE_DB: f64 = 0.5;
 
-/// Mean level over surfaces with its standard error, in dB.
+/// Mean level over surfaces, with its standard error, both in dB.
 #[derive(Clone, Copy, Debug)]
 struct Level {
     mean: f64,
@@ -45,16 +46,16 @@ impl Level {
     }
 }
 
-/// A set of the reference and what it asks for.
+/// A data set of the reference, with the settings of its simulation.
 struct Reference {
     name: String,
     set: ParameterSet,
     design: TrackDesign,
     spans: usize,
     time_step_s: f64,
-    /// Shortest and longest wavelength of the surface in m.
+    /// Shortest and longest wavelength of the surface, in m.
     wavelengths_m: [f64; 2],
-    /// Bands that are compared in Hz.
+    /// Range of the compared bands, in Hz.
     compared_hz: [f64; 2],
     window_m: [f64; 2],
     centres_hz: Vec<f64>,
@@ -71,13 +72,13 @@ fn file(name: &str) -> Value {
 }
 
 impl Reference {
-    /// A set on V-Track.
+    /// A data set on V-Track.
     fn v_track(name: &str) -> Self {
         let file = file(&format!("ensemble-{name}"));
         Self::read(name, &file, TrackDesign::v_track(), 40, [0.25e-3, 1.0], [LOWEST_HZ, f64::MAX])
     }
 
-    /// A set on a line of 60E1, as its description states it.
+    /// A data set on a line with 60E1 rails, as described in the reference.
     fn line(name: &str) -> Self {
         let file = file(&format!("line-{name}"));
         let nominal = file["nominal"].as_object().unwrap().clone();
@@ -137,7 +138,7 @@ impl Reference {
         }
     }
 
-    /// The simulated levels at a speed, in the order of the centres.
+    /// Simulated levels at a speed, in the order of the band centres.
     fn simulate(&self, speed_km_h: f64, surfaces: u32) -> Vec<Level> {
         let supports = vec![Support::from(&self.set); self.spans - 1];
         let mesh = Mesh::uniform(self.spans, 8, 8);
@@ -177,7 +178,7 @@ impl Reference {
         (lowest_hz..highest_hz).contains(&centre_hz)
     }
 
-    /// The table of all levels, and a line for each that is too far off.
+    /// Table of all levels, and one line for each difference that is too large.
     fn compare(&self, surfaces: u32) -> (String, Vec<String>) {
         let (mut table, mut misses) = (String::new(), Vec::new());
         for (speed, reference) in &self.speeds {

@@ -1,4 +1,4 @@
-//! Campaigns added and steered from the command line, without a coordinator.
+//! Campaigns are added and controlled from the command line, without a coordinator.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// Longer than anything here takes, on a busy machine too.
+/// Time limit of all actions in this test, also on a busy machine.
 const LONG: Duration = Duration::from_mins(1);
 
 /// A folder with a campaign file and a library.
@@ -24,7 +24,7 @@ impl Home {
         home
     }
 
-    /// Writes the file with a seed.
+    /// Writes the campaign file with this seed.
     fn campaign(&self, seed: u32) {
         let text = format!("name = \"coarse\"\ncases = 60\n{COARSE_MODEL}");
         let text = text.replace("seed = 5", &format!("seed = {seed}"));

@@ -1,4 +1,5 @@
-//! The coordinator's pages: what they say, who may press their buttons, and how a browser shows them.
+//! Pages of the coordinator: their content, the rights to use their controls, and their display in a
+//! browser.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -15,10 +16,10 @@ use ureq::{Agent, Body};
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
-/// When something that does not happen has failed.
+/// Time limit of an expected event.
 const PATIENCE: Duration = Duration::from_mins(1);
 
-/// A coordinator with pages and 24 cases to do, and a worker if one is asked for.
+/// A coordinator with a dashboard and 24 cases, and optionally a worker.
 struct Farm {
     folder: TempDir,
     library: String,
@@ -32,7 +33,8 @@ impl Farm {
         Self::start_with(token, &[])
     }
 
-    /// The same with further arguments, in which `DIR` is the farm's folder of certificates.
+    /// Starts the farm with further arguments; `DIR` in them is replaced by the farm's folder of
+    /// certificates.
     fn start_with(token: Option<&str>, more: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).display().to_string();
@@ -66,7 +68,7 @@ impl Farm {
         format!("{}{path}", self.pages)
     }
 
-    /// One that says what it gets, errors and redirections too.
+    /// An HTTP client that returns errors and redirections as responses.
     #[expect(clippy::unused_self, reason = "it speaks to this farm")]
     fn agent(&self) -> Agent {
         Agent::config_builder().http_status_as_error(false).max_redirects(0).build().into()
@@ -108,12 +110,12 @@ impl Farm {
     }
 }
 
-/// Waits until something happens.
+/// Waits until a condition is true.
 fn until(what: &str, happened: impl FnMut() -> bool) {
     system_tests::until(what, PATIENCE, happened);
 }
 
-/// No header that matters.
+/// A header without significance for the test.
 const PLAIN: [&str; 2] = ["Accept", "text/html"];
 
 #[test]
@@ -201,7 +203,7 @@ fn other_sites_and_other_names_are_turned_away() {
     assert!(policy.contains("default-src 'none'") && policy.contains("frame-ancestors 'none'"));
 }
 
-/// Chromium, where it is installed.
+/// Chromium; `None` if it is not installed.
 fn browser() -> Option<Browser> {
     if default_executable().is_err() {
         skipped("the dashboard in a browser; install chromium");
@@ -212,7 +214,7 @@ fn browser() -> Option<Browser> {
     Some(Browser::new(options).unwrap())
 }
 
-/// Everything that can be read in the window; nothing while a page is on its way.
+/// The visible text of the window; empty while a page is loading.
 fn read(tab: &Tab) -> String {
     let text = tab.evaluate("document.body.innerText", false).ok().and_then(|it| it.value);
     text.and_then(|it| it.as_str().map(str::to_owned)).unwrap_or_default()

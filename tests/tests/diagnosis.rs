@@ -1,5 +1,5 @@
-//! What is hidden in a recording is found, named and placed by the program as its user calls it;
-//! what cannot be diagnosed is refused.
+//! The program finds, names and locates the hidden extension of a recording, and refuses recordings that it
+//! cannot diagnose.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -15,13 +15,13 @@ use tracktwin_signal::recording::Recording;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// A folder with a recording of thirteen sleepers at these speeds in km/h, two passes each, over a
-/// track with an extension in it.
+/// A folder with a recording of thirteen sleepers on a track with an extension; two passes at each of these
+/// speeds in km/h.
 fn recorded(speeds: &[&str], extension: &str) -> TempDir {
     recorded_over("25", speeds, extension)
 }
 
-/// The same on a track of so many spans.
+/// As [`recorded`], on a track of `spans` spans.
 fn recorded_over(spans: &str, speeds: &[&str], extension: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("extension.toml");
@@ -35,7 +35,7 @@ fn recorded_over(spans: &str, speeds: &[&str], extension: &str) -> TempDir {
     folder
 }
 
-/// The program's answer and what it has written.
+/// Output of the program, and the written document.
 fn diagnosed(folder: &Path, further: &[&str]) -> (Answer, Option<Value>) {
     let [recording, out] = ["recording", "out"].map(|name| folder.join(name));
     let [recording, folder] = [recording, out.clone()].map(|path| path.display().to_string());
@@ -45,7 +45,7 @@ fn diagnosed(folder: &Path, further: &[&str]) -> (Answer, Option<Value>) {
     (answer, text.ok().map(|text| serde_json::from_str(&text).unwrap()))
 }
 
-/// What was accepted, with the sleepers it was placed at.
+/// The accepted hypotheses, each with its sleepers.
 fn accepted(diagnosis: &Value) -> Vec<(&str, Vec<&str>)> {
     let all = diagnosis["hypotheses"].as_array().unwrap();
     all.iter()
@@ -172,7 +172,7 @@ fn passes_without_a_track_in_them_are_refused() {
     refused(&mut noise, &["passes 1 and 2", "correlation", "noise"]);
 }
 
-/// Imports a minute of a running train at 67 km/h without places of sleepers, and diagnoses it: its wheel
+/// Imports a minute of a running train at 67 km/h without sleeper positions, and diagnoses it. The wheel
 /// has this circumference in m.
 fn is_diagnosed_by_its_wheel(file: &Path, acceleration: &str, circumference_m: f64) {
     let folder = tempfile::tempdir().unwrap();

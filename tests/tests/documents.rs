@@ -1,5 +1,5 @@
-//! Every documented command and every setting of the deployment files is one that the programs accept, and
-//! every link between pages leads to a file and a heading.
+//! The programs accept every documented command and every setting in the deployment files. Every link
+//! between pages leads to an existing file and heading.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -12,7 +12,7 @@ use system_tests::{Answer, run};
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
-/// Every file with this ending in a folder and below.
+/// All files with this extension in a folder and its subfolders.
 fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -26,7 +26,7 @@ fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
     found
 }
 
-/// Every page of the documentation.
+/// All pages of the documentation.
 fn pages(root: &Path) -> Vec<PathBuf> {
     let mut pages = files(&root.join("docs"), "md");
     let first = ["README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"];
@@ -34,7 +34,7 @@ fn pages(root: &Path) -> Vec<PathBuf> {
     pages
 }
 
-/// What a page gives to a shell: its blocks of shell, and code within its text.
+/// Shell code of a page: its shell blocks, and inline code.
 fn shell(page: &str) -> String {
     let mut shell = String::new();
     let mut in_shell = true;
@@ -52,7 +52,7 @@ fn shell(page: &str) -> String {
     shell
 }
 
-/// Our commands: programs with their arguments.
+/// The commands of this project: programs with their arguments.
 fn commands(shell: &str) -> Vec<(&'static str, Vec<String>)> {
     let lines = shell.replace("\\\n", " ");
     let words = lines.lines().filter_map(shlex::split);
@@ -65,7 +65,7 @@ fn commands(shell: &str) -> Vec<(&'static str, Vec<String>)> {
     parts.filter_map(command).collect()
 }
 
-/// Of the words of a command the program and what it is told; `tracktwin help` tells nothing to test.
+/// Program and arguments of a command, from its words; `None` for other programs and for `tracktwin help`.
 fn command(words: Vec<String>) -> Option<(&'static str, Vec<String>)> {
     let mut words = words.into_iter().take_while(|it| !it.starts_with('>'));
     let mut program = words.next()?;
@@ -86,7 +86,7 @@ fn command(words: Vec<String>) -> Option<(&'static str, Vec<String>)> {
     (told.first().is_none_or(|it| it != "help")).then_some((program, told))
 }
 
-/// For a placeholder that stands for one of few words or a number, one that it may stand for.
+/// A valid value for a placeholder in the documentation.
 fn example(word: &str) -> &str {
     match word {
         "INDEX" | "N" | "P" => "1",
@@ -117,7 +117,7 @@ fn documented_commands_are_understood() {
     assert!(count > 50, "only {count} commands were found");
 }
 
-/// Names of our settings in a text: `TRACKTWIN_...`.
+/// Names of this project's environment variables (`TRACKTWIN_...`) in a text.
 fn settings(text: &str) -> BTreeSet<&str> {
     let words = text.split(|it: char| !(it.is_ascii_uppercase() || it == '_'));
     words.filter(|it| it.starts_with("TRACKTWIN_") && !it.ends_with('_')).collect()
@@ -140,7 +140,7 @@ fn settings_of_deployed_programs_are_understood() {
     assert!(count > 10, "only {count} settings were found");
 }
 
-/// The anchors of a page's headings, as GitHub makes them.
+/// The anchors of a page's headings, in the form that GitHub generates.
 fn anchors(page: &str) -> BTreeSet<String> {
     let mut anchors = BTreeSet::new();
     let mut heading = String::new();
@@ -159,7 +159,7 @@ fn anchors(page: &str) -> BTreeSet<String> {
     anchors
 }
 
-/// The links of a page that stay in the repository: path and anchor, either of which may be empty.
+/// The links of a page within the repository: path and anchor, either of which may be empty.
 fn links(page: &str) -> Vec<(String, String)> {
     let events = Parser::new_ext(page, Options::ENABLE_TABLES);
     let targets = events.filter_map(|event| match event {

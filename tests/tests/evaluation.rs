@@ -1,4 +1,4 @@
-//! A recording evaluated by the physics alone, as a user does it.
+//! Evaluation of a recording by inversion, from the command line.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -10,7 +10,7 @@ use system_tests::run;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const SAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../coordinator/sample");
 
-/// What the program says of a recording without models.
+/// JSON output of an evaluation without models.
 fn evaluated(recording: &Path, out: &Path) -> Value {
     let [recording, folder] = [recording, out].map(|path| path.display().to_string());
     let answer = run(PROGRAM, &["evaluate", &recording, "--out", &folder, "--json"]).succeeded();
@@ -25,7 +25,7 @@ fn evaluated(recording: &Path, out: &Path) -> Value {
     evaluation
 }
 
-/// Means of a parameter at the sleepers whose numbers lie in a range.
+/// Means of a parameter at the sleepers with numbers in this range.
 fn means(evaluation: &Value, parameter: &str, numbers: std::ops::RangeInclusive<u32>) -> Vec<f64> {
     let sleepers = evaluation["sleepers"].as_array().unwrap().iter();
     let number = |sleeper: &Value| sleeper["id"].as_str().unwrap()[2..].parse::<u32>().unwrap();

@@ -1,4 +1,4 @@
-//! A table of another make becomes a recording, and what is in it is said.
+//! A table of another program is converted to a recording, and its content is described.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -7,7 +7,7 @@ use system_tests::run;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// A second of pseudo-random accelerations at 2 kHz, with a column of times.
+/// A table with one second of pseudo-random accelerations at 2 kHz, and a column of times.
 fn table() -> String {
     let mut text = "t_s,acc\n".to_owned();
     let mut state = 1_u32;

@@ -1,5 +1,4 @@
-//! A campaign survives SIGKILL at any moment: nothing is lost, nothing is computed into another
-//! result.
+//! A campaign continues correctly after SIGKILL at any moment: no result is lost or changed.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -9,7 +8,7 @@ use system_tests::{COARSE_MODEL, Process, run, until};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// Enough cases that ten interruptions fall into the work, few enough for a test.
+/// Number of cases: enough for ten interruptions during the computation, few enough for a test.
 const CASES: u32 = 600;
 
 fn arguments<'a>(campaign: &'a str, library: &'a str, out: &'a str) -> Vec<&'a str> {
@@ -22,7 +21,7 @@ fn digest(library: &str) -> String {
     answer.out
 }
 
-/// Cases with results; none where there is no library yet.
+/// Number of cases with results; `None` if the library does not exist yet.
 fn finished(library: &str) -> u32 {
     let ask = "select count(*) from campaign_case where state = 'finished'";
     let ask = ["library", "sql", ask, "--library", library, "--format", "csv"];

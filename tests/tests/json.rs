@@ -1,4 +1,4 @@
-//! With `--json`, standard output is one JSON value that says what the text says.
+//! With `--json`, standard output is one JSON value with the content of the text output.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -8,7 +8,7 @@ use system_tests::{COARSE_MODEL, run};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// What a command prints with `--json`.
+/// Output of a command with `--json`.
 fn printed(arguments: &[&str]) -> Value {
     let out = run(PROGRAM, &[arguments, &["--json"]].concat()).succeeded();
     serde_json::from_str(&out).unwrap()

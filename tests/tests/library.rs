@@ -1,4 +1,4 @@
-//! The commands on a library as a user types them: asked in SQL, exported, imported, copied, verified.
+//! The `library` commands: queries, export, import, copy, verification.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -11,14 +11,14 @@ use test_postgres::Server;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// A coarse, short model: what is tested is the library.
+/// Campaign with a coarse, short model, because only the library is tested.
 const CAMPAIGN: &str = "name = \"asked\"\nseed = 5\nspeeds_km_h = [7, 13]\n\
     [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n";
 
 const CASES: usize = 8;
 const SPEEDS: usize = 2;
 
-/// A finished campaign's library, made once.
+/// The library of a finished campaign, created once.
 fn finished() -> &'static Path {
     static FINISHED: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let (_, file) = FINISHED.get_or_init(|| {
@@ -39,7 +39,7 @@ fn url(file: &Path) -> String {
     format!("sqlite:{}", file.display())
 }
 
-/// A folder with a copy of the finished library in it, and that copy's URL.
+/// A folder with a copy of the finished library, and the URL of this copy.
 fn home() -> (TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("l.sqlite");
@@ -67,7 +67,7 @@ fn digest(library: &str) -> String {
     answer.out
 }
 
-/// Writes over the last of the places where a text stands in a file.
+/// Overwrites the last occurrence of a text in a file with a text of equal length.
 fn rot(file: &Path, text: &str, with: &str) {
     assert_eq!(text.len(), with.len(), "what lies behind must stay where it is");
     let mut bytes = fs::read(file).unwrap();
@@ -233,10 +233,10 @@ fn a_row_that_rots_on_the_disk_is_found() {
     assert!(answer.out.contains("case 5"), "{}", answer.out);
 }
 
-/// Bytes of a page of a new library.
+/// Size of a page of a new library, in bytes.
 const PAGE: usize = 16_384;
 
-/// The campaign's file, which asks for the cases of the finished library.
+/// The campaign file of the finished library.
 fn campaign(folder: &Path) -> String {
     let file = folder.join("campaign.toml");
     fs::write(&file, format!("cases = {CASES}\n{CAMPAIGN}")).unwrap();

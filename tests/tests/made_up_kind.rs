@@ -1,5 +1,5 @@
-//! A kind of physics is defined in one place: with its definition alone it is in both domains, in the
-//! simulated recordings, in the diagnosis, in the words of its page and in the blind trial.
+//! A kind of physics is defined in one place. Its definition alone adds it to both solvers, the simulated
+//! recordings, the diagnosis, the text of its page and the blind trial.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -18,13 +18,13 @@ const NAME: &str = "rail_absorber";
 const SPANS: usize = 12;
 const PLACE_M: f64 = 0.75;
 
-/// The catalogue of this process has it from now on.
+/// Adds the kind to the catalogue of this process.
 fn add() {
     static ADDED: Once = Once::new();
     ADDED.call_once(|| Kind::add(&RAIL_ABSORBER).unwrap());
 }
 
-/// A track with or without it, by its name.
+/// A track model with or without an extension of this kind.
 fn track(has_it: bool) -> TrackModel {
     let design = TrackDesign::v_track();
     let instance = ExtensionInstance::new(NAME).at([PLACE_M, PLACE_M]);

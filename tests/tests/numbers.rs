@@ -1,5 +1,5 @@
-//! Numbers that cannot be are refused where they enter: one line, exit code 2, and nothing is
-//! allocated for them.
+//! Invalid numbers are refused when they are read, with one line and exit code 2. No memory is allocated
+//! for them.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -10,10 +10,10 @@ use system_tests::Answer;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
-/// Address space in KiB that a command may take here: less than what an unchecked number asks for.
+/// Limit of a command's address space in KiB; less than an unchecked number would need.
 const MEMORY_KIB: &str = "4000000";
 
-/// Runs a program that may take so much memory.
+/// Runs a program with this limit.
 fn bounded(program: &str, arguments: &[&str]) -> Answer {
     let script = format!("ulimit -v {MEMORY_KIB}; exec \"$0\" \"$@\"");
     let output = Command::new("sh").args(["-c", &script, program]).args(arguments).output();
@@ -33,7 +33,7 @@ fn refused(program: &str, arguments: &[&str]) -> String {
     err
 }
 
-/// No number of any quantity.
+/// Texts that are not valid for any quantity.
 const NONE: [&str; 9] = ["NaN", "inf", "-inf", "1e400", "", "many", "0x10", "-1e300", "1e300"];
 
 #[test]
@@ -120,7 +120,7 @@ fn numbers_that_no_track_or_machine_has_are_refused_with_what_can_be() {
     }
 }
 
-/// A campaign file with one line more, or one section.
+/// A campaign file with an additional line or section.
 fn campaign(line: &str) -> String {
     match line.strip_prefix('[') {
         Some(_) => format!("name = \"c\"\nseed = 1\ncases = 8\n{line}\n"),

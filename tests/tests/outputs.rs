@@ -1,5 +1,5 @@
-//! Commands write where they are told and nowhere else, over nobody else's files, whole or not at
-//! all.
+//! Commands write only to the requested paths, do not replace files of other programs, and write a file
+//! completely or not at all.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -12,7 +12,7 @@ use test_needs::skipped;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// Text of another program.
+/// Content of a file of another program.
 const THEIRS: &str = "somebody's own words";
 
 fn refused(answer: &Answer, words: &[&str]) {
@@ -24,7 +24,7 @@ fn refused(answer: &Answer, words: &[&str]) {
     }
 }
 
-/// All files of a folder and below, without the hidden lists.
+/// All files of a folder and its subfolders, without the hidden lists.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -43,7 +43,7 @@ fn text(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// A table of two seconds at 2 kHz with a column of times and columns of accelerations.
+/// A table with two seconds of data at 2 kHz: a column of times, and these columns of accelerations.
 fn table(columns: &[&str]) -> String {
     let mut table = "t_s".to_owned();
     for column in columns {
@@ -60,7 +60,7 @@ fn table(columns: &[&str]) -> String {
     table + "\n"
 }
 
-/// A short, coarse simulation.
+/// Runs a short, coarse simulation.
 fn simulate(out: &Path, more: &[&str]) -> Answer {
     let coarse = ["--spans", "16", "--rail-elements", "2", "--sleeper-elements", "2"];
     let out = ["simulate", "--out", &text(out), "--speed", "13", "--time-step", "5e-5"];
@@ -159,7 +159,7 @@ fn a_simulation_does_not_replace_a_measured_recording_and_its_own_it_does() {
     assert!(measured.join("truth.json").exists());
 }
 
-/// Every command that writes files, the file it would write first, and how it is called.
+/// For every command that writes files: the first file that it writes, and its arguments.
 #[test]
 fn no_command_replaces_a_file_that_it_did_not_write() {
     let home = tempfile::tempdir().unwrap();
@@ -224,7 +224,7 @@ fn what_has_been_written_is_written_again_and_into_a_device_too() {
     );
 }
 
-/// A file system of 1 MB, unmounted with its handle.
+/// A file system of 1 MB, unmounted when dropped.
 struct SmallDisk(tempfile::TempDir);
 
 impl SmallDisk {

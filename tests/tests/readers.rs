@@ -1,4 +1,4 @@
-//! Who reads an answer may go before it ends, as `head` does.
+//! The reader of an output may end early, as `head` does.
 
 use std::io::Read;
 use std::process::{Command, Stdio};

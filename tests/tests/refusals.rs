@@ -1,5 +1,4 @@
-//! Wrong input gives one line with fault, place and remedy, exit code 2, and changes
-//! nothing.
+//! Wrong input is refused with one line (fault, position, remedy) and exit code 2, and changes nothing.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -9,7 +8,8 @@ use system_tests::{Answer, free_port, run};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// One line on standard error with all of `words`, nothing on standard output, exit code 2.
+/// Checks for exit code 2, no text on standard output, and one line on standard error that contains all of
+/// `words`.
 fn assert_refused(answer: &Answer, words: &[&str]) {
     let Answer { code, out, err } = answer;
     assert_eq!(*code, Some(2), "{err}");
@@ -20,7 +20,7 @@ fn assert_refused(answer: &Answer, words: &[&str]) {
     }
 }
 
-/// Names of everything in a folder.
+/// Names of all files in a folder.
 fn contents(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> = fs::read_dir(folder)
         .unwrap()
@@ -64,7 +64,7 @@ fn a_campaign_with_speeds_in_disorder_is_refused() {
     );
 }
 
-/// Every parameter of the catalogue held at one value.
+/// Part of a campaign file with every parameter of the catalogue at a fixed value.
 const HELD: &str = "[parameters]\nrailpad_stiffness_N_m = 1e8\nrailpad_damping_N_s_m = 6e3\n\
                     ballast_stiffness_N_m = 1e7\nballast_damping_N_s_m = 5e3\nsleeper_EI_N_m2 = 1e4\n\
                     irregularity_level = 1.0\n";
@@ -190,7 +190,7 @@ fn a_server_that_does_not_answer_is_a_failure_and_no_wrong_input() {
     }
 }
 
-/// A small recording, with one file changed before it is evaluated.
+/// Checks that a small recording is refused by `evaluate` after one of its files was changed.
 fn refused_recording(change: impl Fn(&Path), words: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let recording = folder.path().join("recording");
@@ -283,7 +283,7 @@ fn a_good_recording_is_followed_by_the_library_s_refusal() {
     refused_recording(|_| {}, &["nowhere.sqlite", "does not exist"]);
 }
 
-/// `diagnose` as on V-Track of a small recording whose `nominal` has been given this.
+/// Checks that `diagnose` refuses a small recording of V-Track with this content of `nominal`.
 fn refused_diagnosis(nominal: &str, words: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();

@@ -1,4 +1,4 @@
-//! The paper's results beside ours, as a user asks for them.
+//! Comparison of results with the paper's, from the command line.
 
 use serde_json::Value;
 use std::fs;
@@ -6,7 +6,7 @@ use system_tests::run;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// A coarse, short model: what is tested is the way from the library to the rows.
+/// Campaign with a coarse, short model, because only the processing of the results is tested.
 const CAMPAIGN: &str = "name = \"compared\"\nseed = 5\ncases = 60\nspeeds_km_h = [7, 13]\n\
     [simulation]\nspans = 22\nrail_elements_per_span = 2\nsleeper_elements = 2\n";
 
@@ -88,7 +88,7 @@ fn models_that_an_earlier_call_trained_are_used_again_while_the_library_is_the_s
     assert!(grown.err.contains("training: done"), "{}", grown.err);
 }
 
-/// One line on standard error with all of `words`, and exit code 2.
+/// Checks for exit code 2, and one line on standard error that contains all of `words`.
 fn refused(answer: &system_tests::Answer, words: &[&str]) {
     assert_eq!(answer.code, Some(2), "{}", answer.err);
     assert_eq!(answer.err.trim_end().lines().count(), 1, "{}", answer.err);

@@ -1,4 +1,4 @@
-//! The paper's test ring, shortened: recorded, evaluated, compared with its truth, and continued.
+//! The paper's test ring, shortened: recorded, evaluated, compared with its true values, and continued.
 
 use serde_json::Value;
 use std::fs;
@@ -6,7 +6,7 @@ use system_tests::run;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// From before joint J4 to behind the sleeper without bolts, one pass.
+/// Arguments for the part from before joint J4 to behind the sleeper without bolts, with one pass.
 const SHORT: [&str; 6] = ["--sleepers", "86-97", "--laps", "1", "--speeds", "13"];
 
 #[test]

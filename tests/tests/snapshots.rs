@@ -1,4 +1,4 @@
-//! What users and other versions of the program rely on: its arguments, and the messages of its farm.
+//! Interfaces for users and for other versions of the program: arguments, and messages of the farm.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -19,7 +19,7 @@ fn help(program: &str, command: &[String]) -> String {
     String::from_utf8(said.stdout).unwrap()
 }
 
-/// Names of the commands below one, as its help lists them.
+/// Names of the subcommands of a command, as listed in its help.
 fn commands(help: &str) -> Vec<String> {
     let list = help.split_once("\nCommands:\n").map_or("", |(_, list)| list);
     let lines = list.lines().take_while(|line| !line.is_empty());
@@ -28,7 +28,7 @@ fn commands(help: &str) -> Vec<String> {
     names.filter(|name| *name != "help").map(str::to_owned).collect()
 }
 
-/// The help of a command and of all below it, each under its name.
+/// Help of a command and of all its subcommands, each under its name.
 fn all_help(program: &str, name: &str, command: &[String]) -> String {
     let help = help(program, command);
     let mut text = format!("# {}\n\n{help}\n", [&[name.to_owned()], command].concat().join(" "));
@@ -46,7 +46,7 @@ fn arguments_are_those_that_are_kept() {
     assert_snapshot("worker-help.txt", &all_help(WORKER, "tracktwin-worker", &[]));
 }
 
-/// The names of the manual pages of a command and of all below it.
+/// Names of the manual pages of a command and of all its subcommands.
 fn pages(program: &str, name: &str, command: &[String]) -> Vec<String> {
     let page = [&[name.to_owned()], command].concat().join("-") + ".1";
     let below = commands(&help(program, command)).into_iter();
@@ -67,7 +67,7 @@ fn every_command_has_a_manual_page() {
     }
 }
 
-/// A field as a line: number, how often, type, name.
+/// Text of a field: number, cardinality, type, name.
 fn field(field: &FieldDescriptorProto) -> String {
     let often = match (field.label(), field.proto3_optional(), field.oneof_index) {
         (Label::Repeated, ..) => "repeated ",

@@ -1,4 +1,5 @@
-//! Samples while they are recorded: the rows are those of the batch, whatever brings the samples.
+//! Evaluation of samples while they are recorded: its rows equal those of `evaluate`, for every source of
+//! samples.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -18,12 +19,12 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 /// Models of a small library, and a recording of one pass at their speed.
 struct Prepared {
     folder: TempDir,
-    /// Position and acceleration of the pass.
+    /// Position in m and acceleration in m/s2 of the pass.
     samples: Vec<[f64; 2]>,
     rate_hz: f64,
 }
 
-/// Made once for all tests.
+/// Models and recording, created once for all tests.
 fn prepared() -> &'static Prepared {
     static PREPARED: OnceLock<Prepared> = OnceLock::new();
     PREPARED.get_or_init(|| {
@@ -53,7 +54,7 @@ impl Prepared {
         self.folder.path().join(name).display().to_string()
     }
 
-    /// The pass as CSV, with times.
+    /// The pass as CSV with times.
     fn csv(&self) -> String {
         let mut text = "time_s,position_m,acceleration_m_s2\n".to_owned();
         for (index, [position, acceleration]) in self.samples.iter().enumerate() {
@@ -76,7 +77,7 @@ impl Prepared {
         command.spawn().unwrap()
     }
 
-    /// What the program says of samples on its standard input.
+    /// Output of the program for samples on its standard input.
     fn streamed(&self, further: &[&str], samples: &[u8]) -> Answer {
         let mut child = self.start(further);
         let mut input = child.stdin.take().unwrap();

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Crates with those that they must not reach, directly or through others.
+/// Crates, with the crates that they must not depend on, directly or indirectly.
 const BORDERS: &[(&str, &[&str])] = &[
     (
         "tracktwin-farm",
@@ -50,7 +50,7 @@ const BORDERS: &[(&str, &[&str])] = &[
     ("tracktwin-experiment", &["tracktwin-protocol", "tokio", "tonic"]),
 ];
 
-/// The twin uses no library, no network and none of the crates that test it.
+/// The twin does not depend on the library, the network, or the crates that test it.
 const OUTSIDE_THE_TWIN: &[&str] = &[
     "tracktwin-library",
     "tracktwin-farm",
@@ -63,7 +63,7 @@ const OUTSIDE_THE_TWIN: &[&str] = &[
     "tokio",
 ];
 
-/// Libraries that only these crates use.
+/// External libraries, with the only crates that may use them.
 const KEPT_TO: &[(&str, &[&str])] = &[
     ("sqlx", &["tracktwin-library"]),
     ("tonic", &["tracktwin-protocol", "tracktwin-worker", "tracktwin-farm"]),
@@ -72,23 +72,23 @@ const KEPT_TO: &[(&str, &[&str])] = &[
     ("clap", &["tracktwin", "tracktwin-worker"]),
 ];
 
-/// Files in which `anyhow` stands: commands.
+/// Files in which `anyhow` is allowed: commands.
 const ANYHOW_IN: &[&str] = &["coordinator/src/commands/", "worker/src/command.rs"];
 
-/// Lines of a source file; an enum of errors can't be cut.
+/// Maximum number of lines of a source file; more for an enum of errors, which cannot be split.
 const FILE_LINES_MAX: usize = 400;
 const ERRORS_LINES_MAX: usize = 450;
-/// Characters of a line in a page of the documentation, tables and code aside.
+/// Maximum number of characters of a line in the documentation, except tables and code.
 const PAGE_LINE_MAX: usize = 130;
 
-/// A file that a how-to makes, for example.
+/// A file that a how-to creates as an example.
 const WORKED_EXAMPLE: &str = "shared/track/src/extension/sleeper_damper.rs";
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Files with this extension below a folder, built ones aside.
+/// All files with this extension in a folder and its subfolders, except build outputs.
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -108,7 +108,7 @@ fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     found
 }
 
-/// What each crate of the workspace uses directly, in what is built for users.
+/// Direct dependencies of each crate of the workspace, without development dependencies.
 fn uses() -> BTreeMap<String, BTreeSet<String>> {
     let manifests = files(&root(), "toml").into_iter().filter(|it| it.ends_with("Cargo.toml"));
     let mut uses = BTreeMap::new();
@@ -124,7 +124,7 @@ fn uses() -> BTreeMap<String, BTreeSet<String>> {
     uses
 }
 
-/// Everything that a crate reaches.
+/// All direct and indirect dependencies of a crate.
 fn reached<'a>(name: &'a str, uses: &'a BTreeMap<String, BTreeSet<String>>) -> BTreeSet<&'a str> {
     let mut reached = BTreeSet::new();
     let mut open = vec![name];
@@ -200,7 +200,7 @@ fn lines_of_pages_stay_short() {
     }
 }
 
-/// Paths of this repository that a page names in code spans or links.
+/// Paths of this repository in the code spans and links of a page.
 fn named_paths(text: &str) -> Vec<&str> {
     let spans = text.split('`').skip(1).step_by(2);
     let inside = ["coordinator/", "shared/", "worker/", "tests/", "docs/", "migrations/", "proto/"];
@@ -224,7 +224,7 @@ fn paths_that_pages_name_are_there() {
     assert!(count > 40, "only {count} paths were found");
 }
 
-/// Words in bold in the last column of the glossary's tables: those that appear nowhere.
+/// The words in bold in the last column of the glossary's tables. They must appear nowhere.
 fn banned_words(glossary: &str) -> Vec<&str> {
     let last_columns = glossary.lines().filter_map(|line| {
         let mut cells = line.strip_prefix('|')?.strip_suffix('|')?.split('|');
@@ -233,13 +233,13 @@ fn banned_words(glossary: &str) -> Vec<&str> {
     last_columns.flat_map(|column| column.split("**").skip(1).step_by(2)).collect()
 }
 
-/// Comments of a source file, one after the other.
+/// All comments of a source file as one text.
 fn comments(source: &str) -> String {
     let lines = source.lines().filter_map(|line| line.trim_start().strip_prefix("//"));
     lines.map(|line| line.trim_start_matches(['/', '!'])).collect::<Vec<_>>().join(" ")
 }
 
-/// Whether a text has a word, or its plural; both are in lower case.
+/// Whether a text contains a word or its plural; both must be in lower case.
 fn has_word(text: &str, word: &str) -> bool {
     let is_part = |neighbour: char| neighbour.is_alphanumeric() || "-_".contains(neighbour);
     text.match_indices(word).any(|(at, _)| {

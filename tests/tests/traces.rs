@@ -1,4 +1,4 @@
-//! Traces that a collector of OpenTelemetry's own protocol gets: from a lease to the rows it became.
+//! Traces received by an OpenTelemetry collector, from a lease to the rows stored for it.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -22,16 +22,16 @@ use tonic::{Request, Response, Status};
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
-/// Where a program sends its traces.
+/// Environment variable with the address to which a program sends its traces.
 const ENDPOINT: &str = "OTEL_EXPORTER_OTLP_ENDPOINT";
 
-/// When a program that has not ended has failed.
+/// Time limit for a program to end.
 const PATIENCE: Duration = Duration::from_mins(1);
 
-/// Cases of the campaign.
+/// Number of cases of the campaign.
 const CASES: i64 = 24;
 
-/// Keeps what it gets.
+/// Stores the received traces.
 #[derive(Clone, Default)]
 struct Collector(Arc<Mutex<Vec<ResourceSpans>>>);
 
@@ -47,7 +47,7 @@ impl TraceService for Collector {
 }
 
 impl Collector {
-    /// Starts one; answers it and its address.
+    /// Starts a collector. Returns the collector and its address.
     async fn start() -> (Self, String) {
         let collector = Self::default();
         let listener = tokio::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
@@ -59,7 +59,7 @@ impl Collector {
         (collector, address)
     }
 
-    /// All spans, each with the service it is from.
+    /// All received spans, each with the name of its service.
     fn spans(&self) -> Vec<(String, Span)> {
         let service = |of: &ResourceSpans| {
             let attributes = &of.resource.as_ref().unwrap().attributes;
@@ -101,7 +101,7 @@ fn indices(span: &Span) -> Vec<i64> {
     array.values.into_iter().map(|it| index(it.value)).collect()
 }
 
-/// Runs a small campaign with a coordinator and a worker that send their traces there.
+/// Runs a small campaign with a coordinator and a worker that send their traces to `endpoint`.
 fn run_campaign(endpoint: &str) {
     let folder = tempfile::tempdir().unwrap();
     let campaign = folder.path().join("campaign.toml").display().to_string();

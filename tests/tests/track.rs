@@ -1,4 +1,4 @@
-//! A track of one's own, as a user describes it: written, checked, simulated, evaluated.
+//! A track defined by the user: described, checked, simulated, evaluated.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -13,7 +13,7 @@ fn text(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Writes the preset of a line to `folder` and returns the file's text.
+/// Writes the preset of a line to `folder`. Returns the text of the file.
 fn line(folder: &Path) -> String {
     let answer = run(PROGRAM, &["new", &text(folder), "--preset", "60E1-concrete"]);
     assert_eq!(answer.code, Some(0), "{}", answer.err);
@@ -109,8 +109,8 @@ fn a_line_is_simulated_described_again_and_evaluated() {
     assert!((mean / 90e6).ln().abs() < 0.15, "{mean}");
 }
 
-/// Means within 10 % for ballast and 20 % for railpads; the 90 % intervals of 41 sleepers, which are not
-/// independent, hold most truths.
+/// Required accuracy: means within 10 % for ballast and 20 % for railpads. The 90 % intervals must contain
+/// most true values; the 41 sleepers are not independent.
 #[test]
 fn a_line_of_an_independent_simulator_is_evaluated_sleeper_by_sleeper() {
     let Some(shared) = test_needs::shared_data() else { return };

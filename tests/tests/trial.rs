@@ -1,5 +1,5 @@
-//! A blind trial is shared by nodes, loses nothing when one of them dies, and goes on where a
-//! diagnosis breaks down.
+//! Several machines share a blind trial. It loses nothing if one of them stops, and it continues if a
+//! diagnosis fails.
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -8,7 +8,8 @@ use system_tests::{run, until};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 
-/// Puts the recordings of two cases where a trial looks for them: it does not record them again.
+/// Writes the recordings of two cases into the folder of the trial, so that the trial does not record them
+/// again.
 fn record(out: &Path, [spans, passes]: [&str; 2]) {
     for case in ["0000", "0001"] {
         let recording = out.join("recordings").join(case).display().to_string();

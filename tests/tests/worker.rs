@@ -1,4 +1,5 @@
-//! A worker as a batch system has it: its exit code says whether to start it again, and its log is a file.
+//! A worker in a batch system: the exit code states whether to start the worker again, and the log is a
+//! file.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -11,10 +12,10 @@ use system_tests::{Answer, COARSE_MODEL, Process, free_port, run, until};
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
-/// Longer than anything here takes, on a busy machine too.
+/// Time limit of all actions in this test, also on a busy machine.
 const LONG: Duration = Duration::from_mins(1);
 
-/// A coordinator without work that wants a token, and its address.
+/// A coordinator without cases that requires a token, and its address.
 fn coordinator(folder: &Path) -> (Process, String) {
     fs::write(folder.join("token"), "a-token-of-thirty-two-characters").unwrap();
     let address = format!("127.0.0.1:{}", free_port());

@@ -16,23 +16,24 @@ use tokio_util::sync::CancellationToken;
 
 /// Time limit of the cases in progress after a worker is stopped.
 ///
-/// Batch systems kill ten seconds after they ask; giving back takes what remains.
+/// Batch systems kill a process ten seconds after the stop signal. The remaining time is for returning
+/// cases.
 const GRACE: Duration = Duration::from_secs(8);
 
-/// Works for a coordinator until `shutdown`; then cases in progress are finished and reported
-/// within eight seconds, and the others are returned. `health` serves its state, if given.
+/// Runs a worker until `shutdown`. Cases in progress are then finished and reported within eight
+/// seconds; the others are returned.
 ///
 /// # Errors
-/// [`AgentError`] when the coordinator refuses the worker or sends invalid messages. An unreachable
-/// coordinator is retried until `shutdown`, or for the configured time.
+/// [`AgentError`] if the coordinator rejects the worker or sends invalid messages. Calls to an
+/// unreachable coordinator are retried until `shutdown`, or for the configured time.
 pub async fn run(config: Config, shutdown: CancellationToken) -> Result<(), AgentError> {
     run_with_health(config, None, shutdown).await
 }
 
-/// [`run`], and answers on a port how it is.
+/// Runs a worker like [`run`], and serves its state on a port for monitoring.
 ///
 /// # Errors
-/// As [`run`].
+/// The errors of [`run`].
 pub async fn run_with_health(
     config: Config,
     port: Option<TcpListener>,

@@ -1,4 +1,4 @@
-//! How long to wait before the next try.
+//! Waiting times between retries.
 
 use std::hash::{BuildHasher, DefaultHasher, Hash, Hasher, RandomState};
 use std::time::Duration;
@@ -7,12 +7,13 @@ use tracktwin_parameters::unit;
 /// The first wait.
 const FIRST: Duration = Duration::from_millis(100);
 
-/// The longest: a coordinator that is back has its workers back within this.
+/// The longest wait. After a restart of the coordinator all workers are connected again within this
+/// time.
 const LONGEST: Duration = Duration::from_secs(4);
 
-/// Waits that double, up to a bound, and differ from worker to worker.
+/// Waiting times that double up to a limit and differ from worker to worker.
 ///
-/// They follow from the worker's name alone, so that a simulated network can be run again.
+/// They depend only on the name of the worker, so that a simulated network is reproducible.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Backoff {
     seed: u64,
@@ -34,7 +35,7 @@ impl Backoff {
     }
 }
 
-/// The same for the same input, in every process.
+/// A hash that is equal for equal input in every process.
 fn hash(input: impl Hash) -> u64 {
     let mut hasher = DefaultHasher::new();
     input.hash(&mut hasher);

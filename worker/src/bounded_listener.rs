@@ -17,7 +17,7 @@ const CONNECTIONS_MAX: usize = 128;
 /// A connection without traffic for this time is closed.
 const SILENCE: Duration = Duration::from_secs(30);
 
-/// A listener with limits.
+/// A TCP listener with a limit of connections and timeouts.
 #[derive(Debug)]
 pub struct BoundedListener {
     listener: TcpListener,

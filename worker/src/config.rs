@@ -9,45 +9,46 @@ use std::time::Duration;
 use tonic::transport::{Channel, Endpoint};
 use tracktwin_experiment::{MODEL_HASH, Prepare, prepare_simulation};
 
-/// How a line to a coordinator is made.
+/// Function that creates a connection to a coordinator.
 pub type Dial = fn(&Endpoint) -> Channel;
 
 /// Configuration of a worker.
 #[derive(Clone, Debug)]
 pub struct Config {
-    /// Addresses of coordinators that serve one library; `http://HOST:PORT` or `https://HOST:PORT`.
-    /// When one does not answer, the next is asked.
+    /// Addresses of coordinators that serve one library: `http://HOST:PORT` or `https://HOST:PORT`. If
+    /// one of them does not respond, the worker calls the next one.
     pub coordinators: Vec<String>,
-    /// Groups of cases simulated at a time.
+    /// Number of groups of cases that the worker simulates at a time.
     pub cores: NonZeroUsize,
     /// The worker's name, unique among workers; see [`unique_name`].
     pub worker: String,
-    /// How it and its coordinators trust each other.
+    /// Credentials of the worker and of its coordinators.
     pub credentials: Credentials,
-    /// How long to try while no coordinator answers; for ever if none.
+    /// Time limit of retries without a response of a coordinator. `None`: unlimited.
     pub give_up_after: Option<Duration>,
-    /// How long to wait for work before it ends; for ever if none.
+    /// Time without work after which the worker ends. `None`: unlimited.
     pub idle_exit: Option<Duration>,
-    /// What simulates: [`prepare_simulation`], or a stand-in in tests of the farm.
+    /// Function that creates the simulator: [`prepare_simulation`], or a substitute in tests of the
+    /// farm.
     pub prepare: Prepare,
-    /// What it counts.
+    /// Counters of the worker.
     pub counters: Arc<Counters>,
-    /// What it holds.
+    /// Cases that the worker holds.
     pub holdings: Holdings,
-    /// Where tests of the farm take another part.
+    /// Parts that tests of the farm replace.
     #[doc(hidden)]
     pub seams: Seams,
 }
 
-/// Parts of a worker that tests of the farm exchange.
+/// Parts of a worker that tests of the farm replace.
 #[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Seams {
     /// Hash of the physics to register with.
     pub model_hash: String,
-    /// [`Endpoint::connect_lazy`], or a simulated network's.
+    /// [`Endpoint::connect_lazy`], or the connection of a simulated network.
     pub dial: Dial,
-    /// Whether to simulate on the leasing task instead of a separate thread: with simulated network
+    /// Whether to simulate in the task that leases, instead of a separate thread. With simulated network
     /// and time, nothing may run in parallel.
     pub inline: bool,
 }
@@ -60,7 +61,8 @@ impl Default for Seams {
 }
 
 impl Config {
-    /// A worker that simulates with the track model for a coordinator on this machine.
+    /// Configuration of a worker with the track model, for a coordinator without credentials on this
+    /// machine.
     pub fn new(coordinator: String, cores: NonZeroUsize) -> Self {
         let counters = Arc::<Counters>::default();
         let holdings = Holdings::new(&counters);
@@ -79,7 +81,7 @@ impl Config {
     }
 }
 
-/// A name that no other worker has: host, process, and chance.
+/// A unique name of a worker, from host name, process id and a random number.
 pub fn unique_name() -> String {
     let host = std::fs::read_to_string("/etc/hostname").unwrap_or_default();
     let host = if host.trim().is_empty() { "worker" } else { host.trim() };

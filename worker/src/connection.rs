@@ -1,4 +1,4 @@
-//! The line to one coordinator.
+//! The connection to one coordinator.
 
 use crate::config::Dial;
 use crate::credentials::{Bearer, Credentials};
@@ -9,20 +9,20 @@ use tonic::transport::{Channel, Endpoint};
 use tracktwin_protocol::farm::farm_client::FarmClient;
 use tracktwin_protocol::{MESSAGE_BYTES_MAX, WINDOW_BYTES};
 
-/// Time limit of connecting; then it is tried again.
+/// Time limit of one attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// An answer that takes longer is not waited for: a commit takes milliseconds, and a coordinator
-/// that is busy beyond this had better be asked again later.
+/// Time limit of a response. A commit takes milliseconds; a call to a busy coordinator is better
+/// repeated later.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// How often an idle line is tested, so that one whose other end has gone is noticed.
+/// Interval of tests of an idle connection. They detect a coordinator that has disappeared.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
-/// How calls are made.
+/// Client for calls to a coordinator.
 pub(crate) type Client = FarmClient<InterceptedService<Channel, Bearer>>;
 
-/// A connection to a coordinator, made when it is first used and again whenever it breaks.
+/// Creates a connection to a coordinator. It opens at first use, and again after each failure.
 pub(crate) fn connect(
     url: &str,
     credentials: &Credentials,

@@ -1,4 +1,4 @@
-//! The coordinators of a worker: each call goes to one that answers.
+//! The coordinators of a worker. Each call goes to a coordinator that responds.
 
 use crate::backoff::Backoff;
 use crate::config::Config;
@@ -14,19 +14,19 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Response, Status};
 
-/// Between two warnings about a coordinator that does not answer.
+/// Interval between two warnings about a coordinator that does not respond.
 const WARN_EVERY: Duration = Duration::from_mins(1);
 
-/// The coordinators a worker may turn to. All serve one library, so any of them will do.
+/// The coordinators of a worker. All of them serve the same library, so each of them can take any call.
 pub(crate) struct Coordinators {
     known: Vec<(String, Client)>,
-    /// The one that answered last, or is to be tried next.
+    /// Index of the coordinator that responded last, or of the next one to call.
     current: AtomicUsize,
     contact: Mutex<Contact>,
     /// Time limit of retrying; unlimited if `None`.
     patience: Option<Duration>,
     backoff: Backoff,
-    /// No more tries from here on.
+    /// After cancellation there are no more retries.
     give_up: CancellationToken,
     counters: Arc<Counters>,
 }
@@ -56,9 +56,10 @@ impl Coordinators {
         })
     }
 
-    /// Calls until there is an answer, or a refusal, or (then `None`) until `end`.
+    /// Repeats a call until a coordinator responds or rejects it. `None` if `end` is cancelled before.
     ///
-    /// A call on its way is waited for even then: what it leases must be known to be given back.
+    /// A call in progress is always completed, because the worker must know the leased cases to return
+    /// them.
     pub(crate) async fn ask<T, F>(
         &self,
         end: &CancellationToken,
@@ -98,7 +99,8 @@ impl Coordinators {
         Ok(None)
     }
 
-    /// One call to the current coordinator. If that one can't be reached, the next becomes current.
+    /// Makes one call to the current coordinator. If it cannot be reached, the next coordinator becomes
+    /// the current one.
     pub(crate) async fn once<T, F>(&self, call: impl Fn(Client) -> F) -> Result<T, Status>
     where
         F: Future<Output = Result<Response<T>, Status>>,
@@ -124,7 +126,7 @@ impl Coordinators {
         answer.map(Response::into_inner)
     }
 
-    /// For how long no coordinator has answered.
+    /// Time since the last response of a coordinator.
     pub(crate) fn silent_for(&self) -> Duration {
         self.contact.lock().answered.elapsed()
     }

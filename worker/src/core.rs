@@ -13,7 +13,7 @@ use tracktwin_experiment::{Case, Experiment, Outcome, Prepare, Simulate};
 use tracktwin_protocol::{CaseLease, CaseReport, Lease, LeasedCase, checksum};
 use tracktwin_traces::{Step, Value};
 
-/// Cases simulated side by side on one core: the lanes of the track model's fast solver.
+/// Number of cases simulated together on one core: the lanes of the fast solver of the track model.
 pub const GROUP: usize = 8;
 
 /// Upper limit of the waiting time for work: that of a suspended worker.
@@ -30,7 +30,7 @@ pub(crate) struct Core {
 }
 
 impl Core {
-    /// Leases and simulates until the worker is stopped, or was idle for too long.
+    /// Leases and simulates cases until the worker is stopped or was idle for too long.
     pub(crate) async fn run(self) -> Result<(), AgentError> {
         let mut told = None;
         while let Some(lease) = self.session.lease().await? {
@@ -48,7 +48,7 @@ impl Core {
         Ok(())
     }
 
-    /// Waits for work, or ends the worker where that has lasted too long.
+    /// Waits for work. Ends the worker if it has waited too long.
     async fn wait(&self, retry_after_s: f64) {
         let mut wait = Duration::try_from_secs_f64(retry_after_s).unwrap_or(WAIT_MAX).min(WAIT_MAX);
         if let Some(limit) = self.idle_exit {
@@ -65,7 +65,7 @@ impl Core {
         }
     }
 
-    /// Simulates and reports what was leased, or gives back what is left at shutdown.
+    /// Simulates and reports the leased cases. At shutdown it returns the cases not yet started.
     async fn work(&self, lease: &CaseLease) -> Result<(), AgentError> {
         let session = &self.session;
         let simulation = match self.prepare(lease).await {
@@ -166,7 +166,8 @@ fn reports(group: &[LeasedCase], outcomes: Vec<Outcome>, duration_s: f64) -> Vec
     group.iter().zip(outcomes).map(report).collect()
 }
 
-/// Simulates; a case that panics is a case that fails, and leaves its group alone.
+/// Simulates cases. A case that panics counts as failed and does not affect the other cases of its
+/// group.
 fn guarded(simulation: &dyn Simulate, cases: &[Case]) -> Vec<Outcome> {
     match catch_unwind(AssertUnwindSafe(|| simulation.simulate(cases))) {
         Ok(outcomes) => outcomes,

@@ -13,15 +13,15 @@ pub struct Counters {
     pub(crate) finished: Counter,
     /// Cases that could not be simulated.
     pub(crate) failed: Counter,
-    /// Computing time of all of them.
+    /// Computing time of all cases in s.
     pub(crate) computing_s: Counter<f64, AtomicU64>,
     /// Cases held under a lease.
     pub(crate) held: Gauge,
     /// Cases whose results wait for a coordinator.
     pub(crate) unsent: Gauge,
-    /// Leases that expired and went to others.
+    /// Leases that expired and went to other workers.
     pub(crate) lost: Counter,
-    /// Calls that a coordinator answered.
+    /// Calls with a response of a coordinator.
     pub(crate) answered_calls: Counter,
     /// Calls without a response.
     pub(crate) silent_calls: Counter,

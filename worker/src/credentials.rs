@@ -6,16 +6,16 @@ use tonic::service::Interceptor;
 use tonic::transport::{Certificate, ClientTlsConfig, Identity, Uri};
 use tonic::{Request, Status};
 
-/// How worker and coordinator trust each other; nothing on one machine.
+/// Credentials between worker and coordinator. Empty if both run on one machine.
 #[derive(Clone, Debug, Default)]
 pub struct Credentials {
-    /// The farm's token.
+    /// Token of the farm.
     pub token: Option<Token>,
-    /// Certificate of the authority that vouches for coordinators (PEM); for `https` addresses.
+    /// Certificate of the certificate authority of the coordinators (PEM), for `https` addresses.
     pub ca_pem: Option<Vec<u8>>,
-    /// The worker's own certificate and key (PEM), where the coordinator demands one.
+    /// Certificate and key of the worker (PEM), if the coordinator requires them.
     pub identity_pem: Option<[Vec<u8>; 2]>,
-    /// Whether plain text may leave this machine.
+    /// Whether plain-text connections to other machines are allowed.
     pub insecure: bool,
 }
 
@@ -26,13 +26,13 @@ pub struct Token(MetadataValue<Ascii>);
 /// Errors of an address or a token, each with the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CredentialsError {
-    /// A token with characters that headers can't hold.
+    /// The token contains characters that are not allowed in headers.
     #[error(
         "the token contains characters other than visible ASCII; create one with `tracktwin \
              certs`"
     )]
     Token,
-    /// Plain text over a network.
+    /// The address would send plain text over a network.
     #[error(
         "coordinator {url}: plain text over a network is not allowed; use https:// and \
              --tls-ca, or --insecure on a trusted network"
@@ -41,16 +41,16 @@ pub enum CredentialsError {
         /// The address.
         url: String,
     },
-    /// Nothing to check the coordinator's certificate by.
+    /// There is no certificate authority to check the certificate of the coordinator.
     #[error("coordinator {url}: https needs --tls-ca with the ca.pem made by `tracktwin certs`")]
     NoAuthority {
         /// The address.
         url: String,
     },
-    /// A file for the authority that holds something else.
+    /// The file of the certificate authority does not contain a certificate.
     #[error("--tls-ca: the file contains no certificate; use the ca.pem made by `tracktwin certs`")]
     NoCertificate,
-    /// Neither `http` nor `https`.
+    /// The address is neither `http` nor `https`.
     #[error("coordinator {url}: not an address; write http://HOST:PORT or https://HOST:PORT")]
     Address {
         /// The address.
@@ -59,10 +59,10 @@ pub enum CredentialsError {
 }
 
 impl Token {
-    /// The token in a text; white space around it is not part of it.
+    /// Reads a token from a text, without white space at both ends.
     ///
     /// # Errors
-    /// [`CredentialsError::Token`] when it is empty or not visible ASCII.
+    /// [`CredentialsError::Token`] if the token is empty or not visible ASCII.
     pub fn new(text: &str) -> Result<Self, CredentialsError> {
         let text = text.trim();
         let visible = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic());
@@ -79,10 +79,10 @@ impl std::fmt::Debug for Token {
 }
 
 impl Credentials {
-    /// The TLS settings for an address; none for plain text.
+    /// The TLS settings for an address. `None` for plain text.
     ///
     /// # Errors
-    /// [`CredentialsError`] when the address and these credentials don't go together.
+    /// [`CredentialsError`] if address and credentials are inconsistent.
     pub(crate) fn tls_for(&self, url: &str) -> Result<Option<ClientTlsConfig>, CredentialsError> {
         let address = || CredentialsError::Address { url: url.to_owned() };
         let uri: Uri = url.parse().map_err(|_| address())?;
@@ -107,13 +107,13 @@ impl Credentials {
     }
 }
 
-/// Whether a host is this machine, without asking anybody.
+/// Whether a host is this machine, without name resolution.
 fn is_loopback(host: &str) -> bool {
     let bare = host.trim_start_matches('[').trim_end_matches(']');
     host == "localhost" || bare.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 
-/// Puts the token into every call.
+/// Adds the token to every call.
 #[derive(Clone, Debug)]
 pub(crate) struct Bearer(pub(crate) Option<Token>);
 

@@ -7,56 +7,56 @@ use tracktwin_protocol::BadMessage;
 /// Errors that end a worker.
 #[derive(Debug, thiserror::Error)]
 pub enum AgentError {
-    /// No address at all.
+    /// No address of a coordinator was given.
     #[error("no coordinator; use --coordinator URL")]
     NoCoordinator,
-    /// The address or the certificates can't be used.
+    /// An address or its certificates are invalid.
     #[error("coordinator {url}: cannot connect")]
     Address {
         /// The address.
         url: String,
-        /// What is wrong with it.
+        /// Error of the address or the certificates.
         source: tonic::transport::Error,
     },
-    /// Address and credentials don't go together.
+    /// Address and credentials are inconsistent.
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
-    /// The coordinator refuses the worker or its message.
+    /// The coordinator rejects the worker.
     #[error("refused by the coordinator: {reason}")]
     Refused {
-        /// Why.
+        /// Reason of the coordinator.
         reason: String,
     },
     /// The coordinator rejects the messages of the worker.
     #[error("the coordinator rejects the messages of this worker: {reason}")]
     NotUnderstood {
-        /// Its reason.
+        /// Reason of the coordinator.
         reason: String,
     },
-    /// No coordinator has answered for longer than was asked for.
+    /// No coordinator has responded within the configured time.
     #[error("no response from a coordinator for {silent_s} s: {reason}")]
     GaveUp {
-        /// For how long, in s.
+        /// Time without a response in s.
         silent_s: u64,
         /// Result of the last attempt.
         reason: String,
     },
-    /// The coordinator does not know the worker (any more).
+    /// The coordinator has no registration of the worker (any more).
     #[error("the coordinator does not know this worker")]
     Unknown,
-    /// The coordinator sends an invalid message.
+    /// The coordinator sent an invalid message.
     #[error("invalid message from the coordinator: {0}")]
     BadMessage(#[from] BadMessage),
-    /// The experiment can't be done here.
+    /// The experiment is not possible.
     #[error("cannot simulate the campaign's experiment: {0}")]
     Experiment(#[from] ExperimentError),
-    /// The experiment is not the one whose hash came with it.
+    /// The hash of the experiment does not match.
     #[error("the campaign's experiment does not match its hash")]
     ExperimentHash,
 }
 
 impl AgentError {
-    /// Whether the same worker might succeed when it is started again.
+    /// Whether the worker may succeed after a restart.
     pub const fn may_pass(&self) -> bool {
         matches!(self, Self::GaveUp { .. })
     }

@@ -1,10 +1,10 @@
-//! Results of a group of cases, as they are reported.
+//! Results of a group of cases for a report.
 
 use tracktwin_experiment::Outcome;
 use tracktwin_protocol::{CaseLease, CaseReport, MESSAGE_BYTES_MAX};
 
-/// Cases and numbers in one report at most: a large message of an ordinary experiment, and a quarter of
-/// what is allowed of any.
+/// Largest number of cases, and of values, in one report: a large message of an ordinary experiment, and
+/// a quarter of the largest allowed message.
 const CASES_A_REPORT: usize = 128;
 const NUMBERS_A_REPORT: usize = MESSAGE_BYTES_MAX / size_of::<f64>() / 4;
 
@@ -13,7 +13,7 @@ pub(crate) struct Finished {
     pub(crate) campaign: String,
     pub(crate) experiment_hash: String,
     pub(crate) reports: Vec<CaseReport>,
-    /// How they were simulated, as W3C Trace Contexts.
+    /// W3C Trace Contexts of the simulations.
     pub(crate) traceparents: Vec<String>,
 }
 
@@ -24,7 +24,8 @@ impl Finished {
         Self { campaign, experiment_hash, reports, traceparents: vec![traceparent] }
     }
 
-    /// Takes another group into the same report, if it belongs there and fits.
+    /// Adds another group to the report. Returns the group if it belongs to another report or does not
+    /// fit.
     pub(crate) fn join(&mut self, other: Self) -> Option<Self> {
         let fits = self.reports.len() + other.reports.len() <= CASES_A_REPORT
             && self.numbers() + other.numbers() <= NUMBERS_A_REPORT;
@@ -37,7 +38,7 @@ impl Finished {
         Some(other)
     }
 
-    /// How many numbers are in its spectra.
+    /// Number of values in the spectra.
     fn numbers(&self) -> usize {
         let of_outcome = |outcome: &Outcome| match outcome {
             Outcome::Finished(passes) => {

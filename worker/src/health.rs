@@ -10,17 +10,17 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
 
-/// A coordinator that has been silent for so long is worth a word.
+/// Time without a response of a coordinator after which `/healthz` reports it.
 const SILENCE: Duration = Duration::from_secs(30);
 
-/// What the answers are made of.
+/// State from which the responses are made.
 #[derive(Clone)]
 struct Watched {
     session: Arc<Session>,
     counters: Arc<Counters>,
 }
 
-/// Answers until it is dropped.
+/// Serves requests until the future is dropped.
 pub(crate) async fn answer(port: TcpListener, session: Arc<Session>, counters: Arc<Counters>) {
     let routes = Router::new()
         .route("/healthz", get(healthz))

@@ -30,7 +30,7 @@ impl Holdings {
         of_campaign.map(|&(_, index, epoch)| (index, epoch)).collect()
     }
 
-    /// Takes what was leased.
+    /// Adds leased cases.
     pub(crate) fn take(&self, lease: &CaseLease) {
         let cases = lease.cases.iter();
         let held = cases.map(|leased| (lease.campaign.clone(), leased.case.index, leased.epoch));
@@ -50,7 +50,7 @@ impl Holdings {
         })
     }
 
-    /// Whether a case is still this worker's, as far as it knows.
+    /// Whether the worker still holds a case.
     pub(crate) fn has(&self, campaign: &str, index: u32, epoch: u32) -> bool {
         self.held.lock().contains(&(campaign.to_owned(), index, epoch))
     }
@@ -59,7 +59,7 @@ impl Holdings {
         self.held.lock().is_empty()
     }
 
-    /// What to renew, in requests of one campaign and a bounded number of cases.
+    /// Requests to renew all leases, each with one campaign and a bounded number of cases.
     pub(crate) fn renewals(&self, worker: &str) -> Vec<farm::RenewRequest> {
         let mut requests: Vec<farm::RenewRequest> = Vec::new();
         for (campaign, index, epoch) in self.held.lock().iter() {

@@ -1,7 +1,8 @@
-//! A worker: parameter set in, features out.
+//! A worker of the farm: simulates leased cases and reports their features.
 //!
-//! Owns the network around a case ([`agent`]): leases, results, credentials. What is done with the case
-//! is [`tracktwin_experiment`]'s; which cases there are, and what becomes of results, the coordinator's.
+//! This crate contains the network side of a worker ([`agent`]): leases, results, credentials. The crate
+//! [`tracktwin_experiment`] simulates the cases. The coordinator selects the cases and stores the
+//! results.
 
 pub mod agent;
 mod backoff;

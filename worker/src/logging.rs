@@ -13,10 +13,10 @@ pub enum LogFormat {
     Json,
 }
 
-/// Sends what passes the filter to standard error.
+/// Writes log events that pass the filter to standard error.
 ///
 /// # Panics
-/// When this process logs already.
+/// If logging was already set up in this process.
 pub fn log_to_stderr(format: LogFormat, filter: EnvFilter) {
     // Colours are for eyes: in a file they are noise.
     let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();

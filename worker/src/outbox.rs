@@ -1,4 +1,4 @@
-//! Finished results on their way to a coordinator.
+//! Queue of finished results for a coordinator.
 //!
 //! The simulation continues during a report, and while no coordinator responds: finished cases wait
 //! here and are sent later. The capacity is bounded; when it is full, the cores wait.
@@ -12,17 +12,17 @@ use tokio::sync::mpsc;
 /// Groups that may wait: some 500 cases, or a few megabytes.
 const GROUPS_WAITING: usize = 64;
 
-/// Where cores put what they have finished.
+/// Queue into which the cores put finished results.
 pub(crate) type Outbox = mpsc::Sender<Finished>;
 
-/// An empty outbox, and what is to be [`send`]ed.
+/// An empty outbox, and its receiver for [`send`].
 pub(crate) fn outbox() -> (Outbox, mpsc::Receiver<Finished>) {
     mpsc::channel(GROUPS_WAITING)
 }
 
-/// Hands in what is put into the outbox, until every core has let go of it or the worker gives up.
+/// Reports the results in the outbox until every core has dropped its sender, or the worker gives up.
 ///
-/// What waits together is sent together.
+/// Results that wait at the same time are sent in one report.
 pub(crate) async fn send(
     session: Arc<Session>,
     mut outbox: mpsc::Receiver<Finished>,

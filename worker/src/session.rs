@@ -1,4 +1,4 @@
-//! A worker's talk with its coordinators: each call is repeated until it is answered.
+//! Calls of a worker to its coordinators. Each call is repeated until there is a response.
 
 use crate::config::Config;
 use crate::coordinators::Coordinators;
@@ -18,7 +18,8 @@ use tracktwin_experiment::{CODE_VERSION, Outcome};
 use tracktwin_protocol::{Lease, PROTOCOL_VERSION, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
 
-/// Cases asked for at a time; the coordinator, who knows how long they take, gives fewer.
+/// Number of cases requested at a time. The coordinator leases fewer cases, according to their computing
+/// time.
 const CASES_ASKED: u32 = 1024;
 
 /// Heartbeat interval until the coordinator states one.
@@ -31,13 +32,13 @@ const HEARTBEATS_S: [f64; 2] = [0.05, 60.0];
 /// dropped and their leases expire; a sender of invalid messages is treated as another version.
 const DAMAGED_MAX: u32 = 5;
 
-/// Between two such times, growing with their number.
+/// Wait before the next attempt; it grows with the number of attempts.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
 /// Time limit of a call after a stop: a scheduler allows ten seconds in all.
 const RELEASE_TIMEOUT: Duration = Duration::from_millis(1500);
 
-/// What the tasks of a worker share.
+/// State that the tasks of a worker share.
 pub(crate) struct Session {
     worker: String,
     cores: u32,
@@ -49,9 +50,9 @@ pub(crate) struct Session {
     last_work: Mutex<Instant>,
     /// Registrations so far; held for writing while one is under way, so that one suffices for all.
     registrations: RwLock<u64>,
-    /// No new work from here on.
+    /// After cancellation the worker takes no new work.
     pub(crate) shutdown: CancellationToken,
-    /// No more tries either.
+    /// After cancellation there are no more retries.
     pub(crate) give_up: CancellationToken,
 }
 
@@ -76,7 +77,7 @@ impl Session {
         })
     }
 
-    /// Introduces the worker, unless another task has done so after `seen` registrations.
+    /// Registers the worker, unless another task has already registered it after `seen` registrations.
     pub(crate) async fn register(
         &self,
         seen: u64,
@@ -111,7 +112,8 @@ impl Session {
         Ok(())
     }
 
-    /// Cases to simulate, or when to ask again; nothing at shutdown.
+    /// Requests cases to simulate. The result has cases, or the time of the next request; `None` at
+    /// shutdown.
     pub(crate) async fn lease(&self) -> Result<Option<Lease>, AgentError> {
         let mut damaged = 0;
         loop {
@@ -154,7 +156,7 @@ impl Session {
         }
     }
 
-    /// Hands in results; after shutdown only until the worker gives up.
+    /// Reports results. After shutdown the call is retried only until the worker gives up.
     pub(crate) async fn report(&self, finished: Finished) -> Result<(), AgentError> {
         let Finished { campaign, experiment_hash, reports, traceparents } = finished;
         let step = Step::after("hand in", &traceparents);
@@ -213,7 +215,7 @@ impl Session {
         Ok(())
     }
 
-    /// Counts what was taken, and warns of what was refused.
+    /// Counts accepted results and logs a warning for rejected results.
     fn count(&self, answer: &farm::ReportResponse, failed: &[u32]) {
         let refused = |it: &&farm::Receipt| it.verdict() == farm::Verdict::Refused;
         let settled = answer.receipts.iter().filter(|it| is_settled(**it));
@@ -229,7 +231,7 @@ impl Session {
         self.counters.finished.inc_by((taken.len() - of_failures) as u64);
     }
 
-    /// Gives back cases that were not simulated. What cannot be given back soon expires.
+    /// Returns cases that were not simulated. If the call fails, their leases expire soon.
     pub(crate) async fn release(&self, campaign: &str, held: Vec<(u32, u32)>) {
         self.holdings.let_go(campaign, held.iter().copied());
         let request = farm::ReleaseRequest {
@@ -250,8 +252,8 @@ impl Session {
         tracing::warn!("cases not returned; their leases will expire: {failed}");
     }
 
-    /// Renews the leases in a separate task, so that no computation and no slow report makes a live
-    /// worker look dead.
+    /// Renews the leases in a separate task, so that computations and slow reports do not delay
+    /// heartbeats.
     pub(crate) async fn keep_alive(&self) {
         loop {
             let heartbeat = *self.heartbeat.lock();
@@ -278,7 +280,7 @@ impl Session {
         }
     }
 
-    /// These leases have ended; cases not yet started are skipped.
+    /// Removes cases whose leases have ended. Those not yet started are skipped.
     fn lose(&self, campaign: &str, lost: &[farm::HeldCase]) {
         // Cases reported or returned during the heartbeat are not counted as lost.
         let lost = self.holdings.let_go(campaign, lost.iter().map(|it| (it.sobol_index, it.epoch)));
@@ -288,12 +290,12 @@ impl Session {
         }
     }
 
-    /// Notes that there is something to do.
+    /// Records that the worker has work.
     pub(crate) fn worked(&self) {
         *self.last_work.lock() = Instant::now();
     }
 
-    /// For how long there was nothing to do.
+    /// Time since the worker last had work.
     pub(crate) fn idle_for(&self) -> Duration {
         if !self.holdings.is_empty() {
             return Duration::ZERO;
@@ -318,7 +320,7 @@ fn is_settled(receipt: farm::Receipt) -> bool {
     !matches!(receipt.verdict(), farm::Verdict::Unspecified | farm::Verdict::Damaged)
 }
 
-/// Leaves the cases that are to be sent again: a case whose index was damaged has no receipt at all.
+/// Keeps the cases that must be sent again. A case whose index was damaged has no receipt.
 fn keep_unsettled(cases: &mut Vec<farm::CaseReport>, answer: &farm::ReportResponse) {
     let settled: HashSet<u32> =
         answer.receipts.iter().filter(|it| is_settled(**it)).map(|it| it.sobol_index).collect();

@@ -1,10 +1,11 @@
-//! How many cases a second the farm can pass through: durable lease, and 12 kB of results a case
-//! through gRPC into the library, by workers that compute nothing.
+//! Throughput of the farm in cases per second: durable leases, and 12 kB of results per case through gRPC
+//! into the library, from workers that compute nothing.
 //!
 //! `cargo bench -p tracktwin-farm --bench farm -- [throughput|sqlite|postgres|workers|memory] [--cases N]`
 //!
-//! Coordinator and workers run in this process; CPU time is its own and, also told alone, that of the
-//! PostgreSQL server it has started. Libraries are made in `$TRACKTWIN_BENCH_DIR`, or here.
+//! Coordinator and workers run in this process. The CPU time is that of this process and, stated
+//! separately, that of the PostgreSQL server it has started. Libraries are created in
+//! `$TRACKTWIN_BENCH_DIR`, or in the current folder.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark reports by stopping")]
 
@@ -23,11 +24,11 @@ use tracktwin_library::Library;
 use tracktwin_signal::{Features, ThirdOctave};
 use tracktwin_worker::agent::{self, Config};
 
-/// Voices that give each of three passes 500 bins: 12 kB of features a case. The built-in campaign's 48
-/// give 7 kB.
+/// Voices per octave. 79 voices give 500 bins per pass, and 12 kB of features per case with three passes.
+/// The 48 voices of the built-in campaign give 7 kB.
 const VOICES_PER_OCTAVE: u32 = 79;
 
-/// Instead of physics: the features of one case, handed out again and again.
+/// Replaces the track model: it returns the same features for every case.
 struct StandIn(Vec<PassFeatures>);
 
 impl Simulate for StandIn {
@@ -51,7 +52,7 @@ fn stand_in(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentErro
     Ok(Box::new(StandIn(experiment.speeds_km_h.iter().map(pass).collect())))
 }
 
-/// What a run cost.
+/// Cost of a run.
 struct Cost {
     seconds: f64,
     cpu: Cpu,
@@ -61,14 +62,14 @@ struct Cost {
 /// CPU time in s.
 struct Cpu {
     total_s: f64,
-    /// Of processes that this one has started.
+    /// Part of the processes that this process has started.
     server_s: f64,
 }
 
-/// CPU time so far of this process and of all that it has started.
+/// CPU time, until now, of this process and of all processes that it has started.
 ///
-/// Of proc(5)'s `stat`: parent (field 4) and times in hundredths, its own (14, 15) and those of
-/// children that have ended (16, 17).
+/// Read from `stat` of proc(5): parent (field 4), and times in hundredths of a second of the process itself
+/// (14, 15) and of its ended children (16, 17).
 fn cpu() -> Cpu {
     let mut parents = HashMap::new();
     for entry in std::fs::read_dir("/proc").unwrap().flatten() {
@@ -87,14 +88,14 @@ fn cpu() -> Cpu {
     Cpu { total_s, server_s: total_s - parents[&std::process::id()].1 }
 }
 
-/// Memory this process holds now, in MB.
+/// Memory of this process in MB.
 fn memory_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find(|line| line.starts_with("VmRSS")).unwrap();
     line.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap() / 1024.0
 }
 
-/// Passes so many cases through a library by so many workers of one core each.
+/// Simulates this number of cases with this number of workers of one core each.
 async fn pass_through(url: &str, cases: u32, workers: usize) -> Cost {
     let mut campaign = Campaign::built_in(Some(cases)).unwrap();
     campaign.definition.experiment.features.voices_per_octave = VOICES_PER_OCTAVE;
@@ -162,8 +163,8 @@ async fn through_postgres(server: &Server, name: &str, cases: u32, workers: usiz
     server.checkpoint();
 }
 
-/// Passes cases through a first library and, when that is removed, through a second one: with the first
-/// the machine finds memory for files, and a fresh server fills the files of its log with zeros.
+/// Measures with a second library, after a run with a first one, which is removed. The first run warms up
+/// the file cache, and a new PostgreSQL server fills its log files with zeros during it.
 async fn measure(engine: &str, cases: u32) {
     if engine == "sqlite" {
         for name in ["SQLite, synchronous=FULL, first", "SQLite, synchronous=FULL"] {

@@ -1,10 +1,10 @@
-//! Where a farm saturates: a discrete-event simulation of workers that lease, compute and report at
-//! one library, with service times as the benchmark `service_times` measures them.
+//! Saturation of a farm: a discrete-event simulation of workers that lease, compute and report to one
+//! library. The service times are those measured with the benchmark `service_times`.
 //!
 //! `cargo run --release -p tracktwin-farm --example scaling -- [--lease-ms X] [--case-ms Y]`
 //!
-//! A lease costs the library `lease-ms` and a stored case `case-ms`, one after another: the library
-//! has one writer. `docs/scaling.md` shows what comes out.
+//! A lease costs the library `lease-ms`, and a stored case `case-ms`. The library processes them one after
+//! another, because it has one writer. The results are in `docs/scaling.md`.
 
 #![expect(clippy::print_stdout, reason = "an example shows its numbers")]
 
@@ -14,24 +14,24 @@ use std::collections::BinaryHeap;
 /// Cores of a node.
 const CORES: u64 = 16;
 
-/// Cases computed side by side on a core, and reported together.
+/// Number of cases that a core computes and reports together.
 const GROUP: u64 = 8;
 
-/// Work of a lease, in s, as the coordinator deals it out: more where there are many cores.
+/// Minimum and maximum computing time of a lease, in s; longer with many cores, as in the coordinator.
 const LEASE_WORK_S: [f64; 2] = [1.5, 30.0];
 const LEASES_A_SECOND: f64 = 100.0;
 
-/// Most groups of a lease.
+/// Maximum number of groups of a lease.
 const GROUPS_MAX: f64 = 64.0;
 
-/// Way of a message there and back in s, within a cluster.
+/// Time of a message and its response within a cluster, in s.
 const ROUND_TRIP_S: f64 = 0.0005;
 
-/// How far reports may lag before the full outbox holds up its cores: some seconds' results.
+/// Maximum delay of reports, in ns, before a full outbox stops its cores.
 const BACKLOG_NS: u64 = 3_000_000_000;
 
-/// Simulated time in s, of which the start does not count: until every core has had its first lease
-/// from a library that is overrun.
+/// Simulated time in s. The start up to `WARM_UP_S` is not evaluated: in an overloaded farm, every core
+/// must first have had a lease.
 const TIME_S: f64 = 900.0;
 const WARM_UP_S: f64 = 500.0;
 
@@ -42,22 +42,22 @@ struct Service {
     case_s: f64,
 }
 
-/// What a core does next.
+/// Next event of a core.
 #[derive(Clone, Copy)]
 enum Step {
     Lease,
-    /// A group is computed; so many are left of the lease.
+    /// A group is computed; the number is that of the remaining groups of the lease.
     Report(u64),
 }
 
-/// What comes out of a simulation.
+/// Result of a simulation.
 struct Outcome {
     cases_per_s: f64,
     cores_busy: f64,
     library_busy: f64,
 }
 
-/// Nanoseconds, so that events have an order.
+/// Time in whole nanoseconds, which can be ordered.
 const fn ns(seconds: f64) -> u64 {
     (seconds * 1e9) as u64
 }

@@ -1,4 +1,4 @@
-//! The farm in one process: a coordinator, and workers that talk to it as a cluster's would.
+//! The farm in one process: a coordinator and a worker that communicate as on a cluster.
 
 use crate::dispatch::{Counts, Dispatch, DispatchError, Scope, Settings, Timing};
 use crate::security::{Security, random_token};
@@ -14,25 +14,25 @@ use tracktwin_library::{Claim, Library, LibraryError, Status};
 use tracktwin_worker::agent::{self, AgentError};
 use tracktwin_worker::{Credentials, Holdings, Token};
 
-/// Interval of reading the counts, short enough for a progress bar.
+/// Interval of reading the counts of cases; short enough for a progress bar.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
-/// How long a library that does not answer is waited for; as long as a blind trial waits for one.
+/// Maximum outage of a library, as for a blind trial. A longer outage ends the run.
 const OUTAGE_MAX: Duration = Duration::from_mins(10);
 
-/// Why the farm stops.
+/// Errors that end an embedded farm.
 #[derive(Debug, thiserror::Error)]
 pub enum FarmError {
-    /// The library fails or refuses.
+    /// The library returned an error.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// The campaign can't be dispatched.
+    /// The campaign cannot be dispatched.
     #[error(transparent)]
     Dispatch(#[from] DispatchError),
-    /// The workers stopped.
+    /// The worker ended with an error.
     #[error("the workers stopped: {0}")]
     Worker(#[from] AgentError),
-    /// The service failed.
+    /// The gRPC service failed.
     #[error(transparent)]
     Service(#[from] ServeError),
     /// No port can be bound.
@@ -40,44 +40,44 @@ pub enum FarmError {
     Port(#[from] std::io::Error),
 }
 
-/// Cases to simulate and number of cores.
+/// The cases to simulate, and how to simulate them.
 #[derive(Clone, Debug)]
 pub struct Task<'a> {
-    /// The campaign.
+    /// Id of the campaign.
     pub campaign: &'a str,
-    /// Number of its first cases.
+    /// Number of cases, counted from index 0.
     pub cases: u32,
-    /// Groups of cases simulated at a time.
+    /// Number of groups of cases that are simulated in parallel.
     pub cores: NonZeroUsize,
-    /// How long leases last.
+    /// Length of the leases, and the derived intervals.
     pub timing: Timing,
-    /// Prepares a simulation: of the track model, or of a stand-in in tests of the farm.
+    /// Creates the simulator: the track model or, in tests of the farm, a stand-in.
     pub prepare: Prepare,
 }
 
 impl<'a> Task<'a> {
-    /// The first `cases` cases of a campaign, by the track model.
+    /// The first `cases` cases of a campaign, simulated with the track model.
     pub fn new(campaign: &'a str, cases: u32, cores: NonZeroUsize) -> Self {
         let timing = Timing::default();
         Self { campaign, cases, cores, timing, prepare: prepare_simulation }
     }
 }
 
-/// The right to lease the cases of a writable library. Its holder may add cases, because it can
-/// lease them.
+/// Claims the right to lease the cases of a library, and checks that the library can be written. The holder
+/// of the claim may also add cases.
 ///
 /// # Errors
-/// [`LibraryError::InUse`] when another process works on the library, [`LibraryError::NotWritable`].
+/// Returns [`LibraryError::InUse`] if another process has the claim, or [`LibraryError::NotWritable`].
 pub async fn claim(library: &Library) -> Result<Claim, FarmError> {
     let claim = library.claim()?;
     library.check_writable().await?;
     Ok(claim)
 }
 
-/// [`claim`] and [`run_claimed`] in one.
+/// Calls [`claim`] and then [`run_claimed`].
 ///
 /// # Errors
-/// As both.
+/// The errors of both functions.
 pub async fn run_embedded(
     library: &Library,
     task: Task<'_>,
@@ -88,14 +88,14 @@ pub async fn run_embedded(
     run_claimed(library, &claim, task, shutdown, progress).await
 }
 
-/// Simulates the missing cases of a claimed library with workers in this process, until every case
-/// is finished or given up, or until `shutdown`. A later run can continue; no finished case is lost
-/// however the process ends. An unavailable library is retried.
+/// Simulates the missing cases of a claimed library in this process, until every case is finished or given
+/// up, or until `shutdown` is cancelled. A later call continues the run. Finished cases are stored even if
+/// the process is killed. Calls to an unavailable library are retried for a limited time.
 ///
-/// `progress` sees the counts now and then.
+/// `progress` is called regularly with the counts of cases by state.
 ///
 /// # Errors
-/// [`FarmError`].
+/// Returns [`FarmError`] if the library, the dispatch, the worker or the service fails.
 pub async fn run_claimed(
     library: &Library,
     claim: &Claim,
@@ -114,10 +114,10 @@ pub async fn run_claimed(
     Ok(status)
 }
 
-/// How a worker ended.
+/// Result of the worker's task.
 type Ended = Result<Result<(), AgentError>, JoinError>;
 
-/// A service and the worker that it serves. However this ends, nothing goes on behind its back.
+/// The tasks of the service and of its worker. Both tasks stop when this value is dropped.
 struct Running {
     worker: JoinHandle<Result<(), AgentError>>,
     server: JoinHandle<Result<(), ServeError>>,
@@ -126,7 +126,7 @@ struct Running {
 }
 
 impl Running {
-    /// Starts both on a port of their own.
+    /// Starts the service on a free port of this machine, and the worker.
     async fn begin(
         dispatch: Dispatch,
         config: agent::Config,
@@ -150,8 +150,8 @@ impl Running {
         Ok(Self { worker, server, stop_working, stop_serving })
     }
 
-    /// Looks at the counts until nothing is left to do or `shutdown`, or until the worker ends of itself;
-    /// then it says how.
+    /// Reads the counts until every case is done or `shutdown` is cancelled; then returns `None`. If the
+    /// worker ends earlier, returns the worker's result.
     async fn watch(
         &mut self,
         library: &Library,
@@ -183,7 +183,7 @@ impl Running {
         }
     }
 
-    /// Ends the worker, unless it `ended`, and then the service.
+    /// Stops the worker, unless its result is given in `ended`; then stops the service.
     async fn end(self, ended: Option<Ended>) -> Result<(), FarmError> {
         // The worker hands in what it has begun, so it must end before the service.
         drop(self.stop_working);
@@ -198,15 +198,15 @@ impl Running {
     }
 }
 
-/// A library that does not answer, since when.
+/// Start of the present outage of the library, if there is one.
 #[derive(Default)]
 struct Outage(Option<Instant>);
 
 impl Outage {
-    /// Returns if the library may respond later: the workers keep their results meanwhile.
+    /// Returns `Ok` if the library may respond later. The workers keep their results until then.
     ///
     /// # Errors
-    /// The library's error where no waiting helps, or after [`OUTAGE_MAX`].
+    /// Returns `error` if waiting does not help, or if the outage is longer than [`OUTAGE_MAX`].
     fn waits_for_library(&mut self, error: LibraryError) -> Result<(), LibraryError> {
         if !error.is_temporary() {
             return Err(error);
@@ -219,7 +219,7 @@ impl Outage {
     }
 }
 
-/// Dispatch of a campaign's cases.
+/// Creates the dispatch of a campaign's cases.
 async fn dispatch(
     library: &Library,
     claim: &Claim,

@@ -1,14 +1,15 @@
-//! The farm: campaigns, and the coordinator that hands their cases to workers.
+//! The farm: campaigns, and the coordinator that leases their cases to workers.
 //!
-//! - [`campaign`]: what is simulated; from an index to a case.
-//! - [`dispatch`]: which worker gets which case, and what becomes of its report.
-//! - [`security`]: certificates, tokens, connections that are let in.
+//! - [`campaign`]: definition of a campaign, and the case that belongs to an index.
+//! - [`dispatch`]: leases cases to workers and evaluates their reports.
+//! - [`security`]: certificates, tokens, accepted connections.
 //! - [`serve`]: the gRPC service on a port.
 //! - [`dashboard`]: pages and metrics for people and Prometheus.
 //! - [`coordinator`]: starts and ends service and dashboard.
 //! - [`embedded`]: coordinator and workers in one process.
 //!
-//! The queue and the results are the library's; no state of this crate outlives the process.
+//! The library stores the queue and the results. Nothing that must survive the process is kept in this
+//! crate.
 
 pub mod campaign;
 pub mod coordinator;

@@ -9,33 +9,35 @@ use tonic::transport::Server;
 use tracktwin_protocol::farm::farm_server::FarmServer;
 use tracktwin_protocol::{MESSAGE_BYTES_MAX, WINDOW_BYTES};
 
-/// How often an idle connection is tested, and how long an answer may take.
+/// Interval of testing an idle connection, and time limit of the response.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
-/// Calls of one connection at a time: a worker has a few a core.
+/// Maximum number of concurrent calls per connection. A worker makes a few calls per core.
 const CALLS_A_CONNECTION: u32 = 512;
 
-/// Most bytes of a message in one piece: HTTP/2's own 16 kB make a hundred of a report.
+/// Maximum size of an HTTP/2 frame, in bytes. With the default of 16 kB, a report would need about a
+/// hundred frames.
 const FRAME_BYTES: u32 = 1 << 20;
 
-/// Time limit of running calls after the service is stopped.
+/// Time limit for running calls after the service is stopped.
 const FAREWELL: Duration = Duration::from_secs(5);
 
 /// Errors that end a service.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// Its certificates or token are invalid.
+    /// The certificates or the token are invalid.
     #[error(transparent)]
     Security(#[from] SecurityError),
-    /// The port was lost.
+    /// The server failed on its port.
     #[error("the farm's service failed")]
     Transport(#[from] tonic::transport::Error),
 }
 
-/// Serves workers on a port until it is stopped; running calls are finished first.
+/// Serves workers on a port until `stop` is cancelled. Running calls are completed first, within a time
+/// limit.
 ///
 /// # Errors
-/// [`ServeError`] when certificates can't be used or the port fails.
+/// Returns [`ServeError`] if the certificates cannot be used or the port fails.
 pub async fn serve(
     listener: TcpListener,
     dispatch: Dispatch,

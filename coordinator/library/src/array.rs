@@ -1,4 +1,4 @@
-//! The table `stored_array`: series of numbers that are dear to compute.
+//! The table `stored_array`: series of numbers that are expensive to compute.
 
 use crate::engine::{Connection, Write, sql};
 use crate::library::Dated;
@@ -12,18 +12,18 @@ const INSERT: &str = "
 /// A stored series of numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredArray {
-    /// Hash of all that the numbers follow from.
+    /// Hash of all inputs that determine the numbers.
     pub key: String,
     /// Kind of series, e.g. `null-campaign`.
     pub kind: String,
-    /// Shape and units of the numbers as JSON.
+    /// Shape and units of the numbers, as JSON.
     pub meta_json: String,
-    /// The numbers.
+    /// The numbers, in the shape and units of `meta_json`.
     pub numbers: Vec<f64>,
 }
 
 impl Library {
-    /// Stores a series; an existing one with the key is kept unchanged.
+    /// Stores a series. An existing series with the same key is kept unchanged.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -31,7 +31,7 @@ impl Library {
         self.write_dated(array).await
     }
 
-    /// The series of this key, if it is there.
+    /// Returns the series with this key; `None` if there is none.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.

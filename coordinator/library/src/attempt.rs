@@ -3,8 +3,8 @@
 use crate::engine::{Connection, Text, sql};
 use crate::{LibraryError, Report, State};
 
-/// Puts leases of a campaign's ($1) cases ($2) on record as ended at $3, so ($4), with this error ($5); a lease is on
-/// record once.
+/// Records that leases of cases ($2) of a campaign ($1) ended at $3, with ending $4 and error $5. A lease
+/// is recorded once.
 const NOTE: Text = Text::Each {
     sqlite: "
         insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms, ended_unix_ms, ending, error)
@@ -18,7 +18,7 @@ const NOTE: Text = Text::Each {
         on conflict (campaign_id, sobol_index, epoch) do nothing",
 };
 
-/// Ends attempts that count.
+/// Sets the state of cases after attempts that count.
 const END: Text = Text::Each {
     sqlite: "
         update campaign_case set state = $3, attempts = $4, error = $5, lease_expires_unix_ms = null
@@ -28,7 +28,7 @@ const END: Text = Text::Each {
         where campaign_id = $1 and sobol_index = any($2)",
 };
 
-/// How many of a case's last $3 attempts that count have failed.
+/// Number of failures among the last $3 counted attempts of a case.
 const FAILURES: &str = "
     select count(*) as failures from (
         select ending from attempt
@@ -36,7 +36,7 @@ const FAILURES: &str = "
         order by epoch desc limit $3) as counted
     where ending = 'failed'";
 
-/// Everything that is leased of a campaign; what is leased after this stays leased.
+/// All leased cases of a campaign. Cases that are leased after this statement stay leased.
 const LEASED: Text = Text::Each {
     sqlite: "
         select sobol_index from campaign_case where campaign_id = $1 and state = 'leased'
@@ -46,7 +46,7 @@ const LEASED: Text = Text::Each {
         order by sobol_index for update",
 };
 
-/// Lets cases wait again; no attempt is counted.
+/// Sets cases to waiting. No attempt is counted.
 const WAIT: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'waiting', lease_expires_unix_ms = null
@@ -56,11 +56,11 @@ const WAIT: Text = Text::Each {
         where campaign_id = $1 and sobol_index = any($2)",
 };
 
-/// Leases that end without result, and where that leaves their cases.
+/// Leases that ended without result, and the new state of their cases.
 pub(crate) struct Ended<'a> {
     pub(crate) campaign: &'a str,
     pub(crate) indices: Vec<i64>,
-    /// Attempts of each case that count, with this one.
+    /// Number of counted attempts of each case, including this one.
     pub(crate) attempts: u32,
     pub(crate) state: State,
     pub(crate) ending: &'static str,
@@ -68,7 +68,7 @@ pub(crate) struct Ended<'a> {
     pub(crate) now_unix_ms: i64,
 }
 
-/// Ends attempts that count.
+/// Records attempts that count, and sets the state of their cases.
 pub(crate) async fn end(connection: &mut Connection, it: Ended<'_>) -> Result<(), LibraryError> {
     let error = Some(it.error.to_owned());
     note(connection, it.campaign, it.indices.clone(), it.now_unix_ms, it.ending, error).await?;
@@ -104,7 +104,7 @@ pub(crate) async fn failures(
     connection.row(ask).await?.map_or(Ok(0), |row| row.get_u32("failures"))
 }
 
-/// Ends every lease of a campaign; no attempt is counted.
+/// Ends all leases of a campaign. No attempt is counted.
 pub(crate) async fn end_all(
     connection: &mut Connection,
     campaign: &str,
@@ -116,7 +116,7 @@ pub(crate) async fn end_all(
     connection.execute(sql(WAIT).bind(campaign).bind(leased)).await.map(drop)
 }
 
-/// Notes that a case's present lease is overtaken by the result of an earlier one.
+/// Records that a case's present lease ended because an earlier lease brought the result.
 pub(crate) async fn overtake(
     connection: &mut Connection,
     report: &Report,

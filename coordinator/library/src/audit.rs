@@ -1,8 +1,8 @@
-//! The table `audit`: finished cases that another worker simulates again.
+//! The table `audit`: finished cases that a second worker simulates again.
 //!
-//! The hash of a case decides whether it is audited, so that the share is independent of the order
-//! and cannot be influenced. The caller compares the results of the second worker; this module only
-//! stores the outcome.
+//! The hash of a case decides whether the case is audited. The sample therefore does not depend on the
+//! order of the results, and a worker cannot influence it. The caller compares the results of the second
+//! worker; this module only stores the outcome.
 
 use crate::case::case_of;
 use crate::engine::{Connection, Row, Text, Write, sql};
@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use tracktwin_parameters::Case;
 use tracktwin_protocol::CaseReport;
 
-/// Marks cases ($2) of a campaign ($1) whose results ($3's) are to be audited.
+/// Inserts audits for cases ($2) of a campaign ($1) whose results are from worker $3.
 const MARK: Text = Text::Each {
     sqlite: "
         insert into audit (campaign_id, sobol_index, worker)
@@ -27,8 +27,8 @@ const MARK: Text = Text::Each {
         on conflict (campaign_id, sobol_index) do nothing",
 };
 
-/// Leases until $5 the first $4 audits of a running campaign ($1) that are not leased at $3, except
-/// those of the worker's ($2) own results.
+/// Leases until $5 the first $4 audits of a running campaign ($1) that are not leased at time $3. Audits of
+/// the worker's ($2) own results are excluded.
 const TAKE: Text = Text::Each {
     sqlite: "
         with next as (
@@ -52,7 +52,7 @@ const TAKE: Text = Text::Each {
         returning sobol_index, worker",
 };
 
-/// The cases that audits are of.
+/// The cases of leased audits.
 const CASES: Text = Text::Each {
     sqlite: "
         select * from campaign_case
@@ -64,13 +64,14 @@ const CASES: Text = Text::Each {
         order by sobol_index",
 };
 
-/// Keeps what came of an audit that is this worker's ($3) still; answers whose result it is about.
+/// Stores the outcome of an audit if it is still leased to this worker ($3). Returns the worker whose
+/// result was audited.
 const KEEP: &str = "
     update audit set state = $4, difference_dB = $5, ended_unix_ms = $6, lease_expires_unix_ms = null
     where campaign_id = $1 and sobol_index = $2 and auditor = $3 and state = 'leased'
     returning worker";
 
-/// Gives audits back that are this worker's ($2) still.
+/// Releases audits that are still leased to this worker ($2).
 const RELEASE: Text = Text::Each {
     sqlite: "
         update audit set state = 'waiting', lease_expires_unix_ms = null
@@ -81,7 +82,7 @@ const RELEASE: Text = Text::Each {
         where campaign_id = $1 and auditor = $2 and state = 'leased' and sobol_index = any($3)",
 };
 
-/// Open audits that a worker seen since $2 could do.
+/// Number of open audits that a worker with a message since $2 could do.
 const TO_DO: &str = "
     select count(*) as cases from audit
     where campaign_id = $1 and state in ('waiting', 'leased') and exists (
@@ -90,9 +91,9 @@ const TO_DO: &str = "
 /// A finished case to be simulated again.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Audit {
-    /// The campaign.
+    /// Id of the campaign.
     pub campaign: String,
-    /// The case.
+    /// The finished case.
     pub case: Case,
     /// Worker whose result is audited.
     pub worker: String,
@@ -101,7 +102,7 @@ pub struct Audit {
 /// Outcome of an audit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AuditFinding {
-    /// Whether both agree within the tolerance of who compared.
+    /// Whether both results agree within the caller's tolerance.
     pub agrees: bool,
     /// Largest difference of a band level, in dB.
     pub difference_db: f64,
@@ -113,14 +114,14 @@ impl AuditFinding {
     }
 }
 
-/// Audits of a campaign, counted.
+/// Number of audits of a campaign by state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AuditCounts {
-    /// Not yet done.
+    /// Audits that are not completed.
     pub open: u32,
-    /// Both workers agreed.
+    /// Audits whose results agree.
     pub agree: u32,
-    /// They did not.
+    /// Audits whose results differ.
     pub differ: u32,
 }
 
@@ -150,8 +151,8 @@ impl AuditState {
 }
 
 impl Library {
-    /// Cases of a campaign for `worker` to audit, none of them its own and none while the campaign is
-    /// paused or cancelled; for `lease_ms`, after which others may be asked.
+    /// Leases cases of a campaign to `worker` for an audit: at most the requested number, none with the
+    /// worker's own result, and none if the campaign is not running. The lease ends after `lease_ms`.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -167,9 +168,9 @@ impl Library {
         self.write(Sample { campaign, worker, cases_max, now_unix_ms, lease_ms }).await
     }
 
-    /// Stores the finding of an auditor. Returns the worker whose result was audited, or nothing if the audit
-    /// no longer belongs to this auditor. The same write puts the worker in `wrong` into quarantine, with the
-    /// reason in `wrong`; see [`Library::flag_worker`].
+    /// Stores the finding of an auditor. Returns the worker whose result was audited; `None` if the audit
+    /// is no longer leased to this auditor. The same write puts the worker in `wrong` into quarantine, with
+    /// the reason in `wrong`; see [`Library::flag_worker`].
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -188,7 +189,7 @@ impl Library {
         self.write(RecordAudit { campaign, index, auditor, finding, wrong, now_unix_ms }).await
     }
 
-    /// Takes back audits of these cases that their auditor will not do.
+    /// Releases the audits of these cases, which the auditor will not do.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -202,8 +203,8 @@ impl Library {
         self.write(ReleaseAudits { campaign, auditor, indices }).await
     }
 
-    /// Open audits of a campaign that a worker could do: one seen since then, not in quarantine,
-    /// that did not simulate the case itself.
+    /// Number of open audits of a campaign that some worker could do. This worker has sent a message since
+    /// the given time, is not in quarantine, and did not simulate the case itself.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -216,7 +217,7 @@ impl Library {
         rows.first().map_or(Ok(0), |row| row.get_u32("cases"))
     }
 
-    /// Counts of a campaign's audits by state.
+    /// Number of a campaign's audits by state.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -236,7 +237,7 @@ impl Library {
     }
 }
 
-/// Marks the share of newly finished cases that is to be audited.
+/// Inserts audits for the sampled share of newly finished cases.
 pub(crate) async fn sample<'a>(
     connection: &mut Connection,
     report: &Report,
@@ -251,7 +252,7 @@ pub(crate) async fn sample<'a>(
     connection.execute(mark).await.map(drop)
 }
 
-/// Whether the case with this hash (hexadecimal) is among the share.
+/// Whether the case with this parameter hash (hexadecimal) belongs to the sampled share.
 fn is_sampled(parameter_hash: &str, share: f64) -> bool {
     let leading = parameter_hash.get(..8).and_then(|digits| u32::from_str_radix(digits, 16).ok());
     leading.is_some_and(|leading| f64::from(leading) < share * 2_f64.powi(32))

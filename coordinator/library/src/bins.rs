@@ -1,13 +1,13 @@
-//! The table `frequency_bin`: what the bins of results mean.
+//! The table `frequency_bin`: frequencies of the bins of results.
 
 use crate::engine::{Connection, Row, Statement, Write, sql};
 use crate::{CampaignRecord, Library, LibraryError};
 use tracktwin_signal::FeatureDefinition;
 
-/// Bins in one statement, of three values each.
+/// Maximum number of bins in one statement; each has three values.
 const BINS_A_STATEMENT: usize = 1000;
 
-/// Frequencies in Hz of the bins of an experiment; none where this version does not understand it.
+/// Frequencies of the bins of an experiment in Hz; empty if this version cannot read the experiment.
 fn frequencies_hz(experiment_json: &str) -> Vec<f64> {
     let experiment = serde_json::from_str::<serde_json::Value>(experiment_json).ok();
     let features =
@@ -16,7 +16,7 @@ fn frequencies_hz(experiment_json: &str) -> Vec<f64> {
     features.map(|features| features.frequencies_hz()).unwrap_or_default()
 }
 
-/// Stores the bins of a campaign's experiment.
+/// Stores the frequency bins of a campaign's experiment.
 pub(crate) async fn insert(
     connection: &mut Connection,
     campaign: &CampaignRecord,
@@ -37,7 +37,7 @@ pub(crate) async fn insert(
 }
 
 impl Library {
-    /// Adds the bins of campaigns that came before the table did.
+    /// Adds the bins of campaigns that were stored before this table existed.
     pub(crate) async fn add_missing_bins(&self) -> Result<(), LibraryError> {
         let ask = "select id, experiment from campaign
             where experiment_hash not in (select experiment_hash from frequency_bin)";

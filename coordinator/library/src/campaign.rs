@@ -10,32 +10,32 @@ const INSERT: &str = "
         created_at)
     values ($1, $2, $3, $4, $5, $6, $7, $8, $9) on conflict (id) do nothing";
 
-/// A campaign as the library keeps it.
+/// A campaign as stored in the library.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CampaignRecord {
-    /// Name and hash of the definition.
+    /// Id: the name and a part of the definition's hash.
     pub id: String,
-    /// Its name.
+    /// Name of the campaign.
     pub name: String,
-    /// Definition, which determines cases and results, as canonical JSON.
+    /// Definition as canonical JSON. It determines the cases and the results.
     pub definition_json: String,
-    /// Hash of that.
+    /// Hash of `definition_json`.
     pub definition_hash: String,
-    /// What is simulated and measured in each case, as canonical JSON.
+    /// Experiment (simulation and features of each case) as canonical JSON.
     pub experiment_json: String,
-    /// Hash of that.
+    /// Hash of `experiment_json`.
     pub experiment_hash: String,
-    /// The speeds of every case, ascending.
+    /// Speeds of every case in km/h, ascending.
     pub speeds_km_h: Vec<f64>,
-    /// Seed of its cases, below 2^63.
+    /// Seed of the cases, below 2^63.
     pub seed: u64,
 }
 
 impl Library {
-    /// Stores a campaign; repeating it changes nothing.
+    /// Stores a campaign. A repeated call changes nothing.
     ///
     /// # Errors
-    /// [`LibraryError::OtherDefinition`] when the id already has another definition.
+    /// Returns [`LibraryError::OtherDefinition`] if the id already exists with another definition.
     pub async fn insert_campaign(&self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
         self.write_dated(campaign.clone()).await
     }
@@ -50,10 +50,10 @@ impl Library {
         rows.iter().map(record).collect()
     }
 
-    /// One campaign.
+    /// The campaign with this id.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownCampaign`] when it does not exist.
+    /// Returns [`LibraryError::UnknownCampaign`] if there is no such campaign.
     pub async fn campaign(&self, id: &str) -> Result<CampaignRecord, LibraryError> {
         let row = self.readers().row(sql("select * from campaign where id = $1").bind(id)).await?;
         row.as_ref()
@@ -61,7 +61,7 @@ impl Library {
     }
 }
 
-/// A seed as a signed integer of SQL.
+/// Converts a seed to a signed integer of SQL.
 pub(crate) fn sql_seed(seed: u64) -> Result<i64, LibraryError> {
     i64::try_from(seed).map_err(|_| LibraryError::SeedTooLarge { seed })
 }

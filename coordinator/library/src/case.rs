@@ -1,58 +1,58 @@
-//! The table `campaign_case`: the cases and their states.
+//! The table `campaign_case`: cases and their states.
 
 use crate::campaign::{seed_from_sql, sql_seed};
 use crate::engine::{Connection, Row, Statement, Write, sql};
 use crate::{Cell, Library, LibraryError, State};
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 
-/// Cases in one statement: ten values each, well below the 32,766 that `SQLite` takes.
+/// Maximum number of cases in one statement. Each has ten values, and `SQLite` accepts 32,766 values.
 const CASES_A_STATEMENT: usize = 1000;
 
 /// A case and its state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseRecord {
-    /// The case.
+    /// The case: index, seed and parameters.
     pub case: Case,
-    /// Its state.
+    /// Present state of the case.
     pub state: State,
-    /// Leases that ended in a failure or in silence.
+    /// Number of leases that ended with a failure or without a report.
     pub attempts: u32,
-    /// Who holds it, or held it last.
+    /// Worker of the present or the last lease.
     pub worker: Option<String>,
-    /// How the last such lease ended.
+    /// Error of the last lease that ended without result.
     pub error: Option<String>,
 }
 
 /// Counts of a campaign's cases by state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
-    /// Nobody works on them.
+    /// Cases that wait for a worker.
     pub waiting: u32,
-    /// Workers hold them.
+    /// Cases leased to a worker.
     pub leased: u32,
-    /// Their results are stored.
+    /// Cases with stored results.
     pub finished: u32,
-    /// They were given up.
+    /// Cases that were given up.
     pub failed: u32,
 }
 
 impl Status {
-    /// All cases.
+    /// Number of all cases.
     pub const fn total(&self) -> u32 {
         self.waiting + self.leased + self.finished + self.failed
     }
 
-    /// Cases that need no more work.
+    /// Number of cases that need no more work: finished and failed ones.
     pub const fn done(&self) -> u32 {
         self.finished + self.failed
     }
 }
 
 impl Library {
-    /// Adds cases to a campaign; existing ones are kept unchanged.
+    /// Adds cases to a campaign. Existing cases are kept unchanged.
     ///
     /// # Errors
-    /// [`LibraryError::SeedTooLarge`], or when the library cannot be written.
+    /// Returns [`LibraryError::SeedTooLarge`], or an error if the library cannot be written.
     pub async fn insert_cases(&self, campaign: &str, cases: &[Case]) -> Result<(), LibraryError> {
         for chunk in cases.chunks(CASES_A_STATEMENT) {
             self.write(Insert { campaign: campaign.to_owned(), cases: chunk.to_vec() }).await?;
@@ -60,7 +60,7 @@ impl Library {
         Ok(())
     }
 
-    /// Number of cases of a campaign before the first missing one: all, unless a damaged library
+    /// Number of consecutive cases from index 0. It is the number of all cases, unless a damaged library
     /// has lost some.
     ///
     /// # Errors
@@ -81,7 +81,7 @@ impl Library {
         row.map_or(Ok(0), |row| row.get_u32("cases"))
     }
 
-    /// The counts of a campaign's first `cases` cases.
+    /// Counts of the campaign's cases with an index below `cases`.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -96,7 +96,7 @@ impl Library {
         self.counts(sql(count).bind(campaign).bind(cases)).await
     }
 
-    /// The counts of a campaign; they cost the same however many cases it has.
+    /// Counts of all cases of a campaign. The cost does not depend on the number of cases.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -120,7 +120,7 @@ impl Library {
         Ok(status)
     }
 
-    /// One case, if the campaign has it.
+    /// Returns one case; `None` if the campaign has no case with this index.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -134,7 +134,7 @@ impl Library {
         row.as_ref().map(record).transpose()
     }
 
-    /// The first `limit` cases that were given up.
+    /// Returns the first `limit` cases that were given up, by index.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -150,7 +150,7 @@ impl Library {
     }
 }
 
-/// The case in a row that has the columns of `campaign_case`.
+/// Reads a case from a row with the columns of `campaign_case`.
 pub(crate) fn case_of(row: &Row) -> Result<Case, LibraryError> {
     let mut parameters = ParameterSet::nominal();
     for &parameter in Parameter::ALL {
@@ -163,8 +163,8 @@ pub(crate) fn case_of(row: &Row) -> Result<Case, LibraryError> {
     })
 }
 
-/// The case in the cells of a table's row, which are found by their columns; none where one is missing or of
-/// another kind.
+/// Reads a case from the cells of a row; `cell` returns the cell of a column. `None` if a cell is missing
+/// or has another type.
 pub(crate) fn case_in<'a>(cell: impl Fn(&str) -> Option<&'a Cell>) -> Option<Case> {
     let mut parameters = ParameterSet::nominal();
     for &parameter in Parameter::ALL {

@@ -6,12 +6,12 @@ use crate::result::{Attested, StoredCase};
 use crate::{CampaignState, Library, LibraryError, result};
 use std::collections::BTreeMap;
 
-/// Lets all cases of a campaign that were given up wait again, as if for the first time.
+/// Sets all given-up cases of a campaign to waiting, with zero attempts.
 const RETRY_FAILED: &str = "
     update campaign_case set state = 'waiting', attempts = 0, error = null
     where campaign_id = $1 and state = 'failed'";
 
-/// The same of some ($2).
+/// As [`RETRY_FAILED`], for the cases in $2 only.
 const RETRY_CASES: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'waiting', attempts = 0, error = null
@@ -21,7 +21,7 @@ const RETRY_CASES: Text = Text::Each {
         where campaign_id = $1 and state = 'failed' and sobol_index = any($2)",
 };
 
-/// Finished cases whose results are flagged; what is flagged after this waits for the next retry.
+/// Finished cases with flagged results. Results that are flagged later are left to the next retry.
 const FLAGGED: Text = Text::Each {
     sqlite: "
         select sobol_index from campaign_case
@@ -35,13 +35,13 @@ const FLAGGED: Text = Text::Each {
         order by sobol_index for update",
 };
 
-/// Takes the audits of cases away.
+/// Deletes the audits of cases.
 const DISCARD_AUDITS: Text = Text::Each {
     sqlite: "delete from audit where campaign_id = $1 and sobol_index in (select value from json_each($2))",
     postgres: "delete from audit where campaign_id = $1 and sobol_index = any($2)",
 };
 
-/// Lets finished cases wait again.
+/// Sets finished cases to waiting.
 const RETRY_FINISHED: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'waiting', attempts = 0, error = null
@@ -51,46 +51,46 @@ const RETRY_FINISHED: Text = Text::Each {
         where campaign_id = $1 and state = 'finished' and sobol_index = any($2)",
 };
 
-/// Cases with results that are not finished.
+/// Cases that have results but are not finished.
 const INCOMPLETE: &str = "
     select distinct campaign_id, sobol_index from result join campaign_case using (campaign_id, sobol_index)
     where state <> 'finished' order by campaign_id, sobol_index";
 
-/// Which cases are tried again.
+/// Selection of the cases that are simulated again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Retry {
-    /// All that were given up.
+    /// All given-up cases.
     Failed,
-    /// Those of these indices that were given up.
+    /// The given-up cases among these indices.
     Cases(Vec<u32>),
-    /// All whose results were flagged; the results are thrown away.
+    /// All cases with flagged results. The results are deleted.
     Flagged,
-    /// All whose results do not have their checksum; the results are thrown away.
+    /// All cases whose results do not match their checksum. The results are deleted.
     Altered,
 }
 
 impl Library {
-    /// Pauses a campaign: leased cases are finished, no further cases are leased.
+    /// Pauses a campaign: workers finish leased cases, and no further cases are leased.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
+    /// Returns [`LibraryError::UnknownCampaign`], or an error if the library cannot be written.
     pub async fn pause(&self, campaign: &str) -> Result<(), LibraryError> {
         self.set_state(campaign, CampaignState::Paused).await
     }
 
-    /// Hands out the cases of a paused or cancelled campaign again.
+    /// Resumes a paused or cancelled campaign: its waiting cases are leased again.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
+    /// Returns [`LibraryError::UnknownCampaign`], or an error if the library cannot be written.
     pub async fn resume(&self, campaign: &str) -> Result<(), LibraryError> {
         self.set_state(campaign, CampaignState::Running).await
     }
 
-    /// Cancels a campaign: no further cases are leased, and leases end; workers learn this when
-    /// they renew. Stored results are kept, and a late result is accepted.
+    /// Cancels a campaign: its leases end, and no further cases are leased. A worker is informed when it
+    /// renews its leases. Stored results are kept, and late results are still accepted.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
+    /// Returns [`LibraryError::UnknownCampaign`], or an error if the library cannot be written.
     pub async fn cancel(&self, campaign: &str) -> Result<(), LibraryError> {
         self.set_state(campaign, CampaignState::Cancelled).await
     }
@@ -104,15 +104,15 @@ impl Library {
     /// default.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
+    /// Returns [`LibraryError::UnknownCampaign`], or an error if the library cannot be written.
     pub async fn set_priority(&self, campaign: &str, priority: i32) -> Result<(), LibraryError> {
         self.write(SetPriority { campaign: campaign.to_owned(), priority }).await
     }
 
-    /// Lets cases be tried again as if for the first time; answers how many.
+    /// Sets the selected cases to waiting, with zero attempts. Returns the number of these cases.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownCampaign`], or when the library cannot be written.
+    /// Returns [`LibraryError::UnknownCampaign`], or an error if the library cannot be read or written.
     pub async fn retry(&self, campaign: &str, which: Retry) -> Result<u64, LibraryError> {
         self.campaign(campaign).await?;
         if which == Retry::Altered {
@@ -222,7 +222,7 @@ impl RetryCases {
     }
 }
 
-/// Deletes results, so that their cases are simulated again.
+/// Deletes results, so that the cases are simulated again.
 struct Discard {
     campaign: String,
     indices: Vec<i64>,

@@ -1,17 +1,17 @@
-//! One hash over everything a campaign has found.
+//! One hash of all results of a campaign.
 
 use crate::{Library, LibraryError};
 
 impl Library {
-    /// BLAKE3 (hexadecimal) over the checksums of a campaign's results by index: parameters, seed
-    /// and features, to the bit. Equal campaigns have equal digests, independent of workers, order
-    /// and database.
+    /// Returns the BLAKE3 hash (hexadecimal) of the checksums of a campaign's results, ordered by index.
+    /// The checksums cover parameters, seed and features to the last bit. Equal campaigns have equal
+    /// digests, independent of workers, order and database.
     ///
-    /// Checksums are computed from the stored data, so a digest describes the stored data;
-    /// [`Library::verify`] checks that they are what the workers reported.
+    /// The checksums are computed again from the stored data. [`Library::verify`] checks that the stored
+    /// data are those that the workers reported.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library cannot be read or has no such campaign.
+    /// Returns [`LibraryError`] if the library cannot be read or has no such campaign.
     pub async fn digest(&self, campaign: &str) -> Result<String, LibraryError> {
         self.campaign(campaign).await?;
         let mut hasher = blake3::Hasher::new_derive_key("tracktwin library digest 2");

@@ -1,4 +1,4 @@
-//! Why a library refuses, or fails.
+//! Errors of a library.
 
 use crate::engine::{self, SQLITE_FULL};
 use sqlx::error::DatabaseError;
@@ -7,218 +7,218 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Why something cannot be read from a library or written to it; one line each.
+/// Errors of reading or writing a library. Each message is one line.
 ///
 /// `library` is a path, or a URL without its password.
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
-    /// Not a library URL at all.
+    /// The text is not a library URL.
     #[error("library {url}: write sqlite:PATH or postgres://USER@HOST/DATABASE")]
     UnknownUrl {
-        /// The URL.
+        /// The given URL.
         url: String,
     },
-    /// A PostgreSQL URL that cannot be read.
+    /// A PostgreSQL URL that cannot be parsed.
     #[error("library {url}: {reason}; write postgres://USER:PASSWORD@HOST:PORT/DATABASE")]
     BadPostgresUrl {
         /// The URL without user and password.
         url: String,
-        /// What is wrong with it.
+        /// Cause.
         reason: String,
     },
-    /// There is a folder at this path.
+    /// The path leads to a folder.
     #[error(
         "library {library}: is a folder; give a file, for example \
              sqlite:{library}/library.sqlite"
     )]
     Folder {
-        /// The library.
+        /// Path of the folder.
         library: String,
     },
-    /// There is nothing at this path.
+    /// No file exists at the path.
     #[error(
         "library {library}: the file does not exist; create it with `tracktwin run \
              --library sqlite:{library}`"
     )]
     Missing {
-        /// The library.
+        /// Path of the file.
         library: String,
     },
-    /// The database holds no library.
+    /// The database exists but contains no library.
     #[error("library {library}: the database is empty; fill it with `tracktwin run`")]
     Empty {
-        /// The library.
+        /// Name of the library.
         library: String,
     },
-    /// The folder of the library does not exist.
+    /// The folder of the library's file does not exist.
     #[error("library {library}: the folder {folder} does not exist; create it first")]
     NoFolder {
-        /// The library.
+        /// Path of the library.
         library: String,
-        /// The folder.
+        /// Path of the missing folder.
         folder: PathBuf,
     },
-    /// The file or database is something else.
+    /// The file or database exists but is not a library of this program.
     #[error("library {library}: not a tracktwin library; correct the path or the database")]
     NotALibrary {
-        /// The library.
+        /// Name of the library.
         library: String,
     },
-    /// The server knows no such database or user, or does not let it in.
+    /// The server has no such database or user, or access is denied.
     #[error("library {library}: {reason}")]
     NotLetIn {
-        /// The library.
+        /// Name of the library.
         library: String,
-        /// Error of the server.
+        /// Error message of the server or of the file system.
         reason: String,
     },
-    /// There is no server.
+    /// The server cannot be reached.
     #[error(
         "library {library}: the server cannot be reached; check host and port, and that the \
              server runs"
     )]
     Unreachable {
-        /// The library.
+        /// Name of the library.
         library: String,
-        /// Why not.
+        /// Error of the connection.
         source: sqlx::Error,
     },
-    /// A later version of the program has written it.
+    /// A later version of the program has written the library.
     #[error(
         "library {library}: its schema {found} is newer than this program's ({known}); use the \
          program that wrote it, or a later one"
     )]
     NewerSchema {
-        /// The library.
+        /// Name of the library.
         library: String,
-        /// The library's schema.
+        /// Version of the library's schema.
         found: i64,
-        /// The newest schema known here.
+        /// Newest version that this program supports.
         known: i64,
     },
-    /// Another process hands out its cases.
+    /// Another process has claimed the right to lease the library's cases.
     #[error(
         "library {library}: another process is running a campaign on it; stop it, or wait until \
              it ends"
     )]
     InUse {
-        /// The library.
+        /// Name of the library.
         library: String,
     },
-    /// There is no such campaign.
+    /// The library has no campaign with this id.
     #[error("the library has no campaign {id}; list the campaigns with `tracktwin library status`")]
     UnknownCampaign {
-        /// The campaign.
+        /// Id of the campaign.
         id: String,
     },
-    /// There is no such worker.
+    /// The library has no worker with this name.
     #[error("the library has no worker {id}; list the workers with `tracktwin status`")]
     UnknownWorker {
-        /// The worker.
+        /// Name of the worker.
         id: String,
     },
-    /// A campaign of that id but another definition.
+    /// The library has a campaign with the same id and another definition.
     #[error("the library has a campaign {id} with another definition; use another library")]
     OtherDefinition {
-        /// The campaign.
+        /// Id of the campaign.
         id: String,
     },
-    /// A trial's case that was sealed with another truth.
+    /// A case of a trial was sealed with another truth.
     #[error(
         "trial {trial} in the library has another truth in case {number}; use another seed, \
              or the program version that started it"
     )]
     OtherTruth {
-        /// The trial.
+        /// Id of the trial.
         trial: String,
         /// Number of the case.
         number: u32,
     },
-    /// A seed that SQL's signed integers cannot hold.
+    /// A seed that does not fit into a signed integer of SQL.
     #[error("the seed {seed} is too large; it must be below 2^63")]
     SeedTooLarge {
         /// The seed.
         seed: u64,
     },
-    /// Stored data are invalid.
+    /// The stored data are invalid.
     #[error("the library is damaged: {what}; list the faults with `tracktwin library verify`")]
     Damaged {
-        /// What was found.
+        /// Description of the invalid data.
         what: String,
     },
-    /// Results that are not what their worker reported.
+    /// Stored results differ from those that their worker reported.
     #[error(
         "the results of case {index} do not match their checksum: a number was altered or a \
              pass was lost after storing; count such cases with `tracktwin library verify`, \
              simulate them again with `tracktwin campaign retry --altered`"
     )]
     Altered {
-        /// The first case found so.
+        /// Lowest index of an affected case found so far.
         index: u32,
     },
-    /// The database is not whole.
+    /// The database itself is damaged.
     #[error(
         "the library's database is damaged ({reason}) and no longer written to: list the \
              faults with `tracktwin library verify`, copy the intact rows to another library \
              with `tracktwin library copy`"
     )]
     Malformed {
-        /// What was found.
+        /// First fault that the database reports.
         reason: String,
     },
-    /// A statement that would write, where only reading is done.
+    /// The statement would write, but only reading is allowed.
     #[error(
         "`library sql` only reads: give one statement that begins with select, with, values or \
          explain and writes nothing"
     )]
     OnlyReads,
-    /// Whoever asks may not write.
+    /// The user or the process has no right to write.
     #[error(
         "the library is read-only here: {reason}; grant the right to write, or use another \
              library"
     )]
     NotWritable {
-        /// Error of the database.
+        /// Error message of the database.
         reason: String,
     },
-    /// A statement that the database does not understand.
+    /// The database rejects a statement.
     #[error("the database rejects the statement: {reason}")]
     BadQuery {
-        /// What it said.
+        /// Error message of the database.
         reason: String,
     },
-    /// A row that does not fit its table.
+    /// A row does not fit its table.
     #[error("a row does not fit the table {table}: {what}")]
     BadRow {
-        /// The table.
+        /// Name of the table.
         table: &'static str,
-        /// What does not fit.
+        /// Description of the misfit.
         what: String,
     },
-    /// The library was closed meanwhile.
+    /// The library was closed before the call.
     #[error("the library is closed")]
     Closed,
-    /// The connection that writes to a file has broken.
+    /// The writing connection to a file was lost.
     #[error(
         "the writing connection to the library was lost ({reason}); acknowledged results \
              are stored: restart the program"
     )]
     Lost {
-        /// What was found.
+        /// Cause.
         reason: String,
     },
-    /// The lock of the library's file can't be taken, for want of rights or of room.
+    /// The lock of the library's file cannot be taken, because of missing permissions or disk space.
     #[error(
         "library {library}: cannot be locked; check the permissions of its folder and the free \
              space"
     )]
     Lock {
-        /// The library.
+        /// Path of the library.
         library: String,
-        /// Error of the system.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file system has no locks, or no memory that processes share, which `SQLite` needs.
+    /// The file system does not support locks or shared memory, which `SQLite` needs.
     #[error(
         "{library}: SQLite's locks do not work on its file system ({reason}), which is \
              common on network file systems: put the library on a local disk (--library \
@@ -226,63 +226,63 @@ pub enum LibraryError {
              postgres://USER@HOST/DATABASE)"
     )]
     NoLocks {
-        /// The library, and what its file system is called where that is known.
+        /// Name of the library, with the name of its file system if known.
         library: String,
-        /// What failed.
+        /// The operation that failed.
         reason: String,
     },
-    /// The disk, or the network that it is behind, fails.
+    /// Reading or writing the disk failed, or the network to it.
     #[error(
         "reading or writing the library's file failed ({reason}): check the system log for \
              disk errors; acknowledged results are stored: repeat the command to continue"
     )]
     Disk {
-        /// What failed.
+        /// The operation that failed.
         reason: String,
     },
-    /// A file of the library can't be opened though the library is.
+    /// A file of an open library cannot be opened.
     #[error(
         "a file of the library could not be opened ({reason}): check that its folder exists \
              and is writable, and the limit of open files (ulimit -n)"
     )]
     NotOpened {
-        /// What failed.
+        /// The operation that failed.
         reason: String,
     },
-    /// Another process writes for longer than anybody waits.
+    /// Another process has been writing for longer than the timeout of 30 s.
     #[error(
         "another program has been writing to the library for longer than 30 s: stop it, or \
              try again later; on a network file system the locks may not work: use a local disk"
     )]
     Busy,
-    /// The database does not answer now, and may later.
+    /// The database does not respond at present. A later call may succeed.
     #[error("the library's database does not respond: {reason}")]
     Unavailable {
-        /// What was found.
+        /// Cause.
         reason: String,
     },
-    /// The file was removed or replaced while it was open.
+    /// The library's file was removed or replaced while it was open.
     #[error(
         "library {library}: its file was removed, moved or replaced while it was open; \
              restore it, or stop and start again"
     )]
     FileGone {
-        /// The library.
+        /// Path of the library.
         library: String,
     },
-    /// There is no room for what should be written.
+    /// The disk is full.
     #[error("the library's disk is full; no data is lost: free space and repeat the command")]
     DiskFull,
-    /// The database failed.
+    /// Any other error of the database.
     #[error("the library's database failed")]
     Database(#[source] sqlx::Error),
-    /// A change of the schema failed.
+    /// An update of the schema failed.
     #[error("the library's schema cannot be updated")]
     Migration(#[source] MigrateError),
 }
 
 impl LibraryError {
-    /// Whether the user asked for what cannot be, rather than something having failed.
+    /// Whether the input of the user is the cause, and not a failure.
     pub const fn is_wrong_input(&self) -> bool {
         matches!(
             self,
@@ -309,7 +309,7 @@ impl LibraryError {
         )
     }
 
-    /// Whether the operation may succeed later, after a repair of the machine.
+    /// Whether the operation may succeed later, for example after the machine is repaired.
     pub const fn is_temporary(&self) -> bool {
         matches!(
             self,
@@ -317,7 +317,7 @@ impl LibraryError {
         )
     }
 
-    /// Whether what was read is to blame, not the way to it.
+    /// Whether the data that were read are invalid, in contrast to a failure of reading.
     pub(crate) fn is_of_the_data(&self) -> bool {
         match self {
             Self::Malformed { .. } | Self::Damaged { .. } | Self::Altered { .. } => true,
@@ -328,12 +328,12 @@ impl LibraryError {
         }
     }
 
-    /// Whether what is in the database is to blame, its schema included.
+    /// Whether the content of the database is the cause, its schema included.
     pub(crate) fn is_of_the_database(&self) -> bool {
         matches!(self, Self::Database(_)) || self.is_of_the_data()
     }
 
-    /// Whether rows that were to be written are to blame: their cells, or what they refer to.
+    /// Whether the rows to be written are the cause: their cells, or their references.
     pub(crate) fn is_about_rows(&self) -> bool {
         match self {
             Self::BadRow { .. } | Self::OtherDefinition { .. } => true,
@@ -342,7 +342,7 @@ impl LibraryError {
         }
     }
 
-    /// A database without a response for this time.
+    /// Error of a database that has not responded for this time.
     pub(crate) fn silent(for_so_long: Duration) -> Self {
         Self::Unavailable { reason: format!("no response within {} s", for_so_long.as_secs()) }
     }
@@ -352,22 +352,23 @@ impl LibraryError {
     }
 }
 
-/// The class of PostgreSQL's codes for a connection that broke; and single codes for a server that
-/// stops, was stopped, or is not up yet, has no connection left, and for transactions that should
-/// simply be tried again.
+/// Class of PostgreSQL's codes for a broken connection. The single codes are for a server that stops, was
+/// stopped, is starting, or has no free connection, and for transactions that should be repeated.
 const POSTGRES_BROKEN: &str = "08";
 const POSTGRES_LATER: [&str; 6] = ["57P01", "57P02", "57P03", "53300", "40001", "40P01"];
 
-/// A file or a folder that may only be read; a transaction that only reads; a role without the right.
+/// Codes for a read-only file or folder, a read-only transaction, and a role without the right to write.
 const NOT_WRITABLE: [&str; 5] = ["8", "776", "1544", "25006", "42501"];
 
-/// `SQLite`'s codes for a malformed file, PostgreSQL's for a malformed page, index or a missing file.
+/// Codes for damage: a malformed file (`SQLite`); a malformed page or index, or a missing file
+/// (PostgreSQL).
 const MALFORMED: [&str; 8] = ["11", "26", "267", "523", "779", "XX001", "XX002", "58P01"];
 
-/// Server-side disk full.
+/// Code of PostgreSQL for a full disk.
 const POSTGRES_FULL: &str = "53100";
 
-/// Constraints that a row breaks: all of `SQLite`'s kinds of it; PostgreSQL's classes of constraints and of data.
+/// Whether a code is for a violated constraint: all such codes of `SQLite`, and PostgreSQL's classes for
+/// constraints and for data.
 fn is_constraint(code: &str) -> bool {
     if code.len() == 5 {
         return code.starts_with("23") || code.starts_with("22");

@@ -1,4 +1,4 @@
-//! Opening and closing a library; the connections to it.
+//! Opening and closing of a library.
 
 use crate::LibraryError;
 use crate::engine::{self, Connection, FileLock, Opened, Readers, Target, Write, iso_utc, sql};
@@ -13,26 +13,26 @@ pub struct Library {
     cursor: Arc<QueueCursor>,
 }
 
-/// The right to hand out a library's cases, until it is dropped.
+/// The right to lease a library's cases, until it is dropped.
 #[derive(Debug)]
 pub struct Claim {
     lock: Option<FileLock>,
 }
 
 impl Claim {
-    /// Whether this process alone leases cases, so that existing leases belong to no running
-    /// worker.
+    /// Whether only this process can lease cases. Then existing leases belong to workers that no longer
+    /// run.
     pub const fn is_exclusive(&self) -> bool {
         self.lock.is_some()
     }
 }
 
 impl Library {
-    /// Opens the library at `sqlite:PATH` or `postgres://...`, bringing its schema up to date.
+    /// Opens the library at `sqlite:PATH` or `postgres://...`, and updates its schema.
     ///
     /// # Errors
-    /// [`LibraryError`] when the URL is none, nothing is there, it is no library, or a later
-    /// version of the program has written it.
+    /// Returns [`LibraryError`] if the URL is invalid, if nothing or something other than a library exists
+    /// there, or if a later version of the program has written it.
     pub async fn open(url: &str) -> Result<Self, LibraryError> {
         let library = Self::of(engine::open(url).await?);
         match library.add_missing_bins().await {
@@ -42,10 +42,10 @@ impl Library {
         }
     }
 
-    /// Opens the library at `sqlite:PATH` or `postgres://...`, or makes an empty one there.
+    /// Opens the library at `sqlite:PATH` or `postgres://...`, or creates an empty one.
     ///
     /// # Errors
-    /// As [`Library::open`]; and when its folder does not exist.
+    /// As [`Library::open`], and [`LibraryError::NoFolder`] if the folder does not exist.
     pub async fn open_or_create(url: &str) -> Result<Self, LibraryError> {
         Ok(Self::of(engine::open_or_create(url).await?))
     }
@@ -65,37 +65,37 @@ impl Library {
     /// an internal error of the program during a write, or after the connection to the file was lost.
     ///
     /// # Errors
-    /// Why not: [`LibraryError::Closed`] or [`LibraryError::Lost`]. A restart is required.
+    /// Returns [`LibraryError::Closed`] or [`LibraryError::Lost`]. The program must be restarted.
     pub fn takes_writes(&self) -> Result<(), LibraryError> {
         self.opened.writer.runs()
     }
 
-    /// Its name: its file, or its URL without user and password.
+    /// Name of the library: the path of its file, or its URL without password.
     pub fn name(&self) -> String {
         self.opened.target.name()
     }
 
-    /// Its file, where it is in one.
+    /// Path of the library's file; `None` for a library on a server.
     pub fn path(&self) -> Option<&Path> {
         self.opened.target.path()
     }
 
-    /// The library's clock, in ms since 1970: what leases are given and ended by.
+    /// Present time of the library's clock, in ms since 1970. Leases begin and end by this clock.
     ///
-    /// With `SQLite` it is this machine's. With PostgreSQL it is the server's, so that coordinators
-    /// with different or adjusted clocks agree on the end of a lease.
+    /// With `SQLite` it is the clock of this machine, with PostgreSQL that of the server. Coordinators
+    /// whose clocks differ or are adjusted therefore agree on the end of a lease.
     pub fn now_unix_ms(&self) -> i64 {
         self.opened.clock.unix_ms()
     }
 
-    /// Claims the right to lease cases. With `SQLite` one process at a time has it; with PostgreSQL
+    /// Claims the right to lease cases. With `SQLite`, one process at a time can have it; with PostgreSQL,
     /// any number of processes.
     ///
-    /// The system takes it back when the process ends, however it ends.
+    /// The operating system releases the claim when the process ends for any reason.
     ///
     /// # Errors
-    /// [`LibraryError::InUse`] when another process has it; [`LibraryError::NoLocks`] where the file system
-    /// has no locks.
+    /// Returns [`LibraryError::InUse`] if another process has the claim; [`LibraryError::NoLocks`] if the
+    /// file system has no locks.
     pub fn claim(&self) -> Result<Claim, LibraryError> {
         let Some(path) = self.opened.target.path() else { return Ok(Claim { lock: None }) };
         match FileLock::try_take(path) {
@@ -105,19 +105,20 @@ impl Library {
         }
     }
 
-    /// Finds out whether this program may write at all.
+    /// Checks that this program has the right to write to the library.
     ///
     /// # Errors
-    /// [`LibraryError::NotWritable`] when it may not, or when the library does not answer.
+    /// Returns [`LibraryError::NotWritable`] if it has not, or another error if the library does not
+    /// respond.
     pub async fn check_writable(&self) -> Result<(), LibraryError> {
         self.write(CheckWritable).await
     }
 
-    /// Checks whether the database is intact, so that nothing is added to a damaged one. With `SQLite` it
-    /// reads the file once. A PostgreSQL server checks the pages that it reads by itself.
+    /// Checks that the database is intact, so that nothing is added to a damaged one. With `SQLite`, the
+    /// check reads the whole file. A PostgreSQL server checks each page itself when it reads the page.
     ///
     /// # Errors
-    /// [`LibraryError::Malformed`] when it is not.
+    /// Returns [`LibraryError::Malformed`] if the database is damaged.
     pub async fn check_whole(&self) -> Result<(), LibraryError> {
         self.readers().refuse_malformed().await
     }
@@ -138,7 +139,7 @@ impl Library {
         self.opened.writer.write(write).await
     }
 
-    /// Stores something with the time that it is.
+    /// Stores a record with the present time.
     pub(crate) async fn write_dated<T>(
         &self,
         it: T,
@@ -150,14 +151,14 @@ impl Library {
     }
 }
 
-/// Something that is stored, and when that is.
+/// A record with the time of storing it.
 pub(crate) struct Dated<T> {
     pub(crate) it: T,
-    /// By the library's clock, as ISO 8601.
+    /// Time by the library's clock, as ISO 8601.
     pub(crate) at: String,
 }
 
-/// Changes nothing.
+/// A write that changes nothing.
 struct CheckWritable;
 
 impl Write for CheckWritable {

@@ -6,48 +6,49 @@ use crate::{CampaignState, Library, LibraryError, Status};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// Number of failure causes distinguished per campaign.
+/// Maximum number of different failure causes per campaign.
 const CAUSES_MAX: usize = 20;
 
-/// Errors of a campaign that are read for its causes, the most frequent first.
+/// Maximum number of error messages of a campaign that are read to find its causes; the most frequent
+/// first.
 const ERRORS_MAX: u32 = 2000;
 
 /// Overview of a campaign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CampaignOverview {
-    /// Its id.
+    /// Id of the campaign.
     pub id: String,
-    /// Its name.
+    /// Name of the campaign.
     pub name: String,
-    /// Whether its cases are leased.
+    /// State of the campaign: running, paused or cancelled.
     pub state: CampaignState,
-    /// The larger goes first.
+    /// Priority; campaigns with a larger number are leased first.
     pub priority: i32,
-    /// When it came, as ISO 8601.
+    /// Time at which the campaign was stored, as ISO 8601.
     pub created_at: String,
-    /// Counts of its cases by state.
+    /// Number of cases by state.
     pub status: Status,
-    /// Cases finished a second: in the last minute or a little more, or since the campaign's first
-    /// results, or the first after a pause.
+    /// Cases finished per second. The average is over the last minute or slightly more, but not before the
+    /// first results of the campaign or the first results after a pause.
     pub per_second: f64,
-    /// Mean computing time of these cases, in s.
+    /// Mean computing time of these cases, in s; `None` without results.
     pub mean_case_s: Option<f64>,
-    /// Why cases were given up, the most frequent first.
+    /// Causes of given-up cases, the most frequent first.
     pub causes: Vec<Cause>,
 }
 
-/// Why cases were given up.
+/// A cause of given-up cases.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cause {
-    /// Error of the last attempt; errors that differ in numbers only are grouped, with dots for the
-    /// numbers.
+    /// Error message of the last attempt. Messages that differ only in numbers are grouped, with dots
+    /// instead of the numbers.
     pub error: String,
-    /// How many cases.
+    /// Number of cases with this cause.
     pub cases: u32,
 }
 
 impl Library {
-    /// Overview of all campaigns, oldest first; the cost does not depend on the number of cases.
+    /// Overview of all campaigns, oldest first. The cost does not depend on the number of cases.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -77,7 +78,7 @@ impl Library {
     }
 }
 
-/// Errors that differ in their numbers only taken together; the most frequent first.
+/// Groups errors that differ only in numbers; the most frequent first.
 fn alike(errors: Vec<Cause>) -> Vec<Cause> {
     let mut kinds: BTreeMap<String, Vec<Cause>> = BTreeMap::new();
     for cause in errors {
@@ -94,7 +95,7 @@ fn alike(errors: Vec<Cause>) -> Vec<Cause> {
     causes
 }
 
-/// The text with dots for its numbers; digits of a name, as in `level_50_Hz`, stay.
+/// Replaces numbers in a text by dots. Digits within a name, as in `level_50_Hz`, are kept.
 fn without_numbers(text: &str) -> String {
     let is_name = |it: char| it.is_alphanumeric() || it == '_';
     let words = text.split_inclusive(|it: char| !is_name(it) && !".+-".contains(it));
@@ -107,7 +108,7 @@ fn without_numbers(text: &str) -> String {
     shown.collect()
 }
 
-/// The overview of a campaign from its row and throughput.
+/// Creates the overview of a campaign from its row and throughput.
 fn overview(row: &Row, throughput: Throughput) -> Result<CampaignOverview, LibraryError> {
     let priority: i64 = row.get("priority")?;
     Ok(CampaignOverview {

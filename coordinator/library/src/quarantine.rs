@@ -1,22 +1,23 @@
-//! Quarantine: who is in it gets no cases.
+//! Quarantine of workers. A worker in quarantine gets no cases.
 
 use crate::engine::{Connection, Write, sql};
 use crate::{Library, LibraryError, WorkerState, result};
 
 impl Library {
-    /// Puts a worker into quarantine: it gets no more cases, and its results are flagged with the
-    /// reason; answers how many. [`crate::Retry::Flagged`] has them computed again.
+    /// Puts a worker into quarantine. The worker gets no more cases, and its results are flagged with
+    /// `reason`. Returns the number of flagged results; [`crate::Retry::Flagged`] simulates their cases
+    /// again.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownWorker`], or when the library cannot be written.
+    /// Returns [`LibraryError::UnknownWorker`], or an error if the library cannot be written.
     pub async fn flag_worker(&self, worker: &str, reason: &str) -> Result<u64, LibraryError> {
         self.write(Flag { worker: worker.to_owned(), reason: reason.to_owned() }).await
     }
 
-    /// Gives cases to a worker again. Its flagged results stay flagged.
+    /// Releases a worker from quarantine. Its flagged results stay flagged.
     ///
     /// # Errors
-    /// [`LibraryError::UnknownWorker`], or when the library cannot be written.
+    /// Returns [`LibraryError::UnknownWorker`], or an error if the library cannot be written.
     pub async fn pardon_worker(&self, worker: &str) -> Result<(), LibraryError> {
         self.write(Pardon { worker: worker.to_owned() }).await
     }
@@ -25,7 +26,7 @@ impl Library {
 /// Sets a worker's state and the reason for it.
 const SET: &str = "update worker set state = $2, reason = $3, failures_in_a_row = 0 where id = $1";
 
-/// Puts a worker into quarantine for a reason, or lifts it.
+/// Puts a worker into quarantine, or releases it if `reason` is `None`.
 async fn set_quarantine(
     connection: &mut Connection,
     worker: &str,
@@ -39,7 +40,7 @@ async fn set_quarantine(
     Ok(())
 }
 
-/// Lifts it.
+/// A write that releases a worker from quarantine.
 struct Pardon {
     worker: String,
 }
@@ -56,7 +57,7 @@ impl Write for Pardon {
     }
 }
 
-/// Imposes it, and flags the worker's results.
+/// A write that puts a worker into quarantine and flags its results.
 pub(crate) struct Flag {
     pub(crate) worker: String,
     pub(crate) reason: String,

@@ -1,4 +1,4 @@
-//! Glances at results: one entry, the newest, and what part of the parameter space is covered.
+//! Single results: one entry, the newest entries, and the covered part of the parameter space.
 
 use crate::case::case_of;
 use crate::engine::sql;
@@ -7,7 +7,7 @@ use crate::{Library, LibraryEntry, LibraryError};
 use tracktwin_parameters::ParameterSet;
 
 impl Library {
-    /// A finished case with its features, if it is one.
+    /// Returns a finished case with its features; `None` if the case has no results.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -24,8 +24,8 @@ impl Library {
         Ok(Some(LibraryEntry { case: case_of(first)?, features }))
     }
 
-    /// The finished cases with the largest indices, at the fastest speed: cases are leased in
-    /// order, so these are the newest, or nearly.
+    /// Returns the finished cases with the largest indices, with their features at the highest speed only.
+    /// Cases are leased in order of index, so these are approximately the newest.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -44,8 +44,8 @@ impl Library {
         rows.iter().map(entry).collect()
     }
 
-    /// Parameters of the first `limit` finished cases; any first part of a Sobol sequence covers the
-    /// space evenly.
+    /// Returns the parameters of the first `limit` finished cases. Any first part of a Sobol sequence
+    /// covers the parameter space evenly.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.

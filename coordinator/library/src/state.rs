@@ -1,14 +1,14 @@
-//! The states of campaigns and cases, and the ways an attempt at a case ends.
+//! States of campaigns and cases, and endings of attempts.
 //!
-//! `docs/case-states.md` draws them.
+//! See `docs/case-states.md` for a diagram.
 
 use crate::LibraryError;
 
-/// The one of `all` that is stored as `name`. What another version of the program, or another hand, has
-/// stored is not taken for something else.
+/// Returns the element of `all` that is stored as `name`. A name that this program version does not define
+/// is an error.
 ///
 /// # Errors
-/// [`LibraryError::Damaged`] names the row that is in an unknown state.
+/// Returns [`LibraryError::Damaged`] with a description of the row `of`.
 pub(crate) fn named<T: Copy, const N: usize>(
     of: &str,
     name: &str,
@@ -24,13 +24,13 @@ pub(crate) fn named<T: Copy, const N: usize>(
 /// State of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
-    /// Nobody works on it.
+    /// The case waits for a worker.
     Waiting,
-    /// A worker holds it.
+    /// The case is leased to a worker.
     Leased,
-    /// Its results are stored.
+    /// The results of the case are stored.
     Finished,
-    /// It was given up: it failed, or lost its worker, too often.
+    /// The case was given up after too many failures or lost workers.
     Failed,
 }
 
@@ -45,26 +45,26 @@ impl State {
     }
 
     /// # Errors
-    /// [`LibraryError::Damaged`] where there is no such state.
+    /// Returns [`LibraryError::Damaged`] if there is no such state.
     pub(crate) fn from_name(name: &str) -> Result<Self, LibraryError> {
         let all = [Self::Waiting, Self::Leased, Self::Finished, Self::Failed];
         named("a case", name, all, Self::name)
     }
 }
 
-/// Whether cases of a campaign are leased.
+/// State of a campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CampaignState {
-    /// They are.
+    /// Cases are leased.
     Running,
-    /// No cases are leased; leased ones are finished.
+    /// No cases are leased; workers finish those already leased.
     Paused,
-    /// No cases are leased, and leases have ended.
+    /// No cases are leased, and existing leases were ended.
     Cancelled,
 }
 
 impl CampaignState {
-    /// As the library and people spell it.
+    /// Name in the library, on pages and in messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Running => "running",
@@ -74,13 +74,13 @@ impl CampaignState {
     }
 
     /// # Errors
-    /// [`LibraryError::Damaged`] where there is no such state.
+    /// Returns [`LibraryError::Damaged`] if there is no such state.
     pub(crate) fn from_name(name: &str) -> Result<Self, LibraryError> {
         named("a campaign", name, [Self::Running, Self::Paused, Self::Cancelled], Self::name)
     }
 }
 
-/// How an attempt ended that brought no result.
+/// Ending of an attempt without result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ending {
     /// The worker could not simulate the case.
@@ -89,18 +89,18 @@ pub(crate) enum Ending {
     Lost,
 }
 
-/// After how many attempts without result a case is given up.
+/// Number of attempts without result after which a case is given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AttemptsMax {
-    /// Where the last one failed: so many that failed.
+    /// Limit after a failure: number of failed attempts.
     pub failed: u32,
-    /// Where the last one's worker was lost: so many that were without result.
+    /// Limit after the loss of a worker: number of all attempts without result.
     pub lost: u32,
 }
 
 impl AttemptsMax {
-    /// Where a case stands after so many attempts, the last of which ended so: those that failed where it failed, all
-    /// that were without result where it was lost.
+    /// State of a case after its last attempt ended with `ending`. `attempts` is the number of failed
+    /// attempts after a failure, and the number of all attempts without result after a lost worker.
     pub(crate) const fn after(self, ending: Ending, attempts: u32) -> State {
         let most = match ending {
             Ending::Failed => self.failed,

@@ -1,13 +1,13 @@
-//! Sums over reports: the counts in the table `worker`, and the table `progress`.
+//! Sums over reports: counts in the table `worker`, and the table `progress`.
 
 use crate::engine::{Connection, Text, sql};
 use crate::{LibraryError, Report, ReportVerdict};
 use tracktwin_experiment::Outcome;
 
-/// Length of the intervals of the progress counts in s.
+/// Length of the intervals of the table `progress`, in s.
 pub(crate) const INTERVAL_S: i64 = 10;
 
-/// Adds to a worker's ($1) counts; answers why its results are not to be trusted, if so.
+/// Adds to the counts of worker $1. Returns the reason of its quarantine, if it is in quarantine.
 const ADD_TO_WORKER: &str = "
     update worker set cases_finished = cases_finished + $2, cases_failed = cases_failed + $3, busy_s = busy_s + $4,
         failures_in_a_row = case when $2 > 0 then $5 else failures_in_a_row + $5 end,
@@ -15,7 +15,7 @@ const ADD_TO_WORKER: &str = "
     where id = $1
     returning case when state = 'quarantined' then reason end as quarantine";
 
-/// Adds to what was done of a campaign ($1) in an interval ($2). On a server each connection adds to a row of its own,
+/// Adds to the progress of campaign $1 in interval $2. On a server, each connection adds to a separate row,
 /// so that none waits for another.
 const ADD_TO_PROGRESS: Text = Text::Each {
     sqlite: "
@@ -40,12 +40,12 @@ pub(crate) struct Tally<'a> {
     finished: u32,
     failed: u32,
     busy_s: f64,
-    /// Failures after the last finished case.
+    /// Number of failures after the last finished case of the report.
     failed_since: u32,
 }
 
 impl<'a> Tally<'a> {
-    /// Counts what was stored.
+    /// Counts the results and failures that were stored.
     pub(crate) fn of(report: &'a Report, verdicts: &[ReportVerdict]) -> Self {
         let mut tally = Self { report, finished: 0, failed: 0, busy_s: 0.0, failed_since: 0 };
         for (case, verdict) in report.cases.iter().zip(verdicts) {
@@ -65,7 +65,7 @@ impl<'a> Tally<'a> {
         tally
     }
 
-    /// Adds it; answers why the worker's results are not to be trusted, if so.
+    /// Stores the counts. Returns the reason of the worker's quarantine, if it is in quarantine.
     pub(crate) async fn store(
         &self,
         connection: &mut Connection,
@@ -92,7 +92,7 @@ impl<'a> Tally<'a> {
     }
 }
 
-/// When the interval of an instant began, in s since 1970.
+/// Start of the interval that contains this instant, in s since 1970.
 pub(crate) const fn interval(unix_ms: i64) -> i64 {
     unix_ms.div_euclid(1000 * INTERVAL_S) * INTERVAL_S
 }

@@ -5,23 +5,24 @@ use crate::tally::{INTERVAL_S, interval};
 use crate::{Library, LibraryError};
 use std::collections::HashMap;
 
-/// Averaging time of the rate in s; the current interval is added.
+/// Averaging time of the rate in s; the current interval is added to it.
 const OVER_S: i64 = 60;
 
-/// Shortest averaging time in s: a first report in a new interval must not give an excessive rate.
+/// Minimum averaging time in s. It prevents an excessive rate after the first report in a new interval.
 const SHORTEST_S: f64 = 1.0;
 
-/// A time without results is a pause if this many results were expected in it at the later rate.
+/// An interval without results is a pause if at least this number of results was expected at the later
+/// rate.
 const MISSING_IN_A_PAUSE: f64 = 10.0;
 
-/// It must also be longer than a worker needs for this number of cases, some of which it reports
-/// together.
+/// A pause must also be longer than a worker needs for this number of cases, because a worker reports
+/// several cases together.
 const CASES_IN_A_PAUSE: f64 = 16.0;
 
 /// Throughput of a campaign.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Throughput {
-    /// Cases finished a second.
+    /// Cases finished per second.
     pub(crate) per_second: f64,
     /// Mean computing time of a case, in s.
     pub(crate) mean_case_s: Option<f64>,
@@ -36,7 +37,7 @@ struct Interval {
 }
 
 impl Library {
-    /// Throughput of campaigns with results in the last minute.
+    /// Throughput of each campaign with results in the last minute.
     pub(crate) async fn throughputs(&self) -> Result<HashMap<String, Throughput>, LibraryError> {
         let now_unix_ms = self.now_unix_ms();
         let since_unix_s = interval(now_unix_ms) - OVER_S;
@@ -64,7 +65,8 @@ impl Library {
     }
 }
 
-/// Throughput over these ascending intervals: since `begun_unix_s`, or since the last pause.
+/// Throughput over these intervals, in ascending order. It starts at `begun_unix_s` or at the end of the
+/// last pause.
 fn throughput(intervals: &[Interval], begun_unix_s: i64, now_unix_s: f64) -> Throughput {
     let all: f64 = intervals.iter().map(|it| it.finished).sum();
     let busy_s: f64 = intervals.iter().map(|it| it.busy_s).sum();
@@ -91,7 +93,8 @@ fn throughput(intervals: &[Interval], begun_unix_s: i64, now_unix_s: f64) -> Thr
 mod tests {
     use super::*;
 
-    /// Intervals that begin so many seconds after 1970, with cases of so many seconds.
+    /// Intervals from pairs of start (in s since 1970) and number of finished cases, with `case_s` seconds
+    /// per case.
     fn intervals(finished: &[(i64, f64)], case_s: f64) -> Vec<Interval> {
         let interval = |&(from_unix_s, finished): &(i64, f64)| Interval {
             from_unix_s,

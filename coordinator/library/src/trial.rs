@@ -1,7 +1,7 @@
 //! Blind trials: the tables `trial`, `trial_case`, `trial_answer` and `trial_lease`.
 //!
-//! Any number of machines share a trial. They derive the open cases from the stored answers; this
-//! table holds the leases, and each answer is stored once.
+//! Several machines can share a trial. A machine derives the open cases from the stored answers. The table
+//! `trial_lease` has the leases, and each answer is stored once.
 
 use crate::campaign::sql_seed;
 use crate::engine::{Connection, Row, Statement, Text, Write, sql};
@@ -9,10 +9,10 @@ use crate::library::Dated;
 use crate::state::named;
 use crate::{DiagnosisRecord, Library, LibraryError};
 
-/// Hexadecimal digits of the hash in a trial's id.
+/// Number of hexadecimal digits of the hash in a trial's id.
 const HASH_DIGITS: usize = 12;
 
-/// Cases sealed in one statement, of three values each.
+/// Number of cases sealed in one statement; each has three values.
 const SEALS_A_STATEMENT: usize = 1000;
 
 /// Stores a trial; an existing one is kept unchanged.
@@ -20,8 +20,8 @@ const INSERT: &str = "
     insert into trial (id, seed, code_version, model_hash, created_at) values ($1, $2, $3, $4, $5)
     on conflict (id) do nothing";
 
-/// Leases until $5 to worker $3 the first of a trial's ($1) cases ($2) that no other worker holds
-/// at $4.
+/// Leases to worker $3 until $5 the first of a trial's ($1) cases ($2) that no other worker holds at time
+/// $4.
 const TAKE: Text = Text::Each {
     sqlite: "
         with next as (
@@ -55,61 +55,61 @@ const TAKE: Text = Text::Each {
         returning case_number",
 };
 
-/// Lets a lease last until $4, if it is the worker's still.
+/// Extends a lease until $4 if the worker still has it.
 const RENEW: &str = "
     update trial_lease set lease_expires_unix_ms = $4
     where trial_id = $1 and case_number = $2 and worker = $3";
 
-/// Gives a case back.
+/// Deletes the lease of a case.
 const RELEASE: &str =
     "delete from trial_lease where trial_id = $1 and case_number = $2 and worker = $3";
 
-/// Keeps an answer; a question that is answered already stays as it is.
+/// Stores an answer. An existing answer to the same question is kept.
 const INSERT_ANSWER: &str = "
     insert into trial_answer (trial_id, case_number, question, diagnosis_id, score, worker, answered_at)
     values ($1, $2, $3, $4, $5, $6, $7)
     on conflict (trial_id, case_number, question) do nothing";
 
-/// A trial as the library keeps it.
+/// A blind trial as stored in the library.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrialRecord {
-    /// Decides what is hidden in which case; below 2^63.
+    /// Seed that determines the hidden extensions of each case; below 2^63.
     pub seed: u64,
     /// Version of the program.
     pub code_version: String,
-    /// Hash of the physics that it simulates.
+    /// Hash of the simulated physics.
     pub model_hash: String,
     /// SHA-256 of each case's truth, from case 0.
     pub seals: Vec<String>,
 }
 
-/// Tests of a case.
+/// Questions that a trial asks about a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Question {
-    /// A diagnosis that knows the whole catalogue.
+    /// Diagnosis with the whole catalogue.
     Catalogue,
-    /// A diagnosis that does not know what is hidden.
+    /// Diagnosis without the hidden kind in the catalogue (knock-out).
     KnockedOut,
-    /// A diagnosis of shuffled sleepers.
+    /// Diagnosis of the recording with shuffled sleepers.
     Shuffled,
-    /// The paper's own pipeline.
+    /// Evaluation with the method of the paper.
     Paper,
 }
 
-/// A question answered and scored.
+/// The scored answer to one question.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrialAnswer {
     /// Number of the case.
     pub number: u32,
-    /// The test.
+    /// The question.
     pub question: Question,
-    /// The score, as JSON.
+    /// Score of the answer, as JSON.
     pub score_json: String,
 }
 
 impl TrialRecord {
-    /// Seed and hash of the program: nodes whose programs differ don't share a trial. The number is
-    /// the format of its cases.
+    /// Id of the trial: the seed, and a hash of seed and program. Machines with different programs
+    /// therefore do not share a trial. The number in the hashed text is the version of the format of cases.
     pub fn id(&self) -> String {
         let hash = crate::provenance::id(
             "tracktwin trial 2",
@@ -120,16 +120,16 @@ impl TrialRecord {
 }
 
 impl Library {
-    /// Stores a trial's seals, or makes sure that they are those that are stored; a longer trial of
-    /// the same seed adds to a shorter one.
+    /// Stores a trial's seals. Seals that are already stored must be equal. A longer trial with the same
+    /// seed adds its cases to a shorter one.
     ///
     /// # Errors
-    /// [`LibraryError::OtherTruth`] when a case is sealed with another truth.
+    /// Returns [`LibraryError::OtherTruth`] if a case was sealed with another truth.
     pub async fn seal_trial(&self, trial: TrialRecord) -> Result<(), LibraryError> {
         self.write_dated(trial).await
     }
 
-    /// All answers of a trial, by case.
+    /// Returns all answers of a trial, by case number.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -140,8 +140,8 @@ impl Library {
         rows.iter().map(answer).collect()
     }
 
-    /// Leases the first of these cases that no other worker holds; a worker gets back its own case
-    /// that it could not release.
+    /// Leases the first of these cases that no other worker holds. If the worker itself holds a case that
+    /// it could not release, it gets this case again.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -159,7 +159,7 @@ impl Library {
         self.write(ClaimQuestion { trial, worker, of, now_unix_ms, until_unix_ms }).await
     }
 
-    /// Lets a lease last for so long from now, if it is the worker's still.
+    /// Extends a lease by this duration from now, if the worker still has it.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -175,7 +175,7 @@ impl Library {
         self.write(RenewOrRelease { trial, worker, number, until_unix_ms }).await
     }
 
-    /// Gives a case back.
+    /// Releases a case.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -189,8 +189,8 @@ impl Library {
         self.write(RenewOrRelease { trial, worker, number, until_unix_ms: None }).await
     }
 
-    /// Keeps an answer, and the diagnosis that it is the score of; a question that is answered
-    /// already stays as it is.
+    /// Stores an answer, and the diagnosis to which its score belongs. An existing answer to the same
+    /// question is kept.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -291,7 +291,7 @@ impl Write for ClaimQuestion {
     }
 }
 
-/// Renews a lease until then, or releases it.
+/// A write that extends a lease until this time, or releases it.
 struct RenewOrRelease {
     trial: String,
     worker: String,

@@ -1,77 +1,77 @@
-//! The table `worker`: who works for the farm, as all coordinators see it.
+//! The table `worker`: the farm's workers, shared by all coordinators.
 
 use crate::engine::{Connection, Row, Write, sql};
 use crate::state::named;
 use crate::{Library, LibraryError};
 
-/// Whether a worker is given cases.
+/// Whether cases are leased to a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum WorkerState {
-    /// It is.
+    /// Cases are leased to the worker.
     Active,
-    /// It is not: something speaks against its results.
+    /// No cases are leased to the worker, because a result of it was wrong.
     Quarantined,
 }
 
 /// Registration of a worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Registration {
-    /// Its name; one that comes again under the same name keeps its counts.
+    /// Name of the worker. A worker that registers again under the same name keeps its counts.
     pub worker: String,
-    /// Version of its program.
+    /// Version of the worker's program.
     pub code_version: String,
-    /// Hash of its physics.
+    /// Hash of the worker's physics.
     pub model_hash: String,
-    /// Groups of cases it simulates at a time.
+    /// Number of groups of cases that it simulates in parallel.
     pub cores: u32,
-    /// The library's clock.
+    /// Present time of the library's clock, in ms since 1970.
     pub now_unix_ms: i64,
 }
 
-/// A worker as the library knows it.
+/// A worker as stored in the library.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkerRecord {
-    /// Its name.
+    /// Name of the worker.
     pub id: String,
-    /// Version of its program.
+    /// Version of the worker's program.
     pub code_version: String,
-    /// Hash of its physics.
+    /// Hash of the worker's physics.
     pub model_hash: String,
-    /// Groups of cases it simulates at a time.
+    /// Number of groups of cases that it simulates in parallel.
     pub cores: u32,
-    /// Whether it is given cases.
+    /// Whether cases are leased to the worker.
     pub state: WorkerState,
-    /// Why not.
+    /// Reason of the quarantine.
     pub reason: Option<String>,
-    /// When it came first.
+    /// Time of the first registration, in ms since 1970.
     pub registered_unix_ms: i64,
-    /// Time of its last message.
+    /// Time of the last message, in ms since 1970.
     pub last_seen_unix_ms: i64,
-    /// Cases whose results it brought first.
+    /// Number of cases whose first result came from this worker.
     pub cases_finished: u32,
-    /// Attempts it reported as failed.
+    /// Number of failed attempts that it reported.
     pub cases_failed: u32,
-    /// Of these, the last ones without a finished case between.
+    /// Number of failed attempts since its last finished case.
     pub failures_in_a_row: u32,
     /// Computing time of its finished cases, in s.
     pub busy_s: f64,
 }
 
 impl WorkerRecord {
-    /// Why it is in quarantine, if it is.
+    /// Reason of the quarantine; `None` if the worker is not in quarantine.
     pub fn quarantine(self) -> Option<String> {
         let reason = self.reason.unwrap_or_else(|| "no reason given".to_owned());
         (self.state == WorkerState::Quarantined).then_some(reason)
     }
 
-    /// Mean computing time of a case, in s.
+    /// Mean computing time of its finished cases, in s; `None` if there are none.
     pub fn mean_case_s(&self) -> Option<f64> {
         (self.cases_finished > 0).then(|| self.busy_s / f64::from(self.cases_finished))
     }
 }
 
 impl Library {
-    /// Notes that a worker has come; answers whether it is to be given cases.
+    /// Registers a worker and returns its state. A known worker keeps its counts and its state.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -82,7 +82,7 @@ impl Library {
         self.write(registration).await
     }
 
-    /// Records a message of a worker; returns its record if it has registered.
+    /// Records a message of a worker and returns its record; `None` if the worker has not registered.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -94,7 +94,7 @@ impl Library {
         self.write(Heartbeat { worker: worker.to_owned(), now_unix_ms }).await
     }
 
-    /// Record of a worker, if it has ever registered.
+    /// Returns the record of a worker; `None` if it never registered.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -103,7 +103,7 @@ impl Library {
         self.readers().row(ask).await?.as_ref().map(record).transpose()
     }
 
-    /// Workers with a message since then, by name.
+    /// Returns the workers with a message since this time, by name.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -144,7 +144,7 @@ fn state(row: &Row) -> Result<WorkerState, LibraryError> {
     named("a worker", &name, [WorkerState::Active, WorkerState::Quarantined], WorkerState::name)
 }
 
-/// Notes that a worker has come; one that comes again keeps its counts and its state.
+/// Registers a worker. A known worker keeps its counts and its state.
 const REGISTER: &str = "
     insert into worker (id, code_version, model_hash, cores, registered_unix_ms, last_seen_unix_ms)
     values ($1, $2, $3, $4, $5, $5)

@@ -1,4 +1,4 @@
-//! The page of an evaluated recording.
+//! The page of an evaluation of a recording.
 
 use crate::UNDER_LOAD;
 use crate::inversion_page;
@@ -14,14 +14,14 @@ use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::Recording;
 
-/// Sleepers whose LWPS is shown.
+/// Number of sleepers with a chart of their LWPS.
 const SLEEPERS_SHOWN: usize = 4;
 
-/// The report of an evaluation: one sentence, pictures, estimates, provenance.
+/// Returns the HTML page of an evaluation: summary sentence, charts, estimates, provenance.
 ///
-/// `inversion` is the same recording's evaluation by the physics, if there is one. `recording` and
-/// `extractor` are those of the evaluation; of them come signal and maps. `command` is the command
-/// line that repeats it.
+/// `inversion` is the inversion of the same recording, if available. `recording` and `extractor` are those
+/// of the evaluation; signal and maps are computed from them. `command` is the command line that repeats
+/// the evaluation.
 pub fn evaluation_page(
     evaluation: &Evaluation,
     inversion: Option<&Inversion>,
@@ -59,13 +59,13 @@ pub fn evaluation_page(
     page(&format!("Track under {}", evaluation.recording), &summary(evaluation, recording), &body)
 }
 
-/// The notes that the banner does not say already.
+/// The notes that are not already in the banner.
 fn notes(evaluation: &Evaluation) -> impl Iterator<Item = &String> {
     let said = evaluation.outside_library.sentences();
     evaluation.notes.iter().filter(move |note| !said.contains(note))
 }
 
-/// Which estimates are not valid, and which library to make instead.
+/// Banner that lists invalid estimates and the required ranges of a new library.
 fn banner(evaluation: &Evaluation) -> Markup {
     let sentences = evaluation.outside_library.sentences();
     html! {
@@ -122,7 +122,7 @@ fn is_whole(sleeper: &SleeperEvaluation) -> bool {
     sleeper.flags.iter().all(|&flag| flag == Flag::AtEdgeOfRange)
 }
 
-/// Lowest to highest mean of a parameter over the sleepers with complete windows, or over all if
+/// Lowest and highest mean of a parameter over the sleepers with complete windows, or over all sleepers if
 /// there are none.
 fn range(evaluation: &Evaluation, parameter: Parameter) -> Option<String> {
     let valid = || evaluation.sleepers.iter().filter(|sleeper| sleeper.is_valid());
@@ -142,7 +142,7 @@ fn maps(evaluation: &Evaluation, recording: &Recording, extractor: &Extractor) -
     maps_at(middle.map(|sleeper| sleeper.x_m), recording, extractor)
 }
 
-/// Signal and maps around a place in m in the fastest pass.
+/// Signal and maps around a position in m, in the pass at the highest speed.
 pub(crate) fn maps_at(
     x_m: Option<f64>,
     recording: &Recording,
@@ -168,7 +168,7 @@ fn spectra(evaluation: &Evaluation) -> Vec<String> {
         .collect()
 }
 
-/// Mean absolute difference in dB between what was measured and the best match.
+/// Mean absolute difference between the measured level and the best match, in dB.
 fn match_db(sleeper: &SleeperEvaluation) -> Option<f64> {
     let differences: Vec<f64> = sleeper
         .measured

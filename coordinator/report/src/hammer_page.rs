@@ -1,4 +1,4 @@
-//! The page of a hammer test: stiffness along the sleepers, without load and under it (paper, Fig. 23).
+//! The page of a hammer test: stiffness along the sleepers, unloaded and under load (paper, Fig. 23).
 
 use crate::capital;
 use maud::{Markup, html};
@@ -6,16 +6,16 @@ use tracktwin_drawing::{Axis, Chart, Shown, figure, page, sheet, significant};
 use tracktwin_hammer::{Beside, HammerRecord, Interval, Loaded, NINETY_PER_CENT, Sleeper};
 use tracktwin_parameters::Parameter;
 
-/// Rows of the picture, as in the paper; bending stiffness follows where the test tells it.
+/// Parameters of the charts, as in the paper; bending stiffness follows if the test determines it.
 const ROWS: [Parameter; 3] =
     [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::SleeperBendingStiffness];
 const SIZE: [f64; 2] = [1104.0, 260.0];
 
-/// Sleepers whose names fit under the charts.
+/// Maximum number of sleeper names that fit below the charts.
 const NAMES: usize = 20;
 
-/// The report of a hammer test. `loaded` is the evaluation beside it, with the comparison; `command`
-/// repeats the evaluation.
+/// Returns the HTML page of a hammer test. `loaded` is the evaluation of a recording for comparison;
+/// `command` is the command line that repeats the evaluation.
 pub fn hammer_page(
     record: &HammerRecord,
     loaded: Option<(&Loaded, &[Beside])>,
@@ -42,7 +42,7 @@ pub fn hammer_page(
     page(&format!("Hammer test on {}", record.track), &summary(record), &body)
 }
 
-/// The charts of the page, one below the other, as the text of an SVG file.
+/// Returns the charts of the page, one below the other, as an SVG file.
 pub fn hammer_chart(record: &HammerRecord, loaded: Option<&Loaded>) -> String {
     let charts = charts(record, loaded);
     let size = [SIZE[0], charts.len() as f64 * SIZE[1]];
@@ -74,7 +74,7 @@ fn summary(record: &HammerRecord) -> String {
     )
 }
 
-/// A chart a parameter; bending stiffness only where the test tells it somewhere.
+/// One chart per parameter; bending stiffness only if the test determines it at some sleeper.
 fn charts(record: &HammerRecord, loaded: Option<&Loaded>) -> Vec<String> {
     let is_told = |parameter: &Parameter| {
         ROWS[..2].contains(parameter)

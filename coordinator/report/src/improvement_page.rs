@@ -1,4 +1,4 @@
-//! The page of an improvement: estimates of a recording without and with the physics that was left out.
+//! The page of an improvement: estimates without and with the left-out physics.
 
 use crate::diagnosis_page::confirmation;
 use maud::{Markup, html};
@@ -11,7 +11,7 @@ use tracktwin_number::significant;
 /// Name and version of the format.
 const FORMAT: &str = "tracktwin-improvement/1";
 
-/// Estimates of a recording without and with the physics that a diagnosis found.
+/// Estimates from a recording, without and with the physics that a diagnosis found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Improvement {
     /// Name and version of the format.
@@ -20,33 +20,33 @@ pub struct Improvement {
     pub recording: String,
     /// Kinds of physics that were added.
     pub physics: Vec<String>,
-    /// What withheld passes say of it, if a pass was withheld.
+    /// Result of the comparison with withheld passes, if a pass was withheld.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirmation: Option<Confirmation>,
-    /// The sleepers that both evaluations have.
+    /// The sleepers that are in both evaluations.
     pub sleepers: Vec<ImprovedSleeper>,
 }
 
-/// A sleeper's estimates, in N/m.
+/// Estimates at a sleeper without and with the added physics, in N/m.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImprovedSleeper {
-    /// Its name.
+    /// Id of the sleeper.
     pub id: String,
-    /// Its place along the track in m.
+    /// Position of the sleeper along the track, in m.
     pub x_m: f64,
-    /// Whether it is at the place of what was found.
+    /// Whether the sleeper is at the location of the added physics.
     pub is_at_place: bool,
-    /// Railpad stiffness.
+    /// Railpad stiffness in N/m.
     #[serde(rename = "railpad_stiffness_N_m")]
     pub railpad_stiffness: BeforeAfter<Estimate>,
-    /// Ballast stiffness.
+    /// Ballast stiffness in N/m.
     #[serde(rename = "ballast_stiffness_N_m")]
     pub ballast_stiffness: BeforeAfter<Estimate>,
 }
 
 impl Improvement {
-    /// From a diagnosis and the documents of two evaluations (`evaluation.json`); none where these have no
-    /// sleeper in common.
+    /// Creates the comparison from a diagnosis and the documents of two evaluations (`evaluation.json`).
+    /// Returns `None` if the evaluations have no sleeper in common.
     pub fn new(diagnosis: &Diagnosis, before: &Value, after: &Value) -> Option<Self> {
         let accepted = || diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
         let is_at_place = |id: &str| {
@@ -83,7 +83,7 @@ fn estimate(value: &Value) -> Option<Estimate> {
     Some(Estimate { mean: value["mean"].as_f64()?, sd: value["sd"].as_f64()? })
 }
 
-/// The page, beside the folders `diagnosis`, `before` and `after`.
+/// Returns the HTML page. It links to the folders `diagnosis`, `before` and `after` beside it.
 pub fn improvement_page(improvement: &Improvement, diagnosis: &Diagnosis) -> String {
     let body = html! {
         p {

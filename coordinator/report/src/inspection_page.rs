@@ -1,4 +1,4 @@
-//! Page of an inspection: content of a recording without a track model.
+//! Page of an inspection: content of a recording, without a track model.
 
 use maud::{Markup, html};
 use tracktwin_drawing::{Axis, Chart, figure, page};
@@ -6,53 +6,53 @@ use tracktwin_drawing::{Axis, Chart, figure, page};
 const SIZE: [f64; 2] = [1000.0, 320.0];
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
-/// A curve and its name.
+/// A named curve of a chart.
 pub struct InspectedCurve {
     /// Text of the legend.
     pub name: String,
-    /// Its points.
+    /// Points of the curve.
     pub points: Vec<(f64, f64)>,
 }
 
-/// A finding of the passes alone.
+/// A finding from the passes alone.
 pub struct Inspected {
-    /// Its kind.
+    /// Name of the physics.
     pub physics: String,
-    /// Where, in words.
+    /// Location, as text.
     pub place: String,
-    /// Probability to see as much without it.
+    /// Probability of such a finding by chance.
     pub p_value: f64,
-    /// Evidence.
+    /// Evidence, as text.
     pub evidence: String,
 }
 
-/// Everything that the page shows.
+/// Content of the page.
 pub struct InspectionReport {
-    /// The recording's name.
+    /// Name of the recording.
     pub name: String,
     /// Summary sentence.
     pub summary: String,
-    /// Rows of the table of passes; the first has the heads.
+    /// Rows of the table of passes; the first row is the header.
     pub passes: Vec<Vec<String>>,
-    /// Findings.
+    /// Findings from the passes alone.
     pub found: Vec<Inspected>,
-    /// Where the wheel loses contact with the rail, in a sentence.
+    /// Sentence on the positions at which the wheel loses contact with the rail, if there are any.
     pub loss_of_contact: Option<String>,
     /// Defects of unusable passes.
     pub pass_defects: Vec<String>,
-    /// Corrections made while reading, and doubts.
+    /// Corrections made while reading, and doubtful values.
     pub doubts: Vec<String>,
-    /// Possible uses of the recording, and limits.
+    /// Possible uses of the recording, and their limits.
     pub uses: Vec<String>,
-    /// Power spectral density in dB by frequency in Hz, a curve a pass.
+    /// Power spectral density in dB against frequency in Hz; one curve per pass.
     pub spectra: Vec<InspectedCurve>,
-    /// Level in dB by position in m, a curve a pass.
+    /// Level in dB against position in m; one curve per pass.
     pub levels: Vec<InspectedCurve>,
-    /// Unit of the accelerations.
+    /// Unit of the acceleration.
     pub unit: String,
 }
 
-/// The page of a recording that was inspected.
+/// Returns the HTML page of an inspection.
 pub fn inspection_page(inspection: &InspectionReport) -> String {
     let unit = &inspection.unit;
     let spectra = chart(

@@ -1,4 +1,4 @@
-//! The page of a recording evaluated by the physics, and the same beside a library's models.
+//! The page of a recording evaluated by inversion, alone or beside the models of a library.
 
 use crate::evaluation_page::maps_at;
 use crate::{UNDER_LOAD, capital};
@@ -13,12 +13,12 @@ use tracktwin_signal::recording::Recording;
 
 const SIZE: [f64; 2] = [1104.0, 240.0];
 
-/// Sleepers whose names fit under the charts.
+/// Maximum number of sleeper names that fit below the charts.
 const NAMES: usize = 20;
 
-/// The report of an evaluation by the physics: one sentence, pictures, estimates, provenance.
+/// Returns the HTML page of an inversion: summary sentence, charts, estimates, provenance.
 ///
-/// `extractor` makes the maps of the signal; `command` is the command line that repeats the evaluation.
+/// `extractor` computes the maps of the signal; `command` is the command line that repeats the evaluation.
 pub fn inversion_page(
     inversion: &Inversion,
     recording: &Recording,
@@ -46,7 +46,7 @@ pub fn inversion_page(
     page(&format!("Track under {}", inversion.recording), &summary(inversion, recording), &body)
 }
 
-/// The charts of the page along the track, one below the other, as the text of an SVG file.
+/// Returns the charts along the track, one below the other, as an SVG file.
 pub fn inversion_chart(inversion: &Inversion) -> String {
     let charts = charts(inversion, None);
     let size = [SIZE[0], charts.len() as f64 * SIZE[1]];
@@ -54,7 +54,7 @@ pub fn inversion_chart(inversion: &Inversion) -> String {
     sheet("Parameters along the track", size, &placed.collect::<Vec<_>>())
 }
 
-/// The section of an evaluation's page that shows the inversion beside the Gaussian processes.
+/// Section that shows the inversion beside the Gaussian processes, on the page of an evaluation.
 pub(crate) fn section(inversion: &Inversion, models: &Evaluation) -> Markup {
     html! {
         h2 { "Inversion" }
@@ -102,7 +102,7 @@ fn range(inversion: &Inversion, parameter: Parameter) -> Option<String> {
     Some(format!("{} {low} to {high} {}", parameter.label(), shown.unit))
 }
 
-/// A chart a parameter; with the Gaussian processes' estimates behind where there are some.
+/// One chart per parameter, with the estimates of the Gaussian processes behind if available.
 fn charts(inversion: &Inversion, models: Option<&Evaluation>) -> Vec<String> {
     PER_SLEEPER.into_iter().map(|parameter| chart(inversion, models, parameter)).collect()
 }

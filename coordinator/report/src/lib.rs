@@ -1,7 +1,7 @@
-//! Self-contained pages and pictures: no file, font or script from elsewhere.
+//! Self-contained HTML pages and SVG charts; they need no external file, font or script.
 //!
-//! Owns how results look; every function goes from data to text. What the data mean, and where
-//! the text is written, is left to others.
+//! This crate defines the appearance of results. Every function converts data to text. The caller supplies
+//! the data and writes the text to a file.
 
 mod diagnosis_page;
 mod evaluation_page;
@@ -29,10 +29,10 @@ pub use reproduction_page::reproduction_page;
 pub use ring_page::ring_page;
 pub use track_picture::evaluation_chart;
 
-/// What an estimate of railpad stiffness is, for a reader who knows railpads from a test bench.
+/// Note on the meaning of a railpad stiffness, for a reader who has values from a test bench.
 const UNDER_LOAD: &str = "Railpad stiffness is the dynamic stiffness under the load of the wheel. A railpad that stiffens with load is softer without it; recordings with one load do not show by how much.";
 
-/// With a capital first letter.
+/// The text with a capital first letter.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())

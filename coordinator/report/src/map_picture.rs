@@ -1,4 +1,4 @@
-//! A stretch of signal with its CWT and SSWT maps (paper, Fig. 2).
+//! A part of the signal with its CWT and SSWT maps (paper, Fig. 2).
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
@@ -10,14 +10,15 @@ use tracktwin_signal::{Extractor, TimeFrequencyMap};
 
 const SIZE: [f64; 2] = [1130.0, 300.0];
 const COLUMNS: usize = 900;
-/// Range of the colour scale below the strongest level in dB.
+/// Range of the colour scale below the maximum, in dB.
 const DEPTH_DB: f64 = 50.0;
-/// Half the length of the stretch, in sleeper spacings.
+/// Half length of the part, in sleeper spacings.
 const SPACINGS: f64 = 2.5;
-/// Points of the drawn signal: two a pixel column, its lowest and highest value.
+/// Number of columns of the drawn signal; each has the lowest and the highest value.
 const SIGNAL_COLUMNS: usize = 1000;
 
-/// Signal, CWT and SSWT over five spans around `x_m` in one pass; empty if they cannot be computed.
+/// Charts of signal, CWT and SSWT over five spans around `x_m` in one pass; empty if they cannot be
+/// computed.
 pub(crate) fn map_charts(
     recording: &Recording,
     extractor: &Extractor,
@@ -37,7 +38,7 @@ pub(crate) fn map_charts(
     charts
 }
 
-/// The samples to draw, and where they were taken.
+/// The samples to draw, with their positions.
 struct Stretch<'a> {
     recording: &'a Recording,
     pass: usize,
@@ -104,12 +105,12 @@ impl<'a> Stretch<'a> {
     }
 }
 
-/// The map as a picture in a `data:` address.
+/// The map as an image in a `data:` URL.
 pub(crate) fn address(map: &TimeFrequencyMap) -> Option<String> {
     Some(format!("data:image/png;base64,{}", BASE64_STANDARD.encode(image(map)?)))
 }
 
-/// The map as PNG, the highest frequency on top.
+/// The map as a PNG image, with the highest frequency at the top.
 fn image(map: &TimeFrequencyMap) -> Option<Vec<u8>> {
     let (width, height) = (map.times_s.len(), map.frequencies_hz.len());
     let peak = map.magnitudes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
@@ -131,8 +132,8 @@ fn image(map: &TimeFrequencyMap) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// 256 colours from dark to bright through anchors of viridis: lightness rises evenly, so that
-/// print in grey and any colour vision keep the order.
+/// 256 colours from dark to bright, interpolated in viridis. The lightness increases uniformly, so that the
+/// order is visible in grey print and with any colour vision.
 fn palette() -> Vec<u8> {
     const ANCHORS: [[f64; 3]; 6] = [
         [68.0, 1.0, 84.0],

@@ -1,4 +1,4 @@
-//! How good the models are (paper, Fig. 14).
+//! Accuracy of trained models (paper, Fig. 14).
 
 use crate::capital;
 use maud::{Markup, html};
@@ -8,8 +8,8 @@ use tracktwin_surrogate::{GroupKey, ModelGroup, ParameterModel, Tested, Trained}
 
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
-/// The page of a library's models: errors of every model, as pictures and as a table, and
-/// predictions of the best models for cases they weren't trained on.
+/// Returns the HTML page of trained models: errors of every model as charts and as a table, and predictions
+/// of the best models for cases that they were not trained on.
 pub fn models_page(models: &Trained, tested: &[Tested]) -> String {
     let charts: Vec<String> =
         parameters(models).into_iter().map(|parameter| mase_chart(models, parameter)).collect();
@@ -36,8 +36,8 @@ pub fn models_page(models: &Trained, tested: &[Tested]) -> String {
     page("Models of the track", &summary(models), &body)
 }
 
-/// MASE of one parameter's models on the test half (paper, Fig. 14, first row): bars by feature
-/// set, grouped by speed, as an inline SVG element.
+/// MASE of one parameter's models on the test half (paper, Fig. 14, first row), as an inline SVG element.
+/// The bars are grouped by speed, one bar per feature set.
 fn mase_chart(models: &Trained, parameter: Parameter) -> String {
     let bars: Vec<(String, &GroupKey, f64)> = models
         .groups()
@@ -78,8 +78,8 @@ fn mase_chart(models: &Trained, parameter: Parameter) -> String {
     chart.into_svg()
 }
 
-/// True against predicted values of a parameter (paper, Fig. 14, second row), in SI units, as an
-/// inline SVG element.
+/// Predicted against true values of a parameter in SI units (paper, Fig. 14, second row), as an inline SVG
+/// element.
 fn scatter_chart(parameter: Parameter, true_and_predicted: &[(f64, f64)]) -> String {
     let shown = Shown::of(parameter);
     let points: Vec<_> =

@@ -1,14 +1,14 @@
-//! Receptances as a picture: magnitude and phase against frequency.
+//! Charts of receptances: magnitude and phase against frequency.
 
 use num_complex::Complex64;
 use tracktwin_drawing::{Axis, Chart, sheet, stand_alone};
 
-/// Receptance between two places of the track.
+/// Receptance between two points of the track.
 #[derive(Clone, Debug)]
 pub struct ReceptanceCurve {
-    /// Name in the legend.
+    /// Name of the curve in the legend.
     pub name: String,
-    /// Displacement a unit force in m/N, a value a frequency, in the convention `exp(+i w t)`.
+    /// Displacement per unit force in m/N, one value per frequency, in the convention `exp(+i w t)`.
     pub values: Vec<Complex64>,
 }
 
@@ -16,9 +16,9 @@ const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 const WIDTH: f64 = 860.0;
 const HEIGHTS: [f64; 2] = [380.0, 240.0];
 
-/// Magnitude (both axes logarithmic) above phase, as the text of an SVG file.
+/// Returns magnitude (both axes logarithmic) above phase, as an SVG file.
 ///
-/// `frequencies_hz` ascend and are positive; curves beyond the sixth use the colours again.
+/// `frequencies_hz` must be positive and ascending. From the seventh curve on, the colours repeat.
 pub fn receptance_chart(frequencies_hz: &[f64], curves: &[ReceptanceCurve]) -> String {
     let (Some(&low), Some(&high)) = (frequencies_hz.first(), frequencies_hz.last()) else {
         return stand_alone("<svg xmlns=\"http://www.w3.org/2000/svg\"></svg>");
@@ -44,7 +44,7 @@ pub fn receptance_chart(frequencies_hz: &[f64], curves: &[ReceptanceCurve]) -> S
     sheet("Receptance", [WIDTH, HEIGHTS[0] + HEIGHTS[1]], &charts)
 }
 
-/// Phases cut where they jump over 180 degrees, so that no line crosses the picture.
+/// Splits a phase curve at jumps of more than 180 degrees, so that no line crosses the chart.
 fn unbroken(points: impl Iterator<Item = (f64, f64)>) -> Vec<Vec<(f64, f64)>> {
     let mut stretches: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
     for point in points {

@@ -1,4 +1,4 @@
-//! The paper's results beside this program's.
+//! Page with the results of the paper beside those of this program.
 
 use crate::map_picture::address;
 use maud::{Markup, html};
@@ -7,17 +7,17 @@ use tracktwin_reproduction::{ClaimVerdict, Compared, Curve, Picture, Reproductio
 
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
-/// Width and height in px of a picture that takes the page's width, and of one of several.
+/// Width and height in px of a chart that fills the page, and of a small one.
 const WIDE: [f64; 2] = [860.0, 320.0];
 const NARROW: [f64; 2] = [370.0, 270.0];
 
-/// Room in px for title and legend above the frame of a narrow picture, and what they take: a letter
-/// of either, a key.
+/// Space in px for title and legend above a small chart, and widths in px of a letter and of a key of the
+/// legend.
 const ROOM: f64 = 284.0;
 const LETTER: f64 = 7.4;
 const KEY: f64 = 36.0;
 
-/// The page of a reproduction: one sentence, a table of all rows, a picture a figure.
+/// Returns the HTML page of a reproduction: one sentence, a table of all rows, one chart per figure.
 pub fn reproduction_page(reproduction: &Reproduction) -> String {
     let of = &reproduction.provenance;
     let body = html! {
@@ -85,7 +85,7 @@ fn table(compared: &Compared) -> Markup {
     }
 }
 
-/// The verdict with a mark, so that it does not hang on colour alone.
+/// The verdict with a symbol, so that it can be read without colour.
 pub(crate) fn verdict(verdict: ClaimVerdict) -> Markup {
     let (mark, colour) = match verdict {
         ClaimVerdict::Reproduced => ("✓", "var(--c)"),
@@ -124,7 +124,7 @@ pub(crate) fn chart(picture: &Picture) -> String {
     chart.into_svg()
 }
 
-/// Everything that a curve covers, for the axes.
+/// All points that the axes must include for a curve.
 fn reach(curve: &Curve) -> Vec<(f64, f64)> {
     let ends = |(place, &(x, y)): (usize, &(f64, f64))| match &curve.style {
         Style::Band(half) => [(x, y - half[place]), (x, y + half[place])],

@@ -1,4 +1,4 @@
-//! The page of the ring: its statements, and its parameters along the sleepers beside the truth.
+//! The page of the ring study: statements, and parameters along the sleepers with their true values.
 
 use crate::reproduction_page::{chart, verdict};
 use maud::{Markup, html};
@@ -7,7 +7,7 @@ use tracktwin_parameters::Parameter;
 use tracktwin_reproduction::{ClaimVerdict, Picture};
 use tracktwin_ring::{Statement, Study};
 
-/// The page of a ring study; `command` is the command line that repeats it.
+/// Returns the HTML page of a ring study; `command` is the command line that repeats it.
 pub fn ring_page(study: &Study, command: &str) -> String {
     let statements = study.statements();
     let body = html! {
@@ -71,7 +71,7 @@ fn group(pictures: &[Picture], caption: &str) -> Markup {
     figure(&pictures.iter().map(chart).collect::<Vec<_>>(), caption)
 }
 
-/// The structures of the ring in a list.
+/// List of the structures of the ring.
 fn ring(study: &Study) -> Markup {
     let truth = &study.truth;
     let ids = |wanted: fn(&tracktwin_ring::SleeperTruth) -> bool| -> String {

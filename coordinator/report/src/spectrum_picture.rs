@@ -1,4 +1,4 @@
-//! Measured LWPS of a sleeper against the library's best matches (paper, Fig. 11).
+//! Measured LWPS of a sleeper with the best matches of the library (paper, Fig. 11).
 
 use tracktwin_drawing::{Axis, Chart};
 use tracktwin_evaluation::{Measured, SleeperEvaluation};
@@ -6,7 +6,7 @@ use tracktwin_number::rounded;
 
 const SIZE: [f64; 2] = [560.0, 300.0];
 
-/// Sleepers evenly chosen among those without flags, or among all if every one has some.
+/// Selects sleepers at even distances from those without flags, or from all if every sleeper has a flag.
 pub(crate) fn chosen(sleepers: &[SleeperEvaluation], count: usize) -> Vec<&SleeperEvaluation> {
     let mut clean: Vec<_> = sleepers.iter().filter(|sleeper| sleeper.flags.is_empty()).collect();
     if clean.is_empty() {

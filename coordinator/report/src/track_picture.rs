@@ -4,7 +4,7 @@ use tracktwin_drawing::{Axis, Chart, Shown, sheet};
 use tracktwin_evaluation::{Estimates, Evaluation, SleeperEvaluation};
 use tracktwin_parameters::Parameter;
 
-/// Order of the panels, as in the paper; dampings, which the paper does not show, follow.
+/// Order of the charts, as in the paper. Dampings, which the paper does not show, follow.
 const PANELS: [Parameter; 6] = [
     Parameter::IrregularityLevel,
     Parameter::RailpadStiffness,
@@ -15,7 +15,7 @@ const PANELS: [Parameter; 6] = [
 ];
 const SIZE: [f64; 2] = [560.0, 250.0];
 
-/// The charts of the page along the track in two columns, as the text of an SVG file.
+/// Returns the charts along the track in two columns, as an SVG file.
 pub fn evaluation_chart(evaluation: &Evaluation) -> String {
     let charts = track_charts(evaluation);
     let size = [2.0 * SIZE[0], charts.len().div_ceil(2) as f64 * SIZE[1]];
@@ -24,7 +24,7 @@ pub fn evaluation_chart(evaluation: &Evaluation) -> String {
     sheet("Parameters along the track", size, &placed.collect::<Vec<_>>())
 }
 
-/// A chart a parameter: Gaussian process with a band of two standard deviations, and selector.
+/// One chart per parameter: Gaussian process with a band of two standard deviations, and model selector.
 pub(crate) fn track_charts(evaluation: &Evaluation) -> Vec<String> {
     let known = evaluation.parameters();
     let panels = PANELS.into_iter().filter(|parameter| known.contains(parameter));
@@ -63,7 +63,7 @@ fn panel(evaluation: &Evaluation, parameter: Parameter) -> String {
     chart.into_svg()
 }
 
-/// An estimate of one parameter at a sleeper, in the chart's unit.
+/// Estimate of one parameter at a sleeper, in the unit of the chart.
 struct ChartEstimate {
     x_m: f64,
     mean: f64,
@@ -71,7 +71,7 @@ struct ChartEstimate {
     valid: bool,
 }
 
-/// Lines and bands through neighbours whose estimates are valid; hollow dots for the others.
+/// Draws lines and bands through neighbouring valid estimates, and hollow dots for invalid ones.
 fn draw(chart: &mut Chart, process: &[ChartEstimate], selector: &[ChartEstimate], range: [f64; 2]) {
     // The models know nothing beyond the library's range.
     let within = |value: f64| value.clamp(range[0], range[1]);

@@ -1,5 +1,5 @@
-//! Pages made of small synthetic results: whole, self-contained, and left in the target folder
-//! for a look.
+//! Pages from small synthetic results: complete and self-contained. They are kept in the target folder for
+//! visual inspection.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_10, PI, TAU};
@@ -18,7 +18,7 @@ use tracktwin_surrogate::{FeatureColumns, Side, TrainOptions, Trained, TrainingS
 
 const RATE_HZ: f64 = 20_000.0;
 
-/// Twelve sleepers under a wheel that hums at 115 and rings at 600 to 900 Hz at each of them.
+/// A recording of twelve sleepers with a resonance at 115 Hz, and one at 600 to 900 Hz at each sleeper.
 fn recording() -> Recording {
     let speed_m_s = 13.0 / 3.6;
     let samples = (1.75 / speed_m_s * RATE_HZ) as usize;
@@ -59,7 +59,7 @@ fn estimates(place: f64, spread: f64) -> Estimates {
     Parameter::ALL.iter().map(estimate).collect()
 }
 
-/// The nominal range of every parameter, told well except for the railpad's damping.
+/// The nominal range of every parameter. All except the damping of the railpad are determined well.
 fn known() -> BTreeMap<Parameter, Known> {
     let of = |&parameter: &Parameter| {
         let mase_test = if parameter == Parameter::RailpadDamping { 0.24 } else { 0.1 };
@@ -120,7 +120,7 @@ fn evaluation(recording: &Recording, extractor: &Extractor) -> Evaluation {
     }
 }
 
-/// Models of two parameters at two speeds on a hash of numbers that says little.
+/// Models of two parameters at two speeds, trained on pseudo-random numbers.
 fn models() -> Trained {
     let random = |index: usize| ((index as f64 + 1.0) * 12.9898).sin() * 43_758.545_3 % 1.0;
     let (entries, bins) = (300, 6);
@@ -152,7 +152,7 @@ fn models() -> Trained {
     train(&set, &TrainOptions::new(columns), &|_| ()).expect("enough entries")
 }
 
-/// Leaves the page for a look, and refuses what would need the network.
+/// Writes the page for visual inspection, and checks that it needs no network.
 fn keep(name: &str, text: &str) {
     std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name), text).expect("writable");
     // The letters of an embedded picture are no words.

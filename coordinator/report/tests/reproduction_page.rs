@@ -1,4 +1,4 @@
-//! The page of a reproduction, made of a figure whose rows and pictures are made up.
+//! The page of a reproduction, from a figure with invented rows and charts.
 
 use std::path::Path;
 use tracktwin_report::reproduction_page;

@@ -168,7 +168,7 @@ async fn add(
     counted(library, json, &line, &counts).await
 }
 
-/// Adds cases with a progress bar; the error of an interrupted run states the progress.
+/// Adds cases with a progress bar. If the user interrupts it, the error states the number of added cases.
 async fn add_cases(library: &Library, campaign: &Campaign) -> Result<(), Stop> {
     let shutdown = stop_on_signal("stopping")?;
     let _nothing_left_to_wind_up = shutdown.clone().drop_guard();
@@ -226,7 +226,7 @@ async fn done(library: Library, line: &str) -> Result<(), Stop> {
     Ok(())
 }
 
-/// The same for an action that counts cases: a line, or JSON.
+/// Prints the result of an action that counts cases: one line, or JSON.
 async fn counted(library: Library, json: bool, line: &str, counts: &Value) -> Result<(), Stop> {
     if !json {
         return done(library, line).await;

@@ -123,7 +123,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     })
 }
 
-/// Adds campaigns: all of them or none.
+/// Adds all campaigns; if one of them is refused, adds none.
 async fn add(library: &Library, campaigns: &[Campaign]) -> Result<(), Stop> {
     let tell = |line: &str| tracing::warn!("{line}");
     for campaign in campaigns {
@@ -170,7 +170,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| remedy.to_owned())
 }
 
-/// A share: `1%` or `0.01`.
+/// Parses a share, such as `1%` or `0.01`.
 fn share(text: &str) -> Result<f64, String> {
     let (number, divisor) = match text.strip_suffix('%') {
         Some(percent) => (percent, 100.0),
@@ -184,7 +184,7 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The length of a lease in seconds.
+/// Parses the length of a lease in s.
 fn lease(text: &str) -> Result<Duration, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.5..=3600.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),

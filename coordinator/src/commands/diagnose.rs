@@ -175,7 +175,7 @@ async fn write(
     Ok(())
 }
 
-/// The verdict, what was accepted, and the path of the report, as JSON.
+/// JSON with the verdict, the accepted hypotheses, and the path of the report.
 fn summary(diagnosis: &Diagnosis, report: &str) -> Value {
     let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
     json!({
@@ -186,7 +186,7 @@ fn summary(diagnosis: &Diagnosis, report: &str) -> Value {
     })
 }
 
-/// What the withheld passes say.
+/// Text on the comparison with the withheld passes.
 fn confirmed(confirmation: Option<&Confirmation>) -> String {
     let Some(Confirmation { speeds, gain_nats, is_confirmed, .. }) = confirmation else {
         return "Withheld passes were not compared: nothing was accepted, or a wheel defect or a fault of the measuring chain."
@@ -204,7 +204,7 @@ fn confirmed(confirmation: Option<&Confirmation>) -> String {
     )
 }
 
-/// An unsuitable recording is wrong input; everything else is a failure.
+/// Converts an error: an unsuitable recording is wrong input, everything else is a failure.
 fn stop(error: ConfirmingError) -> Stop {
     match error {
         ConfirmingError::Diagnosis(DiagnosingError::Recording(error)) => Stop::Input(error.into()),
@@ -213,7 +213,7 @@ fn stop(error: ConfirmingError) -> Stop {
     }
 }
 
-/// The command that repeats the diagnosis.
+/// Provenance of the diagnosis, with the command that repeats it.
 fn origin(arguments: &Arguments) -> Origin {
     let Arguments { recording, models, library, track, out, confirm, without, .. } = arguments;
     let mut command = vec![format!("tracktwin diagnose {}", recording.display())];
@@ -232,7 +232,7 @@ fn origin(arguments: &Arguments) -> Origin {
     }
 }
 
-/// What a diagnosis of another track than V-Track rests on.
+/// Note for a track other than V-Track, for which the diagnosis was not calibrated.
 fn uncalibrated(track: &Track) -> Option<String> {
     (track.design != TrackDesign::v_track()).then(|| {
         "the error rates of diagnoses are measured on V-Track only: on any other track the \
@@ -241,7 +241,7 @@ fn uncalibrated(track: &Track) -> Option<String> {
     })
 }
 
-/// The track that the models' campaign was simulated on, if there are models.
+/// Track of the models' campaign; `None` without models.
 async fn of_models(
     models: Option<PathBuf>,
     library: Option<&Library>,

@@ -23,7 +23,7 @@ use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureDefinition};
 use tracktwin_surrogate::Trained;
 
-/// The page, and its charts along the track as a picture.
+/// Names of the page and of the file with its charts along the track.
 const PAGE: &str = "report.html";
 const PICTURE: &str = "track.svg";
 
@@ -171,19 +171,19 @@ pub(super) fn command() -> String {
     std::iter::once("tracktwin".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
-/// Prints what lies outside the library.
+/// Prints the parameters that are outside the library.
 pub(super) fn print_outside(evaluation: &Evaluation) {
     for sentence in evaluation.outside_library.sentences() {
         println_stdout(&sentence);
     }
 }
 
-/// A negative result if most of the track lies outside the library.
+/// Returns a negative result if most of the track is outside the library.
 pub(super) fn conclude(evaluation: &Evaluation) -> Result<(), Stop> {
     if evaluation.outside_library.is_most() { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// What is printed of an evaluation, as JSON.
+/// Printed summary of an evaluation, as JSON.
 pub(super) fn summary(evaluation: &Evaluation, folder: &Path) -> Value {
     json!({
         "recording": evaluation.recording, "method": evaluation.method,
@@ -192,7 +192,7 @@ pub(super) fn summary(evaluation: &Evaluation, folder: &Path) -> Value {
     })
 }
 
-/// The same of an inversion.
+/// Printed summary of an inversion, as JSON.
 fn inversion_summary(inversion: &Inversion, folder: &Path) -> Value {
     json!({
         "recording": inversion.recording, "method": inversion.method,
@@ -201,7 +201,7 @@ fn inversion_summary(inversion: &Inversion, folder: &Path) -> Value {
     })
 }
 
-/// The recording in a folder.
+/// Reads the recording in a folder.
 pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
     let recording = Recording::open(folder).or_input()?;
     check_sleepers(folder, &recording)?;
@@ -209,7 +209,7 @@ pub(super) fn open(folder: &Path) -> Result<Recording, Stop> {
     Ok(recording)
 }
 
-/// Refuses a recording without sleepers, read from this folder.
+/// Returns an error for a recording without sleepers; `folder` is its path.
 pub(super) fn check_sleepers(folder: &Path, recording: &Recording) -> Result<(), Stop> {
     if recording.sleepers.is_empty() {
         return Err(Stop::Input(anyhow!(
@@ -221,7 +221,7 @@ pub(super) fn check_sleepers(folder: &Path, recording: &Recording) -> Result<(),
     Ok(())
 }
 
-/// The trained models in a folder.
+/// Reads the trained models in a folder.
 pub(super) fn load_models(folder: &Path) -> Result<Trained, Stop> {
     Trained::load(folder)
         .with_context(|| {
@@ -237,7 +237,7 @@ pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError>
     check(folder, Kind::Results, force, &names)
 }
 
-/// Evaluates a recording with models of this library and, if `beside` is set, by inversion; writes
+/// Evaluates a recording with models of this library and, if `beside` is set, also by inversion. Writes
 /// files and report to `folder`.
 pub(super) async fn evaluate(
     recording: &Recording,
@@ -272,7 +272,7 @@ pub(super) async fn evaluate(
     Ok(evaluation)
 }
 
-/// The inversion of what models have evaluated, whose answer stands without it.
+/// Inversion in addition to an evaluation with models. If the inversion fails, the evaluation stays valid.
 async fn invert_beside(
     recording: &Recording,
     evaluator: &Evaluator,
@@ -330,7 +330,7 @@ fn flag(evaluation: &mut Evaluation, lost: &LossOfContact, passes: usize) {
     evaluation.notes.push(line);
 }
 
-/// The usable part of a recording, and notes on its defects, which are also printed.
+/// The usable part of a recording, and notes on its defects. The notes are also printed.
 fn usable_with_notes(recording: &Recording) -> Result<(Recording, Vec<String>), Stop> {
     let (recording, left_out) = usable(recording)?;
     let notes = [recording.doubts.clone(), left_out].concat();

@@ -11,15 +11,16 @@ use tracktwin_farm::campaign::Campaign;
 use tracktwin_files::Kind as FileKind;
 use tracktwin_track::extension::{Kind, KindParameter, PlaceKind};
 
-/// Share of the cases with the extension: models must be valid without it as well.
+/// Share of the cases with the extension. It is below 1, so that models are also valid without the
+/// extension.
 const SHARE: f64 = 0.5;
 
-/// A parameter is drawn within this number of standard deviations of the estimate, and at least
-/// within this factor of it.
+/// Half width of a parameter's range in standard deviations of the estimate; the range also has a minimum
+/// ratio to the estimate.
 const DEVIATIONS: f64 = 3.0;
 const FACTOR_MIN: f64 = 2.0;
 
-/// Greatest relative difference of two sleeper spacings that are alike.
+/// Maximum relative difference of two sleeper spacings that count as equal.
 const ALIKE: f64 = 0.02;
 
 /// Arguments of `extend`.
@@ -92,19 +93,19 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-/// What was accepted that belongs in a campaign, with its kinds.
+/// Accepted hypotheses that can be added to a campaign, with their kinds.
 fn physics(diagnosis: &Diagnosis) -> impl Iterator<Item = (&Hypothesis, &'static Kind)> {
     let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
     let known = accepted.filter_map(|it| Some((it, Kind::from_name(&it.physics)?)));
     known.filter(|(_, kind)| !kind.measuring_chain)
 }
 
-/// Whether anything was accepted that belongs in a campaign.
+/// Whether a hypothesis was accepted that can be added to a campaign.
 pub(super) fn has_physics(diagnosis: &Diagnosis) -> bool {
     physics(diagnosis).next().is_some()
 }
 
-/// Checks that the campaign's sleepers are spaced as the diagnosed ones.
+/// Checks that the campaign has the sleeper spacing of the diagnosed track.
 fn check_spacing(path: &Path, campaign: &Campaign, diagnosis: &Diagnosis) -> anyhow::Result<()> {
     let spacing_m = campaign.definition.experiment.design.sleeper.spacing_m;
     let mut distances: Vec<f64> =
@@ -160,8 +161,8 @@ fn table(
     table + &values(hypothesis, kind)
 }
 
-/// Its parameters: ranges of those that were fitted, values of those that were assumed, and typical values
-/// of all others that must be given.
+/// Parameters of the extension in TOML: ranges for fitted parameters, values for assumed ones, and typical
+/// values for all other required ones.
 fn values(hypothesis: &Hypothesis, kind: &Kind) -> String {
     let mut lines = String::new();
     for (name, estimate) in &hypothesis.parameters {
@@ -192,7 +193,7 @@ fn values(hypothesis: &Hypothesis, kind: &Kind) -> String {
     lines
 }
 
-/// Its place on the campaign's track.
+/// Location of the extension on the campaign's track.
 fn place(
     diagnosis: &Diagnosis,
     hypothesis: &Hypothesis,
@@ -223,7 +224,7 @@ fn place(
     }
 }
 
-/// Range from which a parameter is drawn: around the estimate.
+/// Range of a parameter around the estimate.
 fn range(parameter: &KindParameter, estimate: &Estimate) -> [f64; 2] {
     let factor = (DEVIATIONS * estimate.sd / estimate.mean).exp().clamp(FACTOR_MIN, 10.0);
     let least = parameter.v_track[1].min(parameter.real_scale[1]) * 1e-3;

@@ -17,7 +17,7 @@ use tracktwin_parameters::quantity::CASES;
 use tracktwin_report::{Improvement, improvement_page};
 use tracktwin_signal::recording::Recording;
 
-/// Cases of each of the two campaigns.
+/// Number of cases of each of the two campaigns.
 const CASES_EACH: &str = "400";
 
 /// Arguments of `improve`.
@@ -106,7 +106,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
 }
 
-/// Runs a campaign; estimates that are not valid are no reason to stop, for the page tells them.
+/// Runs a campaign. Invalid estimates do not stop the command, because the page reports them.
 async fn simulate(arguments: campaign::Arguments) -> Result<(), Stop> {
     match campaign::run(arguments).await {
         Err(Stop::Negative) => Ok(()),
@@ -114,7 +114,7 @@ async fn simulate(arguments: campaign::Arguments) -> Result<(), Stop> {
     }
 }
 
-/// Writes a campaign of the recording's track at the recording's speeds, and the description of the track.
+/// Writes a campaign of the recording's track at the recording's speeds, and the description of this track.
 fn write_campaign(
     folder: &Path,
     recording: &Recording,

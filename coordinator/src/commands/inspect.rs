@@ -14,7 +14,7 @@ use tracktwin_signal::{PowerSpectrum, Signal};
 
 /// Line spacing of the drawn spectra in Hz.
 const LINES_HZ: f64 = 20.0;
-/// Points of a drawn curve.
+/// Number of points of a drawn curve.
 const POINTS: usize = 400;
 /// Sample rate required for features up to 4 kHz.
 const FEATURES_HZ: f64 = SAMPLES_A_PERIOD * 4000.0;
@@ -247,7 +247,7 @@ fn curves(recording: &Recording, points: impl Fn(&Pass) -> Vec<(f64, f64)>) -> V
     recording.passes.iter().enumerate().map(curve).collect()
 }
 
-/// Density in dB at equal steps of a logarithmic axis.
+/// Power spectral density in dB, at equal steps of a logarithmic frequency axis.
 fn spectrum(signal: &Signal) -> Vec<(f64, f64)> {
     let segment = ((signal.sample_rate_hz() / LINES_HZ) as usize).clamp(2, signal.len());
     let Ok(spectrum) = PowerSpectrum::welch(signal, segment) else { return Vec::new() };
@@ -261,7 +261,7 @@ fn spectrum(signal: &Signal) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Mean square in dB along the track.
+/// Mean square of the acceleration in dB, by position along the track.
 fn levels(pass: &Pass) -> Vec<(f64, f64)> {
     let samples = pass.signal.samples();
     let length = samples.len().div_ceil(POINTS);

@@ -21,39 +21,39 @@ pub(super) struct LibraryUrl {
 }
 
 impl LibraryUrl {
-    /// The library, which must exist.
+    /// Opens the library, which must exist.
     pub(super) async fn open(&self) -> Result<Library, Stop> {
         Ok(Library::open(&self.url).await?)
     }
 
-    /// The library, which must exist and be intact: for commands that add to it or rely on all of
-    /// it.
+    /// Opens the library, which must exist and be intact. Use this for commands that add data to the
+    /// library or need all its data.
     pub(super) async fn open_whole(&self) -> Result<Library, Stop> {
         open_whole(&self.url).await
     }
 
-    /// The library, intact; created if missing.
+    /// Opens the library, which must be intact; creates it if missing.
     pub(super) async fn open_or_create(&self) -> Result<Library, Stop> {
         open_or_create(&self.url).await
     }
 
-    /// Its name, without the password.
+    /// Name of the library, without password.
     pub(super) fn name(&self) -> String {
         without_password(&self.url)
     }
 }
 
-/// The library of this URL, which must exist and be intact.
+/// Opens the library at this URL, which must exist and be intact.
 pub(super) async fn open_whole(url: &str) -> Result<Library, Stop> {
     whole(Library::open(url).await?).await
 }
 
-/// The library of this URL, intact; created if missing.
+/// Opens the library at this URL, which must be intact; creates it if missing.
 pub(super) async fn open_or_create(url: &str) -> Result<Library, Stop> {
     whole(Library::open_or_create(url).await?).await
 }
 
-/// A library, unless its database is malformed.
+/// Returns the library if its database is intact, otherwise an error.
 async fn whole(library: Library) -> Result<Library, Stop> {
     let name = library.name();
     library.check_whole().await.with_context(|| format!("library {name}"))?;

@@ -1,7 +1,7 @@
 //! The subcommands, one file each: load, compute, store, report.
 //!
-//! Commands read and write files synchronously, also in asynchronous functions, because nothing
-//! else runs meanwhile. Long computations go through `pipeline::compute`.
+//! Commands read and write files synchronously, even in asynchronous functions, because nothing else runs
+//! at that time. Long computations go through `pipeline::compute`.
 
 mod campaign;
 mod certs;
@@ -128,7 +128,7 @@ Example:
     Manual(manual::Arguments),
 }
 
-/// Reads the command line, runs one command and turns its end into an exit code.
+/// Parses the command line, runs one command and returns its exit code.
 pub fn main() -> ExitCode {
     let program = Program::parse();
     log_to_stderr(program.log_format, filter(&program));
@@ -145,14 +145,14 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// The error as one line.
+/// Prints the error as one line.
 fn report(error: &anyhow::Error, code: u8) -> ExitCode {
     let line = chain(error).replace('\n', " ");
     println_stderr(&format!("tracktwin: {line}"));
     ExitCode::from(code)
 }
 
-/// The error and its sources, without repetition: some errors include their source.
+/// The error and its sources in one text. A source that is already in the text is not repeated.
 fn chain(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for part in error.chain().map(ToString::to_string) {

@@ -135,7 +135,7 @@ fn write(arguments: &Arguments, table: &[u8], picture: &str) -> Result<(), Stop>
     Ok(())
 }
 
-/// Names of table and plot.
+/// Names of the files with table and plot.
 fn names(out: &Path) -> Result<[FileName; 2], Stop> {
     let (_, table) = FileName::of_path(out)?;
     let (_, picture) = FileName::of_path(&out.with_extension("svg"))?;
@@ -149,7 +149,7 @@ fn names(out: &Path) -> Result<[FileName; 2], Stop> {
     Ok([table, picture])
 }
 
-/// Checks that both may be written.
+/// Checks that table and plot may be written.
 fn check_files(Arguments { out, force, .. }: &Arguments) -> Result<(), Stop> {
     if is_stream(out) {
         return Ok(());

@@ -110,7 +110,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if reproduction.count(ClaimVerdict::Differs) > 0 { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// Models of the library as it is now, if an earlier call trained some in this folder.
+/// Models of the library in its present state, if an earlier call trained them in this folder.
 async fn kept(
     library: &Library,
     campaign: &CampaignRecord,
@@ -141,7 +141,7 @@ async fn train(
     Ok(trained)
 }
 
-/// The figures of these names, each once, in the order of the paper; all figures without names.
+/// The figures with these names, each once, in the order of the paper; all figures if no names are given.
 fn figures(names: &[String]) -> Result<Vec<Figure>, anyhow::Error> {
     if names.is_empty() {
         return Ok(Figure::ALL.to_vec());
@@ -153,7 +153,7 @@ fn figures(names: &[String]) -> Result<Vec<Figure>, anyhow::Error> {
     Ok(figures)
 }
 
-/// The named campaign, that of the models, or the only one.
+/// The named campaign, or the campaign of the models, or the only one.
 async fn campaign(
     library: &Library,
     id: Option<&str>,
@@ -255,7 +255,7 @@ fn write(reproduction: &Reproduction, out: &Path, force: Force) -> Result<(), Fi
     output.commit()
 }
 
-/// Prints every row, and how many of each verdict there are.
+/// Prints every row, and the number of rows with each verdict.
 fn print(reproduction: &Reproduction, out: &Path) {
     for row in &reproduction.rows {
         let (figure, verdict) = (row.figure.name(), row.verdict.label());

@@ -110,7 +110,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if failed > 0 { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// Prints a line for each statement, and how many hold.
+/// Prints one line per statement, and the number of statements that hold.
 fn print(statements: &[Statement], page: &str) {
     for row in statements {
         let Statement { figure, method, claim, found, verdict, .. } = row;

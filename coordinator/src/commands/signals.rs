@@ -4,7 +4,7 @@ use super::println_stderr;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 
-/// A token that the first Ctrl-C or SIGTERM cancels; `notice` is printed.
+/// Returns a token that the first Ctrl-C or SIGTERM cancels; the signal also prints `notice`.
 ///
 /// A second signal, or a signal after the caller has cancelled the token, ends the process at once.
 pub(super) fn stop_on_signal(notice: &'static str) -> std::io::Result<CancellationToken> {

@@ -17,7 +17,8 @@ pub(super) enum Stop {
     Failure(anyhow::Error),
 }
 
-/// Errors of a library or a file that state wrong input are wrong input; all others are failures.
+/// Converts an error. Library and file errors caused by wrong input become `Input`; all others become
+/// `Failure`.
 impl<E: Into<anyhow::Error>> From<E> for Stop {
     fn from(error: E) -> Self {
         let error = error.into();
@@ -41,7 +42,7 @@ fn is_wrong_input(error: &anyhow::Error) -> Option<bool> {
     file.map(FilesError::is_wrong_input)
 }
 
-/// The same for a library error inside another error.
+/// Finds a library error inside another error.
 fn library_error(error: &anyhow::Error) -> Option<&LibraryError> {
     if let Some(FarmError::Library(library)) = error.downcast_ref() {
         return Some(library);

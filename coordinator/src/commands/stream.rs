@@ -18,7 +18,7 @@ use tracktwin_evaluation::{Row, check_recording};
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::samples::{Framing, SampleReader};
 
-/// Bytes that are read at once: some ten milliseconds of samples at 100 kHz.
+/// Maximum number of bytes read at once; it corresponds to some ten milliseconds of samples at 100 kHz.
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// A connection that sends nothing for this time counts as closed.
@@ -106,14 +106,14 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     conclude(&streamed)
 }
 
-/// What a recording states of the section.
+/// Reads the `recording.json` of the section of track.
 fn open(folder: &Path) -> Result<Recording, Stop> {
     let section = Recording::without_passes(folder).or_input()?;
     check_sleepers(folder, &section)?;
     Ok(section)
 }
 
-/// Refuses to listen where other machines can connect.
+/// Returns an error if other machines can connect to this address and `--insecure` is not given.
 fn check_address(address: SocketAddr) -> Result<(), Stop> {
     if address.ip().is_loopback() {
         return Ok(());
@@ -134,7 +134,7 @@ fn host_and_port(text: &str) -> Result<String, &'static str> {
     }
 }
 
-/// Where samples come from, and its name for errors.
+/// Opens the source of the samples; the text is its name in error messages.
 fn samples(
     input: Option<PathBuf>,
     listen: Option<SocketAddr>,
@@ -160,7 +160,7 @@ fn samples(
     Ok((name, Box::new(BufReader::with_capacity(BUFFER_BYTES, file))))
 }
 
-/// A connection that sends samples. It ends at a silence of [`SILENCE`] as if it were closed.
+/// A connection that sends samples. A silence of [`SILENCE`] ends it like the end of the connection.
 struct Sender(TcpStream);
 
 impl Read for Sender {
@@ -177,7 +177,7 @@ impl Read for Sender {
     }
 }
 
-/// Where rows go.
+/// Destination of the rows.
 enum Rows {
     Stdout,
     Tcp { connection: TcpStream, name: String, error: Option<std::io::Error> },
@@ -193,7 +193,7 @@ impl Rows {
         Ok(Self::Tcp { connection, name: name.to_owned(), error: None })
     }
 
-    /// Writes a row at once; breaks when nobody reads any more.
+    /// Writes a row immediately. Returns `Break` if the receiver no longer reads.
     fn write(&mut self, row: &Row) -> ControlFlow<()> {
         let line = row.to_json() + "\n";
         let is_read = match self {
@@ -206,7 +206,7 @@ impl Rows {
         if is_read { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 
-    /// A receiver that ends the connection has read enough; any other error is a failure.
+    /// Ends the output. A receiver that ends the connection is no error; any other fault is a failure.
     fn end(self) -> Result<(), Stop> {
         match self {
             Self::Tcp { name, error: Some(error), .. }
@@ -219,14 +219,14 @@ impl Rows {
     }
 }
 
-/// Garbage is wrong input; a source that fails is a failure.
+/// Converts an error: invalid samples are wrong input, a failing source is a failure.
 fn stop(name: &str, error: &StreamingError) -> Stop {
     let is_failure = matches!(error, StreamingError::Samples(samples) if !samples.is_wrong_input());
     let error = anyhow!("{name}: {error}");
     if is_failure { Stop::Failure(error) } else { Stop::Input(error) }
 }
 
-/// Prints what was computed and how fast.
+/// Prints a summary with the computing times.
 fn conclude(streamed: &Streamed) -> Result<(), Stop> {
     let Streamed { rows, evaluated, outside, computing, longest, .. } = *streamed;
     if streamed.is_left {

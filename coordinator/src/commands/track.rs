@@ -1,4 +1,4 @@
-//! The track that a command works on: described in a file, stated by a recording, or a preset.
+//! The track that a command uses: from a file, from a recording, or a preset.
 
 use super::{OrInput, Stop};
 use anyhow::anyhow;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tracktwin_parameters::{Preset, Track};
 use tracktwin_signal::recording::{Recording, StatedTrack};
 
-/// Keys of `recording.json` that a note lists one by one.
+/// Maximum number of keys of `recording.json` that a note lists individually.
 const LISTED: usize = 4;
 
 /// The option that describes a track.
@@ -21,7 +21,7 @@ pub(super) struct TrackOption {
 }
 
 impl TrackOption {
-    /// The track that a recording is compared with, and what is assumed of it.
+    /// Returns the track with which a recording is compared, and notes on assumed values.
     pub(super) fn of(&self, recording: &Recording) -> Result<(Track, Vec<String>), Stop> {
         match &self.track {
             Some(path) => Ok((read(path)?, Vec::new())),
@@ -42,7 +42,7 @@ pub(super) struct TrackChoice {
 }
 
 impl TrackChoice {
-    /// The track.
+    /// Returns the selected track.
     pub(super) fn track(&self) -> Result<Track, Stop> {
         self.track.as_deref().map_or_else(|| Ok(self.preset.track()), read)
     }
@@ -61,7 +61,7 @@ pub(super) fn read(path: &Path) -> Result<Track, Stop> {
     Track::parse(&text).map_err(|error| anyhow!("{}: {error}", path.display())).or_input()
 }
 
-/// The track that a recording states, and a note on what it does not state.
+/// Returns the track described in a recording, and a note on missing values.
 pub(super) fn stated(recording: &Recording) -> (Track, Vec<String>) {
     let StatedTrack { track, preset, assumed } = recording.stated_track();
     // On the rig a recording states what is its own; its track is known.

@@ -115,7 +115,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if missed { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// Prints a line for each measure, and the path of the tables.
+/// Prints one line per measure, and the path of the tables.
 fn print(summary: &Summary, folder: &Path) {
     for row in &summary.rows {
         println_stdout(&format!("{}: {} ({})", row.measure, row.value, row.goal));
@@ -123,7 +123,7 @@ fn print(summary: &Summary, folder: &Path) {
     println_stdout(&format!("tables: {}", folder.join("trial.md").display()));
 }
 
-/// The paper's method, with models of V-Track.
+/// Evaluator for the paper's method; checks that the models are of V-Track.
 async fn paper(models: Option<Trained>, library: &Library) -> Result<Option<Evaluator>, Stop> {
     let Some(models) = models else { return Ok(None) };
     let evaluator = Evaluator::new(models, library).await.or_input()?;

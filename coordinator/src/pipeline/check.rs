@@ -1,4 +1,4 @@
-//! What a described track does: stiffness, resonances, surface, contact.
+//! Properties of a described track: stiffness, resonances, surface, contact.
 
 use rustfft::num_complex::Complex64;
 use serde::Serialize;
@@ -9,67 +9,67 @@ use tracktwin_track::model::{
     ContactPatch, HertzContact, Mesh, ModelError, Roughness, Support, TrackModel,
 };
 
-/// Spans of the track whose middle is looked at.
+/// Number of spans of the track; the properties are computed at its middle.
 const SPANS: usize = 80;
 
-/// Elements of the rail in a span and of a half sleeper.
+/// Number of elements of the rail in a span, and of a half sleeper.
 const ELEMENTS: usize = 8;
 
-/// Frequencies in Hz on a track of V-Track's scale divided by its length ratio: from the first to the last,
-/// with so many an octave.
+/// Lowest and highest frequency in Hz for a track of V-Track's scale. For other tracks they are divided by
+/// the length ratio to V-Track. `PER_OCTAVE` frequencies per octave are used.
 const FREQUENCIES_HZ: [f64; 2] = [60.0, 15_000.0];
 const PER_OCTAVE: f64 = 48.0;
 
 /// Frequency in Hz at which a receptance is static.
 const STATIC_HZ: f64 = 0.5;
 
-/// Least prominence of a resonance in dB.
+/// Minimum prominence of a resonance in dB.
 const PROMINENCE_DB: f64 = 0.3;
 
-/// Change of a parameter whose effect on the level is told.
+/// Relative change of a parameter whose effect on the level is computed.
 const CHANGE: f64 = 0.1;
 
-/// Wavelengths in m and limits in dB re 1 um of a one-third octave (ISO 3095:2013, Figure 2).
+/// Wavelengths in m, and limits of the one-third-octave levels in dB re 1 um (ISO 3095:2013, Figure 2).
 const ISO_3095: [(f64, f64); 5] =
     [(0.4, 17.1), (0.2, 11.0), (0.1, 4.9), (0.05, -1.1), (0.025, -5.6)];
 
-/// What a described track does.
+/// Properties of a described track.
 #[derive(Clone, Debug, Serialize)]
 pub struct TrackCheck {
-    /// The description's name.
+    /// Name of the track description.
     pub name: String,
-    /// Mass of half a sleeper in kg.
+    /// Mass of a half sleeper in kg.
     pub half_sleeper_mass_kg: f64,
     /// Mass per length of the rail in kg/m.
     pub rail_mass_kg_m: f64,
-    /// Static stiffness of the track under one wheel in N/m.
+    /// Static stiffness of the track under one wheel, in N/m.
     pub point_stiffness_n_m: f64,
-    /// Stiffness of railpad and ballast in series per length in N/m2: the track modulus.
+    /// Track modulus in N/m2: stiffness of railpad and ballast in series, divided by the sleeper spacing.
     pub track_modulus_n_m2: f64,
-    /// Stiffness of the contact under the static load in N/m.
+    /// Contact stiffness under the static load, in N/m.
     pub contact_stiffness_n_m: f64,
-    /// Half the length of the contact patch in m.
+    /// Half length of the contact patch, in m.
     pub contact_patch_half_length_m: f64,
-    /// Maxima of the rail's receptance above a sleeper in Hz: the full-track resonance first.
+    /// Maxima of the rail's receptance above a sleeper, in Hz. The first one is the full-track resonance.
     pub resonances_at_sleeper_hz: Vec<f64>,
-    /// Maxima of the rail's receptance at midspan in Hz.
+    /// Maxima of the rail's receptance at midspan, in Hz.
     pub resonances_at_midspan_hz: Vec<f64>,
-    /// First pinned-pinned frequency in Hz: half a bending wave in a span, with nodes at the sleepers.
+    /// First pinned–pinned frequency in Hz: half a bending wavelength per span, with nodes at the sleepers.
     pub pinned_pinned_hz: f64,
-    /// Frequency in Hz at which wheel and track resonate on each other: P2.
+    /// P2 frequency in Hz: resonance of the wheel on the track stiffness; `None` if none was found.
     pub p2_hz: Option<f64>,
-    /// One-third-octave levels of the surface against the limit of ISO 3095.
+    /// One-third-octave levels of the surface, with the limits of ISO 3095.
     pub surface: Vec<SurfaceLevel>,
-    /// What happens at each speed.
+    /// Properties at each speed.
     pub speeds: Vec<AtSpeed>,
-    /// How much each parameter changes the level.
+    /// Sensitivity of the level to each parameter.
     pub parameters: Vec<Tellable>,
 }
 
-/// Level of the surface in a one-third octave.
+/// Level of the surface in one one-third octave.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct SurfaceLevel {
-    /// Wavelength in m.
+    /// Wavelength at the centre, in m.
     pub wavelength_m: f64,
     /// Level in dB re 1 um.
     pub level_db: f64,
@@ -77,45 +77,45 @@ pub struct SurfaceLevel {
     pub limit_db: f64,
 }
 
-/// What happens at a speed.
+/// Properties at one speed.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct AtSpeed {
     /// Speed in km/h.
     pub speed_km_h: f64,
     /// Sleeper-passing frequency in Hz.
     pub sleeper_passing_hz: f64,
-    /// Standard deviation of the contact force over the static load.
+    /// Standard deviation of the contact force, divided by the static load.
     pub force_ratio: f64,
-    /// Share of the time without contact, if the force is normally distributed.
+    /// Share of the time without contact, 0 to 1, for a normally distributed contact force.
     pub without_contact: f64,
 }
 
-/// How much a parameter changes the level of the acceleration.
+/// Sensitivity of the acceleration level to one parameter.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Tellable {
     /// The parameter.
     pub parameter: Parameter,
-    /// Greatest change of the level in dB by a change of 10 %.
+    /// Largest change of the level in dB, for a 10 % larger parameter value.
     pub change_db: f64,
-    /// Frequency in Hz at which it is greatest; none where it is the same at all.
+    /// Frequency in Hz of the largest change; `None` if the change is equal at all frequencies.
     pub at_hz: Option<f64>,
 }
 
-/// Why a track cannot be checked.
+/// Reasons for not checking a track.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
-    /// It cannot be built.
+    /// The track model cannot be built.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Its receptance cannot be worked out.
+    /// The receptance of the track cannot be computed.
     #[error(transparent)]
     Frequency(#[from] FrequencyError),
 }
 
-/// The track's response at the frequencies of the check, above a sleeper and at midspan.
+/// Response of the track at the frequencies of the check, above a sleeper and at midspan.
 struct Response {
     rail: [Vec<Complex64>; 2],
-    /// Contact force per height of the surface in N/m.
+    /// Amplitude of the contact force per amplitude of the surface, in N/m.
     force: [Vec<f64>; 2],
 }
 
@@ -142,16 +142,16 @@ impl Response {
         Ok(Self { rail, force })
     }
 
-    /// Mean square of the contact force per height, over both places.
+    /// Mean over both points of the squared contact force per surface amplitude.
     fn power(&self, line: usize) -> f64 {
         0.5 * (self.force[0][line].powi(2) + self.force[1][line].powi(2))
     }
 }
 
-/// Works out what a described track does.
+/// Computes the properties of a described track.
 ///
 /// # Errors
-/// [`CheckError`] when the description makes no track.
+/// Returns [`CheckError`] if the description does not define a valid track model.
 pub fn check(track: &Track) -> Result<TrackCheck, CheckError> {
     let design = &track.design;
     let frequencies = frequencies(design.length_ratio());
@@ -220,7 +220,7 @@ fn model(track: &Track, set: &ParameterSet) -> Result<TrackModel, ModelError> {
     TrackModel::build(&track.design, &mesh, &supports, &[])
 }
 
-/// Derivative of the force by the approach under the static load.
+/// Derivative of the contact force with respect to the approach, under the static load.
 fn contact_stiffness(track: &Track) -> f64 {
     HertzContact::new(&track.design).stiffness(track.design.wheel.load_n)
 }
@@ -261,7 +261,7 @@ fn at_speed(
     })
 }
 
-/// What a change of a parameter does to the level in one-sixth octaves.
+/// Computes the sensitivity of the level to a parameter, in one-sixth octaves.
 fn tellable(
     track: &Track,
     parameter: Parameter,
@@ -290,7 +290,7 @@ fn tellable(
 }
 
 impl TrackCheck {
-    /// What is doubtful about the description, in sentences.
+    /// Returns doubtful properties of the description, one sentence for each.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         for speed in self.speeds.iter().filter(|speed| speed.without_contact > 1e-3) {

@@ -1,9 +1,9 @@
-//! The one door from asynchronous code to computations that take long.
+//! Entry point for long computations from asynchronous code.
 
-/// Computes on this thread; its other tasks move to another one.
+/// Runs `work` on this thread. The runtime moves other tasks of this thread to another one.
 ///
 /// # Panics
-/// On a single-threaded runtime, which cannot move its other tasks.
+/// Panics on a single-threaded runtime, which cannot move other tasks.
 pub fn compute<T>(work: impl FnOnce() -> T) -> T {
     tokio::task::block_in_place(work)
 }

@@ -5,16 +5,16 @@ use crate::pipeline::diagnose::{Compared, DiagnosingError, Setting, diagnose};
 use tracktwin_diagnosis::{ConfirmationError, Confirming, Diagnosis, are_one_speed};
 use tracktwin_signal::recording::Recording;
 
-/// Why nothing was confirmed or refuted.
+/// Errors of confirming a diagnosis.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfirmingError {
-    /// No pass can be withheld.
+    /// No speed has two passes, so no pass can be withheld.
     #[error(
         "passes: no speed was passed twice; --confirm withholds the last pass of each speed that has two or \
          more: record one more pass, or leave --confirm out"
     )]
     NoPass,
-    /// The passes that are left cannot be diagnosed.
+    /// The remaining passes cannot be diagnosed.
     #[error(transparent)]
     Diagnosis(#[from] DiagnosingError),
     /// The simulations failed.
@@ -22,11 +22,12 @@ pub enum ConfirmingError {
     Simulation(#[from] ConfirmationError),
 }
 
-/// Diagnoses a recording without the last pass of each speed that has two or more, and compares these with
-/// simulations of what was accepted. `watch` gets the current stage and the share done.
+/// Diagnoses a recording without the last pass of each speed that has two or more passes. Then compares the
+/// withheld passes with simulations of the accepted hypotheses. `watch` is called with the current stage
+/// and the completed share (0 to 1).
 ///
 /// # Errors
-/// [`ConfirmingError`].
+/// Returns [`ConfirmingError`] if no pass can be withheld, or if the diagnosis or a simulation fails.
 pub async fn diagnose_and_confirm(
     recording: &Recording,
     setting: Setting<'_>,
@@ -44,7 +45,7 @@ pub async fn diagnose_and_confirm(
     Ok(diagnosis)
 }
 
-/// Whether some speed of a recording was passed twice.
+/// Whether some speed of a recording has at least two passes.
 pub fn has_pass_to_withhold(recording: &Recording) -> bool {
     !withheld(recording).is_empty()
 }
@@ -61,8 +62,8 @@ fn withheld(recording: &Recording) -> Vec<usize> {
     (0..passes.len()).filter(is_last).collect()
 }
 
-/// A recording without the last pass of each speed that has two or more, and one of these passes alone; none
-/// where there is no such speed.
+/// Splits a recording: without the last pass of each speed that has two or more passes, and these passes
+/// alone. Returns `None` if there is no such speed.
 fn withhold(recording: &Recording) -> Option<(Recording, Recording)> {
     let last = withheld(recording);
     let of = |is_withheld: bool| {

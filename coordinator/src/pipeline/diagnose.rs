@@ -1,7 +1,7 @@
 //! Diagnosis of a recording: inspection, baseline, null model, search, conclusion.
 //!
-//! Owns the order of the stages; what each does is the diagnosis crate's, where null simulations
-//! are kept the library's.
+//! This module defines the order of the stages. The diagnosis crate implements them, and the library stores
+//! null simulations.
 
 use crate::pipeline::compute::compute;
 use crate::pipeline::null_models::{self, NullModelError};
@@ -18,64 +18,65 @@ use tracktwin_signal::recording::Recording;
 /// Settings of a diagnosis.
 #[derive(Clone, Copy)]
 pub struct Setting<'a> {
-    /// The track that recordings are compared with.
+    /// Track with which the recording is compared.
     pub track: &'a Track,
-    /// Keeps the null simulations, if there is one.
+    /// Library for storing null simulations, if available.
     pub library: Option<&'a Library>,
-    /// Kinds of physics that may not be accepted.
+    /// Kinds of physics that are left out of the catalogue.
     pub without: &'a [String],
-    /// Gives an order of the sleepers for each speed, `[speed][sleeper]`, from the numbers of speeds and
-    /// sleepers: a control in which nothing has a place, and the passes don't speak for themselves.
+    /// For a control: returns an order of the sleepers for each speed, as `[speed][sleeper]`. The arguments
+    /// are the numbers of speeds and sleepers. Shuffled sleepers remove the location of every effect; the
+    /// findings of the inspection are then ignored.
     pub shuffle: Option<&'a Orders<'a>>,
 }
 
-/// From numbers of speeds and sleepers to an order of the sleepers for each speed.
+/// Function from the numbers of speeds and sleepers to an order of the sleepers for each speed.
 pub type Orders<'a> = dyn Fn(usize, usize) -> Vec<Vec<usize>> + Send + Sync + 'a;
 
-/// A diagnosis and what it was concluded from.
+/// A diagnosis with its basis.
 #[derive(Debug)]
 pub struct Diagnosed {
     /// The diagnosis document.
     pub diagnosis: Diagnosis,
-    /// The comparison; none where the passes spoke for themselves alone.
+    /// Comparison with the track model; `None` if the diagnosis is based on the passes alone.
     pub compared: Option<Compared>,
 }
 
-/// A recording's comparison with the model.
+/// Comparison of a recording with the track model.
 #[derive(Debug)]
 pub struct Compared {
     /// The prepared recording.
     pub prepared: PreparedRecording,
     /// Result of the search.
     pub search: SearchOutcome,
-    /// The random variation it was compared with.
+    /// Null model: random variation of the features.
     pub null: NullModel,
 }
 
-/// Why there is no diagnosis.
+/// Errors of a diagnosis.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnosingError {
     /// The recording cannot be diagnosed.
     #[error(transparent)]
     Recording(#[from] PreparationError),
-    /// The model of the track cannot be fitted without anything left out.
+    /// The baseline cannot be fitted.
     #[error("cannot fit the baseline: {0}")]
     Baseline(#[source] CalibrationError),
     /// The null simulations failed.
     #[error(transparent)]
     NullModel(#[from] NullModelError),
-    /// The search broke down.
+    /// The search for left-out physics failed.
     #[error("the search for left-out physics failed: {0}")]
     Search(#[source] CalibrationError),
-    /// What the search found comes to no conclusion.
+    /// No conclusion can be drawn from the result of the search.
     #[error("the search gives no conclusion: {0}")]
     Conclusion(#[source] CalibrationError),
 }
 
-/// Diagnoses a recording. `watch` gets the current stage and the share done.
+/// Diagnoses a recording. `watch` is called with the current stage and its completed share (0 to 1).
 ///
 /// # Errors
-/// [`DiagnosingError::Recording`] states what the recording lacks; everything else is a failure.
+/// Returns [`DiagnosingError::Recording`] if the recording is unsuitable. All other errors are failures.
 pub async fn diagnose(
     recording: &Recording,
     setting: Setting<'_>,
@@ -121,7 +122,7 @@ pub async fn diagnose(
     Ok(Diagnosed { diagnosis, compared: Some(Compared { prepared, search, null }) })
 }
 
-/// The track re-tuned with nothing left out, and what may differ beyond the section.
+/// Fits the baseline, and prepares the variation of parameters beyond the section.
 fn baseline(prepared: &mut PreparedRecording) -> Result<DVector<f64>, CalibrationError> {
     let start = first_calibration(prepared)?;
     prepared.forward.allow_beyond(&start)?;

@@ -1,4 +1,4 @@
-//! From models and their library to what evaluates recordings.
+//! Creates an evaluator of recordings from models and their library.
 
 use crate::pipeline;
 use crate::pipeline::train::TrainingError;
@@ -10,9 +10,9 @@ use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureError};
 use tracktwin_surrogate::{Trained, TrainingSet};
 
-/// Surrogates and model selector of one library, ready for any number of recordings.
+/// Surrogates and model selector of one library. It can evaluate any number of recordings.
 pub struct Evaluator {
-    /// Works out the features that the models were trained on.
+    /// Computes the features on which the models were trained.
     pub extractor: Extractor,
     models: Trained,
     set: TrainingSet,
@@ -21,15 +21,15 @@ pub struct Evaluator {
     fixed: ParameterSet,
 }
 
-/// Why models can't evaluate.
+/// Reasons for not creating an evaluator.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluatorError {
-    /// The library does not hold what they were trained on.
+    /// The library does not contain the data on which the models were trained.
     #[error(
         "the models belong to another library; give their library, or train models on this one"
     )]
     Foreign(#[source] LibraryError),
-    /// Features of another version.
+    /// The features are defined by another version of the program.
     #[error(transparent)]
     Features(#[from] FeatureError),
     /// The library can't be read.
@@ -38,10 +38,11 @@ pub enum EvaluatorError {
 }
 
 impl Evaluator {
-    /// Reads the library that the models were trained on.
+    /// Creates an evaluator. Reads from the library the data on which the models were trained.
     ///
     /// # Errors
-    /// [`EvaluatorError`].
+    /// Returns [`EvaluatorError`] if the models do not belong to the library, or the library cannot be
+    /// read.
     pub async fn new(models: Trained, library: &Library) -> Result<Self, EvaluatorError> {
         let campaign =
             library.campaign(models.campaign()).await.map_err(EvaluatorError::Foreign)?;
@@ -52,43 +53,43 @@ impl Evaluator {
         Ok(Self { extractor, models, set, domains: Domains::default(), experiment, fixed })
     }
 
-    /// The models.
+    /// The trained models.
     pub const fn models(&self) -> &Trained {
         &self.models
     }
 
-    /// The results they were trained and tested on.
+    /// The results on which the models were trained and tested.
     pub const fn set(&self) -> &TrainingSet {
         &self.set
     }
 
-    /// The track of the models' campaign.
+    /// Design of the track in the models' campaign.
     pub const fn design(&self) -> &TrackDesign {
         &self.experiment.design
     }
 
-    /// Experiment of the library's cases.
+    /// Experiment of the campaign's cases.
     pub const fn experiment(&self) -> &Experiment {
         &self.experiment
     }
 
-    /// The values of the parameters that the campaign does not vary.
+    /// Values of the parameters that the campaign does not vary.
     pub const fn fixed(&self) -> &ParameterSet {
         &self.fixed
     }
 
-    /// Evaluation of a recording by models and selector.
+    /// Evaluates a recording with models and model selector.
     ///
     /// # Errors
-    /// Those of [`tracktwin_evaluation::evaluate`].
+    /// The errors of [`tracktwin_evaluation::evaluate`].
     pub fn evaluate(&self, recording: &Recording) -> Result<Evaluation, Error> {
         tracktwin_evaluation::evaluate(recording, &self.twin())
     }
 
-    /// Evaluation of samples while they are recorded, by models and selector.
+    /// Starts an evaluation of samples while they are recorded, with models and model selector.
     ///
     /// # Errors
-    /// Those of [`Stream::new`].
+    /// The errors of [`Stream::new`].
     pub fn stream<'a>(&'a self, section: &'a Recording) -> Result<Stream<'a>, Error> {
         Stream::new(section, self.twin())
     }

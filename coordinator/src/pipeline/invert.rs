@@ -21,7 +21,7 @@ pub enum InvertingError {
     /// The recording cannot be compared with the track model.
     #[error(transparent)]
     Recording(#[from] PreparationError),
-    /// No track fits.
+    /// No parameters of the track model fit the recording.
     #[error("cannot fit a track to the recording: {0}")]
     Fit(#[from] CalibrationError),
     /// The null simulations failed.
@@ -29,11 +29,11 @@ pub enum InvertingError {
     NullModel(#[from] NullModelError),
 }
 
-/// Evaluates a recording by inversion; `library` stores the null simulations. `watch` gets the
-/// current stage and the share done.
+/// Evaluates a recording by inversion. `library` stores null simulations. `watch` is called with the
+/// current stage and its completed share (0 to 1).
 ///
 /// # Errors
-/// [`InvertingError::Recording`] states what the recording lacks; everything else is a failure.
+/// Returns [`InvertingError::Recording`] if the recording is unsuitable. All other errors are failures.
 pub async fn invert(
     recording: &Recording,
     track: &Track,
@@ -59,7 +59,7 @@ pub async fn invert(
     Ok(inversion)
 }
 
-/// A first fit of every section, and what lies beyond it.
+/// First fit of every section, and the variation of parameters beyond each section.
 fn start(
     prepared: Vec<PreparedRecording>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
@@ -75,8 +75,8 @@ fn start(
     Ok(alike(started))
 }
 
-/// Sleepers and railpads of one kind all along: every section starts from the median of what the sections
-/// have in common, so that none starts at the bottom of another valley.
+/// Sets the common parameters of all sections to their median, because sleepers and railpads are of one
+/// type along the track. No section then starts near another local minimum.
 fn alike(
     mut started: Vec<(PreparedRecording, DVector<f64>)>,
 ) -> Vec<(PreparedRecording, DVector<f64>)> {

@@ -1,18 +1,18 @@
-//! Requirements of training, checked before the simulation of a campaign.
+//! Requirements of training, checked before a campaign is simulated.
 
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_surrogate::ENTRIES_MIN;
 
-/// Why models cannot be trained on a campaign; one line each, with the remedy.
+/// Reasons for not training models on a campaign. Each message is one line with the remedy.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Lack {
-    /// Too few cases to fit and to test.
+    /// The campaign has too few cases for training and testing.
     #[error("{cases} cases are too few for training; use `--cases {ENTRIES_MIN}` or more")]
     Cases {
-        /// The cases there are.
+        /// Number of cases.
         cases: u32,
     },
-    /// No parameter varies.
+    /// No parameter is varied.
     #[error(
         "parameters: no parameter varies; give at least one a range, for example \
              `ballast_stiffness_N_m = [4e6, 22e6]`"
@@ -20,10 +20,10 @@ pub enum Lack {
     Axes,
 }
 
-/// Whether models can be trained on a campaign once all its cases are finished.
+/// Checks whether models can be trained on a campaign after all its cases are finished.
 ///
 /// # Errors
-/// [`Lack`].
+/// Returns [`Lack`] with the missing requirement.
 pub fn check_for_training(campaign: &Campaign) -> Result<(), Lack> {
     if (campaign.cases as usize) < ENTRIES_MIN {
         return Err(Lack::Cases { cases: campaign.cases });

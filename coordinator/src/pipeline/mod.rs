@@ -1,7 +1,7 @@
-//! From a library and a recording to results, stage by stage: what commands call.
+//! Sequences of computations that the commands use, from a library and a recording to results.
 //!
-//! Owns the order of stages and the way between the library, which is asynchronous, and the crates
-//! that compute. What a stage does is its crate's.
+//! This module defines the order of the stages, and connects the asynchronous library with the computing
+//! crates. Each stage is implemented in its own crate.
 
 pub mod check;
 pub mod compute;

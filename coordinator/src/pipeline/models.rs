@@ -1,4 +1,4 @@
-//! From a campaign to a folder of models: trained, tested and saved.
+//! Trains, tests and saves the models of a campaign.
 
 use super::compute::compute;
 use super::provenance;
@@ -8,26 +8,26 @@ use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_library::{CampaignRecord, Library};
 use tracktwin_surrogate::{GroupKey, Tested, Trained};
 
-/// The files that are written beside those of [`Trained`].
+/// Files that are written in addition to those of [`Trained`].
 const PAGE: &str = "models.html";
 const SCORES: &str = "mase.json";
 
-/// Why there are no models.
+/// Errors of training models and saving them.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelsError {
-    /// The campaign can't be trained on.
+    /// The campaign is unsuitable for training.
     #[error(transparent)]
     Training(#[from] TrainingError),
-    /// Training broke down.
+    /// The training failed.
     #[error(transparent)]
     Surrogate(#[from] tracktwin_surrogate::Error),
-    /// The folder can't be written.
+    /// The output folder cannot be written.
     #[error(transparent)]
     Files(#[from] FilesError),
 }
 
 impl ModelsError {
-    /// Whether the input is wrong; otherwise the machine has failed.
+    /// Whether the user's input is the cause, and not a failure.
     pub fn is_wrong_input(&self) -> bool {
         match self {
             Self::Training(TrainingError::Library(error)) => error.is_wrong_input(),
@@ -39,19 +39,19 @@ impl ModelsError {
     }
 }
 
-/// Checks that models may be written into a folder, with `force` over other files.
+/// Checks that models can be written to a folder. With `force`, other files may be replaced.
 ///
 /// # Errors
-/// [`FilesError`] names the file in the way.
+/// Returns [`FilesError`] with the path of a file that must not be replaced.
 pub fn check_files(folder: &Path, force: bool) -> Result<(), FilesError> {
     tracktwin_files::check(folder, Kind::Models, force, &[PAGE, SCORES, "models.json"])
 }
 
-/// Trains on a campaign, and saves models and their errors in `folder`; `seed` decides which half of the
-/// cases trains.
+/// Trains on a campaign, and saves the models and their errors in `folder`. `seed` determines which half of
+/// the cases is used for training.
 ///
 /// # Errors
-/// [`ModelsError`].
+/// Returns [`ModelsError`] if the campaign is unsuitable, the training fails, or a file cannot be written.
 pub async fn train_into(
     folder: &Path,
     force: bool,
@@ -100,7 +100,7 @@ pub fn group_name(key: &GroupKey) -> String {
     format!("{} km/h {}", speeds.join("+"), key.feature)
 }
 
-/// The models' errors, a record a model: the content of `mase.json`.
+/// Errors of the models, one record per model: the content of `mase.json`.
 pub fn scores(trained: &Trained) -> serde_json::Value {
     let records: Vec<_> = trained
         .groups()

@@ -1,4 +1,4 @@
-//! Null simulations of a recording's track: taken from the library, or made and kept there.
+//! Null simulations of a recording's track. They are read from the library, or computed and stored there.
 
 use super::compute::compute;
 use nalgebra::DVector;
@@ -8,24 +8,24 @@ use tracktwin_experiment::MODEL_HASH;
 use tracktwin_library::{Library, LibraryError, StoredArray};
 use tracktwin_parameters::TrackDesign;
 
-/// Random surfaces simulated.
+/// Number of simulated random surfaces.
 pub const SURFACES: u32 = 40;
 
-/// Seed of the first.
+/// Seed of the first surface.
 const SEED: u64 = 0x6e75_6c6c;
 
-/// Why there is no null model.
+/// Errors of creating a null model.
 #[derive(Debug, thiserror::Error)]
 pub enum NullModelError {
     /// The library cannot be read or written.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// A simulation breaks down.
+    /// A null simulation failed.
     #[error("the null simulations failed: {0}")]
     Simulation(#[from] NullError),
 }
 
-/// All that the numbers follow from.
+/// All inputs that determine the null simulations.
 #[derive(Serialize)]
 struct Key<'a> {
     model_hash: &'static str,
@@ -39,11 +39,11 @@ struct Key<'a> {
     seed: u64,
 }
 
-/// The null model of a prepared recording whose baseline has the parameters `values`; `progress`
-/// gets the number of surfaces done.
+/// Returns the null model of a prepared recording whose baseline has the parameters `values`. `progress` is
+/// called with the number of completed surfaces.
 ///
 /// # Errors
-/// [`NullModelError`].
+/// Returns [`NullModelError`] if the library or a simulation fails.
 pub async fn of(
     prepared: &PreparedRecording,
     values: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! Library records of trainings, evaluations and diagnoses.
+//! Conversion of trainings, evaluations and diagnoses to records of the library.
 
 use tracktwin_diagnosis::Diagnosis;
 use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
@@ -9,7 +9,7 @@ use tracktwin_library::{
 };
 use tracktwin_surrogate::{ModelGroup, Trained};
 
-/// Library record of trained surrogates.
+/// Record of trained surrogates.
 #[expect(clippy::missing_panics_doc, reason = "a case's index is a u32, and so is their number")]
 pub fn training(trained: &Trained) -> TrainingRecord {
     TrainingRecord {
@@ -34,7 +34,7 @@ fn surrogates(group: &ModelGroup) -> impl Iterator<Item = SurrogateRecord> {
     })
 }
 
-/// Library record of an evaluation by its surrogates.
+/// Record of an evaluation with surrogates.
 pub fn evaluation(evaluation: &Evaluation) -> EvaluationRecord {
     let provenance = &evaluation.provenance;
     EvaluationRecord {
@@ -59,7 +59,7 @@ fn sleeper(sleeper: &SleeperEvaluation) -> SleeperRecord {
     }
 }
 
-/// Library record of a diagnosis with the document `document_json`.
+/// Record of a diagnosis; `document_json` is its document.
 #[expect(clippy::missing_panics_doc, reason = "estimates by their names are plain JSON")]
 pub fn diagnosis(diagnosis: &Diagnosis, document_json: String) -> DiagnosisRecord {
     let mismatches = diagnosis.mismatches.iter().map(|mismatch| MismatchRecord {

@@ -1,4 +1,4 @@
-//! From a library and models to the paper's figures: asks the models.
+//! Computes the figures of the paper from a library and models.
 
 use crate::pipeline::evaluate::Evaluator;
 use crate::pipeline::train;
@@ -11,13 +11,13 @@ use tracktwin_reproduction::{
 use tracktwin_signal::FeatureSet;
 use tracktwin_surrogate::{Tested, Trained, TrainingSet};
 
-/// Why a figure can't be reproduced.
+/// Reasons for not reproducing a figure.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproducingError {
-    /// The library or the models lack something.
+    /// The library or the models lack required data.
     #[error(transparent)]
     Figure(#[from] Error),
-    /// The campaign's track is not the paper's.
+    /// The track of the campaign is not V-Track, the track of the paper.
     #[error(
         "the paper's figures are of V-Track, but the campaign's track has another design: use a \
              library of the built-in campaign"
@@ -29,23 +29,23 @@ pub enum ReproducingError {
              library of the built-in campaign, or omit fig2, fig3 and fig15 to fig19"
     )]
     TooShort {
-        /// Spans of the campaign's track.
+        /// Number of spans of the campaign's track.
         spans: usize,
-        /// How many it takes.
+        /// Required number of spans.
         needed: usize,
     },
-    /// An example can't be evaluated.
+    /// The recording of an example cannot be evaluated.
     #[error(transparent)]
     Evaluation(#[from] tracktwin_evaluation::Error),
-    /// Models and library don't fit.
+    /// The models do not belong to the library.
     #[error(transparent)]
     Surrogate(#[from] tracktwin_surrogate::Error),
 }
 
-/// Refuses a campaign on another track than the paper's.
+/// Checks that the campaign's track is that of the paper and long enough for these figures.
 ///
 /// # Errors
-/// [`ReproducingError::OtherTrack`] or [`ReproducingError::TooShort`].
+/// Returns [`ReproducingError::OtherTrack`] or [`ReproducingError::TooShort`].
 pub fn check(experiment: &Experiment, figures: &[Figure]) -> Result<(), ReproducingError> {
     if experiment.design != TrackDesign::v_track() {
         return Err(ReproducingError::OtherTrack);
@@ -57,10 +57,11 @@ pub fn check(experiment: &Experiment, figures: &[Figure]) -> Result<(), Reproduc
     Ok(())
 }
 
-/// A figure beside the paper's; none where it asks models and there are none.
+/// Computes a figure and compares it with the paper. Returns `None` if the figure needs models and
+/// `evaluator` is `None`.
 ///
 /// # Errors
-/// [`ReproducingError`].
+/// Returns [`ReproducingError`] if data are missing or an example cannot be evaluated.
 pub fn compared(
     figure: Figure,
     results: &Results<'_>,
@@ -82,14 +83,15 @@ pub fn compared(
     })
 }
 
-/// True and predicted values by the global feature at the paper's speed; none without its models.
+/// True and predicted values for the global feature at the speed of the paper; empty if there is no such
+/// model.
 fn tested(set: &TrainingSet, models: &Trained) -> Result<Vec<Tested>, ReproducingError> {
     let single = models.group(&[SPEED_KM_H], FeatureSet::Gf.name());
     let tested = single.map(|group| train::tested_by(set, models, group)).transpose()?;
     Ok(tested.unwrap_or_default())
 }
 
-/// Evaluations of the examples' recordings.
+/// Evaluates the recordings of the examples.
 fn evaluated(
     evaluator: &Evaluator,
     recordings: Vec<RecordedExample>,

@@ -1,4 +1,4 @@
-//! From samples while they are recorded to a row a sleeper.
+//! Evaluation of samples while they are recorded; the result is one row per sleeper.
 
 use std::io::BufRead;
 use std::ops::ControlFlow;
@@ -6,29 +6,29 @@ use std::time::{Duration, Instant};
 use tracktwin_evaluation::{Error, Flag, Outcome, Row, Stream};
 use tracktwin_signal::samples::{SampleReader, SamplesError};
 
-/// What came of a stream.
+/// Summary of an evaluated stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Streamed {
-    /// Rows written.
+    /// Number of rows written.
     pub rows: usize,
-    /// Sleepers with estimates.
+    /// Number of sleepers with estimates.
     pub evaluated: usize,
-    /// Those of them outside the library.
+    /// Number of sleepers with estimates that are outside the library.
     pub outside: usize,
-    /// Time by the clock of the computation of all rows.
+    /// Wall-clock time of computing all rows.
     pub computing: Duration,
-    /// The longest computation of the rows that one sample completes, by the clock.
+    /// Longest wall-clock time of computing the rows that one sample completes.
     pub longest: Duration,
-    /// The stream ended inside a line or a record.
+    /// Whether the stream ended inside a line or a record.
     pub is_cut: bool,
-    /// Nobody read rows any more before the samples ended.
+    /// Whether the reader of the rows ended before the samples.
     pub is_left: bool,
 }
 
-/// Why a stream ends before its samples do.
+/// Errors that end a stream early.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamingError {
-    /// The samples.
+    /// The samples are invalid or cannot be read.
     #[error(transparent)]
     Samples(#[from] SamplesError),
     /// A sleeper cannot be evaluated.
@@ -37,13 +37,13 @@ pub enum StreamingError {
 }
 
 impl Streamed {
-    /// Whether the stream as a whole has no answer: most sleepers have no estimates or are outside the
+    /// Whether the stream has a negative result: at most half of the sleepers have estimates inside the
     /// library.
     pub const fn is_negative(&self) -> bool {
         2 * (self.evaluated - self.outside) < self.rows
     }
 
-    /// Counts rows and hands them on.
+    /// Counts rows and passes them to `write`.
     fn write(
         &mut self,
         rows: &[Row],
@@ -69,11 +69,11 @@ impl Streamed {
     }
 }
 
-/// Reads samples to their end and hands each row to `write` as soon as it is complete; ends early
-/// when `write` breaks.
+/// Reads samples to their end, and passes each row to `write` as soon as the row is complete. Ends early if
+/// `write` returns `Break`.
 ///
 /// # Errors
-/// [`StreamingError`]; the rows before it are written.
+/// Returns [`StreamingError`]. Rows completed before the error have been written.
 pub fn run(
     samples: &mut SampleReader<impl BufRead>,
     mut stream: Stream<'_>,

@@ -1,4 +1,4 @@
-//! From a library to what surrogates are trained on.
+//! Creates the training set of surrogates from a library.
 
 use tracktwin_experiment::{Experiment, ExperimentError};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
@@ -12,22 +12,22 @@ use tracktwin_surrogate::{FeatureColumns, ModelGroup, Split, TrainOptions, Train
 pub(super) const TRAINED: [FeatureSet; 5] =
     [FeatureSet::Gf, FeatureSet::Lf1, FeatureSet::Lf2, FeatureSet::Lf3, FeatureSet::Lf4];
 
-/// Test cases that a picture can show without becoming a blot.
+/// Maximum number of test cases shown in a chart.
 const TESTED_SHOWN: usize = 1000;
 
-/// Why a library can't be trained on.
+/// Reasons for not training on a library.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainingError {
     /// The library can't be read.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// No parameter varies.
+    /// No parameter is varied.
     #[error(
         "campaign {campaign}: no parameter varies over its finished cases; train on a \
              campaign with a range for at least one parameter"
     )]
     NothingVaries {
-        /// The campaign.
+        /// Id of the campaign.
         campaign: String,
     },
     /// Too few cases are finished.
@@ -37,34 +37,34 @@ pub enum TrainingError {
              and `tracktwin campaign add --cases N`"
     )]
     TooFew {
-        /// The campaign.
+        /// Id of the campaign.
         campaign: String,
-        /// Cases that are finished.
+        /// Number of finished cases.
         finished: u32,
     },
-    /// The campaign's experiment isn't understood by this version.
+    /// This version of the program cannot read the campaign's experiment.
     #[error("campaign {campaign}: invalid experiment: {source}")]
     Experiment {
-        /// The campaign.
+        /// Id of the campaign.
         campaign: String,
-        /// What is wrong with it.
+        /// Cause.
         source: ExperimentError,
     },
-    /// The campaign's definition isn't understood by this version.
+    /// This version of the program cannot read the campaign's definition.
     #[error("campaign {campaign}: invalid definition: {source}")]
     Definition {
-        /// The campaign.
+        /// Id of the campaign.
         campaign: String,
-        /// What is wrong with it.
+        /// Cause.
         source: serde_json::Error,
     },
 }
 
-/// All finished cases of a campaign, if there are enough of them to train on and they differ.
+/// Reads all finished cases of a campaign. There must be enough cases for training, and a parameter must
+/// vary.
 ///
 /// # Errors
-/// [`TrainingError`]; everything that can be checked without the results is checked before they are
-/// read.
+/// Returns [`TrainingError`]. All checks that do not need the results are made before the results are read.
 pub async fn set_to_train_on(
     library: &Library,
     campaign: &CampaignRecord,
@@ -80,10 +80,10 @@ pub async fn set_to_train_on(
     Ok(set)
 }
 
-/// All finished cases of a campaign, and what training on them must know.
+/// Reads all finished cases of a campaign as a training set.
 ///
 /// # Errors
-/// [`TrainingError`].
+/// Returns [`TrainingError`] if the library cannot be read or the experiment is invalid.
 pub async fn set(
     library: &Library,
     campaign: &CampaignRecord,
@@ -118,8 +118,8 @@ pub async fn set(
     })
 }
 
-/// Models to train: the paper's feature vectors at every speed, and the global feature of all
-/// speeds together.
+/// The models to train: the feature vectors of the paper at every speed, and the global feature of all
+/// speeds combined.
 pub fn options(set: &TrainingSet) -> TrainOptions {
     let columns = |feature: FeatureSet| FeatureColumns {
         name: feature.name().to_owned(),
@@ -128,11 +128,11 @@ pub fn options(set: &TrainingSet) -> TrainOptions {
     TrainOptions::new(TRAINED.into_iter().map(columns).collect())
 }
 
-/// True and predicted values of cases that no model was trained on, by the models that read most
+/// True and predicted values of cases that no model was trained on, for the models that combine the most
 /// speeds.
 ///
 /// # Errors
-/// [`tracktwin_surrogate::Error`] when set and models don't belong together.
+/// Returns [`tracktwin_surrogate::Error`] if the models do not belong to the training set.
 pub fn tested(
     set: &TrainingSet,
     trained: &Trained,
@@ -141,10 +141,10 @@ pub fn tested(
     tested_by(set, trained, group)
 }
 
-/// True and predicted values of cases that no model was trained on, by the models of one group.
+/// True and predicted values of cases that no model was trained on, for the models of one group.
 ///
 /// # Errors
-/// [`tracktwin_surrogate::Error`] when set and models don't belong together.
+/// Returns [`tracktwin_surrogate::Error`] if the models do not belong to the training set.
 pub fn tested_by(
     set: &TrainingSet,
     trained: &Trained,
@@ -170,18 +170,18 @@ pub fn tested_by(
     Ok(set.varied.iter().enumerate().map(|(column, &of)| (of, pairs(column))).collect())
 }
 
-/// How a campaign's features are made.
+/// Definition of a campaign's features.
 ///
 /// # Errors
-/// [`TrainingError::Experiment`].
+/// Returns [`TrainingError::Experiment`] if the experiment cannot be read.
 pub fn feature_definition(campaign: &CampaignRecord) -> Result<FeatureDefinition, TrainingError> {
     Ok(experiment(campaign)?.features)
 }
 
-/// The values of the parameters that a campaign does not vary.
+/// Values of the parameters that a campaign does not vary.
 ///
 /// # Errors
-/// [`TrainingError::Definition`].
+/// Returns [`TrainingError::Definition`] if the definition cannot be read.
 pub fn fixed(campaign: &CampaignRecord) -> Result<ParameterSet, TrainingError> {
     #[derive(serde::Deserialize)]
     struct Definition {
@@ -195,7 +195,7 @@ pub fn fixed(campaign: &CampaignRecord) -> Result<ParameterSet, TrainingError> {
 /// Experiment of a campaign's cases.
 ///
 /// # Errors
-/// [`TrainingError::Experiment`].
+/// Returns [`TrainingError::Experiment`] if the experiment cannot be read.
 pub fn experiment(campaign: &CampaignRecord) -> Result<Experiment, TrainingError> {
     Experiment::from_json(&campaign.experiment_json)
         .map_err(|source| TrainingError::Experiment { campaign: campaign.id.clone(), source })

@@ -6,53 +6,54 @@ use tracktwin_parameters::{Case, QuantityError, TrackDesign};
 use tracktwin_signal::{FeatureDefinition, FeatureError, ThirdOctave};
 use tracktwin_track::extension::{ExtensionInstance, InstanceError, SampledExtension};
 
-/// Spans between what is evaluated and the held ends of the rail, at least.
+/// Smallest number of spans between the evaluated stretch and the held ends of the rail.
 const END_SPANS: f64 = 8.0;
 
-/// Time steps of a pass: a hundred times those of the built-in campaign, 16 MB a case and more.
+/// Largest number of time steps of a pass: a hundred times that of the built-in campaign, at least 16 MB
+/// per case.
 const STEPS_MAX: f64 = 2e6;
 
 /// Km/h in a m/s.
 const KM_H: f64 = 3.6;
 
-/// Shortest and longest wavelength of the irregularity in m. The paper gives none; at 7 km/h what is
-/// 0.5 mm long sounds at 3.9 kHz, inside the features.
+/// Shortest and longest wavelength of the irregularity in m. The paper does not state them. At 7 km/h a
+/// wavelength of 0.5 mm has a frequency of 3.9 kHz, inside the range of the features.
 const WAVELENGTHS_M: [f64; 2] = [0.25e-3, 1.0];
 
-/// A virtual measurement: a track, a vehicle, its speeds, and what is taken from the signal.
+/// A virtual measurement: track, vehicle, speeds and features of the signal.
 ///
-/// [`Experiment::checked`] checks it; the fields are public so that a campaign may change them
-/// before.
+/// [`Experiment::checked`] checks the fields. They are public, so that a campaign can change them before
+/// the check.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// Sections, masses, spacing and load.
+    /// Design of track and vehicle: sections, masses, spacing and load.
     pub design: TrackDesign,
-    /// Sleeper spans of the track.
+    /// Number of spans of the track.
     pub spans: usize,
-    /// Rail elements in each.
+    /// Number of rail elements in each span.
     pub rail_elements_per_span: usize,
-    /// Elements of a half sleeper.
+    /// Number of elements of a half sleeper.
     pub sleeper_elements: usize,
-    /// Whether the contact gives way by the flexibility inside the loaded rail element.
+    /// Whether the contact includes the local flexibility inside the loaded rail element.
     pub local_flexibility: bool,
-    /// Time step in s, at the same time the sample interval.
+    /// Time step in s. It is also the sample interval.
     pub time_step_s: f64,
-    /// Speeds in km/h, ascending. A case runs at each over one surface.
+    /// Speeds in km/h, ascending. A case has one pass at each speed, all over the same surface.
     pub speeds_km_h: Vec<f64>,
-    /// Spans that the wheel runs before anything is kept, at least.
+    /// Smallest number of spans that the wheel runs before the recorded stretch.
     pub run_in_spans: f64,
     /// Shortest and longest wavelength of the irregularity in m.
     pub wavelengths_m: [f64; 2],
-    /// What is taken from the signal.
+    /// Definition of the features.
     pub features: FeatureDefinition,
-    /// Physics beyond the paper's model, and faults of the measuring chain; the evaluated sleeper
-    /// is number `spans / 2 - 1`.
+    /// Extensions: physics beyond the model of the paper, and faults of the measuring chain. The
+    /// evaluated sleeper has the index `spans / 2 - 1`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extensions: Vec<SampledExtension>,
 }
 
-/// Why an experiment can't be done; each names the setting.
+/// Why an experiment is not possible. Each error names the setting.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExperimentError {
     /// Speeds are missing, not positive, or not in order.
@@ -64,7 +65,7 @@ pub enum ExperimentError {
         /// The speeds.
         speeds: Vec<f64>,
     },
-    /// A number lies outside what makes sense.
+    /// A number is outside its allowed range.
     #[error("{setting}: {value} must lie in {low} to {high}")]
     OutOfRange {
         /// The setting.
@@ -76,10 +77,10 @@ pub enum ExperimentError {
         /// Highest value.
         high: f64,
     },
-    /// A speed that no vehicle has.
+    /// A speed is outside its allowed range.
     #[error("speeds_km_h: {0}")]
     Speed(#[from] QuantityError),
-    /// A pass takes more time steps than can be held.
+    /// A pass has more time steps than fit into memory.
     #[error(
         "time_step_s: {time_step_s:e} gives {steps:.1e} steps at {speed_km_h} km/h, but the \
              limit is {STEPS_MAX:.0e}; use a longer step or higher speeds"
@@ -87,9 +88,9 @@ pub enum ExperimentError {
     TooManySteps {
         /// The time step, in s.
         time_step_s: f64,
-        /// Steps of the slowest pass.
+        /// Number of time steps of the slowest pass.
         steps: f64,
-        /// Its speed, in km/h.
+        /// Speed of this pass in km/h.
         speed_km_h: f64,
     },
     /// Wavelengths are not positive or not in order.
@@ -98,29 +99,29 @@ pub enum ExperimentError {
         /// The wavelengths.
         wavelengths: [f64; 2],
     },
-    /// What is kept comes too near to the held ends of the rail.
+    /// The recorded stretch is too near to the held ends of the rail.
     #[error(
         "spans: {spans} is too small for {speed_km_h} km/h: the evaluated sleepers must be \
              {END_SPANS} spans away from the ends of the rail; use {needed} spans"
     )]
     TooShort {
-        /// The spans.
+        /// Number of spans of the track.
         spans: usize,
-        /// The speed, in km/h.
+        /// Speed in km/h.
         speed_km_h: f64,
-        /// Spans that suffice.
+        /// Smallest sufficient number of spans.
         needed: usize,
     },
-    /// An extension can't be.
+    /// An extension is invalid.
     #[error("extension: {0}")]
     Extension(#[from] InstanceError),
     /// The features can't be extracted.
     #[error(transparent)]
     Features(#[from] FeatureError),
-    /// The features lack one-third octaves that the library keeps.
+    /// The features lack one-third octaves that the library stores.
     #[error("features: the range must hold all one-third octaves from 50 to 4000 Hz")]
     Bands,
-    /// Not the JSON of an experiment that this program knows.
+    /// The text is not the JSON of an experiment of this program version.
     #[error("not an experiment: {message}")]
     Json {
         /// Error of the parser.
@@ -128,7 +129,7 @@ pub enum ExperimentError {
     },
 }
 
-/// The way of the wheel at one speed, and what is kept of it.
+/// Stretch of the wheel at one speed, and its recorded part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "the unit belongs to the name")]
 pub(crate) struct Stretch {
@@ -145,9 +146,10 @@ pub(crate) struct Stretch {
 }
 
 impl Experiment {
-    /// The paper's simulation on a track of this design, at Table D1's speeds; 40 spans instead of
-    /// 25, on which the ends of the rail have an effect, and 4 rail elements in each, which with
-    /// the local flexibility are within 0.012 dB of 32.
+    /// The simulation of the paper on a track of this design, at the speeds of Table D1. The track has
+    /// 40 spans, because with the 25 spans of the paper the ends of the rail have an effect. Each span
+    /// has 4 rail elements. With the local flexibility their result is within 0.012 dB of that of 32
+    /// elements.
     pub fn new(design: TrackDesign) -> Self {
         Self {
             design,
@@ -164,8 +166,8 @@ impl Experiment {
         }
     }
 
-    /// The extensions that a case has, with its values: a function of the experiment and the
-    /// case's parameters and seed.
+    /// The extensions of a case with their values. They depend only on the experiment and on the
+    /// parameters and seed of the case.
     pub fn extensions_of(&self, case: &Case) -> Vec<ExtensionInstance> {
         let seed = |number: usize| {
             let mut hasher = blake3::Hasher::new_derive_key("tracktwin case extension 1");
@@ -177,10 +179,10 @@ impl Experiment {
         numbered.filter_map(|(number, extension)| extension.draw(seed(number))).collect()
     }
 
-    /// The same experiment, if it can be done.
+    /// Checks all settings and returns the experiment.
     ///
     /// # Errors
-    /// [`ExperimentError`] names the setting that prevents it, and what would do.
+    /// [`ExperimentError`] names the invalid setting and its allowed values.
     pub fn checked(self) -> Result<Self, ExperimentError> {
         self.check_speeds()?;
         self.features.check().map_err(FeatureError::from)?;
@@ -216,8 +218,8 @@ impl Experiment {
     /// Reads the canonical JSON of an experiment and checks it.
     ///
     /// # Errors
-    /// [`ExperimentError::Json`] for what this program does not know; else as
-    /// [`Experiment::checked`].
+    /// [`ExperimentError::Json`] if the text is not an experiment of this program version; also the
+    /// errors of [`Experiment::checked`].
     pub fn from_json(json: &str) -> Result<Self, ExperimentError> {
         serde_json::from_str::<Self>(json)
             .map_err(|error| ExperimentError::Json { message: error.to_string() })?
@@ -234,8 +236,8 @@ impl Experiment {
         blake3::hash(self.to_json().as_bytes()).to_hex().to_string()
     }
 
-    /// The middle sleeper: the one whose window is evaluated. It is at the end of this number of
-    /// spans.
+    /// Number of the evaluated sleeper, which is in the middle of the track, at the end of this number
+    /// of spans.
     pub const fn sleeper(&self) -> usize {
         self.spans / 2
     }

@@ -1,12 +1,12 @@
 //! Experiment and outcome of a case, common to coordinator and worker.
 //!
-//! Owns the [`Experiment`] (all that decides results but a case's parameters), the [`Simulation`] of
-//! cases, their [`Outcome`], and [`MODEL_HASH`], by which two programs know that their physics agree.
-//! Which cases there are is the coordinator's, how they travel the protocol's.
+//! This crate contains the [`Experiment`] (all settings except the parameters of a case), the
+//! [`Simulation`] of cases, their [`Outcome`], and [`MODEL_HASH`], the version of the physics. The
+//! coordinator selects the cases. The protocol crate transfers them.
 //!
 //! # Example: LWPS of a simulated pass
 //!
-//! A wheel that rolls at 10 km/h over waves of 6 mm is excited at 463 Hz.
+//! Corrugation of 6 mm wavelength excites a wheel at 10 km/h with 463 Hz.
 //!
 //! ```
 //! use tracktwin_parameters::{ParameterSet, TrackDesign};
@@ -49,11 +49,12 @@ pub use outcome::{Outcome, PassFeatures};
 pub use simulate::{Prepare, Simulate, Simulation, prepare_simulation};
 pub use tracktwin_parameters::Case;
 
-/// Version of the program, for people.
+/// Version of the program, for display.
 pub const CODE_VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Version of the physics: BLAKE3 of `golden.json`, the features of some cases.
 ///
-/// A worker with another one is refused, and null simulations of another one are repeated. A test
-/// simulates the cases; if it fails, it states how to write the file, and so the version, again.
+/// The coordinator rejects workers with another version. Null simulations of another version are
+/// repeated. A test simulates the cases; if it fails, its message states how to write the file, and
+/// therefore the version, again.
 pub const MODEL_HASH: &str = env!("TRACKTWIN_MODEL_HASH");

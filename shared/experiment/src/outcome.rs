@@ -5,11 +5,11 @@ use tracktwin_signal::Features;
 /// Outcome of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// Features, one pass a speed, by ascending speed.
+    /// The features of one pass per speed, by ascending speed.
     Finished(Vec<PassFeatures>),
-    /// It cannot be simulated. That is a result, not an error of the farm.
+    /// The case cannot be simulated. This is a result, not an error of the farm.
     Failed {
-        /// Why.
+        /// Reason of the failure.
         reason: String,
     },
 }
@@ -21,7 +21,7 @@ pub struct PassFeatures {
     pub speed_km_h: f64,
     /// The features.
     pub features: Features,
-    /// Share of the recorded time, 0 to 1, in which the wheel did not touch the rail; none if the
-    /// worker did not report it.
+    /// Share of the recorded time with contact loss, 0 to 1. `None` if the worker did not report this
+    /// value.
     pub contact_loss_share: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! The way of a case: parameters, track model, a pass a speed, signal, features.
+//! Simulation of a case: parameters, track model, one pass per speed, signal, features.
 
 use crate::experiment::{Experiment, ExperimentError, metres_per_second};
 use crate::outcome::{Outcome, PassFeatures};
@@ -9,28 +9,28 @@ use tracktwin_track::extension::{InstanceError, Measured};
 use tracktwin_track::model::{Mesh, ModelError, Roughness, Support, Surface, TrackModel};
 use tracktwin_track::time::{self, Pass, PassError, PassRecord};
 
-/// Simulates cases: the track model, or a stand-in in tests of the farm.
+/// Simulator of cases: the track model, or a substitute in tests of the farm.
 pub trait Simulate: Send + Sync {
-    /// One outcome a case, in their order.
+    /// Returns one outcome per case, in the order of the cases.
     fn simulate(&self, cases: &[Case]) -> Vec<Outcome>;
 }
 
-/// How something that simulates is made for an experiment.
+/// Function that creates a simulator for an experiment.
 pub type Prepare = fn(&Experiment) -> Result<Box<dyn Simulate>, ExperimentError>;
 
-/// An experiment, ready for any number of cases.
+/// A simulator of one experiment, for any number of cases.
 ///
-/// Pure: a case's outcome depends on the case and the experiment, to the bit, and on nothing else;
-/// in particular not on the cases it is simulated with.
+/// The outcome of a case depends, to the bit, only on the case and the experiment. It does not depend on
+/// other cases simulated in the same call.
 pub struct Simulation {
     experiment: Experiment,
     extractor: Extractor,
 }
 
-/// A [`Simulation`] as something that simulates.
+/// Creates a [`Simulation`] as a boxed [`Simulate`].
 ///
 /// # Errors
-/// As [`Simulation::new`].
+/// The errors of [`Simulation::new`].
 pub fn prepare_simulation(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
     Ok(Box::new(Simulation::new(experiment)?))
 }
@@ -66,17 +66,17 @@ impl Simulate for Simulation {
 }
 
 impl Simulation {
-    /// Prepares what all cases share.
+    /// Prepares the data that all cases share.
     ///
     /// # Errors
-    /// [`ExperimentError`] when it can't be done.
+    /// [`ExperimentError`] if the experiment is not possible.
     pub fn new(experiment: &Experiment) -> Result<Self, ExperimentError> {
         let experiment = experiment.clone().checked()?;
         let extractor = Extractor::new(&experiment.features)?;
         Ok(Self { experiment, extractor })
     }
 
-    /// The cases side by side, a speed at a time.
+    /// Simulates all cases together, one speed after another.
     fn together(&self, cases: &[Case]) -> Result<Vec<Outcome>, CaseError> {
         let models = cases.iter().map(|case| self.model(case)).collect::<Result<Vec<_>, _>>()?;
         let pairs = cases.iter().zip(&models);
@@ -95,7 +95,7 @@ impl Simulation {
         Ok(passes.into_iter().map(Outcome::Finished).collect())
     }
 
-    /// The track, every sleeper alike, with the extensions that the case has.
+    /// The track model of a case, with equal sleepers and the extensions of the case.
     fn model(&self, case: &Case) -> Result<TrackModel, CaseError> {
         let Experiment { design, spans, rail_elements_per_span, sleeper_elements, .. } =
             &self.experiment;
@@ -107,7 +107,7 @@ impl Simulation {
         Ok(TrackModel::build(design, &mesh, &supports, &extensions)?)
     }
 
-    /// The surface that the wheel meets at every speed.
+    /// The surface of the case, the same at every speed.
     fn surface(&self, case: &Case, model: &TrackModel) -> Surface {
         let level = case.parameters[Parameter::IrregularityLevel];
         let roughness = Roughness::between(level, self.experiment.wavelengths_m);
@@ -155,7 +155,7 @@ impl Simulation {
     }
 }
 
-/// The record as the measuring chain has it; where the wheel was is taken for known.
+/// The pass as the measuring chain records it, with the true positions of the wheel.
 fn measured(mut record: PassRecord, model: &TrackModel) -> PassRecord {
     let mut measured = Measured {
         time_step_s: record.time_step_s,

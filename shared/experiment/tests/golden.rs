@@ -1,4 +1,5 @@
-//! The version of the physics: features of some cases, as they were when it was last raised.
+//! The version of the physics: compares the features of some cases with those stored at the last change
+//! of the version.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 

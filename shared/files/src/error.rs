@@ -4,7 +4,7 @@ use crate::{Kind, NameError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A file that is not written or not read.
+/// Error in writing or reading a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
     /// An existing file was not written by the program.
@@ -25,7 +25,7 @@ pub enum FilesError {
     OtherKind {
         /// The file.
         path: PathBuf,
-        /// What it belongs to.
+        /// The kind of output that the file belongs to.
         kind: Kind,
     },
     /// A folder exists in place of a file.
@@ -34,12 +34,12 @@ pub enum FilesError {
         /// The folder.
         path: PathBuf,
     },
-    /// A text can't be the name of a file.
+    /// A text is not a valid file name.
     #[error("{name:?}: {fault}")]
     Name {
         /// The text.
         name: String,
-        /// Why not.
+        /// The fault of the text.
         fault: NameError,
     },
     /// A file that another file names lies outside its folder.
@@ -54,12 +54,12 @@ pub enum FilesError {
         /// The name.
         name: String,
     },
-    /// The operating system refuses.
+    /// The operating system returned an error.
     #[error("{}: cannot be {action}: {source}", path.display())]
     System {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried: "written", "read", "made".
+        /// The failed action: "written", "read", "made".
         action: &'static str,
         /// Error of the system.
         source: std::io::Error,
@@ -76,8 +76,8 @@ impl FilesError {
         move |source| Self::System { path, action, source }
     }
 
-    /// Whether the user who named the file can correct it, as with any file to be read; everything
-    /// else is the machine's.
+    /// Whether the user can correct the error, as for every file that is read. Other errors are faults
+    /// of the machine.
     pub fn is_wrong_input(&self) -> bool {
         match self {
             Self::System { action: "read", .. } => true,

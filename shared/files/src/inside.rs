@@ -3,8 +3,9 @@
 use crate::FilesError;
 use std::path::{Component, Path, PathBuf};
 
-/// The file that a file of `folder` calls `name`: a relative path that stays in the folder, also
-/// when links are followed. The path of a missing file is returned unchanged.
+/// The path of a file that another file in `folder` refers to as `name`. The path must be relative and
+/// must stay in the folder after links are resolved. The function returns the path of a missing file
+/// unchanged.
 ///
 /// # Errors
 /// [`FilesError::Outside`] for an absolute path, for one with `..`, and for a link that leads out.

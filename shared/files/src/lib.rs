@@ -1,7 +1,7 @@
-//! Output files: written atomically, never over files of others, under names that stay in their
-//! folder.
+//! Output files. They are written atomically, do not replace files of other programs, and have names
+//! that stay in their folder.
 //!
-//! Owns the writing of files and the rules of file names. The content belongs to the callers.
+//! This crate writes files and defines the rules of file names. The callers provide the content.
 
 mod error;
 mod inside;

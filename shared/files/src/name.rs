@@ -1,4 +1,4 @@
-//! Names of files that are made of foreign text: of columns, speeds, campaigns.
+//! File names made from foreign text: names of columns, speeds, campaigns.
 
 use crate::FilesError;
 use std::collections::HashSet;
@@ -14,48 +14,48 @@ const BYTES_CUT: usize = 80;
 /// Hexadecimal digits of a hash that distinguish two texts with the same name.
 const DIGITS: usize = 8;
 
-/// What a name without one usable character becomes.
+/// File name for a text without an allowed character.
 const NAMELESS: &str = "unnamed";
 
 /// Names reserved for devices by Windows, with any extension.
 const DEVICES: [&str; 6] = ["con", "prn", "aux", "nul", "conin$", "conout$"];
 
-/// The name of a file or folder, without its folder: the only way from foreign text to a path.
+/// The name of a file or folder, without its parent folder. All paths from foreign text use this type.
 ///
-/// It has letters and digits of any script, spaces, and `. _ - +`; it begins with a letter, digit or
-/// underscore and does not end in a dot or space; it is composed (Unicode NFC), of at most 100
-/// bytes, and no name that an operating system keeps for itself.
+/// The name contains letters and digits of any script, spaces, and `. _ - +`. It begins with a letter,
+/// digit or underscore and does not end in a dot or space. It is in Unicode NFC, has at most 100 bytes,
+/// and is not reserved by an operating system.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FileName(String);
 
-/// Why a text is no file's name.
+/// Why a text is not a valid file name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
-    /// Nothing, or nothing but dots.
+    /// The name is empty or contains only dots.
     #[error("is not a file name; use another name")]
     Empty,
-    /// Too long.
+    /// The name is too long.
     #[error("is longer than {BYTES_MAX} bytes; use a shorter name")]
     Long,
-    /// A character that is not allowed.
+    /// The name contains a character that is not allowed.
     #[error(
         "contains {0:?}; use letters, digits, spaces and . _ - +, and start with a letter \
              or digit"
     )]
     Character(char),
-    /// A name that operating systems keep for themselves.
+    /// An operating system reserves the name.
     #[error("is a reserved name of an operating system; use another name")]
     Reserved,
-    /// Letters in pieces: they look like others and are not.
+    /// The name is not in Unicode NFC: letters are decomposed into base letter and accent.
     #[error("contains decomposed letters; use composed letters (Unicode NFC)")]
     Decomposed,
 }
 
 impl FileName {
-    /// The name that a text is.
+    /// Checks a text and returns it as a name.
     ///
     /// # Errors
-    /// [`FilesError::Name`] names what is not allowed.
+    /// [`FilesError::Name`] states the fault of the text.
     pub fn new(text: &str) -> Result<Self, FilesError> {
         match fault(text) {
             None => Ok(Self(text.to_owned())),
@@ -63,11 +63,11 @@ impl FileName {
         }
     }
 
-    /// The file that a user's own path names, and its folder. Only that it is a file's name is
-    /// asked for: who writes it may call it as they like.
+    /// Splits a path from the user into folder and file name. The name needs only to be that of a file;
+    /// the rules for foreign text do not apply.
     ///
     /// # Errors
-    /// [`FilesError::Name`] for a path without a file's name, such as `..` or `/`.
+    /// [`FilesError::Name`] for a path without a file name, such as `..` or `/`.
     pub fn of_path(path: &Path) -> Result<(PathBuf, Self), FilesError> {
         // A link stays, and what it leads to is written.
         let real = if path.is_symlink() { path.canonicalize().ok() } else { None };
@@ -83,18 +83,18 @@ impl FileName {
         &self.0
     }
 
-    /// Where it is in a folder.
+    /// The path of the file in a folder.
     pub fn within(&self, folder: &Path) -> PathBuf {
         folder.join(&self.0)
     }
 
-    /// The same name with an ending, which is the program's own.
+    /// The name with a file extension of the program appended.
     #[must_use]
     pub fn with_ending(&self, ending: &'static str) -> Self {
         Self(format!("{}.{ending}", self.0))
     }
 
-    /// The same name with the first digits of a hash before its ending.
+    /// The name with the first digits of a hash before its extension.
     #[must_use]
     pub(crate) fn marked(&self, hash: &str) -> Self {
         let digits = &hash[..DIGITS.min(hash.len())];
@@ -111,7 +111,8 @@ impl std::fmt::Display for FileName {
     }
 }
 
-/// Makes names of texts, unique within a folder, ignoring case.
+/// Makes file names from texts. The names are unique within a folder, also without regard to upper and
+/// lower case.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
     taken: HashSet<String>,

@@ -1,4 +1,4 @@
-//! Files that come into being together.
+//! Sets of files that are written together.
 
 use crate::ownership::{Entry, LIST, List, hash};
 use crate::partial::Staging;
@@ -9,17 +9,17 @@ use std::io::{ErrorKind, Write as _};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
-/// Files of one kind that appear in a folder together or not at all.
+/// A set of files of one kind, written to a folder completely or not at all.
 ///
-/// They are written into a hidden folder beside their places and get their names when all are
-/// whole ([`Output::commit`]). A set with a manifest, a file that names the others, never replaces
-/// one of the others ([`Output::unique_name`]): until the manifest is replaced, which is one step, the
-/// old set is whole, and afterwards the new one. What the new set leaves over of the old one is then
-/// removed. A file that the program did not make is replaced with `force` only.
+/// The files are first written to a hidden folder next to their final places. [`Output::commit`] renames
+/// them after all are complete. A manifest is a file that names the others. A set with a manifest never
+/// replaces one of the other files ([`Output::unique_name`]). The manifest is replaced in one step:
+/// before this step the old set is complete, afterwards the new one. Unused files of the old set are
+/// then removed. A file that the program did not write is replaced only with `force`.
 #[derive(Debug)]
 pub struct Output {
     folder: PathBuf,
-    /// Folders that were made for it, the innermost first.
+    /// Folders created for the set, the innermost first.
     made: Vec<PathBuf>,
     kind: Kind,
     force: bool,
@@ -29,10 +29,10 @@ pub struct Output {
 }
 
 impl Output {
-    /// Begins a set of files in `folder`, which is made if need be.
+    /// Starts a set of files in `folder`, and creates the folder if it does not exist.
     ///
     /// # Errors
-    /// [`FilesError::System`] when the folder can't be made or written to.
+    /// [`FilesError::System`] if the folder cannot be created or written to.
     pub fn begin(folder: &Path, kind: Kind, force: bool) -> Result<Self, FilesError> {
         let missing =
             folder.ancestors().take_while(|it| !it.as_os_str().is_empty() && !it.exists());
@@ -46,7 +46,7 @@ impl Output {
     /// Starts a set of files in an existing folder.
     ///
     /// # Errors
-    /// [`FilesError::System`] when it is not, or can't be written to.
+    /// [`FilesError::System`] if the folder does not exist or cannot be written to.
     pub fn in_folder(folder: &Path, kind: Kind, force: bool) -> Result<Self, FilesError> {
         Ok(Self {
             folder: folder.to_owned(),
@@ -59,7 +59,7 @@ impl Output {
         })
     }
 
-    /// Where to write the file that will be called `name`.
+    /// Path to which the caller must write the file with the final name `name`.
     pub fn stage(&mut self, name: &FileName) -> PathBuf {
         if !self.names.contains(name) {
             self.names.push(name.clone());
@@ -67,7 +67,7 @@ impl Output {
         self.staged(name)
     }
 
-    /// Adds a file that `write` writes to the path that it is given.
+    /// Adds a file. The function `write` receives the path and must write the file.
     ///
     /// # Errors
     /// [`FilesError::System`] with the error of `write`.
@@ -84,16 +84,16 @@ impl Output {
     /// Adds a file.
     ///
     /// # Errors
-    /// [`FilesError::System`] when it can't be written.
+    /// [`FilesError::System`] if the file cannot be written.
     pub fn add(&mut self, name: &FileName, bytes: &[u8]) -> Result<(), FilesError> {
         let path = self.stage(name);
         std::fs::write(path, bytes).map_err(FilesError::written(&name.within(&self.folder)))
     }
 
-    /// Adds a file that only its owner is to read.
+    /// Adds a file that only its owner can read.
     ///
     /// # Errors
-    /// [`FilesError::System`] when it can't be written.
+    /// [`FilesError::System`] if the file cannot be written.
     pub fn add_secret(&mut self, name: &FileName, bytes: &[u8]) -> Result<(), FilesError> {
         let path = self.stage(name);
         let file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path);
@@ -101,21 +101,21 @@ impl Output {
         written.map_err(FilesError::written(&name.within(&self.folder)))
     }
 
-    /// Adds the file that names the others; it gets its place last.
+    /// Adds the manifest: the file that names the others. It is renamed last.
     ///
     /// # Errors
-    /// [`FilesError::System`] when it can't be written.
+    /// [`FilesError::System`] if the file cannot be written.
     pub fn add_manifest(&mut self, name: &FileName, bytes: &[u8]) -> Result<(), FilesError> {
         self.add(name, bytes)?;
         self.manifest = Some(name.clone());
         Ok(())
     }
 
-    /// The name that a staged file gets so that it replaces none: its own, or that with digits of
-    /// its content's hash where another content has its own name already.
+    /// Final name of a staged file that does not replace another content: `name`, or `name` with digits
+    /// of the hash of the content if an existing file with this name has another content.
     ///
     /// # Errors
-    /// [`FilesError::System`] when the file can't be read.
+    /// [`FilesError::System`] if the file cannot be read.
     pub fn unique_name(&mut self, name: &FileName) -> Result<FileName, FilesError> {
         let content = hash(&self.staged(name))?;
         if self.stands(name, &content)? {
@@ -129,10 +129,10 @@ impl Output {
         Ok(marked)
     }
 
-    /// Makes sure that [`Output::commit`] has nothing in its way.
+    /// Checks that no existing file prevents [`Output::commit`].
     ///
     /// # Errors
-    /// As [`Output::commit`].
+    /// The errors of [`Output::commit`].
     pub fn check(&self) -> Result<(), FilesError> {
         let list = List::of(&self.folder);
         for name in &self.names {
@@ -141,12 +141,12 @@ impl Output {
         Ok(())
     }
 
-    /// Gives all files their names.
+    /// Renames all files to their final names.
     ///
     /// # Errors
-    /// [`FilesError::Foreign`], [`FilesError::OtherKind`] or [`FilesError::Folder`] for an existing
-    /// file that may not be replaced, [`FilesError::System`] when the system refuses; then the old
-    /// files are kept.
+    /// [`FilesError::Foreign`], [`FilesError::OtherKind`] or [`FilesError::Folder`] for an existing file
+    /// that must not be replaced; [`FilesError::System`] for an error of the operating system. The old
+    /// files are then kept.
     pub fn commit(mut self) -> Result<(), FilesError> {
         let _others_wait = Lock::wait(&self.folder);
         if let Some(manifest) = self.manifest.clone() {
@@ -274,7 +274,7 @@ impl Drop for Output {
     }
 }
 
-/// Makes a folder and those above it.
+/// Creates a folder and its parent folders.
 ///
 /// # Errors
 /// [`FilesError::System`] names the folder.
@@ -282,7 +282,7 @@ pub fn make_folder(folder: &Path) -> Result<(), FilesError> {
     std::fs::create_dir_all(folder).map_err(FilesError::system(folder, "made"))
 }
 
-/// Makes a file's content last over a power cut.
+/// Flushes the content of a file to the disk, so that it survives a power failure.
 fn sync(path: &Path) -> std::io::Result<()> {
     File::open(path)?.sync_all()
 }

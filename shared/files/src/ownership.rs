@@ -1,5 +1,5 @@
-//! Which files of a folder the program wrote: a hidden list beside them, with the hash of each,
-//! which distinguishes them from files added or changed by others.
+//! Ownership of files. A hidden list in each folder contains the files that the program wrote, with
+//! their hashes. The hashes distinguish these files from files added or changed by others.
 
 use crate::FilesError;
 use serde::{Deserialize, Serialize};
@@ -9,21 +9,21 @@ use std::fs::File;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// The list's name.
+/// File name of the list.
 pub(crate) const LIST: &str = ".tracktwin.json";
 const FORMAT: &str = "tracktwin-files/1";
 
-/// What a file belongs to. A file replaces one of its own kind only.
+/// Kind of output that a file belongs to. A file replaces only files of its own kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// A recording of `simulate`, or the sample of `run`.
     SimulatedRecording,
-    /// A recording of `import`: measured, and replaced by nothing.
+    /// A recording of `import`. It is measured and therefore never replaced.
     MeasuredRecording,
     /// Models of `train`.
     Models,
-    /// Answers and pages of `evaluate`, `diagnose`, `inspect`, `reproduce` and `run`.
+    /// Results and pages of `evaluate`, `diagnose`, `inspect`, `reproduce` and `run`.
     Results,
     /// Tables of `trial`.
     Trial,
@@ -35,14 +35,14 @@ pub enum Kind {
     Certificates,
     /// Curves of `receptance`.
     Curves,
-    /// A description of `new`, which its user changes.
+    /// A track description of `new`, which the user edits.
     Description,
     /// Pages of `manual`.
     Manual,
 }
 
 impl Kind {
-    /// Whether the program replaces what it made itself.
+    /// Whether the program replaces its own files of this kind.
     const fn is_replaced(self) -> bool {
         !matches!(self, Self::MeasuredRecording | Self::Description)
     }
@@ -119,9 +119,8 @@ impl List {
     }
 }
 
-/// Checks, before a computation, that files of these names may be written into a folder: they do
-/// not exist, or the program wrote them and they are of the same kind, or they are to be replaced
-/// (`force`).
+/// Checks, before a computation, that files with these names may be written to a folder. A file may be
+/// written if it does not exist, if the program wrote it as the same kind, or with `force`.
 ///
 /// # Errors
 /// [`FilesError`] names the first file that may not be replaced.
@@ -140,7 +139,7 @@ pub fn check(folder: &Path, kind: Kind, force: bool, names: &[&str]) -> Result<(
     Ok(())
 }
 
-/// Whether a file is one that the program made, unchanged.
+/// Whether the program wrote this file and its content is unchanged.
 pub fn is_own(folder: &Path, kind: Kind, name: &str) -> bool {
     let path = folder.join(name);
     path.exists() && List::of(folder).allows(name, kind, &path).is_ok()

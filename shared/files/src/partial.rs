@@ -1,5 +1,5 @@
-//! What is being written and has no name yet: hidden, locked while its writer lives, removed by the
-//! next writer once it is dead.
+//! Incomplete files without a final name. They are hidden and locked by the process that writes them.
+//! The next writer removes those of ended processes.
 
 use crate::FilesError;
 use crate::lock::{Lock, is_free};

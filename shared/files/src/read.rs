@@ -1,4 +1,4 @@
-//! Small files read whole: what describes, configures or names, not what was measured.
+//! Reading of small files as a whole: descriptions, configurations and manifests, not recordings.
 
 use crate::FilesError;
 use std::fs::File;
@@ -8,10 +8,10 @@ use std::path::Path;
 /// Upper limit of the size in bytes; a pipe or device may be endless.
 const BYTES_MAX: u64 = 64 << 20;
 
-/// What a file holds, of at most 64 MiB.
+/// The content of a file of at most 64 MiB.
 ///
 /// # Errors
-/// [`FilesError::System`] when it can't be read or is larger.
+/// [`FilesError::System`] if the file cannot be read or is larger.
 pub fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
     let read = || {
         let mut bytes = Vec::new();
@@ -28,10 +28,10 @@ pub fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
     read().map_err(FilesError::system(path, "read"))
 }
 
-/// As [`read`], for text.
+/// The content of a text file of at most 64 MiB.
 ///
 /// # Errors
-/// As [`read`], and when it is not UTF-8.
+/// The errors of [`read`]; also if the file is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FilesError> {
     String::from_utf8(read(path)?).map_err(|error| {
         let error = Error::new(ErrorKind::InvalidInput, format!("the file is not text ({error})"));

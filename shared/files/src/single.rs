@@ -1,4 +1,4 @@
-//! One file, replaced at once.
+//! Atomic replacement of a single file.
 
 use crate::{FilesError, partial};
 use std::fs::File;
@@ -8,19 +8,19 @@ use std::path::Path;
 /// Mode of a file that only its owner reads.
 const SECRET: u32 = 0o600;
 
-/// Writes a file atomically: a reader finds the old or the new one, also after a crash or on a full
-/// disk. For files in folders of the program; others go through [`crate::Output`].
+/// Writes a file atomically: a reader finds the old or the new content, also after a crash or on a full
+/// disk. Use this function for files in folders of the program and [`crate::Output`] for others.
 ///
 /// # Errors
-/// [`FilesError::System`] when the file cannot be written; then the old one is kept.
+/// [`FilesError::System`] if the file cannot be written. The old file is then kept.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), FilesError> {
     write(path, bytes, None)
 }
 
-/// As [`replace`], for a file that only its owner is to read.
+/// Writes a file like [`replace`], with a mode that only its owner can read.
 ///
 /// # Errors
-/// As [`replace`].
+/// The errors of [`replace`].
 pub fn replace_secret(path: &Path, bytes: &[u8]) -> Result<(), FilesError> {
     write(path, bytes, Some(SECRET))
 }
@@ -34,7 +34,8 @@ fn write(path: &Path, bytes: &[u8], mode: Option<u32>) -> Result<(), FilesError>
     Ok(())
 }
 
-/// Makes new names last over a power cut; file systems that can't do so are not asked twice.
+/// Flushes new file names in a folder to the disk, so that they survive a power failure. Errors are
+/// ignored, because some file systems do not support this.
 pub(crate) fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }

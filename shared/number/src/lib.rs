@@ -1,19 +1,19 @@
-//! Numbers as a person reads them: on pages, in messages and in sentences.
+//! Numbers as text for readers: on pages, in messages and in sentences.
 //!
-//! Owns how many digits are shown, and what is said of numbers that are too large or too small to
-//! have been measured. Units with prefixes are left to the pages. Files for programs keep numbers.
+//! This crate defines the number of digits, and the text for numbers that are too large or too small to
+//! be measured. The pages add units with prefixes. Files for programs contain the numbers themselves.
 
-/// The least probability that anything here claims to know.
+/// Smallest probability that the program states.
 ///
-/// The tests behind a probability assume distributions that nobody has seen that far out.
+/// The statistical tests assume distributions whose tails are not verified below this probability.
 pub const PROBABILITY_LEAST: f64 = 1e-12;
 
-/// The greatest ratio that is told as a number; beyond it only that it is greater.
+/// Largest ratio that is stated as a number. The text for a larger ratio is "more than 1000".
 pub const RATIO_GREATEST: f64 = 1000.0;
 
-/// Decimals that a number has at most.
+/// Largest number of decimals.
 const DECIMALS_MAX: i64 = 9;
-/// Sizes outside which a number is written with a power of ten.
+/// Magnitude from which a number is written with a power of ten.
 const SIZE_MAX: f64 = 1e7;
 const SIZE_MIN: f64 = 1e-5;
 
@@ -27,12 +27,12 @@ pub const fn floored(probability: f64) -> f64 {
     probability.clamp(PROBABILITY_LEAST, 1.0)
 }
 
-/// How probable something is by chance: `0.012`, `3e-7`, `below 1e-12`.
+/// A probability as text: `0.012`, `3e-7`, `below 1e-12`.
 pub fn chance(probability: f64) -> String {
     chance_down_to(probability, PROBABILITY_LEAST)
 }
 
-/// As [`chance`], where the test behind it knows no probability below `least`.
+/// A probability as text like [`chance`], for a test whose smallest probability is `least`.
 pub fn chance_down_to(probability: f64, least: f64) -> String {
     if probability <= least {
         let least = if least < 1e-3 { format!("{least:.0e}") } else { least.to_string() };
@@ -53,8 +53,8 @@ pub fn ratio(ratio: f64) -> String {
     }
 }
 
-/// The number rounded to so many significant digits, without trailing zeros behind the point:
-/// `67.4`, `25600`, `0.0123`, `3.3e300`.
+/// The number rounded to `digits` significant digits, without trailing zeros after the point: `67.4`,
+/// `25600`, `0.0123`, `3.3e300`.
 pub fn rounded(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
     let (number, power) = text.split_once('e').map_or((text.as_str(), None), |(n, p)| (n, Some(p)));
@@ -66,9 +66,10 @@ pub fn rounded(value: f64, digits: usize) -> String {
     power.map_or_else(|| number.to_owned(), |power| format!("{number}e{power}"))
 }
 
-/// The number with so many significant digits, trailing zeros included: `30.0`, `0.150`, `0`.
+/// The number with `digits` significant digits, including trailing zeros: `30.0`, `0.150`, `0`.
 ///
-/// Digits before the point beyond these are zeros; what would need many zeros has a power of ten.
+/// Further digits before the point are zeros. A number that would need many zeros is written with a
+/// power of ten.
 pub fn significant(value: f64, digits: usize) -> String {
     let digits = digits.max(1);
     if value == 0.0 {
@@ -86,7 +87,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{rounded:.decimals$}")
 }
 
-/// Decimals that show so many significant digits of `value`, nine at most.
+/// Number of decimals that show `digits` significant digits of `value`, at most nine.
 pub fn decimals(value: f64, digits: usize) -> usize {
     // Rounding first: 9.97 with two digits is 10, not 10.0.
     let text = format!("{value:.*e}", digits.max(1) - 1);

@@ -6,11 +6,11 @@ use crate::ParameterSet;
 /// result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// Place in the campaign's Sobol sequence.
+    /// Index in the Sobol sequence of the campaign.
     pub index: u32,
-    /// The track's parameters, alike at every sleeper.
+    /// Parameters of the track, equal at every sleeper.
     pub parameters: ParameterSet,
-    /// Seed of the irregularity, below 2^63 so that SQL's signed integers hold it.
+    /// Seed of the irregularity. It is below 2^63, the range of the signed integers of SQL.
     pub surface_seed: u64,
 }
 

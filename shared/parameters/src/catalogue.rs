@@ -12,7 +12,8 @@ struct Row {
     label: &'static str,
     nominal: f64,
     range: [f64; 2],
-    /// The value of a track enlarged by `r` is `r` to this power times as large.
+    /// Exponent of the length ratio: on a track enlarged by `r`, the value is multiplied by `r` to this
+    /// power.
     length_exponent: i32,
 }
 
@@ -29,7 +30,7 @@ macro_rules! catalogue {
         impl Parameter {
             /// All parameters, in catalogue order.
             pub const ALL: &'static [Parameter] = &[$(Parameter::$variant,)+];
-            /// How many parameters there are.
+            /// Number of parameters.
             pub const COUNT: usize = Self::ALL.len();
 
             const fn row(self) -> Row {
@@ -61,22 +62,22 @@ catalogue! {
 }
 
 impl Parameter {
-    /// The name used at every border: messages, SQL, TOML, command line, files.
+    /// Name of the parameter in messages, SQL, TOML, files and on the command line.
     pub const fn name(self) -> &'static str {
         self.row().name
     }
 
-    /// The paper's symbol, as plain text.
+    /// Symbol of the paper, as plain text.
     pub const fn symbol(self) -> &'static str {
         self.row().symbol
     }
 
-    /// The unit, as plain text.
+    /// Unit, as plain text.
     pub const fn unit(self) -> &'static str {
         self.row().unit
     }
 
-    /// What a person calls it.
+    /// Name of the parameter for readers.
     pub const fn label(self) -> &'static str {
         self.row().label
     }
@@ -91,26 +92,26 @@ impl Parameter {
         self.row().range
     }
 
-    /// What can be of it on any track: a thousandth of what V-Track has to a thousand times what the
-    /// real-scale track has.
+    /// Allowed values on any track: from a thousandth of the range of V-Track to a thousand times the
+    /// range of the track `real-scale`.
     pub fn quantity(self) -> Quantity {
         let [low, high] = self.range();
         let real = self.enlarged(high, REAL_SCALE);
         Quantity::new(self.label(), self.unit(), [1e-3 * low, 1e3 * real], [low, real])
     }
 
-    /// What a `value` on V-Track becomes on a track whose lengths are `ratio` times V-Track's
-    /// (paper, Table D1: stiffness by the ratio, damping by its square).
+    /// Scales a `value` from V-Track to a track whose lengths are `ratio` times those of V-Track (paper,
+    /// Table D1: stiffness by the ratio, damping by its square).
     pub fn enlarged(self, value: f64, ratio: f64) -> f64 {
         value * ratio.powi(self.row().length_exponent)
     }
 
-    /// The place in [`Parameter::ALL`].
+    /// Index in [`Parameter::ALL`].
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    /// The parameter of that name, if there is one.
+    /// The parameter with this name, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|parameter| parameter.name() == name)
     }

@@ -1,4 +1,4 @@
-//! What is the same in every case of a campaign: sections, masses, spacing, load.
+//! Quantities that are the same in every case of a campaign: sections, masses, spacing, load.
 
 use serde::{Deserialize, Serialize};
 
@@ -54,9 +54,10 @@ pub struct SleeperDesign {
     pub spacing_m: f64,
     /// Length of a half sleeper in m.
     pub half_length_m: f64,
-    /// Distance of the rail seat from the symmetry plane in m; the rotation is held there.
+    /// Distance of the rail seat from the symmetry plane in m. The symmetry plane holds the rotation.
     pub rail_seat_m: f64,
-    /// Section whose bending stiffness is nominal; the parameter `EI_s` scales bending and shear.
+    /// Section of the sleeper, with the nominal bending stiffness. The parameter `EI_s` scales bending
+    /// and shear stiffness.
     pub section: BeamSection,
 }
 
@@ -66,17 +67,17 @@ pub struct SleeperDesign {
 pub struct Wheel {
     /// Unsprung mass in kg.
     pub mass_kg: f64,
-    /// Vertical load in N, the wheel's own weight included.
+    /// Vertical load in N, including the weight of the wheel.
     pub load_n: f64,
     /// Rolling radius in m.
     pub radius_m: f64,
-    /// Places of further wheels of the same mass and load on the same rail, in m ahead of this one;
-    /// negative: behind.
+    /// Positions of further wheels of the same mass and load on the same rail, in m ahead of this wheel.
+    /// Negative: behind.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further_wheels_m: Vec<f64>,
 }
 
-/// Everything about wheel and track that is not a [`crate::Parameter`].
+/// All properties of wheel and track except those of [`crate::Parameter`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrackDesign {
@@ -136,11 +137,11 @@ impl TrackDesign {
         }
     }
 
-    /// The same track with every length multiplied by `ratio`, at equal stress and equal strain.
+    /// The track with every length multiplied by `ratio`, at equal stress and equal strain.
     ///
-    /// Areas grow with its square (and forces, loads), masses with its cube, second moments of
-    /// area with its fourth power; time, hence stiffness-proportional damping, with itself.
-    /// With `ratio` 5 these are the scale factors of the paper's Table D1.
+    /// Areas, forces and loads scale with the square of `ratio`, masses with its cube and second moments
+    /// of area with its fourth power. Time, and therefore stiffness-proportional damping, scales with
+    /// `ratio`. With `ratio` 5 these are the scale factors of Table D1 of the paper.
     #[must_use]
     pub fn enlarged(&self, ratio: f64) -> Self {
         let section = |section: &BeamSection| BeamSection {
@@ -168,7 +169,7 @@ impl TrackDesign {
         }
     }
 
-    /// Sleeper spacing over that of V-Track: the scale of the track's lengths.
+    /// Ratio of the sleeper spacing to that of V-Track: the length scale of the track.
     pub fn length_ratio(&self) -> f64 {
         self.sleeper.spacing_m / V_TRACK_SPACING_M
     }

@@ -1,10 +1,10 @@
-//! Every physical quantity once: its name, symbol, unit, nominal value and range.
+//! Definition of every physical quantity: name, symbol, unit, nominal value and range.
 //!
-//! Owns the catalogue of parameters, the space a campaign samples, the points it samples and the
-//! designs (V-Track, real scale) around them. What the quantities do is the track model's.
+//! This crate contains the catalogue of parameters, the parameter space of a campaign, its sampling
+//! points, and the presets with their designs. The crate `tracktwin-track` contains the equations.
 //!
-//! Convention: **one rail, half sleepers**. Every stiffness, damping and mass is that of one rail
-//! seat; nothing is doubled anywhere.
+//! Convention: **one rail, half sleepers**. Every stiffness, damping and mass refers to one rail seat,
+//! without a factor of two.
 
 mod case;
 mod catalogue;

@@ -3,7 +3,7 @@
 use crate::{Axis, Parameter, ParameterSet, ParameterSpace, Prior, Scale, Track, TrackDesign};
 use serde::{Deserialize, Serialize};
 
-/// A track to start from.
+/// A track that comes with the program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
@@ -16,10 +16,10 @@ pub enum Preset {
     /// A line: rail 60E1 on concrete monobloc sleepers, railpads from soft to stiff.
     #[serde(rename = "60E1-concrete")]
     Concrete60E1,
-    /// The same with soft railpads.
+    /// Rail 60E1 on concrete monobloc sleepers, with soft railpads.
     #[serde(rename = "60E1-concrete-soft")]
     SoftConcrete60E1,
-    /// The same with stiff railpads.
+    /// Rail 60E1 on concrete monobloc sleepers, with stiff railpads.
     #[serde(rename = "60E1-concrete-stiff")]
     StiffConcrete60E1,
     /// Rail 54E1 on concrete monobloc sleepers.
@@ -33,8 +33,8 @@ pub enum Preset {
     BiBlock49E1,
 }
 
-/// Wavelengths of V-Track's irregularity in m. The paper gives none; at 7 km/h what is 0.5 mm long has a
-/// frequency of 3.9 kHz, inside the features.
+/// Shortest and longest wavelength of the irregularity of V-Track in m. The paper does not state them.
+/// At 7 km/h a wavelength of 0.5 mm has a frequency of 3.9 kHz, inside the range of the features.
 const WAVELENGTHS_M: [f64; 2] = [0.25e-3, 1.0];
 
 /// Sleeper spacing in m between the test rigs and the lines.
@@ -52,7 +52,7 @@ const REAL_LEVEL: f64 = 0.05;
 const REAL_LEVELS: [f64; 2] = [0.02, 0.1];
 
 impl Preset {
-    /// All of them.
+    /// All presets.
     pub const ALL: &'static [Self] = &[
         Self::VTrack,
         Self::RealScale,
@@ -64,7 +64,7 @@ impl Preset {
         Self::BiBlock49E1,
     ];
 
-    /// Its name in files and on the command line.
+    /// Name of the preset in files and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::VTrack => "v-track",
@@ -78,17 +78,18 @@ impl Preset {
         }
     }
 
-    /// The preset of that name.
+    /// The preset with this name, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|preset| preset.name() == name)
     }
 
-    /// The description as a file, with the sources of its numbers where it has them.
+    /// The track description as the text of a track file, with the sources of its numbers if they are
+    /// known.
     pub fn text(self) -> String {
         self.file().map_or_else(|| self.track().to_toml(), str::to_owned)
     }
 
-    /// The file of a line.
+    /// Track file of a preset that is a line; `None` for test rigs.
     const fn file(self) -> Option<&'static str> {
         Some(match self {
             Self::VTrack | Self::RealScale => return None,
@@ -101,7 +102,7 @@ impl Preset {
         })
     }
 
-    /// The whole description.
+    /// The track description.
     ///
     /// # Panics
     /// Never: a test reads every file.
@@ -113,7 +114,7 @@ impl Preset {
         }
     }
 
-    /// The one that is meant where a track has sleepers at this spacing and nothing else is known.
+    /// The preset to use for a track of which only the sleeper spacing in m is known.
     pub fn like(spacing_m: f64) -> Self {
         if spacing_m < LINE_SPACING_M { Self::VTrack } else { Self::Concrete60E1 }
     }
@@ -133,7 +134,7 @@ impl Preset {
         self.track().axis(parameter)
     }
 
-    /// All six parameters over their ranges.
+    /// The space of all six parameters over their ranges.
     pub fn space(self) -> ParameterSpace {
         self.track().space()
     }
@@ -144,7 +145,8 @@ impl Preset {
     }
 }
 
-/// V-Track with lengths `ratio` times as large; above one, with the surface of a real rail.
+/// V-Track with all lengths multiplied by `ratio`. If `ratio` is above one, the surface is that of a
+/// real rail.
 fn enlarged(name: &str, ratio: f64) -> Track {
     let mut nominal = ParameterSet::nominal();
     let mut ranges = [[0.0; 2]; Parameter::COUNT];

@@ -1,23 +1,23 @@
-//! What is known of a track's parameters before a recording is evaluated.
+//! Priors of the parameters of a track, before a recording is evaluated.
 
 use crate::{Parameter, ParameterSet};
 
-/// Standard deviations of a log-normal prior that the usual range of a parameter holds.
+/// Width of the usual range of a parameter in standard deviations of its log-normal prior.
 const DEVIATIONS_IN_RANGE: f64 = 2.6;
 
-/// Log-normal priors of a track's parameters, in the mean over its sleepers.
+/// Log-normal priors of the parameters of a track, for the mean over its sleepers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     /// Median of each parameter.
     pub median: ParameterSet,
     /// Standard deviation of each parameter's natural logarithm, in catalogue order.
     pub log_deviation: [f64; Parameter::COUNT],
-    /// Standard deviation of the exponent by which the surface's spectrum falls, about that of eq. B.6.
+    /// Standard deviation of the exponent of the irregularity spectrum, about the exponent of eq. B.6.
     pub slope_deviation: f64,
 }
 
 impl Prior {
-    /// Of V-Track (paper, Table D1), whose surface has the spectrum of eq. B.6.
+    /// Prior of V-Track (paper, Table D1). The irregularity has the spectrum of eq. B.6.
     pub fn v_track() -> Self {
         let mut prior = Self {
             median: ParameterSet::nominal(),
@@ -38,7 +38,7 @@ impl Prior {
         prior
     }
 
-    /// The same of a track whose lengths are `ratio` times as large (paper, Table D1).
+    /// The prior of a track whose lengths are `ratio` times as large (paper, Table D1).
     #[must_use]
     pub fn enlarged(mut self, ratio: f64) -> Self {
         for &parameter in Parameter::ALL {
@@ -47,7 +47,7 @@ impl Prior {
         self
     }
 
-    /// Of a track with these usual values and ranges, each a range of 2.6 standard deviations.
+    /// Prior of a track with these usual values and ranges. Each range spans 2.6 standard deviations.
     pub fn of_ranges(
         median: ParameterSet,
         ranges: &[[f64; 2]; Parameter::COUNT],
@@ -57,7 +57,7 @@ impl Prior {
         Self { median, log_deviation, slope_deviation }
     }
 
-    /// Standard deviation of a parameter's natural logarithm.
+    /// Standard deviation of the natural logarithm of a parameter.
     pub const fn log_deviation(&self, parameter: Parameter) -> f64 {
         self.log_deviation[parameter.index()]
     }

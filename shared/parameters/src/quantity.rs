@@ -1,45 +1,45 @@
-//! Numbers that come from outside: their unit, what they can be and what they usually are.
+//! Limits of numbers from users and files: unit, allowed range and usual range.
 
-/// What a number from a user means, and what it can be.
+/// Meaning and limits of a number from a user.
 ///
-/// Every number that enters, from a command line or a file, is checked against one of these.
+/// The program checks every number from a command line or a file against a `Quantity`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// What it is, to follow "no": `sleeper spacing`.
+    /// Name of the quantity, to follow "no": `sleeper spacing`.
     pub name: &'static str,
-    /// Its unit as plain text; empty for counts and ratios.
+    /// Unit as plain text. Empty for counts and ratios.
     pub unit: &'static str,
-    /// Lowest and highest value that can be.
+    /// Lowest and highest allowed value.
     pub range: [f64; 2],
-    /// Lowest and highest value that is usual.
+    /// Lowest and highest usual value.
     pub usual: [f64; 2],
-    /// Whether it counts something.
+    /// Whether the quantity is a count.
     pub is_count: bool,
 }
 
-/// A number that can't be what it is given for.
+/// A number outside the limits of its [`Quantity`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum QuantityError {
-    /// The text is no number.
+    /// The text is not a number.
     #[error("`{text}` is not a {}number; give the {}", if of.is_count { "whole " } else { "" }, of.described())]
     Text {
         /// The beginning of the text.
         text: String,
-        /// What it is given for.
+        /// The expected quantity.
         of: Box<Quantity>,
     },
-    /// The number lies outside what can be.
+    /// The number is outside the allowed range.
     #[error("{} is not a valid {}{}", with_unit(*value, of.unit), of.described(), of.guess(*value))]
     Range {
         /// The number.
         value: f64,
-        /// What it is given for.
+        /// The expected quantity.
         of: Box<Quantity>,
     },
 }
 
 impl Quantity {
-    /// A quantity of this name and unit, what it can be, and what it usually is.
+    /// A quantity with this name, unit, allowed range and usual range.
     pub const fn new(
         name: &'static str,
         unit: &'static str,
@@ -49,7 +49,7 @@ impl Quantity {
         Self { name, unit, range, usual, is_count: false }
     }
 
-    /// A number of things.
+    /// A count with this name, allowed range and usual range.
     pub const fn count(name: &'static str, range: [u64; 2], usual: [u64; 2]) -> Self {
         let [low, high] = range;
         let [usual_low, usual_high] = usual;
@@ -57,10 +57,10 @@ impl Quantity {
         Self { name, unit: "", range, usual, is_count: true }
     }
 
-    /// The value, if it can be.
+    /// Returns the value if it is in the allowed range.
     ///
     /// # Errors
-    /// [`QuantityError::Range`] for what lies outside, infinities and not-a-number among it.
+    /// [`QuantityError::Range`] if the value is out of range, infinite or NaN.
     pub fn check(self, value: f64) -> Result<f64, QuantityError> {
         let [low, high] = self.range;
         if (low..=high).contains(&value) {
@@ -69,10 +69,11 @@ impl Quantity {
         Err(QuantityError::Range { value, of: Box::new(self) })
     }
 
-    /// The value that a text gives.
+    /// Parses a text and checks the value.
     ///
     /// # Errors
-    /// [`QuantityError`] for what is no number, or none that can be.
+    /// [`QuantityError::Text`] if the text is not a number; [`QuantityError::Range`] if the number is
+    /// out of range.
     pub fn parse(self, text: &str) -> Result<f64, QuantityError> {
         let shown = || text.chars().take(SHOWN).collect();
         let value = text.trim().parse();
@@ -80,10 +81,10 @@ impl Quantity {
         self.check(value)
     }
 
-    /// The count that a text gives.
+    /// Parses a text as a whole number and checks the value.
     ///
     /// # Errors
-    /// As [`Quantity::parse`].
+    /// The errors of [`Quantity::parse`].
     pub fn parse_count(self, text: &str) -> Result<u64, QuantityError> {
         let digits = text.trim();
         let is_whole = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
@@ -95,7 +96,7 @@ impl Quantity {
         Ok(self.parse(digits)? as u64)
     }
 
-    /// Its name, what it can be and what is usual.
+    /// Text with name, allowed range and usual range.
     fn described(self) -> String {
         let Self { name, unit, range: [low, high], usual: [from, to], .. } = self;
         let [low, high, from, to] = [low, high, from, to].map(number);
@@ -104,7 +105,7 @@ impl Quantity {
         format!("{name}: it can be {low} to {high}{unit}; a usual value is {usual}{unit}")
     }
 
-    /// What was meant, if another unit makes the value a usual one.
+    /// Text with the probable meaning, if the value is usual in another unit.
     fn guess(self, value: f64) -> String {
         let is_usual = |meant: &f64| (self.usual[0]..=self.usual[1]).contains(meant);
         let meant = SLIPS.iter().map(|factor| rounded(value * factor)).find(is_usual);
@@ -115,10 +116,10 @@ impl Quantity {
 /// Characters of a wrong text that a message shows.
 const SHOWN: usize = 40;
 
-/// Factors between units that are taken for one another: milli, kilo, per cent, mega, m/s for km/h.
+/// Factors between units that users confuse: milli, kilo, per cent, mega, m/s for km/h.
 const SLIPS: [f64; 8] = [1e-3, 1e3, 1e-2, 1e2, 1e-6, 1e6, 3.6, 1.0 / 3.6];
 
-/// Without the digits that multiplying made.
+/// The value without the rounding error of a multiplication.
 fn rounded(value: f64) -> f64 {
     format!("{value:.12e}").parse().unwrap_or(value)
 }
@@ -127,7 +128,7 @@ fn with_unit(value: f64, unit: &str) -> String {
     if unit.is_empty() { number(value) } else { format!("{} {unit}", number(value)) }
 }
 
-/// As short as reads back to the same number.
+/// The shortest text that parses to the same number.
 fn number(value: f64) -> String {
     if value == 0.0 || (1e-3..1e7).contains(&value.abs()) || !value.is_finite() {
         value.to_string()
@@ -146,7 +147,7 @@ pub const SPACING: Quantity = Quantity::new("sleeper spacing", "m", [0.05, 2.0],
 pub const SAMPLE_RATE: Quantity =
     Quantity::new("sample rate", "Hz", [10.0, 1e7], [1000.0, 200_000.0]);
 
-/// Place along a track in m.
+/// Position along a track in m.
 pub const PLACE: Quantity = Quantity::new("position along a track", "m", [-1e7, 1e7], [0.0, 1e5]);
 
 /// Radius of a wheel in m.
@@ -156,38 +157,38 @@ pub const WHEEL_RADIUS: Quantity =
 /// Time step of a simulation in s.
 pub const TIME_STEP: Quantity = Quantity::new("time step", "s", [1e-7, 1e-3], [1e-6, 5e-5]);
 
-/// Sleeper spans of a track.
+/// Number of spans of a track.
 pub const SPANS: Quantity = Quantity::count("number of spans", [2, 1000], [20, 200]);
 
-/// Finite elements of a span or of a half sleeper.
+/// Number of finite elements of a span or of a half sleeper.
 pub const ELEMENTS: Quantity = Quantity::count("number of elements", [1, 64], [2, 16]);
 
-/// Cases of a campaign; each is a row of the library before the first is simulated.
+/// Number of cases of a campaign. Each case is a row of the library before the first one is simulated.
 pub const CASES: Quantity = Quantity::count("number of cases", [1, 10_000_000], [200, 100_000]);
 
-/// Cores of a machine.
+/// Number of cores of a machine.
 pub const CORES: Quantity = Quantity::count("number of cores", [1, 4096], [1, 128]);
 
 /// Frequency of a receptance in Hz.
 pub const FREQUENCY: Quantity = Quantity::new("frequency", "Hz", [0.1, 1e5], [10.0, 1e4]);
 
-/// Points of a curve.
+/// Number of points of a curve.
 pub const POINTS: Quantity = Quantity::count("number of frequencies", [2, 100_000], [100, 2000]);
 
-/// Passes at a speed, or of a recording.
+/// Number of passes at a speed, or of a recording.
 pub const PASSES: Quantity = Quantity::count("number of passes", [1, 1000], [1, 20]);
 
 /// Standard deviation of a sensor's noise, or a step of its recorder, in m/s2.
 pub const SENSOR: Quantity =
     Quantity::new("noise or resolution of a sensor", "m/s2", [0.0, 1e5], [0.0, 10.0]);
 
-/// By how much an odometer wanders in m: with the most, positions still grow.
+/// Error of an odometer in m. Even with the largest value, positions still increase.
 pub const WANDER: Quantity = Quantity::new("odometer error", "m", [0.0, 0.05], [0.0, 0.02]);
 
-/// Seconds that a process waits: up to a year.
+/// Waiting time of a process in s, up to one year.
 pub const SECONDS: Quantity = Quantity::count("time in seconds", [0, 31_536_000], [1, 86_400]);
 
-/// Sleepers of a recording.
+/// Number of sleepers of a recording.
 pub const SLEEPERS: Quantity = Quantity::count("number of sleepers", [0, 100_000], [1, 2000]);
 
 #[cfg(test)]

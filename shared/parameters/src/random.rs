@@ -1,4 +1,4 @@
-//! Numbers from bits, the same with every version of every library.
+//! Conversion of random bits to numbers, independent of the version of any library.
 
 /// The upper 53 of 64 random bits as a number in [0, 1).
 pub const fn unit(bits: u64) -> f64 {

@@ -18,7 +18,7 @@ impl ParameterSet {
         Self(std::array::from_fn(|index| Parameter::ALL[index].nominal()))
     }
 
-    /// The same set with one value changed.
+    /// The set with one value changed.
     #[must_use]
     pub fn with(mut self, parameter: Parameter, value: f64) -> Self {
         self[parameter] = value;

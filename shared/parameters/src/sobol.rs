@@ -3,13 +3,14 @@
 use crate::unit;
 use serde::{Deserialize, Serialize};
 
-/// Points of the Owen-scrambled sequence: `sobol_burley` repeats itself silently beyond.
+/// Number of points of the Owen-scrambled sequence. Beyond this number `sobol_burley` repeats its points
+/// without an error.
 pub const OWEN_POINTS_MAX: u32 = 1 << 16;
 
-/// Axes a campaign may have: those of the small table of Joe and Kuo's direction numbers.
+/// Largest number of axes of a campaign: that of the small table of direction numbers of Joe and Kuo.
 const DIMENSIONS_MAX: usize = 100;
 
-/// Which Sobol sequence the points come from.
+/// Sobol sequence of the points of a campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sequence {
@@ -28,13 +29,13 @@ pub enum SobolError {
              set `sequence = \"rotated\"` in the campaign"
     )]
     Exhausted {
-        /// The index asked for.
+        /// The requested index.
         index: u32,
     },
     /// More dimensions than the sequence has.
     #[error("{dimensions} axes exceed the limit of the Sobol sequence ({DIMENSIONS_MAX})")]
     TooManyDimensions {
-        /// The dimensions asked for.
+        /// The requested number of dimensions.
         dimensions: usize,
     },
 }
@@ -45,10 +46,11 @@ impl Sequence {
         if cases <= OWEN_POINTS_MAX { Self::OwenScrambled } else { Self::Rotated }
     }
 
-    /// Coordinates in [0, 1) of the points with these indices, one `Vec` of `dimensions` a point.
+    /// Coordinates in [0, 1) of the points with these indices: one `Vec` of length `dimensions` per
+    /// point.
     ///
     /// # Errors
-    /// [`SobolError`] when the sequence has no such point.
+    /// [`SobolError`] if the sequence has no such point.
     pub fn points(
         self,
         indices: std::ops::Range<u32>,

@@ -1,4 +1,4 @@
-//! The space that a campaign samples: an axis a varied parameter.
+//! The parameter space that a campaign samples: one axis per varied parameter.
 
 use crate::{Parameter, ParameterSet};
 use serde::{Deserialize, Serialize};
@@ -7,15 +7,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
-    /// Evenly in the value.
+    /// Uniform in the value.
     #[default]
     Linear,
-    /// Evenly in the value's logarithm.
+    /// Uniform in the logarithm of the value.
     Logarithmic,
 }
 
 impl Scale {
-    /// The value of a range, from lowest to highest, at `x` from 0 to 1.
+    /// The value at the relative position `x` in a range, from 0 (lowest) to 1 (highest).
     pub fn at(self, [low, high]: [f64; 2], x: f64) -> f64 {
         match self {
             Self::Linear => low + x * (high - low),
@@ -34,12 +34,12 @@ pub struct Axis {
     pub low: f64,
     /// Highest value.
     pub high: f64,
-    /// How values spread between them.
+    /// Scale on which the values are uniform.
     #[serde(default)]
     pub scale: Scale,
 }
 
-/// Why a space is refused.
+/// Why a space is invalid.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum SpaceError {
     /// A bound is NaN or infinite.
@@ -76,8 +76,8 @@ impl ParameterSpace {
     /// The space of these axes, put in catalogue order.
     ///
     /// # Errors
-    /// [`SpaceError`] names the parameter whose range is not finite, positive, low before high, or
-    /// which is a duplicate.
+    /// [`SpaceError`] names the parameter that occurs twice, or whose range is not finite, not positive,
+    /// or not ascending.
     pub fn new(mut axes: Vec<Axis>) -> Result<Self, SpaceError> {
         axes.sort_by_key(|axis| axis.parameter);
         for pair in axes.windows(2) {
@@ -104,10 +104,11 @@ impl ParameterSpace {
         &self.axes
     }
 
-    /// The values at a point of the unit cube, one coordinate an axis; the rest as in `fixed`.
+    /// The parameter set at a point of the unit cube, with one coordinate per axis. Parameters without
+    /// an axis have the value of `fixed`.
     ///
     /// # Panics
-    /// When the point has not as many coordinates as the space has axes.
+    /// If the number of coordinates of the point differs from the number of axes.
     pub fn values(&self, point: &[f64], fixed: &ParameterSet) -> ParameterSet {
         assert_eq!(point.len(), self.axes.len(), "a coordinate an axis");
         self.axes.iter().zip(point).fold(*fixed, |set, (axis, &x)| {

@@ -1,33 +1,33 @@
-//! What is checked in every message.
+//! Checks of all messages.
 
 use crate::CASES_MAX;
 
-/// Why a message is refused.
+/// Why a message is rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BadMessage {
-    /// A field that must be there is not.
+    /// A required field is missing.
     #[error("{field} is missing")]
     Missing {
         /// The field.
         field: &'static str,
     },
-    /// A text is longer than it may be.
+    /// A text is too long.
     #[error("{field} has {length} bytes; at most {max} are allowed")]
     TooLong {
         /// The field.
         field: &'static str,
-        /// Its length in bytes.
+        /// Length of the text in bytes.
         length: usize,
-        /// The longest allowed.
+        /// Largest allowed length in bytes.
         max: usize,
     },
-    /// A name with invisible characters.
+    /// A name contains control characters.
     #[error("{field} contains control characters")]
     ControlCharacters {
         /// The field.
         field: &'static str,
     },
-    /// A number is NaN, infinite, negative or beyond all measure where it can't be.
+    /// A number is NaN, infinite, negative or too large.
     #[error("{field} is {value}")]
     NotANumber {
         /// The field.
@@ -35,7 +35,7 @@ pub enum BadMessage {
         /// Its value.
         value: f64,
     },
-    /// A share that is not a number from 0 to 1.
+    /// A share is not a number from 0 to 1.
     #[error("{field} is {value}; a share must lie in 0 to 1")]
     NotAShare {
         /// The field.
@@ -43,17 +43,17 @@ pub enum BadMessage {
         /// Its value.
         value: f64,
     },
-    /// An impossible count.
+    /// A count is too large.
     #[error("{field} is {value}; it must be below {limit}")]
     TooLarge {
         /// The field.
         field: &'static str,
         /// Its value.
         value: u32,
-        /// The least that is not allowed.
+        /// Smallest value that is not allowed.
         limit: u32,
     },
-    /// An enum value this program doesn't know.
+    /// The value of an enum is unknown to this program version.
     #[error("{field} is {value}, which is unknown to this program")]
     UnknownValue {
         /// The field.
@@ -61,7 +61,7 @@ pub enum BadMessage {
         /// Its value.
         value: i32,
     },
-    /// A parameter this program doesn't know, and would ignore.
+    /// A parameter is unknown to this program version and would be ignored.
     #[error(
         "case {index}: unknown parameter `{name}`; coordinator and worker have different \
          versions"
@@ -82,48 +82,48 @@ pub enum BadMessage {
         /// Number of occurrences.
         count: usize,
     },
-    /// A hash does not belong to what it came with.
+    /// A hash does not match its content.
     #[error("{what} does not match its hash")]
     WrongHash {
         /// What was hashed.
         what: String,
     },
-    /// The report of a case is not what its worker sent.
+    /// The report of a case was damaged in transmission.
     #[error("case {index}: the report was damaged in transmission: its checksum does not match")]
     Damaged {
         /// The case.
         index: u32,
     },
-    /// More cases than a message may hold.
+    /// A message has too many cases.
     #[error("{field} has {count} cases; at most {max} are allowed")]
     TooMany {
         /// The field.
         field: &'static str,
-        /// How many it has.
+        /// Number of cases in the field.
         count: usize,
-        /// The most allowed.
+        /// Largest allowed number.
         max: usize,
     },
-    /// Not the speeds of the experiment.
+    /// The speeds differ from those of the experiment.
     #[error("case {index}: reported at {found:?} km/h, not at {expected:?}")]
     WrongSpeeds {
         /// The case.
         index: u32,
-        /// The speeds reported.
+        /// The reported speeds in km/h.
         found: Vec<f64>,
-        /// The experiment's.
+        /// The value of the experiment.
         expected: Vec<f64>,
     },
-    /// Not as many features as the experiment has.
+    /// The number of features differs from that of the experiment.
     #[error("case {index}: {field} has {found} values, not {expected}")]
     WrongLength {
         /// The case.
         index: u32,
         /// The field.
         field: &'static str,
-        /// Its length.
+        /// Number of values in the field.
         found: usize,
-        /// The experiment's.
+        /// The value of the experiment.
         expected: usize,
     },
 }
@@ -131,10 +131,10 @@ pub enum BadMessage {
 /// Longest name of a worker, version or hash, in bytes.
 const NAME_BYTES_MAX: usize = 256;
 
-/// A name: not empty, at most 256 bytes, fit to be printed and stored.
+/// Checks a name: not empty, at most 256 bytes, without control characters.
 ///
 /// # Errors
-/// [`BadMessage`] names the field and what is wrong with it.
+/// [`BadMessage`] states the field and its fault.
 pub fn name(field: &'static str, text: String) -> Result<String, BadMessage> {
     match text.len() {
         0 => Err(BadMessage::Missing { field }),
@@ -146,7 +146,7 @@ pub fn name(field: &'static str, text: String) -> Result<String, BadMessage> {
     }
 }
 
-/// As many cases as a message may hold.
+/// Checks that there are at most [`CASES_MAX`](crate::CASES_MAX) cases.
 pub(crate) fn bounded<T>(field: &'static str, cases: Vec<T>) -> Result<Vec<T>, BadMessage> {
     match cases.len() {
         count if count > CASES_MAX => Err(BadMessage::TooMany { field, count, max: CASES_MAX }),
@@ -157,7 +157,7 @@ pub(crate) fn bounded<T>(field: &'static str, cases: Vec<T>) -> Result<Vec<T>, B
 /// Longest time that a case may have taken, in s: ten years.
 const DURATION_MAX_S: f64 = 3e8;
 
-/// A possible measured time in s.
+/// Checks that a measured time in s is possible.
 pub(crate) fn duration(field: &'static str, value: f64) -> Result<f64, BadMessage> {
     if (0.0..=DURATION_MAX_S).contains(&value) {
         Ok(value)
@@ -166,7 +166,7 @@ pub(crate) fn duration(field: &'static str, value: f64) -> Result<f64, BadMessag
     }
 }
 
-/// A share, 0 to 1.
+/// Checks that a share is from 0 to 1.
 pub(crate) fn share(field: &'static str, value: f64) -> Result<f64, BadMessage> {
     if (0.0..=1.0).contains(&value) {
         Ok(value)
@@ -175,7 +175,7 @@ pub(crate) fn share(field: &'static str, value: f64) -> Result<f64, BadMessage> 
     }
 }
 
-/// That all numbers are finite.
+/// Checks that all numbers are finite.
 pub(crate) fn finite(field: &'static str, values: &[f64]) -> Result<(), BadMessage> {
     match values.iter().find(|value| !value.is_finite()) {
         Some(&value) => Err(BadMessage::NotANumber { field, value }),

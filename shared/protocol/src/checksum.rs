@@ -1,18 +1,19 @@
-//! The checksum of what became of a case: the worker makes it, the border and the library check it.
+//! Checksum of the outcome of a case. The worker computes it; message reader and library check it.
 //!
-//! The bytes that are hashed are described in `docs/checksums.md`, so that any language can do it.
+//! `docs/checksums.md` describes the hashed bytes, so that programs in any language can compute the
+//! checksum.
 
 use tracktwin_experiment::{Outcome, PassFeatures};
 
-/// Says which encoding is hashed; another encoding has another number.
+/// Identifies the hashed encoding. Another encoding has another number.
 const CONTEXT: &str = "tracktwin case result 1";
 
-/// Hexadecimal digits of a checksum: 128 bits, as hashes of parameters have.
+/// Number of hexadecimal digits of a checksum: 128 bits, as for hashes of parameters.
 const DIGITS: usize = 32;
 
 /// BLAKE3 (32 hexadecimal digits) of a case's index, the hash of its parameters and seed, and its outcome.
 ///
-/// It doesn't depend on who simulated the case, when, or under which lease.
+/// The checksum does not depend on the worker, the time or the lease.
 pub fn checksum(index: u32, parameter_hash: &str, outcome: &Outcome) -> String {
     match outcome {
         Outcome::Finished(passes) => checksum_of_passes(index, parameter_hash, passes),
@@ -24,7 +25,7 @@ pub fn checksum(index: u32, parameter_hash: &str, outcome: &Outcome) -> String {
     }
 }
 
-/// [`checksum`] of a case that is finished.
+/// [`checksum`] of a finished case.
 pub fn checksum_of_passes(index: u32, parameter_hash: &str, passes: &[PassFeatures]) -> String {
     let of_pass = |pass: &PassFeatures| {
         8 * (5 + pass.features.log_power.len() + pass.features.band_levels_db.len())
@@ -59,7 +60,7 @@ fn pass(bytes: &mut Vec<u8>, pass: &PassFeatures) {
     numbers(bytes, &pass.features.log_power);
 }
 
-/// How many, and each of them: neighbouring lists are kept apart.
+/// Appends the number of values and each value, so that consecutive lists are unambiguous.
 fn numbers(bytes: &mut Vec<u8>, numbers: &[f64]) {
     count(bytes, numbers.len());
     bytes.extend(numbers.iter().copied().map(big_endian).collect::<Vec<_>>().as_flattened());

@@ -1,56 +1,56 @@
-//! Cases on their way to a worker.
+//! Messages with leased cases.
 
 use crate::check::{BadMessage, bounded, duration, name};
 use crate::farm;
 use tracktwin_parameters::{Case, Parameter, ParameterSet};
 
-/// The answer to a worker that asks for cases.
+/// Response to the request of a worker for cases.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lease {
     /// Cases to simulate.
     Cases(CaseLease),
-    /// None at the moment.
+    /// No case is available at present.
     NoneNow {
-        /// When to ask again, in s.
+        /// Time in s after which to request cases again.
         retry_after_s: f64,
-        /// Why, if it is the worker's own fault.
+        /// Reason, if the worker itself causes this state.
         reason: Option<String>,
     },
 }
 
-/// Cases of one campaign, for a while.
+/// Cases of one campaign under one lease.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseLease {
     /// The campaign.
     pub campaign: String,
-    /// What is simulated and measured in each case, as canonical JSON.
+    /// Experiment of the campaign, as canonical JSON.
     pub experiment_json: String,
-    /// BLAKE3 of that, hexadecimal.
+    /// BLAKE3 of `experiment_json`, hexadecimal.
     pub experiment_hash: String,
     /// The cases.
     pub cases: Vec<LeasedCase>,
-    /// The lease as W3C Trace Context; empty where nothing is traced.
+    /// The lease as W3C Trace Context. Empty if nothing is traced.
     pub traceparent: String,
 }
 
-/// A case, and which lease of it this is.
+/// A case and the epoch of its lease.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeasedCase {
     /// The case.
     pub case: Case,
-    /// Counts its leases, from 1.
+    /// Number of leases that the case has had, from 1.
     pub epoch: u32,
 }
 
-/// Cases under certain leases, as (index, epoch).
+/// Converts cases, given as (index, epoch), to messages.
 pub fn held_to_messages(held: impl IntoIterator<Item = (u32, u32)>) -> Vec<farm::HeldCase> {
     held.into_iter().map(|(sobol_index, epoch)| farm::HeldCase { sobol_index, epoch }).collect()
 }
 
-/// The way back: (index, epoch).
+/// Converts messages to cases, as (index, epoch).
 ///
 /// # Errors
-/// [`BadMessage::TooMany`] when there are more than a message may hold.
+/// [`BadMessage::TooMany`] if there are more cases than a message may have.
 pub fn held_from_messages(messages: Vec<farm::HeldCase>) -> Result<Vec<(u32, u32)>, BadMessage> {
     let held = bounded("cases", messages)?.into_iter();
     Ok(held.map(|held| (held.sobol_index, held.epoch)).collect())
@@ -143,7 +143,8 @@ impl TryFrom<farm::LeasedCase> for LeasedCase {
     }
 }
 
-/// A worker must refuse a parameter it would ignore: silence would poison the library.
+/// Checks the parameters of a case. A worker must reject an unknown parameter, because it would
+/// otherwise store wrong results in the library.
 fn parameter_set(index: u32, values: &[farm::ParameterValue]) -> Result<ParameterSet, BadMessage> {
     let mut set = ParameterSet::nominal();
     let mut counts = [0; Parameter::COUNT];

@@ -1,7 +1,7 @@
 //! The messages between coordinator and workers.
 //!
-//! Owns the code generated from `proto/farm/v1/farm.proto`, and the checked values that messages
-//! become. Only this crate distrusts a message; who receives a checked value may rely on it.
+//! This crate contains the code generated from `proto/farm/v1/farm.proto`, and the checked types of the
+//! messages. Only this crate checks messages; other crates can rely on checked values.
 
 mod check;
 mod checksum;
@@ -15,19 +15,19 @@ pub use lease::{CaseLease, Lease, LeasedCase, held_from_messages, held_to_messag
 pub use register::Registration;
 pub use report::{CaseReport, Shape};
 
-/// Version of the protocol that this program speaks.
+/// Version of the protocol of this program.
 ///
-/// Raised whenever an older program would misunderstand a message, rather than merely miss a field
-/// it can do without. 0 is what programs say that don't know of versions; since 2 a report has checksums.
+/// The version is raised if an older program would misinterpret a message. A new optional field does not
+/// change it. Programs without a version send 0. Since version 2, reports have checksums.
 pub const PROTOCOL_VERSION: u32 = 2;
 
-/// Most cases that a worker may ask for, hold, renew or report in one message.
+/// Largest number of cases that a worker may request, hold, renew or report in one message.
 pub const CASES_MAX: usize = 4096;
 
-/// Most bytes of a message: a hundred cases of ten speeds and a thousand bins.
+/// Largest size of a message in bytes: a hundred cases with ten speeds and a thousand bins.
 ///
-/// A worker reports a few cases at a time, so this bounds what a stranger may make a coordinator
-/// hold, not what a worker may find.
+/// A worker reports only a few cases at a time. The limit bounds the memory that an unknown client can
+/// make a coordinator use, not the results of a worker.
 pub const MESSAGE_BYTES_MAX: usize = 16 << 20;
 
 /// Window of HTTP/2 flow control in bytes, on both sides.

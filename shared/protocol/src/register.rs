@@ -1,4 +1,4 @@
-//! How a worker introduces itself.
+//! Registration of a worker.
 
 use crate::check::{BadMessage, name};
 use crate::farm;
@@ -6,18 +6,18 @@ use crate::farm;
 /// Upper limit of the cores: a false number would make other workers wait.
 const CORES_MAX: u32 = 1 << 14;
 
-/// A worker, as it introduces itself.
+/// Registration of a worker.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Registration {
-    /// What it calls itself, unique among workers.
+    /// Name of the worker, unique among workers.
     pub worker: String,
-    /// Version of its program, for people.
+    /// Version of the program of the worker, for display.
     pub code_version: String,
-    /// Hash of everything that decides what a parameter set becomes.
+    /// Version of the physics: [`MODEL_HASH`](tracktwin_experiment::MODEL_HASH) of the worker.
     pub model_hash: String,
-    /// Groups of cases it simulates at a time, at least one.
+    /// Number of groups of cases that the worker simulates at a time, at least one.
     pub cores: u32,
-    /// Version of its protocol; 0 from programs without a version.
+    /// Protocol version of the worker. Programs without a version send 0.
     pub protocol_version: u32,
 }
 

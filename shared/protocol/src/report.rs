@@ -1,4 +1,4 @@
-//! Results on their way to the coordinator.
+//! Messages with results.
 
 use crate::check::{BadMessage, bounded, duration, finite, name, share};
 use crate::{checksum, farm};
@@ -10,29 +10,29 @@ use tracktwin_signal::{Features, ThirdOctave};
 /// Longest reason of a failure that is kept, in bytes; the rest is cut off.
 const REASON_BYTES_MAX: usize = 2000;
 
-/// What a worker hands in for one case.
+/// Report of a worker on one case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseReport {
-    /// Place in the campaign.
+    /// Index of the case in the campaign.
     pub index: u32,
-    /// The lease under which it was simulated.
+    /// Epoch of the lease under which the case was simulated.
     pub epoch: u32,
     /// Hash of the parameters and seed that were simulated.
     pub parameter_hash: String,
-    /// Computing time at all speeds together, in s.
+    /// Computing time at all speeds, in s.
     pub duration_s: f64,
-    /// What became of it.
+    /// Outcome of the case.
     pub outcome: Outcome,
-    /// [`checksum`] of index, parameters and outcome, as the worker made it.
+    /// [`checksum`] of index, parameters and outcome, computed by the worker.
     pub checksum: String,
 }
 
-/// The shape that an experiment gives to results.
+/// Shape of the results of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
     /// Speeds in km/h, ascending.
     pub speeds_km_h: Vec<f64>,
-    /// Frequency bins.
+    /// Number of frequency bins.
     pub bins: usize,
 }
 
@@ -64,10 +64,11 @@ impl From<PassFeatures> for farm::PassFeatures {
 }
 
 impl CaseReport {
-    /// The reports of a message, none for those that were damaged on their way; see [`CaseReport::checked`].
+    /// The reports of a message, `None` for each report that was damaged in transmission; see
+    /// [`CaseReport::checked`].
     ///
     /// # Errors
-    /// [`BadMessage`] when there are too many, or a whole one is wrong.
+    /// [`BadMessage`] if there are too many reports, or if an undamaged report is invalid.
     pub fn all_checked(
         messages: Vec<farm::CaseReport>,
         shape: &Shape,
@@ -79,11 +80,11 @@ impl CaseReport {
         bounded("cases", messages)?.into_iter().map(checked).collect()
     }
 
-    /// The report in a message, which must have its checksum and the shape of its experiment.
+    /// The report in a message. Its checksum must match, and it must have the shape of the experiment.
     ///
     /// # Errors
-    /// [`BadMessage::Damaged`] when it did not arrive as it was sent; other [`BadMessage`]s when something
-    /// is missing, not finite, or of another shape.
+    /// [`BadMessage::Damaged`] if the report was damaged in transmission; another [`BadMessage`] if a
+    /// value is missing, not finite, or of another shape.
     pub fn checked(message: farm::CaseReport, shape: &Shape) -> Result<Self, BadMessage> {
         let index = message.sobol_index;
         let damaged = BadMessage::Damaged { index };
@@ -158,12 +159,12 @@ fn check_passes(index: u32, passes: &[PassFeatures], shape: &Shape) -> Result<()
     Ok(())
 }
 
-/// Numbers as they lie in a message.
+/// Numbers in the encoding of a message.
 fn as_bytes(numbers: &[f64]) -> Bytes {
     numbers.iter().map(|number| number.to_le_bytes()).collect::<Vec<_>>().into_flattened().into()
 }
 
-/// The numbers that lie in a message; a piece at the end is not a number.
+/// The numbers in the bytes of a message. An incomplete number at the end becomes NaN.
 fn from_bytes(bytes: &[u8]) -> Vec<f64> {
     let (whole, piece) = bytes.as_chunks();
     let mut numbers: Vec<f64> = whole.iter().map(|number| f64::from_le_bytes(*number)).collect();

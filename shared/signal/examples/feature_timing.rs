@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// CPU seconds of this thread so far, which others on the machine do not lengthen much.
+/// CPU time of this thread in s. Other processes on the machine have little influence on this time.
 fn cpu_s() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     let nanoseconds = text.split(' ').next().and_then(|count| count.parse::<f64>().ok());

@@ -7,7 +7,7 @@ pub struct Signal {
     samples: Vec<f64>,
 }
 
-/// Why samples are no signal.
+/// Why samples do not form a valid signal.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SignalError {
     /// The sample rate is zero, negative, NaN or infinite.
@@ -19,7 +19,7 @@ pub enum SignalError {
     /// A sample is NaN or infinite.
     #[error("sample {index} is {value}, not a finite number")]
     NotFinite {
-        /// Place of the first such sample, from 0.
+        /// Index of the first such sample, from 0.
         index: usize,
         /// Its value.
         value: f64,
@@ -30,7 +30,7 @@ impl Signal {
     /// A signal of these samples at `sample_rate_hz` in Hz.
     ///
     /// # Errors
-    /// [`SignalError`]; [`SignalError::NotFinite`] names the first sample that is not.
+    /// [`SignalError`]. [`SignalError::NotFinite`] names the first sample that is NaN or infinite.
     pub fn new(sample_rate_hz: f64, samples: Vec<f64>) -> Result<Self, SignalError> {
         if !(sample_rate_hz.is_finite() && sample_rate_hz > 0.0) {
             return Err(SignalError::SampleRate(sample_rate_hz));

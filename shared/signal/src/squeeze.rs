@@ -5,37 +5,37 @@ use crate::{
     wavelet::Morlet,
 };
 
-/// By what the sums of eq. A.4 are multiplied.
+/// Factor on the sums of eq. A.4.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Normalisation {
     /// As printed: divided by the spacing of the bins, `f_l - f_(l+1)` in Hz.
     Printed,
     /// The sum of `W a^(-3/2) da` alone.
     Sum,
-    /// Twice the sum over what a complex tone of amplitude one adds up to
-    /// ([`Morlet::sum_over_scales`]): a tone of amplitude `A` gives `A`, and the real part summed
+    /// Twice the sum, divided by the sum for a complex tone of amplitude one
+    /// ([`Morlet::sum_over_scales`]). A tone of amplitude `A` gives `A`, and the sum of the real part
     /// over frequency is the signal.
     SignalBack,
 }
 
-/// What eq. A.3 and A.4 leave open.
+/// Conventions that eq. A.3 and A.4 do not define.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conventions {
     /// The factor of the sums.
     pub normalisation: Normalisation,
-    /// Coefficients of at most this part of the largest magnitude are left out: their phase is
-    /// rounding.
+    /// Threshold relative to the largest magnitude. Coefficients up to this threshold are omitted,
+    /// because rounding determines their phase.
     pub threshold: f64,
 }
 
-/// Reassigns every coefficient to its instantaneous frequency `Re(weighted / W)` (paper, eq. A.3,
-/// A.4). One row a scale, at the scale's own frequency; the same columns.
+/// Reassigns every coefficient to its instantaneous frequency `Re(weighted / W)` (paper, eq. A.3, A.4).
+/// The result has one row per scale, at the frequency of the scale, and the columns of the transform.
 ///
-/// The scales are `a_j = a_0 2^(j / voices_per_octave)`. A coefficient goes to the bin nearest in
-/// the logarithm of frequency; one outside all bins is dropped.
+/// The scales are `a_j = a_0 2^(j / voices_per_octave)`. A coefficient is added to the bin nearest in
+/// the logarithm of frequency. A coefficient outside all bins is omitted.
 ///
 /// # Panics
-/// When there are no scales.
+/// If there are no scales.
 pub fn squeeze(
     cwt: &Cwt,
     wavelet: Morlet,

@@ -1,8 +1,8 @@
 //! The continuous wavelet transform (CWT), a literal implementation of the formula.
 //!
-//! Owns padding and the transform with its derivative in time. Every voice takes two Fourier
-//! transforms of the whole padded signal: this form is for pictures and for checking the faster
-//! one that takes features.
+//! This module contains padding and the transform with its derivative in time. Every voice needs two
+//! Fourier transforms of the whole padded signal. This form is for plots and as the reference for the
+//! faster transform of the features.
 
 use crate::wavelet::Morlet;
 use rustfft::{Fft, FftPlanner, num_complex::Complex64};
@@ -19,10 +19,10 @@ pub enum Padding {
 }
 
 impl Padding {
-    /// The padded samples and the place of the signal's first sample among them.
+    /// The padded samples, and the index of the first sample of the signal in them.
     ///
     /// # Panics
-    /// When the padded length is below the signal's, or a mirror image is longer than the signal.
+    /// If the padded length is shorter than the signal, or a mirror image is longer than the signal.
     pub fn around(self, samples: &[f64]) -> (Vec<f64>, usize) {
         match self {
             Self::Zeros(length) => {
@@ -46,7 +46,7 @@ impl Padding {
     }
 }
 
-/// Complex values over frequency (rows) and time (columns, one a sample).
+/// Complex values over frequency (rows) and time (columns, one per sample).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeFrequency {
     /// Frequency of each row in Hz.
@@ -66,7 +66,7 @@ impl TimeFrequency {
         self.columns
     }
 
-    /// The values at the frequency with this place, one a column.
+    /// The values at the frequency with this index, one per column.
     pub fn row(&self, index: usize) -> &[Complex64] {
         &self.values[index * self.columns..][..self.columns]
     }
@@ -75,9 +75,9 @@ impl TimeFrequency {
         &mut self.values[index * self.columns..][..self.columns]
     }
 
-    /// Mean of the squared magnitude over a range of columns, one a row.
+    /// Mean of the squared magnitude over a range of columns, one value per row.
     ///
-    /// Of a synchrosqueezed transform this is the LWPS (paper, eq. 4).
+    /// For a synchrosqueezed transform this is the LWPS (paper, eq. 4).
     pub fn mean_power(&self, columns: Range<usize>) -> Vec<f64> {
         let count = columns.len() as f64;
         (0..self.frequencies_hz.len())
@@ -102,17 +102,17 @@ pub struct Cwt {
     pub coefficients: TimeFrequency,
     /// `dW / db / (2 pi i)`: the coefficients with every frequency weighted by itself, in Hz.
     ///
-    /// Divided by the coefficients it is the instantaneous frequency of eq. A.3. The derivative is
-    /// the wavelet's own, not a difference in time.
+    /// The ratio to the coefficients is the instantaneous frequency of eq. A.3. The derivative is
+    /// analytical, not a difference in time.
     pub weighted: TimeFrequency,
 }
 
 impl Cwt {
-    /// Transforms `samples` at these scales in s, one row a scale, one column a sample:
+    /// Transforms `samples` at these scales in s, with one row per scale and one column per sample:
     /// `W(a, b) = sqrt(a) F^-1( F(s) psihat(a w) )` (paper, eq. A.1).
     ///
     /// # Panics
-    /// As [`Padding::around`].
+    /// Under the conditions of [`Padding::around`].
     pub fn new(
         samples: &[f64],
         sample_rate_hz: f64,

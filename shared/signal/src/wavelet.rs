@@ -27,7 +27,7 @@ impl Morlet {
     /// Fourier transform at the angular frequency `w` in rad (real):
     /// `sqrt(2) pi^(1/4) (e^(-(w - mu)^2 / 2) - e^(-mu^2 / 2) e^(-w^2 / 2))` for `w > 0`.
     ///
-    /// Zero for `w <= 0`: the analytic wavelet, which leaves negative frequencies out.
+    /// Zero for `w <= 0`: the wavelet is analytic and has no negative frequencies.
     pub fn fourier(self, w: f64) -> f64 {
         if w <= 0.0 {
             return 0.0;
@@ -49,8 +49,8 @@ impl Morlet {
         self.centre / (TAU * frequency_hz)
     }
 
-    /// What a complex tone of amplitude one adds up to over all scales:
-    /// `sum_j W(a_j, b) a_j^(-3/2) (a_j - a_(j-1))` with `a_j = s_0 2^(j / N_v)`, in magnitude.
+    /// Magnitude of the sum over all scales for a complex tone of amplitude one:
+    /// `sum_j W(a_j, b) a_j^(-3/2) (a_j - a_(j-1))` with `a_j = s_0 2^(j / N_v)`.
     ///
     /// It is `(1 - 2^(-1 / N_v)) sum_j psihat(2^(j / N_v))`, close to `integral psihat(w) / w dw`
     /// times `(1 - 2^(-1 / N_v)) N_v / ln 2`. A real signal has half its amplitude at positive
@@ -64,9 +64,9 @@ impl Morlet {
         (1.0 - (-1.0 / voices).exp2()) * sum
     }
 
-    /// The factor by which a voice enters when all voices together give the analytic signal back:
-    /// `2 (1 - 2^(-1 / N_v))` over [`sum_over_scales`](Self::sum_over_scales), times the transform
-    /// without the root of its scale.
+    /// Factor on each voice with which the sum of all voices is the analytic signal:
+    /// `2 (1 - 2^(-1 / N_v))` divided by [`sum_over_scales`](Self::sum_over_scales). It applies to the
+    /// transform without the root of the scale.
     pub fn share_of_a_voice(self, voices_per_octave: u32) -> f64 {
         let spacing = 1.0 - (-1.0 / f64::from(voices_per_octave)).exp2();
         2.0 * spacing / self.sum_over_scales(voices_per_octave)

@@ -1,19 +1,20 @@
-//! Power spectral density by Welch's method: levels that can be compared with other programs'.
+//! Power spectral density by Welch's method, comparable with the levels of other programs.
 //!
-//! Features of the twin come from the synchrosqueezed transform; this is for accuracy and noise.
+//! The features come from the synchrosqueezed transform. The spectrum serves for tests of accuracy and
+//! noise.
 
 use crate::Signal;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// A signal shorter than one segment, or a segment of nothing.
+/// The signal is shorter than one segment, or the segment has no samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{samples} samples are fewer than one segment of {segment}")]
 pub struct WelchError {
-    /// Samples of the signal.
+    /// Number of samples of the signal.
     pub samples: usize,
-    /// Samples of a segment.
+    /// Number of samples of a segment.
     pub segment: usize,
 }
 
@@ -25,14 +26,15 @@ pub struct PowerSpectrum {
 }
 
 impl PowerSpectrum {
-    /// Welch's estimate: Hann windows of `segment` samples that overlap by half, each without its
-    /// mean, their periodograms averaged. In the signal's unit squared per Hz.
+    /// Welch's estimate, in the squared unit of the signal per Hz: the mean of the periodograms of
+    /// segments of `segment` samples. The segments overlap by half; each has its mean removed and a Hann
+    /// window.
     ///
-    /// A signal of variance `s` has a density whose integral is `s`, whatever the window.
+    /// The integral of the density equals the variance of the signal, independent of the window.
     /// Source: Welch 1967, *The use of fast Fourier transform for the estimation of power spectra*.
     ///
     /// # Errors
-    /// [`WelchError`] when no segment fits.
+    /// [`WelchError`] if no segment fits into the signal.
     pub fn welch(signal: &Signal, segment: usize) -> Result<Self, WelchError> {
         let samples = signal.samples();
         if segment < 2 || samples.len() < segment {
@@ -61,7 +63,7 @@ impl PowerSpectrum {
         Ok(Self { bin_width_hz: signal.sample_rate_hz() / segment as f64, density })
     }
 
-    /// Distance of the bins in Hz.
+    /// Width of a bin in Hz.
     pub const fn bin_width_hz(&self) -> f64 {
         self.bin_width_hz
     }
@@ -71,16 +73,16 @@ impl PowerSpectrum {
         &self.density
     }
 
-    /// Mean density of the bins from `low_hz` (included) to `high_hz` (not); `None` if there are
-    /// none.
+    /// Mean density of the bins from `low_hz` (included) to `high_hz` (excluded). `None` if no bin lies
+    /// in this range.
     pub fn mean_density(&self, low_hz: f64, high_hz: f64) -> Option<f64> {
         let bin = |frequency: f64| (frequency / self.bin_width_hz).ceil() as usize;
         let bins = self.density.get(bin(low_hz)..bin(high_hz).min(self.density.len()))?;
         (!bins.is_empty()).then(|| bins.iter().sum::<f64>() / bins.len() as f64)
     }
 
-    /// Level of the mean density in a one-third octave around `centre_hz`, in dB re one unit
-    /// squared per Hz; `None` if no bin lies in it.
+    /// Level of the mean density in the one-third octave around `centre_hz`, in dB re one squared unit
+    /// per Hz. `None` if no bin lies in this band.
     pub fn third_octave_level(&self, centre_hz: f64) -> Option<f64> {
         let side = 2.0_f64.powf(1.0 / 6.0);
         self.mean_density(centre_hz / side, centre_hz * side).map(|mean| 10.0 * mean.log10())

@@ -1,17 +1,17 @@
-//! Where steps are sent: to a collector, by OTLP over gRPC.
+//! Export of steps to a collector, by OTLP over gRPC.
 
 use opentelemetry::global;
 use opentelemetry_otlp::{ExporterBuildError, SpanExporter};
 use opentelemetry_sdk::Resource;
 use opentelemetry_sdk::trace::SdkTracerProvider;
 
-/// Each names a collector; without one of them nothing is traced.
+/// Environment variables with the address of a collector. Without one of them nothing is traced.
 const ENDPOINTS: [&str; 2] = ["OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT"];
 
-/// Sends the steps of this process for as long as it lives; what is left is sent when it is dropped.
+/// Exporter of the steps of this process. On drop it sends the remaining steps.
 pub struct Export(Option<SdkTracerProvider>);
 
-/// The collector that the environment names can't be sent anything.
+/// The exporter for the collector in the environment cannot be created.
 #[derive(Debug)]
 pub struct ExportError(ExporterBuildError);
 
@@ -24,12 +24,13 @@ impl std::fmt::Display for ExportError {
 impl std::error::Error for ExportError {}
 
 impl Export {
-    /// Sends steps to the collector that `OTEL_EXPORTER_OTLP_ENDPOINT` names, if it does. The other
-    /// variables of `OpenTelemetry` hold too, such as `OTEL_TRACES_SAMPLER` and `OTEL_SERVICE_NAME`,
-    /// which is `service` otherwise. To be called within a Tokio runtime.
+    /// Creates an exporter to the collector in `OTEL_EXPORTER_OTLP_ENDPOINT`, if this variable is set.
+    /// Other variables of `OpenTelemetry` also apply, such as `OTEL_TRACES_SAMPLER` and
+    /// `OTEL_SERVICE_NAME`; the default of the latter is `service`. Call this function within a Tokio
+    /// runtime.
     ///
     /// # Errors
-    /// [`ExportError`] when the address is none.
+    /// [`ExportError`] if the address is invalid.
     pub fn from_environment(service: &str) -> Result<Self, ExportError> {
         let said = |name: &str| std::env::var(name).ok().filter(|it| !it.is_empty());
         if !ENDPOINTS.iter().any(|name| said(name).is_some()) {

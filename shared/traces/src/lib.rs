@@ -1,7 +1,7 @@
-//! `OpenTelemetry` traces of the farm: how leases become rows.
+//! `OpenTelemetry` traces of the farm: from a lease to the rows of its results.
 //!
-//! Owns what a step of a trace is, how it is passed on between processes (W3C Trace Context) and
-//! where steps are sent (OTLP). Without an exporter, steps cost nothing.
+//! This crate defines a step of a trace, its transfer between processes (W3C Trace Context) and its
+//! export (OTLP). Without an exporter, steps have no cost.
 
 mod export;
 mod step;

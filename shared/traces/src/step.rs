@@ -7,21 +7,21 @@ use opentelemetry_sdk::propagation::TraceContextPropagator;
 use std::collections::HashMap;
 use std::time::SystemTime;
 
-/// Under this name the W3C Trace Context has its place among headers.
+/// Name of the header of the W3C Trace Context.
 const TRACEPARENT: &str = "traceparent";
 
-/// A step under way (a span); it ends when it is dropped.
+/// A step (span) of a trace in progress. The step ends when the value is dropped.
 pub struct Step(Context);
 
 impl Step {
-    /// The first step of a trace, which began at this instant.
+    /// Starts the first step of a trace, with the start time `begun`.
     pub fn first(name: &'static str, begun: SystemTime) -> Self {
         let step = SpanBuilder::from_name(name).with_start_time(begun);
         Self::begin(step, &Context::new())
     }
 
-    /// A step that follows from others, each as its [`Step::traceparent`]: a part of the first one's
-    /// trace, with links to the rest. What is no trace context is left out.
+    /// Starts a step that follows other steps, given by their [`Step::traceparent`]. The step belongs to
+    /// the trace of the first of them and has links to the others. Invalid trace contexts are ignored.
     pub fn after<'a>(
         name: &'static str,
         earlier: impl IntoIterator<Item = &'a (impl AsRef<str> + ?Sized + 'a)>,
@@ -40,23 +40,23 @@ impl Step {
         Self(parent.with_span(span))
     }
 
-    /// Says something about the step.
+    /// Sets an attribute of the step.
     pub fn tell(&self, key: &'static str, value: impl Into<Value>) {
         self.0.span().set_attribute(KeyValue::new(key, value));
     }
 
-    /// Says how many there were of something.
+    /// Sets an attribute of the step to a count.
     pub fn count(&self, key: &'static str, count: usize) {
         self.tell(key, i64::try_from(count).unwrap_or(i64::MAX));
     }
 
-    /// Says that it failed, and why.
+    /// Sets the status of the step to failed, with the reason.
     pub fn fail(&self, reason: &str) {
         self.0.span().set_status(Status::error(reason.to_owned()));
     }
 
-    /// The step as W3C Trace Context, for those that follow; empty where nothing is traced. Where this
-    /// process traces nothing but the one before does, that one's.
+    /// The W3C Trace Context of the step, for the steps that follow. If only the previous process
+    /// traces, the context is that of the previous step. Empty if nothing is traced.
     pub fn traceparent(&self) -> String {
         let mut headers = HashMap::new();
         TraceContextPropagator::new().inject_context(&self.0, &mut headers);

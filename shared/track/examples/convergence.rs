@@ -1,4 +1,4 @@
-//! How levels change with time step and mesh, as tables:
+//! Prints tables of the change of levels with time step and mesh:
 //! `cargo run --release -p tracktwin-track --example convergence`.
 
 use tracktwin_parameters::{ParameterSet, TrackDesign};
@@ -6,10 +6,10 @@ use tracktwin_signal::{PowerSpectrum, Signal};
 use tracktwin_track::model::{Mesh, Support, Surface, TrackModel};
 use tracktwin_track::time::{Pass, passes};
 
-/// Spans of the evaluated stretch, as many before it on every track.
+/// Spans of the evaluated stretch. On every track the same number of spans lies before this stretch.
 const WINDOW_SPANS: usize = 9;
 const SPANS_BEFORE: usize = 8;
-/// Of which the wheel runs over this many.
+/// Number of those spans that the wheel runs over.
 const RUN_IN_SPANS: usize = 2;
 /// Long enough for every track below.
 const SURFACE_M: f64 = 7.0;
@@ -17,7 +17,7 @@ const SURFACES: u64 = 8;
 /// Bands of the paper's features in Hz (eq. 9), and what lies below them.
 const BANDS_HZ: [[f64; 2]; 4] = [[50.0, 400.0], [400.0, 700.0], [800.0, 1500.0], [1500.0, 4000.0]];
 
-/// What is varied.
+/// Settings that are varied.
 #[derive(Clone, Copy)]
 struct Scheme {
     time_step_s: f64,
@@ -27,7 +27,7 @@ struct Scheme {
     spans_after: usize,
 }
 
-/// The program's own choice.
+/// Settings that the program uses.
 const DEFAULT: Scheme = Scheme {
     time_step_s: 1e-5,
     rail_elements: 8,
@@ -65,7 +65,7 @@ fn main() -> Result<(), Error> {
     table("Distance to the far end of the rail", &ends)
 }
 
-/// Levels of all schemes less those of the last, which is the finest.
+/// Levels of all schemes minus the levels of the last scheme, which is the finest.
 fn table(title: &str, schemes: &[(String, Scheme)]) -> Result<(), Error> {
     println!("\n{title}: level less that of the last row, in dB\n");
     let bands = BANDS_HZ.map(|[low, high]| format!("{low:.0}-{high:.0} Hz")).join(" | ");

@@ -8,7 +8,7 @@ use tracktwin_track::model::{Mesh, Support, TrackModel};
 /// Lengths of the track in spans; an even number has a sleeper in the middle.
 const SPANS: [usize; 5] = [24, 40, 80, 160, 200];
 
-/// A peak stands out by at least this much, in dB.
+/// Smallest prominence of a peak in dB.
 const PROMINENCE_DB: f64 = 1.0;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

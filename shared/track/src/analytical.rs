@@ -1,4 +1,4 @@
-//! Closed forms that the finite elements are tested against.
+//! Closed-form solutions. Tests compare the finite elements with them.
 
 use crate::element::BeamElement;
 use std::f64::consts::PI;

@@ -1,5 +1,5 @@
-//! How cost grows with size, as figures: `cargo bench -p tracktwin-benches --bench growth` writes
-//! them to `docs/figures`.
+//! Growth of costs with size, as figures: `cargo bench -p tracktwin-benches --bench growth` writes them to
+//! `docs/figures`.
 
 use faer::Mat;
 use std::path::Path;
@@ -9,7 +9,7 @@ use tracktwin_track::time::passes;
 
 type Error = Box<dyn std::error::Error>;
 
-/// Microseconds and milliseconds in a second.
+/// Number of microseconds and of milliseconds in a second.
 const US: f64 = 1e6;
 const MS: f64 = 1e3;
 

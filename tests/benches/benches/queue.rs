@@ -1,11 +1,11 @@
-//! What the queue costs as a campaign goes on: durable leases and 12 kB results, opening, and status.
+//! Costs of the queue during a campaign: durable leases, results of 12 kB, opening, and status.
 //!
 //! `cargo bench -p tracktwin-benches --bench queue -- [sqlite|postgres] [--cases N] [--batch N]`
 //!
-//! Eight workers lease and report until a thousand cases are finished, three thousand, and so on up to
-//! nine tenths of N (100,000), a batch (50) at a time. What a lease costs then is drawn into
-//! `docs/figures/leases.svg`. Libraries are made in `$TRACKTWIN_BENCH_DIR`, or here; N cases take 15 kB
-//! each.
+//! Eight workers lease and report a batch (50) at a time. The measurement stops at a thousand finished
+//! cases, at three thousand, and so on up to 90 % of N (100,000). The cost of a lease at each stop is drawn
+//! in `docs/figures/leases.svg`. Libraries are created in `$TRACKTWIN_BENCH_DIR`, or in the current folder;
+//! N cases need 15 kB each.
 
 use std::path::Path;
 use std::time::Instant;
@@ -13,7 +13,7 @@ use test_postgres::{Server, Settings};
 use tracktwin_benches::{CAMPAIGN, Curve, Failure, figure, fill, finish, lease, sqlite_library};
 use tracktwin_library::{Held, Library};
 
-/// Leases of one case after another whose mean is told.
+/// Number of successive single-case leases over which the mean is taken.
 const LEASES: u32 = 200;
 
 #[tokio::main]
@@ -44,7 +44,7 @@ async fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Goes through most of a campaign, and stops now and then to measure.
+/// Processes most of a campaign, with stops for measurements.
 async fn measure(name: &str, url: &str, cases: u32, batch: u32) -> Result<Curve, Failure> {
     let mut library = Library::open_or_create(url).await?;
     let begin = Instant::now();
@@ -83,7 +83,7 @@ fn ms(begin: Instant) -> f64 {
     1e3 * begin.elapsed().as_secs_f64()
 }
 
-/// What a lease of one case costs in the mean, one after another, in ms; they are given back.
+/// Mean time of a lease of one case in ms, over successive leases. The cases are released afterwards.
 async fn leases(library: &Library) -> Result<f64, Failure> {
     let mut held = Vec::new();
     let begin = Instant::now();

@@ -1,18 +1,18 @@
-//! What a lease and a case cost `SQLite`'s writer: the service times of `docs/scaling.md`.
+//! Costs of a lease and of a case in the writer of `SQLite`: the service times of `docs/scaling.md`.
 //!
 //! `cargo bench -p tracktwin-benches --bench service_times`
 //!
-//! Eight workers lease and report a batch at a time; told is the CPU time of the threads that speak with
-//! the database. A lease and its report cost `a`, a case in them `b`: the time of n leases of m cases is
-//! n a + n m b, fitted to the batches by least squares of the time a case.
+//! Eight workers lease and report one batch at a time. The result is the CPU time of the threads that call
+//! the database. A lease with its report costs `a`, each of its cases `b`: n leases of m cases take n a + n
+//! m b. The values are fitted to the batches by least squares of the time per case.
 
 use tracktwin_benches::{Failure, cpu_of_threads, fill, finish, sqlite_library};
 use tracktwin_library::Library;
 
-/// Cases of a lease, and how many are done with leases of that size.
+/// Number of cases in a lease, and number of cases processed with leases of this size.
 const BATCHES: [(u32, u32); 4] = [(1, 4_000), (8, 16_000), (50, 40_000), (128, 40_000)];
 
-/// Of the threads in which sqlx speaks with `SQLite`.
+/// Name of the threads in which sqlx calls `SQLite`.
 const THREADS: &str = "sqlx-sqlite-wor";
 
 #[tokio::main]
@@ -30,7 +30,7 @@ async fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-/// What the writer takes for so many cases, a batch at a time, in s.
+/// CPU time of the writer in s for this number of cases, with leases of `batch` cases.
 async fn writer_s(batch: u32, cases: u32) -> Result<f64, Failure> {
     let (_folder, url) = sqlite_library()?;
     let library = Library::open_or_create(&url).await?;

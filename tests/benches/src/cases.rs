@@ -1,4 +1,4 @@
-//! Tracks and surfaces of the paper's ranges.
+//! Tracks and surfaces within the paper's parameter ranges.
 
 use tracktwin_parameters::{Parameter, ParameterSet, Sequence, TrackDesign};
 use tracktwin_track::model::{Mesh, Support, Surface, TrackModel};
@@ -7,16 +7,16 @@ use tracktwin_track::time::Pass;
 /// Length and mesh of a track.
 #[derive(Clone, Copy, Debug)]
 pub struct Track {
-    /// Sleeper spans.
+    /// Number of sleeper spans.
     pub spans: usize,
-    /// Rail elements in each.
+    /// Number of rail elements per span.
     pub rail_elements: usize,
-    /// Elements of a half sleeper.
+    /// Number of elements of a half sleeper.
     pub sleeper_elements: usize,
 }
 
 impl Track {
-    /// A pass at 13 km/h over so many spans in the middle.
+    /// A pass at 13 km/h over this number of spans in the middle of the track.
     pub fn pass(self, spans: f64) -> Pass {
         let spacing_m = TrackDesign::v_track().sleeper.spacing_m;
         let start_m = (self.spans as f64 - spans) / 2.0 * spacing_m;
@@ -30,10 +30,10 @@ impl Track {
     }
 }
 
-/// Tracks of so many parameter sets (Sobol points of Table D1's ranges), and a surface for each.
+/// Tracks of `count` parameter sets (Sobol points in the ranges of Table D1), with a surface for each.
 ///
 /// # Panics
-/// When the points can't be had, which a fixed seed and few points exclude.
+/// Panics if the points cannot be computed, which does not happen with a fixed seed and few points.
 pub fn cases(track: Track, count: u32) -> (Vec<TrackModel>, Vec<Surface>) {
     let design = TrackDesign::v_track();
     let mesh = Mesh::uniform(track.spans, track.rail_elements, track.sleeper_elements);
@@ -48,7 +48,7 @@ pub fn cases(track: Track, count: u32) -> (Vec<TrackModel>, Vec<Surface>) {
     (models, (0..count).map(surface).collect())
 }
 
-/// The paper's Table D1 at a point of the unit cube.
+/// The parameters of the paper's Table D1 at a point of the unit cube.
 pub(crate) fn parameters(point: &[f64]) -> ParameterSet {
     let axes = Parameter::ALL.iter().zip(point);
     axes.fold(ParameterSet::nominal(), |set, (&parameter, x)| {

@@ -1,24 +1,24 @@
-//! CPU time, and time by the clock.
+//! Measurement of CPU time and of wall-clock time.
 
 use std::time::Instant;
 
-/// Runs of one piece of work.
+/// Number of runs of one piece of work.
 const REPEATS: usize = 5;
 
-/// How long a run lasts at least, in s: the system counts CPU time in steps of some milliseconds.
+/// Minimum duration of a run in s. The system counts CPU time in steps of some milliseconds.
 const RUN_S: f64 = 0.3;
 
-/// CPU seconds of one piece of work over repeated runs.
+/// CPU time of one piece of work over repeated runs, in s.
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
-    /// The quickest run.
+    /// Time of the fastest run in s.
     pub least_s: f64,
-    /// The middle one.
+    /// Median time in s.
     pub median_s: f64,
 }
 
 impl Cost {
-    /// The cost of each of `count` equal parts.
+    /// The cost of each of `count` equal parts of the work.
     #[must_use]
     pub fn of_each(self, count: usize) -> Self {
         let count = count as f64;
@@ -26,8 +26,8 @@ impl Cost {
     }
 }
 
-/// Measures `work` a few times, after one run that warms caches and plans up; short work is done
-/// again and again in a run.
+/// Measures the CPU time of `work` in several runs, after one run that fills caches. Short work is repeated
+/// within a run.
 pub fn cost<T>(mut work: impl FnMut() -> T) -> Cost {
     let started = Instant::now();
     std::hint::black_box(work());
@@ -45,8 +45,7 @@ pub fn cost<T>(mut work: impl FnMut() -> T) -> Cost {
     Cost { least_s: seconds[0], median_s: seconds[REPEATS / 2] }
 }
 
-/// Seconds by the clock of a piece of work over repeated runs, after one that warms caches up: for
-/// what several cores do together.
+/// Measures the wall-clock time of work on several cores in repeated runs, after one run that fills caches.
 pub fn by_the_clock<T>(mut work: impl FnMut() -> T) -> Cost {
     let mut seconds: Vec<f64> = (0..=REPEATS)
         .map(|_| {
@@ -60,7 +59,7 @@ pub fn by_the_clock<T>(mut work: impl FnMut() -> T) -> Cost {
     Cost { least_s: seconds[0], median_s: seconds[REPEATS / 2] }
 }
 
-/// Does long work once: what it returned and what it cost.
+/// Runs long work once. Returns its result and its cost.
 pub fn once<T>(work: impl FnOnce() -> T) -> (T, Cost) {
     let before = cpu_s();
     let out = work();
@@ -68,13 +67,13 @@ pub fn once<T>(work: impl FnOnce() -> T) -> (T, Cost) {
     (out, Cost { least_s: seconds, median_s: seconds })
 }
 
-/// CPU seconds that all threads of this process have had so far.
+/// CPU time used by all threads of this process, in s.
 fn cpu_s() -> f64 {
     cpu_of_threads("")
 }
 
-/// CPU seconds that this process's threads have had so far whose names begin so; of a name the system
-/// keeps 15 bytes.
+/// CPU time used by the threads of this process whose names begin with `name`, in s. The system keeps 15
+/// bytes of a name.
 pub fn cpu_of_threads(name: &str) -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let nanoseconds = tasks.filter_map(|task| {

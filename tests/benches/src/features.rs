@@ -5,7 +5,7 @@ use tracktwin_parameters::Parameter;
 use tracktwin_signal::{FeatureDefinition, Signal};
 use tracktwin_surrogate::TrainingSet;
 
-/// A generator of numbers between -1 and 1 (Knuth's MMIX).
+/// A pseudo-random generator of numbers between -1 and 1 (Knuth's MMIX).
 fn noise() -> impl FnMut() -> f64 {
     let mut state = 1_u64;
     move || {
@@ -15,10 +15,10 @@ fn noise() -> impl FnMut() -> f64 {
     }
 }
 
-/// About what an axle box feels, at 100 kHz: resonances at 115 and 900 Hz under white noise.
+/// A signal like an axle-box acceleration, at 100 kHz: resonances at 115 and 900 Hz, and white noise.
 ///
 /// # Panics
-/// Never: the samples are finite.
+/// Never, because the samples are finite.
 pub fn axle_box(samples: usize) -> Signal {
     let mut white = noise();
     let mut past = [[0.0; 2]; 2];
@@ -39,13 +39,13 @@ pub fn axle_box(samples: usize) -> Signal {
     Signal::new(1e5, std::iter::repeat_with(sample).take(samples).collect()).expect("finite")
 }
 
-/// Rows of ln-powers about as a library holds them: smooth in six parameters, and a surface's own
-/// scatter, alike in neighbouring bins.
+/// Rows of ln powers similar to those of a library: smooth functions of six parameters, plus random
+/// deviations of the surface that are correlated between neighbouring bins.
 pub fn feature_vectors(rows: usize, columns: usize) -> Mat<f64> {
     entries(rows, columns).0
 }
 
-/// Such rows, and the parameters (rows x 6, between -1 and 1) that they come from.
+/// Such rows, and their parameters (rows x 6, between -1 and 1).
 fn entries(rows: usize, columns: usize) -> (Mat<f64>, Mat<f64>) {
     let mut white = noise();
     let (mut out, mut all) = (Mat::zeros(rows, columns), Mat::zeros(rows, Parameter::ALL.len()));
@@ -64,10 +64,10 @@ fn entries(rows: usize, columns: usize) -> (Mat<f64>, Mat<f64>) {
     (out, all)
 }
 
-/// A library of such rows at these speeds.
+/// A training set of such rows at these speeds.
 ///
 /// # Panics
-/// Never: the definition becomes JSON.
+/// Never, because the definition can be converted to JSON.
 pub fn library(rows: usize, speeds_km_h: &[f64]) -> TrainingSet {
     let definition = FeatureDefinition::default();
     let frequencies_hz = definition.frequencies_hz();

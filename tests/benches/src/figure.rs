@@ -8,15 +8,15 @@ const BOTTOM: f64 = 50.0;
 const MARGIN: f64 = 24.0;
 const COLOURS: [&str; 3] = ["#1f6feb", "#c2410c", "#4d7c0f"];
 
-/// Points under one name.
+/// A named curve.
 pub struct Curve {
-    /// What the legend says.
+    /// Text in the legend.
     pub name: String,
-    /// Positive coordinates.
+    /// Points of the curve; both coordinates are positive.
     pub points: Vec<(f64, f64)>,
 }
 
-/// The curves in one frame.
+/// Returns an SVG figure with all curves in one frame.
 pub fn figure(title: &str, x_name: &str, y_name: &str, curves: &[Curve]) -> String {
     let all = || curves.iter().flat_map(|curve| curve.points.iter().copied());
     let axes = [range(all().map(|point| point.0)), range(all().map(|point| point.1))];
@@ -71,7 +71,8 @@ pub fn figure(title: &str, x_name: &str, y_name: &str, curves: &[Curve]) -> Stri
     svg + "</svg>\n"
 }
 
-/// A range that holds all values with some room: a decade at least, so that what is level looks so.
+/// A range that contains all values with a margin. It has at least one decade, so that constant curves look
+/// constant.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = values
         .fold([f64::INFINITY, 0.0_f64], |[low, high], value| [low.min(value), high.max(value)]);
@@ -79,7 +80,7 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low / room, high * room]
 }
 
-/// Powers of ten within a range; of less than two decades 2 and 5 times them too.
+/// Powers of ten within a range; for a range of less than two decades, also their multiples by 2 and 5.
 fn ticks(low: f64, high: f64) -> Vec<f64> {
     let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let digits: &[u8] = if high / low < 100.0 { &[1, 2, 5] } else { &[1] };

@@ -1,7 +1,7 @@
-//! What measurements share: the clock, repetition, the cases and signals that are measured.
+//! Common parts of the benchmarks: clock, repetition, and the measured cases and signals.
 //!
-//! The clock counts CPU time of this process, all its threads together, so that neighbours on a
-//! shared machine lengthen a figure little. Linux only.
+//! The clock counts the CPU time of all threads of this process, so that other processes on a shared
+//! machine have little influence. Linux only.
 
 mod cases;
 mod clock;

@@ -1,4 +1,4 @@
-//! Workers that compute nothing: they lease from a library, and report features of 12 kB a case.
+//! Workers that compute nothing. They lease from a library, and report features of 12 kB per case.
 
 use tempfile::TempDir;
 use tokio::task::JoinSet;
@@ -10,26 +10,27 @@ use tracktwin_parameters::{Case, Parameter, ParameterSet};
 use tracktwin_protocol::{CaseReport, checksum};
 use tracktwin_signal::{Features, ThirdOctave};
 
-/// Why a measurement stops.
+/// Error that ends a measurement.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// The campaign that they work on.
+/// Id of the campaign of these workers.
 pub const CAMPAIGN: &str = "queue";
 
-/// Workers that ask at the same time.
+/// Number of workers that send requests at the same time.
 const WORKERS: u32 = 8;
 
-/// Three passes of 500 bins: 12 kB a case.
+/// Speeds in km/h: three passes of 500 bins, 12 kB per case.
 const SPEEDS_KM_H: [f64; 3] = [7.0, 10.0, 13.0];
 const BINS: usize = 500;
 
-/// No case of these fails.
+/// Limits of attempts that are never reached, because no case fails.
 const NEVER_GIVEN_UP: AttemptsMax = AttemptsMax { failed: u32::MAX, lost: u32::MAX };
 
-/// A folder in `$TRACKTWIN_BENCH_DIR`, or here, and the URL of an `SQLite` library in it.
+/// A new folder in `$TRACKTWIN_BENCH_DIR`, or in the current folder, and the URL of a `SQLite` library in
+/// it.
 ///
 /// # Errors
-/// When it can't be made.
+/// Returns an error if the folder cannot be created.
 pub fn sqlite_library() -> Result<(TempDir, String), Failure> {
     let home = std::env::var("TRACKTWIN_BENCH_DIR").unwrap_or_else(|_| ".".into());
     let folder = tempfile::tempdir_in(home)?;
@@ -37,10 +38,10 @@ pub fn sqlite_library() -> Result<(TempDir, String), Failure> {
     Ok((folder, url))
 }
 
-/// Stores a campaign of so many cases.
+/// Stores a campaign with this number of cases.
 ///
 /// # Errors
-/// When the library can't be written.
+/// Returns an error if the library cannot be written.
 pub async fn fill(library: &Library, cases: u32) -> Result<(), Failure> {
     let record = CampaignRecord {
         id: CAMPAIGN.to_owned(),
@@ -66,13 +67,13 @@ fn case(index: u32) -> Case {
     Case { index, parameters, surface_seed: index.into() }
 }
 
-/// Has so many cases done by the workers together, who take `batch` at a time.
+/// Finishes `cases` cases with all workers together; each worker leases `batch` cases at a time.
 ///
 /// # Errors
-/// When the library can't be written, or has no more cases.
+/// Returns an error if the library cannot be written or has no more cases.
 ///
 /// # Panics
-/// When a result is not stored.
+/// Panics if a result is not stored.
 pub async fn finish(library: &Library, cases: u32, batch: u32) -> Result<(), Failure> {
     let mut workers = JoinSet::new();
     for worker in 0..WORKERS {
@@ -109,10 +110,10 @@ async fn work(library: &Library, worker: &str, cases: u32, batch: u32) -> Result
     Ok(())
 }
 
-/// So many cases at most, for one worker.
+/// Leases up to this number of cases to one worker.
 ///
 /// # Errors
-/// When the library can't be written, or has no more cases.
+/// Returns an error if the library cannot be written or has no more cases.
 pub async fn lease(
     library: &Library,
     worker: &str,

@@ -1,7 +1,7 @@
-//! What comes from outside may be anything: it is read or refused, and nothing panics.
+//! Any input from outside is read or refused; no input causes a panic.
 //!
-//! Each test takes the kept inputs in `__fuzz__`, then some at random. `cargo bolero test NAME` goes on
-//! for as long as it is let, guided by what the program does, and keeps what is new.
+//! Each test runs the stored inputs in `__fuzz__`, then random ones. `cargo bolero test NAME` runs until it
+//! is stopped; it uses coverage as a guide and stores new inputs.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -11,5 +11,5 @@ mod questions;
 mod recordings;
 mod tracks;
 
-/// Inputs at random in an ordinary run.
+/// Number of random inputs in an ordinary run.
 const ITERATIONS: usize = 200;

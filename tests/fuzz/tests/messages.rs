@@ -3,7 +3,7 @@ use prost::Message as _;
 use tracktwin_protocol::farm::{LeaseResponse, RegisterRequest, ReportRequest};
 use tracktwin_protocol::{CaseReport, Lease, Registration, Shape};
 
-/// A message's bytes, of the kind that the first byte says.
+/// Decodes bytes as a message; the first byte selects its type.
 fn take(kind: u8, bytes: &[u8]) {
     match kind % 3 {
         0 => {
@@ -23,7 +23,7 @@ fn take(kind: u8, bytes: &[u8]) {
     }
 }
 
-/// Of a campaign with two speeds and three frequencies.
+/// Shape of the features of a campaign with two speeds and three frequencies.
 fn shape() -> Shape {
     Shape { speeds_km_h: vec![10.0, 13.0], bins: 3 }
 }

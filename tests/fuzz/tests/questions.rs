@@ -4,7 +4,7 @@ use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 use tracktwin_library::{Answer, Cell, Library, LibraryError};
 
-/// A question of which chance could make one that never ends.
+/// Time limit of a query, because a random query could run for ever.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 struct Silent;

@@ -3,7 +3,7 @@ use std::fs;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::recording::import::Table;
 
-/// Kinds of files that are read.
+/// Extensions of the supported file formats.
 const KINDS: [&str; 6] = ["csv", "txt", "parquet", "npy", "npz", "mat"];
 
 #[test]

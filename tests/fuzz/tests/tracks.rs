@@ -2,7 +2,7 @@ use super::ITERATIONS;
 use tracktwin_parameters::{Parameter, Preset, Track};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
-/// A description with one of its numbers replaced is a track that can be built, or refused.
+/// A description with one changed number defines a track that can be built, or is refused.
 #[test]
 fn a_track_file_is_understood_or_refused() {
     let lines: Vec<String> =

@@ -1,6 +1,7 @@
-//! What tests need beyond the checkout, such as reference data, a server or a port.
+//! Resources that tests need in addition to the checkout, such as reference data, a server or a port.
 //!
-//! Where it is missing, a test skips and the run says so in one line, unless it is demanded.
+//! If a resource is missing, the test is skipped and prints one line, unless an environment variable
+//! demands the resource.
 
 mod snapshot;
 
@@ -12,16 +13,17 @@ use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-/// The one recording that `tests/reference` keeps whole.
+/// Name of the only recording that `tests/reference` contains completely.
 const KEPT_WHOLE: &str = "dev-01";
 
-/// The reference data of the checkout; its README says what is there and where it is from.
+/// Folder of the reference data in the checkout. Its README describes content and origin.
 pub fn reference() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference")
 }
 
-/// Folders of a recording of a simulator that shares no code with this project: the passes of it
-/// that are in the checkout, if any, and the whole of it, if it lies beside.
+/// Folders of a recording by a simulator that shares no code with this project. They are the folder in the
+/// checkout, which has some of the passes, and the complete one beside the checkout; each only if it
+/// exists.
 pub fn recordings(name: &str) -> Vec<PathBuf> {
     let kept = reference().join("recordings").join(name);
     if name == KEPT_WHOLE {
@@ -31,10 +33,10 @@ pub fn recordings(name: &str) -> Vec<PathBuf> {
     kept.is_dir().then_some(kept).into_iter().chain(whole).collect()
 }
 
-/// The reference data that lies beside a checkout, if it is there.
+/// Folder of the reference data beside the checkout; `None` if it does not exist.
 ///
 /// # Panics
-/// When it is missing although `TRACKTWIN_REQUIRE_SHARED` is set.
+/// Panics if the folder is missing although `TRACKTWIN_REQUIRE_SHARED` is set.
 pub fn shared_data() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     if folder.is_dir() {
@@ -44,19 +46,20 @@ pub fn shared_data() -> Option<PathBuf> {
     None
 }
 
-/// Says that tests skip what they need, for it is missing.
+/// Prints that tests are skipped because a resource is missing.
 ///
 /// # Panics
-/// When the environment has this variable: then it is demanded.
+/// Panics if the environment variable `demanded_by` is set.
 pub fn missing(demanded_by: &str, what: &'static str) {
     assert!(std::env::var_os(demanded_by).is_none(), "{demanded_by} is set, but skipped: {what}");
     skipped(what);
 }
 
-/// Says once what is skipped and why, past the harness, which keeps what passing tests print.
+/// Prints once what is skipped and why. It bypasses the test harness, which hides the output of passing
+/// tests.
 ///
 /// # Panics
-/// Where a test has panicked here.
+/// Panics if another thread has panicked in this function.
 pub fn skipped(what: &'static str) {
     static SAID: Mutex<BTreeSet<&str>> = Mutex::new(BTreeSet::new());
     if SAID.lock().expect("nobody panics while holding it").insert(what) {
@@ -64,10 +67,10 @@ pub fn skipped(what: &'static str) {
     }
 }
 
-/// A port that nobody listens on now.
+/// Returns a TCP port that is free at present.
 ///
 /// # Panics
-/// When the loopback interface has none.
+/// Panics if the loopback interface has no free port.
 pub fn free_port() -> u16 {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("loopback has ports");
     listener.local_addr().expect("a bound socket has an address").port()

@@ -1,15 +1,15 @@
-//! Texts that are kept beside the tests, so that a change of them is seen and meant.
+//! Comparison of texts with stored files, so that a change of a text is visible in review.
 
 use std::path::Path;
 
-/// Set to write kept texts anew.
+/// Environment variable that makes the tests write the files again.
 const WRITE: &str = "TRACKTWIN_WRITE_SNAPSHOTS";
 
-/// Compares a text with the one that is kept under a name in `tests/snapshots`, or keeps it anew where
-/// the environment has `TRACKTWIN_WRITE_SNAPSHOTS`.
+/// Compares a text with the stored text of this name in `tests/snapshots`. If `TRACKTWIN_WRITE_SNAPSHOTS`
+/// is set, stores the text instead.
 ///
 /// # Panics
-/// When they differ, at the first line that does.
+/// Panics if the texts differ, with the first different line.
 pub fn assert_snapshot(name: &str, now: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../snapshots").join(name);
     if std::env::var_os(WRITE).is_some() {

@@ -1,12 +1,12 @@
-//! Where PostgreSQL's programs are, and as whom they run.
+//! Location of PostgreSQL's programs, and the user that runs them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Where Debian puts them, one folder a version.
+/// Folder of Debian's packages, with one folder per version.
 const DEBIAN: &str = "/usr/lib/postgresql";
 
-/// Folder of `initdb` and `postgres`: `$PG_BIN`, the newest of Debian's, or on the `PATH`.
+/// Folder of `initdb` and `postgres`: `$PG_BIN`, the newest version of Debian, or a folder on the `PATH`.
 pub(crate) fn programs() -> Option<PathBuf> {
     let given = std::env::var_os("PG_BIN").map(PathBuf::from);
     let path = std::env::var_os("PATH").unwrap_or_default();
@@ -31,7 +31,7 @@ fn is_complete(folder: &Path) -> bool {
     ["initdb", "postgres", "createdb"].iter().all(|program| folder.join(program).is_file())
 }
 
-/// A command that runs as somebody whom the server accepts: it refuses to be root.
+/// A command that runs as a user accepted by the server, which refuses to run as root.
 pub(crate) fn as_somebody(program: &Path) -> Command {
     if !is_root() {
         return Command::new(program);
@@ -55,7 +55,7 @@ fn group(user: &str) -> String {
     answer("-g", Some(user)).unwrap_or_else(|| user.to_owned())
 }
 
-/// What `id` says.
+/// Output of `id` with this option.
 fn answer(option: &str, user: Option<&str>) -> Option<String> {
     let output = Command::new("id").arg(option).args(user).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())

@@ -1,7 +1,7 @@
-//! A throw-away PostgreSQL server for tests, from the binaries that are installed.
+//! A temporary PostgreSQL server for tests, run from the installed programs.
 //!
-//! Owns finding, starting, stopping and removing it; what the databases hold is the tests' own. It
-//! ends with the test's process, however that ends.
+//! This crate finds, starts, stops and removes the server; the tests define the content of the databases.
+//! The server ends with the test's process, even if the process is killed.
 
 mod installation;
 mod server;

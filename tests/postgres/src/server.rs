@@ -1,4 +1,4 @@
-//! The server: started once a test binary, with a database for each test.
+//! The server. It is started once per test binary, and each test has a separate database.
 
 use crate::installation::{as_somebody, programs};
 use std::io::Write;
@@ -10,30 +10,30 @@ use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 use test_needs::{free_port, missing};
 
-/// What is said where no server is installed.
+/// Text of the message if no server is installed.
 const WITHOUT: &str = "tests on PostgreSQL; install postgresql, or set PG_BIN to its folder";
 
-/// When a server that does not answer has failed.
+/// Time limit of starting the server.
 const START_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Runs the server until its standard input says "keep" or ends, and then removes its files; so it
-/// leaves nothing behind even if the test is killed.
+/// Shell script that runs the server until its standard input contains "keep" or ends, and then removes the
+/// server's files. No files remain even if the test is killed.
 const KEEPER: &str = "\"$0\" -D \"$1\" -p \"$2\" -c fsync=\"$3\" -c full_page_writes=\"$3\" \
     -c listen_addresses=127.0.0.1 -c unix_socket_directories= -c shared_buffers=64MB \
     -c max_connections=200 > \"$1/log\" 2>&1 & server=$!; \
     read -r word; kill -INT $server; wait $server; [ \"$word\" = keep ] || rm -rf \"$1\"";
 
-/// Servers of this process so far.
+/// Number of servers started by this process.
 static SERVERS: AtomicU32 = AtomicU32::new(0);
 
-/// What a server is to be like.
+/// Settings of a server.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Settings {
-    /// Whether a commit waits for the disk; only where durability is what is tested or measured.
+    /// Whether a commit waits for the disk. Only needed where durability is tested or measured.
     pub durable: bool,
 }
 
-/// A PostgreSQL server of this process alone, on the loopback interface.
+/// A PostgreSQL server for this process only, on the loopback interface.
 pub struct Server {
     programs: PathBuf,
     data: PathBuf,
@@ -44,18 +44,20 @@ pub struct Server {
 }
 
 impl Server {
-    /// The server that this process's tests share, started with the first.
+    /// Returns the server shared by the tests of this process. The first call starts it.
     ///
-    /// Prints one line where there is none, so that a skipped test says so.
+    /// Returns `None` and prints one line if PostgreSQL is not installed, so that skipped tests are
+    /// visible.
     ///
     /// # Panics
-    /// When it cannot be started, or is missing although `TRACKTWIN_REQUIRE_POSTGRES` is set.
+    /// Panics if the server cannot be started, or if it is missing although `TRACKTWIN_REQUIRE_POSTGRES` is
+    /// set.
     pub fn shared() -> Option<&'static Self> {
         static SHARED: OnceLock<Option<Server>> = OnceLock::new();
         SHARED.get_or_init(|| Self::start(Settings::default())).as_ref()
     }
 
-    /// A server of one's own, to be stopped and started.
+    /// Starts a separate server, which the test can stop and start.
     ///
     /// # Panics
     /// As [`Server::shared`].
@@ -63,7 +65,8 @@ impl Server {
         Self::start_in(&std::env::temp_dir(), settings)
     }
 
-    /// The same with its files in a folder of their own under `folder`, which everybody may enter.
+    /// As [`Server::start`], with the server's files in a new folder below `folder`, which all users must
+    /// be able to enter.
     ///
     /// # Panics
     /// As [`Server::shared`].
@@ -82,10 +85,10 @@ impl Server {
         Some(server)
     }
 
-    /// The URL of a new, empty database.
+    /// Creates a new, empty database and returns its URL.
     ///
     /// # Panics
-    /// When it cannot be made.
+    /// Panics if the database cannot be created.
     pub fn database(&self) -> String {
         let name = format!("test_{}", self.databases.fetch_add(1, Ordering::Relaxed));
         let mut command = Command::new(self.programs.join("createdb"));
@@ -95,10 +98,10 @@ impl Server {
         format!("postgres://postgres@127.0.0.1:{port}/{name}")
     }
 
-    /// Removes a database, whoever is still connected to it.
+    /// Removes a database, even if clients are connected to it.
     ///
     /// # Panics
-    /// When it cannot be removed.
+    /// Panics if the database cannot be removed.
     pub fn remove(&self, database: &str) {
         let name = database.rsplit('/').next().expect("a URL ends with its database");
         let mut command = Command::new(self.programs.join("dropdb"));
@@ -106,10 +109,11 @@ impl Server {
         succeed(command.args(["-h", "127.0.0.1", "-U", "postgres", "-p", &port, "--force", name]));
     }
 
-    /// Has everything written to the files of tables, so that the log's can be used again.
+    /// Runs a checkpoint, which writes all data to the files of the tables, so that log files can be
+    /// reused.
     ///
     /// # Panics
-    /// When that fails.
+    /// Panics if the checkpoint fails.
     pub fn checkpoint(&self) {
         let mut command = Command::new(self.programs.join("psql"));
         let port = self.port.to_string();
@@ -117,10 +121,10 @@ impl Server {
         succeed(&mut command);
     }
 
-    /// Stops the server, as an administrator would: connections end, data stay.
+    /// Stops the server as an administrator does: connections are closed, and data are kept.
     ///
     /// # Panics
-    /// When it cannot be stopped.
+    /// Panics if the server cannot be stopped.
     pub fn stop(&self) {
         let keeper = self.keeper.lock().expect("nobody panics while holding it").take();
         let Some((mut keeper, mut input)) = keeper else { return };
@@ -128,10 +132,10 @@ impl Server {
         keeper.wait().expect("the keeper ends");
     }
 
-    /// Starts a stopped server with what it held.
+    /// Starts a stopped server with its previous data.
     ///
     /// # Panics
-    /// When it does not answer in time.
+    /// Panics if the server does not respond in time.
     pub fn start_again(&self) {
         let fsync = if self.settings.durable { "on" } else { "off" };
         let mut keeper = as_somebody(Path::new("sh"));
@@ -149,7 +153,7 @@ impl Server {
         }
     }
 
-    /// Whether it takes connections: it may listen before it does.
+    /// Whether the server accepts connections. It may listen before it accepts any.
     fn answers(&self) -> bool {
         let listens = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).is_ok();
         let port = self.port.to_string();

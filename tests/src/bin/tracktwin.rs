@@ -1,4 +1,4 @@
-//! The program as its users run it, built for the tests of this package.
+//! The program `tracktwin`, unchanged, built for the tests of this package.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! The program with one kind more in its catalogue.
+//! The program `tracktwin` with one additional kind in its catalogue.
 
 use std::process::ExitCode;
 use system_tests::RAIL_ABSORBER;

@@ -1,4 +1,4 @@
-//! The worker under test: exactly `tracktwin-worker`.
+//! The program `tracktwin-worker`, unchanged, built for the tests of this package.
 
 use std::process::ExitCode;
 

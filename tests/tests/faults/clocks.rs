@@ -1,4 +1,4 @@
-//! A worker or a coordinator whose time of day jumps by an hour, and back.
+//! The clock of a worker or a coordinator jumps by an hour and back.
 
 use crate::farm::{Engine, Farm};
 use std::path::{Path, PathBuf};
@@ -6,17 +6,17 @@ use std::process::Command;
 use system_tests::Process;
 use test_needs::skipped;
 
-/// Where Debian puts the library that tells a program another time of day.
+/// Path, below Debian's library folder, of the library that gives a program another time of day.
 const FAKETIME: &str = "faketime/libfaketime.so.1";
 
-/// A time of day that can be set, for those who are started under it.
+/// A time of day that the test can set, for programs started with [`Clock::environment`].
 struct Clock {
     library: PathBuf,
     setting: tempfile::NamedTempFile,
 }
 
 impl Clock {
-    /// A clock that is right; none where libfaketime is not installed.
+    /// A clock with the correct time; `None` if libfaketime is not installed.
     fn right() -> Option<Self> {
         let folders = std::fs::read_dir("/usr/lib").ok()?.flatten();
         let library = folders.map(|it| it.path().join(FAKETIME)).find(|it| it.is_file());
@@ -29,13 +29,13 @@ impl Clock {
         Some(clock)
     }
 
-    /// Sets it ahead or back, as in `+1h`.
+    /// Sets the clock ahead or back, for example by `+1h`.
     fn set(&self, ahead: &str) {
         std::fs::write(self.setting.path(), ahead).unwrap();
     }
 
-    /// The surroundings in which it is believed. As with a real clock that is set, durations go on
-    /// as before.
+    /// Environment variables that make a program use this clock. Durations are not affected, as with a real
+    /// clock that is set.
     fn environment(&self) -> [(&'static str, String); 4] {
         let text = |path: &Path| path.display().to_string();
         [
@@ -46,13 +46,13 @@ impl Clock {
         ]
     }
 
-    /// What a program under it takes for now, in s since 1970.
+    /// Present time in s since 1970, as a program with this clock reads it.
     fn now_unix_s(&self) -> i64 {
         let date = Command::new("date").arg("+%s").envs(self.environment()).output().unwrap();
         String::from_utf8(date.stdout).unwrap().trim().parse().unwrap()
     }
 
-    /// Sets it ahead, back and right again while a farm is at work.
+    /// Sets the clock ahead, back, and to the correct time while a farm is running.
     fn jumps_during(&self, farm: &Farm) {
         let before = self.now_unix_s();
         for (ahead, finished) in [("+1h", 4), ("-1h", 16), ("+0", 28)] {

@@ -1,11 +1,11 @@
-//! Coordinators that are killed.
+//! Coordinators are killed.
 
 use crate::farm::{Engine, Farm};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 use system_tests::Process;
 
-/// Kills the coordinator so many times and lets the last one finish.
+/// Kills the coordinator this number of times, and waits until the last one finishes.
 fn coordinator_is_killed(farm: &Farm, times: u32) {
     let workers = [farm.worker(), farm.worker()];
     let mut acknowledged = BTreeMap::new();

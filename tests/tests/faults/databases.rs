@@ -1,4 +1,4 @@
-//! Databases that stop, and disks that are full.
+//! Databases stop, and disks are full.
 
 use crate::farm::Farm;
 use std::path::Path;
@@ -39,11 +39,11 @@ fn a_run_rides_out_a_server_that_is_away_for_twenty_seconds() {
     farm.assert_undisturbed();
 }
 
-/// A small file system of its own.
+/// A separate small file system.
 struct Tmpfs<'a>(&'a Path);
 
 impl<'a> Tmpfs<'a> {
-    /// An empty one; none where that is not allowed.
+    /// Mounts an empty file system; `None` if mounting is not allowed.
     fn mount(path: &'a Path, size: &str) -> Option<Self> {
         let mut mount = Command::new("mount");
         mount.args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(path);

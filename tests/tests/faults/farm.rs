@@ -1,4 +1,4 @@
-//! A farm of processes: its library, its coordinators, its workers.
+//! A farm of several processes: library, coordinators, workers.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
@@ -12,34 +12,34 @@ use test_postgres::Server;
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_tracktwin-under-test");
 pub(crate) const WORKER: &str = env!("CARGO_BIN_EXE_tracktwin-worker-under-test");
 
-/// When a farm that is not done has failed.
+/// Time limit for a farm to finish.
 pub(crate) const PATIENCE: Duration = Duration::from_mins(2);
 
-/// Which database holds the library.
+/// The database that contains the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Engine {
     Sqlite,
     Postgres,
 }
 
-/// A library, and what runs on it.
+/// A library, and the settings of the processes that use it.
 pub(crate) struct Farm {
     folder: TempDir,
     pub(crate) library: String,
     cases: u32,
-    /// The coordinators' ports: they keep them when they are started again.
+    /// Ports of the coordinators. A restarted coordinator uses the same port.
     ports: [u16; 2],
-    /// How long leases last, in s.
+    /// Length of the leases, in s.
     pub(crate) lease: &'static str,
 }
 
 impl Farm {
-    /// A library with the campaign in it; nothing where there is no such database.
+    /// A library with the campaign; `None` if the database is not available.
     pub(crate) fn new(engine: Engine) -> Option<Self> {
         Self::many(engine, 64)
     }
 
-    /// A library with so many cases of the campaign.
+    /// A library with this number of cases of the campaign.
     pub(crate) fn many(engine: Engine, cases: u32) -> Option<Self> {
         let folder = tempfile::tempdir().unwrap();
         let library = match engine {
@@ -49,7 +49,7 @@ impl Farm {
         Some(Self::on(folder, library, cases))
     }
 
-    /// A library at this address with so many cases.
+    /// A library at this URL with this number of cases.
     pub(crate) fn on(folder: TempDir, library: String, cases: u32) -> Self {
         let campaign = folder.path().join("campaign.toml").display().to_string();
         std::fs::write(&campaign, campaign_of(cases)).unwrap();
@@ -58,7 +58,7 @@ impl Farm {
         Self { folder, library, cases, ports, lease: "1.5" }
     }
 
-    /// How a coordinator is started that listens there; it ends when everything is done.
+    /// Command of a coordinator that listens at this address and ends when everything is done.
     pub(crate) fn coordinating(&self, listen: &str) -> Command {
         let mut coordinator = Command::new(PROGRAM);
         coordinator.args(["coordinator", "--exit-when-done", "--library", &self.library]);
@@ -66,7 +66,7 @@ impl Farm {
         coordinator
     }
 
-    /// Starts the campaign in one process, with these arguments as well.
+    /// Starts the campaign in one process, with these additional arguments.
     pub(crate) fn run(&self, arguments: &[&str]) -> Process {
         let mut run = Command::new(PROGRAM);
         run.arg("run").arg(self.campaign()).args(["--no-train", "--library", &self.library]);
@@ -74,12 +74,12 @@ impl Farm {
         Process::start(&mut run, "run")
     }
 
-    /// The campaign's file.
+    /// Path of the campaign file.
     pub(crate) fn campaign(&self) -> PathBuf {
         self.folder.path().join("campaign.toml")
     }
 
-    /// Cases in the library.
+    /// Number of cases in the library.
     pub(crate) fn cases(&self) -> u64 {
         self.count("1 = 1")
     }
@@ -117,8 +117,8 @@ impl Farm {
         Process::start(&mut worker, "worker")
     }
 
-    /// A far worker that is at work is cut off for longer than its lease, until a near one has done some
-    /// of what it held; the rest is left to it alone.
+    /// Cuts off a working remote worker for longer than its lease, until a local worker has finished one of
+    /// its cases. The remaining cases are left to the remote worker.
     pub(crate) fn outlives_a_cut(
         &self,
         cut: impl FnOnce(),
@@ -137,12 +137,12 @@ impl Farm {
         repair();
     }
 
-    /// Waits until a coordinator says that everything is done.
+    /// Waits until a coordinator reports that everything is done.
     pub(crate) fn finish(coordinator: &mut Process) {
         assert_eq!(coordinator.ended(PATIENCE).code(), Some(0));
     }
 
-    /// Results so far.
+    /// Present number of results.
     pub(crate) fn finished(&self) -> u64 {
         let answer = run(PROGRAM, &["status", "--json", "--library", &self.library]).succeeded();
         let status: serde_json::Value = serde_json::from_str(&answer).unwrap();
@@ -154,25 +154,25 @@ impl Farm {
         self.finished() == u64::from(self.cases)
     }
 
-    /// What the library answers.
+    /// Result of a query on the library.
     fn ask(&self, sql: &str) -> Vec<serde_json::Value> {
         let ask = ["library", "sql", sql, "--format", "json"];
         let answer = run(PROGRAM, &[&ask[..], &["--library", &self.library]].concat());
         serde_json::from_str(&answer.succeeded()).unwrap()
     }
 
-    /// Leases that ended without a result so far.
+    /// Present number of leases that ended without a result.
     pub(crate) fn attempts(&self) -> u64 {
         let rows = self.ask("select count(*) as attempts from attempt");
         rows[0]["attempts"].as_u64().unwrap()
     }
 
-    /// Cases leased more than once.
+    /// Number of cases leased more than once.
     pub(crate) fn leased_again(&self) -> u64 {
         self.count("epoch > 1")
     }
 
-    /// Cases that somebody holds.
+    /// Number of cases that are leased at present.
     pub(crate) fn leased(&self) -> u64 {
         self.count("state = 'leased'")
     }
@@ -182,7 +182,7 @@ impl Farm {
         self.ask(&ask)[0]["cases"].as_u64().unwrap()
     }
 
-    /// For each case with a result how often it was leased, and when the result came.
+    /// For each case with a result: number of leases, and time of the result.
     pub(crate) fn results(&self) -> BTreeMap<u64, (u64, String)> {
         let rows = self.ask(
             "select sobol_index, epoch, finished_at
@@ -195,12 +195,12 @@ impl Farm {
         rows.iter().map(came).collect()
     }
 
-    /// Waits until there are so many results.
+    /// Waits until there is this number of results.
     pub(crate) fn reach(&self, finished: u64) {
         until(&format!("{finished} results"), PATIENCE, || self.finished() >= finished);
     }
 
-    /// Every case has a result, and the results are those of an undisturbed run.
+    /// Checks that every case has a result, and that the results equal those of a run without faults.
     pub(crate) fn assert_undisturbed(&self) {
         assert!(
             self.is_done(),
@@ -212,7 +212,7 @@ impl Farm {
     }
 }
 
-/// What is to be done.
+/// Text of the campaign file.
 fn campaign_of(cases: u32) -> String {
     format!("name = \"faults\"\ncases = {cases}\n{COARSE_MODEL}")
 }
@@ -221,7 +221,7 @@ fn digest(library: &str) -> String {
     run(PROGRAM, &["library", "digest", "--library", library]).succeeded()
 }
 
-/// The digest of a campaign of so many cases that nothing disturbed.
+/// Digest of a campaign with this number of cases, simulated without faults.
 fn undisturbed(cases: u32) -> String {
     static KNOWN: OnceLock<Mutex<HashMap<u32, String>>> = OnceLock::new();
     let mut known = KNOWN.get_or_init(Mutex::default).lock().unwrap();

@@ -1,20 +1,20 @@
-//! A worker on another host: behind a network of its own, with certificates and a token, and a cable
-//! that is pulled.
+//! A worker on another host: in a separate network, with certificates and a token, and with an interrupted
+//! connection.
 
 use crate::farm::{Engine, Farm, PROGRAM, WORKER};
 use std::process::{Command, id};
 use system_tests::{Process, free_port, run};
 use test_needs::skipped;
 
-/// A host that is a network namespace, with a cable to this one.
+/// A host, simulated by a network namespace with a virtual cable to this host.
 struct Host {
     name: String,
-    /// This host's address on the cable.
+    /// Address of this host on the virtual cable.
     here: String,
 }
 
 impl Host {
-    /// One of several; none where namespaces may not be made.
+    /// Creates host number `number`; `None` if namespaces are not allowed.
     fn new(number: u32) -> Option<Self> {
         // Addresses kept for tests of networks (RFC 2544).
         let network = format!("198.18.{}", 2 * (id() % 100) + number);
@@ -32,7 +32,7 @@ impl Host {
         made.then_some(host)
     }
 
-    /// Pulls the cable: blocks all traffic without closing connections.
+    /// Interrupts the connection: blocks all traffic without closing connections.
     fn unplug(&self) {
         assert!(succeeds(&format!("-n {0} link set {0}n down", self.name)));
     }
@@ -41,7 +41,7 @@ impl Host {
         assert!(succeeds(&format!("-n {0} link set {0}n up", self.name)));
     }
 
-    /// How a program is started there.
+    /// Command that runs a program on this host.
     fn command(&self, program: &str) -> Command {
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &self.name, program]);
@@ -56,7 +56,7 @@ impl Drop for Host {
     }
 }
 
-/// Whether `ip` does as it is told.
+/// Runs `ip` with these arguments. Returns whether it succeeds.
 fn succeeds(arguments: &str) -> bool {
     let done = Command::new("ip").args(arguments.split(' ')).output();
     done.is_ok_and(|output| output.status.success())

@@ -1,12 +1,12 @@
-//! File systems whose locks don't work, as of some clusters.
+//! File systems without working locks, as on some clusters.
 
 use crate::farm::PROGRAM;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use test_needs::skipped;
 
-/// Stands between a program and the system: every lock is refused as by a file system that has none; with
-/// `ONLY_FLOCK` set, only those that programs take on whole files.
+/// C code of a library that makes system calls for locks fail, as on a file system without locks. With
+/// `ONLY_FLOCK` set, only locks on whole files fail.
 const NO_LOCKS: &str = r#"
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -39,7 +39,7 @@ FCNTL(fcntl)
 FCNTL(fcntl64)
 "#;
 
-/// The library that refuses; none where there is no C compiler.
+/// Compiles the library; `None` without a C compiler.
 fn no_locks(folder: &Path) -> Option<PathBuf> {
     let (source, library) = (folder.join("no_locks.c"), folder.join("no_locks.so"));
     std::fs::write(&source, NO_LOCKS).unwrap();
@@ -52,7 +52,7 @@ fn no_locks(folder: &Path) -> Option<PathBuf> {
     None
 }
 
-/// What a run says under it.
+/// Output of a run with this library.
 fn run_without_locks(environment: &[(&str, &str)]) -> Option<Output> {
     let folder = tempfile::tempdir().unwrap();
     let no_locks = no_locks(folder.path())?;

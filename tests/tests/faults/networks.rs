@@ -1,4 +1,4 @@
-//! A network that is cut between worker and coordinator.
+//! The network between worker and coordinator is interrupted.
 
 use crate::farm::{Engine, Farm};
 use crate::proxy::Proxy;

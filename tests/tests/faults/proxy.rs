@@ -1,4 +1,4 @@
-//! A cable that can be cut: it forwards connections, and then no longer does.
+//! A proxy for TCP connections that can block the traffic, like an interrupted network.
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -6,17 +6,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How often a cut is looked for.
+/// Interval of checking whether the traffic is blocked.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// A port whose connections lead to another.
+/// A port whose connections are forwarded to another port.
 pub(crate) struct Proxy {
     pub(crate) port: u16,
     cut: Arc<AtomicBool>,
 }
 
 impl Proxy {
-    /// Leads to this port.
+    /// Creates a proxy to this port.
     pub(crate) fn to(port: u16) -> Self {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         let own = listener.local_addr().unwrap().port();
@@ -35,12 +35,12 @@ impl Proxy {
         Self { port: own, cut }
     }
 
-    /// Blocks all traffic without closing connections, as a pulled cable does.
+    /// Blocks all traffic without closing connections, like an interrupted network.
     pub(crate) fn cut(&self) {
         self.cut.store(true, Ordering::Relaxed);
     }
 
-    /// Everything gets through again, what was held up first.
+    /// Forwards traffic again; delayed data come first.
     pub(crate) fn repair(&self) {
         self.cut.store(false, Ordering::Relaxed);
     }

@@ -1,10 +1,10 @@
-//! Workers that are killed, stopped and told to end.
+//! Workers are killed, stopped, and asked to end.
 
 use crate::farm::{Engine, Farm, PATIENCE};
 use std::time::{Duration, Instant};
 use system_tests::until;
 
-/// Kills a worker now and then, another one each time, and starts a new one in its place.
+/// Kills a worker at regular intervals, another one each time, and starts a new one in its place.
 fn workers_are_killed(farm: &Farm, every: Duration) {
     let mut coordinator = farm.coordinator(0);
     let mut workers: Vec<_> = (0..3).map(|_| farm.worker()).collect();

@@ -1,22 +1,22 @@
-//! From an index to a case: a function of the campaign's seed and the index alone.
+//! Derives a case from its Sobol index. The case depends only on the campaign's seed and the index.
 
 use super::{Campaign, Surfaces};
 use std::ops::Range;
 use tracktwin_parameters::{Case, ParameterSet, SobolError};
 
-/// The case with this index.
+/// Returns the case with this Sobol index.
 ///
 /// # Errors
-/// [`SobolError`] when the campaign's sequence has no such point.
+/// Returns [`SobolError`] if the campaign's sequence has no point with this index.
 pub fn case(campaign: &Campaign, index: u32) -> Result<Case, SobolError> {
     let mut one = cases(campaign, index..index + 1)?;
     Ok(one.pop().expect("one index makes one case"))
 }
 
-/// The cases with these indices.
+/// Returns the cases with these Sobol indices, in ascending order.
 ///
 /// # Errors
-/// [`SobolError`] when the campaign's sequence has no such points.
+/// Returns [`SobolError`] if the campaign's sequence has no point for one of the indices.
 pub fn cases(campaign: &Campaign, indices: Range<u32>) -> Result<Vec<Case>, SobolError> {
     let definition = &campaign.definition;
     let fixed = ParameterSet::new(definition.fixed);
@@ -38,7 +38,7 @@ pub fn cases(campaign: &Campaign, indices: Range<u32>) -> Result<Vec<Case>, Sobo
         .collect())
 }
 
-/// The seed of an irregularity: 63 bits, so that SQL's signed integers hold it.
+/// Seed of an irregularity. It has 63 bits, because integers in SQL are signed.
 fn surface_seed(campaign_seed: u64, number: u32) -> u64 {
     let mut hasher = blake3::Hasher::new_derive_key("tracktwin surface seed 1");
     hasher.update(&campaign_seed.to_le_bytes()).update(&number.to_le_bytes());

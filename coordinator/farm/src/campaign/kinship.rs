@@ -4,19 +4,19 @@ use super::Campaign;
 use serde_json::Value;
 use tracktwin_parameters::{OWEN_POINTS_MAX, Sequence};
 
-/// Number of differences listed; the others are counted.
+/// Maximum number of differences listed; the message only counts the others.
 const LISTED_MAX: usize = 4;
 
 /// Relation of a campaign to one in the library.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kinship {
-    /// Only the sampling sequence differs, because of the number of cases, without a request in the
-    /// file.
+    /// Only the sampling sequence differs. The file does not name a sequence; the number of cases
+    /// determines it.
     OtherSequence {
-        /// What is wrong, and how to continue.
+        /// The problem and its remedy, as text.
         remedy: String,
     },
-    /// It is another campaign.
+    /// The definition differs: it is another campaign.
     Other {
         /// The differences as text: `simulation.time_step_s (1e-5, was 2e-5)`.
         differences: String,
@@ -24,7 +24,7 @@ pub enum Kinship {
 }
 
 impl Campaign {
-    /// Relation to the campaign `id` with this definition in JSON.
+    /// Relation to the stored campaign `id` with the definition `definition_json`.
     pub fn kinship(&self, id: &str, definition_json: &str) -> Kinship {
         let own = serde_json::from_str(&self.definition_json()).unwrap_or(Value::Null);
         let other = serde_json::from_str(definition_json).unwrap_or(Value::Null);
@@ -71,7 +71,7 @@ impl Campaign {
     }
 }
 
-/// The paths of `own` at which `other` has something else, each with both values where they are short.
+/// Collects the paths of `own` at which `other` has a different value; short values are added to the path.
 fn compare(path: &str, own: &Value, other: &Value, paths: &mut Vec<String>) {
     if own == other {
         return;

@@ -1,7 +1,7 @@
 //! A campaign's definition and its cases.
 //!
-//! Owns the campaign file and the way from an index to a case. Pure but for `store`; running cases is the
-//! worker's.
+//! This module contains the campaign file and derives a case from its index. Only `store` uses the library;
+//! the worker simulates the cases.
 
 mod design;
 mod kinship;

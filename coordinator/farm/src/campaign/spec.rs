@@ -1,4 +1,4 @@
-//! The campaign file (TOML) and the checked campaign it becomes.
+//! The campaign file (TOML) and the checked [`Campaign`] that is built from it.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,23 +12,23 @@ use tracktwin_parameters::{
 use tracktwin_signal::FeatureDefinition;
 use tracktwin_track::extension::SampledExtension;
 
-/// Longest name of a campaign.
+/// Maximum length of a campaign's name, in characters.
 const NAME_CHARACTERS_MAX: usize = 64;
 
-/// The campaign that `tracktwin run` simulates where none is named.
+/// The built-in campaign file, which `tracktwin run` uses if no file is given.
 pub const DEFAULT: &str = include_str!("default.toml");
 
-/// A set of cases: where they are sampled and what is done with each.
+/// A set of cases: the sampled parameter space and the simulation of each case.
 ///
-/// Everything but `name` and `cases` decides results and therefore the campaign's identity; so a
-/// campaign may be given more cases later and stays itself.
+/// All settings except `name` and `cases` determine the results, and therefore the identity of the
+/// campaign. The number of cases can be increased later; the campaign keeps its identity.
 #[derive(Clone, Debug, Serialize)]
 pub struct Campaign {
-    /// Its name.
+    /// Name of the campaign.
     pub name: String,
-    /// How many cases it has.
+    /// Number of cases.
     pub cases: u32,
-    /// Whether the sequence of its points follows from that number, for the file names none.
+    /// Whether the sequence was chosen from the number of cases, because the file does not name one.
     #[serde(skip)]
     pub sequence_by_cases: bool,
     /// Settings that determine the results.
@@ -41,28 +41,29 @@ pub struct Campaign {
 pub struct Definition {
     /// Seed of the sample points and of every case's surface.
     pub seed: u64,
-    /// Sequence that the sample points come from.
+    /// Sequence of the sample points.
     pub sequence: Sequence,
     /// The varied parameters and their ranges.
     pub space: ParameterSpace,
-    /// The values of the parameters that don't vary, in catalogue order.
+    /// Values of the parameters, in catalogue order. Only those of parameters that are not varied are used.
     pub fixed: [f64; Parameter::COUNT],
     /// Whether every case has a separate irregularity.
     #[serde(skip_serializing_if = "Surfaces::is_default")]
     pub surfaces: Surfaces,
-    /// What is simulated and measured in each case.
+    /// Simulation of each case, and the features computed from it.
     pub experiment: Experiment,
 }
 
-/// Which irregularity the cases run over.
+/// Choice of the irregularities of the cases.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Surfaces {
-    /// Every case has its own, as every stretch of a real track has.
+    /// Every case has a separate irregularity, as every stretch of a real track has.
     #[default]
     PerCase,
-    /// All cases share one, scaled by the level: models learn that surface by heart and are of no
-    /// use for a recording, but this may be how the paper's library was made.
+    /// All cases have the same irregularity, scaled by the level. Models trained on such a library learn
+    /// this one surface and cannot be used for a recording. The library of the paper may have been made
+    /// this way.
     Shared,
 }
 
@@ -73,95 +74,95 @@ impl Surfaces {
     }
 }
 
-/// Why a campaign file is refused; one line each.
+/// Reasons for refusing a campaign file. Each message is one line.
 #[derive(Debug, thiserror::Error)]
 pub enum SpecError {
     /// The file can't be read.
     #[error("{0}")]
     Unreadable(#[from] tracktwin_files::FilesError),
-    /// Not TOML, an unknown key, or a value of the wrong type.
+    /// The file is not TOML, has an unknown key, or has a value of the wrong type.
     #[error("{path}:{line}: {message}")]
     Malformed {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// Error of the parser.
+        /// Error message of the parser.
         message: String,
     },
-    /// A name that terminals, pages and commands can't take.
+    /// The name is empty, too long, or has a character that is not allowed.
     #[error(
         "{path}: name: {name:?} must start with a letter or digit and have up to \
              {NAME_CHARACTERS_MAX} letters, digits, spaces, and . _ - +"
     )]
     Name {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The name.
+        /// The given name.
         name: String,
     },
-    /// A range is wrong.
+    /// The range of a parameter is invalid.
     #[error("{path}: parameters.{source}")]
     Space {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// What is wrong.
+        /// Cause, with the name of the parameter.
         source: SpaceError,
     },
-    /// The simulation can't be done as described.
+    /// The experiment cannot be simulated with these settings.
     #[error("{path}: {source}")]
     Experiment {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// What is wrong.
+        /// Cause.
         source: ExperimentError,
     },
-    /// The track's description is wrong.
+    /// The track file is invalid.
     #[error("{path}: track: {track}: {source}")]
     Track {
-        /// The campaign file.
+        /// Path of the campaign file.
         path: String,
-        /// The track file.
+        /// Path of the track file.
         track: String,
-        /// What is wrong.
+        /// Cause.
         source: Box<TrackError>,
     },
-    /// Two descriptions of the track.
+    /// The file gives both a preset and a track file.
     #[error("{path}: track: a preset is given too; remove one of the two")]
     TwoTracks {
-        /// The file.
+        /// Path of the file.
         path: String,
     },
-    /// A number can't be what it is given for.
+    /// A number is outside the limits of its key.
     #[error("{path}: {key}: {source}")]
     Number {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The key.
+        /// The key with its section, as in the file.
         key: String,
-        /// Why not.
+        /// Cause.
         source: QuantityError,
     },
-    /// No case at all.
+    /// The number of cases is zero.
     #[error("{path}: cases: a campaign needs at least one case")]
     NoCases {
-        /// The file.
+        /// Path of the file.
         path: String,
     },
-    /// More cases than the sequence has points.
+    /// The number of cases exceeds the number of points of the sequence.
     #[error(
         "{path}: cases: {cases} exceeds the {OWEN_POINTS_MAX} points of the owen_scrambled \
              sequence; write `sequence = \"rotated\"`"
     )]
     SequenceExhausted {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The cases asked for.
+        /// Requested number of cases.
         cases: u32,
     },
 }
 
-/// The campaign file as it is written.
+/// Content of the campaign file before it is checked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -184,7 +185,7 @@ struct File {
     extension: Vec<SampledExtension>,
 }
 
-/// How a parameter is given.
+/// Value or range of a parameter, as written in the file.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged, expecting = "expected a number, [low, high] or { low, high, scale }")]
 enum Range {
@@ -194,7 +195,7 @@ enum Range {
 }
 
 impl Range {
-    /// The numbers that were given.
+    /// All numbers of the range: one or two.
     fn values(self) -> Vec<f64> {
         match self {
             Self::Fixed(value) => vec![value],
@@ -217,25 +218,25 @@ struct Simulation {
 }
 
 impl Campaign {
-    /// Reads a campaign file; `cases`, if given, takes the place of the file's own number.
+    /// Reads a campaign file. If `cases` is given, it replaces the number of cases in the file.
     ///
     /// # Errors
-    /// [`SpecError`] states in one line what is wrong, where, and what to do.
+    /// Returns [`SpecError`]; its message is one line with the position, the cause and the remedy.
     pub fn read(path: &Path, cases: Option<u32>) -> Result<Self, SpecError> {
         let shown = path.display().to_string();
         let text = tracktwin_files::read_text(path)?;
         Self::parse(&text, &shown, cases)
     }
 
-    /// The campaign that is simulated where none is named.
+    /// Returns the built-in campaign. If `cases` is given, it replaces the number of cases.
     ///
     /// # Errors
-    /// As [`Campaign::read`], for a number of cases that can't be.
+    /// Returns [`SpecError`] if the number of cases is invalid.
     pub fn built_in(cases: Option<u32>) -> Result<Self, SpecError> {
         Self::parse(DEFAULT, "built-in campaign", cases)
     }
 
-    /// The same campaign on another track, whose name it takes.
+    /// Returns the built-in campaign for another track, with the name of this track.
     ///
     /// # Errors
     /// As [`Campaign::built_in`].
@@ -246,17 +247,17 @@ impl Campaign {
         file.check(PATH, cases, track)
     }
 
-    /// Reads a campaign from text, which errors call `path`.
+    /// Parses a campaign from text. Error messages use `path` as the name of the file.
     ///
     /// # Errors
-    /// As [`Campaign::read`], the file's own apart.
+    /// As [`Campaign::read`], except for errors of reading the file.
     pub fn parse(text: &str, path: &str, cases: Option<u32>) -> Result<Self, SpecError> {
         let file = File::parse(text, path)?;
         let track = file.track(path)?;
         file.check(path, cases, &track)
     }
 
-    /// The name in the library: the given name and the hash of the definition.
+    /// Id in the library: the name and the beginning of the definition's hash.
     pub fn id(&self) -> String {
         format!("{}-{}", self.name, &self.definition_hash()[..12])
     }
@@ -280,7 +281,8 @@ impl File {
         })
     }
 
-    /// The track of the preset or of the file, whose path is relative to the campaign file's folder.
+    /// Returns the preset or reads the track file. The path of a track file is relative to the folder of
+    /// the campaign file.
     fn track(&self, path: &str) -> Result<Track, SpecError> {
         let Some(file) = &self.track else {
             return Ok(self.preset.unwrap_or_default().track());
@@ -324,7 +326,7 @@ impl File {
         Ok(Campaign { name: self.name, cases, sequence_by_cases, definition })
     }
 
-    /// The sampled space, and the values of what isn't sampled.
+    /// Returns the sampled parameter space and the values of the parameters that are not sampled.
     fn sampled(
         &self,
         path: &str,

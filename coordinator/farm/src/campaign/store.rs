@@ -1,36 +1,36 @@
-//! Campaigns and their cases on their way into a library.
+//! Stores campaigns and their cases in a library.
 
 use super::{Campaign, cases};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 use tracktwin_parameters::SobolError;
 
-/// Cases stored at a time, so that a million need no more memory than these.
+/// Number of cases stored in one call. It bounds the memory needed for a campaign with a million cases.
 const CASES_AT_A_TIME: u32 = 4096;
 
-/// Why a campaign can't be stored.
+/// Reasons for not storing a campaign.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The library fails or refuses.
+    /// The library returned an error.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// The campaign has no such cases.
+    /// The campaign's sequence has fewer points than the campaign has cases.
     #[error(transparent)]
     Cases(#[from] SobolError),
 }
 
-/// Stores a campaign and those of its cases that the library does not have yet.
+/// Stores a campaign and those of its cases that the library lacks.
 ///
 /// # Errors
-/// [`StoreError`] when the library fails or the campaign has fewer cases.
+/// Returns [`StoreError`] if the library fails or the sequence has too few points.
 pub async fn store_campaign(library: &Library, campaign: &Campaign) -> Result<(), StoreError> {
     insert_campaign(library, campaign).await?;
     add_cases(library, campaign, |_| true).await
 }
 
-/// Stores a campaign, without cases if it is new.
+/// Stores a campaign without adding cases.
 ///
 /// # Errors
-/// [`StoreError`] when the library fails.
+/// Returns [`StoreError`] if the library fails.
 pub async fn insert_campaign(library: &Library, campaign: &Campaign) -> Result<(), StoreError> {
     let definition = &campaign.definition;
     let record = CampaignRecord {
@@ -46,11 +46,11 @@ pub async fn insert_campaign(library: &Library, campaign: &Campaign) -> Result<(
     Ok(library.insert_campaign(&record).await?)
 }
 
-/// Stores the missing cases of a campaign while `goes_on` returns true; its argument is the number
-/// of stored cases.
+/// Stores the missing cases of a campaign while `goes_on` returns true. The argument of `goes_on` is the
+/// number of stored cases.
 ///
 /// # Errors
-/// As [`store_campaign`]; what was stored before stays.
+/// As [`store_campaign`]. Cases stored before the error are kept.
 pub async fn add_cases(
     library: &Library,
     campaign: &Campaign,

@@ -1,4 +1,4 @@
-//! A coordinator's life: it claims the library, serves workers, watches, and ends.
+//! Life cycle of a coordinator: it claims the library, serves workers, monitors the campaigns, and ends.
 
 mod watch;
 
@@ -14,45 +14,45 @@ use watch::watch;
 
 /// Configuration of a coordinator.
 pub struct Coordinator {
-    /// The library it serves.
+    /// The library to serve.
     pub library: Library,
-    /// The right to do so.
+    /// The claim on this library.
     pub claim: Claim,
-    /// The port for workers.
+    /// The listening port for workers.
     pub listener: TcpListener,
-    /// The port for people, if any.
+    /// The listening port for the dashboard, if there is one.
     pub dashboard: Option<TcpListener>,
-    /// Certificates and token.
+    /// Certificates and token of both ports.
     pub security: Security,
-    /// How it hands out cases.
+    /// Settings of the dispatch of cases.
     pub settings: Settings,
-    /// Whether it ends when every running campaign is done.
+    /// Whether the coordinator ends when every running campaign is done.
     pub exit_when_done: bool,
 }
 
 /// Errors that stop a coordinator.
 #[derive(Debug, thiserror::Error)]
 pub enum CoordinatorError {
-    /// The library fails or refuses.
+    /// The library returned an error.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// The service fails.
+    /// The gRPC service failed.
     #[error(transparent)]
     Serve(#[from] ServeError),
-    /// A port would be open to anybody.
+    /// A port would be reachable from other machines without protection.
     #[error(transparent)]
     Security(#[from] SecurityError),
-    /// A port has no address.
+    /// The address of a listening port cannot be determined.
     #[error("a listening port failed")]
     Port(#[from] std::io::Error),
 }
 
 impl Coordinator {
-    /// Serves until it is stopped, or until everything is done if requested. Leases stay with their
-    /// workers: the next coordinator of the library continues from here.
+    /// Serves until `stop` is cancelled or, with `exit_when_done`, until every running campaign is done.
+    /// Leases stay valid: the next coordinator of the library continues with them.
     ///
     /// # Errors
-    /// [`CoordinatorError`].
+    /// Returns [`CoordinatorError`] if the library, the service or a port fails.
     pub async fn run(self, stop: CancellationToken) -> Result<(), CoordinatorError> {
         let address = self.listener.local_addr()?;
         raise_descriptors();
@@ -81,8 +81,8 @@ impl Coordinator {
     }
 }
 
-/// Lets this process have as many descriptors as it may: each connection takes one, and the usual bound is
-/// 1024.
+/// Raises the limit of open file descriptors to its maximum. Each connection needs one descriptor, and the
+/// usual limit is 1024.
 fn raise_descriptors() {
     let Rlimit { maximum, .. } = getrlimit(Resource::Nofile);
     if let Err(error) = setrlimit(Resource::Nofile, Rlimit { current: maximum, maximum }) {

@@ -1,4 +1,4 @@
-//! Log of a coordinator's campaigns, and the end when all are done.
+//! Monitors the campaigns of a coordinator: log messages, and the end when all campaigns are done.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -7,20 +7,20 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tracktwin_library::{CampaignOverview, CampaignState, Library, LibraryError};
 
-/// Interval of checking the campaigns.
+/// Interval of reading the state of the campaigns.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// Interval of the progress lines in the log.
+/// Minimum interval of progress messages in the log.
 const TELL_EVERY: Duration = Duration::from_mins(1);
 
-/// A worker with a message in this time, in ms, is present.
+/// A worker whose last message is at most this old, in ms, is present.
 const PRESENT_MS: i64 = 60_000;
 
-/// Checks the campaigns until it is stopped, or until nothing is left to do.
+/// Monitors the campaigns until `stop` is cancelled or nothing is left to do.
 ///
 /// # Errors
-/// [`LibraryError::Closed`] or [`LibraryError::Lost`] when nothing can be written any more; a
-/// restart is required.
+/// Returns [`LibraryError::Closed`] or [`LibraryError::Lost`] if the library can no longer be written. The
+/// program must be restarted.
 pub(super) async fn watch(
     library: Library,
     exit_when_done: bool,
@@ -55,10 +55,10 @@ pub(super) async fn watch(
     Ok(())
 }
 
-/// What was logged last, to avoid repetition.
+/// State at the last log message, to avoid repeated messages.
 #[derive(Default)]
 struct Logged {
-    /// Of each campaign: cases given up, and whether it is done.
+    /// For each campaign: number of cases given up, and whether the campaign is done.
     campaigns: HashMap<String, (u32, bool)>,
     remaining: Option<(u64, Instant)>,
 }
@@ -93,13 +93,13 @@ impl Logged {
 /// Remaining work.
 #[derive(Default)]
 struct Remaining {
-    /// In campaigns that run.
+    /// Open cases of running campaigns.
     cases: u64,
-    /// In paused ones.
+    /// Open cases of paused campaigns.
     paused: u64,
     /// Open audits.
     audits: u64,
-    /// Those of them that a worker who is there could do.
+    /// Open audits that a present worker could do.
     audits_to_do: u64,
 }
 

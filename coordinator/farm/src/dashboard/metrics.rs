@@ -1,4 +1,4 @@
-//! The farm in numbers, for Prometheus.
+//! State of the farm as Prometheus metrics.
 
 use super::status::Farm;
 use crate::dispatch::Counts;
@@ -9,7 +9,7 @@ use prometheus_client::registry::Registry;
 
 type Labels = Vec<(&'static str, String)>;
 
-/// The farm's gauges and this coordinator's counts, in Prometheus' text format.
+/// Returns the gauges of the farm and the counts of this coordinator, in the text format of Prometheus.
 pub(crate) fn text(farm: &Farm, counts: &Counts) -> String {
     let mut registry = Registry::with_prefix("tracktwin");
     counts.register(&mut registry);

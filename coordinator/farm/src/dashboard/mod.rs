@@ -1,7 +1,7 @@
 //! Pages and Prometheus metrics of a farm over HTTP.
 //!
-//! Owns routes, the token of those who may press buttons, the way from the library to what is shown,
-//! and how it looks.
+//! This module contains the routes, the check of the token for the controls, the queries of the library,
+//! and the layout of the pages.
 
 mod metrics;
 mod page;

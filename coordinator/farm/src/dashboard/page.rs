@@ -1,4 +1,4 @@
-//! How far a farm is: campaigns, workers, newest results, and the space covered so far.
+//! The page of a farm: campaigns, workers, newest results, and the covered part of the parameter space.
 
 use super::status::{Farm, FarmCampaign, FarmWorker};
 use maud::{Markup, PreEscaped, html};
@@ -9,13 +9,13 @@ const SPECTRUM: [f64; 2] = [520.0, 300.0];
 const SCATTER: [f64; 2] = [290.0, 300.0];
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
-/// Pairs of parameters whose plane is shown.
+/// Pairs of parameters; the page has one chart for each pair.
 const PLANES: [[Parameter; 2]; 2] = [
     [Parameter::RailpadStiffness, Parameter::BallastStiffness],
     [Parameter::RailpadDamping, Parameter::BallastDamping],
 ];
 
-/// Style of this page.
+/// CSS of this page.
 const STYLE: &str = "
 .progress{display:flex;height:1rem;background:var(--faint);max-width:60rem;margin:.4rem 0}.progress i{display:block}
 .progress .finished{background:var(--c)}.progress .leased{background:var(--f)}.progress .failed{background:var(--b)}
@@ -39,7 +39,7 @@ pub(super) fn farm_page(farm: &Farm) -> String {
     page_with("The farm", &summary(farm), &head, &farm_view(farm), &end)
 }
 
-/// The middle of the page, which changes.
+/// The main part of the page, which is updated.
 pub(super) fn farm_view(farm: &Farm) -> Markup {
     html! {
         p.note { "library " code { (farm.library) } ", " (farm.at) }
@@ -65,10 +65,10 @@ fn summary(farm: &Farm) -> String {
     )
 }
 
-/// Finished cases up to which each is drawn boldly.
+/// With fewer finished cases than this, each is drawn with a larger symbol.
 const FEW: usize = 300;
 
-/// Below the pictures of a campaign.
+/// Caption of the charts of a campaign.
 const CAPTION: &str = "Local wavelet power spectra of the newest cases, by case index, at the highest \
      speed; finished cases in the parameter space; given-up cases in orange.";
 

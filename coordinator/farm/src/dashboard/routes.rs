@@ -1,4 +1,4 @@
-//! Addresses, and who may do what at them.
+//! HTTP routes of the dashboard, and the rights that each of them requires.
 
 use super::metrics;
 use super::page::{farm_page, farm_view};
@@ -19,10 +19,10 @@ use tokio_util::sync::CancellationToken;
 use tracktwin_library::{Library, LibraryError, Retry};
 use tracktwin_worker::BoundedListener;
 
-/// The cookie of those who have shown the token.
+/// Name of the cookie of a user who has given the token.
 const COOKIE: &str = "tracktwin";
 
-/// Nothing is loaded from other sites, and the page cannot be framed.
+/// Content security policy: no content from other sites, and no framing.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
                       connect-src 'self'; form-action 'self'; frame-ancestors 'none'";
 
@@ -34,17 +34,17 @@ struct Inner {
     library: Library,
     counts: Counts,
     guard: Guard,
-    /// Value of the cookie: a hash of the token, so that the token itself is not stored.
+    /// Value of the cookie: a hash of the token. The token itself is not kept.
     key: Option<String>,
     /// Whether every caller may use the controls.
     open: bool,
-    /// Whether only this machine can reach the port.
+    /// Whether the port is reachable from this machine only.
     loopback: bool,
 }
 
 impl Dashboard {
-    /// Pages of a library. The controls require the token; if only worker certificates are required
-    /// and there is no token, the controls are disabled.
+    /// Creates the pages of a library. The controls require the token. If workers need certificates and
+    /// there is no token, the controls are disabled.
     pub fn new(library: Library, counts: Counts, security: &Security, address: SocketAddr) -> Self {
         let token = security.token.as_deref();
         let open = token.is_none() && security.client_ca_pem.is_none();
@@ -55,9 +55,9 @@ impl Dashboard {
         Self(Arc::new(Inner { library, counts, guard, key, open, loopback }))
     }
 
-    /// Whether the caller may press buttons: by the cookie, or by the token itself.
+    /// Whether the caller may use the controls: the request has the cookie or the token itself.
     ///
-    /// Without a token or certificates the port is local, or the network is trusted.
+    /// Without token and certificates, the port is local or the network is trusted; then every caller may.
     fn admits(&self, headers: &HeaderMap) -> bool {
         let Some(key) = &self.0.key else { return self.0.open };
         let authorization = headers.get(header::AUTHORIZATION).map(HeaderValue::as_bytes);
@@ -70,7 +70,7 @@ impl Dashboard {
     }
 }
 
-/// Serves pages on a port until it is stopped.
+/// Serves the pages on a port until `stop` is cancelled.
 pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: CancellationToken) {
     let routes = Router::new()
         .route("/", get(page))
@@ -88,7 +88,7 @@ pub async fn serve(listener: TcpListener, dashboard: Dashboard, stop: Cancellati
     }
 }
 
-/// Turns away what another site's page sends, and marks who may press buttons.
+/// Refuses requests from pages of other sites, and records whether the caller may use the controls.
 async fn same_origin(
     State(dashboard): State<Dashboard>,
     mut request: Request,
@@ -121,7 +121,7 @@ async fn same_origin(
     response
 }
 
-/// Whether the caller may press buttons.
+/// Whether the caller may use the controls.
 #[derive(Clone, Copy)]
 struct MayControl(bool);
 
@@ -190,13 +190,13 @@ async fn numbers(State(dashboard): State<Dashboard>) -> Result<String, Failed> {
     Ok(metrics::text(&farm, &dashboard.0.counts))
 }
 
-/// Well is a coordinator whose library answers.
+/// Health check: succeeds if the library responds.
 async fn healthz(State(dashboard): State<Dashboard>) -> Result<&'static str, Failed> {
     dashboard.0.library.overview().await?;
     Ok("serving\n")
 }
 
-/// The library does not answer.
+/// The library does not respond.
 struct Failed(LibraryError);
 
 impl From<LibraryError> for Failed {

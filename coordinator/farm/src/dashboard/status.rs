@@ -1,80 +1,80 @@
-//! A farm at one moment: campaigns, workers, newest results, and the space covered so far.
+//! State of a farm at one moment: campaigns, workers, newest results, and covered parameter space.
 
 use tracktwin_parameters::ParameterSet;
 
-/// Everything that is shown of a farm, at one moment.
+/// State of a farm at one moment, as shown on its page.
 #[derive(Clone, Debug, Default)]
 pub struct Farm {
     /// Name of the library.
     pub library: String,
-    /// When, for people.
+    /// Time of this state, in UTC, as text.
     pub at: String,
-    /// The campaigns, in the order they are worked on.
+    /// The campaigns, in the order of leasing.
     pub campaigns: Vec<FarmCampaign>,
-    /// The workers, by time of their last message.
+    /// The workers, the one with the newest message first.
     pub workers: Vec<FarmWorker>,
-    /// Whether the reader may press buttons.
+    /// Whether the reader may use the controls.
     pub may_control: bool,
 }
 
 /// State of a campaign.
 #[derive(Clone, Debug, Default)]
 pub struct FarmCampaign {
-    /// Its id.
+    /// Id of the campaign.
     pub id: String,
     /// `running`, `paused` or `cancelled`.
     pub state: String,
-    /// Cases of the highest priority are leased first.
+    /// Priority: cases of the campaign with the highest priority are leased first.
     pub priority: i64,
-    /// Waiting cases.
+    /// Number of waiting cases.
     pub waiting: u32,
-    /// Cases that workers hold.
+    /// Number of leased cases.
     pub leased: u32,
-    /// Cases with results.
+    /// Number of cases with results.
     pub finished: u32,
-    /// Cases that were given up.
+    /// Number of cases that were given up.
     pub failed: u32,
-    /// Cases finished a second, lately.
+    /// Cases finished per second, averaged over about the last minute.
     pub per_second: f64,
-    /// Why cases were given up, and how many so.
+    /// Reasons for giving up cases, each with the number of cases.
     pub causes: Vec<(String, u32)>,
-    /// Cases whose wheel lost contact with the rail.
+    /// Number of cases with loss of contact between wheel and rail.
     pub contact_lost: u32,
-    /// The largest share of a pass's time without contact, 0 to 1.
+    /// Largest contact-loss share of a pass, 0 to 1.
     pub contact_loss_share_max: f64,
-    /// Frequencies of the spectra in Hz.
+    /// Frequencies of the spectra in `newest`, in Hz.
     pub frequencies_hz: Vec<f64>,
-    /// ln LWPS of the newest cases at the fastest speed, with what each is called.
+    /// Newest cases: label, and ln LWPS at the highest speed, by frequency.
     pub newest: Vec<(String, Vec<f64>)>,
-    /// Finished cases, or an even share of them where there are many.
+    /// Parameters of finished cases; of many cases, an even selection.
     pub covered: Vec<ParameterSet>,
-    /// Cases that were given up.
+    /// Parameters of cases that were given up.
     pub given_up: Vec<ParameterSet>,
 }
 
 /// A worker at its last message.
 #[derive(Clone, Debug, Default)]
 pub struct FarmWorker {
-    /// Its name.
+    /// Name of the worker.
     pub id: String,
-    /// Version of its program.
+    /// Version of the worker's program.
     pub code_version: String,
-    /// Groups of cases it simulates at a time.
+    /// Number of groups of cases that the worker simulates in parallel.
     pub cores: u32,
-    /// Results it has brought.
+    /// Number of results reported first by this worker.
     pub finished: u64,
-    /// Failures it has reported.
+    /// Number of failures reported by this worker.
     pub failed: u64,
     /// Mean computing time of a case in s.
     pub case_s: Option<f64>,
-    /// Time since its last message in s.
+    /// Time since the last message, in s.
     pub silent_s: f64,
-    /// Why it gets no cases, if so.
+    /// Reason of the quarantine, or the number of failures in a row, as text; `None` if neither applies.
     pub aside: Option<String>,
 }
 
 impl FarmWorker {
-    /// Whether its last message is less than a minute old. Idle and suspended workers ask less
+    /// Whether the last message is less than a minute old. Idle and suspended workers send requests less
     /// often than leases are renewed.
     pub fn is_present(&self) -> bool {
         self.silent_s < 60.0
@@ -82,33 +82,34 @@ impl FarmWorker {
 }
 
 impl FarmCampaign {
-    /// All cases.
+    /// Number of cases.
     pub const fn cases(&self) -> u32 {
         self.waiting + self.leased + self.finished + self.failed
     }
 
-    /// Whether every case has its results or was given up.
+    /// Whether every case is finished or given up.
     pub const fn is_done(&self) -> bool {
         self.waiting + self.leased == 0
     }
 
-    /// Text of its state, or that it is done.
+    /// The state as text; `done` if every case is done.
     pub fn state_text(&self) -> &str {
         if self.is_done() { "done" } else { &self.state }
     }
 
-    /// Whether it is running and has cases left.
+    /// Whether the campaign is running and has open cases.
     pub fn is_at_work(&self) -> bool {
         self.state == "running" && !self.is_done()
     }
 
-    /// How long the rest takes at the present rate, in s; none where no cases are leased.
+    /// Estimated remaining time at the present rate, in s; `None` if no cases are leased or the rate is
+    /// zero.
     pub fn eta_s(&self) -> Option<f64> {
         let left = f64::from(self.waiting + self.leased);
         (self.is_at_work() && self.per_second > 0.0).then(|| left / self.per_second)
     }
 
-    /// Text on the remaining time.
+    /// The remaining time as text.
     pub fn left(&self) -> String {
         match self.eta_s() {
             Some(eta_s) => format!("{} left", duration(eta_s)),
@@ -122,7 +123,7 @@ impl FarmCampaign {
     }
 }
 
-/// A time as people say it: the two largest units that matter.
+/// Formats a time in s with its two largest units.
 pub fn duration(seconds: f64) -> String {
     let whole = seconds.max(0.0).round() as u64;
     let (days, hours, minutes) = (whole / 86_400, whole / 3600 % 24, whole / 60 % 60);

@@ -1,4 +1,4 @@
-//! From the library to what is shown of it.
+//! Reads the state of a farm from its library.
 
 use super::status::{Farm, FarmCampaign, FarmWorker};
 use time::OffsetDateTime;
@@ -8,16 +8,16 @@ use tracktwin_library::{CampaignOverview, ContactLoss, Library, LibraryError, Wo
 /// Newest cases whose spectra are shown.
 const NEWEST: u32 = 5;
 
-/// Cases shown in the parameter space: enough to see how evenly it is covered.
+/// Maximum number of finished cases shown in the parameter space; enough to judge its coverage.
 const COVERED: u32 = 2000;
 
-/// Given-up cases shown in it.
+/// Maximum number of given-up cases shown in the parameter space.
 const GIVEN_UP: u32 = 200;
 
-/// Workers silent for longer are history, in ms.
+/// A worker without a message for this time, in ms, is not shown.
 const HISTORY_MS: i64 = 3_600_000;
 
-/// How much is asked of the library.
+/// Amount of data to read from the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
     /// Counts, rates and workers.
@@ -26,10 +26,11 @@ pub enum Detail {
     Pictures,
 }
 
-/// The farm as its library knows it, which is all there is to know: coordinators share it.
+/// Reads the state of a farm from its library. The library contains the complete state, because several
+/// coordinators can share it.
 ///
 /// # Errors
-/// [`LibraryError`] when the library can't be read.
+/// Returns [`LibraryError`] if the library cannot be read.
 pub async fn farm(library: &Library, detail: Detail) -> Result<Farm, LibraryError> {
     let now_unix_ms = library.now_unix_ms();
     let mut overview = library.overview().await?;

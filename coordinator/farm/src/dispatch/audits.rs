@@ -1,7 +1,7 @@
-//! Has a share of the finished cases simulated again by another worker, and compares.
+//! Audits: a second worker simulates a share of the finished cases again, and the results are compared.
 //!
-//! An auditor does not know that it is one. Where two workers differ, this machine simulates the
-//! case itself and finds out which of them is wrong.
+//! The worker cannot distinguish an audit from an ordinary case. If two results differ, the coordinator
+//! simulates the case itself and determines which worker is wrong.
 
 use super::campaigns::{Campaigns, Served};
 use super::settings::Settings;
@@ -16,15 +16,15 @@ use tracktwin_library::{Audit, AuditFinding, Library, LibraryError};
 use tracktwin_protocol::{CaseLease, CaseReport, LeasedCase};
 use tracktwin_signal::Features;
 
-/// The lease number of audited cases: the library counts real ones from 1.
+/// The epoch of audited cases. The epochs of ordinary leases start at 1.
 const EPOCH: u32 = 0;
 
-/// Kind of a lease, from its number.
+/// Kind of a lease, determined by its epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LeaseKind {
-    /// A case that waited.
+    /// A case that was waiting.
     Case,
-    /// A finished case that is simulated again.
+    /// A finished case that is simulated again for an audit.
     Audit,
 }
 
@@ -34,22 +34,22 @@ impl LeaseKind {
     }
 }
 
-/// Largest difference of a one-third-octave level between two workers, in dB.
+/// Maximum difference of a one-third-octave level between two correct workers, in dB.
 ///
-/// Sound machines differ by rounding only, where their vector units order sums differently: far
-/// below a hundredth. What the surface's chance leaves uncertain in a level is a third of a dB.
+/// Correct machines differ only by rounding, if their vector units add in a different order. This
+/// difference is far below 0.01 dB. The random surface causes an uncertainty of about 0.3 dB in a level.
 const TOLERANCE_DB: f64 = 0.05;
 
-/// Cases of one audit lease: one group.
+/// Number of cases of an audit lease: one group.
 const CASES: u32 = tracktwin_worker::agent::GROUP as u32;
 
-/// How long an auditor may take, for its leases are not renewed.
+/// Duration of an audit lease. Audit leases are not renewed.
 const LEASE: Duration = Duration::from_mins(10);
 
-/// Pause after there was nothing to audit.
+/// Minimum pause before the next search, after a search found no case to audit.
 const PAUSE: Duration = Duration::from_secs(2);
 
-/// Audits under way.
+/// The audits that are leased at present.
 pub(crate) struct Audits {
     library: Library,
     share: f64,
@@ -70,7 +70,7 @@ impl Audits {
         }
     }
 
-    /// So many cases for a worker to audit at most, if there are any.
+    /// Leases at most `cases_max` cases to a worker for an audit; `None` if there are no such cases.
     pub(crate) async fn lease(
         &self,
         worker: &str,
@@ -101,7 +101,7 @@ impl Audits {
         Ok(None)
     }
 
-    /// Takes back what an auditor will not do.
+    /// Releases audits that their worker will not do.
     pub(crate) async fn release(
         &self,
         worker: &str,
@@ -119,7 +119,7 @@ impl Audits {
         self.under_way.lock().insert(key, (worker, audit));
     }
 
-    /// Removes and returns the audit leased to this worker; another's is kept.
+    /// Removes and returns an audit if it is leased to this worker. The audit of another worker is kept.
     fn take(&self, worker: &str, campaign: &str, index: u32) -> Option<Audit> {
         let mut under_way = self.under_way.lock();
         match under_way.entry((campaign.to_owned(), index)) {
@@ -128,7 +128,7 @@ impl Audits {
         }
     }
 
-    /// Whether there may be something to audit; the next to ask waits for a while.
+    /// Whether a search for audits is due. If it is, the next search is due after [`PAUSE`].
     fn is_time(&self) -> bool {
         let now = Instant::now();
         let mut next = self.next.lock();
@@ -139,10 +139,10 @@ impl Audits {
         is_time
     }
 
-    /// Takes an auditor's result. Returns whether it was expected, and the worker that was wrong,
-    /// if any.
+    /// Compares the result of an auditing worker with the stored result, and returns the outcome; `None` if
+    /// this worker had no such audit.
     ///
-    /// It is completed even if the caller is gone.
+    /// The comparison is completed even if the caller is dropped.
     pub(crate) async fn report(
         self: &Arc<Self>,
         worker: &str,
@@ -204,7 +204,7 @@ impl Audits {
         Ok(Some(AuditOutcome::Wrong { worker: wrong.to_owned(), reason }))
     }
 
-    /// This machine's own result of a case, if it can simulate it.
+    /// Simulates the case in this process; `None` if this fails.
     async fn judge(&self, served: Arc<Served>, case: Case) -> Option<Outcome> {
         let prepare = self.prepare;
         let simulate = move || {
@@ -217,20 +217,20 @@ impl Audits {
 
 /// Outcome of an audit.
 pub(crate) enum AuditOutcome {
-    /// Both agree, or it is known already.
+    /// Both results agree, or the audit was completed before.
     Agreement,
-    /// They differ, and it is unknown which worker is wrong.
+    /// The results differ, and the coordinator could not determine which worker is wrong.
     Unjudged,
-    /// A worker is wrong, and was put into quarantine.
+    /// A worker was wrong and is now in quarantine.
     Wrong {
-        /// Which.
+        /// Name of the worker.
         worker: String,
         /// Reason of the quarantine.
         reason: String,
     },
 }
 
-/// Largest difference of a level between what is stored and what was found, in dB.
+/// Largest difference of a one-third-octave level between the stored and the new result, in dB.
 fn difference(stored: &[Features], found: &Outcome) -> f64 {
     let Outcome::Finished(passes) = found else { return f64::INFINITY };
     if passes.len() != stored.len() {

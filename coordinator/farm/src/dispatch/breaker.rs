@@ -1,4 +1,4 @@
-//! Puts a worker aside that fails and fails: its machine may be at fault.
+//! Circuit breaker: it suspends a worker whose cases fail repeatedly, because its machine may be faulty.
 
 use std::time::Duration;
 use tokio::time::Instant;
@@ -9,7 +9,7 @@ const FAILURES_IN_A_ROW: u32 = 8;
 /// Length of the first suspension; each further one is twice as long.
 const FIRST: Duration = Duration::from_secs(15);
 
-/// The longest suspension: a repaired machine works again within this time.
+/// The longest suspension. A repaired machine gets cases again after at most this time.
 const LONGEST: Duration = Duration::from_mins(10);
 
 /// The circuit breaker of one worker.
@@ -21,7 +21,7 @@ pub struct Breaker {
 }
 
 impl Breaker {
-    /// Takes how the worker's cases ended, in order.
+    /// Records the outcomes of the worker's cases, in order; true is a failure.
     pub fn reported(&mut self, failed: impl IntoIterator<Item = bool>) {
         for failed in failed {
             if failed {
@@ -32,14 +32,14 @@ impl Breaker {
         }
     }
 
-    /// Whether it has failed too often in a row.
+    /// Whether the worker should be suspended: too many failures in a row, or one after a suspension.
     pub const fn is_failing(&self) -> bool {
         // After a suspension one further failure suffices.
         self.failures_in_a_row >= FAILURES_IN_A_ROW
             || (self.openings > 0 && self.failures_in_a_row > 0)
     }
 
-    /// Puts it aside; a trial follows.
+    /// Suspends the worker from `now`; after the suspension the worker gets one case as a trial.
     pub fn open(&mut self, now: Instant) {
         let wait = FIRST.saturating_mul(2_u32.saturating_pow(self.openings)).min(LONGEST);
         self.openings = self.openings.saturating_add(1);
@@ -47,13 +47,13 @@ impl Breaker {
         self.open_until = Some(now + wait);
     }
 
-    /// For how long it still gets no cases.
+    /// Remaining time of the suspension; `None` if the worker is not suspended.
     pub fn open_for(&self, now: Instant) -> Option<Duration> {
         let left = self.open_until?.saturating_duration_since(now);
         (!left.is_zero()).then_some(left)
     }
 
-    /// Whether it was suspended and has not finished a case since.
+    /// Whether the worker was suspended and has not finished a case since.
     pub const fn is_on_trial(&self) -> bool {
         self.openings > 0
     }

@@ -1,4 +1,4 @@
-//! The campaigns being leased, prepared for messages.
+//! The campaigns that are leased, prepared for building messages.
 
 use super::LeaseSizer;
 use parking_lot::Mutex;
@@ -8,23 +8,23 @@ use tracktwin_experiment::{Experiment, ExperimentError};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 use tracktwin_protocol::Shape;
 
-/// Why a campaign can't be dispatched.
+/// Reasons for not dispatching a campaign.
 #[derive(Debug, thiserror::Error)]
 pub enum DispatchError {
-    /// The library can't be read.
+    /// The library returned an error.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// Its experiment can't be done by this version.
+    /// This version cannot simulate the campaign's experiment.
     #[error("campaign {campaign}: {source}")]
     Experiment {
-        /// The campaign.
+        /// Id of the campaign.
         campaign: String,
-        /// Why not.
+        /// Cause.
         source: ExperimentError,
     },
 }
 
-/// A campaign, and what its messages must look like.
+/// A campaign with the values that its messages need.
 pub(crate) struct Served {
     pub(crate) record: CampaignRecord,
     pub(crate) experiment: Experiment,
@@ -43,19 +43,19 @@ impl Served {
         Ok(Self { record, experiment, shape, lease_sizer: Mutex::default() })
     }
 
-    /// Takes measured computing times of cases, in s.
+    /// Adds measured computing times of cases, in s, to the running mean.
     pub(crate) fn measured(&self, durations_s: impl IntoIterator<Item = f64>) {
         let mut lease_sizer = self.lease_sizer.lock();
         durations_s.into_iter().for_each(|case_s| lease_sizer.measured(case_s));
     }
 
-    /// Cases of a lease for this number of working cores.
+    /// Number of cases in a lease if this number of cores works.
     fn cases_per_lease(&self, cores: u32) -> u32 {
         self.lease_sizer.lock().cases_per_lease(cores)
     }
 }
 
-/// The campaigns of a library, read when they are first needed: they never change.
+/// Cache of the library's campaigns. A campaign is read once, because its definition never changes.
 pub(crate) struct Campaigns {
     library: Library,
     known: Mutex<HashMap<String, Arc<Served>>>,
@@ -67,7 +67,7 @@ impl Campaigns {
         Self { library, known: Mutex::default(), latest: Mutex::default() }
     }
 
-    /// A campaign of the library.
+    /// Returns a campaign of the library, from the cache if possible.
     pub(crate) async fn of(&self, id: &str) -> Result<Arc<Served>, DispatchError> {
         let known = self.known.lock().get(id).cloned();
         if let Some(served) = known {
@@ -78,12 +78,12 @@ impl Campaigns {
         Ok(known.entry(id.to_owned()).or_insert(served).clone())
     }
 
-    /// Caches the campaign leased last: the next lease is most likely of the same one.
+    /// Records the campaign leased last: the next lease is probably of the same campaign.
     pub(crate) fn leased(&self, served: &Arc<Served>) {
         *self.latest.lock() = Some(served.clone());
     }
 
-    /// Cases of the next lease, as far as one can know before.
+    /// Probable number of cases of the next lease, from the campaign leased last.
     pub(crate) fn cases_per_lease(&self, cores: u32) -> u32 {
         let latest = self.latest.lock();
         let unknown = || LeaseSizer::default().cases_per_lease(cores);

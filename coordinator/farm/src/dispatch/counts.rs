@@ -4,7 +4,7 @@ use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::histogram::{Histogram, exponential_buckets};
 use prometheus_client::registry::Registry;
 
-/// Counts of a coordinator since its start.
+/// Event counts and times of a coordinator since its start.
 #[derive(Clone, Debug)]
 pub struct Counts {
     pub(crate) leased: Counter,
@@ -45,7 +45,7 @@ impl Default for Counts {
 }
 
 impl Counts {
-    /// Makes the counts known to those who ask.
+    /// Registers the counts with a Prometheus registry.
     pub fn register(&self, to: &mut Registry) {
         to.register("cases_leased", "Cases leased to workers", self.leased.clone());
         to.register("reports_stored", "Reports of cases stored", self.stored.clone());

@@ -1,41 +1,41 @@
-//! How many cases a lease has: one or two seconds of work.
+//! Number of cases in a lease: enough for one or two seconds of computing.
 
 use tracktwin_worker::agent::GROUP;
 
-/// Computing time that a lease holds at least, in s.
+/// Minimum computing time of a lease, in s.
 ///
-/// Long against the milliseconds that a lease and a report cost, short against what anybody would
-/// mind losing with a worker.
+/// It is long compared with the milliseconds that a lease and a report cost. It is short enough that the
+/// loss of one lease with its worker does not matter.
 const LEASE_WORK_S: f64 = 1.5;
 
-/// Leases a second that all cores together are to need: beyond this leases become longer.
+/// Target for the number of leases per second of all cores together. With more cores, leases become longer.
 ///
-/// A lease costs the library about a millisecond, so they take a tenth of its time.
+/// A lease costs the library about 1 ms; this rate uses a tenth of the library's time.
 const LEASES_A_SECOND: f64 = 100.0;
 
-/// Computing time that a lease holds at most, in s: what the last cores may be waited for.
+/// Maximum computing time of a lease, in s. It bounds the wait for the last cores at the end of a campaign.
 const LEASE_WORK_MAX_S: f64 = 30.0;
 
-/// Upper limit of groups in a lease, which bounds the loss with a worker.
+/// Maximum number of groups in a lease. It bounds the number of cases lost with a worker.
 const GROUPS_MAX: f64 = 64.0;
 
 /// Weight of the newest measurement in the running mean.
 const NEWEST: f64 = 0.1;
 
-/// Running mean of a case's computing time, and the size of leases that follows from it.
+/// Running mean of the computing time of a case; it determines the size of leases.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LeaseSizer {
     case_s: Option<f64>,
 }
 
 impl LeaseSizer {
-    /// Takes a measured computing time of a case, in s.
+    /// Adds a measured computing time of one case, in s, to the running mean.
     pub fn measured(&mut self, case_s: f64) {
         let mean = self.case_s.unwrap_or(case_s);
         self.case_s = Some(mean + NEWEST * (case_s - mean));
     }
 
-    /// Cases of a lease for this number of working cores: whole groups, at least one.
+    /// Number of cases in a lease if this number of cores works: a whole number of groups, at least one.
     pub fn cases_per_lease(&self, cores: u32) -> u32 {
         let work_s = (f64::from(cores) / LEASES_A_SECOND).clamp(LEASE_WORK_S, LEASE_WORK_MAX_S);
         let groups = self.case_s.map_or(1.0, |case_s| work_s / (case_s * GROUP as f64));

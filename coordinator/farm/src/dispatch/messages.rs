@@ -1,4 +1,4 @@
-//! Between the values of messages and those of the library.
+//! Conversion between messages and values of the library.
 
 use std::error::Error;
 use tonic::Status;
@@ -6,7 +6,7 @@ use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
 use tracktwin_library::{Held, LibraryError, ReportVerdict};
 use tracktwin_protocol::{BadMessage, PROTOCOL_VERSION, Registration, farm, held_from_messages};
 
-/// Why a worker is incompatible with this coordinator, if so, with the remedy.
+/// Reason why a worker is incompatible with this coordinator, with the remedy; `None` if it is compatible.
 pub(crate) fn incompatibility(registration: &Registration) -> Option<String> {
     let Registration { worker, code_version, model_hash, protocol_version, .. } = registration;
     if *protocol_version != PROTOCOL_VERSION {
@@ -47,7 +47,7 @@ pub(crate) fn malformed(error: &BadMessage) -> Status {
     Status::invalid_argument(error.to_string())
 }
 
-/// The worker asks again; what is wrong with the library is the coordinator's to say.
+/// Status for a failed library call. The worker repeats the call; the coordinator logs the error.
 pub(crate) fn unavailable(error: &LibraryError) -> Status {
     tracing::error!(error = error as &dyn Error, "library request failed");
     Status::unavailable(error.to_string())

@@ -1,7 +1,7 @@
 //! Hands cases to workers and takes their results.
 //!
-//! Owns the gRPC service and its decisions; the queue itself is the library's, so that nothing of
-//! it is lost with this process, and so that several coordinators may serve one library.
+//! This module contains the gRPC service and its decisions. The queue itself is in the library. The queue
+//! therefore survives this process, and several coordinators can serve one library.
 
 mod audits;
 mod breaker;

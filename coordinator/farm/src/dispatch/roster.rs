@@ -1,4 +1,4 @@
-//! The workers that talk to this coordinator.
+//! The workers registered with this coordinator.
 
 use super::Breaker;
 use parking_lot::Mutex;
@@ -7,16 +7,16 @@ use std::time::Duration;
 use tokio::time::Instant;
 use tracktwin_protocol::Registration;
 
-/// A worker without a message for this time is forgotten; it must register again.
+/// A worker without a message for this time is removed from the roster. It must register again.
 const FORGET_AFTER: Duration = Duration::from_mins(10);
 
-/// A worker with a message within this time is present.
+/// A worker with a message within this time counts as present.
 const PRESENT: Duration = Duration::from_mins(1);
 
-/// Interval of recording in the library that a worker is alive.
+/// Minimum interval of recording a worker's last message in the library.
 const NOTE_EVERY: Duration = Duration::from_secs(5);
 
-/// Workers known at a time: what strangers with the token may make a coordinator remember.
+/// Maximum number of registered workers. It bounds the memory that callers with the token can occupy.
 const WORKERS_MAX: usize = 65_536;
 
 /// Registered workers.
@@ -26,9 +26,9 @@ pub(crate) struct Roster(Mutex<HashMap<String, Worker>>);
 struct Worker {
     registration: Registration,
     heard_of: Instant,
-    /// Time of the last record in the library.
+    /// Time at which the last message was recorded in the library.
     noted: Instant,
-    /// Why it is in quarantine.
+    /// Reason of the quarantine, if the worker is in quarantine.
     quarantine: Option<String>,
     breaker: Breaker,
 }
@@ -36,19 +36,19 @@ struct Worker {
 /// Whether a worker may get cases.
 #[derive(Clone, Debug)]
 pub(crate) struct WorkerEligibility {
-    /// Version of its program.
+    /// Version of the worker's program.
     pub(crate) code_version: String,
-    /// Hash of its physics.
+    /// Hash of the worker's physics.
     pub(crate) model_hash: String,
-    /// Why it gets none, and for how long.
+    /// Time for which the worker gets no cases, and the reason; `None` if it may get cases.
     pub(crate) exclusion: Option<(Duration, String)>,
-    /// Whether it gets one only, to show that it works again.
+    /// Whether the worker gets only one case, as a trial after a suspension.
     pub(crate) on_trial: bool,
-    /// Whether the library must record that it is alive.
+    /// Whether the caller must record in the library that the worker is alive.
     pub(crate) to_be_noted: bool,
 }
 
-/// There are too many workers already.
+/// The roster has [`WORKERS_MAX`] workers.
 #[derive(Debug)]
 pub(crate) struct Full;
 
@@ -94,7 +94,7 @@ impl Roster {
         })
     }
 
-    /// Notes why a worker is in quarantine, or that it is not.
+    /// Sets the reason of a worker's quarantine, or removes the quarantine with `None`.
     pub(crate) fn set_quarantine(&self, worker: &str, reason: Option<String>) {
         if let Some(worker) = self.0.lock().get_mut(worker) {
             worker.quarantine = reason;
@@ -103,7 +103,8 @@ impl Roster {
 
     /// Records the outcomes of a worker's cases; returns whether it was suspended.
     ///
-    /// Only where others succeed: where everybody fails, the cases are at fault.
+    /// A worker is suspended only if another worker is present whose cases succeed. Otherwise the cases
+    /// themselves are the probable cause.
     pub(crate) fn reported(&self, worker: &str, failed: &[bool]) -> bool {
         let mut workers = self.0.lock();
         let Some(it) = workers.get_mut(worker) else { return false };
@@ -119,7 +120,7 @@ impl Roster {
         suspended
     }
 
-    /// How many workers are present, and their cores.
+    /// Number of present workers, and the sum of their cores.
     pub(crate) fn present(&self) -> (usize, u32) {
         let workers = self.0.lock();
         let present = workers.values().filter(|worker| worker.heard_of.elapsed() < PRESENT);

@@ -5,29 +5,29 @@ use std::time::Duration;
 use tracktwin_experiment::{Prepare, prepare_simulation};
 use tracktwin_worker::Holdings;
 
-/// Tells the time in ms since 1970.
+/// Returns the time in ms since 1970.
 pub type Clock = Arc<dyn Fn() -> i64 + Send + Sync>;
 
-/// How long leases last, and what follows from it.
+/// Length of the leases, and the intervals derived from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Timing {
-    /// A lease that is not renewed for so long has lost its worker.
+    /// Length of a lease without renewal. After this time the worker counts as lost.
     pub lease: Duration,
-    /// How often workers renew.
+    /// Interval at which workers renew their leases.
     pub heartbeat: Duration,
-    /// When a worker that got no cases asks again.
+    /// Pause before the next request of a worker that got no cases.
     pub retry: Duration,
 }
 
 impl Default for Timing {
-    /// Three heartbeats may be lost; a dead worker's cases go to others within 12 s.
+    /// Leases of 12 s with heartbeats every 3 s: three heartbeats may be lost.
     fn default() -> Self {
         Self::of_lease(Duration::from_secs(12))
     }
 }
 
 impl Timing {
-    /// The timing that goes with leases of this length.
+    /// The intervals that belong to leases of this length.
     pub fn of_lease(lease: Duration) -> Self {
         Self { lease, heartbeat: lease / 4, retry: (lease / 24).min(Duration::from_millis(500)) }
     }
@@ -36,29 +36,29 @@ impl Timing {
 /// The part of a library that is leased.
 #[derive(Clone, Debug)]
 pub struct Scope {
-    /// This campaign only.
+    /// Id of the campaign.
     pub campaign: String,
-    /// Its cases with a smaller index.
+    /// Cases with an index below this number.
     pub cases: u32,
 }
 
 /// Settings of a dispatch.
 #[derive(Clone)]
 pub struct Settings {
-    /// How long leases last.
+    /// Length of the leases and the derived intervals.
     pub timing: Timing,
     /// What is leased; all running campaigns if `None`.
     pub scope: Option<Scope>,
     /// Share of the cases that are simulated again by another worker, 0 to 1.
     pub audit_share: f64,
-    /// Whether a worker is suspended if its cases fail and those of others do not.
+    /// Whether a worker is suspended if its cases fail and the cases of other workers do not.
     pub suspends_failing: bool,
-    /// Prepares the simulation that decides between two workers that differ.
+    /// Creates the simulator for the case whose two results differ in an audit.
     pub prepare: Prepare,
-    /// The clock that leases go by; the library's if none.
+    /// The clock of the leases; the library's clock if `None`.
     pub clock: Option<Clock>,
-    /// Cases held by the worker of this process, if there is one: their leases do not expire while
-    /// it holds them, even on a busy machine.
+    /// Cases held by the worker of this process, if there is such a worker. The leases of these cases do
+    /// not expire, even if heartbeats are late on a busy machine.
     pub own: Option<Holdings>,
 }
 

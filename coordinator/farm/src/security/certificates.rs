@@ -1,4 +1,4 @@
-//! A small authority and the certificates of a farm.
+//! Certificate authority and certificates of a farm.
 
 use rcgen::{
     BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa,
@@ -12,33 +12,33 @@ use std::path::{Path, PathBuf};
 use time::{Duration, OffsetDateTime};
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 
-/// How long the authority is valid.
+/// Validity of the authority in days.
 const AUTHORITY_DAYS: i64 = 3650;
 
-/// Clocks of a cluster may differ by this.
+/// Tolerance for the differences between the clocks of a cluster.
 const CLOCKS: Duration = Duration::hours(1);
 
 /// Name of the authority.
 const AUTHORITY: &str = "tracktwin farm";
 
-/// Bytes of chance in a token.
+/// Number of random bytes in a token.
 const TOKEN_BYTES: usize = 32;
 
-/// Why no certificates are made.
+/// Reasons for not creating certificates.
 #[derive(Debug, thiserror::Error)]
 pub enum CertificatesError {
     /// The folder, or a file in it, can't be read.
     #[error("cannot read {path}: {source}")]
     File {
-        /// The file.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// Error of the system.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A file cannot be written, or exists already.
     #[error("{0}")]
     Files(#[from] FilesError),
-    /// A host that workers can't call.
+    /// The name of a host is not a valid host name or address.
     #[error(
         "{host:?} is not a host; write a name such as head.cluster or an address such as \
              10.0.0.1"
@@ -52,22 +52,22 @@ pub enum CertificatesError {
     Certificate(#[from] rcgen::Error),
 }
 
-/// Writes a farm's authority, certificates and token into a folder.
+/// Writes the authority, the certificates and the token of a farm into a folder.
 ///
-/// An existing authority and token are kept, so that certificates can be renewed, or created for
-/// further hosts, without changes on the other machines. Files of other programs are replaced with
-/// `force` only.
+/// An existing authority and an existing token are kept. Certificates can therefore be renewed, or created
+/// for further hosts, without changes on the other machines. Other existing files are replaced only with
+/// `force`.
 ///
-/// | file | whose |
+/// | file | needed by |
 /// |---|---|
-/// | `ca.pem` | everybody's |
-/// | `ca-key.pem` | to be kept where certificates are made |
-/// | `coordinator.pem`, `coordinator-key.pem` | the coordinators', valid for `hosts` |
-/// | `worker.pem`, `worker-key.pem` | the workers' |
-/// | `token` | everybody's |
+/// | `ca.pem` | all machines |
+/// | `ca-key.pem` | only the machine on which certificates are created |
+/// | `coordinator.pem`, `coordinator-key.pem` | coordinators; valid for `hosts` |
+/// | `worker.pem`, `worker-key.pem` | workers |
+/// | `token` | all machines |
 ///
 /// # Errors
-/// [`CertificatesError`] when a file can't be written or a host's name can't be one.
+/// Returns [`CertificatesError`] if a file cannot be written or the name of a host is invalid.
 pub fn issue(
     folder: &Path,
     hosts: &[String],
@@ -107,7 +107,7 @@ pub fn issue(
     Ok(output.commit()?)
 }
 
-/// The authority in the folder, or a new one.
+/// Reads the authority in the folder, or creates a new one.
 fn authority(
     folder: &Path,
     now: OffsetDateTime,
@@ -149,7 +149,7 @@ fn named(name: &str) -> DistinguishedName {
     full
 }
 
-/// A token of 256 bits, in hexadecimal.
+/// Returns a random token of 256 bits, in hexadecimal.
 pub(crate) fn random_token() -> std::io::Result<blake3::Hash> {
     let mut chance = [0; TOKEN_BYTES];
     File::open("/dev/urandom")?.read_exact(&mut chance)?;

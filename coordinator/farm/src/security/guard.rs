@@ -4,20 +4,20 @@ use super::peer::Caller;
 use tonic::service::Interceptor;
 use tonic::{Request, Status};
 
-/// Lets calls pass that show the token.
+/// Admits calls that have the token.
 #[derive(Clone)]
 pub struct Guard {
-    /// The token's hash: comparing hashes takes the same time wherever they differ.
+    /// Hash of the token. A comparison of hashes reveals nothing about the token by its duration.
     token: Option<blake3::Hash>,
 }
 
 impl Guard {
-    /// A guard that demands this token, or none.
+    /// Creates a guard that requires this token; without token it admits every call.
     pub fn new(token: Option<&str>) -> Self {
         Self { token: token.map(|token| blake3::hash(token.trim().as_bytes())) }
     }
 
-    /// Whether an `authorization` header opens the door.
+    /// Whether a call with this `authorization` header is admitted.
     pub fn admits(&self, header: Option<&[u8]>) -> bool {
         let shown = header.and_then(|header| header.strip_prefix(b"Bearer "));
         self.token.is_none_or(|token| shown.is_some_and(|shown| blake3::hash(shown) == token))

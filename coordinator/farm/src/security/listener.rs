@@ -1,4 +1,4 @@
-//! Accepts or refuses connections, with the reason in the log.
+//! Accepts or refuses connections; the log has the reason of a refusal.
 
 use super::peer::{Peer, Stream};
 use super::settings::HTTP2;
@@ -12,22 +12,23 @@ use tokio_rustls::TlsAcceptor;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::either::Either;
 
-/// Connections at a time: a few thousand nodes. Each costs a file descriptor and some 100 kB.
+/// Maximum number of connections, enough for a few thousand nodes. Each connection needs a file descriptor
+/// and about 100 kB.
 const CONNECTIONS_MAX: usize = 4096;
 
-/// Connections that were let in and wait for the service.
+/// Maximum number of accepted connections that wait for the service.
 const WAITING_MAX: usize = 64;
 
 /// Time limit of the connection preface; TLS over a slow line takes a second.
 const PREFACE_TIME: Duration = Duration::from_secs(10);
 
-/// Pause after a failed accept: file descriptors become free within moments.
+/// Pause after an error of accepting a connection, because file descriptors soon become free.
 const SYSTEM_PAUSE: Duration = Duration::from_millis(100);
 
 /// Preface of every HTTP/2 connection (RFC 9113, 3.4).
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
-/// Reasons of refusing a connection.
+/// Reasons for refusing a connection.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
     #[error("no data for {} s", PREFACE_TIME.as_secs())]
@@ -42,9 +43,9 @@ enum Refusal {
     Gone(#[from] std::io::Error),
 }
 
-/// The accepted connections of a port. It ends when the stream is dropped.
+/// Returns the accepted connections of a port. Accepting ends when the stream is dropped.
 ///
-/// Each preface is read in a separate task, so that a slow or silent caller delays no other.
+/// Each preface is read in a separate task, so that a slow or silent caller does not delay others.
 pub fn accept(
     listener: TcpListener,
     tls: Option<TlsAcceptor>,
@@ -87,7 +88,7 @@ async fn accept_connection(
     }
 }
 
-/// Takes the beginning of a connection, up to the end of [`PREFACE`].
+/// Reads the start of a connection, up to the end of [`PREFACE`].
 async fn read_preface(stream: TcpStream, tls: Option<TlsAcceptor>) -> Result<Stream, Refusal> {
     stream.set_nodelay(true)?;
     let mut stream = match tls {
@@ -118,7 +119,7 @@ mod tests {
     use tokio::io::AsyncWriteExt;
     use tokio_stream::StreamExt;
 
-    /// A port with a caller that has sent `begin`.
+    /// Opens a port, and connects a caller that sends `begin`.
     async fn called(begin: &[u8]) -> (ReceiverStream<std::io::Result<Peer>>, TcpStream) {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let mut caller = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();

@@ -1,4 +1,4 @@
-//! Who may talk to a coordinator: certificates, tokens, and the connections of a port.
+//! Access to a coordinator: certificates, tokens, and the connections of a port.
 
 mod certificates;
 mod guard;

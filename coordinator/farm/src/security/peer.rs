@@ -1,4 +1,4 @@
-//! A connection that was let in.
+//! An accepted connection.
 
 use std::net::SocketAddr;
 use std::pin::Pin;
@@ -14,40 +14,40 @@ use tokio_rustls::server::TlsStream;
 use tokio_util::either::Either;
 use tonic::transport::server::Connected;
 
-/// How long a connection may last without a call that was admitted.
+/// Maximum duration of a connection without an admitted call.
 const ADMISSION_TIME: Duration = Duration::from_secs(30);
 
-/// Plain text or TLS.
+/// Plain text or TLS connection.
 pub(crate) type Stream = Either<TcpStream, Box<TlsStream<TcpStream>>>;
 
-/// Who calls; every request carries it.
+/// Caller of a request; added to every request of its connection.
 #[derive(Clone, Debug)]
 pub struct Caller {
-    /// Where it calls from.
+    /// Network address of the caller.
     pub address: SocketAddr,
     admitted: Arc<AtomicBool>,
 }
 
 impl Caller {
-    /// Notes that a call of its connection was admitted: the connection may last.
+    /// Records that a call of this connection was admitted, so that the connection is kept.
     pub(crate) fn admit(&self) {
         self.admitted.store(true, Ordering::Relaxed);
     }
 }
 
-/// A connection that was let in, and its share of the connections there may be.
+/// An accepted connection. It counts towards the maximum number of connections.
 pub struct Peer {
     stream: Stream,
     caller: Caller,
-    /// Bytes already read from it.
+    /// Bytes of the preface that were already read and are not yet passed on.
     begin: &'static [u8],
-    /// Runs until a call was admitted.
+    /// Time limit of the first admitted call; `None` after that call.
     deadline: Option<Pin<Box<Sleep>>>,
     _share: OwnedSemaphorePermit,
 }
 
 impl Peer {
-    /// A connection of which `begin` was read.
+    /// Creates a connection of which the bytes `begin` were already read.
     pub(crate) fn new(
         stream: Stream,
         begin: &'static [u8],
@@ -59,7 +59,7 @@ impl Peer {
         Self { stream, caller, begin, deadline, _share: share }
     }
 
-    /// Ends the connection of a caller that has shown nothing.
+    /// Returns an error if no call was admitted within the time limit.
     fn check_deadline(&mut self, context: &mut Context<'_>) -> std::io::Result<()> {
         let Some(deadline) = &mut self.deadline else { return Ok(()) };
         if self.caller.admitted.load(Ordering::Relaxed) {

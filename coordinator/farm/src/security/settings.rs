@@ -12,57 +12,57 @@ use tokio_rustls::rustls::{self, RootCertStore, ServerConfig};
 /// The protocol inside TLS.
 pub(crate) const HTTP2: &[u8] = b"h2";
 
-/// Certificates and token of a coordinator; empty on one machine.
+/// Certificates and token of a coordinator; all empty if it serves this machine only.
 #[derive(Clone, Debug, Default)]
 pub struct Security {
-    /// Its certificate, with what leads to the authority, and its key (PEM).
+    /// Certificate chain and private key of the coordinator (PEM).
     pub identity_pem: Option<[Vec<u8>; 2]>,
-    /// Certificate of the authority that workers' certificates must be of (PEM).
+    /// Certificate of the authority that must have signed the certificates of workers (PEM).
     pub client_ca_pem: Option<Vec<u8>>,
-    /// The token that workers must show.
+    /// Token that workers must send.
     pub token: Option<String>,
-    /// Whether strangers may call in plain text: where the network itself is trusted.
+    /// Whether plain text and calls without a token are allowed from other machines, on a trusted network.
     pub insecure: bool,
 }
 
-/// Reasons of not opening a port, each with the remedy.
+/// Reasons for not opening a port. Each message has the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum SecurityError {
-    /// A port that others can reach, in plain text.
+    /// The port is reachable from other machines and has no certificate.
     #[error(
         "{address} is reachable from other machines, but has no certificate; create one \
              with `tracktwin certs` and use --tls-cert and --tls-key, or use --insecure on a \
              trusted network"
     )]
     PlainText {
-        /// The address.
+        /// Address of the port.
         address: SocketAddr,
     },
-    /// A port that others can reach, and nothing that they must show.
+    /// The port is reachable from other machines and requires neither token nor certificate.
     #[error(
         "{address} is reachable from other machines, but requires no token; use \
              --token-file or worker certificates (--tls-client-ca), or --insecure on a trusted \
              network"
     )]
     Anybody {
-        /// The address.
+        /// Address of the port.
         address: SocketAddr,
     },
-    /// A PEM file that holds something else.
+    /// A file is not a PEM file with the expected content.
     #[error("{what}: not a valid PEM file ({source}); create one with `tracktwin certs`")]
     Pem {
         /// Expected content.
         what: &'static str,
-        /// What is wrong.
+        /// Cause.
         source: pem::Error,
     },
-    /// Certificate and key don't go together, or can't be used.
+    /// Certificate and key do not belong together, or cannot be used.
     #[error(
         "the certificate cannot be used ({0}); check that certificate and key belong together, or \
              create both with `tracktwin certs`"
     )]
     Tls(#[from] rustls::Error),
-    /// The authority can't be used.
+    /// The certificate of the authority cannot be used.
     #[error(
         "--tls-client-ca: the authority cannot be used ({0}); give the ca.pem of `tracktwin certs`"
     )]
@@ -70,10 +70,10 @@ pub enum SecurityError {
 }
 
 impl Security {
-    /// Whether a port at this address is safe.
+    /// Checks that a port at this address would be protected.
     ///
     /// # Errors
-    /// [`SecurityError`] states what is missing.
+    /// Returns [`SecurityError`] with the missing protection.
     pub fn check(&self, address: SocketAddr) -> Result<(), SecurityError> {
         if address.ip().is_loopback() || self.insecure {
             return Ok(());
@@ -87,10 +87,10 @@ impl Security {
         Ok(())
     }
 
-    /// TLS acceptor; `None` for plain text.
+    /// Creates the TLS acceptor; `None` for plain text.
     ///
     /// # Errors
-    /// [`SecurityError`] when certificates can't be used.
+    /// Returns [`SecurityError`] if the certificates cannot be used.
     pub fn acceptor(&self) -> Result<Option<TlsAcceptor>, SecurityError> {
         let Some([certificate, key]) = &self.identity_pem else { return Ok(None) };
         let key = PrivateKeyDer::from_pem_slice(key)

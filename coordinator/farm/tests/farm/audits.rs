@@ -19,7 +19,7 @@ use tracktwin_library::WorkerState;
 use tracktwin_protocol::farm::{self as messages, CaseReport, ReportRequest};
 use tracktwin_worker::agent::{self, Config};
 
-/// A machine whose every level is a tenth of a dB too high.
+/// A machine whose levels are all too high by 0.1 dB.
 struct Faulty(StandIn);
 
 impl Simulate for Faulty {

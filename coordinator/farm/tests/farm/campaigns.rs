@@ -1,4 +1,4 @@
-//! Several campaigns at once, added and steered while they are served.
+//! Several campaigns at the same time, added and controlled while they are served.
 
 use crate::support::{CORES, Coordinator, coordinator_with, lease, registered, stand_in, until};
 use tokio_util::sync::CancellationToken;
@@ -7,7 +7,7 @@ use tracktwin_farm::dispatch::Settings;
 use tracktwin_farm::security::Security;
 use tracktwin_worker::agent::{self, Config};
 
-/// Another campaign than the built-in one.
+/// A campaign other than the built-in one.
 fn other(cases: u32) -> Campaign {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("other.toml");

@@ -10,7 +10,7 @@ use tracktwin_farm::dispatch::Timing;
 use tracktwin_farm::embedded::{self, FarmError, Task};
 use tracktwin_library::{LibraryError, Status};
 
-/// Fails at case 3, panics at case 5.
+/// A simulator that fails at case 3 and panics at case 5.
 struct Troubled(StandIn);
 
 impl Simulate for Troubled {
@@ -95,7 +95,7 @@ async fn a_campaign_that_grows_keeps_what_it_has() {
     assert_eq!(library.digest(&id).await.unwrap(), undisturbed(&many).await);
 }
 
-/// Takes three of the leases that the tests give.
+/// A simulator that needs three times the lease duration of the tests.
 struct Slow(StandIn);
 
 impl Simulate for Slow {
@@ -110,7 +110,7 @@ fn slow(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
     Ok(Box::new(Slow(StandIn(experiment.clone()))))
 }
 
-/// Runs eight slow cases with leases of 400 ms and such heartbeats; none may be handed out twice.
+/// Runs eight slow cases with leases of 400 ms and this heartbeat; no case may be leased twice.
 async fn no_lease_is_lost(heartbeat: Duration) {
     let campaign = Campaign::built_in(Some(8)).unwrap();
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! The farm over real sockets, with a stand-in for the physics: in one process, as a service, with
-//! certificates and tokens, with several campaigns, and over a network that misbehaves.
+//! The farm with real sockets and a stand-in for the track model: in one process, as a service, with
+//! certificates and tokens, with several campaigns, and on an unreliable network.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 

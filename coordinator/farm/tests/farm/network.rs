@@ -1,7 +1,7 @@
-//! The farm over a simulated network, in simulated time: delays, cuts, crashes, and messages that
-//! come twice, late or damaged. What a seed does it does again.
+//! The farm on a simulated network in simulated time, with delays, cuts, crashes, and messages that are
+//! repeated, late or damaged. A run with the same seed is identical.
 //!
-//! `TRACKTWIN_SEEDS=1000` runs as many seeds instead of a few, `TRACKTWIN_SEED=7` that one.
+//! `TRACKTWIN_SEEDS=1000` runs this number of seeds; `TRACKTWIN_SEED=7` runs this seed only.
 
 use crate::support::{CORES, library_at, stand_in, undisturbed};
 use prost::Message;
@@ -38,15 +38,15 @@ const CASES: u32 = 40;
 const PORT: u16 = 7700;
 const WORKERS: [&str; 3] = ["worker-0", "worker-1", "worker-2"];
 
-/// Simulated time after which a farm that is not done has failed.
+/// Limit of the simulated time; a farm that is not done then has failed.
 const PATIENCE: Duration = Duration::from_mins(30);
 
-/// How long the network misbehaves.
+/// Simulated time during which faults are injected.
 const TROUBLE: Duration = Duration::from_mins(2);
 
 type Answer<T> = Result<Response<T>, Status>;
 
-/// Chance that is the same for the same seed (splitmix64).
+/// Random number generator; equal seeds give equal numbers (splitmix64).
 #[derive(Clone)]
 struct Chance(Arc<Mutex<u64>>);
 
@@ -55,7 +55,7 @@ impl Chance {
         Self(Arc::new(Mutex::new(seed)))
     }
 
-    /// A number below `bound`.
+    /// A random number below `bound`.
     fn below(&self, bound: u64) -> u64 {
         let mut state = self.0.lock().unwrap();
         *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -66,7 +66,7 @@ impl Chance {
     }
 }
 
-/// Waits for a future without letting simulated time pass: databases are no part of it.
+/// Waits for a future while simulated time stands still, because databases are not simulated.
 fn at_once<F: Future>(future: F) -> F::Output {
     struct Parked(Thread);
     impl Wake for Parked {
@@ -84,7 +84,7 @@ fn at_once<F: Future>(future: F) -> F::Output {
     }
 }
 
-/// The service, whose callers' messages may come twice, and again long after, and both sides' damaged.
+/// The service with faults: requests may be repeated, even much later, and requests and responses damaged.
 struct Troubled {
     dispatch: Dispatch,
     chance: Chance,
@@ -93,7 +93,7 @@ struct Troubled {
 }
 
 impl Troubled {
-    /// One of the earlier messages, now and then.
+    /// Sometimes an earlier message instead of the newest one.
     fn earlier<T: Clone>(&self, all: &Mutex<Vec<T>>, newest: &T) -> Option<T> {
         let mut all = all.lock().unwrap();
         all.push(newest.clone());
@@ -101,7 +101,7 @@ impl Troubled {
         (self.chance.below(4) == 0).then(|| all[self.chance.below(count) as usize].clone())
     }
 
-    /// A message one bit of which is another, now and then, as a network without TLS may bring it.
+    /// The message, sometimes with one inverted bit, as after an error of a network without TLS.
     fn damaged<M: Message + Default>(&self, message: M) -> Result<M, Status> {
         if self.chance.below(8) > 0 {
             return Ok(message);
@@ -172,7 +172,7 @@ impl Farm for Troubled {
     }
 }
 
-/// A simulated connection, as the server takes it.
+/// A simulated connection in the form that the server requires.
 struct Accepted(TcpStream);
 
 impl Connected for Accepted {
@@ -214,7 +214,7 @@ impl AsyncWrite for Accepted {
     }
 }
 
-/// What the coordinator's host runs, each time it is started.
+/// Program of the coordinator's host, run at each start of the host.
 async fn coordinate(library: Library, campaign: String, chance: Chance) -> turmoil::Result {
     let clock = || turmoil::sim_elapsed().map_or(0, |it| i64::try_from(it.as_millis()).unwrap());
     let settings =
@@ -241,7 +241,7 @@ async fn coordinate(library: Library, campaign: String, chance: Chance) -> turmo
     Ok(())
 }
 
-/// What a worker's host runs.
+/// Program of a worker's host.
 async fn work(name: &'static str) -> turmoil::Result {
     let config = Config {
         worker: name.to_owned(),
@@ -262,7 +262,7 @@ fn dial(endpoint: &Endpoint) -> Channel {
     }))
 }
 
-/// Cuts, delays, repairs or crashes something at random.
+/// Cuts, delays or repairs a connection, or crashes a host, at random.
 fn inject_fault(sim: &mut turmoil::Sim<'_>, chance: &Chance) {
     let worker = WORKERS[chance.below(3) as usize];
     match chance.below(12) {
@@ -283,8 +283,8 @@ fn repair(sim: &turmoil::Sim<'_>) {
     }
 }
 
-/// A farm whose network and hosts misbehave as the seed says, with a new library at this address; its
-/// digest, and the time it took.
+/// Runs a farm with faults drawn from `seed`, on a new library at this address. Returns the digest and the
+/// simulated time.
 fn misbehaving(real: &Runtime, library: &str, seed: u64) -> (String, Duration) {
     let campaign = Campaign::built_in(Some(CASES)).unwrap();
     let id = campaign.id();
@@ -337,7 +337,7 @@ fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|text| text.parse().expect("a number"))
 }
 
-/// Does so with many seeds, each in a library of its own, which is removed.
+/// Runs many seeds, each with a separate library, which is removed afterwards.
 fn all_misbehave(new: impl Fn() -> String, remove: impl Fn(&str)) {
     let real = runtime();
     let campaign = Campaign::built_in(Some(CASES)).unwrap();

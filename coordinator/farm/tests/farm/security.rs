@@ -1,4 +1,4 @@
-//! Certificates, tokens, and what comes from strangers.
+//! Certificates, tokens, and invalid data from unknown callers.
 
 use crate::support::{CORES, Coordinator, coordinator, coordinator_with, stand_in};
 use std::io::{Read, Write};
@@ -13,7 +13,7 @@ use tracktwin_farm::security::{Security, issue};
 use tracktwin_worker::agent::{self, AgentError, Config};
 use tracktwin_worker::{Credentials, Token};
 
-/// A folder of certificates for this machine, issued at this moment and valid for a day.
+/// Creates a folder of certificates for this machine, issued at `now` and valid for a day.
 fn certificates(now: OffsetDateTime) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     issue(folder.path(), &["127.0.0.1".to_owned()], 1, now, false).unwrap();
@@ -32,7 +32,7 @@ fn token(folder: &Path) -> String {
     String::from_utf8(read(folder, "token")).unwrap()
 }
 
-/// A coordinator with TLS that demands the token.
+/// A coordinator with TLS that requires the token.
 async fn guarded(folder: &Path) -> Coordinator {
     let security = Security {
         identity_pem: Some(pair(folder, "coordinator")),
@@ -42,7 +42,7 @@ async fn guarded(folder: &Path) -> Coordinator {
     coordinator_with(Settings { prepare: stand_in, ..Settings::default() }, security, 20).await
 }
 
-/// Works until there is no more work, or until the worker fails or gives up.
+/// Runs a worker until there are no more cases, or until the worker fails or gives up.
 async fn work(coordinator: &Coordinator, credentials: Credentials) -> Result<(), AgentError> {
     work_at(coordinator.url.clone(), credentials).await
 }
@@ -174,7 +174,7 @@ fn certificates_can_be_renewed_without_touching_authority_and_token() {
     }
 }
 
-/// Bytes that no farm speaks, some of them the beginnings of something it does.
+/// Data that are not a valid request; some begin like one.
 fn garbage() -> Vec<Vec<u8>> {
     let preface = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n".to_vec();
     let mut noise = Vec::new();

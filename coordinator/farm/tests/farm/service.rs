@@ -1,4 +1,4 @@
-//! What the service answers, and what it refuses.
+//! Responses and refusals of the service.
 
 use crate::support::{
     CORES, coordinator, coordinator_with, lease, pass, registered, registration, report, stand_in,
@@ -240,7 +240,7 @@ async fn a_silent_worker_s_cases_go_to_another_and_its_late_results_change_nothi
     assert_eq!(verdicts(&mut client, report(&first, "silent")).await, [Verdict::Duplicate; 4]);
 }
 
-/// Blocks its thread for three leases before it has prepared anything.
+/// Blocks its thread for three lease durations before it returns a simulator.
 fn slow_preparation(experiment: &Experiment) -> Result<Box<dyn Simulate>, ExperimentError> {
     std::thread::sleep(Duration::from_millis(1200));
     stand_in(experiment)

@@ -1,4 +1,4 @@
-//! A stand-in for the physics, libraries, and a coordinator to talk to.
+//! A stand-in for the track model, libraries, and a coordinator for tests.
 
 use std::net::Ipv4Addr;
 use std::num::NonZeroUsize;
@@ -23,7 +23,7 @@ use tracktwin_protocol::farm::{
 use tracktwin_protocol::{PROTOCOL_VERSION, checksum};
 use tracktwin_signal::{Features, ThirdOctave};
 
-/// Instead of physics: a function of the case that takes no time.
+/// Replaces the track model: a function of the case that takes no time.
 pub(crate) struct StandIn(pub(crate) Experiment);
 
 impl StandIn {
@@ -69,7 +69,7 @@ pub(crate) fn task(campaign: &str, cases: u32) -> Task<'_> {
     Task { prepare: stand_in, ..Task::new(campaign, cases, CORES) }
 }
 
-/// The digest of a campaign that nothing disturbed.
+/// The digest of a campaign simulated without faults.
 pub(crate) async fn undisturbed(campaign: &Campaign) -> String {
     let folder = tempfile::tempdir().unwrap();
     let library = library(&folder, campaign).await;
@@ -138,13 +138,13 @@ pub(crate) async fn lease(
     client.lease(request).await.unwrap().into_inner()
 }
 
-/// The message of a pass.
+/// The message with the features of one pass.
 pub(crate) fn pass(speed_km_h: f64, log_power: Vec<f64>) -> messages::PassFeatures {
     let features = Features { log_power, band_levels_db: vec![1.0; ThirdOctave::COUNT] };
     PassFeatures { speed_km_h, features, contact_loss_share: None }.into()
 }
 
-/// A message with the checksum that a worker makes of what it says.
+/// The message with the checksum of its content, as a worker computes it.
 pub(crate) fn with_checksum(message: CaseReport) -> CaseReport {
     let outcome = match message.outcome.clone() {
         Some(messages::case_report::Outcome::Passes(passes)) => {
@@ -191,7 +191,7 @@ pub(crate) async fn verdicts(
     response.receipts.iter().map(messages::Receipt::verdict).collect()
 }
 
-/// Waits until something is so.
+/// Waits until the condition is true; fails after 20 s.
 pub(crate) async fn until(what: &str, mut is_so: impl AsyncFnMut() -> bool) {
     let begun = Instant::now();
     while !is_so().await {

@@ -1,4 +1,4 @@
-//! Holding rows of results against their checksums while they are read out.
+//! Comparison of results with their checksums while a table is read.
 
 use super::{Cell, Table};
 use crate::LibraryError;
@@ -7,13 +7,13 @@ use tracktwin_experiment::PassFeatures;
 use tracktwin_protocol::checksum_of_passes;
 use tracktwin_signal::Features;
 
-/// The case whose rows are coming; looks at nothing where the table's rows have no checksum.
+/// Checks the checksum of each case. It does nothing for tables without a column `checksum`.
 pub(super) struct Attestation<'a> {
     table: &'a Table,
     present: Option<Present>,
 }
 
-/// Passes of one case, so far.
+/// The passes read so far of one case.
 struct Present {
     campaign: String,
     index: u32,
@@ -27,10 +27,10 @@ impl<'a> Attestation<'a> {
         Self { table, present: None }
     }
 
-    /// Takes rows, which come by campaign, index and speed.
+    /// Adds rows, which must be in the order of campaign, index and speed.
     ///
     /// # Errors
-    /// [`LibraryError::Altered`] where the case before does not have its checksum.
+    /// Returns [`LibraryError::Altered`] if a completed case does not match its checksum.
     pub(super) fn take(&mut self, rows: &[Vec<Cell>]) -> Result<(), LibraryError> {
         if self.table.column("checksum").is_none() {
             return Ok(());
@@ -45,7 +45,7 @@ impl<'a> Attestation<'a> {
         Ok(())
     }
 
-    /// Looks at the last case.
+    /// Checks the last case.
     ///
     /// # Errors
     /// As [`Attestation::take`].
@@ -53,7 +53,8 @@ impl<'a> Attestation<'a> {
         self.present.map_or(Ok(()), Present::check)
     }
 
-    /// A row as a case of one pass; none where a cell is missing, which the schema does not allow.
+    /// Converts a row to a case with one pass; `None` if a cell is missing, which the schema does not
+    /// allow.
     fn first_pass(&self, row: &[Cell]) -> Option<Present> {
         let cell = |column: &str| row.get(self.table.column(column)?);
         let text = |column| match cell(column) {

@@ -1,27 +1,27 @@
-//! A value of any table.
+//! A value of any column of any table.
 
 use crate::data::ColumnKind;
 use crate::engine::Value;
 
-/// A value in a row.
+/// Value of one column in a row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// Missing.
+    /// No value.
     Null,
-    /// A truth.
+    /// A logical value.
     Boolean(bool),
     /// A text.
     Text(String),
     /// An integer.
     Integer(i64),
-    /// A number.
+    /// A floating-point number.
     Real(f64),
-    /// A series of numbers.
+    /// A series of floating-point numbers.
     Doubles(Vec<f64>),
 }
 
 impl Cell {
-    /// To be bound where the column is of this kind; nothing if it does not fit.
+    /// Converts the cell to a value for a column of this type; `None` if it does not fit.
     pub(crate) fn bound_as(self, kind: ColumnKind) -> Option<Value> {
         Some(match (kind, self) {
             (ColumnKind::Text, Self::Null) => Value::Text(None),

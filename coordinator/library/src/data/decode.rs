@@ -1,4 +1,4 @@
-//! Rows of a database as cells.
+//! Conversion of database rows to cells.
 
 use super::{Cell, Column, ColumnKind, Table};
 use crate::LibraryError;
@@ -8,12 +8,12 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{Row as _, TypeInfo, ValueRef};
 use std::fmt::Write as _;
 
-/// The row of a table, column by column.
+/// Converts a row of a table, in the order of the table's columns.
 pub(super) fn table_row(table: &Table, row: &Row) -> Result<Vec<Cell>, LibraryError> {
     cells(table.columns, row)
 }
 
-/// These columns of a row.
+/// Converts these columns of a row.
 pub(super) fn cells<'a>(
     columns: impl IntoIterator<Item = &'a Column>,
     row: &Row,
@@ -30,7 +30,7 @@ pub(super) fn cells<'a>(
     columns.into_iter().map(cell).collect()
 }
 
-/// Whatever a statement answers.
+/// Converts a row of any query.
 pub(super) fn any_row(row: &Row, columns: &[String]) -> Result<Vec<Cell>, LibraryError> {
     let cells = columns.iter().enumerate();
     match row {
@@ -39,7 +39,7 @@ pub(super) fn any_row(row: &Row, columns: &[String]) -> Result<Vec<Cell>, Librar
     }
 }
 
-/// `SQLite` knows a type for each value, and no series: they are blobs.
+/// Converts a value of `SQLite`. `SQLite` has a type for each value; series are stored as blobs.
 fn sqlite_cell(row: &SqliteRow, place: usize, name: &str) -> Result<Cell, LibraryError> {
     let value = row.try_get_raw(place)?;
     if value.is_null() {
@@ -54,7 +54,8 @@ fn sqlite_cell(row: &SqliteRow, place: usize, name: &str) -> Result<Cell, Librar
     })
 }
 
-/// Bytes are a series where the column is called as one of the schema's; else their digits.
+/// Converts bytes to a series if the schema has a series column of this name, otherwise to hexadecimal
+/// digits.
 fn bytes_cell(bytes: &[u8], name: &str) -> Cell {
     if bytes.len().is_multiple_of(size_of::<f64>()) && is_series(name) {
         Cell::Doubles(series(bytes))
@@ -70,20 +71,20 @@ fn hexadecimal(bytes: &[u8]) -> String {
     })
 }
 
-/// Whether a column of that name holds series.
+/// Whether a column of this name contains series.
 fn is_series(name: &str) -> bool {
     let mut columns = Table::ALL.into_iter().flat_map(|table| table.columns);
     columns.any(|column| column.kind == ColumnKind::Doubles && column.name == name)
 }
 
-/// Types that [`postgres_cell`] reads otherwise than as text.
+/// Types that [`postgres_cell`] converts to a cell other than text.
 const POSTGRES_NUMBERS: [&str; 8] =
     ["BOOL", "INT2", "INT4", "INT8", "FLOAT4", "FLOAT8", "FLOAT8[]", "BYTEA"];
 
-/// Types that PostgreSQL sends as the text itself.
+/// Types whose values PostgreSQL sends as plain text.
 const POSTGRES_TEXTS: [&str; 6] = ["TEXT", "VARCHAR", "CHAR", "NAME", "UNKNOWN", "JSON"];
 
-/// Whether there are cells for a type of PostgreSQL's.
+/// Whether [`postgres_cell`] supports this type of PostgreSQL.
 pub(super) fn is_postgres_cell(kind: &str) -> bool {
     POSTGRES_NUMBERS.contains(&kind) || POSTGRES_TEXTS.contains(&kind)
 }
@@ -106,7 +107,8 @@ fn postgres_cell(row: &PgRow, place: usize, name: &str) -> Result<Cell, LibraryE
     })
 }
 
-/// The number that a server writes so: sums and means of integers are decimal numbers of any length.
+/// Converts a decimal number in text form. PostgreSQL returns sums and means of integers as decimal numbers
+/// of any length.
 pub(super) fn number(text: &str) -> Cell {
     let integer = text.parse().map(Cell::Integer);
     integer

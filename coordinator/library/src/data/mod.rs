@@ -1,7 +1,7 @@
 //! The library as plain tables: SQL queries, reading, writing, verification.
 //!
-//! Owns what is the same for every table; knows no file format and compares nothing but what the
-//! schema itself promises.
+//! This module contains the operations that are equal for all tables. It does not depend on any file
+//! format, and it checks only what the schema guarantees.
 
 mod attest;
 mod cell;

@@ -1,4 +1,4 @@
-//! Anybody's SQL, which only reads.
+//! Read-only execution of SQL statements of the user.
 
 use super::{Cell, decode, question, schema};
 use crate::engine::{Dialect, Row, Target};
@@ -14,28 +14,28 @@ use tokio_stream::StreamExt;
 
 /// Receiver of the rows of a query.
 pub trait Answer {
-    /// Its error.
+    /// Error type of the receiver.
     type Error: From<LibraryError>;
 
-    /// The columns; comes first, and also where there are no rows.
+    /// Receives the names of the columns. It is called once, before any row, also if there are no rows.
     ///
     /// # Errors
-    /// Ends the answer.
+    /// An error ends the query.
     fn columns(&mut self, names: &[String]) -> Result<(), Self::Error>;
 
-    /// A row.
+    /// Receives a row.
     ///
     /// # Errors
-    /// Ends the answer.
+    /// An error ends the query.
     fn row(&mut self, cells: Vec<Cell>) -> Result<(), Self::Error>;
 }
 
 impl Library {
-    /// Runs one statement of the user on a separate read-only connection.
+    /// Runs one statement of the user on a separate read-only connection, and passes the rows to `answer`.
     ///
     /// # Errors
-    /// [`LibraryError::OnlyReads`] for a statement that would write, [`LibraryError::BadQuery`] for
-    /// one that the database rejects; or the error of `answer`.
+    /// Returns [`LibraryError::OnlyReads`] for a statement that would write, [`LibraryError::BadQuery`] for
+    /// a statement that the database rejects, or the error of `answer`.
     pub async fn query<A: Answer>(&self, text: &str, answer: &mut A) -> Result<(), A::Error> {
         match self.target() {
             Target::Sqlite(path) => sqlite(path, text, answer).await,
@@ -95,8 +95,8 @@ async fn postgres<A: Answer>(
     Ok(())
 }
 
-/// The same statement with columns of types without a cell (times, decimal numbers, arrays of
-/// integers) cast to text; `None` if there are no such columns.
+/// Returns the statement with a cast to text for columns whose type has no cell (times, decimal numbers,
+/// arrays of integers); `None` if there are no such columns.
 fn with_texts(text: &str, columns: &[PgColumn]) -> Option<String> {
     let is_cell = |column: &PgColumn| decode::is_postgres_cell(column.type_info().name());
     if columns.iter().all(is_cell) {
@@ -119,8 +119,8 @@ fn names<C: Column>(columns: &[C]) -> Vec<String> {
     columns.iter().map(|column| schema::spelled(column.name()).to_owned()).collect()
 }
 
-/// `SQLITE_READONLY` and its kin end so; PostgreSQL's codes for a transaction that only reads, and for what
-/// can't be written because it is a view.
+/// Converts the error of a statement. `SQLITE_READONLY` and its extended codes have this low byte.
+/// PostgreSQL has one code for a read-only transaction and one for a view that cannot be written.
 fn refused(error: sqlx::Error) -> LibraryError {
     let sqlx::Error::Database(database) = &error else { return error.into() };
     let code = database.code().unwrap_or_default();

@@ -1,20 +1,19 @@
-//! Whether a text is one statement that asks.
+//! Checks that a text is a single SQL statement that only reads.
 //!
-//! No statement can change a file opened read-only, or a database in a read-only transaction. But
-//! `vacuum into` and `copy` write other files, and `SQLite` runs several statements one after the
-//! other.
+//! No statement can change a file that was opened read-only, or a database in a read-only transaction. But
+//! `vacuum into` and `copy` write other files, and `SQLite` runs several statements in one call.
 
 use crate::LibraryError;
 use crate::engine::Dialect;
 
-/// Words that statements begin with that only ask.
+/// First keywords of statements that only read.
 const ASKING: [&str; 4] = ["select", "with", "values", "explain"];
 
-/// More of them.
+/// Further first keywords, for `SQLite` only.
 const ASKING_SQLITE: [&str; 1] = ["pragma"];
 const ASKING_POSTGRES: [&str; 2] = ["show", "table"];
 
-/// Refuses what is not a single asking statement.
+/// Returns an error unless the text is a single statement that only reads.
 pub(super) fn check(text: &str, dialect: Dialect) -> Result<(), LibraryError> {
     let bare = bare(text, dialect);
     let bare = bare.trim().trim_end_matches(';').trim();
@@ -39,7 +38,7 @@ pub(super) fn check(text: &str, dialect: Dialect) -> Result<(), LibraryError> {
     }
 }
 
-/// The text without quoted parts and comments.
+/// Returns the text without quoted parts and comments.
 fn bare(text: &str, dialect: Dialect) -> String {
     let mut bare = String::new();
     let mut rest = text;
@@ -68,7 +67,7 @@ fn bare(text: &str, dialect: Dialect) -> String {
     bare
 }
 
-/// The text after its leading comment; comments of PostgreSQL can be nested.
+/// Returns the text after its leading comment. In PostgreSQL, comments can be nested.
 fn after_remark(text: &str, dialect: Dialect) -> &str {
     let mut rest = &text[2..];
     let mut depth = 1;

@@ -1,4 +1,4 @@
-//! Reading tables out, whole.
+//! Reading of complete tables.
 
 use super::attest::Attestation;
 use super::{Cell, Table, decode};
@@ -7,10 +7,10 @@ use crate::{Library, LibraryError};
 use tokio_stream::StreamExt;
 
 impl Library {
-    /// Hands the rows of a table to `take`, by its key, at most `rows_max` at a time.
+    /// Passes all rows of a table to `take`, in the order of the table's key, at most `rows_max` per call.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library cannot be read, or results do not match their checksum; or
+    /// Returns [`LibraryError`] if the library cannot be read or results do not match their checksum, or
     /// the error of `take`.
     pub async fn read_table<E: From<LibraryError>>(
         &self,
@@ -27,8 +27,8 @@ impl Library {
         Ok(attestation.end()?)
     }
 
-    /// Passes the rows of a statement to `take`; distinguishes errors of reading from errors of
-    /// `take`.
+    /// Passes the rows of a statement to `take`. The inner result has an error of reading, the outer one an
+    /// error of `take`.
     pub(super) async fn read<E>(
         &self,
         table: &Table,
@@ -57,7 +57,7 @@ impl Library {
         Ok(Ok(()))
     }
 
-    /// How many rows a table has.
+    /// Number of rows of a table.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be read.
@@ -69,7 +69,7 @@ impl Library {
     }
 }
 
-/// Asks for all of a table by its key, in this direction (`desc`, or nothing).
+/// Statement that selects all rows of a table, ordered by the key in this direction (`desc`, or empty).
 pub(super) fn by_key(table: &Table, direction: &str) -> Statement {
     let key: Vec<_> = table.key.iter().map(|column| format!("{column} {direction}")).collect();
     let (columns, name, key) = (table.column_list(), table.name, key.join(", "));

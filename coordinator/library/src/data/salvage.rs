@@ -1,41 +1,41 @@
-//! Reading what is whole of a malformed library.
+//! Reading of the intact rows of a damaged library.
 
 use super::{Cell, Table, read};
 use crate::engine::{Dialect, Statement, sql};
 use crate::{Library, LibraryError};
 use std::ops::Range;
 
-/// Rows or cases that are asked for together; what cannot be read is asked for in halves.
+/// Number of rows or cases that are read together. A range that cannot be read is divided into halves.
 const TOGETHER: i64 = 1024;
 
-/// The largest index searched when the number of cases is unknown.
+/// Upper limit of the indices searched if the number of cases is unknown.
 const INDICES_MAX: i64 = 1 << 20;
 
 /// Unreadable rows of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lost {
-    /// How many rows at most, if that is known; of cases, each counts as one.
+    /// Maximum number of lost rows, if it is known. In a range of cases, each case counts as one row.
     pub rows: Option<u64>,
-    /// Error of the database at the first of them.
+    /// Error of the database at the first unreadable row.
     pub reason: String,
 }
 
-/// How the rows of a table are found one by one.
+/// How to address the rows of a table one by one.
 enum Way {
-    /// By the numbers that `SQLite` gives them, past every index.
+    /// By `rowid` of `SQLite`, without use of any index.
     Rowid { max: i64 },
-    /// By campaign and index.
+    /// By campaign and case index.
     Index { campaigns: Vec<(String, i64)> },
-    /// Not at all: from either end, as far as possible.
+    /// Not possible: the table is read from both ends, as far as possible.
     Ends,
 }
 
 impl Library {
-    /// As [`Library::read_table`], but skips unreadable rows and returns what was skipped. Rows may
-    /// then come twice and in any order.
+    /// As [`Library::read_table`], but skips unreadable rows and returns what was skipped. A row may be
+    /// passed to `take` twice, and the order of the rows is undefined.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library does not respond; or the error of `take`.
+    /// Returns [`LibraryError`] if the library does not respond, or the error of `take`.
     pub async fn read_what_is_whole<E: From<LibraryError>>(
         &self,
         table: &Table,
@@ -82,8 +82,8 @@ impl Library {
         Ok((rows > 0).then_some(Lost { rows: Some(rows), reason }))
     }
 
-    /// Reads a table in ranges, and those that cannot be read in halves; answers how many single numbers could
-    /// not.
+    /// Reads a table in ranges of numbers, and divides unreadable ranges into halves. Returns how many
+    /// single numbers could not be read.
     async fn read_ranges<E: From<LibraryError>>(
         &self,
         table: &Table,
@@ -134,7 +134,7 @@ impl Library {
         Way::Index { campaigns: known }
     }
 
-    /// The largest number of a row; none where rows have no numbers.
+    /// The largest `rowid` of a table; `None` if its rows have none.
     async fn largest_rowid(&self, table: &Table) -> Option<i64> {
         // Where the table's own end cannot be read, its index knows as well.
         for order in ["rowid", &table.key.join(", ")] {

@@ -1,4 +1,4 @@
-//! Tables and columns of the schema; the same in both databases.
+//! Tables and columns of the schema. They are equal in both databases.
 
 use crate::result::LEVEL_COLUMNS;
 use ColumnKind::{Doubles, Integer, Real, Text};
@@ -9,35 +9,35 @@ use tracktwin_parameters::Parameter;
 pub enum ColumnKind {
     /// Text.
     Text,
-    /// Integers of 64 bits.
+    /// Integer of 64 bits.
     Integer,
-    /// Numbers.
+    /// Floating-point number of 64 bits.
     Real,
-    /// Series of numbers.
+    /// Series of floating-point numbers.
     Doubles,
 }
 
-/// A column.
+/// A column of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// Its name, with its unit.
+    /// Name of the column, with its unit.
     pub name: &'static str,
-    /// Its type.
+    /// Type of the column.
     pub kind: ColumnKind,
 }
 
-/// A table that is read out and written in.
+/// A table that can be exported and imported.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Table {
-    /// Its name.
+    /// Name of the table.
     pub name: &'static str,
-    /// Its columns.
+    /// The columns, in the order of the cells of a row.
     pub columns: &'static [Column],
-    /// The columns of its key.
+    /// Names of the columns of the primary key.
     pub key: &'static [&'static str],
 }
 
-/// Writes columns down: those of a table's own in brackets, or the name of some that several tables have.
+/// Defines columns: those of one table in brackets, or the name of a list shared by several tables.
 macro_rules! columns {
     ([$($column:literal $kind:ident),* $(,)?]) => {
         [$(Column { name: $column, kind: $kind }),*].as_slice()
@@ -47,7 +47,7 @@ macro_rules! columns {
     };
 }
 
-/// Writes a table down: its name, its key, and its columns with their kinds.
+/// Defines tables: name, key, and columns with their types.
 macro_rules! tables {
     ($($(#[$doc:meta])* $constant:ident = $name:literal by [$($key:literal),+] { $($part:tt),+ })+) => {$(
         $(#[$doc])*
@@ -87,7 +87,7 @@ const fn joined<const N: usize>(parts: &[&[Column]]) -> [Column; N] {
     columns
 }
 
-/// The catalogue's parameters.
+/// Columns of the catalogue's parameters.
 const PARAMETERS: [Column; Parameter::COUNT] = {
     let mut columns = [Column { name: "", kind: Real }; Parameter::COUNT];
     let mut place = 0;
@@ -98,7 +98,7 @@ const PARAMETERS: [Column; Parameter::COUNT] = {
     columns
 };
 
-/// Their means and standard deviations.
+/// Columns of the means and standard deviations of the parameters.
 const ESTIMATES: [Column; 2 * Parameter::COUNT] = {
     let mut columns = [Column { name: "", kind: Real }; 2 * Parameter::COUNT];
     let mut place = 0;
@@ -110,10 +110,10 @@ const ESTIMATES: [Column; 2 * Parameter::COUNT] = {
     columns
 };
 
-/// Suffix of a parameter's standard deviation.
+/// Suffix of the column with a parameter's standard deviation.
 const DEVIATION: &[u8] = b"_sd";
 
-/// The name of a parameter's standard deviation.
+/// Name of the column with a parameter's standard deviation.
 const fn deviation(place: usize) -> &'static str {
     const BYTES_MAX: usize = 64;
     const NAMES: &[[u8; BYTES_MAX]; Parameter::COUNT] = &{
@@ -138,7 +138,7 @@ const fn deviation(place: usize) -> &'static str {
     }
 }
 
-/// Levels of one-third octaves.
+/// Columns of the one-third-octave levels.
 const LEVELS: [Column; LEVEL_COLUMNS.len()] = {
     let mut columns = [Column { name: "", kind: Real }; LEVEL_COLUMNS.len()];
     let mut place = 0;
@@ -150,9 +150,8 @@ const LEVELS: [Column; LEVEL_COLUMNS.len()] = {
 };
 
 impl Table {
-    /// All tables, those first that others refer to. What follows from others is not among them:
-    /// counts of cases; nor are the
-    /// leases of trials, which don't travel.
+    /// All tables, each after the tables that it refers to. Derived tables, such as the counts of cases,
+    /// are left out. The leases of trials are left out as well, because leases are not copied.
     pub const ALL: [&'static Self; 19] = [
         &CAMPAIGN,
         &CAMPAIGN_CASE,
@@ -175,16 +174,16 @@ impl Table {
         &STORED_ARRAY,
     ];
 
-    /// The view of one row a case and speed, parameters beside features: what a table of a training
-    /// set looks like.
+    /// The view with one row per case and speed, which contains parameters and features. A table of a
+    /// training set has the same columns.
     pub const ENTRIES: &'static Self = &RESULT_WITH_PARAMETERS;
 
-    /// The table of this name.
+    /// Returns the table with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|table| table.name == name)
     }
 
-    /// The names of the columns, after each other.
+    /// Names of all columns, separated by commas.
     pub(crate) fn column_list(&self) -> String {
         self.columns.iter().map(|column| column.name).collect::<Vec<_>>().join(", ")
     }
@@ -194,7 +193,7 @@ impl Table {
     }
 }
 
-/// As the schema spells a column that PostgreSQL answers in lower case.
+/// Spelling of a column in the schema, from the lower-case spelling that PostgreSQL returns.
 pub(crate) fn spelled(folded: &str) -> &str {
     let columns = Table::ALL.into_iter().flat_map(|table| table.columns);
     let mut names = columns.map(|column| column.name);

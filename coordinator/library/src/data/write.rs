@@ -1,4 +1,4 @@
-//! Writing rows in that came from another library.
+//! Import of rows from another library.
 
 use super::{Cell, Column, Table, decode};
 use crate::case::case_in;
@@ -7,11 +7,11 @@ use crate::result::{Attested, Gathering};
 use crate::{Library, LibraryError, result};
 use std::collections::HashSet;
 
-/// Rows in one statement: of the widest table's 38 columns well below the 32,766 values that
-/// `SQLite` takes.
+/// Maximum number of rows in one statement. The widest table has 38 columns, and `SQLite` accepts 32,766
+/// values.
 const ROWS_A_STATEMENT: usize = 250;
 
-/// Says that cases which have a result at each speed are finished.
+/// Sets the state of all cases with a result at each speed to finished.
 const FINISH_ALL_CASES: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
@@ -28,7 +28,7 @@ const FINISH_ALL_CASES: Text = Text::Each {
                 where campaign.id = campaign_case.campaign_id)",
 };
 
-/// The same of a campaign's ($1) cases ($2).
+/// As [`FINISH_ALL_CASES`], for the cases ($2) of a campaign ($1).
 const FINISH_THESE_CASES: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'finished', error = null, lease_expires_unix_ms = null
@@ -45,7 +45,7 @@ const FINISH_THESE_CASES: Text = Text::Each {
                 where campaign.id = campaign_case.campaign_id)",
 };
 
-/// The passes of cases, and how many speeds their campaign has.
+/// The passes of cases, and the number of speeds of their campaign.
 const PASSES: Text = Text::Each {
     sqlite: "
         select *, (select json_array_length(speeds_km_h) from campaign where id = $1) as speeds
@@ -60,14 +60,14 @@ const PASSES: Text = Text::Each {
 };
 
 impl Library {
-    /// Adds rows that are not there yet; answers how many these were.
+    /// Adds rows that do not exist yet. Returns the number of added rows.
     ///
-    /// Leases don't travel: a case that was leased elsewhere waits here.
+    /// Leases are not copied: a case that is leased in the other library becomes waiting in this one.
     ///
     /// # Errors
-    /// [`LibraryError::OtherDefinition`] for a campaign that is another here;
-    /// [`LibraryError::BadRow`] for cells that don't fit their columns, a case that doesn't have its hash or
-    /// results that don't have their checksum; or when the library cannot be written.
+    /// Returns [`LibraryError::OtherDefinition`] if a campaign exists here with another definition;
+    /// [`LibraryError::BadRow`] if cells do not fit their columns, a case does not match its hash, or
+    /// results do not match their checksum; or another error if the library cannot be written.
     pub async fn write_table(
         &self,
         table: &'static Table,
@@ -81,8 +81,8 @@ impl Library {
         Ok(added)
     }
 
-    /// As [`Library::write_table`], but leaves out the rows that are refused: answers how many were added, and
-    /// why others were not.
+    /// As [`Library::write_table`], but skips refused rows. Returns the number of added rows, and an error
+    /// for each refused row.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -107,7 +107,7 @@ impl Library {
         Ok((added, refused))
     }
 
-    /// Rows of one statement.
+    /// Adds the rows of one statement.
     async fn write_rows(
         &self,
         table: &'static Table,
@@ -120,7 +120,7 @@ impl Library {
         if rows.is_empty() { Ok(0) } else { self.write(Rows { table, rows }).await }
     }
 
-    /// Leaves out rows of cases that are here, so that going on with a copy costs little.
+    /// Removes rows that this library already has, so that an interrupted copy continues quickly.
     async fn without_those_here(
         &self,
         table: &Table,
@@ -176,8 +176,9 @@ impl Library {
         Ok(())
     }
 
-    /// Marks all cases with complete results as finished, as [`Self::write_table`] does for the
-    /// results that it adds; this repairs a copy that was interrupted between the passes of a case.
+    /// Marks all cases with complete results as finished, as [`Self::write_table`] does for added results.
+    /// This call repairs a copy that was interrupted between the passes of a case. Returns the number of
+    /// such cases.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -186,7 +187,7 @@ impl Library {
     }
 }
 
-/// Refuses cases that do not have their hash.
+/// Returns an error for cases that do not match their hash.
 fn refuse_other_parameters(table: &Table, rows: &[Vec<Cell>]) -> Result<(), LibraryError> {
     let Some(hash) = table.column("parameter_hash").filter(|_| table.name == "campaign_case")
     else {
@@ -205,7 +206,7 @@ fn refuse_other_parameters(table: &Table, rows: &[Vec<Cell>]) -> Result<(), Libr
     Ok(())
 }
 
-/// A key as text; numbers in one way only, so equal keys have equal texts.
+/// Text of a key. Each number has only one text, so that equal keys have equal texts.
 fn key(cells: &[Cell]) -> String {
     format!("{cells:?}")
 }
@@ -217,7 +218,7 @@ fn integer(cell: &Cell) -> Option<i64> {
     }
 }
 
-/// A row without a lease; a case becomes finished when its results are stored as well.
+/// Returns the row without a lease. A case becomes finished only when its results are stored as well.
 fn without_lease(table: &Table, mut row: Vec<Cell>) -> Vec<Cell> {
     let state = table.column("state");
     let expires = table.column("lease_expires_unix_ms");
@@ -276,8 +277,8 @@ impl Rows {
         Ok(())
     }
 
-    /// Reads these rows' cases again as they are stored now, and refuses them where one whose passes are all
-    /// here does not have its checksum.
+    /// Reads the cases of these rows again, as stored now. Returns an error if a case with all its passes
+    /// does not match its checksum.
     async fn refuse_altered(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let mut campaigns = self.texts("campaign_id");
         campaigns.dedup();
@@ -306,7 +307,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Locks the cases of these results, which must all be there.
+    /// Locks the cases of these results. Returns an error if a case is missing.
     async fn lock_cases(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let (campaigns, indices) = (self.texts("campaign_id"), self.integers("sobol_index"));
         let expected = campaigns.iter().zip(&indices).collect::<HashSet<_>>().len() as u64;
@@ -318,7 +319,7 @@ impl Rows {
         Err(LibraryError::BadRow { table: self.table.name, what })
     }
 
-    /// A statement with the cells of all rows.
+    /// The statement with the cells of all rows bound.
     fn bound(&self, statement: String) -> Result<Statement, LibraryError> {
         let columns = self.table.columns;
         let misfit = |what: String| LibraryError::BadRow { table: self.table.name, what };
@@ -336,7 +337,7 @@ impl Rows {
         Ok(statement)
     }
 
-    /// The cells of a column.
+    /// The cells of one column.
     fn column(&self, name: &str) -> impl Iterator<Item = &Cell> {
         let place = self.table.column(name);
         self.rows.iter().filter_map(move |row| row.get(place?))

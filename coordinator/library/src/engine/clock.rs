@@ -3,29 +3,29 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// After so long a server is asked for its time again, for no two clocks run equally fast.
+/// Interval of reading the server's time again, because two clocks never run at the same rate.
 const READ_EVERY: Duration = Duration::from_mins(1);
 
-/// The clock of leases: this machine's with `SQLite`, the server's with PostgreSQL, so that
-/// coordinators agree on the end of a lease, independent of their own clocks.
+/// The clock of leases. With `SQLite` it is the clock of this machine, with PostgreSQL that of the server.
+/// Coordinators therefore agree on the end of a lease, independent of their own clocks.
 pub(crate) enum Clock {
     Machine,
     Server(Mutex<Reading>),
 }
 
-/// Last reading of the server's clock, and its local time.
+/// Last reading of the server's clock, and the local time of this reading.
 pub(crate) struct Reading {
     unix_ms: i64,
     at: Instant,
 }
 
 impl Clock {
-    /// A server's clock with its present reading.
+    /// Creates the clock of a server from its present time.
     pub(super) fn server(unix_ms: i64) -> Self {
         Self::Server(Mutex::new(Reading { unix_ms, at: Instant::now() }))
     }
 
-    /// The time now, in ms since 1970.
+    /// The present time, in ms since 1970.
     pub(crate) fn unix_ms(&self) -> i64 {
         match self {
             Self::Machine => {
@@ -39,7 +39,7 @@ impl Clock {
         }
     }
 
-    /// Whether the server is to be asked again.
+    /// Whether the server's time must be read again.
     pub(super) fn is_old(&self) -> bool {
         match self {
             Self::Machine => false,
@@ -50,7 +50,7 @@ impl Clock {
         }
     }
 
-    /// Takes a reading of the server's clock.
+    /// Stores a new reading of the server's clock.
     pub(super) fn set(&self, unix_ms: i64) {
         if let Self::Server(reading) = self {
             let reading = &mut *reading.lock().expect("nobody panics while holding it");

@@ -9,10 +9,10 @@ use sqlx::{Connection as _, PgConnection, PgPool, SqliteConnection, SqlitePool};
 use std::pin::Pin;
 use tokio_stream::{Stream, StreamExt};
 
-/// Where every statement of a connection that writes is shown, at the level `trace`.
+/// Target of the log events (level `trace`) with each statement of a writing connection.
 const STATEMENTS: &str = "tracktwin_library::statements";
 
-/// A connection that writes, inside a transaction.
+/// A writing connection, inside a transaction.
 pub(crate) enum Connection {
     Sqlite(SqliteConnection, OpenFile),
     Postgres(PgConnection),
@@ -26,7 +26,7 @@ impl Connection {
         }
     }
 
-    /// Runs a statement; answers how many rows it changed.
+    /// Runs a statement. Returns the number of changed rows.
     pub(crate) async fn execute(&mut self, statement: Statement) -> Result<u64, LibraryError> {
         self.tell(&statement);
         Ok(match self {
@@ -53,8 +53,8 @@ impl Connection {
         })
     }
 
-    /// Traces a statement; a test compares the description of the lease protocol with these
-    /// (docs/lease-protocol.md).
+    /// Traces a statement. A test compares the description of the lease protocol (docs/lease-protocol.md)
+    /// with these traces.
     fn tell(&self, statement: &Statement) {
         tracing::trace!(target: STATEMENTS, text = &*statement.text(self.dialect()));
     }
@@ -63,13 +63,13 @@ impl Connection {
         Ok(self.rows(statement).await?.into_iter().next())
     }
 
-    /// The places of cases that a statement answers, in its order.
+    /// The case indices that a statement returns, in its order.
     pub(crate) async fn indices(&mut self, statement: Statement) -> Result<Vec<i64>, LibraryError> {
         self.rows(statement).await?.iter().map(|row| row.get("sobol_index")).collect()
     }
 
-    /// Begins a transaction; with `SQLite` as one that writes, for a reading one that becomes a
-    /// writing one may be refused despite any timeout.
+    /// Begins a transaction. With `SQLite` it is a writing transaction from the start: a change from
+    /// reading to writing may be refused despite a timeout.
     pub(super) async fn begin(&mut self) -> Result<(), LibraryError> {
         let text = match self {
             Self::Sqlite(..) => "begin immediate",
@@ -78,7 +78,7 @@ impl Connection {
         self.execute(sql(text)).await.map(drop)
     }
 
-    /// Commits the transaction; with `SQLite` only to a file that others still find.
+    /// Commits the transaction. With `SQLite`, checks before that the file still exists at its path.
     pub(super) async fn commit(&mut self) -> Result<(), LibraryError> {
         if let Self::Sqlite(_, file) = self {
             file.check()?;
@@ -86,7 +86,7 @@ impl Connection {
         self.execute(sql("commit")).await.map(drop)
     }
 
-    /// Leaves nothing of the present transaction, if there is one.
+    /// Rolls the present transaction back, if there is one.
     pub(super) async fn rollback(&mut self) {
         // It fails if the database has rolled back already, or if the connection is lost.
         let _ = self.execute(sql("rollback")).await;
@@ -101,7 +101,7 @@ impl Connection {
     }
 }
 
-/// Connections that read.
+/// The reading connections.
 #[derive(Clone)]
 pub(crate) enum Readers {
     Sqlite(SqlitePool),
@@ -116,7 +116,7 @@ impl Readers {
         }
     }
 
-    /// All rows at once, waiting for a database that is away.
+    /// Returns all rows. An unavailable database is retried within the retry budget.
     pub(crate) async fn rows(&self, statement: Statement) -> Result<Vec<Row>, LibraryError> {
         let mut budget = RetryBudget::new(true);
         loop {
@@ -132,7 +132,8 @@ impl Readers {
         }
     }
 
-    /// A server that does not respond is treated as lost, even if the network reports no error.
+    /// Applies a time limit to calls of a server. A server that does not respond counts as lost, even if
+    /// the network reports no error.
     async fn within_bounds<T>(
         &self,
         asked: impl Future<Output = Result<T, LibraryError>>,
@@ -149,7 +150,7 @@ impl Readers {
         Ok(self.rows(statement).await?.into_iter().next())
     }
 
-    /// The rows as they come, so that memory does not grow with their number.
+    /// Returns the rows as a stream, so that the memory does not grow with their number.
     pub(crate) fn stream(
         &self,
         statement: Statement,
@@ -166,8 +167,8 @@ impl Readers {
         }
     }
 
-    /// Refuses a database whose pages do not fit together. A server looks at its pages itself, at each that it
-    /// reads.
+    /// Checks that the pages of the database are consistent. A PostgreSQL server checks each page itself
+    /// when it reads the page.
     ///
     /// # Errors
     /// [`LibraryError::Malformed`].

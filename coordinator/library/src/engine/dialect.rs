@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-/// Whose SQL is spoken.
+/// The SQL dialect of a database.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Dialect {
     Sqlite,
@@ -11,7 +11,7 @@ pub(crate) enum Dialect {
 }
 
 impl Dialect {
-    /// That a value is one of the list bound as `$N`.
+    /// SQL for `value in (list)`, with the list bound as `$N`.
     pub(crate) fn listed(self, list: &str) -> String {
         match self {
             Self::Sqlite => format!("in (select value from json_each({list}))"),
@@ -19,10 +19,11 @@ impl Dialect {
         }
     }
 
-    /// Placeholders of `rows` rows of values, the only values of their statement: `(?, ?), (?, ?)`.
+    /// Placeholders for `rows` rows, such as `(?, ?), (?, ?)`. They must be the only values of the
+    /// statement.
     ///
-    /// `SQLite` looks a named place up among all that have names, so that a statement with a thousand
-    /// of `$1`, `$2`, ... takes a million steps; question marks have none.
+    /// `SQLite` searches a named placeholder among all named ones. A statement with a thousand of `$1`,
+    /// `$2`, ... therefore needs a million steps; question marks have no name.
     pub(crate) fn rows_of_values(self, rows: usize, values: usize) -> String {
         let mut text = String::with_capacity(rows * values * 4);
         for row in 0..rows {

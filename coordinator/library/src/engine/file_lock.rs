@@ -1,4 +1,4 @@
-//! The lock of a library's file: on the file itself, independent of its name.
+//! The lock of a library's file. The lock is on the file itself and does not depend on the file's name.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -8,7 +8,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 
-/// The files that this process has locked once, by device and inode.
+/// The files that this process has locked at least once, by device and inode.
 ///
 /// No descriptor is closed before the process exits: closing any descriptor of a file releases all
 /// POSIX locks of the process on that file, including those of `SQLite`.
@@ -17,7 +17,7 @@ static FILES: Mutex<BTreeMap<Identity, Locked>> = Mutex::new(BTreeMap::new());
 /// Device and inode: identity of a file, independent of links and mounts.
 pub(super) type Identity = [u64; 2];
 
-/// The file at a path, if there is one.
+/// Identity of the file at a path; `None` if there is no file.
 pub(super) fn identity(path: &Path) -> Option<Identity> {
     std::fs::metadata(path).ok().as_ref().map(identity_of)
 }
@@ -28,25 +28,26 @@ fn identity_of(file: &std::fs::Metadata) -> Identity {
 
 struct Locked {
     file: File,
-    /// Whether a [`FileLock`] of this process holds it.
+    /// Whether a [`FileLock`] of this process holds the lock at present.
     held: bool,
 }
 
-/// The right to hand out the cases of a file, until it is dropped. The system takes it back when the
-/// process ends, however it ends.
+/// The right to lease the cases of a file, until it is dropped. The operating system releases the lock when
+/// the process ends for any reason.
 #[derive(Debug)]
 pub(crate) struct FileLock {
-    /// None where the file system answers for its locks by name only.
+    /// `None` if the file system only supports locks on `_beside`.
     identity: Option<Identity>,
-    /// A file beside the library: what earlier versions of the program lock.
+    /// Locked file beside the library. Earlier versions of the program lock only this file.
     _beside: File,
 }
 
 impl FileLock {
-    /// Takes the lock; none while another has it, in this process or in another.
+    /// Takes the lock; `None` if another holder has it, in this process or in another.
     ///
     /// # Errors
-    /// The error of the system if the file system has no locks, or the folder is not writable.
+    /// Returns the error of the operating system if the file system has no locks or the folder is not
+    /// writable.
     pub(crate) fn try_take(path: &Path) -> io::Result<Option<Self>> {
         let beside = File::create(beside(&path.canonicalize()?))?;
         match beside.try_lock() {
@@ -76,7 +77,7 @@ impl Drop for FileLock {
     }
 }
 
-/// Locks the file at a path; answers which, or none while another holds it.
+/// Locks the file at a path. Returns its identity; `None` if another holder has the lock.
 fn hold(path: &Path) -> io::Result<Option<Identity>> {
     let mut files = files();
     let mut found = identity_of(&std::fs::metadata(path)?);

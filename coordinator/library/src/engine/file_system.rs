@@ -1,12 +1,11 @@
-//! Which file systems a library in a file should not be on.
+//! Detection of file systems that are unsuitable for a library in a file.
 
 use std::path::Path;
 
-/// File systems that several machines may share, by their magic number of `statfs(2)`, with their
-/// names.
+/// File systems that several machines may share: magic number of `statfs(2)`, and name.
 ///
-/// `SQLite`'s locks and the memory that its log shares between processes work at most between the
-/// processes of one host there, and on some not at all.
+/// There, the locks of `SQLite` and the shared memory of its log work at most between processes of one
+/// machine, and on some file systems not at all.
 const SHARED: [(u32, &str); 15] = [
     (0x0000_6969, "NFS"),
     (0x0000_517b, "SMB"),
@@ -25,7 +24,7 @@ const SHARED: [(u32, &str); 15] = [
     (0x6573_5546, "FUSE"),
 ];
 
-/// Name of the file system at a path, if several machines may share it.
+/// Name of the file system at a path, if several machines may share it; otherwise `None`.
 pub(crate) fn shared_between_hosts(path: &Path) -> Option<&'static str> {
     // A file that is still to be made lies where its folder does.
     let place = path.ancestors().find(|it| it.exists()).filter(|it| !it.as_os_str().is_empty());

@@ -1,9 +1,9 @@
-//! Instants as text.
+//! Formatting of instants.
 
 use time::OffsetDateTime;
 
-/// An instant as ISO 8601 with milliseconds, as in `2026-11-21T08:20:49.125Z`; 1970 for one beyond
-/// the calendar of four digits.
+/// Formats an instant as ISO 8601 with milliseconds, as in `2026-11-21T08:20:49.125Z`. An instant outside
+/// years of four digits becomes 1970.
 pub(crate) fn iso_utc(unix_ms: i64) -> String {
     let at = OffsetDateTime::from_unix_timestamp_nanos(i128::from(unix_ms) * 1_000_000)
         .unwrap_or(OffsetDateTime::UNIX_EPOCH);
@@ -17,7 +17,7 @@ pub(crate) fn iso_utc(unix_ms: i64) -> String {
 mod tests {
     use super::iso_utc;
 
-    /// Format of `date -u -d @SECONDS +%FT%T`.
+    /// The expected values are from `date -u -d @SECONDS +%FT%T`.
     #[test]
     fn instants_read_as_the_calendar_has_them() {
         assert_eq!(iso_utc(0), "1970-01-01T00:00:00.000Z");

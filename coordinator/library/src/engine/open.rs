@@ -1,4 +1,4 @@
-//! Opening a library, whichever database it is in.
+//! Opening of a library in either database.
 
 use super::clock::Clock;
 use super::{Readers, Target, Writer, postgres, sqlite};
@@ -6,7 +6,7 @@ use crate::LibraryError;
 use std::path::Path;
 use std::sync::Arc;
 
-/// An open library's connections.
+/// Connections of an open library.
 pub(crate) struct Opened {
     pub(crate) target: Target,
     pub(crate) readers: Readers,
@@ -23,7 +23,7 @@ pub(crate) async fn open(url: &str) -> Result<Opened, LibraryError> {
     connect(target, false).await
 }
 
-/// Opens a library, or makes an empty one.
+/// Opens a library, or creates an empty one.
 pub(crate) async fn open_or_create(url: &str) -> Result<Opened, LibraryError> {
     let target = parse(url)?;
     let folder = target.path().and_then(Path::parent);

@@ -1,4 +1,4 @@
-//! A library on a server.
+//! A library on a PostgreSQL server.
 
 use super::clock::Clock;
 use super::{Connection, Readers, views};
@@ -10,19 +10,19 @@ use std::time::Duration;
 
 static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations/postgres");
 
-/// Connections of one coordinator that read beside the one that writes.
+/// Number of reading connections of one coordinator, in addition to the writing ones.
 const READERS: u32 = 4;
 
-/// How long a reader waits for a free connection, or for the server to come back.
+/// Time limit of waiting for a free reading connection, or for the return of the server.
 const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// How long a connection may take: a server on the other side of the world answers within a second or two.
+/// Time limit of connecting. Even a very distant server responds within one or two seconds.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Key of the advisory lock for creating views; an arbitrary unique number.
 const VIEWS_LOCK: i64 = 0x7477_696e;
 
-/// Opens the library in this database and brings its schema up to date; answers also the server's clock.
+/// Opens the library in this database and updates its schema. Also returns the server's clock.
 pub(super) async fn open(
     options: &PgConnectOptions,
     name: &str,
@@ -48,13 +48,14 @@ pub(super) async fn open(
     Ok((Readers::Postgres(readers), clock))
 }
 
-/// A connection that writes.
+/// Opens a writing connection.
 pub(super) async fn connect(options: &PgConnectOptions) -> Result<Connection, LibraryError> {
     Ok(Connection::Postgres(within_bounds(options).await?))
 }
 
-/// A connection, or an error within [`CONNECT_TIMEOUT`]: an address that swallows what is sent to it
-/// would be waited for for minutes, and a port that takes connections but never answers for ever.
+/// Opens a connection, or returns an error after [`CONNECT_TIMEOUT`]. Without this limit, an address that
+/// discards packets would block for minutes, and a port that accepts connections without a response would
+/// block for ever.
 async fn within_bounds(options: &PgConnectOptions) -> Result<PgConnection, sqlx::Error> {
     let silent = || {
         let reason = format!("no response within {} s", CONNECT_TIMEOUT.as_secs());
@@ -81,7 +82,7 @@ fn unreachable(error: sqlx::Error, name: &str) -> LibraryError {
     }
 }
 
-/// Whether the library's tables are there; refuses a database that holds other things.
+/// Whether the library's tables exist. Returns an error if the database contains other tables only.
 async fn refuse_foreign_database(
     connection: &mut PgConnection,
     name: &str,
@@ -100,8 +101,8 @@ async fn refuse_foreign_database(
     }
 }
 
-/// Brings the tables up to date; answers whether anything was to be done. Somebody who may only read is not asked to
-/// write where nothing needs to be.
+/// Updates the tables, and returns whether an update was needed. Without need for an update nothing is
+/// written, so that a read-only role can open the library.
 async fn migrate(
     connection: &mut PgConnection,
     name: &str,
@@ -128,7 +129,7 @@ async fn migrate(
     })
 }
 
-/// Makes the views as this program has them, unless they are of a later one.
+/// Creates the views of this program version, unless the existing views are of a later one.
 async fn make_views(connection: &mut PgConnection) -> Result<(), LibraryError> {
     let mut alone = connection.begin().await?;
     // Of those who open it at once one makes them after the other.
@@ -139,15 +140,15 @@ async fn make_views(connection: &mut PgConnection) -> Result<(), LibraryError> {
     Ok(alone.commit().await?)
 }
 
-/// Version of the existing views; 0 for those created by migrations. A comment is readable without
-/// any other right.
+/// Version of the existing views; 0 for those created by migrations. It is stored in a comment, which every
+/// role can read.
 async fn views_version(connection: &mut PgConnection) -> Result<i64, LibraryError> {
     let ask = "select coalesce(cast(substring(
             obj_description(to_regclass('campaign_status'), 'pg_class') from '[0-9]+$') as bigint), 0)";
     Ok(sqlx::query_scalar(ask).fetch_one(connection).await?)
 }
 
-/// The server's time, in ms since 1970.
+/// Present time of the server, in ms since 1970.
 pub(super) async fn unix_ms(connection: &mut PgConnection) -> Result<i64, LibraryError> {
     let ask = "select (extract(epoch from clock_timestamp()) * 1000)::bigint";
     Ok(sqlx::query_scalar(ask).fetch_one(connection).await?)

@@ -7,7 +7,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{Decode, Postgres, Sqlite, Type};
 use std::borrow::Cow;
 
-/// A row that a statement answered.
+/// A row returned by a statement.
 pub(crate) enum Row {
     Sqlite(SqliteRow),
     Postgres(PgRow),
@@ -25,7 +25,7 @@ impl<T> Column for T where
 }
 
 impl Row {
-    /// The value of a column.
+    /// The value of a column, by name.
     pub(crate) fn get<T: Column>(&self, column: &str) -> Result<T, LibraryError> {
         Ok(match self {
             Self::Sqlite(row) => sqlx::Row::try_get(row, column)?,
@@ -33,14 +33,14 @@ impl Row {
         })
     }
 
-    /// A count or an index.
+    /// The value of a column with a count or an index.
     pub(crate) fn get_u32(&self, column: &str) -> Result<u32, LibraryError> {
         let value: i64 = self.get(column)?;
         u32::try_from(value)
             .map_err(|_| LibraryError::Damaged { what: format!("{column} is {value}") })
     }
 
-    /// How many elements something has.
+    /// The value of a column with a number of elements.
     pub(crate) fn get_count(&self, column: &str) -> Result<usize, LibraryError> {
         // PostgreSQL counts elements in 32 bits.
         let count = match self {
@@ -50,13 +50,13 @@ impl Row {
         Ok(usize::try_from(count).unwrap_or(0))
     }
 
-    /// A series of numbers.
+    /// The value of a column with a series of numbers.
     pub(crate) fn doubles(&self, column: &str) -> Result<Vec<f64>, LibraryError> {
         let missing = || LibraryError::Damaged { what: format!("{column} is missing") };
         self.doubles_if_there(column)?.ok_or_else(missing)
     }
 
-    /// A series of numbers that may be missing.
+    /// The value of a column with a series of numbers, or `None` for null.
     pub(crate) fn doubles_if_there(&self, column: &str) -> Result<Option<Vec<f64>>, LibraryError> {
         let bytes: Option<&[u8]> = match self {
             Self::Sqlite(row) => sqlx::Row::try_get(row, column)?,
@@ -66,7 +66,7 @@ impl Row {
     }
 }
 
-/// As PostgreSQL spells an unquoted name.
+/// The lower-case spelling that PostgreSQL uses for an unquoted name.
 fn folded(column: &str) -> Cow<'_, str> {
     if column.bytes().any(|byte| byte.is_ascii_uppercase()) {
         Cow::Owned(column.to_ascii_lowercase())

@@ -1,4 +1,4 @@
-//! A library in a file.
+//! A library in a `SQLite` file.
 
 use super::file_lock::{Identity, identity};
 use super::file_system::shared_between_hosts;
@@ -17,25 +17,25 @@ use std::time::Duration;
 /// `application_id` of a library, set by the first migration.
 const APPLICATION_ID: i64 = 0x7477_696e;
 
-/// How long to wait for another process that writes.
+/// Time limit of waiting for another writing process.
 ///
-/// The longest writes take seconds; anything beyond half a minute is a stuck process.
+/// The longest writes take seconds. A process that writes for more than half a minute is stuck.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Size of a new library's pages in bytes: three to five results fit, where with `SQLite`'s 4096 one does
-/// and leaves a quarter empty.
+/// Page size of a new library in bytes. Three to five results fit into a page. With the default of 4096
+/// bytes, one result fits and a quarter of the page stays empty.
 const PAGE_BYTES: u32 = 16_384;
 
-/// Pages of the write-ahead log before it is carried over into the file: 32 MB.
+/// Number of pages of the write-ahead log before a checkpoint: 32 MB.
 ///
-/// Carrying over waits twice for the disk. With `SQLite`'s 4 MB, 300 cases, that would come with
-/// every second group of reports.
+/// A checkpoint waits for the disk twice. With the default of 4 MB (300 cases), every second group of
+/// reports would cause one.
 const LOG_PAGES: &str = "2048";
 
-/// Connections that read beside the one that writes.
+/// Number of reading connections, in addition to the writing one.
 const READERS: u32 = 4;
 
-/// Opens the file and updates its schema; with `create`, fills an empty file or creates one.
+/// Opens the file and updates its schema. With `create`, initialises an empty file or creates a new one.
 pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connection), LibraryError> {
     refuse_what_seems_empty(path)?;
     warn_of_the_place(path);
@@ -74,8 +74,8 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<(Readers, Connecti
     Ok((Readers::Sqlite(readers), Connection::Sqlite(connection, file)))
 }
 
-/// The file that is open, to notice when its path leads to it no longer: what is written to a file that
-/// was removed or replaced is gone with the process that has it open.
+/// Identity of the open file, to detect that its path no longer leads to it. Data written to a removed or
+/// replaced file is lost when the process ends.
 pub(crate) struct OpenFile {
     path: PathBuf,
     identity: Identity,
@@ -87,7 +87,7 @@ impl OpenFile {
         Ok(Self { path: path.to_owned(), identity })
     }
 
-    /// Whether the path still leads to the file.
+    /// Checks that the path still leads to the open file.
     ///
     /// # Errors
     /// [`LibraryError::FileGone`].
@@ -103,7 +103,7 @@ fn gone(path: &Path) -> LibraryError {
     LibraryError::FileGone { library: path.display().to_string() }
 }
 
-/// Reasons, correctable by the user, why a file cannot be opened.
+/// Converts the error of opening a file to one with a remedy for the user, if there is a remedy.
 fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
     let library = path.display().to_string();
     let code = error.as_database_error().and_then(sqlx::error::DatabaseError::code);
@@ -129,7 +129,7 @@ fn closed_to_us(error: sqlx::Error, path: &Path) -> LibraryError {
     }
 }
 
-/// Why the lock that coordinators keep each other away with can't be taken.
+/// Error for a lock of the library that cannot be taken.
 pub(crate) fn not_locked(path: &Path, source: std::io::Error) -> LibraryError {
     match source.kind() {
         // The rights of the folder, or its room, are another matter.
@@ -143,7 +143,7 @@ pub(crate) fn not_locked(path: &Path, source: std::io::Error) -> LibraryError {
     }
 }
 
-/// A library, and the file system that it is on where several hosts may share that.
+/// Name of a library, with the name of its file system if several machines may share that.
 fn place(path: &Path) -> String {
     match shared_between_hosts(path) {
         Some(name) => format!("library {} (on {name})", path.display()),
@@ -151,7 +151,7 @@ fn place(path: &Path) -> String {
     }
 }
 
-/// Says what may go wrong with a file where it is, before anything does.
+/// Logs a warning if the file system is unsuitable for a library.
 fn warn_of_the_place(path: &Path) {
     if let Some(name) = shared_between_hosts(path) {
         tracing::warn!(
@@ -172,7 +172,7 @@ fn warn_of_the_place(path: &Path) {
     }
 }
 
-/// Header of every `SQLite` file, and its minimum size.
+/// First bytes of every `SQLite` file.
 const HEAD: &[u8] = b"SQLite format 3\0";
 const BYTES_MIN: usize = 512;
 
@@ -195,7 +195,7 @@ fn refuse_what_seems_empty(path: &Path) -> Result<(), LibraryError> {
     }
 }
 
-/// The first bytes of a file, if it can be read.
+/// The first bytes of a file; `None` if it cannot be read.
 fn begin(path: &Path) -> Option<Vec<u8>> {
     let mut begin = Vec::new();
     let file = std::fs::File::open(path).ok()?;
@@ -207,8 +207,7 @@ fn begin_of_log(log: &OsStr) -> bool {
     begin(Path::new(log)).is_some_and(|begin| !begin.is_empty())
 }
 
-/// Returns an error for a foreign database before anything is written; otherwise whether it is
-/// empty.
+/// Returns whether the database is empty, and an error if it is a foreign database. Nothing is written.
 async fn refuse_foreign_database(
     connection: &mut SqliteConnection,
     path: &Path,

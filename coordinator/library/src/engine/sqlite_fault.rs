@@ -1,16 +1,16 @@
-//! Faults of disk and locks in `SQLite`'s error codes.
+//! Conversion of the error codes of `SQLite` for faults of disk and locks.
 
 use crate::LibraryError;
 use sqlx::sqlite::SqliteError;
 
-/// The disk is full: found in a file, or in the memory shared between processes.
+/// Codes for a full disk: a full file, or no space for the memory shared between processes.
 pub(crate) const SQLITE_FULL: [&str; 2] = ["13", "4874"];
 
-/// Another process wrote for longer than anybody waits, or recovered what a third had left.
+/// Codes for a database that another process has locked for longer than the timeout, or is recovering.
 const SQLITE_BUSY: [&str; 3] = ["5", "261", "773"];
 
-/// Names of `SQLite`'s codes for missing locks of the file system: locks, shared memory, and the
-/// locking protocol.
+/// Codes, with their names, for missing support of the file system: locks, shared memory, and the locking
+/// protocol.
 const SQLITE_NO_LOCKS: [(&str, &str); 8] = [
     ("3850", "SQLITE_IOERR_LOCK"),
     ("2058", "SQLITE_IOERR_UNLOCK"),
@@ -22,13 +22,13 @@ const SQLITE_NO_LOCKS: [(&str, &str); 8] = [
     ("15", "SQLITE_PROTOCOL"),
 ];
 
-/// `SQLite`'s primary code for a file that can't be read or written; the low byte of all its kinds.
+/// Primary code for a file that cannot be read or written; it is the low byte of the extended codes.
 const SQLITE_IOERR: i32 = 10;
 
-/// `SQLite`'s primary code for a file that can't be opened: the library's, its log's, or a temporary one.
+/// Primary code for a file that cannot be opened: the library, its log, or a temporary file.
 const SQLITE_CANTOPEN: i32 = 14;
 
-/// Fault of disk or locks that a code reports, if any.
+/// Converts an error code to a fault of disk or locks; `None` for other errors.
 pub(crate) fn sqlite_fault(error: &sqlx::Error) -> Option<LibraryError> {
     let fault = error.as_database_error()?;
     fault.try_downcast_ref::<SqliteError>()?;

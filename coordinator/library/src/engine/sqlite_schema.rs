@@ -9,7 +9,7 @@ use std::path::Path;
 
 static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations/sqlite");
 
-/// Brings the schema up to date.
+/// Updates the schema to the newest version.
 pub(super) async fn bring_up_to_date(
     connection: &mut SqliteConnection,
     path: &Path,
@@ -38,7 +38,7 @@ pub(super) async fn bring_up_to_date(
     Ok(alone.commit().await?)
 }
 
-/// Creates the views again if they are of an earlier version.
+/// Creates the views again if the existing ones are of an earlier version.
 async fn renew_views(connection: &mut SqliteConnection) -> Result<(), LibraryError> {
     if views_version(&mut *connection).await? >= views::VERSION {
         return Ok(());
@@ -58,10 +58,10 @@ async fn views_version<'c>(connection: impl SqliteExecutor<'c>) -> Result<i64, L
         .await?)
 }
 
-/// Refuses a file whose pages do not fit together, before anything is written to it.
+/// Checks that the pages of a file are consistent, before anything is written to the file.
 ///
 /// # Errors
-/// [`LibraryError::Malformed`] with the first thing that `SQLite` finds.
+/// Returns [`LibraryError::Malformed`] with the first fault that `SQLite` finds.
 pub(super) async fn refuse_malformed<'c>(
     connection: impl SqliteExecutor<'c>,
 ) -> Result<(), LibraryError> {
@@ -73,7 +73,7 @@ pub(super) async fn refuse_malformed<'c>(
     Err(LibraryError::Malformed { reason: last.to_owned() })
 }
 
-/// Kind, name and text of what the present schema consists of.
+/// Kind, name and text of each object of the present schema.
 pub(crate) async fn schema_objects() -> Result<Vec<(String, String, String)>, LibraryError> {
     let mut memory = SqliteConnectOptions::new().in_memory(true).connect().await?;
     MIGRATIONS.run(&mut memory).await?;

@@ -1,4 +1,4 @@
-//! A statement and its values, for either database.
+//! A statement with its values, for either database.
 
 use super::Dialect;
 use sqlx::postgres::PgArguments;
@@ -7,45 +7,45 @@ use sqlx::sqlite::SqliteArguments;
 use sqlx::{AssertSqlSafe, Postgres, Sqlite};
 use std::borrow::Cow;
 
-/// A value to be bound; a missing one keeps its type, for PostgreSQL asks.
+/// A value to be bound. A missing value has a type, because PostgreSQL requires it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
     Text(Option<String>),
     Integer(Option<i64>),
     Real(Option<f64>),
-    /// A series of numbers as it is stored: big-endian doubles, one after the other.
+    /// A series of numbers in stored form: big-endian doubles, concatenated.
     Series(Option<Vec<u8>>),
-    /// A list for a statement's own use; with `SQLite` JSON. See [`Dialect::listed`].
+    /// A list used within a statement; with `SQLite` it is bound as JSON. See [`Dialect::listed`].
     Integers(Vec<i64>),
-    /// The same of texts.
+    /// As `Integers`, with texts.
     Texts(Vec<String>),
-    /// The same of numbers.
+    /// As `Integers`, with floating-point numbers.
     Reals(Vec<f64>),
-    /// The same of numbers that may be missing.
+    /// As `Integers`, with floating-point numbers that may be missing.
     OptionalReals(Vec<Option<f64>>),
 }
 
-/// Text of a statement.
+/// SQL text of a statement.
 #[derive(Clone, Debug)]
 pub(crate) enum Text {
-    /// The same in both databases.
+    /// One text for both databases.
     Same(Cow<'static, str>),
-    /// To each database in its own words.
+    /// A separate text for each database.
     Each {
-        /// As `sqlite3` takes it.
+        /// Text in the dialect of `SQLite`.
         sqlite: &'static str,
-        /// As `psql` takes it.
+        /// Text in the dialect of PostgreSQL.
         postgres: &'static str,
     },
 }
 
 impl Text {
-    /// The same in both databases.
+    /// Creates one text for both databases.
     pub(crate) const fn same(text: &'static str) -> Self {
         Self::Same(Cow::Borrowed(text))
     }
 
-    /// As this database understands it.
+    /// The text for this dialect.
     fn of(self, dialect: Dialect) -> Cow<'static, str> {
         match (self, dialect) {
             (Self::Same(text), _) => text,
@@ -67,26 +67,26 @@ impl From<String> for Text {
     }
 }
 
-/// A statement of this crate's own making.
+/// A statement written in this crate.
 #[derive(Clone, Debug)]
 pub(crate) struct Statement {
     text: Text,
     values: Vec<Value>,
 }
 
-/// A statement without values yet. `text` must not hold anything that came from outside.
+/// A statement without values. `text` must not contain anything from outside this crate.
 pub(crate) fn sql(text: impl Into<Text>) -> Statement {
     Statement { text: text.into(), values: Vec::new() }
 }
 
 impl Statement {
-    /// Binds the next value: the first is `$1`.
+    /// Binds the next value. The first bound value is `$1`.
     pub(crate) fn bind(mut self, value: impl Into<Value>) -> Self {
         self.values.push(value.into());
         self
     }
 
-    /// Its text for this database.
+    /// The SQL text of the statement for this database.
     pub(super) fn text(&self, dialect: Dialect) -> Cow<'static, str> {
         self.text.clone().of(dialect)
     }
@@ -121,7 +121,7 @@ impl Statement {
 }
 
 impl Value {
-    /// Series after each other, as one.
+    /// Concatenates several series into one value.
     pub(crate) fn series<'a>(parts: impl IntoIterator<Item = &'a [f64], IntoIter: Clone>) -> Self {
         let parts = parts.into_iter();
         let mut numbers = Vec::with_capacity(parts.clone().map(<[f64]>::len).sum());
@@ -132,7 +132,7 @@ impl Value {
     }
 }
 
-/// The numbers of a stored series.
+/// Decodes a stored series.
 pub(crate) fn series(bytes: &[u8]) -> Vec<f64> {
     bytes.as_chunks().0.iter().map(|chunk| f64::from_be_bytes(*chunk)).collect()
 }

@@ -1,18 +1,18 @@
-//! The database of a library URL.
+//! Location of a library, parsed from its URL.
 
 use crate::LibraryError;
 use sqlx::postgres::PgConnectOptions;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Where a library is.
+/// Location of a library.
 #[derive(Clone)]
 pub(crate) enum Target {
     Sqlite(PathBuf),
     Postgres {
         // Several hundred bytes, and a library has one.
         options: Box<PgConnectOptions>,
-        /// The URL without password and settings.
+        /// The URL without password and settings, for messages.
         name: String,
     },
 }
@@ -46,7 +46,7 @@ impl Target {
         }
     }
 
-    /// The file, with `SQLite`.
+    /// Path of the file, with `SQLite` only.
     pub(crate) fn path(&self) -> Option<&Path> {
         match self {
             Self::Sqlite(path) => Some(path),
@@ -55,8 +55,8 @@ impl Target {
     }
 }
 
-/// A library's URL for messages, pages and command lines: without password, and without settings,
-/// which may contain one.
+/// Returns a library's URL for messages, pages and command lines. The password is removed, and so are the
+/// settings, which may contain a password.
 pub fn without_password(url: &str) -> String {
     let Some((scheme, rest)) =
         url.split_once("://").filter(|(scheme, _)| scheme.contains("postgres"))

@@ -1,20 +1,20 @@
-//! The views: one file a database, outside the numbered migrations.
+//! The views: one SQL file per database, outside the numbered migrations.
 //!
-//! Opening a library creates them again if the existing ones are of an earlier version.
+//! Opening a library creates the views again if the existing ones are of an earlier version.
 
 use crate::LibraryError;
 
-/// Version of both files; to be raised with every change of one, as a test demands.
+/// Version of both files. It must be raised with every change of one of them; a test checks this.
 pub(super) const VERSION: i64 = 1;
 
 pub(super) const SQLITE: &str = include_str!("../../../../migrations/sqlite/views.sql");
 pub(super) const POSTGRES: &str = include_str!("../../../../migrations/postgres/views.sql");
 
-/// Reduces an error of creating views to a warning if the existing views are usable: for read-only
-/// access, and for the salvage of a damaged library.
+/// Logs a failure to update the views as a warning if the existing views are still usable. This is the case
+/// for read-only access and for the salvage of a damaged library.
 ///
 /// # Errors
-/// Whatever else went wrong.
+/// Returns any other error.
 pub(super) fn made(done: Result<(), LibraryError>, library: &str) -> Result<(), LibraryError> {
     use LibraryError::{Busy, DiskFull, Malformed, NotWritable};
     match done {

@@ -1,9 +1,9 @@
-//! The tasks that write: what arrives together is committed together.
+//! The writing tasks. Writes that arrive together are committed together.
 //!
-//! A durable commit waits for the disk, and `SQLite` has one writer at a time. So all writes of a
-//! process go through one connection, or a few with PostgreSQL, where one waits for the disk while
-//! another fills its transaction. A caller gets its result after the commit. A lost server is
-//! retried within a bound.
+//! A durable commit waits for the disk, and `SQLite` has one writer at a time. So all writes of a process
+//! go through one connection. With PostgreSQL there are a few connections: while one waits for the disk,
+//! another fills its transaction. A caller gets its result after the commit. A lost server is retried for a
+//! limited time.
 
 use super::clock::Clock;
 use super::retry_budget::RetryBudget;
@@ -16,23 +16,23 @@ use std::time::Duration;
 use tokio::sync::{Notify, mpsc, oneshot};
 use tokio::task::JoinHandle;
 
-/// Writes committed together at most.
+/// Maximum number of writes that are committed together.
 ///
-/// Enough to make the disk's part of each negligible, and few enough that the first waits
-/// milliseconds for the last.
+/// It is large enough to make the disk time per write negligible. It is small enough that the first write
+/// waits only milliseconds for the last.
 const GROUP_MAX: usize = 256;
 
-/// Writes that wait for the writer before those who ask have to wait themselves.
+/// Maximum number of queued writes. Further callers wait until there is space in the queue.
 const QUEUE_MAX: usize = 1024;
 
 /// A query or a transaction that takes longer is treated as a lost connection, even if the network
 /// reports no error.
 pub(super) const SERVER_TIMEOUT: Duration = Duration::from_mins(1);
 
-/// Connections that write to a server.
+/// Number of connections that write to a server.
 const SERVER_SHARDS: usize = 2;
 
-/// A change to the library, made inside a transaction that others share.
+/// A change to the library, made in a transaction that it may share with others.
 pub(crate) trait Write: Send + Sync + 'static {
     /// Result of the committed write.
     type Answer: Send + 'static;
@@ -43,15 +43,14 @@ pub(crate) trait Write: Send + Sync + 'static {
         None
     }
 
-    /// Makes the change. It may be called again after a transaction that failed, or whose success
-    /// is unknown.
+    /// Makes the change. It may be called again if the transaction failed or its success is unknown.
     fn apply(
         &self,
         connection: &mut Connection,
     ) -> impl Future<Output = Result<Self::Answer, LibraryError>> + Send;
 }
 
-/// A handle on the writing tasks.
+/// Handle of the writing tasks.
 pub(crate) struct Writer {
     tasks: Vec<Task>,
     shards: WriterShards,
@@ -61,12 +60,12 @@ struct Task {
     requests: mpsc::Sender<Box<dyn WriteRequest>>,
     closing: Arc<Notify>,
     handle: Mutex<Option<JoinHandle<()>>>,
-    /// Error that broke the connection of a file, if it ended the task.
+    /// Error that broke the connection to a file, if it ended the task.
     lost: Arc<OnceLock<String>>,
 }
 
 impl Writer {
-    /// Starts the tasks; without a connection they make their own when there is something to write.
+    /// Starts the tasks. A task without a connection opens one at its first write.
     pub(super) fn start(
         target: &Target,
         connection: Option<Connection>,
@@ -88,7 +87,7 @@ impl Writer {
         Self { tasks, shards: WriterShards::new(count) }
     }
 
-    /// Makes a change and waits until it is on the disk.
+    /// Makes a change and returns after the change is on the disk.
     pub(crate) async fn write<W: Write>(&self, write: W) -> Result<W::Answer, LibraryError> {
         let (responder, answer) = oneshot::channel();
         let slot = self.shards.enter(write.worker().unwrap_or_default());
@@ -98,16 +97,16 @@ impl Writer {
         answer.await.map_err(|_| task.end())?
     }
 
-    /// Whether all tasks run: one that panicked, was closed, or lost the connection of its file, writes no
-    /// more.
+    /// Checks that all tasks can write. A task stops writing after a panic, after closing, or after the
+    /// connection to its file was lost.
     ///
     /// # Errors
-    /// Why not: [`LibraryError::Closed`] or [`LibraryError::Lost`].
+    /// Returns the cause: [`LibraryError::Closed`] or [`LibraryError::Lost`].
     pub(crate) fn runs(&self) -> Result<(), LibraryError> {
         self.tasks.iter().try_for_each(|task| if task.runs() { Ok(()) } else { Err(task.end()) })
     }
 
-    /// Finishes what was ordered and closes the connections.
+    /// Finishes the queued writes and closes the connections.
     pub(crate) async fn close(&self) {
         for task in &self.tasks {
             task.closing.notify_one();
@@ -131,7 +130,7 @@ impl Task {
         Self { requests, closing, handle: Mutex::new(Some(handle)), lost }
     }
 
-    /// Why it writes no more.
+    /// Error that explains why the task no longer writes.
     fn end(&self) -> LibraryError {
         match self.lost.get() {
             Some(reason) => LibraryError::Lost { reason: reason.clone() },
@@ -145,7 +144,7 @@ impl Task {
     }
 }
 
-/// An ordered write of any kind.
+/// A queued write of any type.
 trait WriteRequest: Send {
     fn apply<'a>(
         &'a mut self,
@@ -159,7 +158,7 @@ struct Pending<W: Write> {
     write: W,
     answer: Option<W::Answer>,
     responder: oneshot::Sender<Result<W::Answer, LibraryError>>,
-    /// Kept until the write is done, whether who asked still waits or not.
+    /// Kept until the write is done, even if the caller no longer waits.
     _slot: Slot,
 }
 
@@ -207,22 +206,22 @@ async fn write_all(
     }
 }
 
-/// The connection that writes, through the life of several.
+/// State of a writing task; it outlasts single connections.
 struct Session {
     target: Target,
     connection: Option<Connection>,
-    /// Kept right from here, where there is a connection anyway.
+    /// Clock of the library. The session updates it, because it has a connection to the server.
     clock: Arc<Clock>,
-    /// Whether to wait for the database: false after the retry budget was used up, until the
-    /// database responds again.
+    /// Whether to retry an unavailable database. False from the time at which the retry budget is used up
+    /// until the database responds again.
     retries: bool,
-    /// Error that broke the connection of a file. The file is not opened again, because its state
-    /// is unknown: nothing can be written any more, and a supervisor should restart the program.
+    /// Error that broke the connection to a file. The file is not opened again, because its state is
+    /// unknown. Nothing can be written any more; a supervisor should restart the program.
     lost: Arc<OnceLock<String>>,
 }
 
 impl Session {
-    /// Drops a broken connection; returns the error for the waiting writes if it was of a file.
+    /// Drops a broken connection. For a file, returns the error for the waiting writes.
     fn disconnect(&mut self, error: &LibraryError) -> Result<(), LibraryError> {
         self.connection = None;
         if matches!(self.target, Target::Postgres { .. }) {
@@ -234,7 +233,7 @@ impl Session {
         Err(lost)
     }
 
-    /// Commits a group, or each of it alone where one spoils it for the others.
+    /// Commits a group of writes. If one of them makes the commit fail, commits each write separately.
     async fn commit_and_respond(&mut self, group: &mut Vec<Box<dyn WriteRequest>>) {
         match self.commit(group).await {
             Ok(()) => group.drain(..).for_each(|request| request.respond(Ok(()))),
@@ -258,7 +257,7 @@ impl Session {
         }
     }
 
-    /// Commits these orders together, waiting for a database that is away.
+    /// Commits these writes together. Retries an unavailable database.
     async fn commit(&mut self, requests: &mut [Box<dyn WriteRequest>]) -> Result<(), LibraryError> {
         let mut budget = RetryBudget::new(self.retries);
         loop {
@@ -342,7 +341,7 @@ mod tests {
         }
     }
 
-    /// As a connection whose thread has ended answers.
+    /// A write whose error is that of a connection whose thread has ended.
     struct Crashes;
 
     impl Write for Crashes {

@@ -5,19 +5,19 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Pending writes by shard.
 ///
-/// Writes of one worker share a shard, because they change the same rows; a worker without pending
-/// writes takes the emptiest shard.
+/// All pending writes of one worker are in one shard, because they change the same rows. A worker without
+/// pending writes gets the shard with the fewest pending writes.
 #[derive(Clone)]
 pub(super) struct WriterShards(Arc<Mutex<UnderWay>>);
 
 struct UnderWay {
     /// Pending writes of each shard.
     counts: Vec<usize>,
-    /// Shard of each worker with pending writes, and their number.
+    /// Shard and number of pending writes of each worker that has some.
     workers: HashMap<String, (usize, usize)>,
 }
 
-/// A write's slot in a shard, until it is dropped.
+/// The place of a pending write in a shard; it is freed when the slot is dropped.
 pub(super) struct Slot {
     shards: WriterShards,
     number: usize,
@@ -31,7 +31,7 @@ impl WriterShards {
         Self(Arc::new(Mutex::new(under_way)))
     }
 
-    /// A slot for a write of a worker.
+    /// Takes a slot for a write of this worker.
     pub(super) fn enter(&self, worker: &str) -> Slot {
         let mut under_way = self.lock();
         let UnderWay { counts, workers } = &mut *under_way;
@@ -48,7 +48,7 @@ impl WriterShards {
 }
 
 impl Slot {
-    /// The shard, from 0.
+    /// Number of the shard, from 0.
     pub(super) const fn number(&self) -> usize {
         self.number
     }

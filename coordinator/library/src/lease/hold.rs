@@ -9,7 +9,7 @@ use std::collections::HashSet;
 // and $4 these with their epochs, as one number each. The indices come first, because both
 // databases find the cases by them.
 
-/// Lets leases last until $5.
+/// Extends leases until $5.
 const RENEW: Text = Text::Each {
     sqlite: "
         update campaign_case set lease_expires_unix_ms = $5
@@ -24,7 +24,7 @@ const RENEW: Text = Text::Each {
         returning sobol_index, epoch",
 };
 
-/// Those that their worker ended itself: by a result, by saying that the case failed, or by giving it back.
+/// Leases that their worker ended itself: it reported a result or a failure, or released the case.
 const ENDED_BY_THE_WORKER: Text = Text::Each {
     sqlite: "
         select sobol_index, epoch from campaign_case
@@ -46,7 +46,7 @@ const ENDED_BY_THE_WORKER: Text = Text::Each {
             and sobol_index = any($3) and ((sobol_index << 32) | epoch) = any($4)",
 };
 
-/// Puts on record that their worker gave them back at $5.
+/// Records that the worker released these leases at $5.
 const NOTE_RETURN: Text = Text::Each {
     sqlite: "
         insert into attempt (campaign_id, sobol_index, epoch, worker, leased_unix_ms, ended_unix_ms, ending, error)
@@ -65,7 +65,7 @@ const NOTE_RETURN: Text = Text::Each {
         on conflict (campaign_id, sobol_index, epoch) do nothing",
 };
 
-/// Lets their cases wait again; no attempt is counted.
+/// Sets the cases of these leases to waiting. No attempt is counted.
 const RETURN: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'waiting', lease_expires_unix_ms = null
@@ -78,7 +78,7 @@ const RETURN: Text = Text::Each {
             and sobol_index = any($3) and ((sobol_index << 32) | epoch) = any($4)",
 };
 
-/// A statement about leases of a worker.
+/// Binds the values of a statement about a worker's leases.
 fn about(text: Text, campaign: &str, worker: &str, held: &[Held]) -> Statement {
     let index = |held: &Held| i64::from(held.index);
     let indices: Vec<_> = held.iter().map(index).collect();
@@ -115,9 +115,10 @@ impl Write for Renew {
 }
 
 impl Renew {
-    /// Which of these leases the worker has ended itself: it reported the case, or gave it back.
+    /// Returns those of these leases that the worker has ended itself: it reported or released the case.
     ///
-    /// A heartbeat may name them still, for it was sent before the answer to that report came.
+    /// A heartbeat may still contain such leases if the worker sent it before it received the response to
+    /// its report.
     async fn ended_by_the_worker(
         &self,
         connection: &mut Connection,
@@ -131,14 +132,14 @@ impl Renew {
     }
 }
 
-/// The leases of these rows.
+/// The leases in these rows.
 fn leases(rows: &[Row]) -> Result<HashSet<Held>, LibraryError> {
     let held =
         |row: &Row| Ok(Held { index: row.get_u32("sobol_index")?, epoch: row.get_u32("epoch")? });
     rows.iter().map(held).collect()
 }
 
-/// Lets those of a worker's leases that it still has last until then; answers which.
+/// Extends those of these leases that the worker still has, and returns them.
 pub(super) async fn renew(
     connection: &mut Connection,
     campaign: &str,

@@ -1,4 +1,4 @@
-//! A lease: whose turn it is, and which cases.
+//! Selection of the campaign and of the cases of a lease.
 
 use super::hold::renew;
 use super::{Lease, LeaseRequest, Leased, QueueCursor};
@@ -10,15 +10,16 @@ use crate::{AttemptsMax, LibraryError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Number of campaigns considered for one lease.
+/// Maximum number of campaigns considered for one lease.
 ///
-/// The first has cases to give, except where other coordinators take its last ones just now.
+/// Usually the first one has waiting cases, unless other coordinators lease its last cases at the same
+/// time.
 const CAMPAIGNS_TRIED: u32 = 4;
 
-/// Expired leases ended with one lease; more wait for the next.
+/// Maximum number of expired leases that one lease request ends.
 const EXPIRED_MAX: u32 = 500;
 
-/// Expired leases in the order of expiry; those locked by another transaction are skipped.
+/// Expired leases, ordered by expiry. Leases locked by another transaction are skipped.
 const EXPIRED: Text = Text::Each {
     sqlite: "
         select campaign_id, sobol_index, attempts from campaign_case
@@ -30,7 +31,7 @@ const EXPIRED: Text = Text::Each {
         order by lease_expires_unix_ms limit $2 for update skip locked",
 };
 
-/// The $2 running campaigns of highest priority with waiting cases; none for a worker ($1) in
+/// The $2 running campaigns of highest priority that have waiting cases; none if the worker ($1) is in
 /// quarantine.
 const CAMPAIGNS: &str = "
     select id from campaign
@@ -40,7 +41,7 @@ const CAMPAIGNS: &str = "
             where campaign_id = campaign.id and case_count.state = 'waiting')
     order by priority desc, created_at, id limit $2";
 
-/// The same of one campaign ($3).
+/// As [`CAMPAIGNS`], for the campaign $3 only.
 const CAMPAIGN: &str = "
     select id from campaign
     where id = $3 and state = 'running'
@@ -49,9 +50,9 @@ const CAMPAIGN: &str = "
             where campaign_id = campaign.id and case_count.state = 'waiting')
     order by priority desc, created_at, id limit $2";
 
-/// The first $4 waiting cases of a campaign with index from $2 to below $3, locked until this
-/// transaction ends. The index is prescribed for `SQLite`, which without statistics would scan all
-/// finished cases.
+/// The first $4 waiting cases of a campaign with an index from $2 to below $3, locked until this
+/// transaction ends. The statement names the index for `SQLite`, which would otherwise scan all finished
+/// cases if it has no statistics.
 const WAITING: Text = Text::Each {
     sqlite: "
         select * from campaign_case indexed by campaign_case_by_state
@@ -104,7 +105,7 @@ impl Write for LeaseCases {
 }
 
 impl LeaseCases {
-    /// Ends leases that have expired, but for those that are known to be held.
+    /// Ends expired leases, except those that the worker of this process is known to hold.
     async fn end_expired(&self, connection: &mut Connection) -> Result<(), LibraryError> {
         let LeaseRequest { campaign, worker, held, now_unix_ms, lease_ms, attempts_max, .. } =
             &self.request;
@@ -115,7 +116,7 @@ impl LeaseCases {
         end_expired(connection, *now_unix_ms, *attempts_max).await
     }
 
-    /// The first cases that wait, of the most urgent campaign that has some.
+    /// Leases the first waiting cases of the campaign with the highest priority.
     async fn first(&self, connection: &mut Connection) -> Result<Option<Lease>, LibraryError> {
         for campaign in self.candidates(connection).await? {
             let cases = self.of(connection, &campaign).await?;
@@ -126,7 +127,7 @@ impl LeaseCases {
         Ok(None)
     }
 
-    /// Campaigns that have waiting cases, the most urgent first.
+    /// Campaigns with waiting cases, the highest priority first.
     async fn candidates(&self, connection: &mut Connection) -> Result<Vec<String>, LibraryError> {
         let (worker, most) = (&self.request.worker, CAMPAIGNS_TRIED);
         let ask = match &self.request.campaign {
@@ -162,7 +163,7 @@ impl LeaseCases {
         Ok(taken.into_iter().map(|it| it.leased).collect())
     }
 
-    /// The first waiting cases of a campaign from an index on, locked.
+    /// The first waiting cases of a campaign from an index on. They are locked.
     async fn waiting(
         &self,
         connection: &mut Connection,
@@ -184,7 +185,7 @@ impl LeaseCases {
 
 /// A case to be leased.
 struct Waiting {
-    /// As it is once it is.
+    /// The case after it is leased.
     leased: Leased,
     attempts: u32,
 }
@@ -195,8 +196,8 @@ impl Waiting {
     }
 }
 
-/// Selects the waiting cases of one lease: a case with this number of attempts without result is
-/// leased alone.
+/// Splits the waiting cases into those of this lease and the others. A case with at least `alone_after`
+/// attempts without result is leased alone.
 fn share(mut waiting: Vec<Waiting>, alone_after: u32) -> (Vec<Waiting>, Vec<Waiting>) {
     if waiting.first().is_some_and(|first| first.attempts >= alone_after) {
         let others = waiting.split_off(1);
@@ -212,7 +213,7 @@ struct Expired {
     attempts: u32,
 }
 
-/// Ends expired leases of all campaigns: two statements for all cases of a campaign with the same
+/// Ends expired leases of all campaigns. It runs two statements for all cases of a campaign with the same
 /// number of attempts, so that many lost workers do not delay reports.
 async fn end_expired(
     connection: &mut Connection,
@@ -243,7 +244,7 @@ async fn end_expired(
     Ok(())
 }
 
-/// The cases of each campaign with this number of attempts.
+/// Groups expired leases by campaign and number of attempts.
 fn alike(expired: Vec<Expired>) -> BTreeMap<(String, u32), Vec<i64>> {
     let mut alike = BTreeMap::<_, Vec<i64>>::new();
     for Expired { campaign, index, attempts } in expired {

@@ -1,4 +1,4 @@
-//! Leases: handing cases out, keeping them, taking them back.
+//! Leases: leasing, renewal and release of cases.
 
 mod hold;
 mod lease_cases;
@@ -11,56 +11,56 @@ use hold::{Release, ReleaseAll, Renew};
 use lease_cases::LeaseCases;
 use tracktwin_parameters::Case;
 
-/// A worker's wish for cases.
+/// A worker's request for cases.
 #[derive(Clone, Debug)]
 pub struct LeaseRequest {
-    /// Only cases of this campaign; else of the running one with the largest priority, the oldest
+    /// Campaign of the cases. If `None`, the running campaign with the highest priority is used, the oldest
     /// among equals.
     pub campaign: Option<String>,
-    /// Only cases with a smaller index.
+    /// Only cases with an index below this number are leased.
     pub indices_below: u32,
-    /// Who asks.
+    /// Name of the worker.
     pub worker: String,
-    /// Most cases wanted.
+    /// Maximum number of cases.
     pub cases_max: u32,
-    /// Leases of this worker and this campaign that are known to be held, because the worker runs in
-    /// this very process: they last on, however late their heartbeats are.
+    /// Leases of this worker that are known to be held, because the worker runs in this process. They
+    /// belong to `campaign`. They do not expire, even if heartbeats are late.
     pub held: Vec<Held>,
-    /// The library's clock.
+    /// Present time of the library's clock, in ms since 1970.
     pub now_unix_ms: i64,
-    /// How long the lease lasts without renewal.
+    /// Duration of the lease without renewal, in ms.
     pub lease_ms: i64,
-    /// When cases whose lease has expired are given up.
+    /// Limits of attempts for cases whose lease has expired.
     pub attempts_max: AttemptsMax,
-    /// Attempts without result after which a case is leased alone: if it kills its workers, no
-    /// other case is lost with it.
+    /// Number of attempts without result after which a case is leased alone. If such a case kills its
+    /// workers, no other case is lost with it.
     pub alone_after: u32,
 }
 
-/// Cases handed to a worker, all of one campaign.
+/// Cases leased to a worker, all of one campaign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lease {
-    /// The campaign.
+    /// Id of the campaign.
     pub campaign: String,
-    /// The cases, by ascending index; at least one.
+    /// The cases, by ascending index. There is at least one.
     pub cases: Vec<Leased>,
 }
 
-/// A case handed to a worker.
+/// A case leased to a worker.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Leased {
     /// The case.
     pub case: Case,
-    /// Which lease of this case it is, from 1.
+    /// Number of this lease of the case, from 1.
     pub epoch: u32,
 }
 
-/// A case under a certain lease.
+/// A case together with one of its leases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Held {
-    /// Place in the campaign.
+    /// Index of the case in its campaign.
     pub index: u32,
-    /// Which lease of the case.
+    /// Number of the lease of this case, from 1.
     pub epoch: u32,
 }
 
@@ -68,8 +68,8 @@ impl Library {
     /// Leases waiting cases of a running campaign to a worker, in ascending order of index. A worker in
     /// quarantine gets no cases.
     ///
-    /// Several times per lease duration, and always before it returns no lease, the function ends expired
-    /// leases and searches for cases that wait again.
+    /// Expired leases are ended, and all cases are searched again, several times per lease duration and
+    /// always before the function returns `None`.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -77,9 +77,9 @@ impl Library {
         self.write(LeaseCases { request, cursor: self.cursor() }).await
     }
 
-    /// Lets leases last until `until_unix_ms`; answers those that were taken from the worker: they
-    /// expired, or their campaign was cancelled. A lease that the worker ended itself, by a report or by
-    /// giving the case back, is not among them.
+    /// Extends leases until `until_unix_ms`. Returns the leases that the worker has lost, because they
+    /// expired or their campaign was cancelled. Leases that the worker ended itself, by a report or a
+    /// release, are not returned.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -94,7 +94,7 @@ impl Library {
         self.write(Renew { campaign, worker, held, until_unix_ms }).await
     }
 
-    /// Takes back cases that their worker did not begin; no attempt is counted.
+    /// Releases cases that their worker did not begin. No attempt is counted.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -109,10 +109,10 @@ impl Library {
         self.write(Release { campaign, worker, held, now_unix_ms }).await
     }
 
-    /// Takes back every lease of a campaign; no attempt is counted.
+    /// Releases all leases of a campaign. No attempt is counted.
     ///
-    /// For a coordinator whose workers die with it, so that none can be alive when it starts, and
-    /// that is alone: see [`crate::Claim::is_exclusive`].
+    /// Only for a coordinator that is alone and whose workers end with it, so that no worker is running
+    /// when it starts; see [`crate::Claim::is_exclusive`].
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.

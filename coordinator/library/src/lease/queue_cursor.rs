@@ -1,17 +1,17 @@
-//! Cursor of the lease queries: start of the waiting cases.
+//! Cursor of the lease queries: lowest index of the waiting cases.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
 
-/// Full scans per lease duration.
+/// Number of full scans per lease duration.
 const LOOKS_PER_LEASE: i64 = 24;
 
-/// Lowest index of each campaign that may be waiting.
+/// Lowest index of each campaign at which a case may be waiting.
 ///
-/// An index of PostgreSQL keeps removed entries until it is vacuumed, so a query for the first
-/// waiting case would scan all cases finished since. A lease query therefore starts at the cursor.
-/// Cases that wait again before the cursor are found by a full scan from time to time; several
-/// coordinators may serve a library, and none knows the cases released by the others.
+/// PostgreSQL keeps removed entries of an index until a vacuum, so a query for the first waiting case would
+/// scan all cases finished since then. A lease query therefore starts at the cursor. Cases before the
+/// cursor can become waiting again; a regular full scan finds them. The scan is needed because several
+/// coordinators may serve a library, and none is informed of the cases released by the others.
 #[derive(Debug, Default)]
 pub(crate) struct QueueCursor(Mutex<CursorState>);
 
@@ -41,8 +41,8 @@ impl QueueCursor {
         state.first_waiting.get(campaign).copied().unwrap_or(0)
     }
 
-    /// Moves the cursor after a scan from `from` found no waiting case before `to`; keeps it if
-    /// another scan has moved it meanwhile.
+    /// Moves the cursor after a scan from `from` found no waiting case before `to`. The cursor is kept if
+    /// another scan has moved it in the meantime.
     pub(super) fn advance(&self, campaign: &str, from: u32, to: u32) {
         let mut state = self.0.lock().expect("nobody panics while holding it");
         let first = state.first_waiting.entry(campaign.to_owned()).or_insert(0);
@@ -51,7 +51,7 @@ impl QueueCursor {
         }
     }
 
-    /// Requires a full scan with the next lease.
+    /// Makes a full scan due for the next lease.
     pub(super) fn forget(&self) {
         *self.0.lock().expect("nobody panics while holding it") = CursorState::default();
     }

@@ -9,62 +9,62 @@ const INSERT: &str = "
     insert into diagnosis (id, recording, verdict, code_version, document, created_at)
     values ($1, $2, $3, $4, $5, $6) on conflict (id) do nothing";
 
-/// Keeps one of its mismatches.
+/// Stores a mismatch of a diagnosis.
 const INSERT_MISMATCH: &str = "
     insert into mismatch (diagnosis_id, place, from_x_m, to_x_m, from_frequency_Hz, to_frequency_Hz, level_dB,
         p_value)
     values ($1, $2, $3, $4, $5, $6, $7, $8) on conflict (diagnosis_id, place) do nothing";
 
-/// Keeps one of its hypotheses.
+/// Stores a hypothesis of a diagnosis.
 const INSERT_HYPOTHESIS: &str = "
     insert into hypothesis (diagnosis_id, place, physics, probability, from_x_m, to_x_m, parameters)
     values ($1, $2, $3, $4, $5, $6, $7) on conflict (diagnosis_id, place) do nothing";
 
-/// A diagnosed recording.
+/// The diagnosis of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiagnosisRecord {
-    /// The recording's name.
+    /// Name of the recording.
     pub recording: String,
-    /// `consistent`, `left_out_physics`, `unknown_physics` or `measurement_chain`.
+    /// Verdict: `consistent`, `left_out_physics`, `unknown_physics` or `measurement_chain`.
     pub verdict: String,
-    /// Version of the program.
+    /// Version of the program that made the diagnosis.
     pub code_version: String,
-    /// `diagnosis.json`.
+    /// Content of `diagnosis.json`.
     pub document_json: String,
-    /// Where recording and twin differ, in the document's order.
+    /// Mismatches between recording and twin, in the order of the document.
     pub mismatches: Vec<MismatchRecord>,
     /// Hypotheses, the most probable first.
     pub hypotheses: Vec<HypothesisRecord>,
 }
 
-/// Where a recording and the twin differ.
+/// A mismatch between a recording and the twin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MismatchRecord {
-    /// From where to where along the track, in m.
+    /// First and last position along the track, in m.
     pub x_m: [f64; 2],
     /// Lowest and highest frequency, in Hz.
     pub frequency_hz: [f64; 2],
-    /// By how much, in dB.
+    /// Level difference, in dB.
     pub level_db: f64,
-    /// How probable so large a difference is by chance.
+    /// Probability of at least this difference by chance.
     pub p_value: f64,
 }
 
-/// Hypothesis that explains a mismatch.
+/// A hypothesis that explains a mismatch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisRecord {
-    /// Name of the physics.
+    /// Name of the extension (kind).
     pub physics: String,
-    /// Of its being present.
+    /// Probability that this extension is present, 0 to 1.
     pub probability: f64,
-    /// From where to where along the track in m, if it is anywhere in particular.
+    /// First and last position along the track, in m; `None` if the extension has no position.
     pub x_m: Option<[f64; 2]>,
-    /// JSON object: name with unit to mean and sd.
+    /// JSON object: parameter name with unit, to mean and standard deviation.
     pub parameters_json: String,
 }
 
 impl Library {
-    /// Keeps a diagnosis; answers its id.
+    /// Stores a diagnosis and returns its id. An existing one is kept unchanged.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.
@@ -74,7 +74,7 @@ impl Library {
 }
 
 impl DiagnosisRecord {
-    /// Stores it as of this time; answers its id.
+    /// Stores the diagnosis with this time and returns its id.
     pub(crate) async fn store(
         &self,
         connection: &mut Connection,

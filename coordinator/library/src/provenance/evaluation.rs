@@ -12,40 +12,40 @@ const INSERT: &str = "
     insert into evaluation (id, recording, method, campaign_id, library_digest, code_version, document, created_at)
     values ($1, $2, $3, $4, $5, $6, $7, $8) on conflict (id) do nothing";
 
-/// An evaluated recording.
+/// The evaluation of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EvaluationRecord {
-    /// The recording's name.
+    /// Name of the recording.
     pub recording: String,
-    /// How the estimates were made.
+    /// Method that produced the estimates.
     pub method: String,
-    /// The campaign the surrogates were trained on.
+    /// Id of the campaign on which the surrogates were trained.
     pub campaign: String,
-    /// Its digest when they were.
+    /// Digest of this campaign at the time of training.
     pub library_digest: String,
-    /// Version of the program.
+    /// Version of the program that made the evaluation.
     pub code_version: String,
-    /// `evaluation.json`.
+    /// Content of `evaluation.json`.
     pub document_json: String,
-    /// Its sleepers.
+    /// Estimates of each sleeper.
     pub sleepers: Vec<SleeperRecord>,
 }
 
-/// Estimates of a sleeper.
+/// Estimates at one sleeper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SleeperRecord {
-    /// Its name.
+    /// Id of the sleeper.
     pub id: String,
-    /// Its place along the track in m.
+    /// Position of the sleeper along the track, in m.
     pub x_m: f64,
-    /// Mean and standard deviation of each parameter, in its unit.
+    /// Mean and standard deviation of each parameter, in the parameter's unit.
     pub estimates: BTreeMap<Parameter, [f64; 2]>,
     /// Flags as text; empty if there are none.
     pub flags: String,
 }
 
 impl Library {
-    /// Keeps an evaluation; answers its id.
+    /// Stores an evaluation and returns its id. An existing one is kept unchanged.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.

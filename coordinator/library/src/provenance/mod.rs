@@ -1,7 +1,7 @@
 //! Provenance: trainings, evaluations and diagnoses made from the library's results.
 //!
-//! The tables hold the queried columns and the whole document. Storing the same record again
-//! changes nothing: the id of a record is a hash of its content.
+//! Each table has columns for queries, and some tables have the whole document as well. Storing the same
+//! record again changes nothing, because the id of a record is a hash of its content.
 
 mod diagnosis;
 mod evaluation;
@@ -11,7 +11,7 @@ pub use diagnosis::{DiagnosisRecord, HypothesisRecord, MismatchRecord};
 pub use evaluation::{EvaluationRecord, SleeperRecord};
 pub use training::{SurrogateRecord, TrainingRecord};
 
-/// Hash of texts in order, 128 bits in hexadecimal.
+/// Hash of these texts in this order: 128 bits, in hexadecimal.
 pub(crate) fn id(kind: &str, texts: &[&str]) -> String {
     let mut hasher = blake3::Hasher::new_derive_key(kind);
     for text in texts {

@@ -10,48 +10,49 @@ const INSERT: &str = "
     insert into training (id, campaign_id, library_digest, cases, seed, code_version, created_at)
     values ($1, $2, $3, $4, $5, $6, $7) on conflict (id) do nothing";
 
-/// Keeps how well one of its surrogates does.
+/// Stores the accuracy of a surrogate of a training.
 const INSERT_SURROGATE: &str = "
     insert into surrogate (training_id, feature, speeds_km_h, parameter, mase_test, mase_folds, coverage_90_test)
     values ($1, $2, $3, $4, $5, $6, $7)
     on conflict (training_id, feature, speeds_km_h, parameter) do nothing";
 
-/// Surrogates trained together.
+/// A training: surrogates that were trained together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingRecord {
-    /// The campaign they were trained on.
+    /// Id of the campaign on which they were trained.
     pub campaign: String,
-    /// Its digest when it was read.
+    /// Digest of the campaign at the time of training.
     pub library_digest: String,
-    /// Cases, those kept for testing included.
+    /// Number of cases, including those of the test set.
     pub cases: u32,
-    /// Seed of the split; below 2^63.
+    /// Seed of the split into training set and test set; below 2^63.
     pub seed: u64,
-    /// Version of the program.
+    /// Version of the program that trained the surrogates.
     pub code_version: String,
-    /// Each of them.
+    /// Accuracy of each surrogate.
     pub surrogates: Vec<SurrogateRecord>,
 }
 
-/// How well a surrogate does on cases it was not trained on.
+/// Accuracy of a surrogate on cases that it was not trained on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurrogateRecord {
-    /// The feature set it reads.
+    /// Name of the feature set that the surrogate uses.
     pub feature: String,
-    /// The speeds it reads together, ascending.
+    /// Speeds that the surrogate combines, in km/h, ascending.
     pub speeds_km_h: Vec<f64>,
-    /// Parameter that it estimates.
+    /// Parameter that the surrogate estimates.
     pub parameter: Parameter,
-    /// Mean absolute error on the test set over the parameter's range (paper, eq. 11).
+    /// Mean absolute error on the test set, divided by the parameter's range (paper, eq. 11).
     pub mase_test: f64,
-    /// The same over the folds of the training set.
+    /// As `mase_test`, over the cross-validation folds of the training set.
     pub mase_folds: f64,
-    /// Share of the test cases inside their 90 % intervals.
+    /// Share of the test cases with the true value inside the 90 % interval, 0 to 1.
     pub coverage_90_test: f64,
 }
 
 impl Library {
-    /// Keeps what a training has reached; answers its id.
+    /// Stores the accuracy of a training and returns the id of the training. An existing one is kept
+    /// unchanged.
     ///
     /// # Errors
     /// [`LibraryError`] when the library cannot be written.

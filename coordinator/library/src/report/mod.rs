@@ -1,59 +1,59 @@
-//! Reports: the first result of each case is stored; later ones change nothing.
+//! Reports of workers. The first result of each case is stored; later results change nothing.
 //!
-//! Owns what a report is; what it changes is `record`'s.
+//! This module defines a report; the module `record` makes its changes.
 
 mod record;
 
 use crate::{AttemptsMax, Library, LibraryError};
 use tracktwin_protocol::CaseReport;
 
-/// Report of a worker.
+/// Report of a worker on a group of cases.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// The campaign.
+    /// Id of the campaign.
     pub campaign: String,
-    /// Who reports.
+    /// Name of the worker.
     pub worker: String,
     /// Version of the worker's program.
     pub code_version: String,
     /// Hash of the worker's physics.
     pub model_hash: String,
-    /// Hash of the experiment.
+    /// Hash of the experiment that the worker simulated.
     pub experiment_hash: String,
-    /// The speeds of the experiment in km/h, as many as every case has passes.
+    /// Speeds of the experiment in km/h; every case has one pass per speed.
     pub speeds_km_h: Vec<f64>,
-    /// The cases, each with the checksum that came with it.
+    /// Outcome of each case, with the worker's checksum.
     pub cases: Vec<CaseReport>,
-    /// The library's clock.
+    /// Present time of the library's clock, in ms since 1970.
     pub now_unix_ms: i64,
-    /// When cases that could not be simulated are given up.
+    /// Limits of attempts for cases that could not be simulated.
     pub attempts_max: AttemptsMax,
-    /// Share of the stored cases that another worker is to simulate again, 0 to 1.
+    /// Share of the stored cases that another worker simulates again, 0 to 1.
     pub audit_share: f64,
 }
 
-/// What became of the report of a case.
+/// How the library treated the report of one case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReportVerdict {
-    /// Stored.
+    /// The result or failure was stored.
     Stored,
-    /// A result was there already; nothing changed.
+    /// A result was already stored; nothing changed.
     Duplicate,
-    /// The failure of a lease that has ended; nothing changed.
+    /// The report was a failure of a lease that has ended; nothing changed.
     Late,
-    /// No such case, never leased so to this worker, or other parameters than the case has; nothing
-    /// changed.
+    /// The report was refused and nothing changed: the case does not exist, was never leased to this worker
+    /// under this epoch, or has other parameters.
     Refused,
 }
 
 impl Library {
-    /// Stores what a worker reports, one verdict a case. Repeating it changes nothing.
+    /// Stores the report of a worker. Returns one verdict per case. A repeated call changes nothing.
     ///
-    /// A result is stored if there is none yet, even when its lease has expired: it is the same
-    /// result. A failure counts only under the lease it happened in.
+    /// A result is stored if the case has none, even after the lease has expired, because every worker
+    /// computes the same result. A failure counts only under the lease in which it happened.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library cannot be written; then nothing is stored.
+    /// Returns [`LibraryError`] if the library cannot be written; then nothing is stored.
     pub async fn report(&self, report: Report) -> Result<Vec<ReportVerdict>, LibraryError> {
         self.write(report).await
     }

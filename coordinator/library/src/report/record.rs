@@ -1,4 +1,4 @@
-//! Changes of a report, in one transaction.
+//! Storing a report in one transaction.
 
 use super::{Report, ReportVerdict};
 use crate::attempt::{self, Ended};
@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 use tracktwin_experiment::{Outcome, PassFeatures};
 use tracktwin_protocol::CaseReport;
 
-/// States of cases ($2) of a campaign, locked until this transaction ends.
+/// States of cases ($2) of a campaign. The rows are locked until this transaction ends.
 const STANDINGS: Text = Text::Each {
     sqlite: "
         select sobol_index, state, epoch, attempts, worker, parameter_hash from campaign_case
@@ -21,7 +21,7 @@ const STANDINGS: Text = Text::Each {
         where campaign_id = $1 and sobol_index = any($2) order by sobol_index for update",
 };
 
-/// Leases of cases ($3) that a worker ($2) had, and that ended without result.
+/// Leases of cases ($3) that worker $2 had and that ended without result.
 const EARLIER_LEASES: Text = Text::Each {
     sqlite:
         "
@@ -32,7 +32,7 @@ const EARLIER_LEASES: Text = Text::Each {
         where campaign_id = $1 and worker = $2 and sobol_index = any($3)",
 };
 
-/// Says that cases ($3) are finished, by this worker ($2).
+/// Sets the state of cases ($3) to finished, by worker $2.
 const FINISH: Text = Text::Each {
     sqlite: "
         update campaign_case set state = 'finished', worker = $2, error = null, lease_expires_unix_ms = null
@@ -81,7 +81,7 @@ impl Write for Report {
     }
 }
 
-/// State of a case before a report.
+/// State of a case before the report.
 struct CaseState {
     state: State,
     epoch: u32,
@@ -91,7 +91,7 @@ struct CaseState {
 }
 
 impl Report {
-    /// States of the reported cases, locked.
+    /// Reads and locks the states of the reported cases.
     async fn case_states(
         &self,
         connection: &mut Connection,
@@ -110,7 +110,7 @@ impl Report {
         connection.rows(ask).await?.iter().map(case_state).collect()
     }
 
-    /// Leases of these cases that the worker had, and that have ended.
+    /// Leases of the reported cases that this worker had and that have ended.
     async fn earlier_leases(
         &self,
         connection: &mut Connection,
@@ -134,12 +134,12 @@ impl Report {
         self.cases.iter().filter(|case| which(case)).map(|case| case.index.into()).collect()
     }
 
-    /// Whether the report is of the case's last lease.
+    /// Whether the report belongs to the case's latest lease.
     fn is_present(&self, case: &CaseReport, case_state: &CaseState) -> bool {
         case.epoch == case_state.epoch && case_state.worker.as_ref() == Some(&self.worker)
     }
 
-    /// Whether an earlier lease brings the result that a later one is working on.
+    /// Whether the result belongs to an earlier lease while a later lease of the case is still open.
     fn overtakes(&self, case: &CaseReport, case_state: &CaseState) -> bool {
         case_state.state == State::Leased && !self.is_present(case, case_state)
     }

@@ -1,4 +1,4 @@
-//! A row a case, and a row for the series of a pass, as a server has it.
+//! Storage on a PostgreSQL server: one row per case, and one row per pass for its series.
 
 use super::columns::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
@@ -7,11 +7,13 @@ use crate::report::Report;
 use tracktwin_experiment::PassFeatures;
 use tracktwin_protocol::CaseReport;
 
-/// Cases in one statement: what is read and copied again and again on both sides stays in the cache.
+/// Number of cases in one statement. It is small, so that the data, which client and server copy several
+/// times, stay in the processor's cache.
 const CASES_A_STATEMENT: usize = 64;
 
-/// Rows of cases and passes out of lists: what is one for a report in $1 to $7 and $15, cases in $8 to $11,
-/// their levels ($12), series ($13) and shares of lost contact ($14) one after the other.
+/// Inserts rows of cases and passes from lists. $1 to $7 and $15 have one value for the report, $8 to $11
+/// one value per case. Levels ($12), series ($13) and contact-loss shares ($14) of all passes are
+/// concatenated.
 const INSERT: &str = "
     with given as (
         select sobol_index, duration_s, parameter_hash, checksum, cast(place as integer) as place
@@ -35,8 +37,8 @@ const INSERT: &str = "
         substring($13 from bytes * (passes * (place - 1) + pass - 1) + 1 for bytes)
     from stored join given using (sobol_index), size, generate_series(1, passes) as pass";
 
-/// Over a network many cases go in one statement: their levels and series travel one after the other, and
-/// every row takes its stretch.
+/// Inserts results. Because of network delays, one statement inserts many cases. Levels and series are
+/// concatenated; each row takes its part of them.
 pub(super) async fn insert(
     connection: &mut Connection,
     report: &Report,
@@ -64,8 +66,8 @@ pub(super) async fn insert(
     Ok(())
 }
 
-/// Keeps others from writing results of these cases before this transaction ends; answers how many of them
-/// are there.
+/// Prevents other transactions from writing results of these cases until this transaction ends. Returns the
+/// number of these cases that exist.
 pub(crate) async fn lock(
     connection: &mut Connection,
     campaigns: Vec<String>,
@@ -77,8 +79,8 @@ pub(crate) async fn lock(
     connection.execute(sql(lock).bind(Value::Texts(campaigns)).bind(indices)).await
 }
 
-/// A statement that adds passes which stand in `values` in the columns `columns` of `result`, and answers
-/// how many were `added`: those that are not there yet, beside the passes of their cases that are.
+/// Statement that inserts those passes in `values` (columns `columns` of `result`) that do not exist yet;
+/// existing passes of the same cases are kept. It returns the number of inserted passes as `added`.
 pub(crate) fn gathering(columns: &str, values: &str) -> String {
     format!(
         "with given ({columns}) as (values {values}),

@@ -1,4 +1,4 @@
-//! A row a pass, as a file has it.
+//! Storage in a `SQLite` file: one row per pass.
 
 use super::columns::{LEVEL_COLUMNS, of_report};
 use crate::LibraryError;
@@ -7,18 +7,19 @@ use crate::report::Report;
 use tracktwin_experiment::PassFeatures;
 use tracktwin_protocol::CaseReport;
 
-/// The columns that are one for a whole report, and then those that are not, without the levels.
+/// The columns with one value per report, and then those with one value per pass, without the levels.
 const INSERT: &str = "insert into result (campaign_id, worker, code_version, model_hash,
     experiment_hash, finished_at, flagged, sobol_index, speed_km_h, duration_s, parameter_hash, checksum,
     contact_loss_share, log_power";
 const OF_A_REPORT: usize = 7;
 const OF_A_PASS: usize = 7 + LEVEL_COLUMNS.len();
 
-/// Rows in one statement at most: 64 rows of 27 values stay well below the 32,766 that `SQLite` takes.
+/// Maximum number of rows in one statement. 64 rows of 27 values are well below the 32,766 values that
+/// `SQLite` accepts.
 const ROWS_MAX: usize = 64;
 
-/// Statements of as many rows as a power of two, so that there are few to prepare: each costs a turn
-/// of the thread that speaks to the file.
+/// Inserts results. The number of rows in a statement is a power of two, so that few different statements
+/// must be prepared. Each statement costs one call of the thread of the connection.
 pub(super) async fn insert(
     connection: &mut Connection,
     report: &Report,
@@ -53,9 +54,10 @@ pub(super) async fn insert(
     Ok(())
 }
 
-/// So many rows of a report's values, which stand once behind those of all passes, and of a pass's own.
+/// Placeholders for this number of rows. Each row has the report's values, bound once after those of all
+/// passes, and the values of its pass.
 ///
-/// Values without a name are taken in order, whatever names stand between them.
+/// Unnamed placeholders take the values in order, independent of named placeholders between them.
 fn places(rows: usize) -> String {
     let of_report: Vec<_> =
         (1..=OF_A_REPORT).map(|value| format!("${}", rows * OF_A_PASS + value)).collect();

@@ -1,4 +1,4 @@
-//! Columns that both databases have.
+//! Columns of results that both databases have.
 
 use crate::LibraryError;
 use crate::engine::{Row, Statement, iso_utc};
@@ -37,7 +37,7 @@ pub(super) fn levels_of(row: &Row) -> Result<Vec<f64>, LibraryError> {
     LEVEL_COLUMNS.iter().map(|&column| row.get(column)).collect()
 }
 
-/// Binds what both databases keep of a report: campaign, worker, version, model, experiment and time.
+/// Binds the values of a report in both databases: campaign, worker, version, model, experiment and time.
 pub(super) fn of_report(insert: Statement, report: &Report) -> Statement {
     insert
         .bind(&report.campaign)

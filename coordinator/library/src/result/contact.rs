@@ -1,9 +1,10 @@
-//! How many cases lost the rail.
+//! Number of cases with contact loss.
 
 use crate::engine::{Text, sql};
 use crate::{Library, LibraryError};
 
-/// Cases of a campaign that lost the rail, and the largest share; both databases read an index of these cases alone.
+/// Number of a campaign's cases with contact loss, and the largest share. Both databases use an index that
+/// has these cases only.
 const LOST: Text = Text::Each {
     sqlite: "
         select count(distinct sobol_index) as cases, max(contact_loss_share) as share
@@ -14,17 +15,17 @@ const LOST: Text = Text::Each {
         from case_result where campaign_id = $1 and 0 < any (contact_loss_shares)",
 };
 
-/// Cases of a campaign whose wheel was in the air for some of the recorded time.
+/// Contact loss between wheel and rail in the cases of a campaign.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactLoss {
-    /// How many, at one speed at least.
+    /// Number of cases with contact loss at one speed at least.
     pub cases: u32,
-    /// The largest share of a pass's recorded time, 0 to 1.
+    /// Largest share of a pass's recorded time with contact loss, 0 to 1.
     pub largest_share: f64,
 }
 
 impl Library {
-    /// Number of cases of a campaign with loss of contact. Results stored before schema 8 lack this
+    /// Returns the contact loss in the cases of a campaign. Results stored before schema 8 lack this
     /// information and are not counted.
     ///
     /// # Errors

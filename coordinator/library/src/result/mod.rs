@@ -1,7 +1,8 @@
-//! `result`: what came out of each case at each speed.
+//! The relation `result`: features of each case at each speed.
 //!
-//! With `SQLite` a table of a row a pass; with PostgreSQL a view of `case_result`, which has a row a
-//! case, and `case_series`, which has a row a pass: docs/decisions/0030 and 0035.
+//! With `SQLite`, `result` is a table with one row per pass. With PostgreSQL it is a view of `case_result`,
+//! which has one row per case, and `case_series`, which has one row per pass (docs/decisions/0030 and
+//! 0035).
 
 mod by_case;
 mod by_pass;
@@ -25,7 +26,7 @@ use tracktwin_experiment::PassFeatures;
 use tracktwin_protocol::CaseReport;
 use tracktwin_signal::Features;
 
-/// Takes the results of a campaign's ($1) cases ($2) away.
+/// Deletes the results of cases ($2) of a campaign ($1).
 const DISCARD: Text = Text::Each {
     sqlite: "delete from result where campaign_id = $1 and sobol_index in (select value from json_each($2))",
     postgres: "
@@ -34,17 +35,17 @@ const DISCARD: Text = Text::Each {
         delete from case_series where result_id in (select id from discarded)",
 };
 
-/// How many results of a worker ($1) are not flagged.
+/// Number of a worker's ($1) results that are not flagged.
 const UNFLAGGED: &str =
     "select count(*) as results from result where worker = $1 and flagged is null";
 
-/// Flags these, for this reason ($2).
+/// Flags these results with the reason $2.
 const FLAG: Text = Text::Each {
     sqlite: "update result set flagged = $2 where worker = $1 and flagged is null",
     postgres: "update case_result set flagged = $2 where worker = $1 and flagged is null",
 };
 
-/// Takes the results of cases away.
+/// Deletes the results of cases.
 pub(crate) async fn discard(
     connection: &mut Connection,
     campaign: &str,
@@ -53,7 +54,7 @@ pub(crate) async fn discard(
     connection.execute(sql(DISCARD).bind(campaign).bind(indices.to_vec())).await.map(drop)
 }
 
-/// Flags all results of a worker that are not flagged; answers how many.
+/// Flags all results of a worker that are not flagged yet. Returns the number of them.
 pub(crate) async fn flag(
     connection: &mut Connection,
     worker: &str,
@@ -64,10 +65,11 @@ pub(crate) async fn flag(
     theirs.map_or(Ok(0), |row| row.get_u32("results").map(u64::from))
 }
 
-/// Stores the results of cases that have none, flagged where there is a reason to.
+/// Stores the results of cases that have none. If a reason is given, the results are flagged with it.
 ///
 /// # Panics
-/// When features have another shape than the first: the receiver of the message has checked this.
+/// Panics if the shape of features differs from that of the first ones. The receiver of the message must
+/// check this.
 pub(crate) async fn insert_results(
     connection: &mut Connection,
     report: &Report,

@@ -11,23 +11,23 @@ use tracktwin_parameters::Case;
 use tracktwin_protocol::checksum_of_passes;
 use tracktwin_signal::Features;
 
-/// A case with results, as it is stored.
+/// A case with results, as stored.
 pub(crate) struct StoredCase {
     pub(crate) case: Case,
-    /// One a speed.
+    /// The passes, one per speed.
     pub(crate) passes: Vec<PassFeatures>,
-    /// Checksum of its worker; none if the result was stored by a version without checksums.
+    /// Checksum of the worker; `None` if a version without checksums stored the result.
     checksum: Option<String>,
 }
 
-/// Whether what is stored has the checksum that came with it.
+/// Result of comparing stored data with the checksum of their worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Attested {
-    /// It has.
+    /// The checksums are equal.
     Whole,
-    /// It has another: something was altered since.
+    /// The checksums differ: the data were altered after storing.
     Altered,
-    /// No checksum came with it.
+    /// No checksum was stored.
     Unknown,
 }
 
@@ -46,7 +46,7 @@ impl StoredCase {
         Ok(())
     }
 
-    /// The checksum of what is stored: parameters, seed and every pass.
+    /// Computes the checksum of the stored data: parameters, seed and every pass.
     pub(crate) fn checksum(&self) -> String {
         checksum_of_passes(self.case.index, &self.case.parameter_hash(), &self.passes)
     }
@@ -59,7 +59,7 @@ impl StoredCase {
         }
     }
 
-    /// The case and its features, unless something was altered.
+    /// Returns the case and its features, or [`LibraryError::Altered`].
     pub(super) fn entry(self) -> Result<LibraryEntry, LibraryError> {
         if self.attested() == Attested::Altered {
             return Err(LibraryError::Altered { index: self.case.index });
@@ -79,19 +79,19 @@ fn pass_of(row: &Row) -> Result<PassFeatures, LibraryError> {
     })
 }
 
-/// Asks for the passes of a campaign's cases, in the order in which [`Gathering`] takes them.
+/// Statement that selects the passes of a campaign's cases, in the order that [`Gathering`] requires.
 pub(crate) fn passes_of(campaign: &str) -> Statement {
     let ask = "select * from result_with_parameters where campaign_id = $1
         order by sobol_index, speed_km_h";
     sql(ask).bind(campaign)
 }
 
-/// Puts cases together from rows of `result_with_parameters` of one campaign, by index and speed.
+/// Assembles cases from rows of `result_with_parameters` of one campaign, ordered by index and speed.
 #[derive(Default)]
 pub(crate) struct Gathering(Option<StoredCase>);
 
 impl Gathering {
-    /// Takes a row; answers the case before, once a row is of another.
+    /// Adds a row. If the row belongs to a new case, returns the completed previous case.
     pub(crate) fn take(&mut self, row: &Row) -> Result<Option<StoredCase>, LibraryError> {
         match &mut self.0 {
             Some(case) if case.case.index == row.get_u32("sobol_index")? => {
@@ -102,14 +102,14 @@ impl Gathering {
         }
     }
 
-    /// The last case.
+    /// Returns the last case.
     pub(crate) fn end(self) -> Option<StoredCase> {
         self.0
     }
 }
 
 impl Library {
-    /// Hands a campaign's cases with results to `take`, by ascending index, one at a time.
+    /// Passes each case with results of a campaign to `take`, by ascending index.
     pub(crate) async fn stored_cases(
         &self,
         campaign: &str,

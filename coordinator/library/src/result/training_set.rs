@@ -5,13 +5,13 @@ use super::stored::StoredCase;
 use crate::{Library, LibraryError};
 
 impl Library {
-    /// Hands every finished case of a campaign to `take`, by ascending index.
+    /// Passes every finished case of a campaign to `take`, by ascending index.
     ///
-    /// One entry is held at a time, so a million cases need no more memory than one.
+    /// Only one entry is in memory at a time, independent of the number of cases.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library cannot be read, a case lacks a speed, or its results do not have
-    /// their checksum.
+    /// Returns [`LibraryError`] if the library cannot be read, a case lacks a speed, or its results do not
+    /// match their checksum.
     pub async fn training_set(
         &self,
         campaign: &str,

@@ -1,4 +1,4 @@
-//! Several campaigns in one library: which is served, and what people may decide.
+//! Several campaigns in one library: order of leasing, and control by the user.
 
 use crate::support::{
     ATTEMPTS_MAX, CAMPAIGN, Home, failed, fill, finished, held, lease, message, on_both_databases,
@@ -11,7 +11,7 @@ use tracktwin_library::{
 
 const OTHER: &str = "other-000000000000";
 
-/// Of which campaign a worker gets so many cases.
+/// The campaign of a lease of up to `max` cases, and the number of cases.
 async fn served(library: &tracktwin_library::Library, max: u32) -> Option<(String, usize)> {
     let lease = library.lease(request("w", max, 0)).await.unwrap();
     lease.map(|lease| (lease.campaign, lease.cases.len()))

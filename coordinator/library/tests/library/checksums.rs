@@ -1,4 +1,4 @@
-//! Results that were altered are found, wherever they pass.
+//! Altered results are detected in every operation that reads them.
 
 use crate::data::{copy, sql};
 use crate::support::{
@@ -11,7 +11,7 @@ use tracktwin_library::{
 
 const CASES: u32 = 3;
 
-/// A library of three finished cases.
+/// A library with three finished cases.
 async fn whole(home: &Home) -> Library {
     let library = home.library(CASES).await;
     let leased = lease(&library, "w", CASES, 0).await;
@@ -19,7 +19,7 @@ async fn whole(home: &Home) -> Library {
     library
 }
 
-/// Statements that alter one number of case 1, with `SQLite` and with PostgreSQL.
+/// Statements that alter one number of case 1, for `SQLite` and for PostgreSQL.
 const ALTERED: [(&str, &str, &str); 8] = [
     (
         "a level",
@@ -75,7 +75,7 @@ async fn alter(home: &Home, (_, sqlite, postgres): (&str, &'static str, &'static
     sql(home, if home.folder.is_some() { sqlite } else { postgres }).await;
 }
 
-/// What is wrong with results' checksums, as `verify` says it.
+/// Number and first index of results that do not match their checksum, according to `verify`.
 async fn unlike_their_checksum(library: &Library) -> Option<(u64, Option<u32>)> {
     let findings = library.verify(|| ()).await.unwrap().findings;
     let finding = findings.iter().find(|it| it.what.contains("do not match their checksum"));
@@ -262,7 +262,7 @@ on_both_databases! {
     }
 }
 
-/// Copies what is whole, as `tracktwin library copy` does; what was left out.
+/// Copies the intact rows, as `tracktwin library copy` does. Returns descriptions of the rows left out.
 pub(crate) async fn salvage(from: &Library, to: &Library) -> Vec<String> {
     let mut left_out = Vec::new();
     for table in Table::ALL {

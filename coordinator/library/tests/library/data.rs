@@ -1,10 +1,10 @@
-//! The library as plain tables: asked, copied, looked over.
+//! The library as plain tables: queries, copies, verification.
 
 use crate::support::{CAMPAIGN, Home, failed, fill, finished, lease, on_both_databases, report};
 use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
 use tracktwin_library::{Answer, Cell, Library, LibraryError, ReportVerdict, Table};
 
-/// An answer, kept.
+/// The stored result of a query.
 #[derive(Default)]
 pub(crate) struct Kept {
     pub(crate) columns: Vec<String>,
@@ -35,7 +35,7 @@ async fn refusal(library: &Library, text: &str) -> LibraryError {
     library.query(text, &mut Kept::default()).await.expect_err(text)
 }
 
-/// A library with a finished case, one given up, one leased and one waiting.
+/// A library with one finished, one given-up, one leased and one waiting case.
 async fn some_of_all(home: &Home) -> Library {
     let library = home.library(4).await;
     let leased = lease(&library, "w", 2, 0).await;
@@ -61,7 +61,7 @@ pub(crate) async fn copy(from: &Library, to: &Library) -> u64 {
     added
 }
 
-/// Does something to the database behind the library's back.
+/// Changes the database directly, without the library.
 pub(crate) async fn sql(home: &Home, statement: impl Into<String>) {
     let statement = AssertSqlSafe(statement.into());
     if home.folder.is_some() {
@@ -73,7 +73,7 @@ pub(crate) async fn sql(home: &Home, statement: impl Into<String>) {
     }
 }
 
-/// Damages a library, and looks whether that is found.
+/// Damages a library, and checks that the verification finds the damage.
 async fn verify_finds(home: &Home, damage: &'static str, what: &str) {
     let library = some_of_all(home).await;
     sql(home, damage).await;

@@ -1,4 +1,4 @@
-//! What breaks around the library, and what must hold all the same.
+//! Faults in the environment of the library, and the guarantees that hold despite them.
 
 use crate::support::{CAMPAIGN, Home, fill, finished, lease, report};
 use std::path::Path;
@@ -8,7 +8,7 @@ use test_needs::skipped;
 use test_postgres::{Server, Settings};
 use tracktwin_library::{Leased, Library, LibraryError, ReportVerdict};
 
-/// Leases cases and reports them until none wait; calls without a response are repeated.
+/// Leases cases and reports them until no case is waiting. Calls without a response are repeated.
 async fn work(library: &Library, cases: usize) -> usize {
     let mut temporary = 0;
     let mut stored = 0;
@@ -48,7 +48,7 @@ async fn finish(library: &Library, case: &Leased, temporary: &mut usize) -> usiz
     }
 }
 
-/// The digest of so many cases, undisturbed.
+/// The digest of this number of cases, computed without faults.
 async fn undisturbed(count: u32) -> String {
     let home = Home::sqlite_in_memory();
     let library = home.library(count).await;
@@ -106,7 +106,7 @@ async fn a_server_that_stays_away_is_told_as_such_within_a_bound() {
     library.pause(CAMPAIGN).await.unwrap();
 }
 
-/// A file system of eight megabytes, unmounted when dropped; none where that is not allowed.
+/// A file system of 8 MB, unmounted when dropped; `None` if mounting is not allowed.
 struct SmallDisk(tempfile::TempDir);
 
 impl SmallDisk {
@@ -190,10 +190,11 @@ async fn a_full_disk_is_said_and_survived() {
     library.close().await;
 }
 
-/// Set for a copy of this test's program: the library it is to write to until it is killed.
+/// Environment variable for a second process of this test program: the library that it writes to until it
+/// is killed.
 const VICTIM: &str = "TRACKTWIN_TEST_VICTIM";
 
-/// Does nothing unless it is the copy that [`kill_writers`] starts.
+/// Does nothing except in the process that [`kill_writers`] starts.
 #[tokio::test]
 async fn victim() {
     let Ok(url) = std::env::var(VICTIM) else { return };

@@ -1,5 +1,5 @@
-//! Any history of leases, reports, expiries, repetitions and restarts ends with each case finished
-//! or given up exactly once.
+//! Every history of leases, reports, expiries, repetitions and restarts ends with each case finished or
+//! given up exactly once.
 
 use crate::support::{ATTEMPTS_MAX, CAMPAIGN, Home, failed, finished, held, lease, report};
 use proptest::prelude::*;
@@ -8,14 +8,15 @@ use tracktwin_library::{Leased, Library, ReportVerdict, Retry, State};
 
 const CASES: u32 = 6;
 
-/// Something that happens to a farm.
+/// An event in the history of a farm.
 #[derive(Clone, Debug)]
 enum Event {
     Lease {
         worker: usize,
         max: u32,
     },
-    /// One of the leases ever given is reported; it may have expired, or been reported before.
+    /// A report for one of the leases given so far. The lease may have expired, or may have been reported
+    /// before.
     Finish {
         lease: usize,
     },
@@ -28,15 +29,15 @@ enum Event {
     Release {
         lease: usize,
     },
-    /// Time goes on, by more or less than a lease.
+    /// Time passes; the time may be shorter or longer than a lease.
     Pass {
         ms: i64,
     },
-    /// The coordinator is restarted; its workers live on, or died with it.
+    /// The coordinator is restarted; its workers continue, or have ended with it.
     Restart {
         alone: bool,
     },
-    /// Workers turn to the other coordinator.
+    /// Workers change to the other coordinator.
     TurnToOther,
     Pause,
     Resume,
@@ -59,7 +60,7 @@ fn event() -> impl Strategy<Value = Event> {
     ]
 }
 
-/// A farm of two coordinators, and what it must have stored if it keeps its promises.
+/// A farm of two coordinators, and the expected content of its library.
 struct Farm<'a> {
     home: &'a Home,
     libraries: [Option<Library>; 2],
@@ -148,7 +149,7 @@ impl<'a> Farm<'a> {
         self.libraries[self.present] = Some(library);
     }
 
-    /// A sound worker does what is left.
+    /// A sound worker finishes the remaining cases.
     async fn end(&mut self) {
         self.library().resume(CAMPAIGN).await.unwrap();
         for _ in 0..=ATTEMPTS_MAX * CASES {
@@ -184,7 +185,7 @@ impl<'a> Farm<'a> {
     }
 }
 
-/// Each history works on a real database with committed transactions.
+/// Number of histories. Each uses a real database with committed transactions.
 const HISTORIES: u32 = 48;
 
 fn play(runtime: &Runtime, home: &Home, events: Vec<Event>) {

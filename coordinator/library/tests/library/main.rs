@@ -1,4 +1,4 @@
-//! The library on real files.
+//! Tests of the library on real files and databases.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 

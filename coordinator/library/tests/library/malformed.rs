@@ -1,4 +1,4 @@
-//! Files that are not whole: found, not added to, and saved as far as they are.
+//! Damaged files are detected and not written to, and their intact rows are copied.
 
 use crate::checksums::salvage;
 use crate::support::{CAMPAIGN, Home, features, finished, lease, report};
@@ -9,10 +9,10 @@ use tracktwin_library::{Library, LibraryError};
 
 const CASES: u32 = 300;
 
-/// Bytes of a page of a new library.
+/// Size of a page of a new library, in bytes.
 const PAGE: usize = 16_384;
 
-/// The file of a library whose cases are all finished, and its digest.
+/// The file of a library with finished cases, and its digest.
 struct Sound {
     home: Home,
     bytes: Vec<u8>,
@@ -36,7 +36,7 @@ impl Sound {
         self.bytes.len() / PAGE
     }
 
-    /// A file beside it with other bytes.
+    /// Writes a second file with changed bytes.
     fn with(&self, change: impl FnOnce(&mut Vec<u8>)) -> (PathBuf, String) {
         let file = path(&self.home).with_file_name("damaged.sqlite");
         let mut bytes = self.bytes.clone();
@@ -56,7 +56,7 @@ fn path(home: &Home) -> PathBuf {
     home.folder.as_ref().unwrap().path().join("library.sqlite")
 }
 
-/// Whether a library is found to be damaged: when it is opened, or looked over.
+/// Whether the damage of a library is detected, when it is opened or verified.
 async fn is_found(url: &str) -> bool {
     match Library::open(url).await {
         Err(error) => {
@@ -73,7 +73,7 @@ async fn is_found(url: &str) -> bool {
     }
 }
 
-/// Whether adding to a library is prevented.
+/// Whether adding to a library is refused.
 async fn is_refused(url: &str) -> bool {
     let Ok(library) = Library::open_or_create(url).await else { return true };
     let whole = library.check_whole().await;
@@ -85,7 +85,7 @@ async fn is_refused(url: &str) -> bool {
     whole.is_err()
 }
 
-/// How many finished cases a copy has of what is whole; each of them is what was reported.
+/// Number of finished cases in a copy of the intact rows. Each of them equals its report.
 async fn saved(url: &str) -> Option<u32> {
     let from = Library::open(url).await.ok()?;
     let home = Home::sqlite_in_memory();
@@ -269,7 +269,7 @@ async fn what_a_server_loses_of_its_pages_is_found_and_the_rest_is_saved() {
     }
 }
 
-/// The file of a server's table, once all of it is there; none where the table has no page.
+/// File of a table on a server, after its data were written to the disk; `None` if the table has no page.
 async fn file_of(url: &str, table: &str) -> Option<PathBuf> {
     use sqlx::Connection as _;
     let mut connection = sqlx::PgConnection::connect(url).await.unwrap();
@@ -282,7 +282,7 @@ async fn file_of(url: &str, table: &str) -> Option<PathBuf> {
     fs::metadata(&path).is_ok_and(|file| file.len() >= 8192).then_some(path)
 }
 
-/// Adds a case to a library, and an attempt of it.
+/// Adds a case and an attempt of it to a library.
 async fn attempt(url: &str) {
     let library = Library::open(url).await.unwrap();
     library.insert_cases(CAMPAIGN, &[crate::support::case(2)]).await.unwrap();

@@ -1,10 +1,10 @@
-//! What is a library, and what is not.
+//! Opening: which files and databases are accepted as a library, and which are refused.
 
 use crate::support::{CAMPAIGN, Home, case, on_both_databases, record};
 use sqlx::{Connection, PgConnection, SqliteConnection};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
 
-/// Does something to the database behind the library's back.
+/// Changes the database directly, without the library.
 async fn sql(home: &Home, statement: &'static str) {
     if home.folder.is_some() {
         let mut connection =
@@ -138,10 +138,10 @@ async fn with_a_file_one_process_at_a_time_hands_out_cases() {
     other.claim().unwrap();
 }
 
-/// Where two names lead to one file.
+/// A second name of a library's file.
 struct SecondName {
     path: std::path::PathBuf,
-    /// To be unmounted.
+    /// Mount point that must be unmounted.
     mounted: Option<std::path::PathBuf>,
 }
 
@@ -153,7 +153,7 @@ impl Drop for SecondName {
     }
 }
 
-/// Other names of a file, each of another kind; a mounted one only where that is allowed.
+/// Names of several kinds for one file; a mounted one only if mounting is allowed.
 fn second_names(file: &std::path::Path, elsewhere: &std::path::Path) -> Vec<SecondName> {
     let name = |name: &str| elsewhere.join(name);
     std::fs::hard_link(file, name("hard.sqlite")).unwrap();

@@ -1,4 +1,4 @@
-//! What the page on querying says, holds on both databases.
+//! The statements of the page on queries are valid in both databases.
 
 use crate::data::{Kept, copy};
 use crate::provenance::{diagnosis, evaluation, training};
@@ -15,13 +15,13 @@ use tracktwin_signal::Features;
 
 const PAGE: &str = include_str!("../../../../docs/how-to/query-the-library.md");
 
-/// The page's blocks of a language.
+/// The code blocks of the page in this language.
 fn blocks(language: &str) -> Vec<&'static str> {
     let begin = format!("```{language}\n");
     PAGE.split(begin.as_str()).skip(1).filter_map(|block| block.split("```").next()).collect()
 }
 
-/// A library with something in every table that the page asks.
+/// A library with rows in every table that the page queries.
 async fn library(home: &Home) -> Library {
     let file = Home::sqlite();
     released(&file).await;
@@ -38,7 +38,7 @@ async fn library(home: &Home) -> Library {
     library
 }
 
-/// What the page's queries answer.
+/// The results of the page's queries.
 async fn answers(library: &Library) -> Vec<Vec<Vec<Cell>>> {
     let mut answers = Vec::new();
     for query in blocks("sql") {
@@ -50,7 +50,7 @@ async fn answers(library: &Library) -> Vec<Vec<Vec<Cell>>> {
     answers
 }
 
-/// Adds a campaign like the first, with results, models, and an evaluation of the same recording.
+/// Adds a campaign like the first one, with results, models, and an evaluation of the same recording.
 async fn another_campaign(library: &Library) {
     let campaign = || "another-000000000000".to_owned();
     let record = CampaignRecord { id: campaign(), ..library.campaign(CAMPAIGN).await.unwrap() };
@@ -64,7 +64,7 @@ async fn another_campaign(library: &Library) {
     library.record_evaluation(evaluation).await.unwrap();
 }
 
-/// Finishes the cases of a campaign that wait.
+/// Finishes the waiting cases of a campaign.
 async fn work(library: &Library, campaign: &str) {
     let now_unix_ms = library.now_unix_ms();
     let registration = Registration {

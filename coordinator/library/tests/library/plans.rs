@@ -1,5 +1,5 @@
-//! What a lease, a report and an audit do, statement by statement, and how each database goes about it. The
-//! account in words is docs/lease-protocol.md.
+//! The statements of a lease, a report and an audit, and the query plans of both databases.
+//! docs/lease-protocol.md describes them in words.
 
 use crate::snapshot::assert_kept;
 use crate::support::{CAMPAIGN, Home, failed, fill, finished, lease, message, report, request};
@@ -13,21 +13,21 @@ use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Metadata, Subscriber};
 use tracktwin_library::{AuditFinding, Held, LeaseRequest, Library, Report};
 
-/// The server whose plans are kept: another one may plan otherwise.
+/// The PostgreSQL version of the stored plans; another version may have other plans.
 const POSTGRES_VERSION: &str = "15";
 
 thread_local! {
-    /// Statements of connections that write, of this thread's test.
+    /// Statements of writing connections in the test of this thread.
     static STATEMENTS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Statements of this thread since they were taken last.
+/// Statements of this thread since the last call.
 fn taken() -> Vec<String> {
     STATEMENTS.take()
 }
 
-/// Keeps the statements of all threads, each for its own. It is the subscriber of the whole process: whether
-/// an event is wanted is asked once, on whichever thread comes by first.
+/// Stores the statements of each thread separately. It is the subscriber of the whole process, because the
+/// filter of an event is evaluated only once, on an arbitrary thread.
 struct Listener;
 
 impl Subscriber for Listener {
@@ -62,20 +62,20 @@ impl Visit for Statements {
     }
 }
 
-/// What is done, and the statements that did it.
+/// An operation with its statements.
 struct Step {
     what: &'static str,
     statements: Vec<String>,
 }
 
-/// Does everything that the protocol has, one after the other.
+/// Runs all operations of the protocol in sequence.
 struct Scenario {
     library: Library,
     steps: Vec<Step>,
 }
 
 impl Scenario {
-    /// A library in which some cases are finished, some given up, and most wait.
+    /// A library with some finished, some given-up, and mostly waiting cases.
     async fn new(home: &Home) -> Self {
         let library = home.library(2000).await;
         fill(&library, "other-000000000000", 100).await;
@@ -171,7 +171,7 @@ impl Scenario {
     }
 }
 
-/// How a database goes about a statement, one line a step.
+/// Query plan of a statement, one line per step.
 trait Plan {
     async fn plan(&mut self, statement: &str) -> Vec<String>;
 }
@@ -203,10 +203,10 @@ impl Plan for PgConnection {
     }
 }
 
-/// What each step begins and ends with.
+/// First and last statements of each step.
 const BRACKETS: [&str; 3] = ["begin immediate", "begin", "commit"];
 
-/// A statement without the blanks that it has from its place in the program.
+/// A statement without the indentation of the source code.
 fn to_the_left(statement: &str) -> String {
     let lines = statement.trim_end().lines().filter(|line| !line.is_empty());
     let indent = |line: &str| line.len() - line.trim_start().len();
@@ -214,7 +214,8 @@ fn to_the_left(statement: &str) -> String {
     lines.map(|line| &line[least..]).collect::<Vec<_>>().join("\n")
 }
 
-/// The steps with their statements, each with its plan where it stands first. All of a step is one transaction.
+/// Text of all steps with their statements; each statement has its plan at its first occurrence. A step is
+/// one transaction.
 async fn account(steps: Vec<Step>, database: &mut impl Plan) -> String {
     let mut account = String::new();
     let mut known: Vec<(String, String)> = Vec::new();
@@ -238,7 +239,7 @@ async fn account(steps: Vec<Step>, database: &mut impl Plan) -> String {
     account.trim_end().to_owned() + "\n"
 }
 
-/// Everything that the protocol has, done on a database.
+/// Runs all operations of the protocol on a database.
 async fn played(home: &Home) -> Vec<Step> {
     static LISTENING: Once = Once::new();
     LISTENING.call_once(|| tracing::subscriber::set_global_default(Listener).unwrap());

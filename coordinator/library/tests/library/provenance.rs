@@ -1,4 +1,4 @@
-//! What was made of results is kept with them, once.
+//! Trainings, evaluations and diagnoses are stored once.
 
 use crate::support::{CAMPAIGN, Home, on_both_databases};
 use std::collections::BTreeMap;

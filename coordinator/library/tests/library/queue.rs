@@ -1,4 +1,4 @@
-//! Leases: a case belongs to one worker at a time, and none is lost.
+//! Leases: a case is leased to one worker at a time, and no case is lost.
 
 use crate::support::{
     CAMPAIGN, Home, failed, finished, held, lease, on_both_databases, report, request,

@@ -1,4 +1,4 @@
-//! Reports: the first result of a case stays, and the digest knows nothing of how it came.
+//! Reports: the first result of a case is kept, and the digest does not depend on the history.
 
 use crate::support::{
     CAMPAIGN, Home, case, failed, features, finished, lease, on_both_databases, passes, report,

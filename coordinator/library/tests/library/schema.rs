@@ -1,4 +1,4 @@
-//! The schemas after all migrations, as they are kept beside the tests.
+//! The schemas after all migrations, compared with files stored beside the tests.
 
 use crate::data::ask;
 use crate::snapshot::{assert_kept, kept};
@@ -6,7 +6,7 @@ use crate::support::Home;
 use std::path::Path;
 use tracktwin_library::{Cell, Library};
 
-/// Tables, indexes and triggers as they stand in the file, and the columns of views.
+/// Tables, indexes and triggers as stored in the file, and the columns of views.
 const SQLITE: &str = "
     select sql || ';' as text from sqlite_schema
     where sql is not null and type <> 'view' and name <> '_sqlx_migrations'
@@ -15,8 +15,8 @@ const SQLITE: &str = "
     from sqlite_schema as schema join pragma_table_info(schema.name) as columns
     where schema.type = 'view' group by schema.name";
 
-/// Tables with their columns and constraints, indexes, triggers, functions, and the columns of views. Views and
-/// functions are not written out: each version of the server writes them otherwise.
+/// Tables with columns and constraints, indexes, triggers, functions, and the columns of views. The text of
+/// views and functions is left out, because it depends on the version of the server.
 const POSTGRES: &str = "
     with relation as (
         select oid, relname, relkind from pg_class
@@ -79,7 +79,7 @@ async fn the_schema_of_a_server_is_the_one_that_is_kept() {
     assert_kept("schema.postgres.sql", &schema(&home, POSTGRES).await);
 }
 
-/// What is kept is `VERSION HASH-OF-SQLITE'S-FILE HASH-OF-POSTGRESQL'S`.
+/// The stored text is `VERSION HASH-OF-SQLITE'S-FILE HASH-OF-POSTGRESQL'S`.
 #[tokio::test]
 async fn who_changes_a_view_raises_the_version_of_the_views() {
     let home = Home::sqlite();

@@ -1,21 +1,21 @@
-//! Texts that are kept beside the tests, and compared.
+//! Comparison of texts with files stored beside the tests.
 
 use std::fs;
 use std::path::Path;
 
-/// Set to write the texts again.
+/// Environment variable that makes the tests write the files again.
 const WRITE: &str = "TRACKTWIN_WRITE_GOLDEN";
 
 fn file(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/library/snapshots").join(name)
 }
 
-/// What is kept under this name; nothing where nothing is.
+/// The stored text with this name; empty if there is none.
 pub(crate) fn kept(name: &str) -> String {
     fs::read_to_string(file(name)).unwrap_or_default()
 }
 
-/// Compares a text with what is kept under this name.
+/// Compares a text with the stored text of this name.
 pub(crate) fn assert_kept(name: &str, text: &str) {
     if std::env::var_os(WRITE).is_some() {
         fs::write(file(name), text).unwrap();

@@ -1,4 +1,4 @@
-//! A library in either database, and a campaign to put into it.
+//! A library in either database, and a campaign for tests.
 
 use tempfile::TempDir;
 use test_postgres::Server;
@@ -15,13 +15,13 @@ pub(crate) const CAMPAIGN: &str = "test-000000000000";
 /// Attempts before a case is given up, in these tests.
 pub(crate) const ATTEMPTS_MAX: u32 = 3;
 
-/// The same, as the library is told.
+/// The limits of attempts as an argument for the library.
 pub(crate) const GIVE_UP: AttemptsMax = AttemptsMax { failed: ATTEMPTS_MAX, lost: ATTEMPTS_MAX };
 
-/// Where a test's library is: nobody else's.
+/// Location of a test's library, which no other test uses.
 pub(crate) struct Home {
     pub(crate) url: String,
-    /// With `SQLite`.
+    /// Folder of a `SQLite` library.
     pub(crate) folder: Option<TempDir>,
 }
 
@@ -32,7 +32,7 @@ impl Home {
         Self { url, folder: Some(folder) }
     }
 
-    /// A file in memory where the system has a place for such: for what isn't about the disk.
+    /// A file in memory, if the system supports it; for tests that are not about the disk.
     pub(crate) fn sqlite_in_memory() -> Self {
         let memory = std::path::Path::new("/dev/shm");
         if !memory.is_dir() {
@@ -43,7 +43,7 @@ impl Home {
         Self { url, folder: Some(folder) }
     }
 
-    /// None where there is no server.
+    /// A database on the test server; `None` without a server.
     pub(crate) fn postgres() -> Option<Self> {
         Server::shared().map(|server| Self { url: server.database(), folder: None })
     }
@@ -56,7 +56,7 @@ impl Home {
         }
     }
 
-    /// The library of so many cases.
+    /// A library with this number of cases.
     pub(crate) async fn library(&self, count: u32) -> Library {
         let library = Library::open_or_create(&self.url).await.unwrap();
         fill(&library, CAMPAIGN, count).await;
@@ -68,7 +68,7 @@ impl Home {
     }
 }
 
-/// The same test on either database, as `NAME::sqlite` and `NAME::postgres`.
+/// Defines the same test for both databases, as `NAME::sqlite` and `NAME::postgres`.
 macro_rules! on_both_databases {
     ($(async fn $name:ident($home:ident: &Home) $body:block)*) => {$(
         mod $name {
@@ -92,7 +92,7 @@ macro_rules! on_both_databases {
 }
 pub(crate) use on_both_databases;
 
-/// Stores a campaign of so many cases.
+/// Stores a campaign with this number of cases.
 pub(crate) async fn fill(library: &Library, campaign: &str, count: u32) {
     let record = CampaignRecord { id: campaign.to_owned(), ..record() };
     library.insert_campaign(&record).await.unwrap();
@@ -119,7 +119,7 @@ pub(crate) fn case(index: u32) -> Case {
     Case { index, parameters, surface_seed: u64::MAX / 2 - u64::from(index) }
 }
 
-/// What the case's simulation would find: a function of the case alone.
+/// Features of a case: a function of its index.
 pub(crate) fn features(index: u32) -> Vec<Features> {
     let pass = |speed: f64| Features {
         log_power: (0..5)
@@ -132,7 +132,7 @@ pub(crate) fn features(index: u32) -> Vec<Features> {
     record().speeds_km_h.into_iter().map(pass).collect()
 }
 
-/// What a worker asks for at a time, of any campaign.
+/// Request for up to `max` cases of any campaign.
 pub(crate) fn request(worker: &str, max: u32, now: i64) -> LeaseRequest {
     LeaseRequest {
         campaign: None,
@@ -156,7 +156,7 @@ pub(crate) fn held(leased: &Leased) -> Held {
     Held { index: leased.case.index, epoch: leased.epoch }
 }
 
-/// The passes of features, as a worker reports them.
+/// Features as passes in a worker's report.
 pub(crate) fn passes(features: Vec<Features>) -> Vec<PassFeatures> {
     let pass = |(speed_km_h, features)| PassFeatures {
         speed_km_h,
@@ -166,7 +166,7 @@ pub(crate) fn passes(features: Vec<Features>) -> Vec<PassFeatures> {
     record().speeds_km_h.into_iter().zip(features).map(pass).collect()
 }
 
-/// A report with the checksum that its worker makes.
+/// A case report with the checksum that its worker computes.
 pub(crate) fn reported(leased: &Leased, outcome: Outcome) -> CaseReport {
     let parameter_hash = leased.case.parameter_hash();
     CaseReport {
@@ -195,7 +195,7 @@ pub(crate) async fn report(
     library.report(message(worker, cases)).await.unwrap()
 }
 
-/// What a worker sends.
+/// Report of a worker.
 pub(crate) fn message(worker: &str, cases: Vec<CaseReport>) -> Report {
     Report {
         campaign: CAMPAIGN.to_owned(),

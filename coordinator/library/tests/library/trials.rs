@@ -1,4 +1,4 @@
-//! Blind trials: nodes share their cases, and each question is answered once.
+//! Blind trials: machines share the cases, and each question is answered once.
 
 use crate::data::{Kept, copy};
 use crate::provenance::diagnosis;

@@ -1,4 +1,4 @@
-//! Libraries that earlier programs wrote are brought up to date, and hold what they held.
+//! Libraries of earlier program versions are updated and keep their content.
 
 use crate::support::{GIVE_UP, Home};
 use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
@@ -6,7 +6,7 @@ use tracktwin_library::{LeaseRequest, Library, State, Status};
 
 pub(crate) const CAMPAIGN: &str = "released-13c0db7b51c4";
 
-/// A library as the first released schema left it.
+/// Creates a library with the first released schema.
 pub(crate) async fn released(home: &Home) {
     let url = format!("{}?mode=rwc", home.url);
     let mut connection = SqliteConnection::connect(&url).await.unwrap();

@@ -1,12 +1,12 @@
-//! Views are created again from one file per database, and only if the existing ones are of an
-//! earlier program.
+//! Views are created again from one file per database, and only if the existing ones are of an earlier
+//! version.
 
 use crate::data::{Kept, ask, sql};
 use crate::support::{CAMPAIGN, Home, on_both_databases};
 use tracktwin_library::{IntegrityFault, Library};
 use tracktwin_parameters::Parameter;
 
-/// Takes a view away and says that the views are of this version.
+/// Removes a view, and sets the version of the views.
 async fn of_version(home: &Home, version: &'static str) {
     sql(home, "drop view if exists failed_case").await;
     let says = match home.folder {
@@ -16,7 +16,7 @@ async fn of_version(home: &Home, version: &'static str) {
     sql(home, says).await;
 }
 
-/// Whether the view that was taken away is there.
+/// Whether the removed view exists.
 async fn is_there(library: &Library) -> bool {
     library.query("select * from failed_case", &mut Kept::default()).await.is_ok()
 }

@@ -1,4 +1,4 @@
-//! Workers as all coordinators see them, and whether they can be believed.
+//! Workers as shared by all coordinators, and their quarantine.
 
 use crate::support::{CAMPAIGN, Home, failed, finished, lease, message, on_both_databases, report};
 use tracktwin_library::{
@@ -17,7 +17,7 @@ pub(crate) fn registration(worker: &str, now_unix_ms: i64) -> Registration {
     }
 }
 
-/// Simulates `count` cases, all of which are to be audited.
+/// Finishes `count` cases, all of which are marked for an audit.
 async fn work_audited(library: &Library, worker: &str, count: u32) {
     let leased = lease(library, worker, count, 0).await;
     let message = message(worker, leased.iter().map(finished).collect());

@@ -1,4 +1,4 @@
-//! Axes of charts: where a value lies, and which values get a tick.
+//! Axes of charts: position of a value on the axis, and ticks.
 
 /// A linear or logarithmic axis with its label.
 #[derive(Clone, Debug)]
@@ -8,19 +8,19 @@ pub struct Axis {
     low: f64,
     high: f64,
     logarithmic: bool,
-    /// Distance of the ticks, where it is not to be chosen.
+    /// Distance of the ticks; chosen automatically if `None`.
     step: Option<f64>,
 }
 
 impl Axis {
-    /// A linear axis over these values with a little room at either end.
+    /// A linear axis that covers these values, with a margin at both ends.
     pub fn around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let [low, high] = ends(values);
         let room = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
         Self::linear(label, low - room, high + room)
     }
 
-    /// A linear axis.
+    /// A linear axis from `low` to `high`.
     pub fn linear(label: &str, low: f64, high: f64) -> Self {
         Self { label: label.to_owned(), low, high, logarithmic: false, step: None }
     }
@@ -31,17 +31,17 @@ impl Axis {
         Self { step: Some(step), ..self }
     }
 
-    /// A logarithmic axis; both ends are positive.
+    /// A logarithmic axis from `low` to `high`, which must both be positive.
     pub fn logarithmic(label: &str, low: f64, high: f64) -> Self {
         Self { label: label.to_owned(), low, high, logarithmic: true, step: None }
     }
 
-    /// Lowest and highest value.
+    /// Lowest and highest value of the axis.
     pub const fn ends(&self) -> [f64; 2] {
         [self.low, self.high]
     }
 
-    /// Where `value` lies: 0 at the low end, 1 at the high end.
+    /// Relative position of `value` on the axis: 0 at the low end, 1 at the high end.
     pub fn place(&self, value: f64) -> f64 {
         if self.logarithmic {
             (value / self.low).ln() / (self.high / self.low).ln()
@@ -50,7 +50,7 @@ impl Axis {
         }
     }
 
-    /// Values that get a tick, and their texts.
+    /// Values of the ticks with their labels; at most about `at_most` ticks.
     pub fn ticks(&self, at_most: usize) -> Vec<(f64, String)> {
         if self.logarithmic { self.decades(at_most) } else { self.round_values(at_most) }
     }
@@ -86,14 +86,14 @@ impl Axis {
     }
 }
 
-/// Lowest and highest of the values; 0 and 1 if there are none.
+/// Lowest and highest of the values; 0 and 1 if there are no values.
 fn ends(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     let fold = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
     let [low, high] = values.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], fold);
     if low.is_finite() { [low, high] } else { [0.0, 1.0] }
 }
 
-/// Plain digits between a thousandth and a hundred thousand, else a power such as 2·10⁻⁹.
+/// Formats a value with plain digits between 1e-3 and 1e5, otherwise as a power such as 2·10⁻⁹.
 fn power_of_ten(value: f64) -> String {
     if (1e-3..1e5).contains(&value) {
         return format!("{}", (value * 1e6).round() / 1e6);

@@ -1,4 +1,5 @@
-//! A chart as inline SVG: frame, axes, lines, bands, dots, bars; colours come from the page.
+//! A chart as inline SVG: frame, axes, lines, bands, dots, bars. The page's style sheet defines the
+//! colours.
 
 use crate::axis::Axis;
 use std::fmt::Write as _;
@@ -7,10 +8,10 @@ const LEFT: f64 = 72.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;
-/// Distance in px that a tick's text needs along x and along y.
+/// Minimum distance of tick labels along x and along y, in px.
 const TICK_ROOM: [f64; 2] = [70.0, 34.0];
 
-/// A chart that is being drawn.
+/// A chart under construction.
 pub struct Chart {
     title: String,
     size: [f64; 2],
@@ -22,31 +23,31 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// An empty chart, `width` by `height` px.
+    /// Creates an empty chart of `width` by `height` px.
     pub fn new(title: &str, [width, height]: [f64; 2], x: Axis, y: Axis) -> Self {
         let title = title.to_owned();
         let size = [width - LEFT - RIGHT, height - TOP - BOTTOM];
         Self { title, size, x, y, marks: String::new(), x_names: None, legend: Vec::new() }
     }
 
-    /// Names at places of the x axis, in place of numbers.
+    /// Sets names at positions of the x axis, instead of numbers.
     pub fn name_x(&mut self, names: Vec<(f64, String)>) {
         self.x_names = Some(names);
     }
 
-    /// An entry of the legend in the style `class`.
+    /// Adds an entry with the style `class` to the legend.
     pub fn explain(&mut self, class: &'static str, text: &str) {
         self.legend.push((class, text.to_owned()));
     }
 
-    /// A line through the points.
+    /// Adds a line through the points.
     pub fn line(&mut self, class: &str, points: impl IntoIterator<Item = (f64, f64)>) {
         let points: Vec<_> = points.into_iter().map(|(x, y)| self.at(x, y)).collect();
         let _ =
             write!(self.marks, r#"<polyline class="line {class}" points="{}"/>"#, join(&points));
     }
 
-    /// The area between a low and a high value.
+    /// Adds the area between a lower and an upper curve. A point is x, lower value and upper value.
     pub fn band(&mut self, class: &str, points: &[(f64, f64, f64)]) {
         let low = points.iter().map(|&(x, low, _)| self.at(x, low));
         let high = points.iter().rev().map(|&(x, _, high)| self.at(x, high));
@@ -54,8 +55,8 @@ impl Chart {
         let _ = write!(self.marks, r#"<polygon class="band {class}" points="{}"/>"#, join(&points));
     }
 
-    /// A line through means with a band around it; a point is place, mean and half width of the
-    /// band. The reference line (`was`) is drawn behind the others, without dots.
+    /// Adds a line through mean values, with a band around the line. A point is x, mean, and half width of
+    /// the band. The reference line (class `was`) is drawn behind the others and without dots.
     pub fn curve(&mut self, class: &str, points: &[(f64, f64, f64)]) {
         let band: Vec<_> = points.iter().map(|&(x, y, half)| (x, y - half, y + half)).collect();
         let means: Vec<_> = points.iter().map(|&(x, y, _)| (x, y)).collect();
@@ -66,7 +67,7 @@ impl Chart {
         }
     }
 
-    /// A dot a point, `radius` px.
+    /// Adds a dot of `radius` px at each point.
     pub fn dots(&mut self, class: &str, radius: f64, points: &[(f64, f64)]) {
         for &(x, y) in points {
             let [x, y] = self.at(x, y);
@@ -77,7 +78,7 @@ impl Chart {
         }
     }
 
-    /// A bar from the bottom to `y` between `from` and `to`, named when pointed at.
+    /// Adds a bar from the bottom of the chart to `y`, between `from` and `to`; `name` is its tooltip.
     pub fn bar(&mut self, class: &str, [from, to]: [f64; 2], y: f64, name: &str) {
         let ([left, top], [right, _]) = (self.at(from, y), self.at(to, y));
         let _ = write!(
@@ -89,7 +90,7 @@ impl Chart {
         );
     }
 
-    /// Filled rectangles, each from left to right and from low to high.
+    /// Adds filled rectangles, each given as left, right, low and high edge.
     pub fn cells(&mut self, class: &str, edges: &[[f64; 4]]) {
         let _ = write!(self.marks, r#"<path class="cell {class}" d=""#);
         for &[left, right, low, high] in edges {
@@ -99,14 +100,14 @@ impl Chart {
         self.marks += r#""/>"#;
     }
 
-    /// A thin line from bottom to top.
+    /// Adds a thin vertical line at `x`, from bottom to top.
     pub fn vertical(&mut self, x: f64) {
         let [x, _] = self.at_x(x);
         let bottom = self.size[1];
         let _ = write!(self.marks, r#"<path class="mark" d="M{x:.1} 0V{bottom:.1}"/>"#);
     }
 
-    /// A picture over the whole frame, as a `data:` address.
+    /// Adds an image over the whole frame, given as a `data:` URL.
     pub fn image(&mut self, address: &str) {
         let [width, height] = self.size;
         let _ = write!(
@@ -115,7 +116,7 @@ impl Chart {
         );
     }
 
-    /// The chart as an `<svg>` element.
+    /// Returns the chart as an `<svg>` element.
     pub fn into_svg(self) -> String {
         let [width, height] = self.size;
         let (full_width, full_height) = (width + LEFT + RIGHT, height + TOP + BOTTOM);
@@ -174,9 +175,9 @@ impl Chart {
         );
     }
 
-    /// The legend, in the upper right corner above the frame.
+    /// Writes the legend in the upper right corner, above the frame.
     fn explanations(&self, svg: &mut String) {
-        /// Mean width in px of a letter at the legend's size.
+        /// Mean width of a letter in the legend, in px.
         const LETTER: f64 = 6.3;
         let mut x = self.size[0];
         for (class, text) in self.legend.iter().rev() {
@@ -208,7 +209,7 @@ fn join(points: &[[f64; 2]]) -> String {
     text
 }
 
-/// The text with the characters replaced that mean something in SVG and HTML.
+/// Replaces the characters that have a special meaning in SVG and HTML.
 pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

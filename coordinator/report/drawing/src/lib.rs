@@ -1,6 +1,7 @@
 //! Elements of pages: axes, charts as inline SVG, numbers with units, page frame.
 //!
-//! Owns how things look; what is shown is left to others. No file, font or script from elsewhere.
+//! This crate defines the appearance of pages; its callers define their content. A page needs no external
+//! file, font or script.
 
 mod axis;
 mod chart;

@@ -1,8 +1,8 @@
-//! Estimates of parameters as a person reads them: units with prefixes, digits as they are known.
+//! Formatting of parameter estimates: units with prefixes, and digits according to the uncertainty.
 
 use tracktwin_parameters::Parameter;
 
-/// How a parameter is shown: divided by `divisor`, in `unit`.
+/// Format of a parameter: the SI value divided by `divisor`, in the unit `unit`.
 pub struct Shown {
     /// Divisor of the SI value.
     pub divisor: f64,
@@ -11,7 +11,7 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// How this parameter is shown: prefixes follow from the upper end of its range.
+    /// Format of this parameter. The upper end of the parameter's range determines the prefix.
     pub fn of(parameter: Parameter) -> Self {
         let [_, high] = parameter.range();
         let (divisor, prefix) = match high {
@@ -23,7 +23,7 @@ impl Shown {
         Self { divisor, unit: format!("{prefix}{unit}") }
     }
 
-    /// Mean and standard deviation, in SI units, as `148 ± 12`.
+    /// Formats mean and standard deviation, both in SI units, as `148 ± 12`.
     pub fn estimate(&self, mean: f64, sd: f64) -> String {
         let (mean, sd) = (mean / self.divisor, sd / self.divisor);
         let decimals = tracktwin_number::decimals(mean, 3);
@@ -31,12 +31,12 @@ impl Shown {
     }
 }
 
-/// The number with three significant digits.
+/// Formats a number with three significant digits.
 pub fn significant(value: f64) -> String {
     tracktwin_number::significant(value, 3)
 }
 
-/// A share, 0 to 1, in percent with two significant digits.
+/// Formats a share (0 to 1) in percent with two significant digits.
 pub fn percent(share: f64) -> String {
     format!("{} %", tracktwin_number::significant(100.0 * share, 2))
 }

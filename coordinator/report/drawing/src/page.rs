@@ -3,9 +3,9 @@
 use crate::chart::escape;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// Colours and lines of charts; light, and dark where the reader prefers it.
+/// Style sheet of charts: colours and lines, in a light version and a dark one for readers who prefer it.
 ///
-/// The hues are Okabe and Ito's, which readers with any colour vision can distinguish.
+/// The colours are those of Okabe and Ito, which readers with any colour vision can distinguish.
 pub const CHART_STYLE: &str = "
 :root{--paper:#fff;--ink:#1b1f24;--faint:#d9dde2;--dim:#5b6470;--a:#0072b2;--b:#d55e00;--c:#009e73;--d:#cc79a7;--e:#e69f00;--f:#56b4e9}
 @media (prefers-color-scheme:dark){:root{--paper:#14171a;--ink:#e6e9ec;--faint:#343a41;--dim:#9aa4af;--a:#56b4e9;--b:#f08a4b;--c:#2cc295;--d:#e29cc2;--e:#f0c04a;--f:#2b8fd0}}
@@ -34,12 +34,12 @@ tr.invalid{color:var(--dim);font-style:italic}.banner{border:2px solid var(--b);
 @media print{body{max-width:none;padding:0;font-size:11pt}figure,tr{break-inside:avoid}}
 ";
 
-/// A whole page: heading, summary sentence, content.
+/// Returns a whole page: heading, summary sentence and content.
 pub fn page(title: &str, summary: &str, body: &Markup) -> String {
     page_with(title, summary, &Markup::default(), body, &Markup::default())
 }
 
-/// A whole page, with more in its head and behind its end.
+/// Returns a whole page, with additional elements in its head and after its content.
 pub fn page_with(title: &str, summary: &str, head: &Markup, body: &Markup, end: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
@@ -63,7 +63,7 @@ pub fn page_with(title: &str, summary: &str, head: &Markup, body: &Markup, end: 
     page.into_string()
 }
 
-/// Charts beside each other, with what is to be seen in them.
+/// Charts side by side, with a caption.
 pub fn figure(charts: &[String], caption: &str) -> Markup {
     html! {
         figure {
@@ -73,7 +73,7 @@ pub fn figure(charts: &[String], caption: &str) -> Markup {
     }
 }
 
-/// Charts as one separate file, `width` by `height` px, each with its place in px.
+/// Returns several charts as one SVG file of `width` by `height` px. Each chart has its position in px.
 pub fn sheet(title: &str, [width, height]: [f64; 2], charts: &[([f64; 2], String)]) -> String {
     let placed = |([x, y], chart): &([f64; 2], String)| {
         format!(r#"<g transform="translate({x} {y})">{chart}</g>"#)
@@ -84,7 +84,7 @@ pub fn sheet(title: &str, [width, height]: [f64; 2], charts: &[([f64; 2], String
     ))
 }
 
-/// A chart as a separate file, with the colours of a page.
+/// Returns a chart as one SVG file with the colours of a page.
 pub fn stand_alone(chart: &str) -> String {
     let style = format!("<style>{CHART_STYLE}</style>");
     match chart.find('>') {

@@ -1,4 +1,4 @@
-//! The stiffness along the track before and after, and the bias that goes.
+//! Stiffness along the track before and after the extension of the model, and the removed bias.
 
 use super::quantity::{Unit, rounded_pair, signed};
 use super::words::{accepted, addition, is_chain, numbers, physics};
@@ -10,10 +10,10 @@ use tracktwin_parameters::Parameter;
 
 const SIZE: [f64; 2] = [1104.0, 240.0];
 
-/// Sleepers whose names fit under the charts.
+/// Maximum number of sleeper names that fit below a chart.
 const NAMES: usize = 20;
 
-/// A parameter, and where a sleeper has its values.
+/// A parameter, and the access to its values at a sleeper.
 type Column = (Parameter, fn(&SleeperValues) -> &BeforeAfter<Estimate>);
 
 const COLUMNS: [Column; 3] = [
@@ -22,7 +22,7 @@ const COLUMNS: [Column; 3] = [
     (Parameter::IrregularityLevel, |sleeper| &sleeper.irregularity_level),
 ];
 
-/// A chart a parameter, and the table of biases.
+/// One chart per parameter, and the table of biases.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     if diagnosis.track.is_empty() {
         return Markup::default();
@@ -68,7 +68,7 @@ fn chart(diagnosis: &Diagnosis, (parameter, pick): &Column) -> String {
     chart.into_svg()
 }
 
-/// Thin lines where accepted physics have a place, and not nearly everywhere.
+/// Draws thin lines at the positions of accepted physics, unless they cover nearly the whole track.
 fn mark_places(chart: &mut Chart, diagnosis: &Diagnosis) {
     for location in accepted(diagnosis).filter_map(|hypothesis| hypothesis.location.as_ref()) {
         let places = numbers(diagnosis, &location.sleepers);

@@ -1,9 +1,9 @@
-//! Passes that were withheld from the search, compared with simulations in time.
+//! Passes withheld from the search, compared with time-domain simulations.
 
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Confirmation, Diagnosis};
 
-/// The table; nothing where no pass was withheld.
+/// The table of the comparison; empty if no pass was withheld.
 pub(crate) fn section(diagnosis: &Diagnosis) -> Markup {
     let Some(confirmation) = &diagnosis.confirmation else { return Markup::default() };
     let Confirmation { passes, speeds, sleepers, gain_nats, is_confirmed } = confirmation;

@@ -1,4 +1,4 @@
-//! How well recording and prediction agree, in numbers, and what the numbers mean.
+//! Agreement of recording and prediction in numbers, with an explanation.
 
 use super::levels::{Side, cells, rms};
 use super::place::Site;
@@ -7,7 +7,7 @@ use super::words::{accepted, addition, physics, speeds};
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Score, Scores};
 
-/// Scores, and differences and gains by speed.
+/// Section with the scores, and with differences and gains by speed.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let fit = &diagnosis.fit;
     // Where no track was compared the first that was found is what the scores are about.
@@ -44,7 +44,7 @@ fn scores(name: &str, scores: &Scores, better: bool) -> Markup {
     }
 }
 
-/// One sentence on the meaning of the scores.
+/// Explanation of the scores in one sentence.
 fn meaning(diagnosis: &Diagnosis) -> String {
     let fit = &diagnosis.fit;
     let single = "With a single speed no speed could be withheld, so no model was tested on other \
@@ -66,7 +66,7 @@ fn meaning(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// Differences and gains, a row a speed.
+/// Table of differences and gains, one row per speed.
 fn by_speed(diagnosis: &Diagnosis, extended: bool) -> Markup {
     let levels = &diagnosis.levels;
     let site = Site::first(diagnosis);
@@ -109,7 +109,7 @@ fn by_speed(diagnosis: &Diagnosis, extended: bool) -> Markup {
     }
 }
 
-/// The gain at a speed; its key begins with the speed in km/h, perhaps rounded.
+/// Gain at a speed. Its key begins with the speed in km/h, which may be rounded.
 fn gain(diagnosis: &Diagnosis, km_h: f64) -> Option<f64> {
     let speed = |key: &str| {
         let number = key.trim_start().split(|c: char| !(c.is_ascii_digit() || c == '.')).next();

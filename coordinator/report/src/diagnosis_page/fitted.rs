@@ -1,4 +1,4 @@
-//! Parameters of what was accepted, with units and intervals.
+//! Parameters of the accepted hypotheses, with units and intervals.
 
 use super::quantity::{interval, mean};
 use super::words::{accepted, physics};
@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Estimate, Hypothesis};
 use tracktwin_track::extension::{Bound, Kind, KindParameter};
 
-/// The table; nothing where nothing was accepted or what was has no parameters.
+/// The table; empty if no hypothesis with parameters was accepted.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let has_any = |hypothesis: &&Hypothesis| {
         !(hypothesis.parameters.is_empty() && hypothesis.assumed.is_empty())
@@ -56,7 +56,7 @@ fn meaning(known: Option<&KindParameter>, name: &str) -> String {
     known.map_or_else(|| physics(name), |parameter| parameter.meaning.to_owned())
 }
 
-/// Whether values below zero make no sense.
+/// Whether the parameter cannot be negative.
 fn is_positive(known: Option<&KindParameter>) -> bool {
     known.is_some_and(|parameter| parameter.bound != Bound::Any)
 }

@@ -41,7 +41,7 @@ pub(super) const fn verdict(verdict: Verdict) -> (&'static str, &'static str, &'
     }
 }
 
-/// Key figures, each with what it is.
+/// Key figures, each with its explanation.
 fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
     let among_others = accepted(diagnosis).count() > 1;
     let mut facts: Vec<(String, String)> = accepted(diagnosis)
@@ -61,7 +61,7 @@ fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
     facts
 }
 
-/// How sure it is that nothing is left out, where nothing was found.
+/// Probability that nothing is left out, if the verdict is `consistent`.
 fn nothing(diagnosis: &Diagnosis) -> Option<(String, String)> {
     let probability = diagnosis.nothing_left_out?;
     let what =
@@ -69,7 +69,7 @@ fn nothing(diagnosis: &Diagnosis) -> Option<(String, String)> {
     (diagnosis.verdict == Verdict::Consistent).then(|| (per_cent(probability), what.to_owned()))
 }
 
-/// How far measured and predicted levels are apart.
+/// Agreement of measured and predicted levels.
 fn agreement(diagnosis: &Diagnosis) -> Vec<(String, String)> {
     match (addition(diagnosis).is_some(), diagnosis.mismatches.first()) {
         (true, _) => improvement(diagnosis).into_iter().collect(),

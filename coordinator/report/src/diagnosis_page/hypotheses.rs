@@ -7,13 +7,13 @@ use super::words::{
 use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Hypothesis, UNKNOWN, Verdict};
 
-/// Hypotheses that are shown one by one, accepted ones apart.
+/// Maximum number of hypotheses shown in full, in addition to the accepted ones.
 const SHOWN: usize = 8;
 
-/// Probability below which a hypothesis that was not accepted is only counted.
+/// Probability below which a hypothesis that was not accepted is counted and not shown.
 const LEAST: f64 = 0.005;
 
-/// The hypotheses, or what it means that there are none.
+/// The hypotheses, or an explanation if there are none.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let worth = |(rank, hypothesis): &(usize, &Hypothesis)| {
         hypothesis.accepted || (*rank < SHOWN && hypothesis.probability >= LEAST)

@@ -1,17 +1,17 @@
-//! Measured less predicted levels, and their means over cells.
+//! Differences between measured and predicted levels, and their means over cells (speed, sleeper, band).
 
 use tracktwin_diagnosis::{Diagnosis, Levels};
 
-/// Which prediction the measured levels are compared with.
+/// Prediction with which the measured levels are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Side {
-    /// The re-tuned baseline.
+    /// Prediction of the re-tuned baseline.
     Before,
-    /// With what was named.
+    /// Prediction with the accepted hypotheses.
     After,
 }
 
-/// Measured level in dB; none where there is no number.
+/// Measured level in dB at `[speed, sleeper, band]`; `None` if there is no finite value.
 pub(super) fn measured(levels: &Levels, at: [usize; 3]) -> Option<f64> {
     of(&levels.measured_db, at)
 }
@@ -25,13 +25,13 @@ pub(super) fn predicted(levels: &Levels, side: Side, at: [usize; 3]) -> Option<f
     of(table, at)
 }
 
-/// Measured less predicted level in dB; none where they are not compared.
+/// Measured minus predicted level in dB; `None` if the cell is not compared.
 pub(super) fn difference(levels: &Levels, side: Side, at: [usize; 3]) -> Option<f64> {
     scatter(levels, at[0], at[2])?;
     Some(measured(levels, at)? - predicted(levels, side, at)?)
 }
 
-/// Scatter to expect in dB of one level at a speed in a band; none where it is not compared.
+/// Expected standard deviation of a level at a speed in a band, in dB; `None` if the band is not compared.
 pub(super) fn scatter(levels: &Levels, speed: usize, band: usize) -> Option<f64> {
     levels.scatter_db.get(speed)?.get(band).copied()?.filter(|sd| *sd > 0.0)
 }
@@ -47,12 +47,12 @@ pub(super) fn cells(diagnosis: &Diagnosis, speed: usize) -> impl Iterator<Item =
         .flat_map(move |sleeper| (0..bands).map(move |band| [speed, sleeper, band]))
 }
 
-/// All cells.
+/// All cells of all speeds.
 pub(super) fn all_cells(diagnosis: &Diagnosis) -> impl Iterator<Item = [usize; 3]> {
     (0..diagnosis.levels.speeds_km_h.len()).flat_map(|speed| cells(diagnosis, speed))
 }
 
-/// Root mean square difference in dB over cells; none without any.
+/// Root mean square of the difference over cells, in dB; `None` if there are no cells.
 pub(super) fn rms(
     levels: &Levels,
     side: Side,
@@ -63,7 +63,7 @@ pub(super) fn rms(
     (count > 0).then(|| (sum / f64::from(count)).sqrt())
 }
 
-/// Share of the cells whose difference is at most twice the scatter; none without any.
+/// Share of the cells with a difference of at most two standard deviations; `None` if there are no cells.
 pub(super) fn share_within_two_sd(diagnosis: &Diagnosis, side: Side) -> Option<f64> {
     let levels = &diagnosis.levels;
     let within = all_cells(diagnosis).filter_map(|at| {
@@ -73,7 +73,7 @@ pub(super) fn share_within_two_sd(diagnosis: &Diagnosis, side: Side) -> Option<f
     (count > 0).then(|| f64::from(inside) / f64::from(count))
 }
 
-/// Mean square of difference over scatter at a sleeper, over speeds and bands.
+/// Mean of (difference / standard deviation)² at a sleeper, over speeds and bands.
 pub(super) fn mismatch_norm(diagnosis: &Diagnosis, sleeper: usize) -> f64 {
     let levels = &diagnosis.levels;
     let (mut sum, mut count) = (0.0, 0u32);
@@ -89,7 +89,7 @@ pub(super) fn mismatch_norm(diagnosis: &Diagnosis, sleeper: usize) -> f64 {
     if count == 0 { 0.0 } else { sum / f64::from(count) }
 }
 
-/// The middle one of the scatters in dB; none without any.
+/// Median of the expected standard deviations, in dB; `None` if there are none.
 pub(super) fn usual_scatter(levels: &Levels) -> Option<f64> {
     let mut all: Vec<f64> = levels.scatter_db.iter().flatten().copied().flatten().collect();
     all.sort_by(f64::total_cmp);

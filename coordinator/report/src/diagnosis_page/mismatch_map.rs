@@ -1,4 +1,4 @@
-//! Measured less predicted levels over the track and frequency, at each speed, before and after.
+//! Maps of measured minus predicted levels over position and frequency, at each speed, before and after.
 
 use super::levels::{Side, all_cells, difference, usual_scatter};
 use super::quantity::digits;
@@ -7,26 +7,26 @@ use maud::{Markup, html};
 use tracktwin_diagnosis::{Diagnosis, Mismatch};
 use tracktwin_drawing::{Axis, Chart, figure};
 
-/// Width of a panel in a row of two, and of three.
+/// Width of a map in px, in a row of two and in a row of three.
 const WIDTHS: [f64; 2] = [546.0, 361.0];
 const HEIGHT: f64 = 250.0;
 
-/// Shades on either side of zero.
+/// Number of shades on either side of zero.
 const SHADES: usize = 6;
 
-/// Ends that the colour scale may have, in dB: a shade is a half to six decibels.
+/// Possible ends of the colour scale in dB; with six shades, a shade has 0.5 to 6 dB.
 const LIMITS_DB: [f64; 7] = [3.0, 6.0, 9.0, 12.0, 18.0, 24.0, 36.0];
 
-/// Scatters that reach the end of the scale: what is chance stays pale.
+/// Minimum end of the scale in standard deviations, so that random differences have a pale shade.
 const SCATTERS: f64 = 6.0;
 
-/// Most columns of cells in a panel.
+/// Maximum number of columns of cells in a map.
 const COLUMNS_MAX: usize = 240;
 
-/// Pixels that a sleeper's name needs.
+/// Width of a sleeper's name in px.
 const NAME_WIDTH: f64 = 46.0;
 
-/// The maps with their scale, and the mismatches in words.
+/// The maps with their scale, and a list of the mismatches.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let levels = &diagnosis.levels;
     if levels.speeds_km_h.is_empty() || levels.frequency_hz.is_empty() || diagnosis.track.is_empty()
@@ -49,7 +49,7 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// The end of the colour scale in dB: nearly all differences before lie inside.
+/// End of the colour scale in dB. 98 % of the differences before the extension are inside the scale.
 fn limit(diagnosis: &Diagnosis) -> f64 {
     let levels = &diagnosis.levels;
     let mut sizes: Vec<f64> = all_cells(diagnosis)
@@ -93,7 +93,8 @@ fn panel(diagnosis: &Diagnosis, speed: usize, side: Side, limit_db: f64) -> Stri
     chart.into_svg()
 }
 
-/// Number of a difference's shade: the first half is for less than predicted; none for about zero.
+/// Index of a difference's shade. The first half of the indices is for negative differences; `None` is for
+/// differences near zero.
 fn shade(difference_db: f64, limit_db: f64) -> Option<usize> {
     let steps = (difference_db.abs() / limit_db * SHADES as f64).round() as usize;
     let strength = steps.min(SHADES).checked_sub(1)?;
@@ -105,12 +106,12 @@ fn class(shade: usize) -> String {
     format!("{side} s{}", shade % SHADES + 1)
 }
 
-/// Sleepers that share a cell, so that a kilometre of track has no more cells than there are pixels.
+/// Number of sleepers per cell, so that a long track has no more cells than a map has pixels.
 fn shared(diagnosis: &Diagnosis) -> usize {
     diagnosis.track.len().div_ceil(COLUMNS_MAX).max(1)
 }
 
-/// Edges of sleepers and bands.
+/// Edges of the cells along position and frequency.
 struct Grid<'a> {
     diagnosis: &'a Diagnosis,
     half_span_m: f64,
@@ -132,7 +133,7 @@ impl<'a> Grid<'a> {
         Self { diagnosis, half_span_m: 0.5 * span_m, half_band: ratio.sqrt() }
     }
 
-    /// The cells of a speed, each with its edges and the mean difference of its sleepers in dB.
+    /// The cells of a speed: edges, and mean difference of the sleepers in dB.
     fn cells(&self, speed: usize, side: Side) -> Vec<([f64; 4], f64)> {
         let Diagnosis { track, levels, .. } = self.diagnosis;
         let many = shared(self.diagnosis);
@@ -153,7 +154,7 @@ impl<'a> Grid<'a> {
             .collect()
     }
 
-    /// Left, right, low and high edge of a sleeper's band.
+    /// Left, right, low and high edge of one sleeper in one band.
     fn cell(&self, sleeper: usize, band: usize) -> [f64; 4] {
         let x_m = self.diagnosis.track[sleeper].x_m;
         let hz = self.diagnosis.levels.frequency_hz[band];
@@ -171,7 +172,7 @@ impl<'a> Grid<'a> {
         Axis::logarithmic("frequency in Hz", self.cell(0, 0)[2], self.cell(0, last)[3])
     }
 
-    /// Names of sleepers, as many as there is room for.
+    /// Names of sleepers at their positions, as many as fit.
     fn names(&self, width: f64) -> Vec<(f64, String)> {
         let room = ((width / NAME_WIDTH) as usize).saturating_sub(2).max(1);
         let track = &self.diagnosis.track;
@@ -179,7 +180,7 @@ impl<'a> Grid<'a> {
         track.iter().step_by(step).map(|s| (s.x_m, s.id.clone())).collect()
     }
 
-    /// The edges of a mismatch: those of its sleepers where they are known, and half a band more.
+    /// Edges of a mismatch: those of its sleepers if they are known, extended by half a band in frequency.
     fn around(&self, mismatch: &Mismatch) -> [[f64; 2]; 2] {
         let places = numbers(self.diagnosis, &mismatch.sleepers);
         let x = match (places.iter().min(), places.iter().max()) {
@@ -191,7 +192,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// The colour scale: a box a shade, its ends in dB.
+/// The colour scale: one box per shade, with the end values in dB.
 fn scale(limit_db: f64) -> Markup {
     let shades = (0..SHADES).rev().map(class);
     let more = (SHADES..2 * SHADES).map(class);

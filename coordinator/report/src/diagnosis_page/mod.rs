@@ -1,7 +1,7 @@
-//! The page of a diagnosis, for a track engineer who never read the paper.
+//! The page of a diagnosis, for a track engineer who has not read the paper.
 //!
-//! Owns what is shown of a diagnosis, in which order, and in which words. What the numbers are is
-//! the diagnosis' own affair.
+//! This module defines content, order and wording of the page. The diagnosis crate defines the meaning of
+//! the numbers.
 
 mod along;
 pub(crate) mod confirmation;
@@ -20,18 +20,19 @@ use maud::{Markup, PreEscaped, html};
 use tracktwin_diagnosis::Diagnosis;
 use tracktwin_drawing::page_with;
 
-/// How a diagnosis came about.
+/// Provenance of a diagnosis.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
-    /// The command line that repeats it.
+    /// Command line that repeats the diagnosis.
     pub command: String,
-    /// The program and its version.
+    /// Name and version of the program.
     pub version: String,
-    /// The library or models it used, or why none; empty if that does not matter.
+    /// The library or models used, or the reason for using none; empty if this is not relevant.
     pub library: String,
 }
 
-/// The report of a diagnosis: what it is, where it shows, what explains it, what that changes.
+/// Returns the HTML page of a diagnosis: verdict, mismatches, hypotheses, and their effect on the
+/// estimates.
 pub fn diagnosis_page(diagnosis: &Diagnosis, origin: &Origin) -> String {
     let head = html! { style { (PreEscaped(style::STYLE)) } };
     let body = html! {

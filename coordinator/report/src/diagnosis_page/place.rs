@@ -1,4 +1,4 @@
-//! Measured and predicted levels by frequency where it matters.
+//! Measured and predicted levels by frequency, at the sites of accepted physics or of the largest mismatch.
 
 use super::levels::{Side, measured, mismatch_norm, predicted, scatter};
 use super::words::{accepted, addition, numbers, sleepers, speeds};
@@ -8,20 +8,21 @@ use tracktwin_drawing::{Axis, Chart, figure};
 
 const SIZE: [f64; 2] = [361.0, 280.0];
 
-/// Frequencies in Hz that get a thin line.
+/// Frequencies in Hz that are marked with a thin line.
 const ROUND_HZ: [f64; 9] = [20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0];
 
-/// Sleepers of a location up to which the strangest is shown, and beyond which their mean.
+/// Up to this number of sleepers of a location, the one with the largest mismatch is shown; above it, their
+/// mean.
 const TOGETHER: usize = 3;
 
-/// Sleepers whose levels are shown together.
+/// Sleepers whose levels are shown as one mean.
 pub(super) struct Site {
     sleepers: Vec<usize>,
     name: String,
 }
 
 impl Site {
-    /// Where the accepted physics are, or else where measured and predicted levels differ most.
+    /// Sites of the accepted physics; if there are none, the sleeper with the largest mismatch.
     fn all(diagnosis: &Diagnosis) -> Vec<Self> {
         let mut sites: Vec<Self> = Vec::new();
         for hypothesis in accepted(diagnosis) {
@@ -36,7 +37,7 @@ impl Site {
         if sites.is_empty() { vec![Self::strangest(diagnosis)] } else { sites }
     }
 
-    /// The first of them.
+    /// The first site.
     pub(super) fn first(diagnosis: &Diagnosis) -> Self {
         Self::all(diagnosis).swap_remove(0)
     }
@@ -69,23 +70,23 @@ impl Site {
         Self { sleepers, name: "mean over all sleepers".to_owned() }
     }
 
-    /// To follow a quantity: "at SN18", "over all sleepers".
+    /// Text for use after a quantity: "at SN18", "over all sleepers".
     pub(super) fn at(&self) -> String {
         self.name.strip_prefix("mean ").map_or_else(|| format!("at {}", self.name), str::to_owned)
     }
 
-    /// Whether there are sleepers beside it.
+    /// Whether the track has other sleepers as well.
     pub(super) fn is_part(&self, diagnosis: &Diagnosis) -> bool {
         self.sleepers.len() < diagnosis.track.len()
     }
 
-    /// All its cells.
+    /// All cells of this site.
     pub(super) fn cells(&self, diagnosis: &Diagnosis) -> impl Iterator<Item = [usize; 3]> {
         let speeds = diagnosis.levels.speeds_km_h.len();
         (0..speeds).flat_map(|speed| self.cells_at(diagnosis, speed))
     }
 
-    /// Its cells at one speed.
+    /// Cells of this site at one speed.
     pub(super) fn cells_at(
         &self,
         diagnosis: &Diagnosis,
@@ -96,7 +97,7 @@ impl Site {
         self.sleepers.iter().flat_map(of)
     }
 
-    /// Mean over its sleepers of a level in a band.
+    /// Mean of a level over the sleepers of this site, in one band.
     fn mean(
         &self,
         speed: usize,
@@ -119,7 +120,7 @@ fn nearest(diagnosis: &Diagnosis, [from, to]: [f64; 2]) -> Option<usize> {
     (0..diagnosis.track.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// A row of charts a place, one chart a speed.
+/// One row of charts per site, one chart per speed.
 pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
     let levels = &diagnosis.levels;
     if levels.speeds_km_h.is_empty() || levels.frequency_hz.is_empty() || diagnosis.track.is_empty()
@@ -179,8 +180,8 @@ fn chart(diagnosis: &Diagnosis, site: &Site, speed: usize) -> String {
     chart.into_svg()
 }
 
-/// Thin lines and names at round frequencies, more than the axis would choose itself: they show
-/// what moves from one speed to the next.
+/// Draws thin lines with labels at round frequencies, closer than automatic ticks. They show which features
+/// move from one speed to the next.
 fn rule(chart: &mut Chart, levels: &Levels, y: &Axis) {
     let (Some(&low), Some(&high)) = (levels.frequency_hz.first(), levels.frequency_hz.last())
     else {
@@ -193,8 +194,8 @@ fn rule(chart: &mut Chart, levels: &Levels, y: &Axis) {
     chart.name_x(round.map(|hz| (hz, hz.to_string())).collect());
 }
 
-/// Two standard deviations to expect on either side of a prediction. Sleepers scatter each for
-/// itself, so that the mean over many scatters less.
+/// Expected band of two standard deviations around a prediction. Sleepers vary independently, so the band
+/// of a mean over many sleepers is narrower.
 fn band(diagnosis: &Diagnosis, site: &Site, speed: usize, side: Side) -> Vec<(f64, f64, f64)> {
     let levels = &diagnosis.levels;
     let many = (site.sleepers.len() as f64).sqrt();

@@ -1,12 +1,12 @@
-//! Numbers with units for people: 30.0 MN/m, 0.15, 82 µm.
+//! Formatting of numbers with units: 30.0 MN/m, 0.15, 82 µm.
 //!
-//! Owns prefixes and digits. The unit of a parameter is what its name ends in.
+//! This module chooses prefixes and digits. The suffix of a parameter's name gives its unit.
 
 use tracktwin_diagnosis::Estimate;
 use tracktwin_parameters::Parameter;
 
-/// Suffixes of names, longest first if one contains another, with their unit and whether it takes
-/// prefixes.
+/// Suffixes of parameter names, with unit and whether the unit takes prefixes. A suffix that contains
+/// another is listed before the other.
 const UNITS: [(&str, &str, bool); 16] = [
     ("_N_m_per_rad", "N m/rad", true),
     ("_dB_per_octave", "dB/octave", false),
@@ -26,7 +26,7 @@ const UNITS: [(&str, &str, bool); 16] = [
     ("_m", "m", true),
 ];
 
-/// Prefixes and their factors, the largest first.
+/// Prefixes with their factors, in descending order.
 const PREFIXES: [(f64, &str); 6] =
     [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ")];
 
@@ -34,12 +34,12 @@ const PREFIXES: [(f64, &str); 6] =
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unit {
     factor: f64,
-    /// The unit with its prefix; empty for a plain number.
+    /// Name of the unit with prefix; empty for a dimensionless number.
     pub name: String,
 }
 
 impl Unit {
-    /// The unit for a value of about `size` of the parameter of that name.
+    /// Unit for the parameter `parameter`, with a prefix for values of about `size` in SI units.
     pub(super) fn of(parameter: &str, size: f64) -> Self {
         if let Some(known) = Parameter::from_name(parameter).filter(|p| p.unit().contains("1e-4")) {
             let shown = tracktwin_drawing::Shown::of(known);
@@ -61,31 +61,31 @@ impl Unit {
         }
     }
 
-    /// The value in this unit.
+    /// Converts an SI value to this unit.
     pub(super) fn value(&self, si: f64) -> f64 {
         si / self.factor
     }
 
-    /// A text with this unit behind it.
+    /// Appends this unit to a text.
     pub(super) fn after(&self, text: &str) -> String {
         if self.name.is_empty() { text.to_owned() } else { format!("{text} {}", self.name) }
     }
 }
 
-/// Two values in one unit, with the decimals that show three digits of the second.
+/// Formats two SI values in one unit, with enough decimals for three digits of the second.
 pub(super) fn rounded_pair(unit: &Unit, si: [f64; 2]) -> [String; 2] {
     let values = si.map(|value| unit.value(value));
     let decimals = tracktwin_number::decimals(values[1], 3);
     values.map(|value| unit.after(&rounded(value, decimals)))
 }
 
-/// The mean, as exactly as its standard deviation warrants, with its unit.
+/// Formats the mean with its unit, with the digits that its standard deviation justifies.
 pub(super) fn mean(parameter: &str, estimate: Estimate) -> String {
     let unit = Unit::of(parameter, estimate.mean);
     unit.after(&rounded(unit.value(estimate.mean), decimals(&unit, estimate)))
 }
 
-/// Two standard deviations to either side, with the unit; not below zero where `positive`.
+/// Formats the interval of ± two standard deviations with its unit; it is cut at zero if `positive`.
 pub(super) fn interval(parameter: &str, estimate: Estimate, positive: bool) -> String {
     let unit = Unit::of(parameter, estimate.mean);
     let decimals = decimals(&unit, estimate);
@@ -96,8 +96,8 @@ pub(super) fn interval(parameter: &str, estimate: Estimate, positive: bool) -> S
     unit.after(&format!("{low} to {high}"))
 }
 
-/// Decimals that show one digit of the standard deviation, two if it begins with a one, and no
-/// more than three digits of the mean.
+/// Number of decimals: one digit of the standard deviation, two if its first digit is one, and at most
+/// three digits of the mean.
 fn decimals(unit: &Unit, estimate: Estimate) -> usize {
     let (mean, sd) = (unit.value(estimate.mean), unit.value(estimate.sd));
     let of_mean = tracktwin_number::decimals(mean, 3);
@@ -108,12 +108,12 @@ fn decimals(unit: &Unit, estimate: Estimate) -> usize {
     of_mean.min(tracktwin_number::decimals(sd, if leading < 2.0 { 2 } else { 1 }))
 }
 
-/// The number with the given significant digits, without a power of ten.
+/// Formats a number with `count` significant digits, without a power of ten.
 pub(super) fn digits(value: f64, count: usize) -> String {
     rounded(value, tracktwin_number::decimals(value, count))
 }
 
-/// With a minus sign that is one, and none before zero.
+/// Formats a number with a typographic minus sign; a rounded zero has no sign.
 fn rounded(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
@@ -123,7 +123,7 @@ fn rounded(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A probability in per cent; the ends are not claimed.
+/// Formats a probability in per cent; values near 0 and 100 % are shown as bounds.
 pub(super) fn per_cent(probability: f64) -> String {
     match 100.0 * probability {
         p if p >= 99.5 => "over 99 %".to_owned(),
@@ -132,7 +132,7 @@ pub(super) fn per_cent(probability: f64) -> String {
     }
 }
 
-/// A difference with its sign.
+/// Formats a difference with its sign.
 pub(super) fn signed(value: f64, decimals: usize) -> String {
     let text = rounded(value, decimals);
     if value > 0.0 { format!("+{text}") } else { text }

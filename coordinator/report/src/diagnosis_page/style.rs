@@ -1,6 +1,7 @@
 //! Style of this page.
 
-/// Headline, tags, map and bars. Colours are the page's own, so that dark and print follow.
+/// Headline, tags, map and bars. The colours are the variables of the page, so that dark mode and printing
+/// work.
 pub(super) const STYLE: &str = "
 header h1{font-size:1rem;font-weight:600;color:var(--dim);letter-spacing:.02em}
 header .summary{font-size:1.55rem;line-height:1.32;font-weight:600;margin:.2rem 0 .7rem;max-width:none;text-wrap:pretty}

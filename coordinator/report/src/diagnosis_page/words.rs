@@ -1,17 +1,17 @@
-//! Readable names of physics, sleepers and places.
+//! Readable names of physics, sleepers and locations.
 
 use tracktwin_diagnosis::{Diagnosis, Hypothesis, Location, UNKNOWN};
 use tracktwin_track::extension::Kind;
 
-/// Sleepers that are named one by one.
+/// Maximum number of sleepers that are listed individually.
 const NAMED_MAX: usize = 4;
 
-/// A name of the catalogue in words.
+/// Readable name of a kind in the catalogue.
 pub(super) fn physics(name: &str) -> String {
     name.replace('_', " ")
 }
 
-/// Summary of a kind of physics, without a full stop.
+/// Summary of a kind, without a full stop.
 pub(super) fn summary(name: &str) -> &'static str {
     match Kind::from_name(name) {
         Some(kind) => kind.summary,
@@ -20,7 +20,7 @@ pub(super) fn summary(name: &str) -> &'static str {
     }
 }
 
-/// Whether it is a fault of the measuring chain.
+/// Whether the kind is a fault of the measuring chain.
 pub(super) fn is_chain(name: &str) -> bool {
     Kind::from_name(name).is_some_and(|kind| kind.measuring_chain)
 }
@@ -30,12 +30,13 @@ pub(super) fn accepted(diagnosis: &Diagnosis) -> impl Iterator<Item = &Hypothesi
     diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted)
 }
 
-/// Whether the track model was fitted with it: what has no trace there was seen in the passes alone.
+/// Whether the track model was fitted with this hypothesis. A hypothesis found in the passes alone was not
+/// fitted.
 pub(super) fn is_fitted(hypothesis: &Hypothesis) -> bool {
     hypothesis.physics != UNKNOWN && hypothesis.detectability > 0.0
 }
 
-/// Kinds in the second prediction only, each once.
+/// Kinds that are only in the second prediction, each once; `None` if there are none.
 pub(super) fn addition(diagnosis: &Diagnosis) -> Option<String> {
     let fitted = accepted(diagnosis).filter(|hypothesis| is_fitted(hypothesis));
     let mut names: Vec<String> = Vec::new();
@@ -47,7 +48,7 @@ pub(super) fn addition(diagnosis: &Diagnosis) -> Option<String> {
     (!names.is_empty()).then(|| list(&names))
 }
 
-/// "a", "a and b", "a, b and c".
+/// Joins items as "a", "a and b", "a, b and c".
 pub(super) fn list(items: &[String]) -> String {
     match items {
         [] => String::new(),
@@ -56,7 +57,7 @@ pub(super) fn list(items: &[String]) -> String {
     }
 }
 
-/// Sleepers as "SN18", "SN18 to SN24" where none between is missing, or one by one.
+/// Sleepers as "SN18", as "SN18 to SN24" if they are consecutive, or listed individually.
 pub(super) fn sleepers(diagnosis: &Diagnosis, ids: &[String]) -> String {
     let mut places = numbers(diagnosis, ids);
     places.sort_unstable();
@@ -78,7 +79,7 @@ pub(super) fn numbers(diagnosis: &Diagnosis, ids: &[String]) -> Vec<usize> {
     ids.iter().filter_map(|id| diagnosis.track.iter().position(|known| known.id == *id)).collect()
 }
 
-/// A place on the track.
+/// Text of a location on the track.
 pub(super) fn place(diagnosis: &Diagnosis, location: &Location) -> String {
     let stretch = stretch(location.x_m);
     if location.sleepers.len() == diagnosis.track.len() && !diagnosis.track.is_empty() {
@@ -90,7 +91,7 @@ pub(super) fn place(diagnosis: &Diagnosis, location: &Location) -> String {
     }
 }
 
-/// From where to where in m, to the millimetre.
+/// Range of positions in m, with millimetres.
 pub(super) fn stretch([from, to]: [f64; 2]) -> String {
     if (to - from).abs() < 5e-4 {
         format!("{from:.3} m")
@@ -99,17 +100,17 @@ pub(super) fn stretch([from, to]: [f64; 2]) -> String {
     }
 }
 
-/// Speeds in km/h, with three digits.
+/// Speeds in km/h, with three significant digits.
 pub(super) fn speeds(speeds_km_h: &[f64]) -> String {
     let rounded = |speed: &f64| tracktwin_number::rounded(*speed, 3);
     let texts: Vec<String> = speeds_km_h.iter().map(rounded).collect();
     format!("{} km/h", list(&texts))
 }
 
-/// Smallest probability shown on a page: a few hundred null simulations resolve no smaller one.
+/// Smallest p-value shown on a page. A few hundred null simulations do not resolve smaller ones.
 const CHANCE_LEAST: f64 = 1e-3;
 
-/// How probable something is by chance, to follow "probability".
+/// Text of a p-value, for use after "probability".
 pub(super) fn chance(p_value: f64) -> String {
     tracktwin_number::chance_down_to(p_value, CHANCE_LEAST)
 }

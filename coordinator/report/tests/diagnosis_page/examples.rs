@@ -1,4 +1,4 @@
-//! Constructed diagnoses, one of each verdict.
+//! Constructed diagnoses, one for each verdict.
 
 use std::collections::BTreeMap;
 use tracktwin_diagnosis::{
@@ -6,17 +6,17 @@ use tracktwin_diagnosis::{
     Levels, Location, Mismatch, Score, Scores, SleeperValues, Verdict,
 };
 
-/// As metres a second times 3.6 come out.
+/// Speeds in km/h as they result from m/s times 3.6, with rounding errors.
 const SPEEDS_KM_H: [f64; 3] = [13.000_000_000_000_002, 10.0, 7.0];
 pub(crate) const SLEEPERS: usize = 29;
 const BANDS: usize = 33;
 const SCATTER_DB: f64 = 1.4;
-/// Names begin at SN5, as in a recording whose first sleepers are run over too early.
+/// Number of the first sleeper, as in a recording whose first sleepers were not recorded completely.
 const FIRST: usize = 5;
 
 type At = [usize; 3];
 
-/// A number that looks drawn from a normal distribution, always the same for the same cell.
+/// A pseudo-random number with normal distribution; a function of the cell.
 fn noise(at: At) -> f64 {
     let seed = (at[0] * 7919 + at[1] * 104_729 + at[2] * 1_299_709) as f64;
     let uniform = |k: f64| ((seed + k * 12.9898).sin() * 43_758.545_3).rem_euclid(1.0);
@@ -35,7 +35,7 @@ fn table(level: impl Fn(At) -> f64) -> Vec<Vec<Vec<f64>>> {
         .collect()
 }
 
-/// Levels whose prediction lacks `effect_db` before, and has it after.
+/// Levels whose first prediction lacks `effect_db` and whose second prediction includes it.
 fn levels(effect_db: impl Fn(At) -> f64) -> Levels {
     let track = |at: At| {
         let octave = (frequency_hz(at[2]) / 300.0).log2();
@@ -53,7 +53,7 @@ fn levels(effect_db: impl Fn(At) -> f64) -> Levels {
     }
 }
 
-/// Stiffness along the track; `biased` says by what factor it is wrong before.
+/// Stiffness along the track; `biased` is the factor by which the stiffness is wrong before.
 fn track(biased: impl Fn(usize) -> f64) -> Vec<SleeperValues> {
     let sleeper = |index: usize| {
         let wave = 1.0 + 0.06 * (index as f64 * 0.9).sin();
@@ -112,7 +112,7 @@ pub(crate) fn estimates(values: &[(&str, f64, f64)]) -> BTreeMap<String, Estimat
     values.iter().map(|&(name, mean, sd)| (name.to_owned(), Estimate { mean, sd })).collect()
 }
 
-/// Nothing left out.
+/// A recording in which nothing is left out.
 pub(crate) fn consistent() -> Diagnosis {
     Diagnosis {
         format: FORMAT.to_owned(),
@@ -136,7 +136,7 @@ fn at_joint() -> Location {
     Location { x_m: [2.4375, 2.4375], sleepers: vec!["SN18".to_owned(), "SN19".to_owned()] }
 }
 
-/// A dipped rail joint between SN18 and SN19 that the baseline takes for soft railpads.
+/// A dipped rail joint between SN18 and SN19, which the baseline fits as soft railpads.
 pub(crate) fn left_out() -> Diagnosis {
     let joint = |[speed, sleeper, band]: At| {
         let [place, octave] = [
@@ -196,7 +196,7 @@ pub(crate) fn left_out() -> Diagnosis {
     }
 }
 
-/// Something at SN12 that nothing in the catalogue does.
+/// An effect at SN12 that no kind of the catalogue explains.
 pub(crate) fn unknown() -> Diagnosis {
     let absorber =
         |at: At| if at[1] + FIRST == 12 && (18..24).contains(&at[2]) { -7.0 } else { 0.0 };
@@ -223,7 +223,7 @@ pub(crate) fn unknown() -> Diagnosis {
     }
 }
 
-/// A sensor that resonates on its mounting.
+/// A sensor whose mounting resonates.
 pub(crate) fn chain() -> Diagnosis {
     let resonance =
         |at: At| 11.0 * (-(6.0 * (frequency_hz(at[2]) / 3200.0).log2()).powi(2) / 2.0).exp();

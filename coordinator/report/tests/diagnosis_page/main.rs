@@ -1,5 +1,5 @@
-//! Pages of constructed diagnoses: what a reader must find on them, and that nothing is fetched
-//! from elsewhere. The pages are left in the target folder for a look.
+//! Pages of constructed diagnoses: required content, and no external resources. The pages are kept in the
+//! target folder for visual inspection.
 
 mod examples;
 mod improvement;
@@ -11,7 +11,7 @@ use std::path::Path;
 use tracktwin_diagnosis::{Diagnosis, Levels, SleeperValues, Verdict};
 use tracktwin_report::{Origin, diagnosis_page};
 
-/// The page, left for a look, after a check that nothing on it comes from elsewhere.
+/// The page, after a check for external resources. It is also written to the target folder.
 fn page(name: &str, diagnosis: &Diagnosis) -> String {
     let origin = Origin {
         command: format!("tracktwin diagnose recordings/{} --out result", diagnosis.recording),
@@ -30,7 +30,7 @@ fn page(name: &str, diagnosis: &Diagnosis) -> String {
     page
 }
 
-/// How many charts have a title that contains `text`.
+/// Number of charts whose title contains `text`.
 fn charts(page: &str, text: &str) -> usize {
     page.split("aria-label=\"")
         .skip(1)
@@ -45,7 +45,7 @@ fn assert_reads(page: &str, facts: &[&str]) {
     }
 }
 
-/// The sentence as it stands on the page.
+/// The sentence of the result in the form that the page contains.
 fn unbroken(diagnosis: &Diagnosis) -> String {
     diagnosis.sentence.replace(" %", "\u{a0}%")
 }
@@ -191,7 +191,7 @@ fn missing_levels_leave_gaps_and_no_levels_leave_out_the_pictures() {
     assert_reads(&page, &["unknown physics", "800 to 1425 Hz"]);
 }
 
-/// Names of the fields of a document, each with those that it stands in.
+/// Collects the names of the fields of a document, each with the fields that contain it.
 fn fields(value: &Value, name: &str, all: &mut BTreeSet<String>) {
     match value {
         Value::Object(fields) => {

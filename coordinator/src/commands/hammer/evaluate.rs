@@ -21,10 +21,10 @@ const PAGE: &str = "report.html";
 const PICTURE: &str = "stiffness.svg";
 const NAMES: [&str; 4] = [PAGE, PICTURE, "estimates.csv", "estimates.json"];
 
-/// Endings of the files that are read in a folder.
+/// Extensions of the files that are read in a folder.
 const ENDINGS: [&str; 3] = ["csv", "uff", "unv"];
 
-/// What is said where the evaluation beside the hammer test has nothing to compare.
+/// Note if hammer test and evaluation have no sleeper in common with valid estimates.
 const NONE_COMPARED: &str =
     "No sleeper has valid estimates by hammer test and evaluation: they are not compared.";
 
@@ -134,14 +134,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     conclude(&record)
 }
 
-/// A negative result if half of the struck sleepers or more have no valid estimates.
+/// Returns a negative result if at least half of the struck sleepers have no valid estimates.
 fn conclude(record: &HammerRecord) -> Result<(), Stop> {
     let struck = record.sleepers.iter().filter(|sleeper| sleeper.misfit.is_some()).count();
     let invalid = record.sleepers.iter().filter(|sleeper| !sleeper.is_valid()).count();
     if 2 * invalid >= struck { Err(Stop::Negative) } else { Ok(()) }
 }
 
-/// That the evaluation has a sleeper where one of the hammer test stands, before anything is fitted.
+/// Checks, before the fit, that the evaluation has a sleeper at each position of the hammer test.
 fn check_places(
     track: &Track,
     sleeper_at_m: f64,
@@ -160,7 +160,7 @@ fn check_places(
     )))
 }
 
-/// The record of a fit, with the names that the evaluation has for the sleepers.
+/// Record of a fit, with the sleeper names of the evaluation.
 fn record(
     fitted: &Fitted,
     track: &Track,
@@ -190,14 +190,14 @@ fn points(arguments: &Arguments) -> Result<Vec<PointReceptance>, Stop> {
     Ok(points)
 }
 
-/// What a file says: where it is not UTF-8, question marks for all that is not ASCII, as in remarks in
-/// Latin-1 and in binary data.
+/// Content of a file as text. If the file is not UTF-8, non-ASCII bytes become question marks; such bytes
+/// are in Latin-1 remarks and in binary data.
 fn text(bytes: Vec<u8>) -> String {
     let ascii = |byte: &u8| if byte.is_ascii() { char::from(*byte) } else { '?' };
     String::from_utf8(bytes).unwrap_or_else(|error| error.as_bytes().iter().map(ascii).collect())
 }
 
-/// The file, or those of a folder in the order of their names.
+/// The file itself, or the files of a folder in the order of their names.
 fn files(path: &Path) -> Result<Vec<PathBuf>, Stop> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);

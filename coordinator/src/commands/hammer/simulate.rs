@@ -1,4 +1,4 @@
-//! `tracktwin hammer simulate`: a table of receptances to try the evaluation with.
+//! `tracktwin hammer simulate`: a table of simulated receptances, to test the evaluation.
 
 use crate::commands::files::{Force, check, is_stream, write_file};
 use crate::commands::numbers::{count, number};
@@ -22,7 +22,7 @@ const HITS: Quantity = Quantity::count("number of hits", [2, 1000], [3, 10]);
 const UNEVENNESS: Quantity = Quantity::new("unevenness", "%", [0.0, 60.0], [5.0, 30.0]);
 const NOISE: Quantity = Quantity::new("noise of a hit", "%", [0.0, 100.0], [1.0, 20.0]);
 
-/// Values of an octave, and the share by which the table goes beyond the fitted range.
+/// Frequencies per octave, and share by which the table exceeds the fitted frequency range.
 const PER_OCTAVE: f64 = 24.0;
 const BEYOND: f64 = 1.5;
 
@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Stop> {
     Ok(())
 }
 
-/// The folder, and the names of table and true values.
+/// Output folder, and names of the files with the table and with the true values.
 fn names(out: &Path) -> Result<(PathBuf, [FileName; 2]), Stop> {
     let (folder, table) = FileName::of_path(out)?;
     let stem = out.file_stem().map(|stem| stem.to_string_lossy().into_owned());

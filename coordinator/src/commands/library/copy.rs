@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::error::Error;
 use tracktwin_library::{Cell, Library, LibraryError, Lost, Table};
 
-/// Rows in memory at a time: 4 MB of results.
+/// Maximum number of rows in memory: 4 MB of results.
 const ROWS_AT_A_TIME: usize = 1000;
 
 /// Arguments of `library copy`.
@@ -131,7 +131,7 @@ fn unwritten(table: &Table, refused: &[LibraryError]) -> Option<String> {
     Some(format!("{} damaged rows of {}; the first: {reason}", refused.len(), table.name))
 }
 
-/// The digests of a campaign in both libraries; for the source also why it has none.
+/// Digests of a campaign in both libraries, and the reason if the source has no digest.
 struct Compared {
     campaign: String,
     from: Result<String, String>,

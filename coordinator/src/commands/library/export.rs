@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_library::{Cell, Library, Table};
 
-/// Rows in memory at a time, and rows in one group of a Parquet file: 30 MB of results.
+/// Maximum number of rows in memory and in a row group of a Parquet file: 30 MB of results.
 const ROWS_A_GROUP: usize = 8192;
 
 /// Arguments of `library export`.

@@ -71,7 +71,7 @@ pub(super) async fn run(arguments: &Arguments) -> Result<(), Stop> {
 enum Ended {
     Library(LibraryError),
     Output(io::Error),
-    /// A name can occur only once in a JSON object.
+    /// Two columns have this name, but a name can occur only once in a JSON object.
     Twice(String),
 }
 

@@ -40,8 +40,7 @@ async fn verify(library: &Library) -> Result<Verified, Stop> {
     Ok(verified)
 }
 
-/// Whether a library cannot be opened because of its content, not because it is missing or does not
-/// respond.
+/// Whether a library cannot be opened because of its content, and not because it is missing or unavailable.
 fn says_what_is_there(error: &anyhow::Error) -> bool {
     error.downcast_ref().is_some_and(|error| {
         matches!(

@@ -83,7 +83,7 @@ pub(super) struct Arguments {
 }
 
 impl Arguments {
-    /// A campaign file whose models evaluate a recording.
+    /// Arguments for a campaign file whose models evaluate a recording.
     pub(super) fn of(
         campaign: PathBuf,
         recording: &Path,
@@ -108,7 +108,7 @@ impl Arguments {
         }
     }
 
-    /// The track that takes the place of V-Track.
+    /// The track that replaces V-Track; `None` if no track is given.
     fn track(&self) -> Result<Option<Track>, Stop> {
         match (&self.track, self.preset) {
             (Some(path), _) => read(path).map(Some),
@@ -163,7 +163,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     made?.conclude(&name, &arguments)
 }
 
-/// What a run has made besides the library: nothing, models, or models and an evaluation.
+/// Results of a run in addition to the library: none, models, or models and an evaluation.
 #[derive(Default)]
 struct Made {
     models: Option<PathBuf>,
@@ -171,7 +171,7 @@ struct Made {
 }
 
 impl Made {
-    /// Prints it; a negative result if the estimates of most sleepers are not valid.
+    /// Prints the results. Returns a negative result if the estimates of most sleepers are not valid.
     fn conclude(&self, library: &str, Arguments { out, json, .. }: &Arguments) -> Result<(), Stop> {
         if *json {
             print_json(&self.json(library, out));

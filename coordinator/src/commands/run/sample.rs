@@ -1,7 +1,7 @@
 //! The sample recording bundled with the program.
 //!
-//! Made by `tracktwin simulate`; `coordinator/sample/README.md` states the command and the hidden
-//! parameters.
+//! It was created with `tracktwin simulate`; `coordinator/sample/README.md` contains the command and the
+//! hidden parameters.
 
 use super::super::Stop;
 use super::super::files::{Force, check};

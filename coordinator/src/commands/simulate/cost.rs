@@ -4,11 +4,11 @@ use super::track::SimulatedTrack;
 use super::{Arguments, Drive, RUN_IN_SPANS};
 use anyhow::anyhow;
 
-/// Bytes per time step until it is in the recording's file: acceleration, force, position and
-/// surface of the solver, a second copy during measurement, and the columns of the file.
+/// Memory per time step in bytes. It contains acceleration, force, position and surface of the solver, a
+/// second copy during measurement, and the columns of the recording's file.
 const BYTES_A_STEP: f64 = 120.0;
 
-/// Time steps of all passes together.
+/// Maximum number of time steps of all passes together.
 const STEPS_MAX: f64 = 2e7;
 
 /// Returns an error, with a remedy, for a simulation that exceeds the memory.

@@ -76,7 +76,7 @@ pub(in crate::commands) fn list() -> String {
     Kind::all().map(kind).collect::<Vec<_>>().join("\n")
 }
 
-/// The same as JSON.
+/// All kinds with their parameters, as JSON.
 pub(in crate::commands) fn list_json() -> Value {
     let parameter = |parameter: &KindParameter| {
         let KindParameter { name, unit, meaning, typical, default, .. } = parameter;

@@ -9,7 +9,7 @@ use tracktwin_signal::recording::{self, Sleeper};
 use tracktwin_track::extension::{ExtensionInstance, Kind};
 use tracktwin_track::model::{Mesh, Roughness, Support, TrackModel};
 
-/// A track with its own parameters at every sleeper.
+/// A track with separate parameters at every sleeper.
 pub(super) struct SimulatedTrack {
     described: Track,
     spans: usize,
@@ -48,23 +48,23 @@ impl SimulatedTrack {
         &self.model
     }
 
-    /// The surface's spectrum.
+    /// Spectrum of the surface.
     pub(super) fn roughness(&self) -> Roughness {
         let level = self.sleepers[0][Parameter::IrregularityLevel];
         Roughness::between(level, self.described.wavelengths_m)
     }
 
-    /// The usual speeds in km/h.
+    /// Default speeds in km/h.
     pub(super) fn speeds_km_h(&self) -> Vec<f64> {
         self.described.speeds_km_h.clone()
     }
 
-    /// The kinds of its extensions.
+    /// Kinds of the track's extensions.
     pub(super) fn kinds(&self) -> impl Iterator<Item = &'static Kind> + '_ {
         self.extensions.iter().filter_map(|instance| Kind::from_name(&instance.physics))
     }
 
-    /// Start and end of the recording in m; every wheel stays away from the ends of the track.
+    /// Start and end of the recording in m. At both, all wheels are far from the ends of the track.
     pub(super) fn recorded_m(&self) -> [f64; 2] {
         let further_m = &self.model.vehicle().further_wheels_m;
         let behind_m = further_m.iter().copied().fold(0.0, f64::min);
@@ -74,7 +74,7 @@ impl SimulatedTrack {
         [from_m - behind_m, to_m - ahead_m]
     }
 
-    /// The sleepers inside the recorded stretch.
+    /// The sleepers within the recorded part.
     pub(super) fn sleepers_recorded(&self) -> Vec<Sleeper> {
         let spacing_m = self.described.design.sleeper.spacing_m;
         let [from_m, to_m] = self.recorded_m();
@@ -121,7 +121,7 @@ fn id(number: usize) -> String {
     format!("SN{number}")
 }
 
-/// The parameters of every sleeper.
+/// Parameters of every sleeper.
 fn sleepers(
     described: &Track,
     count: usize,

@@ -11,22 +11,22 @@ use tracktwin_parameters::{Parameter, Preset};
 use tracktwin_reference_simulator::{Scene, SleeperTruth, TruthError, simulate};
 use tracktwin_ring::correlation;
 
-/// Standard deviation of the logarithm from sleeper to sleeper.
+/// Unevenness: standard deviation of the logarithm of a stiffness from sleeper to sleeper.
 const SCATTER: [f64; 3] = [0.05, 0.15, 0.3];
 
 /// Reads a parameter of a sleeper.
 type TruthOf = fn(&SleeperTruth) -> f64;
 
-/// Parameters whose truth differs from sleeper to sleeper, and where a scene has them.
+/// Parameters whose true value differs from sleeper to sleeper, with access to this value.
 const COMPARED: [(Parameter, TruthOf); 2] = [
     (Parameter::RailpadStiffness, |sleeper| sleeper.railpad_stiffness_n_m),
     (Parameter::BallastStiffness, |sleeper| sleeper.ballast_stiffness_n_m),
 ];
 
-/// Sleepers at either end of a recording that are not scored, because of the run-in.
+/// Number of sleepers at either end of a recording that are not scored, because of the run-in.
 const ENDS: usize = 1;
 
-/// Why inversion can't be scored.
+/// Errors of measuring the coverage of the inversion.
 #[derive(Debug, thiserror::Error)]
 pub enum InversionCoverageError {
     /// A track can't be simulated.
@@ -37,38 +37,38 @@ pub enum InversionCoverageError {
     Inverting(#[from] InvertingError),
 }
 
-/// Result of the tracks of one unevenness.
+/// Result for all tracks of one unevenness.
 #[derive(Clone, Debug, Serialize)]
 pub struct InversionRow {
-    /// Scatter from sleeper to sleeper.
+    /// Unevenness of railpad and ballast stiffness from sleeper to sleeper.
     pub scatter: f64,
-    /// Tracks.
+    /// Number of tracks.
     pub tracks: u32,
-    /// Share of the sleepers whose estimates are called not valid.
+    /// Share of the sleepers with estimates that are not valid, 0 to 1.
     pub invalid: f64,
-    /// Estimates against the truth.
+    /// Comparison of the estimates with the true values, by parameter.
     pub estimates: BTreeMap<Parameter, InversionScore>,
 }
 
-/// Estimates of one parameter against the truth, over the sleepers of all tracks.
+/// Comparison of one parameter's estimates with the true values, over the sleepers of all tracks.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct InversionScore {
-    /// Sleepers compared.
+    /// Number of sleepers compared.
     pub sleepers: usize,
-    /// Median of the absolute error of the logarithm.
+    /// Median absolute error of the natural logarithm.
     pub median_log_error: f64,
-    /// Share of truths inside the 90 % interval.
+    /// Share of the true values inside the 90 % interval, 0 to 1.
     pub holds_90: f64,
-    /// Correlation of estimates and truths along a track, in the logarithm, mean over the tracks
-    /// where both vary.
+    /// Correlation of the logarithms of estimates and true values along a track. It is the mean over the
+    /// tracks where both vary.
     pub correlation: f64,
 }
 
-/// Simulates and evaluates `tracks` tracks of each unevenness; reports the number done and the
-/// total.
+/// Simulates and evaluates `tracks` tracks for each unevenness. Progress is reported as number of completed
+/// tracks and total number.
 ///
 /// # Errors
-/// [`InversionCoverageError`] of the first track that has one.
+/// Returns the [`InversionCoverageError`] of the first track that fails.
 pub async fn inversion_rows(
     tracks: u32,
     seed: u64,
@@ -144,7 +144,7 @@ impl Scores {
     }
 }
 
-/// Number of the sleeper of this name: `SN` and its number.
+/// Number in the name of a sleeper (`SN` and its number).
 fn number(id: &str) -> usize {
     id.trim_start_matches("SN").parse().expect("the reference simulator numbers its sleepers")
 }

@@ -1,5 +1,5 @@
-//! How often estimates hold and refusals are right: unseen tracks are simulated inside the
-//! library's ranges, beyond each of their ends and with sleepers that differ, then evaluated.
+//! Coverage of the intervals, and error rates of the domain check. Unseen tracks are simulated inside the
+//! library's ranges, beyond each end of a range, and with unevenness. Then they are evaluated.
 
 mod inversion;
 mod plan;
@@ -18,7 +18,7 @@ use track::Track;
 use tracktwin_experiment::Experiment;
 use tracktwin_parameters::{Parameter, ParameterSet};
 
-/// Tracks that are simulated side by side.
+/// Number of tracks that are simulated together.
 const TOGETHER: usize = 8;
 
 /// Errors of measuring the coverage.
@@ -34,23 +34,24 @@ pub enum CoverageError {
 
 /// Tracks to simulate, and the models that evaluate them.
 pub struct Coverage<'a> {
-    /// Models and library.
+    /// The models with their library.
     pub evaluator: &'a Evaluator,
     /// Experiment of the library's cases.
     pub experiment: &'a Experiment,
-    /// Values of the parameters that do not vary.
+    /// Values of the parameters that the library does not vary.
     pub fixed: ParameterSet,
-    /// Tracks with one parameter at a value of the user's.
+    /// Additional tracks with one parameter at a value given by the user.
     pub settings: Vec<(Parameter, f64)>,
-    /// How much.
+    /// Numbers of tracks and sleepers, and the seed.
     pub counts: Counts,
 }
 
 impl Coverage<'_> {
-    /// Simulates and evaluates all tracks on all cores; reports the number done and the total.
+    /// Simulates and evaluates all tracks on all cores. Progress is reported as number of completed tracks
+    /// and total number.
     ///
     /// # Errors
-    /// [`CoverageError`] of the first track that has one.
+    /// Returns the [`CoverageError`] of the first track that fails.
     pub fn rows(
         &self,
         progress: &(dyn Fn(usize, usize) + Sync),

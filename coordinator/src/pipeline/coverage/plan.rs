@@ -1,5 +1,5 @@
-//! Which tracks are simulated: unseen ones inside the library's ranges, beyond every end, uneven
-//! ones, and those that a user names.
+//! Selection of the simulated tracks: unseen tracks inside the library's ranges, beyond each end of a
+//! range, uneven ones, and those requested by the user.
 
 use super::track::Track;
 use rand_chacha::ChaCha8Rng;
@@ -9,34 +9,35 @@ use serde::Serialize;
 use tracktwin_parameters::{Parameter, ParameterSet, unit};
 use tracktwin_surrogate::{Side, TrainingSet};
 
-/// Scatter from sleeper to sleeper, as a share of the mean.
+/// Unevenness from sleeper to sleeper, relative to the mean.
 const SCATTER: [f64; 4] = [0.0, 0.05, 0.15, 0.3];
-/// Factors that move a value beyond the ends of a range.
+/// Factors of a value beyond the ends of a range, applied to the end.
 const BEYOND: [(Side, f64); 2] = [(Side::Low, 0.7), (Side::High, 1.3)];
-/// Range above which values are drawn evenly in the logarithm.
+/// Ratio of the ends of a range above which values are drawn log-uniformly.
 const LOGARITHMIC_FROM: f64 = 4.0;
 
 /// Kind of the tracks of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Kind {
-    /// All parameters inside; railpad and ballast stiffness differ from sleeper to sleeper.
+    /// All parameters are inside their ranges. Railpad and ballast stiffness differ from sleeper to
+    /// sleeper.
     Inside {
-        /// Scatter over mean.
+        /// Unevenness: standard deviation divided by the mean.
         scatter: f64,
     },
-    /// One parameter beyond an end of its range, the others inside.
+    /// One parameter is beyond an end of its range; the others are inside.
     Beyond {
         /// The parameter.
         parameter: Parameter,
-        /// The end.
+        /// The end of the range.
         side: Side,
     },
-    /// One parameter at a value, the others in the middle of their ranges.
+    /// One parameter has a given value; the others are in the middle of their ranges.
     Set {
         /// The parameter.
         parameter: Parameter,
-        /// Its value in its unit.
+        /// Value in the unit of the parameter.
         value: f64,
     },
 }
@@ -68,14 +69,14 @@ pub(super) fn rows(
     kinds.enumerate().map(tracks).collect()
 }
 
-/// How much is simulated.
+/// Numbers of tracks and sleepers.
 #[derive(Clone, Copy, Debug)]
 pub struct Counts {
-    /// Tracks beyond each end; twice as many inside.
+    /// Number of tracks beyond each end of a range; twice this number inside.
     pub tracks: usize,
-    /// Sleepers of a track.
+    /// Number of sleepers per track.
     pub sleepers: usize,
-    /// Decides parameters and surfaces.
+    /// Seed of parameters and surfaces.
     pub seed: u64,
 }
 
@@ -111,7 +112,7 @@ fn track(
     Track { sleepers, surface_seed }
 }
 
-/// A parameter's mean along the track, at a `place` from 0 to 1 of where it may lie.
+/// Mean of a parameter along the track; `place` (0 to 1) is the relative position in the allowed range.
 fn value(kind: Kind, parameter: Parameter, [low, high]: [f64; 2], place: f64) -> f64 {
     match kind {
         Kind::Beyond { parameter: beyond, side } if beyond == parameter => match side {
@@ -149,7 +150,7 @@ fn differs(parameter: Parameter) -> bool {
     matches!(parameter, Parameter::RailpadStiffness | Parameter::BallastStiffness)
 }
 
-/// The set with random railpad and ballast stiffness: log-normal, with unchanged mean.
+/// The set with random log-normal railpad and ballast stiffness of unchanged mean.
 fn uneven(set: ParameterSet, scatter: f64, random: &mut impl Rng) -> ParameterSet {
     let variance = (scatter * scatter).ln_1p();
     [Parameter::RailpadStiffness, Parameter::BallastStiffness].into_iter().fold(

@@ -1,4 +1,4 @@
-//! Evaluations of tracks compared with the truth.
+//! Comparison of evaluations with the true values.
 
 use super::plan::Kind;
 use super::track::Track;
@@ -7,59 +7,60 @@ use std::collections::BTreeMap;
 use tracktwin_evaluation::Evaluation;
 use tracktwin_parameters::Parameter;
 
-/// Standard deviations on either side that hold 90 % of a normal distribution.
+/// Half width of the 90 % interval of a normal distribution, in standard deviations.
 pub(super) const WIDTH_90: f64 = 1.644_853_626_951_472_7;
 
-/// Result of the tracks of one row.
+/// Result for the tracks of one row.
 #[derive(Clone, Debug, Serialize)]
 pub struct CoverageRow {
-    /// Their kind.
+    /// Kind of the tracks.
     #[serde(flatten)]
     pub kind: Kind,
-    /// How many there are.
+    /// Number of tracks.
     pub tracks: usize,
-    /// Share of the tracks with any sleeper called outside.
+    /// Share of the tracks with at least one sleeper flagged as outside the library.
     pub any_outside: f64,
-    /// Share of the tracks with most sleepers called outside.
+    /// Share of the tracks with most sleepers flagged as outside the library.
     pub most_outside: f64,
-    /// Share of all sleepers called outside.
+    /// Share of all sleepers flagged as outside the library.
     pub sleepers_outside: f64,
-    /// How often each parameter was named first as the one to widen, as a share of the tracks.
+    /// For each parameter: share of the tracks for which it was the first one whose range should be
+    /// widened.
     pub widen: BTreeMap<Parameter, f64>,
-    /// Scatter that the evaluations assumed, mean over the tracks.
+    /// Unevenness that the evaluations assumed; mean over the tracks.
     pub assumed_scatter: f64,
-    /// How the estimates of sleepers that were not called outside compare with the truth.
+    /// Comparison of valid estimates with the true values, by parameter.
     pub estimates: BTreeMap<Parameter, Compared>,
-    /// The same for all sleepers; where the two differ much, refusals matter.
+    /// As `estimates`, for all sleepers. A large difference between both shows the benefit of the flags.
     pub estimates_of_all: BTreeMap<Parameter, Compared>,
 }
 
-/// Estimates of one parameter against the truth.
+/// Comparison of one parameter's estimates with the true values.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Compared {
-    /// Sleepers compared.
+    /// Number of sleepers compared.
     pub sleepers: usize,
     /// Mean of the estimates, in the parameter's unit.
     pub mean: f64,
-    /// Mean standard deviation over the truth.
+    /// Mean of standard deviation divided by true value.
     pub relative_sd: f64,
-    /// Mean absolute error over the truth.
+    /// Mean of absolute error divided by true value.
     pub relative_error: f64,
-    /// Share of truths inside the 90 % interval.
+    /// Share of the true values inside the 90 % interval, 0 to 1.
     pub holds_90: f64,
-    /// The same with the standard deviations of an even track.
+    /// As `holds_90`, with the standard deviations for a track without unevenness.
     pub holds_90_if_even: f64,
-    /// Part of a sleeper's own deviation from its track's mean that its estimate lacks; none where
-    /// sleepers are alike.
+    /// Missed share of the deviation of a sleeper from the mean of its track; 0 if the estimates follow it
+    /// completely. `None` if the sleepers of a track are equal.
     pub missed: Option<f64>,
-    /// Standard deviation of the estimates along a track, in the logarithm.
+    /// Standard deviation of the logarithm of the estimates along a track.
     pub along: f64,
 }
 
 /// A track and its evaluation.
 pub(super) type Answer = (Track, Evaluation);
 
-/// The row of these answers.
+/// Computes the row of these evaluations.
 pub(super) fn row(kind: Kind, answers: &[Answer]) -> CoverageRow {
     let tracks = answers.len();
     let share = |of: &dyn Fn(&Evaluation) -> bool| {
@@ -88,7 +89,7 @@ pub(super) fn row(kind: Kind, answers: &[Answer]) -> CoverageRow {
     }
 }
 
-/// Sums over sleepers, on their way to means.
+/// Sums over sleepers, for computing means.
 #[derive(Default)]
 struct Sums {
     sleepers: f64,
@@ -97,7 +98,7 @@ struct Sums {
     error: f64,
     held: f64,
     held_without_unevenness: f64,
-    /// Own deviation times itself, and times what the estimate lacks of it.
+    /// Sums of the squared deviation from the track's mean, and of the deviation times its missed part.
     own: f64,
     lacking: f64,
     along: f64,

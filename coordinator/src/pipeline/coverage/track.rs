@@ -1,4 +1,4 @@
-//! A simulated track with its own parameters at every sleeper, and its recording.
+//! A simulated track with separate parameters at every sleeper, and its recording.
 
 use serde_json::Map;
 use std::ops::Range;
@@ -9,27 +9,27 @@ use tracktwin_signal::{Signal, SignalError};
 use tracktwin_track::model::{Mesh, ModelError, Roughness, Support, TrackModel};
 use tracktwin_track::time::{self, PassError};
 
-/// Spans between what is recorded and the held ends of the rail.
+/// Number of spans between the recorded part and the fixed ends of the rail.
 const END_SPANS: usize = 8;
-/// Km/h in a m/s.
+/// Conversion factor from m/s to km/h.
 const KM_H: f64 = 3.6;
 
 /// A track to be simulated.
 #[derive(Clone, Debug)]
 pub(super) struct Track {
-    /// Of every recorded sleeper.
+    /// Parameters of every recorded sleeper.
     pub(super) sleepers: Vec<ParameterSet>,
-    /// Seed of its surface.
+    /// Seed of the surface.
     pub(super) surface_seed: u64,
 }
 
-/// Why a track can't be simulated.
+/// Reasons for not simulating a track.
 #[derive(Debug, thiserror::Error)]
 pub enum TrackError {
-    /// The track can't be built.
+    /// The track model cannot be built.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The wheel can't run over it.
+    /// The pass over the track cannot be simulated.
     #[error(transparent)]
     Pass(#[from] PassError),
     /// The acceleration is not finite.
@@ -37,12 +37,12 @@ pub enum TrackError {
     Signal(#[from] SignalError),
 }
 
-/// Where on the rail is recorded; the same for all tracks of one length.
+/// Position of the recorded part on the rail. It is equal for all tracks of one length.
 struct Place {
     spans: usize,
-    /// Numbers of the recorded sleepers: sleeper `n` stands at the end of `n` spans.
+    /// Numbers of the recorded sleepers. Sleeper `n` is at the end of `n` spans.
     numbers: Range<usize>,
-    /// Signal beside the outer windows, in spans.
+    /// Length of the signal beyond the outer windows, in spans.
     margin_spans: usize,
 }
 
@@ -58,12 +58,12 @@ impl Place {
     }
 }
 
-/// Recordings of tracks of one length, a pass at each of the experiment's speeds.
+/// Records tracks of equal length, with one pass at each speed of the experiment.
 ///
-/// Beyond the recorded sleepers a track continues with the outer ones.
+/// Beyond the recorded sleepers, a track continues with the parameters of the outer ones.
 ///
 /// # Errors
-/// [`TrackError`] of a track that has one.
+/// Returns the [`TrackError`] of a track that cannot be simulated.
 pub(super) fn record(
     experiment: &Experiment,
     tracks: &[Track],
@@ -112,7 +112,7 @@ fn model(experiment: &Experiment, track: &Track, place: &Place) -> Result<TrackM
     TrackModel::build(design, &mesh, &supports, &[])
 }
 
-/// The wheel's way at a speed, and where the recording begins.
+/// The wheel's pass at a speed, and the position at which the recording begins.
 fn way(experiment: &Experiment, place: &Place, speed_km_h: f64) -> (time::Pass, f64) {
     let spacing_m = experiment.design.sleeper.spacing_m;
     let from_m = (place.numbers.start - 1 - place.margin_spans) as f64 * spacing_m;

@@ -1,4 +1,4 @@
-//! The diagnoses of the laps, section by section.
+//! Diagnoses of the laps, one per section of sleepers.
 
 use super::error::json;
 use super::folder::DIAGNOSES;
@@ -10,11 +10,11 @@ use tracktwin_files::{FileName, Kind, Output, read_text};
 use tracktwin_parameters::Preset;
 use tracktwin_signal::recording::Recording;
 
-/// File of a diagnosis.
+/// Name of the file with a diagnosis.
 const DIAGNOSIS: &str = "diagnosis.json";
 
 impl RingStudy<'_> {
-    /// The diagnoses of a lap, section by section.
+    /// Returns the diagnoses of a lap, one per section.
     pub(super) async fn diagnoses(
         &self,
         recording: &Recording,

@@ -1,4 +1,4 @@
-//! Why a ring study ends before its time.
+//! Errors of a ring study.
 
 use crate::pipeline::diagnose::DiagnosingError;
 use crate::pipeline::invert::InvertingError;
@@ -9,17 +9,18 @@ use tracktwin_ring::RingError;
 use tracktwin_signal::FeatureError;
 use tracktwin_signal::recording::RecordingError;
 
-/// Why a ring study ends before its time.
+/// Errors that end a ring study.
 #[derive(Debug, thiserror::Error)]
 pub enum RingStudyError {
-    /// The folder holds another ring.
+    /// The folder contains a ring with other settings.
     #[error(
         "{folder}: contains a ring of other settings ({known}); use another --out, or the same settings"
     )]
     Other {
-        /// The folder.
+        /// Path of the folder.
         folder: String,
-        /// Seed, laps, speeds and stretch of the ring there, and the version that began it.
+        /// Seed, laps, speeds and stretch of the existing ring, and the version of the program that created
+        /// it.
         known: String,
     },
     /// The ring cannot be recorded.
@@ -31,56 +32,56 @@ pub enum RingStudyError {
     /// A part of the recording cannot be evaluated by inversion.
     #[error("{part}: {source}")]
     Inversion {
-        /// The part.
+        /// Name of the part: all passes, a lap or a speed.
         part: String,
-        /// Why.
+        /// Cause.
         source: InvertingError,
     },
-    /// The recording has no spectra.
+    /// The spectra of the recording cannot be computed.
     #[error(transparent)]
     Features(#[from] FeatureError),
-    /// The models cannot evaluate the recording, or a window of it has no spectrum.
+    /// The models cannot evaluate the recording, or a window has no spectrum.
     #[error(transparent)]
     Models(#[from] tracktwin_evaluation::Error),
     /// A part of the recording cannot be diagnosed.
     #[error("{part}: {source}")]
     Diagnosis {
-        /// The part.
+        /// Name of the part.
         part: String,
-        /// Why.
+        /// Cause.
         source: DiagnosingError,
     },
-    /// A file of the folder is not what it was.
+    /// An evaluation file in the folder is invalid.
     #[error("{path}: {source}; remove it, and it is made again")]
     NoEvaluation {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// Cause.
         source: RingError,
     },
-    /// The same of a file of the program's own.
+    /// Another file written by the program is invalid.
     #[error("{path}: {source}; remove it, and it is made again")]
     Json {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// Cause.
         source: serde_json::Error,
     },
-    /// The file that identifies the folder's ring says nothing.
+    /// The file that identifies the folder's ring is invalid.
     #[error("{path}: not the plan of a ring of this version ({source}); use another --out")]
     Terms {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// Cause.
         source: serde_json::Error,
     },
-    /// A file cannot be read or written, or belongs to another.
+    /// A file cannot be read or written, or another program has written it.
     #[error(transparent)]
     Files(#[from] FilesError),
 }
 
 impl RingStudyError {
-    /// Whether the settings or the folder are to be changed.
+    /// Whether settings or folder are the cause; the user must change them.
     pub fn is_wrong_input(&self) -> bool {
         match self {
             Self::Other { .. }

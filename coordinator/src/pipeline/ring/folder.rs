@@ -1,4 +1,4 @@
-//! The folder of a ring study: its files, and whose ring it holds.
+//! The folder of a ring study: its files, and the identity of its ring.
 
 use super::{RingStudy, RingStudyError};
 use crate::pipeline::trial::Trial;
@@ -27,21 +27,21 @@ struct Terms {
     #[serde(flatten)]
     plan: Plan,
     code_version: String,
-    /// Models of another version give other estimates.
+    /// Hash of the physics. Other physics gives other estimates.
     model_hash: String,
 }
 
-/// Checks that the study can be written into a folder.
+/// Checks that the study can be written to a folder.
 ///
 /// # Errors
-/// [`FilesError`] names the first file that is not the program's.
+/// Returns [`FilesError`] with the first file that the program did not write.
 pub fn check_folder(folder: &Path, force: bool) -> Result<(), FilesError> {
     let names = [PAGE, STATEMENTS, TABLE, TRUTH[0], TRUTH[1]];
     check(folder, Kind::Results, force, &names)?;
     if folder.join(TERMS).symlink_metadata().is_ok() { Ok(()) } else { check_parts(folder) }
 }
 
-/// Refuses parts of a folder that no ring owns: they would be taken for this ring's.
+/// Returns an error if the folder has parts of a ring without a plan. They would be used for this ring.
 fn check_parts(folder: &Path) -> Result<(), FilesError> {
     let mut paths = [RECORDING, EVALUATIONS, DIAGNOSES].into_iter().map(|name| folder.join(name));
     match paths.find(|path| Trial::is_taken(path)) {
@@ -51,7 +51,7 @@ fn check_parts(folder: &Path) -> Result<(), FilesError> {
 }
 
 impl RingStudy<'_> {
-    /// Makes sure that the folder's ring is this one.
+    /// Checks that the folder contains this ring, or records its identity in an empty folder.
     pub(super) fn begin(&self) -> Result<(), RingStudyError> {
         let path = self.folder.join(TERMS);
         let terms = Terms {
@@ -79,7 +79,7 @@ impl RingStudy<'_> {
     }
 }
 
-/// Text of a file; none where there is none.
+/// Text of a file; `None` if the file does not exist.
 fn if_there(path: &Path) -> Result<Option<String>, FilesError> {
     match path.symlink_metadata() {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),

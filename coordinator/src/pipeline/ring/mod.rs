@@ -1,8 +1,8 @@
-//! The ring study: recorded, evaluated as a whole, by lap and by speed, diagnosed, compared with its
-//! truth.
+//! The ring study. The ring is recorded, evaluated as a whole, by lap and by speed, diagnosed, and compared
+//! with its true values.
 //!
-//! Owns the order of the stages and the files of the folder; a stage whose file is there is not done
-//! again. The ring crate owns the ring and the statements.
+//! This module defines the order of the stages and the files of the folder. A stage is skipped if its file
+//! exists. The ring crate defines the ring and the statements.
 
 mod diagnoses;
 mod error;
@@ -27,33 +27,33 @@ use tracktwin_ring::{Estimated, Method, RailSpectra, Ring, Study};
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureDefinition};
 
-/// Digits of a library's digest in the name of a folder.
+/// Number of digits of a library's digest in the name of a folder.
 const DIGEST_SHOWN: usize = 12;
 
-/// File of an evaluation.
+/// Name of the file with an evaluation.
 const EVALUATION: &str = "evaluation.json";
 
-/// A ring study, and where it is kept.
+/// A ring study with its settings and its folder.
 pub struct RingStudy<'a> {
-    /// The ring.
+    /// The ring to record.
     pub ring: &'a Ring,
-    /// Its folder.
+    /// Output folder.
     pub folder: &'a Path,
-    /// Keeps the null simulations, if there is one.
+    /// Library for storing null simulations, if available.
     pub library: Option<&'a Library>,
-    /// The models of the paper's method, if it is to be asked too.
+    /// Models of the paper's method; `None` if this method is not used.
     pub models: Option<&'a Evaluator>,
     /// Whether every lap is diagnosed.
     pub diagnose: bool,
-    /// Whether files that the program did not write are replaced.
+    /// Whether files that the program did not write may be replaced.
     pub force: bool,
 }
 
-/// Progress of a study: steps done, and what is being done.
+/// Receives the progress of a study: number of completed steps, and name of the current step.
 pub type Watch<'a> = dyn Fn(u64, &str) + Sync + 'a;
 
 impl RingStudy<'_> {
-    /// Steps of the study.
+    /// Number of steps of the study.
     pub fn steps(&self) -> u64 {
         let plan = self.ring.plan();
         let diagnoses =
@@ -62,10 +62,10 @@ impl RingStudy<'_> {
         (1 + evaluations + diagnoses) as u64
     }
 
-    /// Does what is not done yet, and compares all with the truth.
+    /// Computes the missing stages, and compares all results with the true values.
     ///
     /// # Errors
-    /// [`RingStudyError`]; what is done by then is kept.
+    /// Returns [`RingStudyError`]. Stages completed before the error are kept.
     pub async fn run(&self, watch: &Watch<'_>) -> Result<Study, RingStudyError> {
         self.begin()?;
         watch(0, "recording");
@@ -95,10 +95,10 @@ impl RingStudy<'_> {
         Ok(study)
     }
 
-    /// Writes page, table and statements; gives the path of the page.
+    /// Writes page, tables and statements. Returns the path of the page.
     ///
     /// # Errors
-    /// [`FilesError`] of a file that cannot be written.
+    /// Returns [`FilesError`] if a file cannot be written.
     pub fn write(&self, study: &Study, page: &str) -> Result<PathBuf, FilesError> {
         let truth = &study.truth;
         let mut output = Output::begin(self.folder, Kind::Results, self.force)?;
@@ -115,7 +115,7 @@ impl RingStudy<'_> {
         Ok(self.folder.join(PAGE))
     }
 
-    /// All passes; with several laps or speeds, each of them alone too.
+    /// The parts to evaluate: all passes; with several laps or speeds, also each lap or speed.
     fn parts(&self) -> Vec<Part> {
         let plan = self.ring.plan();
         let mut parts = vec![Part::All];
@@ -128,7 +128,7 @@ impl RingStudy<'_> {
         parts
     }
 
-    /// The recording, made if it is not there.
+    /// The recording, created if missing.
     fn recording(&self) -> Result<Recording, RingStudyError> {
         let folder = self.folder.join(RECORDING);
         if !folder.join("recording.json").exists() {
@@ -162,7 +162,7 @@ impl RingStudy<'_> {
         Estimated::read(&text).map_err(no_evaluation(&path))
     }
 
-    /// Adds what models and model selector say of the whole recording.
+    /// Adds the estimates of models and model selector for the whole recording.
     fn by_models(
         &self,
         recording: &Recording,

@@ -5,25 +5,26 @@ use std::ops::Range;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 
-/// Sleepers of a section that is diagnosed at once, and those that two neighbouring ones share.
+/// Number of sleepers in a section for one diagnosis, and number of sleepers shared by neighbouring
+/// sections.
 const LENGTH: usize = 30;
 const OVERLAP: usize = 6;
-/// Spans of the passes that are kept beyond a section.
+/// Length of the passes beyond a section, in spans.
 const BESIDE: f64 = 3.0;
 
-/// Some of the passes.
+/// Selection of passes of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Part {
-    /// All.
+    /// All passes.
     All,
-    /// The passes of a lap, from 1: one at each speed.
+    /// The passes of one lap, counted from 1: one pass at each speed.
     Lap(usize),
-    /// The passes of a speed in km/h.
+    /// The passes at one speed in km/h.
     Speed(f64),
 }
 
 impl Part {
-    /// Its folder.
+    /// Name of the folder of this part.
     pub(super) fn name(&self) -> String {
         match self {
             Self::All => "all".to_owned(),
@@ -32,13 +33,13 @@ impl Part {
         }
     }
 
-    /// The recording with these passes only.
+    /// The recording with the selected passes only.
     pub(super) fn of(self, recording: &Recording) -> Recording {
         let passes = self.passes(recording).into_iter().cloned().collect();
         with(recording, passes, recording.sleepers.clone())
     }
 
-    /// These passes.
+    /// The selected passes.
     fn passes(self, recording: &Recording) -> Vec<&Pass> {
         let all = recording.passes.iter();
         match self {
@@ -56,7 +57,7 @@ impl Part {
     }
 }
 
-/// The recording with other passes and sleepers.
+/// The recording with these passes and sleepers instead of its own.
 fn with(recording: &Recording, passes: Vec<Pass>, sleepers: Vec<Sleeper>) -> Recording {
     Recording {
         name: recording.name.clone(),
@@ -80,7 +81,7 @@ impl Display for Part {
     }
 }
 
-/// Sections of about equal length that cover so many sleepers.
+/// Sections of about equal length that cover this number of sleepers.
 pub(super) fn sections(sleepers: usize) -> Vec<Range<usize>> {
     let length = sleepers.min(LENGTH);
     let count = sleepers.saturating_sub(OVERLAP).div_ceil(LENGTH - OVERLAP).max(1);
@@ -88,7 +89,7 @@ pub(super) fn sections(sleepers: usize) -> Vec<Range<usize>> {
     (0..count).map(|number| first(number)..first(number) + length).collect()
 }
 
-/// The recording of a part and some of its sleepers: passes end a few spans beyond them.
+/// The recording of a part, cut to a range of sleepers. The passes end a few spans beyond these sleepers.
 pub(super) fn cut(recording: &Recording, part: Part, sleepers: Range<usize>) -> Recording {
     let kept = recording.sleepers[sleepers].to_vec();
     let beside_m = (0.5 + BESIDE) * recording.spacing_m;

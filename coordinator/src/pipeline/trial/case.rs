@@ -1,4 +1,4 @@
-//! One case: recorded, diagnosed from its folder alone, opened, scored.
+//! Processing of one case: recorded, diagnosed without access to its truth, unsealed, scored.
 
 use super::{SEALS, Trial, TrialError, file, sealed, text};
 use crate::pipeline;
@@ -40,13 +40,14 @@ impl Trial {
         self.discard(number)
     }
 
-    /// The library is read again, because another machine may have answered since.
+    /// The first unanswered question. It is read from the library, because another machine may have stored
+    /// answers.
     async fn next_question(&self, number: u32) -> Result<Option<Question>, TrialError> {
         let answered = self.scores().await?.remove(&number);
         Ok(self.unanswered(answered.as_ref()).first().copied())
     }
 
-    /// With the whole catalogue.
+    /// Answers the question [`Question::Catalogue`]: diagnosis with the whole catalogue.
     async fn diagnosed(
         &self,
         number: u32,
@@ -67,7 +68,7 @@ impl Trial {
         self.keep(number, Question::Catalogue, &score, Some(record)).await
     }
 
-    /// Without the hidden effect's kind in the catalogue.
+    /// Answers the question [`Question::KnockedOut`]: diagnosis without the hidden kind in the catalogue.
     async fn knocked_out(
         &self,
         number: u32,
@@ -86,7 +87,7 @@ impl Trial {
         self.keep(number, Question::KnockedOut, &score, Some(record)).await
     }
 
-    /// With the sleepers of each speed in another order.
+    /// Answers the question [`Question::Shuffled`]: diagnosis with shuffled sleepers at each speed.
     async fn shuffled(
         &self,
         number: u32,
@@ -100,7 +101,7 @@ impl Trial {
         self.keep(number, Question::Shuffled, &diagnosis.verdict, Some(record)).await
     }
 
-    /// By surrogates and model selector.
+    /// Answers the question [`Question::Paper`]: evaluation with surrogates and model selector.
     async fn asked_of_the_paper(
         &self,
         number: u32,
@@ -137,7 +138,7 @@ impl Trial {
         std::fs::remove_dir_all(&folder).map_err(|source| file(&folder, source))
     }
 
-    /// Writes a diagnosis to its file; gives what the library keeps of it.
+    /// Writes a diagnosis to its file. Returns the library's record of it.
     fn written(
         &self,
         number: u32,
@@ -154,7 +155,7 @@ impl Trial {
         })
     }
 
-    /// The truth, its seal unbroken.
+    /// The truth of a case, after a check of its seal.
     fn opened(&self, number: u32) -> Result<Plan, TrialError> {
         let path = self.folder.join(sealed(number));
         let content = std::fs::read(&path).map_err(|source| file(&path, source))?;
@@ -180,7 +181,7 @@ async fn diagnose(
     Ok((diagnosis, compared.ok_or(TrialError::NoTrack { number })?))
 }
 
-/// CPU time of this process so far in s.
+/// CPU time used by this process, in s.
 fn cpu_s() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64

@@ -1,17 +1,17 @@
-//! The folder of a trial, before anything is written into it.
+//! Checks of a trial's folder before anything is written to it.
 
 use super::{SCORES, SEALS, SUMMARY, TABLES, TERMS, Trial, TrialError};
 use std::path::Path;
 use tracktwin_files::{FilesError, Kind, check, make_folder};
 
-/// Folders inside it.
+/// Names of the folders inside the trial's folder.
 const PARTS: [&str; 3] = ["recordings", "sealed", "diagnoses"];
 
-/// Checks that a folder holds a trial, or no file with a name of the trial's files: such a file
-/// would belong to another program.
+/// Checks that a folder contains a trial, or no file with the name of a trial's file. Such a file would
+/// belong to another program.
 ///
 /// # Errors
-/// [`FilesError`] names the first file that exists already.
+/// Returns [`FilesError`] with the first file that exists already.
 pub fn check_folder(folder: &Path, force: bool) -> Result<(), FilesError> {
     check(folder, Kind::Trial, force, &[TABLES, SCORES, SUMMARY])?;
     if force || folder.join(TERMS).exists() {
@@ -25,7 +25,7 @@ pub fn check_folder(folder: &Path, force: bool) -> Result<(), FilesError> {
 }
 
 impl Trial {
-    /// Makes the folder.
+    /// Creates the folder.
     pub(super) fn make_folder(&self) -> Result<(), TrialError> {
         check_folder(&self.folder, self.force)?;
         for part in PARTS {
@@ -33,7 +33,7 @@ impl Trial {
         }
         Ok(())
     }
-    /// Whether a path is a file, or a folder with something in it.
+    /// Whether the path is a file or a non-empty folder.
     pub(in crate::pipeline) fn is_taken(path: &Path) -> bool {
         match path.read_dir() {
             Ok(mut entries) => entries.next().is_some(),

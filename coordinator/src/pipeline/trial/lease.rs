@@ -1,11 +1,11 @@
-//! A case is processed by one machine at a time, as long as the machine is alive.
+//! Leases of a trial's cases: one machine at a time processes a case.
 
 use super::{Trial, TrialError};
 use std::time::Duration;
 use tokio::task::JoinHandle;
 use tracktwin_farm::dispatch::Timing;
 
-/// Duration of a lease: after it, the case goes to the next machine that asks.
+/// Duration of a lease without renewal; then another machine can lease the case.
 const LEASE: Duration = Duration::from_mins(1);
 
 /// Renews a lease until it is dropped.
@@ -18,12 +18,12 @@ impl Drop for Renewal {
 }
 
 impl Trial {
-    /// Leases the first of these cases that is free.
+    /// Leases the first of these cases that no other machine holds.
     pub(super) async fn lease(&self, of: Vec<u32>) -> Result<Option<u32>, TrialError> {
         Ok(self.library.lease_trial_case(&self.id(), &self.node, of, lease_ms()).await?)
     }
 
-    /// Keeps a case's lease.
+    /// Renews a case's lease regularly, until the returned value is dropped.
     pub(super) fn renewal(&self, number: u32) -> Renewal {
         let (library, trial, node) = (self.library.clone(), self.id(), self.node.clone());
         Renewal(tokio::spawn(async move {

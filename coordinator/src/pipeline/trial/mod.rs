@@ -1,8 +1,9 @@
-//! A blind trial: truths sealed, recordings made, diagnosed, opened and scored, by as many nodes as
-//! share a library.
+//! A blind trial, which all machines with access to one library can share. Truths are sealed; recordings
+//! are simulated, diagnosed, unsealed and scored.
 //!
-//! Owns the order of the steps and the files of the folder. The trial crate owns the hidden physics
-//! and the scores; the library holds leases and answers, so an interrupted trial can be continued.
+//! This module defines the order of the steps and the files of the folder. The trial crate defines the
+//! hidden physics and the scores. The library stores leases and answers, so that an interrupted trial can
+//! be continued.
 
 mod case;
 mod folder;
@@ -33,46 +34,46 @@ const TERMS: &str = "trial.json";
 /// File of the seals.
 const SEALS: &str = "seals.sha256";
 
-/// Result files: tables, one line per case, numbers.
+/// Names of the result files: tables, one line per case, and numbers.
 const TABLES: &str = "trial.md";
 const SCORES: &str = "scores.jsonl";
 const SUMMARY: &str = "summary.json";
 
-/// Interval of checking the cases of other machines.
+/// Pause before the next check for open cases, if other machines hold all of them.
 const WAIT: Duration = Duration::from_secs(2);
 
-/// Time limit of an unavailable library.
+/// Maximum outage of the library; a longer one ends the trial.
 const PATIENCE: Duration = Duration::from_mins(10);
 
-/// A trial, as one node takes part in it.
+/// A trial with the settings of this machine.
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub struct Trial {
-    /// Decides what is hidden.
+    /// Seed that determines the hidden extensions.
     pub seed: u64,
-    /// How many cases.
+    /// Number of cases.
     pub cases: u32,
-    /// Where this node keeps its files.
+    /// Output folder of this machine.
     pub folder: PathBuf,
-    /// Where all nodes keep their answers.
+    /// Library shared by all machines of the trial.
     pub library: Library,
     /// Name of this machine.
     pub node: String,
-    /// Whether single effects are diagnosed again without their kind.
+    /// Whether cases with a single hidden extension are diagnosed again without its kind (knock-out).
     pub knock_out: bool,
-    /// Whether local effects that were found are diagnosed again with shuffled sleepers.
+    /// Whether cases with a local effect that was found are diagnosed again with shuffled sleepers.
     pub shuffle: bool,
-    /// The models of the paper's pipeline, if it is to be asked too.
+    /// Models of the paper's method; `None` if this method is not scored.
     pub paper: Option<Evaluator>,
-    /// Whether recordings are removed once they are scored.
+    /// Whether recordings are deleted after scoring.
     pub discard_recordings: bool,
-    /// Whether files that the program did not write are replaced.
+    /// Whether files that the program did not write may be replaced.
     pub force: bool,
 }
 
-/// Identity of a folder's trial.
+/// Identity of the trial in a folder.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Terms {
-    /// The first format did not state it.
+    /// Format of the cases; files of the first format do not contain this field.
     #[serde(default = "first_format")]
     format: u32,
     seed: u64,
@@ -83,89 +84,89 @@ const fn first_format() -> u32 {
     1
 }
 
-/// Why a trial ends before its time.
+/// Errors that end a trial.
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
-    /// The folder holds another trial.
+    /// The folder contains another trial.
     #[error(
         "{folder}: contains a trial of seed {seed} by version {version}; use another --out, \
              or the same seed"
     )]
     Other {
-        /// The folder.
+        /// Path of the folder.
         folder: String,
-        /// Seed of the trial there.
+        /// Seed of the existing trial.
         seed: u64,
-        /// Version of the program that began it.
+        /// Version of the program that started the existing trial.
         version: String,
     },
-    /// The folder holds a trial whose cases are others.
+    /// The folder contains a trial with cases of another format.
     #[error(
         "{folder}: contains a trial of format {format}, whose cases are others than those of this \
              program (format {}); use another --out, or the program that began it",
         FORMAT
     )]
     OtherFormat {
-        /// The folder.
+        /// Path of the folder.
         folder: String,
-        /// Format of the trial there.
+        /// Format of the existing trial.
         format: u32,
     },
-    /// The library fails, or refuses.
+    /// The library returned an error.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// A truth was changed.
+    /// A truth was changed after sealing.
     #[error(transparent)]
     Seal(#[from] SealError),
-    /// A recording cannot be made.
+    /// A recording cannot be simulated.
     #[error(transparent)]
     Truth(#[from] TruthError),
     /// A recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// Diagnoses broke down, each with its reason by the number of its case; all others are answered.
+    /// Some diagnoses failed. All other cases were answered and scored.
     #[error(
         "{} of {of} diagnoses failed; all others are scored; repeat the command to try these again\n{}",
         .cases.len(),
         .cases.iter().map(|(number, reason)| format!("case {number}: {reason}")).collect::<Vec<_>>().join("\n")
     )]
     BrokenDown {
-        /// The cases.
+        /// Reason of each failure, by number of the case.
         cases: BTreeMap<u32, String>,
-        /// Of how many.
+        /// Number of cases of the trial.
         of: u32,
     },
-    /// A diagnosis broke down.
+    /// A diagnosis failed.
     #[error("case {number}: {source}")]
     Diagnosis {
         /// Number of the case.
         number: u32,
-        /// Why.
+        /// Cause.
         source: DiagnosingError,
     },
-    /// A recording has no track to compare with.
+    /// The recording was not compared with a track model.
     #[error("case {number}: the recording has no track to compare with")]
     NoTrack {
         /// Number of the case.
         number: u32,
     },
-    /// The paper's pipeline can't be asked.
+    /// The paper's method cannot evaluate the recording.
     #[error("case {number}: {source}")]
     Paper {
         /// Number of the case.
         number: u32,
-        /// Why.
+        /// Cause.
         source: tracktwin_evaluation::Error,
     },
-    /// The truth makes no track.
+    /// The track model of a truth cannot be built.
     #[error(transparent)]
     Model(#[from] CalibrationError),
-    /// A file is not what it was.
+    /// A file has invalid content.
     #[error("{path}: {source}")]
     Json {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// Cause.
         source: serde_json::Error,
     },
     /// A file cannot be written, or exists already.
@@ -174,15 +175,15 @@ pub enum TrialError {
     /// A file cannot be read.
     #[error("{path}: {source}")]
     File {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
 }
 
 impl TrialError {
-    /// Whether the same may succeed later, when the library answers again.
+    /// Whether the same call may succeed later, when the library is available again.
     fn is_temporary(&self) -> bool {
         match self {
             Self::Library(error) => error.is_temporary(),
@@ -201,11 +202,11 @@ impl Trial {
         self.record(Vec::new()).id()
     }
 
-    /// Makes the folder, or makes sure that it holds this trial; seals all truths, here and in the
-    /// library, before anything is diagnosed. Gives the digest of all seals.
+    /// Creates the folder, or checks that it contains this trial. Seals all truths in the folder and in the
+    /// library, before any diagnosis. Returns the digest of all seals.
     ///
     /// # Errors
-    /// [`TrialError::Other`] when the folder holds another trial, [`TrialError::Seal`] when seals
+    /// Returns [`TrialError::Other`] if the folder contains another trial, [`TrialError::Seal`] if seals
     /// were changed.
     pub async fn begin(&self) -> Result<String, TrialError> {
         self.make_folder()?;
@@ -224,22 +225,22 @@ impl Trial {
         self.seal_folder(&seals)
     }
 
-    /// How many cases have all their answers.
+    /// Number of cases with all their answers.
     ///
     /// # Errors
-    /// [`TrialError`] when the library cannot be read.
+    /// Returns [`TrialError`] if the library cannot be read.
     pub async fn answered(&self) -> Result<u64, TrialError> {
         let scores = self.scores().await?;
         Ok(u64::from(self.cases) - self.open(&scores).len() as u64)
     }
 
-    /// Works on the cases that lack an answer and that no other node works on, until none lacks one;
-    /// then sums up. A library that does not answer is waited for; a case whose diagnosis breaks down
-    /// is left, and counts as such.
+    /// Processes cases that lack an answer and that no other machine holds, until all cases are answered.
+    /// Then computes the summary. Calls to an unavailable library are retried for a limited time. A case
+    /// whose diagnosis fails is skipped on this machine.
     ///
     /// # Errors
-    /// [`TrialError`] when a seal is broken; [`TrialError::BrokenDown`] at the end, after the
-    /// summary.
+    /// Returns [`TrialError`] if a seal is broken. Returns [`TrialError::BrokenDown`] at the end, after the
+    /// summary was written, if diagnoses failed.
     pub async fn answer(&self, mut progress: impl FnMut(u64, &str)) -> Result<Summary, TrialError> {
         let mut failing_since: Option<Instant> = None;
         let mut broken = BTreeMap::new();
@@ -267,8 +268,8 @@ impl Trial {
         }
     }
 
-    /// One case, or a look at what the others do; the summary once all is answered but for what has
-    /// broken down here.
+    /// Processes one case, or waits for other machines. Returns the summary when all cases are answered
+    /// except those that failed on this machine.
     async fn step(
         &self,
         broken: &BTreeMap<u32, String>,
@@ -292,7 +293,7 @@ impl Trial {
         Ok(None)
     }
 
-    /// The cases that lack an answer.
+    /// Numbers of the cases that lack an answer.
     fn open(&self, scores: &scores::Scores) -> Vec<u32> {
         let lacks = |number: &u32| !self.unanswered(scores.get(number)).is_empty();
         (0..self.cases).filter(lacks).collect()
@@ -319,7 +320,7 @@ impl Trial {
         Ok(summary)
     }
 
-    /// Makes sure that the folder's trial is this one.
+    /// Checks that the folder contains this trial, or records its identity.
     fn begin_folder(&self) -> Result<(), TrialError> {
         let path = self.folder.join(TERMS);
         let code_version = CODE_VERSION.to_owned();
@@ -337,7 +338,7 @@ impl Trial {
         Err(TrialError::Other { folder, seed: known.seed, version: known.code_version })
     }
 
-    /// Writes the seals down, or makes sure that they are those that were; gives their digest.
+    /// Writes the seals, or checks that they equal the existing ones. Returns their digest.
     fn seal_folder(&self, seals: &Seals) -> Result<String, TrialError> {
         let path = self.folder.join(SEALS);
         if let Some(known) = read_if_there(&path)? {
@@ -378,7 +379,7 @@ fn write(path: &Path, value: &impl Serialize) -> Result<(), TrialError> {
     Ok(replace(path, text(value).as_bytes())?)
 }
 
-/// Content of a file, if it exists. An unreadable file is an error, not a missing file.
+/// Content of a file; `None` if the file does not exist. An unreadable file is an error.
 fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, TrialError> {
     match std::fs::read(path) {
         Ok(content) => Ok(Some(content)),

@@ -1,4 +1,4 @@
-//! The answers that the library holds, as scores; and which are lacking.
+//! Scores from the answers in the library, and the questions that are still open.
 
 use super::{Trial, TrialError};
 use serde::Serialize;
@@ -6,17 +6,17 @@ use std::collections::BTreeMap;
 use tracktwin_library::{DiagnosisRecord, Question, TrialAnswer};
 use tracktwin_trial::CaseScore;
 
-/// Stored scores by case.
+/// Stored scores, by number of the case.
 pub(super) type Scores = BTreeMap<u32, Answered>;
 
-/// Stored scores of a case.
+/// Stored scores of one case, and the answered questions.
 pub(super) struct Answered {
     pub(super) score: CaseScore,
     questions: Vec<Question>,
 }
 
 impl Trial {
-    /// The questions of a case that have no answer yet, in the order in which they can be asked.
+    /// The unanswered questions of a case that can be asked now, in their order.
     pub(super) fn unanswered(&self, answered: Option<&Answered>) -> Vec<Question> {
         let Some(Answered { score, questions }) = answered else {
             return vec![Question::Catalogue];
@@ -31,7 +31,7 @@ impl Trial {
         open.map(|(question, _)| question).collect()
     }
 
-    /// Scores stored by all machines for this trial.
+    /// Reads the scores that all machines have stored for this trial.
     pub(super) async fn scores(&self) -> Result<Scores, TrialError> {
         let mut answers = self.library.trial_answers(&self.id()).await?;
         answers.retain(|answer| answer.number < self.cases);

@@ -1,22 +1,23 @@
 //! Frequency bands in which recording and simulation are compared.
 //!
-//! The paper's feature is the synchrosqueezed spectrum, which has no closed form. Here the plain
-//! wavelet power serves: it is linear in the signal's power, so that a track model predicts its
-//! mean without any time simulation.
+//! The feature of the paper is the synchrosqueezed spectrum, which has no closed form. The diagnosis uses
+//! the wavelet power instead: it is linear in the power of the signal, and a track model predicts its mean
+//! without a time simulation.
 
-/// Bands an octave: their wavelets, a sixth of the frequency wide, overlap by half.
+/// Number of bands per octave; neighbouring wavelets, with a width of a sixth of the frequency, overlap by
+/// half.
 const BANDS_PER_OCTAVE: f64 = 6.0;
 
-/// Frequencies an octave at which a spectrum is known when it is averaged over a band.
+/// Number of spectral lines per octave over which a band is averaged.
 const LINES_PER_OCTAVE: f64 = 30.0;
 
 /// Centre of the Morlet wavelet in rad, as in the features.
 pub(crate) const CENTRE_RAD: f64 = 6.0;
 
-/// How far a band reaches, in its standard deviations.
+/// Reach of a band in standard deviations.
 const REACH: f64 = 4.0;
 
-/// Bands of a Morlet wavelet and the lines of the spectra they average.
+/// Bands of a Morlet wavelet, and the spectral lines over which they are averaged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bands {
     centres_hz: Vec<f64>,
@@ -44,12 +45,12 @@ impl Bands {
         &self.centres_hz
     }
 
-    /// How many bands there are.
+    /// Number of bands.
     pub fn count(&self) -> usize {
         self.centres_hz.len()
     }
 
-    /// The frequencies in Hz at which spectra are to be known.
+    /// Frequencies in Hz of the spectral lines.
     pub fn lines_hz(&self) -> &[f64] {
         &self.lines_hz
     }

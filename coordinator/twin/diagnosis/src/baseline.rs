@@ -23,24 +23,24 @@ pub struct Unknowns {
     response_knots: Vec<f64>,
     /// Mean over all sleepers of each quantity of [`Own`].
     pub mean: [Mean; 3],
-    /// How each quantity of [`Own`] varies along the track.
+    /// Variation of each quantity of [`Own`] along the track.
     pub variation: [Variation; 3],
     /// Sleepers that differ from their neighbours by more than `variation`.
     pub exceptions: Vec<Exception>,
-    /// Each quantity of [`Common`].
+    /// Mean of each quantity of [`Common`].
     common: [Mean; 3],
     /// Standard deviation of the exponent of the surface's spectrum.
     slope_deviation: f64,
-    /// Standard deviation of the sensor's response to power, in nats at each knot.
+    /// Standard deviation of the sensor's power response, in nats at each knot.
     pub response_deviation: f64,
 }
 
-/// What is known of the mean over all sleepers of a quantity's logarithm before anything is measured.
+/// Prior of the mean over all sleepers of a quantity's logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mean {
     /// Expected value of the logarithm.
     pub log: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the logarithm.
     pub deviation: f64,
 }
 
@@ -50,7 +50,7 @@ impl Mean {
     }
 }
 
-/// How the logarithm of a quantity varies along the track, about its mean.
+/// Variation of the logarithm of a quantity along the track, about its mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Variation {
     /// Standard deviation of the smooth part.
@@ -61,12 +61,12 @@ pub struct Variation {
     pub independent: f64,
 }
 
-/// A sleeper of which one quantity lies far from its neighbours'.
+/// A sleeper at which one quantity is far from that of its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exception {
     /// The quantity.
     pub field: Own,
-    /// Number of the sleeper among those compared.
+    /// Index of the sleeper among the compared ones.
     pub sleeper: usize,
 }
 
@@ -75,45 +75,45 @@ const KNOT_DISTANCE: f64 = 0.35;
 
 /// Prior of logarithms: standard deviations, and lengths in sleepers or of `ln kappa`.
 mod prior {
-    /// Variation along the track where it is not learned from the recording.
+    /// Variation along the track if it is not estimated from the recording.
     pub(super) const VARIATION: [super::Variation; 3] = [
         super::Variation { smooth: 0.35, length: 3.0, independent: 0.15 },
         super::Variation { smooth: 0.35, length: 3.0, independent: 0.2 },
         super::Variation { smooth: 0.15, length: 3.0, independent: 0.2 },
     ];
-    /// Deviation of an exception from its neighbours.
+    /// Standard deviation of an exception from its neighbours.
     pub(super) const EXCEPTION: f64 = 1.0;
-    /// Spectrum of the surface about eq. B.6, and its length in `ln kappa`.
+    /// Deviation of the surface spectrum from eq. B.6, and its correlation length in `ln kappa`.
     pub(super) const SPECTRUM: f64 = 0.5;
     pub(super) const SPECTRUM_LENGTH: f64 = 0.7;
-    /// Gain of a speed's passes against the others'.
+    /// Gain of the passes at one speed relative to the others.
     pub(super) const GAIN: f64 = 0.05;
-    /// What the sensor makes of power at a frequency, 0.2 dB: accelerometers are flat to 2 % in
-    /// amplitude, and so is a finite-element model.
+    /// Power response of the sensor at a frequency, 0.2 dB: accelerometers are flat to 2 % in amplitude,
+    /// and a finite-element model has the same accuracy.
     pub(super) const RESPONSE: f64 = 0.046;
 }
 
-/// Distances in spans at which the track may end: what that changes is free to be any of them.
+/// Possible distances of the end of the track in spans; their effects are free in the fit.
 pub(crate) const ENDS_SPANS: [usize; 7] = [7, 8, 9, 10, 11, 13, 24];
 
-/// Sleepers beyond either end of the section whose support is free; the last of them represents all
+/// Number of sleepers beyond either end of the section with free supports; the last of them represents all
 /// further ones.
 const OUTER: usize = 3;
 
 /// Stiffness of railpad or ballast of a sleeper beyond the section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Outer {
-    /// Its number, counted from the first sleeper compared.
+    /// Index relative to the first compared sleeper.
     pub(crate) sleeper: isize,
-    /// Whether those further out have the same.
+    /// Whether all sleepers further out have the same stiffness.
     pub(crate) is_last: bool,
-    /// Whether it is the railpad's; else the ballast's.
+    /// Whether the stiffness is that of the railpad; otherwise that of the ballast.
     pub(crate) is_railpad: bool,
 }
 
 impl Unknowns {
-    /// For a section, a number of speeds, surfaces with wave numbers in a range in rad/m, and bands
-    /// with centres in a range in Hz.
+    /// Makes the unknowns of a section for `speeds` speeds, surface wave numbers in a range in rad/m, and
+    /// bands with centres in a range in Hz.
     pub fn new(
         section: &Section,
         speeds: usize,
@@ -136,49 +136,49 @@ impl Unknowns {
         }
     }
 
-    /// How many unknowns there are.
+    /// Number of unknowns.
     pub fn count(&self) -> usize {
         self.outer().end
     }
 
-    /// A quantity of all sleepers, one after the other.
+    /// Indices of a quantity at all sleepers, in the order of the sleepers.
     pub fn own(&self, quantity: Own) -> Range<usize> {
         let first = quantity as usize * self.sleepers;
         first..first + self.sleepers
     }
 
-    /// A quantity of one sleeper.
+    /// Index of a quantity at one sleeper.
     pub fn at(&self, quantity: Own, sleeper: usize) -> usize {
         self.own(quantity).start + sleeper
     }
 
-    /// Ballast stiffness of each sleeper.
+    /// Indices of the ballast stiffness of each sleeper.
     pub fn ballast(&self) -> Range<usize> {
         self.own(Own::BallastStiffness)
     }
 
-    /// Railpad stiffness of each sleeper.
+    /// Indices of the railpad stiffness of each sleeper.
     pub fn railpad(&self) -> Range<usize> {
         self.own(Own::RailpadStiffness)
     }
 
-    /// Irregularity level at each sleeper.
+    /// Indices of the irregularity level at each sleeper.
     pub fn level(&self) -> Range<usize> {
         self.own(Own::Level)
     }
 
-    /// What is common to all sleepers.
+    /// Indices of the quantities that all sleepers share.
     pub fn global(&self) -> Range<usize> {
         let first = Own::ALL.len() * self.sleepers;
         first..first + Common::ALL.len()
     }
 
-    /// A quantity that is common to all sleepers.
+    /// Index of a quantity that all sleepers share.
     pub fn common(&self, quantity: Common) -> usize {
         self.global().start + quantity as usize
     }
 
-    /// A quantity of one sleeper, its own or that of all.
+    /// Index of a quantity at one sleeper, either its own or a common one.
     pub(crate) fn of(&self, quantity: Quantity, sleeper: usize) -> usize {
         match quantity {
             Quantity::Own(quantity) => self.at(quantity, sleeper),
@@ -186,42 +186,43 @@ impl Unknowns {
         }
     }
 
-    /// The surface's spectrum against eq. B.6, at its knots.
+    /// Indices of the ratio of the surface spectrum to eq. B.6, at the knots.
     pub fn spectrum(&self) -> Range<usize> {
         self.global().end..self.global().end + self.knots.len()
     }
 
-    /// The power gain of each speed's passes.
+    /// Indices of the power gain of the passes at each speed.
     pub fn gains(&self) -> Range<usize> {
         self.spectrum().end..self.spectrum().end + self.speeds
     }
 
-    /// The power gain of one speed's passes.
+    /// Index of the power gain of the passes at one speed.
     pub fn gain(&self, speed: usize) -> usize {
         self.gains().start + speed
     }
 
-    /// The response of the sensor to power, at its knots.
+    /// Indices of the power response of the sensor, at the knots.
     pub fn response(&self) -> Range<usize> {
         self.gains().end..self.gains().end + self.response_knots.len()
     }
 
-    /// Weights of the changes due to each possible end of the track.
+    /// Indices of the weights of the possible ends of the track.
     pub fn ends(&self) -> Range<usize> {
         self.response().end..self.response().end + ENDS_SPANS.len()
     }
 
-    /// How much stiffer sleepers beyond the section are held than its first or last one.
+    /// Indices of the log ratio of stiffness between sleepers beyond the section and its first or last
+    /// sleeper.
     pub fn outer(&self) -> Range<usize> {
         self.ends().end..self.ends().end + self.outer_supports().len()
     }
 
-    /// All that lies beyond the section.
+    /// Indices of all unknowns beyond the section.
     pub fn beyond(&self) -> Range<usize> {
         self.ends().start..self.outer().end
     }
 
-    /// What each unknown of [`Unknowns::outer`] is.
+    /// Meaning of each unknown of [`Unknowns::outer`].
     pub(crate) fn outer_supports(&self) -> Vec<Outer> {
         let (sleepers, outer) = (self.sleepers.cast_signed(), OUTER.cast_signed());
         let beyond = || (-outer..0).chain(sleepers..sleepers + outer);
@@ -247,19 +248,19 @@ impl Unknowns {
         values
     }
 
-    /// These values of a problem with the baseline's unknowns at the prior mean.
+    /// A copy of the values of a problem, with the unknowns of the baseline at their prior mean.
     pub(crate) fn with_typical(&self, values: &DVector<f64>) -> DVector<f64> {
         let mut typical = values.clone();
         typical.rows_mut(0, self.count()).copy_from(&self.typical());
         typical
     }
 
-    /// Standard deviation of each unknown's prior, without exceptions.
+    /// Prior standard deviation of each unknown, without exceptions.
     pub fn prior_deviations(&self) -> DVector<f64> {
         self.covariance().diagonal().map(f64::sqrt)
     }
 
-    /// Inverse of the prior covariance.
+    /// Inverse of the prior covariance, with exceptions.
     pub fn precision(&self) -> DMatrix<f64> {
         let mut covariance = self.covariance();
         for &Exception { field, sleeper } in &self.exceptions {
@@ -309,8 +310,8 @@ impl Unknowns {
         covariance
     }
 
-    /// The sleepers beyond vary as those compared do: a difference from the first or last one is what
-    /// the same field has between the two.
+    /// Adds the sleepers beyond the section. They vary as the compared ones do: the difference from the
+    /// first or last sleeper has the prior of the same quantity between the two.
     fn add_outer(&self, covariance: &mut DMatrix<f64>) {
         let last = self.sleepers.cast_signed() - 1;
         let outer: Vec<(usize, Outer)> = self.outer().zip(self.outer_supports()).collect();
@@ -335,7 +336,7 @@ impl Unknowns {
         section.compared().map(|sleeper| self.support(values, sleeper)).collect()
     }
 
-    /// Support of one of the compared sleepers.
+    /// Support of one compared sleeper.
     pub fn support(&self, values: &DVector<f64>, sleeper: usize) -> Support {
         let own = |quantity| values[self.at(quantity, sleeper)].exp();
         let common = |quantity| values[self.common(quantity)].exp();
@@ -348,12 +349,12 @@ impl Unknowns {
         }
     }
 
-    /// Knots on both sides of a wave number in rad/m, with their shares.
+    /// Indices of the spectrum knots on both sides of a wave number in rad/m, with interpolation weights.
     pub fn spectrum_shares(&self, wave_number_rad_m: f64) -> [(usize, f64); 2] {
         shares(&self.knots, wave_number_rad_m, self.spectrum().start)
     }
 
-    /// Knots of the sensor's response on both sides of a frequency, with their shares.
+    /// Indices of the response knots on both sides of a frequency in Hz, with interpolation weights.
     pub fn response_shares(&self, frequency_hz: f64) -> [(usize, f64); 2] {
         shares(&self.response_knots, frequency_hz, self.response().start)
     }
@@ -368,14 +369,14 @@ impl Unknowns {
     }
 }
 
-/// Knots that cover a range, in logarithms.
+/// Logarithms of equidistant knots that cover a range.
 fn knots(range: Range<f64>) -> Vec<f64> {
     let (from, to) = (range.start.ln(), range.end.ln());
     let count = ((to - from) / KNOT_DISTANCE).ceil() as usize + 1;
     (0..count).map(|knot| from + KNOT_DISTANCE * knot as f64).collect()
 }
 
-/// Knots on both sides of a value, counted from the unknown `first`, with their shares.
+/// Knots on both sides of a value, as indices from `first`, with interpolation weights.
 fn shares(knots: &[f64], value: f64, first: usize) -> [(usize, f64); 2] {
     let last = knots.len() - 1;
     let place = ((value.ln() - knots[0]) / KNOT_DISTANCE).clamp(0.0, last as f64);

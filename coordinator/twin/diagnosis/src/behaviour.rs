@@ -1,8 +1,8 @@
 //! Element that an unknown dynamic stiffness resembles: a spring, a damper, a mass, or a mass on a
 //! spring.
 //!
-//! Each has a dynamic stiffness of known form, so that how well it explains what is left follows from
-//! the port scan's own traces (docs/diagnosis.md, section 5).
+//! Each element has a dynamic stiffness of known form. The signatures of the port scan therefore give the
+//! part of the residual that the element explains (docs/diagnosis.md, section 5).
 
 use crate::estimate::Estimate;
 use nalgebra::{DMatrix, DVector};
@@ -12,30 +12,30 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use tracktwin_number::significant;
 
-/// Share of what a free dynamic stiffness explains from which something behaves like an element.
+/// Smallest share of the gain of a free dynamic stiffness that an element must explain.
 const ALIKE: f64 = 0.5;
 
-/// Nats that each parameter beyond the first must gain.
+/// Gain in nats that each parameter beyond the first must add.
 const PARAMETER_NATS: f64 = 3.0;
 
-/// Resonances tried between two centres of the frequencies asked for.
+/// Number of tested resonances between two centres.
 const RESONANCES: usize = 6;
 
-/// Damping ratios tried.
+/// Tested damping ratios.
 const DAMPING_RATIOS: [f64; 4] = [0.02, 0.05, 0.1, 0.3];
 
-/// Points of a bump that its mean is taken over.
+/// Number of points on half a basis function for its mean.
 const POINTS: i32 = 8;
 
 /// An element with one end at the port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Element {
-    /// A spring to the ground, `stiffness_N_per_m`; below zero one that is missing.
+    /// A spring to the ground, `stiffness_N_per_m`; a negative value stands for a missing spring.
     Spring,
-    /// A damper to the ground, `damping_N_s_per_m`; below zero one that is missing.
+    /// A damper to the ground, `damping_N_s_per_m`; a negative value stands for a missing damper.
     Damper,
-    /// A mass, `mass_kg`; below zero one that is missing.
+    /// A mass, `mass_kg`; a negative value stands for a missing mass.
     Mass,
     /// A mass on a spring: `mass_kg`, `frequency_Hz` and `damping_ratio`.
     MassOnSpring,
@@ -44,14 +44,14 @@ pub enum Element {
 /// An element with its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Behaviour {
-    /// What it behaves like.
+    /// The element.
     pub element: Element,
-    /// Its parameters by name; standard deviations are those of the linear model.
+    /// Parameters by name, with unit in the name; standard deviations are those of the linear model.
     pub parameters: Vec<(&'static str, Estimate)>,
 }
 
-/// Evidence on a port: gradient and Hessian of the log likelihood with respect to the heights of
-/// its bumps, and the receptance in m/N to which the heights refer, at the centres in Hz.
+/// Evidence at a port: gradient and Hessian of the log likelihood with respect to the heights of its basis
+/// functions, and the receptance in m/N to which the heights refer, at the centres in Hz.
 pub(crate) struct PortEvidence<'a> {
     pub(crate) along: &'a DVector<f64>,
     pub(crate) square: &'a DMatrix<f64>,
@@ -59,14 +59,15 @@ pub(crate) struct PortEvidence<'a> {
     pub(crate) centres_hz: &'a [f64],
 }
 
-/// One element's best fit.
+/// Best fit of one element.
 struct ElementFit {
     behaviour: Behaviour,
     nats: f64,
 }
 
 impl PortEvidence<'_> {
-    /// What it behaves like, if that explains most of what anything would, `free` in nats.
+    /// The element that explains most, if it explains enough of `free`, the gain of a free dynamic
+    /// stiffness in nats.
     pub(crate) fn behaviour(&self, free: f64) -> Option<Behaviour> {
         let spring = self.linear(Element::Spring, "stiffness_N_per_m", |_| Complex64::ONE);
         let damper =
@@ -77,7 +78,7 @@ impl PortEvidence<'_> {
         (best.nats >= ALIKE * free).then_some(best.behaviour)
     }
 
-    /// An element that is its one parameter times a dynamic stiffness in N/m.
+    /// Fit of an element whose dynamic stiffness in N/m is proportional to its one parameter.
     fn linear(
         &self,
         element: Element,
@@ -88,7 +89,7 @@ impl PortEvidence<'_> {
         ElementFit { behaviour: Behaviour { element, parameters: vec![(name, parameter)] }, nats }
     }
 
-    /// The resonance and damping with which a mass above zero explains most.
+    /// Fit of the resonance and damping for which a positive mass explains most.
     fn mass_on_spring(&self) -> Option<ElementFit> {
         let (first, last) =
             (self.centres_hz[0].ln(), self.centres_hz[self.centres_hz.len() - 1].ln());
@@ -111,7 +112,7 @@ impl PortEvidence<'_> {
         Some(ElementFit { behaviour, nats: nats - 2.0 * PARAMETER_NATS })
     }
 
-    /// Best factor of a dynamic stiffness in N/m, and what it explains in nats.
+    /// Best factor of a dynamic stiffness in N/m, and its gain in nats.
     fn amplitude(&self, stiffness: impl Fn(f64) -> Complex64) -> (Estimate, f64) {
         let width = (self.centres_hz[1] / self.centres_hz[0]).ln();
         let mean = |centre_hz: f64| {
@@ -133,23 +134,22 @@ impl PortEvidence<'_> {
     }
 }
 
-/// Dynamic stiffness of a mass on a spring over that of the mass alone, turned round, at a frequency
-/// in parts of its resonance: `-1/(1 - r^2/(1 + 2i zeta r))`.
+/// Dynamic stiffness of a mass on a spring divided by that of the mass alone, with opposite sign, at the
+/// ratio `r` of frequency to resonance: `-1/(1 - r^2/(1 + 2i zeta r))`.
 fn resonator(ratio: f64, damping_ratio: f64) -> Complex64 {
     let spring = Complex64::new(1.0, 2.0 * damping_ratio * ratio);
     -spring / (spring - ratio * ratio)
 }
 
 impl Behaviour {
-    /// The parameters as a hypothesis has them.
+    /// The parameters as a map by name.
     pub(crate) fn named(&self) -> BTreeMap<String, Estimate> {
         self.parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect()
     }
 }
 
 impl Element {
-    /// What something that behaves like it does, as part of a sentence; none where a parameter is not
-    /// known.
+    /// Behaviour of the element as part of a sentence; `None` if a parameter is unknown.
     pub(crate) fn words(self, parameters: &BTreeMap<String, Estimate>) -> Option<String> {
         let value = |name: &str| parameters.get(name).map(|parameter| parameter.mean);
         let quantity = |name: &str, unit: &str, scale: f64, thing: &str| {
@@ -180,8 +180,8 @@ impl Element {
 mod tests {
     use super::*;
 
-    /// What a stiffness in N/m at a port looks like whose traces are as loud at all frequencies, `loud`
-    /// for each part of its own stiffness; the centres are those of a scan from 100 to 3,300 Hz.
+    /// Behaviour of a stiffness in N/m at a port with signatures of equal size at all frequencies. `loud`
+    /// is the size per relative stiffness; the centres are those of a scan from 100 to 3,300 Hz.
     fn evidence(stiffness: impl Fn(f64) -> Complex64, loud: f64) -> Option<Behaviour> {
         let centres_hz: Vec<f64> =
             (0..14).map(|bump| 100.0 * 33_f64.powf(f64::from(bump) / 13.0)).collect();

@@ -1,4 +1,4 @@
-//! The baseline, alone or with extensions, that fits a recording best, and what is known of it.
+//! Fit of the baseline, alone or with extensions, to a recording, with its posterior.
 
 mod ranges;
 
@@ -13,37 +13,37 @@ use std::sync::Arc;
 use tracktwin_track::extension::{Extension, InstanceError};
 use tracktwin_track::model::ModelError;
 
-/// Gauss-Newton steps; five suffice where the track is not far from the catalogue's.
+/// Largest number of Gauss-Newton steps; five suffice if the track is similar to that of the catalogue.
 const STEPS_MAX: usize = 10;
 
-/// Steps after which the linearisation tells how far a search may come.
+/// Number of steps after which the linearisation predicts the minimum.
 const FIRST_STEPS: usize = 3;
 
-/// Largest change of a logarithm in one step: further the linearisation does not carry.
+/// Largest change of a logarithm in one step; the linearisation is not valid beyond it.
 const STEP_MAX: f64 = 0.7;
 
-/// Steps shorter than this lead nowhere.
+/// A step shorter than this is not halved again.
 const STEP_MIN: f64 = 1e-3;
 
-/// The search ends when the objective falls by less, in nats.
+/// The search ends when a step reduces the objective by less than this, in nats.
 const TOLERANCE: f64 = 0.2;
 
-/// Step of a logarithm by which extensions' parameters are varied for derivatives.
+/// Step of the logarithms of extension parameters for numerical derivatives.
 const VARIATION: f64 = 1e-3;
 
-/// Sleepers on either side of a force law on which a wheel that decides about it stands.
+/// Number of sleepers on either side of a force law from which the wheel load affects the law.
 const LOADED: usize = 2;
 
-/// Why no calibration is found.
+/// Reason why a calibration failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CalibrationError {
-    /// Values that the search came to make no track.
+    /// No track model exists for the values of the search.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Values that the search came to make no extension.
+    /// No extension exists for the values of the search.
     #[error(transparent)]
     Extension(#[from] InstanceError),
-    /// Derivatives are not finite.
+    /// A derivative is not finite.
     #[error("the track's response is not a number: is a stiffness or a damping out of range?")]
     NotFinite,
 }
@@ -51,7 +51,7 @@ pub enum CalibrationError {
 /// Fit of a baseline with the candidates that are part of the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
-    /// Predicts.
+    /// The forward model.
     pub forward: &'a Forward,
     /// The observed log powers.
     pub observation: &'a Observation,
@@ -62,33 +62,33 @@ pub struct Problem<'a> {
 /// A fitted baseline with its extensions.
 #[derive(Clone, Debug)]
 pub struct Calibration {
-    /// The baseline's unknowns, then the logarithms of the candidates' free parameters.
+    /// The unknowns of the baseline, then the logarithms of the candidates' free parameters.
     pub values: DVector<f64>,
-    /// Whitened residual.
+    /// Whitened residual of the fitted log powers.
     pub residual: DVector<f64>,
-    /// Whitened derivatives.
+    /// Whitened derivatives of the fitted log powers, rows x values.
     pub jacobian: DMatrix<f64>,
-    /// Derivatives of the log posterior by the values: none where the search came to its end.
+    /// Derivatives of the log posterior with respect to the values; zero at the minimum of the objective.
     pub gradient: DVector<f64>,
-    /// Posterior precision of the values, factored.
+    /// Cholesky factor of the posterior precision of the values.
     pub precision: Cholesky<f64, Dyn>,
-    /// Half the sum of squares of residual and prior: minus the log posterior, in nats.
+    /// Half the sum of squares of residual and prior, which is minus the log posterior, in nats.
     pub objective: f64,
-    /// Logarithm of the evidence, up to a constant of the observation alone.
+    /// Log evidence in nats, up to a constant of the observation.
     pub log_evidence: f64,
 }
 
-/// A search that was interrupted.
+/// State of an interrupted search.
 #[derive(Clone, Debug)]
 pub(crate) struct Descent {
-    /// Where it is.
+    /// Current state.
     pub(crate) state: Calibration,
-    /// Whether it came to its end.
+    /// Whether the search has ended.
     has_ended: bool,
 }
 
 impl Calibration {
-    /// The objective at the minimum that the derivatives at these values predict, in nats.
+    /// Prediction of the smallest objective, from the derivatives at the current values, in nats.
     pub(crate) fn predicted_objective(&self) -> f64 {
         self.objective - 0.5 * self.precision.solve(&self.gradient).dot(&self.gradient)
     }
@@ -102,21 +102,22 @@ struct Prior {
 }
 
 impl Problem<'_> {
-    /// Finds the values of greatest posterior probability, from `start`: the baseline's unknowns,
-    /// followed by the candidates' parameters.
+    /// Finds the values of greatest posterior probability. `start` holds the unknowns of the baseline, then
+    /// the candidates' parameters.
     ///
-    /// Gauss-Newton on the whitened log powers; steps that lead uphill are halved.
+    /// The method is Gauss-Newton on the whitened log powers; a step that increases the objective is
+    /// halved.
     ///
     /// # Errors
-    /// [`CalibrationError`] when the start makes no track.
+    /// [`CalibrationError`] if no track or extension exists for `start`, or a derivative is not finite.
     pub fn calibrate(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
         self.calibrate_among(start, &Ranges::default())
     }
 
-    /// The same among values that have the last candidate's parameters inside their ranges.
+    /// As [`Problem::calibrate`], with the last candidate's parameters restricted to their ranges.
     ///
     /// # Errors
-    /// As [`Problem::calibrate`].
+    /// The errors of [`Problem::calibrate`].
     pub fn calibrate_in_range(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
         let ranges = |candidate: &Candidate| {
             candidate.free.iter().map(|parameter| candidate.range(parameter)).collect()
@@ -129,7 +130,7 @@ impl Problem<'_> {
     /// The first steps of [`Problem::calibrate`].
     ///
     /// # Errors
-    /// As [`Problem::calibrate`].
+    /// The errors of [`Problem::calibrate`].
     pub(crate) fn begin(&self, start: &DVector<f64>) -> Result<Descent, CalibrationError> {
         let prior = self.prior();
         let state = self.linearise(&prior, start)?;
@@ -139,7 +140,7 @@ impl Problem<'_> {
     /// The remaining steps of [`Problem::calibrate`].
     ///
     /// # Errors
-    /// As [`Problem::calibrate`].
+    /// The errors of [`Problem::calibrate`].
     pub(crate) fn go_on(&self, begun: Descent) -> Result<Calibration, CalibrationError> {
         if begun.has_ended {
             return Ok(begun.state);
@@ -160,7 +161,7 @@ impl Problem<'_> {
         Ok(self.descend(&prior, ranges, state, STEPS_MAX)?.state)
     }
 
-    /// Goes on from a state, for so many steps at most.
+    /// Continues from a state with at most `steps` steps.
     fn descend(
         &self,
         prior: &Prior,
@@ -197,7 +198,7 @@ impl Problem<'_> {
         Ok(Descent { state, has_ended: false })
     }
 
-    /// Values to start from: those of a baseline and a candidate's trial.
+    /// Start values: the unknowns of a baseline, then one trial of each candidate.
     pub fn start(&self, baseline: &DVector<f64>, trials: &[&[f64]]) -> DVector<f64> {
         let count = self.forward.unknowns.count();
         let mut values: Vec<f64> = baseline.rows(0, count).iter().copied().collect();
@@ -207,7 +208,7 @@ impl Problem<'_> {
         DVector::from_vec(values)
     }
 
-    /// The candidates with the parameters of a calibration.
+    /// Builds the extensions of the candidates with the parameters in `values`.
     pub fn extensions(
         &self,
         values: &DVector<f64>,
@@ -224,10 +225,10 @@ impl Problem<'_> {
         self.candidates.iter().map(build).collect()
     }
 
-    /// The state at values that were not searched for.
+    /// Linearises at given values, without a search.
     ///
     /// # Errors
-    /// [`CalibrationError`] when they make no track.
+    /// [`CalibrationError`] if no track or extension exists for the values.
     pub(crate) fn at(&self, values: &DVector<f64>) -> Result<Calibration, CalibrationError> {
         self.linearise(&self.prior(), values)
     }
@@ -262,13 +263,13 @@ impl Problem<'_> {
         Ok(0.5 * (objective + from_prior.dot(&(&prior.precision * &from_prior))))
     }
 
-    /// The same; infinite for values that make no track, such as an axle box heavier than the wheel, so
-    /// that a step stops short of them.
+    /// The objective, or infinity if no track exists for the values (for example, an axle box heavier than
+    /// the wheel), so that a step ends before such values.
     fn objective_or_infinity(&self, prior: &Prior, values: &DVector<f64>) -> f64 {
         self.objective(prior, values).unwrap_or(f64::INFINITY)
     }
 
-    /// Whitened residual and derivatives at some values, held-out rows included.
+    /// Whitened residual and derivatives at given values, including held-out rows.
     pub(crate) fn whitened(
         &self,
         values: &DVector<f64>,
@@ -311,8 +312,8 @@ impl Problem<'_> {
         Ok((residual, self.observation.whiten_matrix(&jacobian)))
     }
 
-    /// Ballast and railpads that decide under which places of the wheel a candidate's force laws
-    /// take hold: no receptance contains this change.
+    /// Indices of the ballast and railpad stiffnesses that affect at which wheel positions a candidate's
+    /// force laws are active. Receptances do not contain this effect.
     fn under_load(&self) -> Vec<usize> {
         let unknowns = &self.forward.unknowns;
         // A gap that no load closes has nothing free.

@@ -1,45 +1,46 @@
-//! Candidates: kinds of physics with places and strengths for the screening.
+//! Candidates: kinds of physics with locations and trial values for the screening.
 
 use crate::section::Section;
 use tracktwin_track::extension::{Class, ExtensionInstance, Family, Kind, KindParameter, Places};
 
-/// Of a parameter that may be zero, the least part of its greatest value that counts.
+/// Smallest value of a parameter that may be zero, as a share of its greatest value.
 const LEAST: f64 = 1e-2;
 
-/// A piece of physics at a place, in terms of the recording, with the parameters to be found.
+/// An extension at one location of the recording, with free parameters.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// What it is.
+    /// Kind of the extension.
     pub kind: &'static Kind,
-    /// The physics with its place; compared sleepers count from 0, places are the recording's.
+    /// The extension with its location: indices of compared sleepers from 0, positions in m of the
+    /// recording.
     pub extension: ExtensionInstance,
-    /// Parameters to be fitted, inside their ranges.
+    /// Parameters to be fitted within their ranges.
     pub free: Vec<&'static KindParameter>,
-    /// Values of the free parameters that screening tries.
+    /// Trial values of the free parameters for the screening.
     pub trials: Vec<Vec<f64>>,
-    /// Length ratio of the track to V-Track, by which parameters have their ranges.
+    /// Length ratio of the track to V-Track; it scales the ranges of the parameters.
     pub length_ratio: f64,
 }
 
 impl Candidate {
-    /// Whether it is nowhere in particular: all along the track, at the wheel or in the sensor.
+    /// Whether it has no particular location: all along the track, at the wheel or in the sensor.
     pub fn is_everywhere(&self) -> bool {
         self.extension.sleepers.is_none() && self.extension.x_m.is_none()
     }
 
-    /// Whether it acts by laws that the wheel's load decides about.
+    /// Whether it acts by force laws that depend on the wheel load.
     pub(crate) fn is_under_load(&self) -> bool {
         self.kind.classes.contains(&Class::Load)
     }
 
-    /// Whether it does nothing but add to the dynamic stiffness of track, vehicle or sensor: its model
-    /// lacks neither what a load decides nor the phase of a shape.
+    /// Whether it only adds to the dynamic stiffness of track, vehicle or sensor. Its linear model is then
+    /// complete, without effects of the load and without the phase of a shape.
     pub(crate) fn is_linear(&self) -> bool {
         let classes = self.kind.classes;
         !classes.contains(&Class::Load) && !classes.contains(&Class::Wavelength)
     }
 
-    /// The extension with values for the free parameters.
+    /// The extension with these values of the free parameters.
     pub fn with(&self, values: &[f64]) -> ExtensionInstance {
         let pairs = self.free.iter().zip(values);
         pairs.fold(self.extension.clone(), |extension, (parameter, &value)| {
@@ -47,7 +48,7 @@ impl Candidate {
         })
     }
 
-    /// Logarithms of values of the free parameters; of none a hundredth of what is usual.
+    /// Logarithms of values of the free parameters; zero counts as a hundredth of the greatest value.
     pub fn logarithms(&self, values: &[f64]) -> Vec<f64> {
         let logarithm = |(parameter, &value): (&&KindParameter, &f64)| {
             value.max(LEAST * parameter.range(self.length_ratio)[1]).ln()
@@ -55,7 +56,7 @@ impl Candidate {
         self.free.iter().zip(values).map(logarithm).collect()
     }
 
-    /// Whether what was found, by the logarithms of the free parameters, may be of this kind.
+    /// Whether fitted values (logarithms of the free parameters) are plausible for this kind.
     pub fn is_plausible(&self, logarithms: &[f64]) -> bool {
         let plausible = |(parameter, &value): (&&KindParameter, &f64)| {
             let [low, high] = parameter.range(self.length_ratio).map(f64::ln);
@@ -65,29 +66,29 @@ impl Candidate {
         self.free.iter().zip(logarithms).all(plausible)
     }
 
-    /// Middle and standard deviation of a parameter's logarithm before anything is measured: its
-    /// range holds two deviations.
+    /// Prior mean and standard deviation of a parameter's logarithm; the half width of the range is about
+    /// one standard deviation.
     pub fn prior(&self, parameter: &KindParameter) -> (f64, f64) {
         let [low, high] = self.range(parameter);
         (0.5 * (low + high), 0.5 * (high - low) + 0.1)
     }
 
-    /// Logarithms of the ends of a parameter's range; of one that may be zero the lower end is a
-    /// hundredth of the upper.
+    /// Logarithms of the ends of a parameter's range. If the parameter may be zero, the lower end is a
+    /// hundredth of the upper end.
     pub fn range(&self, parameter: &KindParameter) -> [f64; 2] {
         let [low, high] = parameter.range(self.length_ratio);
         [low.max(LEAST * high).ln(), high.ln()]
     }
 }
 
-/// Every candidate for a section: each kind at each possible place, according to its screening.
+/// All candidates for a section: each kind at each location that its screening defines.
 pub fn candidates(section: &Section) -> Vec<Candidate> {
     let design = &section.track.design;
     let kinds = Kind::all().filter(|kind| !(kind.screening.is_stated)(design));
     kinds.flat_map(|kind| of_kind(kind, section)).collect()
 }
 
-/// Those of a kind: families with the same places go through them together.
+/// Candidates of a kind; families with the same locations share one loop.
 fn of_kind(kind: &'static Kind, section: &Section) -> Vec<Candidate> {
     let mut all = Vec::new();
     let length_ratio = section.track.design.length_ratio();
@@ -131,7 +132,7 @@ pub(crate) fn parameter(kind: &'static Kind, name: &str) -> &'static KindParamet
     kind.parameter(name).expect("a kind's screening names parameters of its own")
 }
 
-/// A place on the recording's track; compared sleepers count from 0.
+/// A location on the recording's track; indices of compared sleepers begin at 0.
 enum Place {
     Everywhere,
     Sleepers(Vec<usize>),

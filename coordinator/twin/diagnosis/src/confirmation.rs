@@ -1,9 +1,9 @@
-//! Confirmation in the time domain, on passes that nothing was fitted to.
+//! Confirmation in the time domain, with passes that were not fitted.
 //!
-//! The search predicts mean powers in the frequency domain. Here what it accepted is simulated in time at the
-//! place where it was found, contact and force laws included, and compared with passes that were withheld from
-//! the search. The prediction uses the fitted levels and spectrum. The difference between simulated and
-//! expected powers at the mean level is added to it (docs/diagnosis.md, section 9).
+//! The search predicts mean powers in the frequency domain. The confirmation simulates the accepted
+//! extensions in the time domain at their locations, with contact and force laws, and compares the result
+//! with withheld passes. The prediction uses the fitted levels and spectrum. The difference between
+//! simulated and expected powers at the mean level is added to it (docs/diagnosis.md, section 9).
 
 use crate::calibration::{Calibration, Problem};
 use crate::candidate::Candidate;
@@ -19,45 +19,45 @@ use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{Class, InstanceError};
 use tracktwin_track::model::ModelError;
 
-/// Random surfaces that are simulated without and with what was accepted.
+/// Number of random surfaces that are simulated without and with the accepted extensions.
 const CONFIRMING_SURFACES: u64 = 8;
 
-/// Seed of the first.
+/// Random seed of the first surface.
 const SEED: u64 = 0x636f_6e66;
 
-/// Why nothing was confirmed or refuted.
+/// Errors of a confirmation.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfirmationError {
-    /// What was accepted makes no extension.
+    /// An accepted candidate cannot be built as an extension.
     #[error(transparent)]
     Extension(#[from] InstanceError),
     /// The fitted track cannot be built.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A simulation breaks down.
+    /// A simulation fails.
     #[error(transparent)]
     Simulation(#[from] NullError),
-    /// The scatter of the log powers has no inverse.
+    /// The covariance of the log powers is not positive definite.
     #[error("the null simulations give no covariance of the log powers")]
     Covariance,
 }
 
-/// What is compared: a search on some passes of a recording, with its null model.
+/// Data of a confirmation: a search on some passes of a recording, with its null model.
 pub struct Confirming<'a> {
-    /// The recording without the passes that are withheld.
+    /// The recording without the withheld passes.
     pub recording: &'a Recording,
-    /// The same, prepared.
+    /// The prepared recording, from `recording`.
     pub prepared: &'a PreparedRecording,
-    /// What the search found in them.
+    /// The result of the search.
     pub search: &'a SearchOutcome,
-    /// The random variation.
+    /// The null model of the search.
     pub null: &'a NullModel,
 }
 
 impl Confirming<'_> {
-    /// Compares what was accepted with passes that were withheld; none where nothing was accepted that a
-    /// simulated pass shows at its place: faults of the chain, and the wheel, whose angle in another pass
-    /// is not known.
+    /// Compares the accepted extensions with withheld passes. `None` if nothing was accepted, or if an
+    /// accepted extension has no fixed effect in a simulated pass: faults of the measuring chain, and
+    /// physics that depends on the unknown angle of the wheel.
     ///
     /// # Errors
     /// [`ConfirmationError`].
@@ -148,7 +148,7 @@ impl Confirming<'_> {
         prepared.of_compared(self.null.covariance(bands, &variance))
     }
 
-    /// The sleepers at which what was accepted is felt.
+    /// Range of the sleepers that the accepted extensions affect.
     fn sleepers(&self) -> Range<usize> {
         let forward = &self.prepared.forward;
         let of = |candidate: &Candidate| {

@@ -1,30 +1,31 @@
-//! What further wheels on the rail do to the power that the first one records.
+//! Effect of further wheels on the power that is recorded at the first wheel.
 //!
 //! `a_1` and `a_2` are the receptances at the contacts, and `b` is the receptance of the rail between them.
-//! The contact forces are `F = -A^-1 r`, `A = [[a_1, b], [b, a_2]]`. For a rough surface they give `|F_1|^2 =
-//! (|a_2|^2 + |b|^2) / |a_1 a_2 - b^2|^2 S`: both wheels run on the same surface, a fixed distance apart, and
-//! the phase between them turns many times within a band. The second term comes from the surface under the
-//! other wheel; at a defect of the rail this is another place. The model treats several further wheels one by
-//! one, each as a rigid wheel with the mass and load of the first.
-//! Source: T. X. Wu and D. J. Thompson, Vehicle System Dynamics 34 (2001).
+//! The contact forces are `F = -A^-1 r`, `A = [[a_1, b], [b, a_2]]`. For a rough surface they give `|F_1|^2
+//! = (|a_2|^2 + |b|^2) / |a_1 a_2 - b^2|^2 S`: both wheels roll on the same surface at a fixed distance,
+//! and the phase between them turns many times within a band. The second term comes from the surface under
+//! the other wheel; at a defect of the rail this is another position. The model treats several further
+//! wheels one by one, each as a rigid wheel with the mass and load of the first. Source: T. X. Wu and D. J.
+//! Thompson, Vehicle System Dynamics 34 (2001).
 
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use tracktwin_track::frequency::{receptances_ahead, shares};
 use tracktwin_track::model::TrackModel;
 
-/// What all of them do.
+/// Effect of all further wheels.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FurtherWheels {
-    /// By what they multiply the power, `[line][node]`; empty for a single wheel.
+    /// Factors on the power, `[line][node]`; empty for a single wheel.
     gains: Vec<Vec<f64>>,
-    /// Part of the power that comes from what each of them meets, `[wheel][line][node]`.
+    /// Share of the power that comes from the surface under each further wheel, `[wheel][line][node]`.
     parts: Vec<Vec<Vec<f64>>>,
 }
 
 impl FurtherWheels {
-    /// Of a model's wheels. `hertz` is the contact stiffness in N/m, `direct` the rail's receptance in m/N and
-    /// `stiffness` that of contact, rail and vehicle in series in N/m, both `[line][node]`.
+    /// Computes the effect for a model's wheels. `hertz` is the contact stiffness in N/m, `direct` the
+    /// receptance of the rail in m/N, and `stiffness` that of contact, rail and vehicle in series in N/m,
+    /// both `[line][node]`.
     pub(crate) fn new(
         model: &TrackModel,
         lines_hz: &[f64],
@@ -49,23 +50,23 @@ impl FurtherWheels {
         all
     }
 
-    /// By what they multiply the power, line by line; none for a single wheel.
+    /// Factors on the power, line by line; empty for a single wheel.
     pub(crate) fn gains(&self) -> impl Iterator<Item = &f64> {
         self.gains.iter().flatten()
     }
 
-    /// Part of the power at a node that comes from what a further wheel meets.
+    /// Share of the power at a node that comes from the surface under a further wheel.
     pub(crate) fn share(&self, wheel: usize, line: usize, node: usize) -> f64 {
         self.parts[wheel][line][node]
     }
 
-    /// Part of the power at a node that comes from what the first wheel meets.
+    /// Share of the power at a node that comes from the surface under the first wheel.
     pub(crate) fn own_share(&self, line: usize, node: usize) -> f64 {
         1.0 - self.parts.iter().map(|parts| parts[line][node]).sum::<f64>()
     }
 }
 
-/// A wheel so far ahead of the first one (negative: behind).
+/// A wheel at `distance_m` ahead of the first one (negative: behind).
 struct OneWheel<'a> {
     model: &'a TrackModel,
     hertz: f64,
@@ -73,8 +74,8 @@ struct OneWheel<'a> {
 }
 
 impl OneWheel<'_> {
-    /// Gain of the power, and the part of it that comes from what this wheel meets, at each node: a pair a
-    /// line.
+    /// For each line: the factor on the power at each node, and the share of the power that comes from the
+    /// surface under this wheel.
     fn gains_and_parts(
         &self,
         lines_hz: &[f64],

@@ -1,28 +1,28 @@
-//! How well passes are predicted that nothing was fitted to.
+//! Scores of predictions for held-out speeds.
 
 use crate::calibration::{CalibrationError, Problem};
 use nalgebra::{Cholesky, DVector};
 use std::f64::consts::TAU;
 
-/// The score of predictions on what was held out.
+/// Score of the prediction of held-out log powers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOutScore {
-    /// Logarithm of the probability density of all that was held out, given all that was fitted.
+    /// Log probability density of the held-out log powers given the fitted ones, in nats.
     pub log_density: f64,
-    /// Logarithm of the evidence of what was fitted, up to a constant of the observation alone.
+    /// Log evidence of the fitted log powers in nats, up to a constant of the observation.
     pub log_evidence: f64,
-    /// How many log powers were held out.
+    /// Number of held-out log powers.
     pub count: usize,
 }
 
 impl Problem<'_> {
-    /// Fits from `start` to what is not held out and scores the rest.
+    /// Fits to the data that are not held out, from `start`, and scores the held-out data.
     ///
-    /// The prediction is Gaussian: it knows the surface from the fitted speeds as far as they share
-    /// it, and the scatter of what was fitted.
+    /// The prediction is Gaussian. It includes the posterior of the fit, and the information on the common
+    /// surface from the fitted speeds.
     ///
     /// # Errors
-    /// [`CalibrationError`] when the model breaks down on the way.
+    /// [`CalibrationError`] if the fit fails.
     pub fn held_out(&self, start: DVector<f64>) -> Result<HeldOutScore, CalibrationError> {
         let fit = self.calibrate(start)?;
         let (residual, jacobian) = self.whitened(&fit.values)?;

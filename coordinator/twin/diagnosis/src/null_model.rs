@@ -1,8 +1,8 @@
 //! Null model: differences between recording and prediction when nothing is left out.
 //!
-//! Time simulations of the calibrated track over random surfaces give the offset of one pass's log
-//! powers from their expected value, and their covariance: over bands, and over speeds at equal
-//! wave numbers, since all speeds roll over one surface.
+//! Time simulations of the calibrated track over random surfaces give two quantities: the offset of the log
+//! powers of one pass from their expected value, and their covariance. The covariance extends over bands
+//! and, at equal wave numbers, over speeds, because all speeds share one surface.
 
 use crate::forward::Forward;
 use crate::section::Section;
@@ -20,56 +20,56 @@ use tracktwin_track::extension::Extension;
 use tracktwin_track::model::{Mesh, Roughness, Surface, TrackModel};
 use tracktwin_track::time::{self, Pass, PassError};
 
-/// Time step in s, and interval of the samples.
+/// Time step and sample interval in s.
 const TIME_STEP_S: f64 = 1e-5;
 
-/// Spans simulated beyond the first and the last sleeper: enough for the scatter, which hardly
-/// knows the ends.
+/// Number of spans simulated beyond the first and the last sleeper; the ends of the track hardly affect the
+/// covariance.
 const SPANS_BEYOND: usize = 8;
 
-/// Elements of the rail in a span and of a half sleeper, as in campaigns (docs/accuracy.md).
+/// Number of rail elements per span, and of elements per half sleeper, as in campaigns (docs/accuracy.md).
 const ELEMENTS: usize = 4;
 const SLEEPER_ELEMENTS: usize = 8;
 
-/// Spans rolled over before the first window and after the last.
+/// Number of spans before the first window and after the last.
 const RUN_IN_SPANS: f64 = 4.0;
 
-/// Surfaces that are simulated side by side.
+/// Number of surfaces that are simulated together.
 const AT_A_TIME: u64 = 8;
 
-/// Step of the grid of logarithms on which null models are simulated: their scatter changes little
-/// when a stiffness changes by a fifth.
+/// Step of the grid of logarithms on which null models are simulated. A change of the stiffness by a fifth
+/// has little effect on the covariance.
 const GRID_STEP: f64 = 0.4;
 
-/// How far the covariance is drawn towards its diagonal: the sample is many, but not many times,
-/// the number of log powers.
+/// Shrinkage of the covariance towards its diagonal; the number of samples is only a few times the number
+/// of log powers.
 const SHRINKAGE: f64 = 0.03;
 
-/// Standard deviation in nats of what the prediction itself is wrong by: a tenth of a decibel.
+/// Standard deviation of the prediction error in nats: 0.1 dB.
 const PREDICTION_ERROR: f64 = 0.025;
 
-/// Bands over which the prediction's error hangs together.
+/// Correlation length of the prediction error in bands.
 const PREDICTION_LENGTH: f64 = 1.5;
 
 /// Differences of simulated and predicted log powers when nothing is left out.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct NullModel {
-    /// Log powers of a sleeper.
+    /// Number of log powers per sleeper.
     per_sleeper: usize,
-    /// A row a simulation: simulated less predicted log powers, in the order of [`Forward`].
+    /// One row per simulation: simulated minus predicted log powers, in the order of [`Forward`].
     pub differences: Vec<Vec<f64>>,
 }
 
 impl NullModel {
-    /// Version of how null models are simulated and predicted, beside that of the physics: those of
-    /// another version are simulated again. A test fails when it must be raised.
+    /// Version of the simulation and prediction of null models, in addition to that of the physics. Stored
+    /// null models of another version are simulated again. A test fails if the version must be raised.
     pub const VERSION: u32 = 1;
 
-    /// Simulates passes over `surfaces` random surfaces with the values of `values`, levels apart,
-    /// which are all the mean one.
+    /// Simulates passes over `surfaces` random surfaces with the given values. All irregularity levels are
+    /// replaced by their mean.
     ///
     /// # Errors
-    /// [`PassError`] when the simulation breaks down.
+    /// [`NullError`] if a simulation fails.
     pub fn simulate(
         forward: &Forward,
         values: &DVector<f64>,
@@ -83,17 +83,18 @@ impl NullModel {
         Ok(Self { per_sleeper: forward.per_sleeper(), differences })
     }
 
-    /// From stored numbers: simulation by simulation, each in the order of [`Forward`].
+    /// Restores a null model from stored numbers: one simulation after the other, each in the order of
+    /// [`Forward`].
     ///
-    /// None if they are not what a forward model of this kind has.
+    /// `None` if the count of numbers does not match the forward model.
     pub fn from_numbers(forward: &Forward, numbers: &[f64]) -> Option<Self> {
         let whole = !numbers.is_empty() && numbers.len().is_multiple_of(forward.count());
         let differences = numbers.chunks_exact(forward.count()).map(<[f64]>::to_vec).collect();
         whole.then(|| Self { per_sleeper: forward.per_sleeper(), differences })
     }
 
-    /// The values, on a coarse grid and the same for all sleepers, that a null model is simulated
-    /// with: tracks that are nearly alike share it.
+    /// Values for the simulation of a null model: rounded to a coarse grid and equal at all sleepers, so
+    /// that similar tracks share a null model.
     pub fn grid_values(forward: &Forward, values: &DVector<f64>) -> DVector<f64> {
         let unknowns = &forward.unknowns;
         let mut grid = unknowns.typical();
@@ -107,7 +108,7 @@ impl NullModel {
         grid
     }
 
-    /// Mean difference of a sleeper's log powers, over all simulations and sleepers.
+    /// Mean difference of the log powers of a sleeper, over all simulations and sleepers.
     pub fn offset(&self) -> DVector<f64> {
         let mut sum = DVector::zeros(self.per_sleeper);
         let mut count = 0.0;
@@ -118,24 +119,25 @@ impl NullModel {
         sum / count
     }
 
-    /// The offset of this number of sleepers, one after the other.
+    /// The offset repeated for `sleepers` sleepers.
     pub fn offset_of(&self, sleepers: usize) -> DVector<f64> {
         let offset = self.offset();
         DVector::from_fn(sleepers * self.per_sleeper, |row, _| offset[row % self.per_sleeper])
     }
 
-    /// Covariance of a sleeper's log powers about the offset, drawn towards its diagonal, with what
-    /// the passes do not share and the prediction's own error.
+    /// Covariance of the log powers of a sleeper about the offset, with shrinkage towards its diagonal. It
+    /// includes the variation between passes and the prediction error.
     ///
-    /// `pass_variance` is the variance of the mean over the passes, a value a speed and band.
+    /// `pass_variance` is the variance of the mean over the passes, one value per speed and band.
     pub fn covariance(&self, bands: usize, pass_variance: &DVector<f64>) -> DMatrix<f64> {
         let simulated = self.simulated_covariance();
         let further = further_covariance(&simulated, bands, pass_variance);
         (1.0 - SHRINKAGE) * simulated + further
     }
 
-    /// The differences less their offset, each with a draw of what the simulations lack: what the passes do
-    /// not share and the prediction's own error. They scatter as [`NullModel::covariance`] says.
+    /// Simulated differences minus their offset. A random draw adds the variation that the simulations
+    /// lack: that between passes and the prediction error. The result has the covariance
+    /// [`NullModel::covariance`].
     pub(crate) fn drawn(&self, bands: usize, pass_variance: &DVector<f64>) -> Vec<DVector<f64>> {
         let offset = self.offset();
         let further = further_covariance(&self.simulated_covariance(), bands, pass_variance);
@@ -175,7 +177,7 @@ impl NullModel {
     }
 }
 
-/// What is added to the simulated covariance, of which the shrinkage takes a part.
+/// Part of the covariance that is added to the simulated one, including the diagonal part of the shrinkage.
 fn further_covariance(
     simulated: &DMatrix<f64>,
     bands: usize,
@@ -194,21 +196,21 @@ fn further_covariance(
     })
 }
 
-/// Why there is no null model.
+/// Reason why no null model exists.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NullError {
     /// The calibrated track cannot be built.
     #[error(transparent)]
     Model(#[from] tracktwin_track::model::ModelError),
-    /// A pass over it breaks down.
+    /// The simulation of a pass fails.
     #[error(transparent)]
     Pass(#[from] PassError),
-    /// The simulated passes are not numbers.
+    /// A simulated acceleration is not finite.
     #[error("a simulated pass is no signal: {0}")]
     Signal(#[from] tracktwin_signal::SignalError),
 }
 
-/// The values with one level, the surface's own spectrum and no gains.
+/// The values with one level, the unmodified surface spectrum and no gains.
 fn plain(forward: &Forward, values: &DVector<f64>) -> DVector<f64> {
     let unknowns = &forward.unknowns;
     let mut plain = values.clone();
@@ -219,8 +221,8 @@ fn plain(forward: &Forward, values: &DVector<f64>) -> DVector<f64> {
     plain
 }
 
-/// A forward model of passes that are simulated: near ends, no noise, and the first wheel alone, for a further
-/// one costs twenty times the time and hardly changes the scatter.
+/// A forward model for simulated passes: near ends, no noise, and only the first wheel. Further wheels take
+/// twenty times the time and hardly change the covariance.
 pub(crate) fn without_ends(forward: &Forward) -> Forward {
     let mut quiet = forward.with_ends(SPANS_BEYOND);
     quiet.noise_density.fill(0.0);
@@ -228,11 +230,11 @@ pub(crate) fn without_ends(forward: &Forward) -> Forward {
     quiet
 }
 
-/// Simulated less expected log powers over random surfaces with the values of `values`, levels apart, which are
-/// all the mean one; `quiet` is a forward model [`without_ends`], on whose track the extensions are.
+/// Simulated minus expected log powers over random surfaces, with all levels replaced by their mean.
+/// `quiet` is a forward model from [`without_ends`]; the extensions belong to its track.
 ///
 /// # Errors
-/// [`NullError`] when the simulation breaks down.
+/// [`NullError`] if a simulation fails.
 pub(crate) fn simulated(
     quiet: &Forward,
     values: &DVector<f64>,

@@ -3,28 +3,28 @@
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
-/// Log powers over the compared sleepers with their covariance, in the order of
-/// [`crate::Forward`]; some of them may be held out from fitting.
+/// Log powers of the compared sleepers, in the order of [`crate::Forward`], with their covariance. Some of
+/// them may be held out from fitting.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// Log powers, less the offset between mean and expected log power.
+    /// Log powers minus the offset between mean and expected log power.
     log_power: DVector<f64>,
-    /// Order in which a sleeper's log powers are whitened: those fitted first.
+    /// Order in which the log powers of a sleeper are whitened; the fitted ones come first.
     order: Vec<usize>,
-    /// How many of a sleeper's log powers are fitted.
+    /// Number of fitted log powers per sleeper.
     fitted: usize,
-    /// How many of a sleeper's log powers are compared; the whitened values of the others are zero.
+    /// Number of compared log powers per sleeper; the whitened values of the others are zero.
     compared: usize,
-    /// Inverse Cholesky factor of a sleeper's covariance, in that order.
+    /// Inverse Cholesky factor of the covariance of a sleeper, in that order.
     whitening: DMatrix<f64>,
     /// Weights of each sleeper's whitened values.
     weights: Vec<f64>,
 }
 
 impl Observation {
-    /// Log powers with the covariance of any one sleeper's; a sleeper's rows for which `held_out` is
-    /// true are not fitted. A row of infinite variance is not compared: its whitened value is zero. None if
-    /// the covariance is none.
+    /// Makes an observation from log powers and the covariance of one sleeper, which is the same for all
+    /// sleepers. Rows of a sleeper for which `held_out` is true are not fitted. A row of infinite variance
+    /// is not compared: its whitened value is zero. `None` if the covariance is not positive definite.
     pub fn new(
         log_power: DVector<f64>,
         covariance: &DMatrix<f64>,
@@ -51,24 +51,24 @@ impl Observation {
         Some(Self { log_power, order, fitted, compared, whitening, weights })
     }
 
-    /// The same with a covariance at each sleeper that is larger by its own factor.
+    /// The same observation, with the covariance of each sleeper multiplied by its factor.
     #[must_use]
     pub fn with_factors(mut self, factors: &[f64]) -> Self {
         self.weights = factors.iter().map(|factor| factor.sqrt().recip()).collect();
         self
     }
 
-    /// How many of a sleeper's log powers are compared.
+    /// Number of compared log powers per sleeper.
     pub const fn compared(&self) -> usize {
         self.compared
     }
 
-    /// Measured less predicted log powers.
+    /// Measured minus predicted log powers.
     pub fn difference(&self, predicted: &DVector<f64>) -> DVector<f64> {
         &self.log_power - predicted
     }
 
-    /// The whitened difference; for held-out values, the part that the fitted ones do not predict.
+    /// Whitened difference. For held-out values it is the part that the fitted values do not predict.
     pub fn residual(&self, predicted: &DVector<f64>) -> DVector<f64> {
         self.whiten(&self.difference(predicted))
     }
@@ -102,27 +102,27 @@ impl Observation {
         whitened.select_rows(&self.rows(true))
     }
 
-    /// The part of a whitened vector that was held out.
+    /// The held-out part of a whitened vector.
     pub fn held_out(&self, whitened: &DVector<f64>) -> DVector<f64> {
         whitened.select_rows(&self.rows(false))
     }
 
-    /// The rows of a whitened matrix that were held out.
+    /// The held-out rows of a whitened matrix.
     pub fn held_out_rows(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
         whitened.select_rows(&self.rows(false))
     }
 
-    /// Sum over all log powers of the logarithms of their conditional standard deviations.
+    /// Sum of the logarithms of the conditional standard deviations, over all compared log powers.
     pub fn log_deviation(&self) -> f64 {
         self.log_deviation_of(0..self.order.len())
     }
 
-    /// Sum over what was held out of the logarithms of its conditional standard deviations.
+    /// Sum of the logarithms of the conditional standard deviations, over the held-out log powers.
     pub fn held_out_log_deviation(&self) -> f64 {
         self.log_deviation_of(self.fitted..self.order.len())
     }
 
-    /// Over these of each sleeper's rows, in the order in which they are whitened.
+    /// Sum over these rows of each sleeper, in the order of the whitening.
     fn log_deviation_of(&self, rows: Range<usize>) -> f64 {
         let inverses = rows.map(|row| self.whitening[(row, row)]);
         let compared = inverses.filter(|inverse| *inverse > 0.0);

@@ -1,4 +1,4 @@
-//! The diagnosis as files and pages have it (`tracktwin-diagnosis/1`).
+//! Record of a diagnosis, from which files and pages are made (`tracktwin-diagnosis/1`).
 
 use crate::behaviour::Element;
 use crate::estimate::Estimate;
@@ -6,28 +6,28 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use tracktwin_inspection::chain::LossOfContact;
 
-/// Name and version of the format.
+/// Value of the field `format` in `diagnosis.json`.
 pub const FORMAT: &str = "tracktwin-diagnosis/1";
 
-/// Physics that is not in the catalogue.
+/// Name of a hypothesis for physics that is not in the catalogue.
 pub const UNKNOWN: &str = "unknown_physics";
 
 /// Verdict of the comparison with the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// The re-tuned baseline explains it.
+    /// The calibrated baseline explains the recording.
     Consistent,
-    /// Physics of a known kind was left out.
+    /// An extension of a known kind was accepted.
     LeftOutPhysics,
-    /// Something was left out that no known kind explains.
+    /// Physics is left out that no known kind explains.
     UnknownPhysics,
-    /// The sensor, its mounting, the clock or the odometer did it.
+    /// A fault of the sensor, its mounting, the clock or the odometer explains the difference.
     MeasurementChain,
 }
 
 impl Verdict {
-    /// Its name in files.
+    /// Name of the verdict in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Consistent => "consistent",
@@ -41,171 +41,171 @@ impl Verdict {
 /// A diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
-    /// [`FORMAT`].
+    /// Always [`FORMAT`].
     pub format: String,
     /// Name of the recording.
     pub recording: String,
-    /// What it is.
+    /// Verdict on the recording.
     pub verdict: Verdict,
-    /// The verdict in a sentence that needs no further reading.
+    /// The verdict as a self-contained sentence.
     pub sentence: String,
-    /// Probability that nothing is left out; none where no model of the track was compared.
+    /// Probability that nothing is left out; `None` if no track model was compared.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub nothing_left_out: Option<f64>,
-    /// Where recording and re-tuned baseline differ.
+    /// Significant differences between recording and calibrated baseline.
     pub mismatches: Vec<Mismatch>,
-    /// Hypotheses, most probable first.
+    /// Hypotheses, the most probable first.
     pub hypotheses: Vec<Hypothesis>,
-    /// How well recording and model agree, before and after.
+    /// Agreement of recording and model without and with the accepted physics.
     pub fit: FitScores,
-    /// Parameters without and with the accepted physics.
+    /// Parameters (by name, in SI units) without and with the accepted physics.
     pub bias_removed: BTreeMap<String, BeforeAfter<f64>>,
-    /// The stiffness along the track.
+    /// Parameters of every sleeper along the track.
     pub track: Vec<SleeperValues>,
     /// Measured and predicted levels.
     pub levels: Levels,
-    /// Comparison of what was accepted with passes that were withheld from the search, in the time domain;
-    /// none unless it was asked for and something accepted shows in a simulated pass.
+    /// Comparison with withheld passes in the time domain. `None` if it was not requested, or if no
+    /// accepted extension is visible in a simulated pass.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub confirmation: Option<Confirmation>,
-    /// Where the wheel loses contact with the rail; what was fitted there does not hold.
+    /// Contact loss between wheel and rail; the fit is not valid on these stretches.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub loss_of_contact: Option<LossOfContact>,
     /// Notes.
     pub notes: Vec<String>,
 }
 
-/// A comparison with passes that were withheld from the search, by simulation in time.
+/// Comparison of time-domain simulations with passes that were withheld from the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Confirmation {
-    /// The files of the withheld passes.
+    /// File names of the withheld passes.
     pub passes: Vec<String>,
-    /// How far levels and simulations differ at each speed.
+    /// Differences between measured and simulated levels at each speed.
     pub speeds: Vec<ConfirmedSpeed>,
-    /// Number of sleepers compared: where what was accepted is felt.
+    /// Number of compared sleepers: those that the accepted physics affects.
     pub sleepers: usize,
-    /// By how much more probable the withheld passes are with what was accepted, in nats.
+    /// Gain in log probability of the withheld passes from the accepted physics, in nats.
     pub gain_nats: f64,
-    /// Whether that is enough to confirm it.
+    /// Whether the gain is large enough for a confirmation.
     pub is_confirmed: bool,
 }
 
-/// The withheld passes of one speed.
+/// Level differences in the withheld passes of one speed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConfirmedSpeed {
     /// Speed in km/h.
     pub speed_km_h: f64,
-    /// Root mean square difference of levels without what was accepted, in dB.
+    /// Root mean square difference of levels without the accepted physics, in dB.
     #[serde(rename = "before_dB")]
     pub before_db: f64,
-    /// The same with it.
+    /// Root mean square difference of levels with the accepted physics, in dB.
     #[serde(rename = "after_dB")]
     pub after_db: f64,
 }
 
-/// A place in space and frequency where recording and baseline differ.
+/// A patch in position and frequency where recording and baseline differ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mismatch {
-    /// From where to where along the track in m.
+    /// First and last position along the track in m.
     pub x_m: [f64; 2],
-    /// The sleepers there.
+    /// Ids of the sleepers in this stretch.
     pub sleepers: Vec<String>,
-    /// From which frequency to which, in Hz.
+    /// Lowest and highest frequency in Hz.
     #[serde(rename = "frequency_Hz")]
     pub frequency_hz: [f64; 2],
-    /// At which speeds.
+    /// Speeds of the difference in km/h.
     pub speeds_km_h: Vec<f64>,
-    /// Root mean square difference of the levels there in dB.
+    /// Root mean square difference of the levels in the patch, in dB.
     #[serde(rename = "level_dB")]
     pub level_db: f64,
-    /// Probability to see as much anywhere if nothing is left out.
+    /// Probability of such a patch anywhere if nothing is left out.
     pub p_value: f64,
 }
 
-/// A piece of physics that may be left out.
+/// Hypothesis of left-out physics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hypothesis {
-    /// Its name in the catalogue.
+    /// Name of the kind in the catalogue.
     pub physics: String,
-    /// The family of effects that it belongs to, by the part of track, vehicle or measurement that differs;
-    /// `unknown_…` of what is unknown.
+    /// Family of the kind: the part of track, vehicle or measurement that differs. For unknown physics it
+    /// begins with `unknown_`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub family: Option<String>,
-    /// Probability that something of this family is present at the place.
+    /// Probability that physics of this family is present at the location.
     #[serde(default)]
     pub family_probability: f64,
-    /// Probability that it is present.
+    /// Probability that this kind is present.
     pub probability: f64,
-    /// Whether it was accepted: its name is in the sentence.
+    /// Whether it was accepted and appears in the sentence.
     pub accepted: bool,
-    /// Where it is.
+    /// Location on the track; `None` if it is everywhere.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub location: Option<Location>,
-    /// Of something unknown, where in the model it acts: `rail_seat`, `between_rail_seats`, `wheel`,
-    /// `rail_surface` or `wheel_surface`.
+    /// Port of unknown physics in the model: `rail_seat`, `between_rail_seats`, `wheel`, `rail_surface` or
+    /// `wheel_surface`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub port: Option<String>,
-    /// Of something unknown, the element that it behaves like, with its parameters below.
+    /// Element that unknown physics resembles; `parameters` holds its parameters.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub behaviour: Option<Element>,
-    /// Its parameters.
+    /// Fitted parameters by name, with unit in the name.
     pub parameters: BTreeMap<String, Estimate>,
-    /// Values of further parameters that were tried as they are, not fitted.
+    /// Further parameters with fixed values, which were not fitted.
     #[serde(skip_serializing_if = "BTreeMap::is_empty", default)]
     pub assumed: BTreeMap<String, f64>,
-    /// What looks alike.
+    /// Names of look-alikes.
     pub look_alikes: Vec<String>,
-    /// Measurement that separates it from them.
+    /// Measurement that would separate the hypothesis from its look-alikes.
     pub would_separate: String,
-    /// Length of its trace over the scatter, after re-tuning.
+    /// Detectability d': norm of the whitened signature after the baseline was fitted again.
     pub detectability: f64,
-    /// Logarithm of the evidence for it against the model without it, in nats.
+    /// Log ratio of the evidence to the model without the hypothesis, in nats.
     pub log_evidence: f64,
 }
 
-/// A place on the track.
+/// A stretch of the track.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Location {
-    /// From where to where in m.
+    /// First and last position in m.
     pub x_m: [f64; 2],
-    /// The sleepers there.
+    /// Ids of the sleepers in this stretch.
     pub sleepers: Vec<String>,
 }
 
-/// Whether two places have a sleeper in common; none is everywhere.
+/// Whether two locations share a sleeper; `None` is everywhere.
 pub(crate) fn meet(one: Option<&Location>, other: Option<&Location>) -> bool {
     let (Some(one), Some(other)) = (one, other) else { return true };
     one.sleepers.iter().any(|sleeper| other.sleepers.contains(sleeper))
 }
 
-/// Without and with what was named.
+/// Values without and with the accepted physics.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BeforeAfter<T> {
-    /// The re-tuned baseline alone.
+    /// Value of the calibrated baseline alone.
     pub before: T,
-    /// With what was named.
+    /// Value with the accepted physics.
     pub after: T,
 }
 
-/// Mean log predictive densities.
+/// Mean log predictive densities without and with the accepted physics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FitScores {
-    /// What the scores are.
+    /// Definition of the scores.
     pub score: String,
-    /// The re-tuned baseline.
+    /// Scores of the calibrated baseline.
     pub before: Scores,
-    /// With what was named.
+    /// Scores with the accepted physics.
     pub after: Scores,
-    /// Gain on each speed held out in nats, over all its log powers.
+    /// Gain at each held-out speed in nats, over all its log powers; keys are speeds in km/h.
     pub held_out_gain_nats: BTreeMap<String, f64>,
 }
 
 /// Scores of one model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
-    /// On what it was fitted to.
+    /// Score on the fitted data.
     pub in_sample: Score,
-    /// On speeds that it was not fitted to; none with a single speed.
+    /// Score on speeds that were not fitted; `None` for a single speed.
     pub held_out: Option<Score>,
 }
 
@@ -216,12 +216,12 @@ pub struct Score {
     pub score: f64,
 }
 
-/// Parameters of a sleeper.
+/// Parameters of a sleeper without and with the accepted physics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SleeperValues {
-    /// Name of the sleeper.
+    /// Id of the sleeper.
     pub id: String,
-    /// Its place in m.
+    /// Position along the track in m.
     pub x_m: f64,
     /// Railpad stiffness in N/m.
     #[serde(rename = "railpad_stiffness_N_m")]
@@ -231,7 +231,7 @@ pub struct SleeperValues {
     pub ballast_stiffness: BeforeAfter<Estimate>,
     /// Irregularity level.
     pub irregularity_level: BeforeAfter<Estimate>,
-    /// Flags: `loss_of_contact` where the wheel loses contact.
+    /// Flags: `loss_of_contact` if the wheel loses contact at the sleeper.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub flags: Vec<String>,
 }
@@ -239,21 +239,21 @@ pub struct SleeperValues {
 /// Levels in dB re 1 (m/s2)2: `[speed][sleeper][band]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Levels {
-    /// Centres of the bands.
+    /// Centres of the bands in Hz.
     #[serde(rename = "frequency_Hz")]
     pub frequency_hz: Vec<f64>,
-    /// Speeds.
+    /// Speeds in km/h.
     pub speeds_km_h: Vec<f64>,
-    /// Recorded.
+    /// Measured levels.
     #[serde(rename = "measured_dB")]
     pub measured_db: Vec<Vec<Vec<f64>>>,
-    /// Predicted by the re-tuned baseline.
+    /// Levels predicted by the calibrated baseline.
     #[serde(rename = "before_dB")]
     pub before_db: Vec<Vec<Vec<f64>>>,
-    /// Predicted with what was named.
+    /// Levels predicted with the accepted physics.
     #[serde(rename = "after_dB")]
     pub after_db: Vec<Vec<Vec<f64>>>,
-    /// Scatter to expect of one log power, `[speed][band]`; none where it is not compared.
+    /// Expected standard deviation of one level, `[speed][band]`; `None` for bands that are not compared.
     #[serde(rename = "scatter_dB")]
     pub scatter_db: Vec<Vec<Option<f64>>>,
 }

@@ -15,57 +15,58 @@ use std::ops::Range;
 use tracktwin_track::extension::{CORRUGATION, ExtensionInstance};
 use tracktwin_track::model::Roughness;
 
-/// Patches an octave of wavelength or frequency.
+/// Number of patches per octave of wavelength or frequency.
 const PER_OCTAVE: f64 = 12.0;
 
-/// Sleepers of a patch; whole tracks are the surface's spectrum and the sensor's response.
+/// Numbers of sleepers of a patch. Effects on the whole track belong to the surface spectrum and the sensor
+/// response.
 const LENGTHS: [usize; 8] = [1, 2, 3, 4, 6, 8, 11, 14];
 
-/// Largest part of the track that a patch covers.
+/// Largest share of the track that a patch covers.
 const SHARE_MAX: f64 = 0.6;
 
-/// Power of a line over its surroundings for which a patch has its shape: ten decibels.
+/// Power ratio of a line to its surroundings that defines the shape of a patch: 10 dB.
 const RATIO: f64 = 10.0;
 
-/// Part of a patch that the baseline must leave.
+/// Smallest share of a patch that the baseline cannot reproduce.
 const LEFT_MIN: f64 = 0.05;
 
-/// What a patch keeps when the speed changes.
+/// Quantity of a patch that does not depend on the speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fixed {
-    /// Its wavelength in m: the surface of the rail.
+    /// Wavelength in m: the patch belongs to the rail surface.
     Wavelength(f64),
-    /// Its frequency in Hz: track or vehicle.
+    /// Frequency in Hz: the patch belongs to track or vehicle.
     Frequency(f64),
 }
 
-/// A patch that was found.
+/// A detected patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
-    /// What it keeps.
+    /// Quantity that does not depend on the speed.
     pub fixed: Fixed,
-    /// Its sleepers among those compared.
+    /// Range of the compared sleepers.
     pub sleepers: Range<usize>,
-    /// Natural logarithm of its power over the model's in the middle of its band.
+    /// Natural logarithm of the ratio of measured to predicted power in the middle of the band.
     pub height: f64,
-    /// The same over its standard deviation.
+    /// `height` divided by its standard deviation.
     pub deviations: f64,
 }
 
-/// Whitened shape of a patch at one sleeper, the same at all.
+/// Whitened shape of a patch at one sleeper; it is the same at all sleepers.
 struct Shape {
     fixed: Fixed,
     column: DVector<f64>,
-    /// Product of the derivatives at each sleeper with the shape.
+    /// Product of the derivatives with the shape, for each sleeper.
     projected_gradient: Vec<DVector<f64>>,
 }
 
-/// A patch as a matched filter.
+/// Matched filter of a patch.
 struct Filter {
     shape: usize,
     sleepers: Range<usize>,
     imitation: DVector<f64>,
-    /// Square of its length after the baseline has taken what it can.
+    /// Squared norm of the whitened patch after the baseline was fitted again.
     detectability: f64,
 }
 
@@ -77,15 +78,15 @@ pub(crate) struct PatchScan {
 }
 
 impl Patch {
-    /// Gain in nats of this patch in log predictive density on what was held out when `before` was found:
-    /// the same patch without that.
+    /// Gain in log predictive density of the held-out data from this patch, in nats. `before` is the same
+    /// patch, found without these data.
     pub(crate) fn gain_over(&self, before: &Self) -> f64 {
         let toward = |patch: &Self| 0.5 * patch.deviations.powi(2) * patch.height.signum();
         (toward(self) - toward(before)) * before.height.signum()
     }
 
-    /// The waves that a patch of one wavelength would be, as a candidate; none for a patch of one
-    /// frequency. `level` is the irregularity level that the waves add to.
+    /// Corrugation candidate for a patch of constant wavelength; `None` for a patch of constant frequency.
+    /// `level` is the irregularity level to which the corrugation is added.
     pub(crate) fn as_waves(&self, section: &Section, level: f64) -> Option<Candidate> {
         let Fixed::Wavelength(length_m) = self.fixed else { return None };
         let half_m = 0.5 * section.track.design.sleeper.spacing_m;
@@ -107,7 +108,7 @@ impl Patch {
 }
 
 impl PatchScan {
-    /// Works out the filters on a calibrated track.
+    /// Computes the filters for a calibrated track.
     pub(crate) fn new(problem: &Problem<'_>, current: &Calibration) -> Self {
         let sleepers = problem.forward.section.sleepers;
         let shapes: Vec<Shape> =
@@ -119,8 +120,8 @@ impl PatchScan {
         Self { shapes, filters, sleepers }
     }
 
-    /// The patch that stands out most in a whitened residual, if any does; `projected_gradient` is the residual's
-    /// product with the baseline's derivatives.
+    /// The patch with the largest deviation in a whitened residual, among those for which `is_one` is true.
+    /// `projected_gradient` is the product of the residual with the baseline's derivatives.
     pub(crate) fn best(
         &self,
         residual: &DVector<f64>,
@@ -158,7 +159,8 @@ impl PatchScan {
     }
 }
 
-/// Wavelengths that all of two speeds or more have in their bands, and the frequencies of all bands.
+/// Wavelengths that lie in the bands of all speeds (for two speeds or more), and the frequencies of all
+/// bands.
 fn kept(problem: &Problem<'_>) -> Vec<Fixed> {
     let centres = problem.forward.bands.centres_hz();
     let speeds = &problem.forward.speeds_m_s;

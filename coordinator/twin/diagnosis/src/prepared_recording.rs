@@ -17,122 +17,125 @@ use tracktwin_signal::recording::{OtherTrack, Recording};
 use tracktwin_track::extension::Kind;
 use tracktwin_track::model::ContactPatch;
 
-/// Lowest band times the time in which the fastest pass rolls over a sleeper spacing: below, a window
-/// holds hardly a wavelet. 80 Hz on V-Track at 13 km/h.
+/// Lowest band times the time in which the fastest pass crosses a sleeper spacing. Below this frequency a
+/// window is shorter than a wavelet. 80 Hz on V-Track at 13 km/h.
 const LOWEST_PERIODS: f64 = 80.0 * 0.125 * 3.6 / 13.0;
 
-/// Highest band in Hz, as far as the sample rate lets it: above, there is hardly any irregularity.
+/// Highest band in Hz if the sample rate permits; the irregularity is negligible above it.
 const HIGHEST_HZ: f64 = 5100.0;
 
-/// Highest band as a part of the sample rate.
+/// Highest band as a share of the sample rate.
 const SAMPLE_RATE_SHARE: f64 = 0.35;
 
 /// Smallest number of bands for a diagnosis.
 const BANDS_MIN: usize = 12;
 
-/// Wave number times half the length of the contact patch above which powers are not compared.
+/// Powers are not compared if the wave number times half the length of the contact patch exceeds this
+/// value.
 const PATCH_WAVE_NUMBER: f64 = 4.0;
 
-/// Least number of neighbouring sleepers that all passes cover.
+/// Smallest number of neighbouring sleepers that all passes must cover.
 const SLEEPERS_MIN: usize = 6;
 
-/// Part of a spacing that a pass must cover beyond a sleeper's window, where low bands reach.
+/// Margin that a pass must cover beyond a sleeper's window, as a share of the spacing; low bands depend on
+/// it.
 const MARGIN_SPANS: f64 = 0.6;
 
-/// Greatest difference of two neighbouring sleepers' distance from the spacing, as a share of it: the
-/// model's sleepers are evenly spaced.
+/// Largest deviation of the distance of two neighbouring sleepers from the spacing, as a share of the
+/// spacing; the sleepers of the model are evenly spaced.
 const UNEVEN: f64 = 0.1;
 
-/// Step, relative to the nominal speed, to which a true one is rounded: passes that nearly keep the nominal
-/// one share their null simulations.
+/// Relative step to which a true speed is rounded from the nominal speed. Passes close to the nominal speed
+/// thus share their null simulations.
 const SPEED_STEP: f64 = 5e-3;
 
-/// Why a recording cannot be diagnosed.
+/// Reason why a recording cannot be diagnosed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PreparationError {
-    /// It states another track or vehicle than it would be compared with.
+    /// The recording states another track or vehicle than the track description.
     #[error(
         "recording.json: {} {}, but the track it is compared with has {}; describe the recording's \
              track with --track", .0.quantity, .0.found(), .0.known()
     )]
     OtherTrack(OtherTrack),
-    /// Its sleepers are not evenly spaced.
+    /// The sleepers are not evenly spaced.
     #[error(
         "recording.json: sleepers: the distance between {} and {} is {distance_m:.3} m, the \
              model's {spacing_m} m; list every sleeper, or keep the evenly spaced stretch", .between[0], .between[1]
     )]
     Uneven {
-        /// The two sleepers.
+        /// Ids of the two sleepers.
         between: [String; 2],
-        /// Their distance in m.
+        /// Distance of the two sleepers in m.
         distance_m: f64,
-        /// The model's in m.
+        /// Sleeper spacing of the model in m.
         spacing_m: f64,
     },
-    /// Levels without a unit.
+    /// The sensor gain is unknown, and the levels have no unit.
     #[error("recording.json: nominal.gain_known: is false; the model needs accelerations in m/s2")]
     GainUnknown,
-    /// No sleepers.
+    /// The positions of the sleepers are unknown.
     #[error(
         "sleepers: their positions are unknown; add them to recording.json, or import with \
              --sleeper"
     )]
     NoSleepers,
-    /// Too few sleepers.
+    /// Too few sleepers lie inside every pass.
     #[error(
         "passes: only {sleepers} neighbouring sleepers lie inside every pass with a margin of \
          {margin_m:.2} m; a diagnosis needs {SLEEPERS_MIN} or more: record a longer stretch"
     )]
     TooShort {
-        /// Sleepers inside every pass.
+        /// Number of sleepers inside every pass.
         sleepers: usize,
-        /// Margin in m.
+        /// Required margin in m.
         margin_m: f64,
     },
-    /// Too low a sample rate.
+    /// The sample rate, in Hz, is too low.
     #[error(
         "sample_rate_Hz: {0} is too low: the comparison with the model is limited to \
              {high:.0} Hz", high = SAMPLE_RATE_SHARE * .0
     )]
     SampleRate(f64),
-    /// Passes without a track in them.
+    /// A pass defect makes the recording unusable.
     #[error("passes: unusable: {0}")]
     Unusable(PassDefect),
 }
 
-/// A recording in the terms of the forward model.
+/// A recording in the form that the forward model predicts.
 #[derive(Clone, Debug)]
 pub struct PreparedRecording {
-    /// Predicts it.
+    /// The forward model.
     pub forward: Forward,
-    /// Its log powers in the order of [`Forward`], means over the passes of a speed.
+    /// Log powers in the order of [`Forward`], as means over the passes of a speed.
     pub log_power: DVector<f64>,
-    /// Variance of these means by what passes of one speed do not share, a value a speed and band.
+    /// Variance of these means from the variation between passes of one speed, one value per speed and
+    /// band.
     pub pass_variance: DVector<f64>,
-    /// Number in the recording of the first sleeper compared.
+    /// Index in the recording of the first compared sleeper.
     pub first_sleeper: usize,
-    /// Numbers in the recording of the passes at each speed.
+    /// Indices in the recording of the passes at each speed.
     pub pass_numbers: Vec<Vec<usize>>,
-    /// Kinds of physics that may not be accepted.
+    /// Names of kinds that may not be accepted.
     pub without: Vec<String>,
-    /// Stretches in m in which the passes alone show a shape of the rail; empty until
+    /// Stretches in m in which an inspection of the passes found a shape of the rail; empty before
     /// [`PreparedRecording::suggested`].
     pub detected_shapes_m: Vec<[f64; 2]>,
 }
 
 impl PreparationError {
-    /// Whether the recording is of another track than it is compared with.
+    /// Whether the error states that the recording belongs to another track.
     pub const fn is_of_the_track(&self) -> bool {
         matches!(self, Self::OtherTrack(_) | Self::Uneven { .. })
     }
 }
 
-/// Whether a recording can be compared with a track of this design.
+/// Checks that a recording can be compared with a track of this design.
 ///
-/// A recording whose sleepers are not known is compared with no track.
+/// A recording without sleeper positions passes the check.
 ///
 /// # Errors
-/// [`PreparationError::OtherTrack`] and [`PreparationError::Uneven`].
+/// [`PreparationError::OtherTrack`] or [`PreparationError::Uneven`].
 pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), PreparationError> {
     if recording.sleepers.is_empty() {
         return Ok(());
@@ -152,7 +155,7 @@ pub fn check_track(recording: &Recording, design: &TrackDesign) -> Result<(), Pr
     }
 }
 
-/// What a recording has in bands, and the sleepers that can be compared.
+/// Band powers of a recording, and its comparable sleepers.
 struct Measured {
     bands: Bands,
     spectra: Spectra,
@@ -184,7 +187,7 @@ impl Measured {
         Ok(Self { bands, spectra, sleepers })
     }
 
-    /// Some of the sleepers.
+    /// Prepares a range of the sleepers.
     fn prepared(
         &self,
         recording: &Recording,
@@ -218,20 +221,20 @@ impl Measured {
 }
 
 impl PreparedRecording {
-    /// Prepares a recording.
+    /// Prepares a recording for comparison with `track`.
     ///
     /// # Errors
-    /// [`PreparationError`] states what is missing.
+    /// [`PreparationError`] with the first requirement that the recording does not meet.
     pub fn new(recording: &Recording, track: &Track) -> Result<Self, PreparationError> {
         let measured = Measured::of(recording, &track.design)?;
         Ok(measured.prepared(recording, track, measured.sleepers.clone()))
     }
 
-    /// The same in sections of at most `length` sleepers, each of which shares at least `overlap` with
-    /// the next: a long track need not be fitted as a whole.
+    /// Prepares a recording in sections of at most `length` sleepers, so that a long track need not be
+    /// fitted as a whole. Neighbouring sections share at least `overlap` sleepers.
     ///
     /// # Errors
-    /// As [`PreparedRecording::new`].
+    /// The errors of [`PreparedRecording::new`].
     pub fn sections(
         recording: &Recording,
         track: &Track,
@@ -243,14 +246,13 @@ impl PreparedRecording {
         Ok(ranges.into_iter().map(|range| measured.prepared(recording, track, range)).collect())
     }
 
-    /// Whether physics of a kind may be named.
+    /// Whether a hypothesis of this kind may be accepted.
     pub(crate) fn may_be_named(&self, kind: &Kind) -> bool {
         !self.without.iter().any(|other| other == kind.physics)
     }
 
-    /// The same powers at other sleepers: those of each speed in a separate order,
-    /// `[speed][sleeper]`, so that speeds have no place in common. A control: no local effect can
-    /// be found.
+    /// Moves the log powers to other sleepers, with a separate order for each speed, `[speed][sleeper]`.
+    /// Speeds then have no common location, and no local effect can be found. Serves as a control.
     pub fn shuffle(&mut self, orders: &[Vec<usize>]) {
         let (bands, per_sleeper) = (self.forward.bands.count(), self.forward.per_sleeper());
         let measured = self.log_power.clone();
@@ -263,8 +265,8 @@ impl PreparedRecording {
         }
     }
 
-    /// Log powers of further passes over the track of a recording that was prepared, in the same order, means
-    /// over those of a speed; none where no pass covers a sleeper at a speed.
+    /// Log powers of further passes over the same track, in the same order, as means over the passes of a
+    /// speed; `None` where no pass covers a sleeper at a speed.
     pub(crate) fn log_power_of(
         &self,
         recording: &Recording,
@@ -288,20 +290,22 @@ impl PreparedRecording {
         all
     }
 
-    /// The log powers less the null model's offset: what the forward model predicts where nothing is
-    /// left out.
+    /// The log powers minus the offset of the null model: the values that the forward model predicts if
+    /// nothing is left out.
     pub fn expected_log_power(&self, null: &NullModel) -> DVector<f64> {
         &self.log_power - null.offset_of(self.forward.section.sleepers)
     }
 
-    /// Covariance of any one sleeper's log powers: the null model's, and what the passes do not share.
+    /// Covariance of the log powers of one sleeper: that of the null model plus the variation between
+    /// passes.
     pub fn covariance(&self, null: &NullModel) -> DMatrix<f64> {
         let covariance = null.covariance(self.forward.bands.count(), &self.pass_variance);
         self.of_compared(covariance)
     }
 
-    /// A sleeper's covariance with an infinite variance of what is not compared: waves that are short
-    /// against the contact patch, for its filter is the coarsest part of the model.
+    /// A sleeper's covariance, with infinite variance for log powers that are not compared: those of waves
+    /// shorter than the contact patch, because the contact-patch filter is the least accurate part of the
+    /// model.
     pub(crate) fn of_compared(&self, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
         let forward = &self.forward;
         let design = &forward.section.track.design;
@@ -322,8 +326,8 @@ impl PreparedRecording {
     }
 }
 
-/// Mean speed in km/h of a speed's passes over a stretch, by their positions; the nominal one where it is
-/// hardly different.
+/// Mean speed in km/h of the passes of a speed over a stretch, from their positions, rounded in steps of
+/// [`SPEED_STEP`] from the nominal speed.
 fn true_speed(recording: &Recording, speed: &SpeedSpectra, [from_m, to_m]: [f64; 2]) -> f64 {
     let of_pass = |&pass: &usize| {
         let pass = &recording.passes[pass];
@@ -350,8 +354,8 @@ fn log_power(forward: &Forward, spectra: &Spectra, first: usize) -> DVector<f64>
     all
 }
 
-/// A single pass at a speed scatters as passes of the other speeds do, or as a twentieth of the
-/// surface's power.
+/// Variance of the mean over the passes, per speed and band. A single pass at a speed takes the variance of
+/// another speed, or 0.01 if there is none.
 fn pass_variance(forward: &Forward, spectra: &Spectra) -> DVector<f64> {
     let bands = forward.bands.count();
     let known: Vec<_> = spectra.speeds.iter().map(SpeedSpectra::pass_variance).collect();

@@ -1,27 +1,27 @@
-//! The shape that an extension gives rail or wheel, as a spectrum over every sleeper.
+//! Spectrum, over every sleeper, of the shape that an extension adds to rail or wheel.
 //!
-//! A shape is not random, but over one sleeper its mean power in a band is that of its spectrum,
-//! as for the surface: so both are added.
+//! A shape is not random. Over one sleeper, however, its mean power in a band follows from its spectrum, as
+//! for the surface. The two spectra are therefore added.
 
 use crate::section::Section;
 use rustfft::{Fft, FftPlanner, num_complex::Complex64};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-/// Samples over a sleeper spacing: the shortest waves compared have more than two of them.
+/// Number of samples per sleeper spacing; the shortest compared wave has more than two samples.
 const SAMPLES_PER_SPACING: usize = 1250;
 
-/// Samples of a transform, zeros included.
+/// Number of samples of a transform, including zeros.
 const SAMPLES: usize = 4096;
 
-/// Part of a spacing over which a shape passes from one sleeper's window to the next.
+/// Length of the transition between the windows of two sleepers, as a share of the spacing.
 const FADE: f64 = 0.3;
 
-/// Least height in m that is a shape: a nanometre is below any surface.
+/// Smallest height of a shape in m; a nanometre is below the height of any surface.
 const HEIGHT_MIN_M: f64 = 1e-9;
 
-/// Spectrum of a shape over the compared sleepers, `[sleeper][wave]`: squares of its Fourier
-/// integral in m4 at whole numbers of waves on [`SAMPLES`]; none for sleepers without a shape.
+/// Spectrum of a shape over the compared sleepers, `[sleeper][wave]`: squared magnitudes of its Fourier
+/// integral in m4, at integer numbers of waves on [`SAMPLES`]; `None` for sleepers without a shape.
 pub(crate) struct Shape {
     squares: Vec<Option<Vec<f64>>>,
     step_m: f64,
@@ -29,7 +29,8 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// The spectrum of a height in m by place on the model's track in m; none if it is flat.
+    /// The spectrum of a height in m as a function of the position on the model's track in m; `None` if it
+    /// is flat.
     pub(crate) fn new(section: &Section, height_m: impl Fn(f64) -> f64) -> Option<Self> {
         let spacing_m = section.track.design.sleeper.spacing_m;
         let step_m = spacing_m / SAMPLES_PER_SPACING as f64;
@@ -56,7 +57,7 @@ impl Shape {
     }
 }
 
-/// Squares of the Fourier integral of a height around a sleeper.
+/// Squared magnitudes of the Fourier integral of a height around a sleeper, in m4.
 fn squares(
     transform: &Arc<dyn Fft<f64>>,
     step_m: f64,
@@ -82,8 +83,8 @@ fn squares(
     Some(samples[..SAMPLES / 2].iter().map(|value| value.norm_sqr() * step_m * step_m).collect())
 }
 
-/// Weight of a height at this distance in spacings from the sleeper: squares of neighbours' weights
-/// sum to one.
+/// Weight of a height at this distance from the sleeper in spacings; the squared weights of neighbouring
+/// sleepers sum to one.
 fn window(spacings: f64) -> f64 {
     let past = (spacings.abs() - 0.5) / FADE + 0.5;
     (FRAC_PI_2 * past.clamp(0.0, 1.0)).cos()

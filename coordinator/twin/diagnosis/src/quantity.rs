@@ -1,8 +1,8 @@
-//! The quantities of a support, by which the baseline's unknowns are addressed.
+//! Quantities of a support, which identify the unknowns of the baseline.
 
 use tracktwin_parameters::Parameter;
 
-/// A quantity of which every sleeper has its own value.
+/// A quantity with a separate value at every sleeper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Own {
     /// Stiffness of the ballast, `k_b`.
@@ -13,7 +13,7 @@ pub enum Own {
     Level,
 }
 
-/// A quantity that all sleepers have in common.
+/// A quantity with one value for all sleepers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Common {
     /// Bending stiffness of the sleeper, `EI_s`.
@@ -24,7 +24,7 @@ pub enum Common {
     BallastDamping,
 }
 
-/// A quantity of a sleeper, its own or that of all.
+/// A quantity of a sleeper, either its own or common to all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Quantity {
     Own(Own),
@@ -32,10 +32,10 @@ pub(crate) enum Quantity {
 }
 
 impl Own {
-    /// All of them, in the order of the unknowns.
+    /// All quantities, in the order of the unknowns.
     pub const ALL: [Self; 3] = [Self::BallastStiffness, Self::RailpadStiffness, Self::Level];
 
-    /// The parameter of the track that it is.
+    /// The corresponding parameter of the track.
     pub const fn parameter(self) -> Parameter {
         match self {
             Self::BallastStiffness => Parameter::BallastStiffness,
@@ -46,11 +46,11 @@ impl Own {
 }
 
 impl Common {
-    /// All of them, in the order of the unknowns.
+    /// All quantities, in the order of the unknowns.
     pub const ALL: [Self; 3] =
         [Self::SleeperBendingStiffness, Self::RailpadDamping, Self::BallastDamping];
 
-    /// The parameter of the track that it is.
+    /// The corresponding parameter of the track.
     pub const fn parameter(self) -> Parameter {
         match self {
             Self::SleeperBendingStiffness => Parameter::SleeperBendingStiffness,

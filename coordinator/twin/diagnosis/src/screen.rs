@@ -1,4 +1,4 @@
-//! A filter for every candidate: how much better the recording is understood with it.
+//! Matched filters for the screening of candidates: the evidence for every candidate.
 
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
@@ -6,35 +6,35 @@ use crate::search::Extent;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-/// Prior deviation of an effect's strength about each trial value.
+/// Prior standard deviation of an extension's strength relative to each trial value.
 const STRENGTH_DEVIATION: f64 = 0.3;
 
-/// Strengths in parts of a trial's at which it is asked whether it would show: an effect's range is
-/// about a decade, and trials are in its upper half.
+/// Strengths relative to a trial for the test whether an extension would be detected: the range of an
+/// extension is about a decade, and trials lie in its upper half.
 pub(crate) const STRENGTHS: [f64; 5] = [0.125, 0.25, 0.5, 1.0, 2.0];
 
-/// The trace of a candidate with certain values, as far as the baseline cannot imitate it.
+/// Signature of a candidate with trial values, and the part of it that the baseline cannot reproduce.
 #[derive(Clone, Debug)]
 pub struct Template {
-    /// Number of the candidate.
+    /// Index of the candidate.
     pub candidate: usize,
-    /// Number of the trial.
+    /// Index of the trial.
     pub trial: usize,
     /// Whitened change of the log powers.
     pub change: DVector<f64>,
-    /// Its product with the baseline's derivatives.
+    /// Product of the change with the baseline's derivatives.
     pub projected_gradient: DVector<f64>,
-    /// The baseline's part in it: what it is multiplied with for a residual's projection.
+    /// Factor that projects a residual onto the part of the change that the baseline reproduces.
     pub imitation: DVector<f64>,
-    /// Square of its length, after the baseline has taken what it can: `d'^2`.
+    /// Squared norm of the change after the baseline was fitted again: `d'^2`.
     pub detectability: f64,
 }
 
-/// Works out the traces of all candidates and trials on a calibrated track.
+/// Computes the signatures of all candidates and trials on a calibrated track. A trial for which no model
+/// exists is left out.
 ///
 /// # Errors
-/// [`CalibrationError`] when the calibrated track makes no model. A trial that makes none is left
-/// out.
+/// [`CalibrationError`] if no model exists for the calibrated values.
 pub fn templates(
     problem: &Problem<'_>,
     calibration: &Calibration,
@@ -88,14 +88,14 @@ pub fn templates(
 }
 
 impl Template {
-    /// Nats that a trial of free size gains in a calibration's residual; none for one that would
+    /// Gain in nats of a trial with free strength in a calibration's residual; zero if the strength would
     /// have to be negative.
     pub fn along(&self, residual: &DVector<f64>) -> f64 {
         let along = self.change.dot(residual).max(0.0);
         0.5 * along.powi(2) / self.detectability.max(f64::MIN_POSITIVE)
     }
 
-    /// Logarithms of the evidence for the trial at each of [`STRENGTHS`].
+    /// Log evidence for the trial at each of [`STRENGTHS`], in nats.
     pub(crate) fn at_strengths(
         &self,
         residual: &DVector<f64>,
@@ -105,11 +105,11 @@ impl Template {
         STRENGTHS.map(|part| part * along - 0.5 * part * part * self.detectability)
     }
 
-    /// Logarithm of the evidence for the effect in a whitened residual, against the baseline alone:
-    /// with strength `N(1, 0.3^2)` times the trial's (docs/diagnosis.md, eq. 12).
+    /// Log ratio of the evidence for the extension to the baseline alone, in nats, for a whitened residual.
+    /// The strength is `N(1, 0.3^2)` times that of the trial (docs/diagnosis.md, eq. 12).
     ///
-    /// `projected_gradient` is the residual's product with the baseline's derivatives; for the residual of a
-    /// calibration its gradient, which is zero where it came to its end.
+    /// `projected_gradient` is the product of the residual with the baseline's derivatives. For the
+    /// residual of a calibration it is the gradient, which is zero at the minimum.
     pub fn log_evidence(&self, residual: &DVector<f64>, projected_gradient: &DVector<f64>) -> f64 {
         let along = self.change.dot(residual) - self.imitation.dot(projected_gradient);
         let square = self.detectability;

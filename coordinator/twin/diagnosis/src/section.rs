@@ -1,4 +1,4 @@
-//! The stretch of track that is compared: its geometry, and which part of it a band sees.
+//! The compared stretch of track: its geometry, and the part of it that contributes to a band.
 
 use crate::bands::{Bands, CENTRE_RAD};
 use std::f64::consts::{SQRT_2, TAU};
@@ -7,31 +7,31 @@ use tracktwin_parameters::Track;
 use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::model::Mesh;
 
-/// Spans modelled beyond the first and last sleeper compared.
+/// Number of spans modelled beyond the first and last compared sleeper.
 const SPANS_BEYOND: usize = 16;
 
-/// Elements of the rail in a span and of a half sleeper (docs/accuracy.md).
+/// Number of rail elements per span and of elements per half sleeper (docs/accuracy.md).
 const ELEMENTS: usize = 8;
 
-/// Standard deviations of its blur by which a window extends beyond its ends.
+/// Reach of a window beyond its ends, in standard deviations of its blur.
 const BLUR_REACH: f64 = 3.5;
 
-/// The rail's nodes that are seen, with shares that sum to one.
+/// Rail nodes that contribute to a window, with weights that sum to one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Window {
-    /// The first node.
+    /// Index of the first node.
     pub first: usize,
-    /// Its share and those of the nodes after it.
+    /// Weights of this node and of the nodes after it.
     pub shares: Vec<f64>,
 }
 
 impl Window {
-    /// The nodes.
+    /// Range of the nodes.
     pub fn nodes(&self) -> Range<usize> {
         self.first..self.first + self.shares.len()
     }
 
-    /// Mean of values at the nodes of a rail, of which the first has this number.
+    /// Weighted mean of values at rail nodes; `first` is the index of the node of `values[0]`.
     pub fn mean(&self, values: &[f64], first: usize) -> f64 {
         let seen = &values[self.first - first..][..self.shares.len()];
         self.shares.iter().zip(seen).map(|(share, value)| share * value).sum()
@@ -41,41 +41,41 @@ impl Window {
 /// A stretch of sleepers and the track around it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    /// Rail, sleepers, wheel, and what is known of them.
+    /// Track description with its priors.
     pub track: Track,
-    /// Sleepers compared.
+    /// Number of compared sleepers.
     pub sleepers: usize,
-    /// Place of the first of them on the recording's scale in m.
+    /// Position of the first compared sleeper in m, in the coordinates of the recording.
     pub first_x_m: f64,
-    /// Spans modelled beyond the first and the last of them. The continuation of the track is
-    /// unknown; distant ends matter less.
+    /// Number of spans modelled beyond the first and the last compared sleeper. The continuation of the
+    /// track is unknown; distant ends have less effect.
     pub spans_beyond: usize,
 }
 
 impl Section {
-    /// A section of `sleepers` sleepers with the usual length of track around it.
+    /// A section of `sleepers` sleepers with the default length of track around it; `first_x_m` in m.
     pub fn new(track: impl Into<Track>, sleepers: usize, first_x_m: f64) -> Self {
         Self { track: track.into(), sleepers, first_x_m, spans_beyond: SPANS_BEYOND }
     }
 
-    /// Mesh of the whole track: the sleepers compared and what lies beyond them.
+    /// Mesh of the whole track: the compared sleepers and the spans beyond them.
     pub fn mesh(&self) -> Mesh {
         Mesh::uniform(self.spans(), ELEMENTS, ELEMENTS)
     }
 
-    /// Spans of the whole track.
+    /// Number of spans of the whole track.
     pub fn spans(&self) -> usize {
         self.sleepers - 1 + 2 * self.spans_beyond
     }
 
-    /// For each sleeper of the whole track the compared one whose values it has: itself, or the
-    /// first or last.
+    /// For each sleeper of the whole track, the index of the compared sleeper whose values it takes: its
+    /// own, or those of the first or last compared sleeper.
     pub fn compared(&self) -> impl Iterator<Item = usize> + '_ {
         (1..self.spans())
             .map(|sleeper| sleeper.clamp(self.spans_beyond, self.last()) - self.spans_beyond)
     }
 
-    /// Number in the whole track (from 0) of a compared sleeper.
+    /// Index in the whole track (from 0) of a compared sleeper.
     pub const fn in_track(&self, sleeper: usize) -> usize {
         self.spans_beyond + sleeper - 1
     }
@@ -84,34 +84,34 @@ impl Section {
         self.spans_beyond + self.sleepers - 1
     }
 
-    /// Rail node above a compared sleeper.
+    /// Index of the rail node above a compared sleeper.
     pub const fn seat_node(&self, sleeper: usize) -> usize {
         self.node_above(self.in_track(sleeper))
     }
 
-    /// The same above a sleeper of the whole track.
+    /// Index of the rail node above a sleeper of the whole track.
     pub const fn node_above(&self, in_track: usize) -> usize {
         (in_track + 1) * ELEMENTS
     }
 
-    /// Place on the model's track of a place on the recording's scale, both in m.
+    /// Position on the model's track, in m, of a position of the recording in m.
     pub fn model_x_m(&self, x_m: f64) -> f64 {
         x_m - self.first_x_m + self.spans_beyond as f64 * self.track.design.sleeper.spacing_m
     }
 
-    /// Place in the middle of a compared sleeper's window on the recording's scale, in m.
+    /// Position of the middle of a compared sleeper's window, in m of the recording.
     pub fn x_m(&self, sleeper: usize) -> f64 {
         self.first_x_m + sleeper as f64 * self.track.design.sleeper.spacing_m
     }
 
-    /// Whether two stretches, each from and to in m, are at most a spacing apart.
+    /// Whether two stretches, `[from, to]` in m, are at most a spacing apart.
     pub fn are_beside(&self, one: [f64; 2], other: [f64; 2]) -> bool {
         let spacing_m = self.track.design.sleeper.spacing_m;
         one[0] - spacing_m <= other[1] && other[0] - spacing_m <= one[1]
     }
 
-    /// An extension given in terms of the recording (compared sleepers, places on its scale) in
-    /// terms of the model's track.
+    /// Converts an extension from the coordinates of the recording (compared sleepers, positions in m) to
+    /// those of the model's track.
     pub fn in_model(&self, extension: &ExtensionInstance) -> ExtensionInstance {
         let mut placed = extension.clone();
         placed.x_m = extension.x_m.map(|ends| ends.map(|x_m| self.model_x_m(x_m)));
@@ -122,10 +122,10 @@ impl Section {
         placed
     }
 
-    /// What a sleeper's window sees of the rail at a speed in a band.
+    /// Rail nodes that contribute to a sleeper's window at a speed and band centre in Hz.
     ///
-    /// The wavelet smears the window: at position `x` it holds power from around `x`, by a
-    /// Gaussian whose deviation is the way rolled in `6 / (2 pi f sqrt 2)`.
+    /// The wavelet blurs the window: the value at position `x` contains power from around `x`, weighted by
+    /// a Gaussian. Its standard deviation is the distance that the wheel covers in `6 / (2 pi f sqrt 2)`.
     pub fn window(&self, sleeper: usize, speed_m_s: f64, centre_hz: f64) -> Window {
         let spacing_m = self.track.design.sleeper.spacing_m;
         let blur_m = speed_m_s * CENTRE_RAD / (TAU * centre_hz * SQRT_2);

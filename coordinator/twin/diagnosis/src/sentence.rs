@@ -1,26 +1,26 @@
-//! A diagnosis in one sentence or two.
+//! Summary of a diagnosis in one or two sentences.
 
 use crate::outcome::{BeforeAfter, FitScores, Hypothesis, Verdict, meet};
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{Kind, PlaceKind};
 
-/// Logarithm of a parameter's bias that is worth a word.
+/// Smallest bias of a parameter's logarithm that the sentence states.
 const BIAS_MIN: f64 = 0.1;
 
-/// Ratio of a family's to its member's probability from which the family is stated first.
+/// The family is stated first if its probability exceeds that of its member by more than this.
 const FAMILY_MORE: f64 = 0.02;
 
-/// Probability from which another hypothesis is stated beside the first.
+/// Smallest probability of another hypothesis that the sentence states.
 const RIVAL_MIN: f64 = 0.05;
 
-/// Error of a sum of probabilities by rounding and by their limits.
+/// Error of a sum of probabilities from rounding and limits.
 const ROUNDING: f64 = 0.01;
 
-/// Sleepers that are named one by one.
+/// Largest number of sleepers that are listed one by one.
 const NAMED_MAX: usize = 3;
 
-/// Sentence on the hypotheses: what, where, how probable, and the bias removed; for a section with
-/// these sleepers and this probability that nothing is left out.
+/// Sentence on the hypotheses: kind, location, probability and removed bias. `sleepers` are the ids of the
+/// section's sleepers; `nothing_left_out` is a probability.
 pub(crate) fn sentence(
     verdict: Verdict,
     hypotheses: &[Hypothesis],
@@ -54,7 +54,7 @@ pub(crate) fn sentence(
     [found, gained(fit), biased(bias)].concat()
 }
 
-/// Place, summary, name and probability.
+/// Location, summary, name and probability of a hypothesis.
 fn named(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
     let Hypothesis { physics, probability, .. } = hypothesis;
     let summary = Kind::from_name(physics)
@@ -71,8 +71,8 @@ fn named(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
     }
 }
 
-/// The next alternative to the first hypothesis, and the measurement that separates them. Alternatives share one
-/// probability: what is probable beside the first is another effect.
+/// The next alternative to the first hypothesis, and the measurement that separates them. Alternatives
+/// share one probability; a hypothesis that is probable in addition to the first is another effect.
 fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     let is_rival = |other: &&Hypothesis| {
         !other.accepted
@@ -89,7 +89,7 @@ fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     )
 }
 
-/// Something that the catalogue lacks, with its port and what it does there.
+/// Description of unknown physics: its port and its behaviour.
 fn unknown(hypothesis: &Hypothesis) -> String {
     let port = match hypothesis.port.as_deref() {
         Some("rail_seat") => " under the rail seat",
@@ -104,7 +104,7 @@ fn unknown(hypothesis: &Hypothesis) -> String {
     format!("something{port} that no kind in the catalogue explains{does}")
 }
 
-/// With a capital first letter.
+/// The text with a capital first letter.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect()
@@ -127,7 +127,7 @@ fn place(hypothesis: &Hypothesis, sleepers: &[String]) -> String {
     }
 }
 
-/// Names of some of all sleepers, of a run only the first and the last.
+/// Ids of some of all sleepers; of a contiguous run only the first and the last.
 fn together(some: &[String], all: &[String]) -> String {
     if all.windows(some.len()).any(|run| run == some) {
         format!("{} to {}", some[0], some[some.len() - 1])
@@ -136,7 +136,7 @@ fn together(some: &[String], all: &[String]) -> String {
     }
 }
 
-/// Whether a kind has a stretch of the rail as its place.
+/// Whether the location of a kind is a stretch of the rail.
 fn is_stretch(physics: &str) -> bool {
     Kind::from_name(physics).is_some_and(|kind| kind.place == PlaceKind::Stretch)
 }

@@ -1,4 +1,4 @@
-//! How well an effect whose truth is known could be seen at all.
+//! Detectability of an extension with known parameters.
 
 use crate::calibration::{CalibrationError, Problem};
 use crate::candidate::Candidate;
@@ -8,14 +8,14 @@ use crate::screen::templates;
 use nalgebra::DVector;
 use tracktwin_track::extension::ExtensionInstance;
 
-/// Length `d'` of an extension's trace in a recording over the scatter of nulls, after the baseline
-/// has taken what it can.
+/// Detectability `d'` of an extension in a recording: norm of its whitened signature after the baseline was
+/// fitted again.
 ///
-/// `values` are the unknowns of the track without it, `extension` is in terms of the recording:
-/// compared sleepers count from 0, places are the recording's.
+/// `values` are the unknowns of the track without the extension. The indices of compared sleepers in
+/// `extension` begin at 0; its positions are those of the recording in m.
 ///
 /// # Errors
-/// [`CalibrationError`] when values or extension make no track.
+/// [`CalibrationError`] if no track or extension exists for the values.
 pub fn signature(
     prepared: &PreparedRecording,
     observation: &Observation,

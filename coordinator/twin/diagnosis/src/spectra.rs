@@ -1,4 +1,4 @@
-//! Measured wavelet power in bands over every sleeper in every pass.
+//! Measured wavelet power in bands, over every sleeper in every pass.
 
 use crate::bands::{Bands, gain};
 use rayon::prelude::*;
@@ -8,20 +8,20 @@ use std::ops::Range;
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::Recording;
 
-/// Instants at which a band's power is taken, per period of its centre: the power of a band
-/// changes no faster than its bandwidth.
+/// Number of power values per period of a band's centre frequency; the power of a band changes no faster
+/// than its bandwidth permits.
 const INSTANTS_PER_PERIOD: f64 = 5.0;
 
-/// Decibels in a neper of power.
+/// Number of decibels per neper of power.
 pub(crate) const DECIBEL: f64 = 4.342_944_819_032_518;
 
-/// Relative difference within which two passes have one speed.
+/// Largest relative difference between the speeds of two passes that count as one speed.
 const SPEED_TOLERANCE: f64 = 0.02;
 
-/// Least share of its window that a pass must cover to count for a sleeper.
+/// Smallest share of a sleeper's window that a pass must cover.
 const SHARE_MIN: f64 = 0.98;
 
-/// Part of the spectrum, below half the sample rate, from which the sensor's noise is taken.
+/// Share of the spectrum up to half the sample rate from which the sensor noise is estimated.
 const NOISE_BAND: Range<f64> = 0.6..0.9;
 
 /// The log powers of a recording, by speed, sleeper and band.
@@ -36,18 +36,18 @@ pub struct Spectra {
 pub struct SpeedSpectra {
     /// Nominal speed in km/h.
     pub speed_km_h: f64,
-    /// Numbers of the passes in the recording.
+    /// Indices of the passes in the recording.
     pub passes: Vec<usize>,
-    /// Natural logarithm of the mean power in m2/s4, `[pass][sleeper][band]`; none where the pass
-    /// does not cover the sleeper's window.
+    /// Natural logarithm of the mean power in m2/s4, `[pass][sleeper][band]`; `None` if the pass does not
+    /// cover the sleeper's window.
     pub log_power: Vec<Vec<Option<Vec<f64>>>>,
-    /// One-sided power spectral density in m2/s3 of the sensor noise, estimated at the highest
-    /// frequencies: an upper bound.
+    /// One-sided power spectral density of the sensor noise in m2/s3; an upper bound, estimated at the
+    /// highest frequencies.
     pub noise_density: f64,
 }
 
 impl Spectra {
-    /// Works out the powers of all passes over all sleepers.
+    /// Computes the powers of all passes over all sleepers.
     pub fn new(recording: &Recording, bands: &Bands) -> Self {
         let powers: Vec<_> = (0..recording.passes.len())
             .into_par_iter()
@@ -77,13 +77,14 @@ impl Spectra {
     }
 }
 
-/// Whether passes at two speeds are passes at one.
+/// Whether two speeds in km/h count as one speed.
 pub fn are_one_speed(one_km_h: f64, other_km_h: f64) -> bool {
     (one_km_h / other_km_h - 1.0).abs() <= SPEED_TOLERANCE
 }
 
 impl SpeedSpectra {
-    /// Mean over the passes of a sleeper's log powers; none if no pass covers it.
+    /// Mean over the passes of the log powers of a sleeper, one value per band; `None` if no pass covers
+    /// it.
     pub fn mean(&self, sleeper: usize) -> Option<Vec<f64>> {
         let covered: Vec<_> =
             self.log_power.iter().filter_map(|pass| pass[sleeper].as_ref()).collect();
@@ -94,8 +95,8 @@ impl SpeedSpectra {
         Some((0..first.len()).map(mean).collect())
     }
 
-    /// Variance of one pass's log power about the mean of the passes, a value a band, over all
-    /// sleepers; none with a single pass.
+    /// Variance of one pass's log power about the mean of the passes, one value per band, over all
+    /// sleepers; `None` for a single pass.
     pub fn pass_variance(&self) -> Option<Vec<f64>> {
         let sleepers = self.log_power[0].len();
         let bands = self.log_power.iter().flatten().flatten().next()?.len();
@@ -126,7 +127,7 @@ fn pass_powers(recording: &Recording, pass: usize, bands: &Bands) -> Vec<Option<
     log_powers(&recording.passes[pass].signal, &windows, bands)
 }
 
-/// Natural logarithm of the mean wavelet power in each window and band; none for no window.
+/// Natural logarithm of the mean wavelet power in each window and band; `None` for a missing window.
 pub(crate) fn log_powers(
     signal: &Signal,
     windows: &[Option<Range<usize>>],
@@ -148,18 +149,18 @@ pub(crate) fn log_powers(
     all
 }
 
-/// A signal's spectrum, from which bands are taken.
+/// Spectrum of a signal, from which band powers are computed.
 struct Transform {
     sample_rate_hz: f64,
-    /// Samples with the zeros behind them.
+    /// Number of samples, including the zeros after them.
     samples: usize,
     spectrum: Vec<Complex64>,
 }
 
-/// Power of the analytic signal in a band, at even instants.
+/// Power of the analytic signal in a band, at equidistant instants.
 struct Power {
     values: Vec<f64>,
-    /// Samples of the signal between two instants.
+    /// Number of signal samples between two instants.
     step: f64,
 }
 
@@ -196,7 +197,7 @@ impl Transform {
 }
 
 impl Power {
-    /// Mean over a window of samples, which holds at least one instant.
+    /// Mean over a window of samples, from at least one instant.
     fn mean(&self, window: &Range<usize>) -> f64 {
         let first = (window.start as f64 / self.step).ceil() as usize;
         let end = ((window.end as f64 / self.step).ceil() as usize).max(first + 1);
@@ -205,7 +206,7 @@ impl Power {
     }
 }
 
-/// Mean density in m2/s3 where hardly anything but the sensor's noise is left.
+/// Mean power spectral density in m2/s3 at frequencies at which the sensor noise dominates.
 fn noise_density(signal: &Signal) -> f64 {
     let transform = Transform::new(signal);
     let count = transform.spectrum.len() as f64;

@@ -1,4 +1,4 @@
-//! Candidates for the model from the findings of the passes alone.
+//! Candidates from the findings of an inspection.
 
 use crate::candidate::{Candidate, parameter};
 use crate::prepared_recording::PreparedRecording;
@@ -6,8 +6,8 @@ use tracktwin_inspection::{Finding, Inspection, Place};
 use tracktwin_track::extension::{ExtensionInstance, Kind, KindParameter, PlaceKind};
 
 impl PreparedRecording {
-    /// Sets the start of the wheel's revolutions from the blows of a flat, and the detected shapes
-    /// of the rail; returns the candidates from an inspection.
+    /// Sets the start of the wheel's revolutions from the blows of a flat, and the detected shapes of the
+    /// rail. Returns the candidates that the inspection suggests.
     pub fn suggested(&mut self, inspection: &Inspection) -> Vec<Candidate> {
         let section = &self.forward.section;
         let turn_start_m = |pass: &usize| {
@@ -28,7 +28,7 @@ impl PreparedRecording {
     }
 }
 
-/// Stretch in which a finding shows the rail's shape.
+/// Stretch in m in which a finding indicates a shape of the rail.
 fn detected_shape_m(finding: &Finding) -> Option<[f64; 2]> {
     match finding.place {
         Place::Stretch { from_m, to_m } => Some([from_m, to_m]),
@@ -36,7 +36,7 @@ fn detected_shape_m(finding: &Finding) -> Option<[f64; 2]> {
     }
 }
 
-/// The candidate that a finding speaks for; none where a model of the track has nothing to say.
+/// The candidate that a finding suggests; `None` if a track model cannot represent its kind.
 fn candidate(finding: &Finding, length_ratio: f64) -> Option<Candidate> {
     let kind = Kind::from_name(finding.physics)?;
     if kind.screening.suggested.is_empty() {

@@ -1,4 +1,4 @@
-//! From the surface under the wheel to the acceleration that is recorded.
+//! Transfer from the surface under the wheel to the recorded acceleration.
 
 use crate::further_wheels::FurtherWheels;
 use crate::profile::Shape;
@@ -10,39 +10,40 @@ use std::sync::Arc;
 use tracktwin_track::frequency::{KnownRail, RailReceptances, SeatReceptances, StateReceptances};
 use tracktwin_track::model::{HertzContact, TrackModel};
 
-/// What a track with its extensions makes of the surface, at all lines of the spectrum and all
-/// nodes of its rail.
+/// Transfer of a track with its extensions, at all spectral lines and all rail nodes.
 pub(crate) struct Transfer {
-    /// Recorded acceleration over height of the surface, squared, in 1/s4: `[line][node]`.
+    /// Squared ratio of recorded acceleration to surface height in 1/s4: `[line][node]`.
     pub(crate) power: Vec<Vec<f64>>,
     /// Dynamic stiffness of contact, rail and vehicle in series in N/m: `[line][node]`.
     pub(crate) stiffness: Vec<Vec<Complex64>>,
-    /// Root of that by which a change of the dynamic stiffness at a rail seat changes the power at a
-    /// node near it: the square's and its product's real part, `[line][sleeper]`. Empty unless asked for.
+    /// Square roots of the sensitivities of the power at a node to the dynamic stiffness at a nearby rail
+    /// seat, `[line][sleeper]`. The change of the power is the real part of the squared root times the
+    /// change of stiffness. Empty unless requested.
     by_seats: Vec<Vec<SeatReceptances>>,
     /// Receptance of the wheel in m/N at each line.
     wheel_receptance: Vec<Complex64>,
-    /// The shape that extensions give the rail, if they do.
+    /// Shape that extensions give the rail, if any.
     pub(crate) rail: Option<Shape>,
-    /// The shape of the wheel in each pass, `[speed][pass]`; empty for a round one.
+    /// Shape of the wheel in each pass, `[speed][pass]`; empty for a round wheel.
     pub(crate) wheel: Vec<Vec<Shape>>,
-    /// The shape of the rail under each further wheel where the first stands, with the wheel's number.
+    /// Index of each further wheel, and the shape of the rail under it as a function of the first wheel's
+    /// position.
     pub(crate) rail_elsewhere: Vec<(usize, Shape)>,
-    /// What the further wheels do.
+    /// Effect of the further wheels.
     further_wheels: Arc<FurtherWheels>,
     /// Direct receptances of the rail in m/N: `[line][node]`.
     direct: Arc<Vec<Vec<Complex64>>>,
     model: TrackModel,
-    /// What the receptances of tracks that differ a little follow from, and up to how many nodes from
-    /// what differs; none until [`Transfer::with_known_rail`].
+    /// Data from which the receptances of slightly different tracks follow, and the reach of a difference
+    /// in nodes; `None` before [`Transfer::with_known_rail`].
     known_rail: Option<Arc<(KnownRail, usize)>>,
-    /// Receptances in each state that force laws give the track, if they do.
+    /// Receptances in each state of the force laws, if there are any.
     by_state: Option<Arc<StateReceptances>>,
 }
 
 impl Transfer {
-    /// Works it out for a model at these lines in Hz, with what derivatives need so many nodes on either
-    /// side of each rail seat, if `reach` says so.
+    /// Computes the transfer of a model at these lines in Hz. With `reach` it includes the data for
+    /// derivatives, for `reach` nodes on either side of each rail seat.
     pub(crate) fn new(model: TrackModel, lines_hz: &[f64], reach: Option<usize>) -> Self {
         let RailReceptances { direct, from_seats, by_state } =
             RailReceptances::new(&model, lines_hz, reach);
@@ -50,10 +51,10 @@ impl Transfer {
         Self { by_state, ..on_rail }.with_seats(from_seats)
     }
 
-    /// With receptances from the rail seats in m/N, `[line][sleeper]`.
+    /// Adds receptances from the rail seats in m/N, `[line][sleeper]`.
     ///
-    /// `d alpha = -alpha_seat^2 dZ`, hence `d |H|^2 = 2 |H|^2 Re(k alpha_seat^2 dZ)`; between two
-    /// seats it is the difference of their receptances.
+    /// `d alpha = -alpha_seat^2 dZ`, hence `d |H|^2 = 2 |H|^2 Re(k alpha_seat^2 dZ)`. For a stiffness
+    /// between two seats, `alpha_seat` is the difference of their receptances.
     fn with_seats(self, mut from_seats: Vec<Vec<SeatReceptances>>) -> Self {
         for (line, seats) in from_seats.iter_mut().enumerate() {
             let nodes = self.power[line].iter().zip(&self.stiffness[line]);
@@ -67,16 +68,16 @@ impl Transfer {
         Self { by_seats: from_seats, ..self }
     }
 
-    /// The same, from which [`Transfer::with_model`] is quick: what extensions at a place change is felt up
-    /// to `reach` nodes from it.
+    /// Adds the data that make [`Transfer::with_model`] fast. A local change of the track has an effect up
+    /// to `reach` nodes from its position.
     pub(crate) fn with_known_rail(mut self, lines_hz: &[f64], reach: usize) -> Self {
         self.known_rail = Some(Arc::new((KnownRail::new(&self.model, lines_hz), reach)));
         self
     }
 
-    /// The same for the model with further extensions at the same lines, which change little: what a further
-    /// wheel does stays. Where they change no matrix and add no force law, as the shape of the rail or the
-    /// sensor, the rail's receptances stay too.
+    /// Transfer of the model with further extensions that change little, at the same lines. The effect of
+    /// the further wheels is reused. The receptances of the rail are reused if the extensions change no
+    /// matrix and add no force law, as for a shape of the rail or a sensor.
     pub(crate) fn with_model(&self, model: TrackModel, lines_hz: &[f64]) -> Self {
         let adds_law = model.force_laws().len() != self.model.force_laws().len();
         let has_wheels = model.vehicle().further_wheels_m == self.model.vehicle().further_wheels_m;
@@ -92,8 +93,9 @@ impl Transfer {
         Self::on_rail(model, lines_hz, direct, further)
     }
 
-    /// The same where force laws take hold as they do in a model that differs little, and that may differ in
-    /// nothing else if `alike`; none where there is no law, or where they take hold in another way.
+    /// Transfer with the force laws active as in a slightly different model; with `alike` the model may
+    /// differ in nothing else. `None` if there is no force law, or if the laws are active in a state that
+    /// is not stored.
     pub(crate) fn with_laws_of(
         &self,
         model: TrackModel,
@@ -150,13 +152,13 @@ impl Transfer {
         }
     }
 
-    /// What the further wheels do.
+    /// Effect of the further wheels.
     pub(crate) const fn further_wheels(&self) -> &Arc<FurtherWheels> {
         &self.further_wheels
     }
 
-    /// The same with the shapes of rail and wheel over a section; in its passes the wheel begins a
-    /// turn at these places in m: `[speed][pass]`.
+    /// Adds the shapes of rail and wheel over a section. `starts_m` are the positions in m at which a turn
+    /// of the wheel begins: `[speed][pass]`.
     pub(crate) fn with_shapes(mut self, section: &Section, starts_m: &[Vec<f64>]) -> Self {
         let model = &self.model;
         let of_pass =
@@ -173,25 +175,25 @@ impl Transfer {
         self
     }
 
-    /// By what extensions multiply the surface's spectral density at a wave number in rad/m.
+    /// Factor of the extensions on the spectral density of the surface, at a wave number in rad/m.
     pub(crate) fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
         self.model.roughness_gain(wave_number_rad_m)
     }
 
-    /// Roots of that by which a change of the dynamic stiffness under a sleeper's rail seat changes the
-    /// power at these nodes near it.
+    /// Square roots of the sensitivities of the power at these nodes to the dynamic stiffness under a
+    /// sleeper's rail seat.
     pub(crate) fn by_seat(&self, line: usize, sleeper: usize, nodes: Range<usize>) -> &[Complex64] {
         self.by_seats[line][sleeper].at(nodes)
     }
 
-    /// Sensitivity of a window's mean power to a change of the dynamic stiffness under a sleeper's
-    /// rail seat: the real part of the product.
+    /// Sensitivity of a window's mean power to the dynamic stiffness under a sleeper's rail seat. The
+    /// change of the power is the real part of its product with the change of stiffness.
     pub(crate) fn sensitivity(&self, window: &Window, line: usize, sleeper: usize) -> Complex64 {
         let by_seat = self.by_seat(line, sleeper, window.nodes());
         window.shares.iter().zip(by_seat).map(|(share, root)| share * root * root).sum()
     }
 
-    /// The same for a dynamic stiffness between two sleepers' rail seats.
+    /// Sensitivity of a window's mean power to a dynamic stiffness between the rail seats of two sleepers.
     pub(crate) fn sensitivity_between(
         &self,
         window: &Window,
@@ -203,7 +205,7 @@ impl Transfer {
         window.shares.iter().zip(apart).map(|(share, apart)| share * apart * apart).sum()
     }
 
-    /// Magnitude of the rail's direct receptance at a node in m/N.
+    /// Magnitude of the direct receptance of the rail at a node in m/N.
     pub(crate) fn receptance(&self, line: usize, node: usize) -> f64 {
         self.direct[line][node].norm()
     }
@@ -213,11 +215,11 @@ impl Transfer {
         self.wheel_receptance[line]
     }
 
-    /// By what a change of the dynamic stiffness between wheel and ground, in parts of the wheel's
-    /// own, changes a window's mean power: its product's real part.
+    /// Sensitivity of a window's mean power to the dynamic stiffness between wheel and ground, relative to
+    /// that of the wheel. The change of the power is the real part of its product with the relative change.
     ///
-    /// `d alpha_w = -alpha_w^2 dZ` changes the series stiffness `k` and what the sensor feels of a
-    /// force, hence `d |H|^2 = -2 |H|^2 Re((1 - k alpha_w) alpha_w dZ)`.
+    /// `d alpha_w = -alpha_w^2 dZ` changes the series stiffness `k` and the sensor's response to a force,
+    /// hence `d |H|^2 = -2 |H|^2 Re((1 - k alpha_w) alpha_w dZ)`.
     pub(crate) fn sensitivity_at_wheel(&self, window: &Window, line: usize) -> Complex64 {
         let (power, stiffness) = (&self.power[line], &self.stiffness[line]);
         let wheel = self.wheel_receptance[line];
@@ -227,13 +229,13 @@ impl Transfer {
         window.nodes().zip(&window.shares).map(at).sum::<Complex64>() * wheel / wheel.norm()
     }
 
-    /// Mean of the power over a window's nodes at a line.
+    /// Mean of the power over the nodes of a window at a line, in 1/s4.
     pub(crate) fn mean_power(&self, window: &Window, line: usize) -> f64 {
         window.mean(&self.power[line], 0)
     }
 }
 
-/// Slope of the Hertzian law at the static load, in N/m.
+/// Derivative of the Hertzian force law at the static load, in N/m.
 fn hertz(model: &TrackModel) -> f64 {
     HertzContact::new(model.design()).stiffness(model.design().wheel.load_n)
 }

@@ -1,5 +1,5 @@
-//! The search on log powers that the forward model itself predicts, with known scatter: what was put
-//! in must come out, and where nothing was put in, nothing.
+//! Search on log powers from the forward model with known random variation: the search must find the added
+//! extension, and nothing if none was added.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -66,7 +66,7 @@ fn searched_for(
     search_for(&prepared, &null, is_known)
 }
 
-/// What was recorded of this track, with its null model.
+/// The log powers of this track as a prepared recording, with its null model.
 fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (PreparedRecording, NullModel) {
     let forward = forward();
     let mut random = Normal(ChaCha8Rng::seed_from_u64(seed));

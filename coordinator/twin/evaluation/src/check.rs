@@ -1,4 +1,4 @@
-//! Whether a recording is of the track and the speeds that the models know.
+//! Check of a recording against the track and the speeds of the models.
 
 use crate::Error;
 use crate::windows::speed_index;
@@ -10,8 +10,8 @@ use tracktwin_signal::recording::Recording;
 /// Quantities missing in `recording.json` are not compared.
 ///
 /// # Errors
-/// [`Error::GainUnknown`], [`Error::UnknownSpeed`] with the first pass at a speed that is none of
-/// `speeds_km_h`, or [`Error::OtherTrack`] with the first quantity that differs by more than 2 %.
+/// [`Error::GainUnknown`]; [`Error::UnknownSpeed`] with the first pass whose speed is none of
+/// `speeds_km_h`; [`Error::OtherTrack`] with the first quantity that differs by more than 2 %.
 pub fn check_recording(
     recording: &Recording,
     design: &TrackDesign,

@@ -1,4 +1,4 @@
-//! Why a recording cannot be evaluated.
+//! Errors of an evaluation.
 
 use tracktwin_number::rounded;
 use tracktwin_signal::FeatureError;
@@ -22,26 +22,26 @@ pub enum Error {
         /// The speeds of the models in km/h.
         known: Vec<f64>,
     },
-    /// The features would be made in another way than in training.
+    /// The features are defined differently from those in training.
     #[error("the models were trained on other features: {trained_on}, not {offered}")]
     OtherFeatures {
         /// The definition of the models, as JSON.
         trained_on: String,
-        /// The definition at hand, as JSON.
+        /// The definition of this evaluation, as JSON.
         offered: String,
     },
-    /// The sensor's gain is not known.
+    /// The sensor gain is unknown.
     #[error(
         "recording.json: nominal.gain_known: is false; the evaluation needs levels: give \
              accelerations in m/s2"
     )]
     GainUnknown,
-    /// The recording is of another track or vehicle.
+    /// The recording belongs to another track or vehicle.
     #[error(
         "{} {}, the models are of {}; train models of such a track", .0.quantity, .0.found(), .0.known()
     )]
     OtherTrack(#[from] OtherTrack),
-    /// There is no model for these features.
+    /// There is no model for these speeds and this feature set.
     #[error("the {feature} model for {} km/h is missing; train it", join(speeds_km_h))]
     NoModel {
         /// Speeds in km/h.
@@ -49,29 +49,29 @@ pub enum Error {
         /// The feature set.
         feature: &'static str,
     },
-    /// A window has no features.
+    /// The features of a window cannot be computed.
     #[error("pass {file}, sleeper {sleeper}: {source}")]
     Features {
         /// The file of the pass.
         file: String,
         /// The sleeper's id.
         sleeper: String,
-        /// Why not.
+        /// Reason.
         source: FeatureError,
     },
     /// The sample rate of a stream is too low for the features of the models.
     #[error("recording.json: sample_rate_Hz: {0}")]
     Rate(FeatureError),
-    /// The samples of a stream come at another rate than declared.
+    /// The sample rate of a stream differs from the declared rate.
     #[error(
         "time_s: the samples come at {} Hz, but recording.json states {} Hz in sample_rate_Hz",
         rounded(*observed_hz, 6),
         rounded(*declared_hz, 6)
     )]
     OtherSampleRate {
-        /// Sample rate in Hz by the times of the samples.
+        /// Sample rate in Hz, computed from the times of the samples.
         observed_hz: f64,
-        /// Sample rate in Hz that the recording states.
+        /// Sample rate in Hz declared in the recording.
         declared_hz: f64,
     },
     /// No sleeper has a window at any speed.
@@ -80,7 +80,7 @@ pub enum Error {
         /// The recording's name.
         recording: String,
     },
-    /// The models or the library refuse.
+    /// Error of the models or of the training set.
     #[error(transparent)]
     Surrogate(#[from] tracktwin_surrogate::Error),
 }

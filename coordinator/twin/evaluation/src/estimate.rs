@@ -1,4 +1,4 @@
-//! One recording through surrogates and model selector.
+//! Evaluation of one recording with surrogates and model selector.
 
 use crate::evaluation::{
     Estimate, Estimates, Evaluation, FORMAT, Flag, Known, Measured, Provenance, SleeperEvaluation,
@@ -12,38 +12,40 @@ use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::Recording;
 use tracktwin_surrogate::{Trained, TrainingSet};
 
-/// The feature set whose models speak: the global one (paper, eq. 9).
+/// The feature set of the models in use: the global one (paper, eq. 9).
 pub const METHOD_FEATURE: &str = "GF";
 
-/// Part of a parameter's range in the library from its ends within which a mean is at the edge.
+/// Distance of a mean from an end of the range, as a share of the range, below which it counts as at the
+/// edge.
 const EDGE: f64 = 0.02;
 
 const ALL_SPEEDS: &str = "one model of all speeds together";
 const SINGLE_SPEEDS: &str = "models of single speeds: means weighted by precision; variance their harmonic mean, as if errors were common to all";
 
-/// The trained twin that evaluates a recording.
+/// Surrogates, library and feature definition with which a recording is evaluated.
 #[derive(Clone, Copy)]
 pub struct Twin<'a> {
-    /// Takes features as they were taken in training.
+    /// Computes features with the definition used in training.
     pub extractor: &'a Extractor,
     /// The surrogates.
     pub models: &'a Trained,
-    /// The library they were trained on, searched by the model selector.
+    /// The library on which the surrogates were trained; the model selector searches it.
     pub library: &'a TrainingSet,
-    /// Domains of that library.
+    /// Domain checks of that library.
     pub domains: &'a Domains,
 }
 
-/// The parameters of the track at every sleeper that a pass covers.
+/// Estimates the track parameters at every sleeper that a pass covers.
 ///
-/// Passes of one speed are averaged in the logarithm of the power. Where a sleeper has all speeds
-/// of the campaign, the model of all speeds speaks; else the single-speed models are combined:
-/// means weighted by precision, variance the harmonic mean of theirs. That treats their errors as
-/// one: all speeds saw the same surface, and independence would claim too much.
+/// Passes of one speed are averaged in the logarithm of the power. A sleeper with all speeds of the
+/// campaign is evaluated with the model of all speeds. Otherwise the single-speed models are combined: the
+/// mean is weighted by precision, and the variance is the harmonic mean of the variances. This rule treats
+/// the errors as common to all speeds, because all speeds share one surface; independent errors would give
+/// too small a variance.
 ///
 /// # Errors
-/// [`Error::UnknownSpeed`], [`Error::OtherFeatures`], [`Error::NoModel`],
-/// [`Error::NothingToEvaluate`], or what features and models report.
+/// [`Error::UnknownSpeed`], [`Error::OtherFeatures`], [`Error::NoModel`], [`Error::NothingToEvaluate`],
+/// [`Error::Features`] or [`Error::Surrogate`].
 pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Error> {
     check_features(twin)?;
     twin.models.belongs_to(&twin.library.library_digest)?;
@@ -90,7 +92,7 @@ pub(crate) fn check_features(twin: &Twin<'_>) -> Result<(), Error> {
     Err(Error::OtherFeatures { trained_on: trained_on.to_string(), offered: offered.to_string() })
 }
 
-/// Estimates for every one of the sleepers, in their order.
+/// Estimates for each of the sleepers, in the same order.
 pub(crate) fn estimates(
     sleepers: &[SleeperFeatures],
     models: &Trained,
@@ -112,7 +114,7 @@ pub(crate) fn estimates(
     Ok(out.into_iter().map(combined).collect())
 }
 
-/// Adds the estimates of the model of these speeds for the `chosen` sleepers, all at once.
+/// Adds the estimates of the model for these speeds to the `chosen` sleepers, in one batch.
 fn predict(
     sleepers: &[SleeperFeatures],
     models: &Trained,
@@ -141,7 +143,7 @@ fn predict(
     Ok(())
 }
 
-/// One estimate out of several of the same quantity whose errors may be common to them.
+/// Combines several estimates of one quantity whose errors may be common.
 fn combine(estimates: &[Estimate]) -> Estimate {
     if let [only] = estimates {
         return *only;
@@ -152,7 +154,7 @@ fn combine(estimates: &[Estimate]) -> Estimate {
     Estimate { mean: mean / total, sd: (estimates.len() as f64 / total).sqrt() }
 }
 
-/// The record of a sleeper from its features and estimates.
+/// Makes the record of a sleeper from its features and estimates.
 pub(crate) fn evaluated(
     recording: &Recording,
     twin: &Twin<'_>,
@@ -187,7 +189,7 @@ pub(crate) fn evaluated(
     })
 }
 
-/// Whether a mean lies at an end of its range in the library.
+/// Whether a mean lies at an end of its parameter's range in the library.
 fn is_at_edge(estimates: &Estimates, library: &TrainingSet) -> bool {
     library.varied.iter().enumerate().any(|(column, parameter)| {
         let [low, high] = library.range(column);
@@ -221,7 +223,7 @@ fn provenance(twin: &Twin<'_>, sleepers: &[SleeperEvaluation]) -> Provenance {
     }
 }
 
-/// Ranges and errors of the parameters by the models of these speeds.
+/// Ranges and errors of the parameters for the models of these speeds.
 fn known(twin: &Twin<'_>, speeds_km_h: &[f64]) -> BTreeMap<Parameter, Known> {
     let Twin { models, library, .. } = twin;
     let groups: Vec<_> = match models.group(speeds_km_h, METHOD_FEATURE) {

@@ -5,10 +5,10 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
 
-/// The format of `evaluation.json`.
+/// Value of the field `format` in `evaluation.json`.
 pub const FORMAT: &str = "tracktwin-evaluation/1";
 
-/// An estimated value, in the parameter's unit.
+/// Mean and standard deviation of a parameter, in the unit of the parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     /// Expected value.
@@ -17,19 +17,19 @@ pub struct Estimate {
     pub sd: f64,
 }
 
-/// An estimate a parameter, in catalogue order.
+/// One estimate per parameter, in catalogue order.
 pub type Estimates = BTreeMap<Parameter, Estimate>;
 
 /// The track's parameters along a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// [`FORMAT`].
+    /// Always [`FORMAT`].
     pub format: &'static str,
-    /// The recording's name.
+    /// Name of the recording.
     pub recording: String,
-    /// How the sleepers' own estimates were made: `gp`.
+    /// Method of the estimates: `gp` (Gaussian processes).
     pub method: &'static str,
-    /// Where they come from.
+    /// Models and data of the estimates.
     pub provenance: Provenance,
     /// The sleepers, along the track.
     pub sleepers: Vec<SleeperEvaluation>,
@@ -37,33 +37,33 @@ pub struct Evaluation {
     pub unevaluated: Vec<Unevaluated>,
     /// Part of the recording outside the library.
     pub outside_library: OutsideLibrary,
-    /// How much sleepers are taken to differ.
+    /// Assumed unevenness of the track.
     pub unevenness: Unevenness,
     /// Passes left out, with the reason.
     pub notes: Vec<String>,
-    /// Frequencies of the bins in Hz, ascending; for pictures.
+    /// Frequencies of the bins in Hz, ascending; for charts, not written to files.
     #[serde(skip)]
     pub frequencies_hz: Vec<f64>,
 }
 
-/// Provenance of the estimates.
+/// Models and data of the estimates.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Provenance {
     /// Version of this program.
     pub code_version: &'static str,
-    /// The campaign the models were trained on.
+    /// The campaign on which the models were trained.
     pub campaign: String,
-    /// Digest of its library.
+    /// Digest of the campaign's library.
     pub library_digest: String,
-    /// Library entries, those kept for testing included.
+    /// Number of library entries, including the test half.
     pub library_entries: usize,
     /// Feature set of the models.
     pub feature: &'static str,
-    /// How features are made.
+    /// Definition of the features.
     pub feature_definition: serde_json::Value,
     /// Speeds of the models in km/h that the recording has, ascending.
     pub speeds_km_h: Vec<f64>,
-    /// Which models speak where a sleeper has all of these speeds.
+    /// Models that are used where a sleeper has all of these speeds.
     pub combination: &'static str,
     /// Range and error of each parameter.
     pub parameters: BTreeMap<Parameter, Known>,
@@ -72,20 +72,20 @@ pub struct Provenance {
 /// Range and error of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Known {
-    /// Lowest and highest value in the library, in the parameter's unit. Means stay inside.
+    /// Lowest and highest value in the library, in the parameter's unit. Estimated means lie inside.
     pub range: [f64; 2],
-    /// Mean absolute error on the test half over that range (paper, eq. 11), of the best of the
-    /// models that speak.
+    /// Mean absolute error on the test half, divided by the range (paper, eq. 11), of the best model in
+    /// use.
     pub mase_test: f64,
-    /// The same of a constant, the library's median.
+    /// Mean absolute error of a constant (the library's median), divided by the range.
     pub mase_constant: f64,
 }
 
 impl Known {
-    /// Share of a constant's error above which a parameter counts as not resolved.
+    /// A parameter counts as not resolved if its error exceeds this share of the error of a constant.
     const HARDLY: f64 = 0.9;
 
-    /// Whether the models estimate the parameter noticeably better than a constant.
+    /// Whether the error of the models is clearly smaller than that of a constant.
     pub fn beats_constant(&self) -> bool {
         self.mase_test < Self::HARDLY * self.mase_constant
     }
@@ -94,31 +94,31 @@ impl Known {
 /// A sleeper that was evaluated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SleeperEvaluation {
-    /// Its name.
+    /// Id of the sleeper.
     pub id: String,
-    /// Its place along the track in m.
+    /// Position along the track in m.
     pub x_m: f64,
-    /// Mean and standard deviation by Gaussian processes.
+    /// Mean and standard deviation of every parameter, from Gaussian processes.
     #[serde(flatten)]
     pub estimates: Estimates,
-    /// Standard deviations without the unevenness of the track.
+    /// Standard deviations without the part that the unevenness of the track adds.
     #[serde(rename = "sd_if_even")]
     pub sd_without_unevenness: BTreeMap<Parameter, f64>,
-    /// The model selector's answer.
+    /// Result of the model selector.
     pub selector: Selected,
-    /// Flags of its estimates.
+    /// Flags of the estimates.
     pub flags: Vec<Flag>,
-    /// Passes that were averaged at each speed.
+    /// Measured features at each speed.
     pub measured: Vec<Measured>,
 }
 
 /// The library entries nearest to a sleeper's features (paper, eq. 7, 8 and 10).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Selected {
-    /// Mean and standard deviation over the matches.
+    /// Mean and standard deviation of every parameter over the matches.
     #[serde(flatten)]
     pub estimates: Estimates,
-    /// Rows of the library that match best, the best first.
+    /// Rows of the best matches in the library, the best first.
     pub entries: Vec<usize>,
     /// Mean absolute percentage error of each match (0.05 is 5 %; paper, eq. 10).
     pub mape: Vec<f64>,
@@ -129,59 +129,59 @@ pub struct Selected {
 pub struct Measured {
     /// Speed of the models in km/h.
     pub speed_km_h: f64,
-    /// Passes averaged.
+    /// Number of averaged passes.
     pub passes: usize,
-    /// Mean over passes of the ln LWPS, a value a bin; for pictures.
+    /// Mean over the passes of the natural logarithm of the LWPS, one value per bin; for charts.
     #[serde(skip)]
     pub log_power: Vec<f64>,
-    /// The ln LWPS of the matches, the best first; for pictures.
+    /// Natural logarithms of the LWPS of the matches, the best first, one value per bin; for charts.
     #[serde(skip)]
     pub matches: Vec<Vec<f64>>,
 }
 
-/// Something to keep in mind about a sleeper's estimates.
+/// Limitation of the estimates of a sleeper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Flag {
     /// A pass covers only part of the sleeper's window.
     IncompleteWindow,
-    /// A pass begins or ends so near that low frequencies lack signal beside the window.
+    /// A pass begins or ends so close to the window that low frequencies lack part of their margin.
     ShortMargin,
-    /// A speed is missing: single-speed models were combined.
+    /// A speed is missing; the estimates combine single-speed models.
     MissingSpeed,
-    /// A mean lies at an end of what the library's tracks have: the track may lie beyond.
+    /// A mean lies at an end of the parameter's range in the library; the true value may lie beyond.
     AtEdgeOfRange,
-    /// It differs from its neighbours by more than the track varies elsewhere.
+    /// The sleeper differs from its neighbours by more than the track varies elsewhere.
     UnlikeNeighbours,
-    /// The railpad is so stiff that stiffer ones hardly change the recording: its stiffness is a lower
-    /// bound.
+    /// The railpad stiffness is a lower bound, because a stiffer railpad hardly changes the recording.
     RailpadAtLeast,
-    /// The wheel is in the air in the sleeper's window: what was recorded there is hardly the track's.
+    /// The wheel is off the rail in the sleeper's window; the recorded acceleration hardly depends on the
+    /// track.
     LossOfContact,
-    /// The features are such as no track of the library has: the estimates are not valid.
+    /// No track of the library can produce the features; the estimates are not valid.
     OutsideLibrary,
 }
 
 /// A sleeper without estimates.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unevaluated {
-    /// Its name.
+    /// Id of the sleeper.
     pub id: String,
-    /// Its place along the track in m.
+    /// Position along the track in m.
     pub x_m: f64,
-    /// Why there are none.
+    /// Reason for the missing estimates.
     pub reason: &'static str,
 }
 
 impl SleeperEvaluation {
-    /// Whether the estimates, the selector's too, mean anything.
+    /// Whether the estimates, including those of the model selector, are valid.
     pub fn is_valid(&self) -> bool {
         !self.flags.contains(&Flag::OutsideLibrary)
     }
 }
 
 impl Flag {
-    /// A few words for a person.
+    /// Short description in English.
     pub const fn label(self) -> &'static str {
         match self {
             Self::IncompleteWindow => "incomplete window",
@@ -195,7 +195,7 @@ impl Flag {
         }
     }
 
-    /// Its name in files.
+    /// Name of the flag in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::IncompleteWindow => "incomplete_window",

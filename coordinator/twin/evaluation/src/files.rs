@@ -13,7 +13,7 @@ impl Evaluation {
         text
     }
 
-    /// The text of `evaluation.csv`: a row a sleeper, units in the heads.
+    /// The text of `evaluation.csv`: one row per sleeper, with units in the column names.
     pub fn to_csv(&self) -> String {
         let parameters = self.parameters();
         let mut rows = vec![head(&parameters)];
@@ -29,7 +29,7 @@ impl Evaluation {
     /// Adds `evaluation.csv` and `evaluation.json` to the files of a folder.
     ///
     /// # Errors
-    /// [`FilesError`] names the file that cannot be written.
+    /// [`FilesError`] with the file that cannot be written.
     pub fn add_to(&self, output: &mut Output) -> Result<(), FilesError> {
         output.add(&FileName::new("evaluation.csv")?, self.to_csv().as_bytes())?;
         output.add(&FileName::new("evaluation.json")?, self.to_json().as_bytes())

@@ -1,8 +1,8 @@
-//! From a recording to the track's parameters, sleeper by sleeper.
+//! Evaluation of a recording: estimates of the track parameters at every sleeper.
 //!
-//! Owns the features of a sleeper from several passes, their way through surrogates and model
-//! selector, and the files that say the outcome. Leaves to others what a window and a feature is
-//! (signal), what a model predicts (surrogate) and how it looks on a page (report).
+//! This crate computes the features of a sleeper from several passes, applies surrogates and model
+//! selector, and writes the files of the result. Other crates define windows and features (signal), predict
+//! parameters from features (surrogate) and make pages (report).
 
 mod check;
 mod error;

@@ -5,13 +5,13 @@ use crate::{Error, SpeedFeatures};
 use std::collections::HashMap;
 use tracktwin_surrogate::{Selection, Selector, TrainingSet, mape};
 
-/// How many of the nearest entries are averaged (paper, section 3.1.2).
+/// Number of nearest entries that are averaged (paper, section 3.1.2).
 pub const MATCHES: usize = 10;
 
-/// Selectors over the library, one for every set of speeds that is asked for.
+/// Selectors over the library, one for every set of speeds in use.
 pub(crate) struct Matcher<'a> {
     library: &'a TrainingSet,
-    /// Values of every varied parameter, an entry each.
+    /// Values of every varied parameter, one per entry.
     values: Vec<Vec<f64>>,
     selectors: HashMap<Vec<usize>, Selector>,
 }
@@ -24,7 +24,7 @@ impl<'a> Matcher<'a> {
         Self { library, values, selectors: HashMap::new() }
     }
 
-    /// The best matches of a sleeper's features, all its speeds side by side.
+    /// The best matches of a sleeper's features, with all its speeds one after the other.
     pub(crate) fn select(&mut self, speeds: &[SpeedFeatures]) -> Result<Selected, Error> {
         let key: Vec<usize> = speeds.iter().map(|known| known.speed).collect();
         let observed: Vec<f64> =
@@ -50,13 +50,13 @@ impl<'a> Matcher<'a> {
         })
     }
 
-    /// The ln LWPS of library entries at a speed, a value a bin each.
+    /// Natural logarithms of the LWPS of library entries at a speed, one value per bin.
     pub(crate) fn log_powers(&self, speed: usize, entries: &[usize]) -> Vec<Vec<f64>> {
         entries.iter().map(|&entry| row(self.library, speed, entry).to_vec()).collect()
     }
 }
 
-/// The ln-powers of all entries with these speeds side by side, row-major.
+/// The ln-powers of all entries with these speeds one after the other, row-major.
 fn side_by_side(library: &TrainingSet, speeds: &[usize]) -> Vec<f64> {
     let bins = library.frequencies_hz.len();
     let mut table = Vec::with_capacity(library.entries() * speeds.len() * bins);

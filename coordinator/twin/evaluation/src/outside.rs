@@ -1,8 +1,8 @@
-//! Which sleepers' features lie outside what the library knows.
+//! Domain check of a recording: the sleepers whose features are outside the library.
 //!
-//! A track outside the library is outside at many sleepers, and the mean over them is more
-//! significant than each. So running windows of one, three, seven and all sleepers are tested, and
-//! a sleeper is outside if any window that contains it is.
+//! A track outside the library is outside at many sleepers, and the mean over these sleepers is more
+//! significant than a single one. The check therefore tests running windows of one, three, seven and all
+//! sleepers. A sleeper is outside if any window that contains it is outside.
 
 use crate::{Error, Flag, SleeperFeatures};
 use serde::Serialize;
@@ -11,11 +11,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tracktwin_parameters::Parameter;
 use tracktwin_surrogate::{Beyond, Domain, Judgement, Side, TrainingSet};
 
-/// Share of the library's own tracks in which some sleeper may be called outside.
+/// False-alarm rate: share of the library's own tracks in which at least one sleeper may be flagged.
 const FALSE_RATE: f64 = 0.01;
-/// Sleepers in a running window; the whole track is judged beside.
+/// Numbers of sleepers in a running window; the whole track is tested in addition.
 const SIZES: [usize; 3] = [1, 3, 7];
-/// Share of the sleepers outside that an end must explain to be named.
+/// An end is reported if it explains at least this share of the sleepers outside.
 const NAMED_FROM: f64 = 0.2;
 
 /// Part of a recording outside the library.
@@ -23,24 +23,24 @@ const NAMED_FROM: f64 = 0.2;
 pub struct OutsideLibrary {
     /// Share of the evaluated sleepers, 0 to 1.
     pub share: f64,
-    /// Parameters whose range must be wider, the one that explains most first.
+    /// Parameters whose range must be wider, sorted by the number of sleepers they explain, largest first.
     pub widen: Vec<Parameter>,
-    /// The ends that the track lies beyond.
+    /// The ends of ranges that the track exceeds.
     pub ends: Vec<BeyondEnd>,
-    /// Sleepers outside that no range explains.
+    /// Number of sleepers outside that no range explains.
     pub unexplained: usize,
 }
 
-/// An end of a range that sleepers lie beyond.
+/// An end of a parameter range that some sleepers exceed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BeyondEnd {
     /// The parameter.
     pub parameter: Parameter,
-    /// Which end.
+    /// The end of the range.
     pub side: Side,
-    /// The library's value there, in the parameter's unit.
+    /// Value of the library at this end, in the parameter's unit.
     pub value: f64,
-    /// How many sleepers.
+    /// Number of sleepers beyond this end.
     pub sleepers: usize,
 }
 
@@ -61,7 +61,7 @@ impl Domains {
     }
 }
 
-/// Whether a sleeper is outside, and beyond what.
+/// Result of the domain check of a sleeper: whether it is outside, and the end that it exceeds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DomainTest {
     pub(crate) outside: bool,
@@ -71,7 +71,7 @@ pub(crate) struct DomainTest {
 }
 
 impl DomainTest {
-    /// Takes a window's result; larger windows determine the violated range more reliably.
+    /// Adds the result of a window; larger windows determine the exceeded range more reliably.
     fn take(&mut self, judgement: &Judgement, window: usize) {
         if !judgement.is_outside() {
             return;
@@ -84,9 +84,9 @@ impl DomainTest {
     }
 }
 
-/// The test of every sleeper, in their order.
+/// Domain check of every sleeper, in the order of `sleepers`.
 ///
-/// Sleepers whose windows are not complete are judged by the whole track only.
+/// Sleepers with incomplete windows take the result of the whole track only.
 ///
 /// # Errors
 /// Errors of [`Domain`].
@@ -112,7 +112,7 @@ pub(crate) fn judge(
     Ok(tests)
 }
 
-/// The test of the last sleeper only, as [`judge`] does it.
+/// Domain check of the last sleeper only, with the rules of [`judge`].
 ///
 /// # Errors
 /// Errors of [`Domain`].
@@ -140,7 +140,7 @@ pub(crate) fn judge_last(
     Ok(test)
 }
 
-/// The sleepers by their speeds.
+/// Indices of the sleepers, grouped by their speeds.
 fn by_speeds(sleepers: &[SleeperFeatures]) -> BTreeMap<Vec<usize>, Vec<usize>> {
     let mut by_speeds: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
     for (index, sleeper) in sleepers.iter().enumerate() {
@@ -156,7 +156,7 @@ struct Windows {
     members: Vec<usize>,
     /// The members whose own windows are complete.
     whole: Vec<usize>,
-    /// Coordinates of each of these.
+    /// Coordinates of each sleeper in `whole`.
     coordinates: Vec<Vec<f64>>,
 }
 
@@ -189,15 +189,15 @@ impl Windows {
         sizes
     }
 
-    /// Judges the window of `size` sleepers that begins with the `first`; `groups` sets of speeds share
-    /// the rate of false alarms.
+    /// Tests the window of `size` sleepers that begins with the `first`; the `groups` sets of speeds share
+    /// the false-alarm rate.
     fn judge(&self, first: usize, size: usize, groups: usize) -> Result<Judgement, Error> {
         let windows = self.whole.len() + 1 - size;
         let probability = FALSE_RATE / (groups * self.sizes().len() * windows) as f64;
         Ok(self.domain.judge(&mean(&self.coordinates[first..first + size]), size, probability)?)
     }
 
-    /// The sleepers that a window speaks of.
+    /// The sleepers to which the result of a window applies.
     fn held(&self, first: usize, size: usize) -> &[usize] {
         if size == self.whole.len() { &self.members } else { &self.whole[first..first + size] }
     }
@@ -217,7 +217,7 @@ fn mean(rows: &[Vec<f64>]) -> Vec<f64> {
 }
 
 impl OutsideLibrary {
-    /// The verdicts on a recording, taken together.
+    /// Summary of the domain checks of a recording.
     pub(crate) fn of(tests: &[DomainTest], library: &TrainingSet) -> Self {
         let outside: Vec<&DomainTest> = tests.iter().filter(|test| test.outside).collect();
         let mut counts: BTreeMap<Beyond, usize> = BTreeMap::new();
@@ -245,12 +245,12 @@ impl OutsideLibrary {
         Self { share, widen, ends, unexplained }
     }
 
-    /// Whether most sleepers are outside: the recording as a whole has no answer.
+    /// Whether most sleepers are outside; the recording as a whole then has no valid result.
     pub fn is_most(&self) -> bool {
         self.share > 0.5
     }
 
-    /// Sentences on the sleepers outside and the remedy; none if nothing is outside.
+    /// Sentences on the sleepers outside and the remedy; empty if no sleeper is outside.
     pub fn sentences(&self) -> Vec<String> {
         if self.share <= 0.0 {
             return Vec::new();
@@ -272,7 +272,7 @@ impl OutsideLibrary {
 }
 
 impl BeyondEnd {
-    /// The end in words, and what to do.
+    /// A sentence on the end and its remedy.
     fn sentence(&self) -> String {
         let Self { parameter, side, value, sleepers } = self;
         let than = match side {
@@ -290,7 +290,7 @@ impl BeyondEnd {
     }
 }
 
-/// The value with three significant digits.
+/// `value` with three significant digits.
 fn rounded(value: f64) -> String {
     let text = format!("{value:.2e}");
     match text.parse::<f64>() {

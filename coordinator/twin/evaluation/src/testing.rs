@@ -48,7 +48,7 @@ pub(crate) fn recording(level: f64, speeds_km_h: &[f64]) -> Recording {
     long_recording(level, speeds_km_h, 7)
 }
 
-/// The same of any number of sleepers.
+/// A recording as made by [`recording`], with any number of sleepers.
 pub(crate) fn long_recording(level: f64, speeds_km_h: &[f64], sleepers: u32) -> Recording {
     let pass = |(number, &speed_km_h): (usize, &f64)| {
         let samples = window_samples(speed_km_h) * (sleepers as usize - 1);

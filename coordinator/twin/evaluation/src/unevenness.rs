@@ -1,49 +1,50 @@
 //! Additional uncertainty from the unevenness of the track.
 //!
-//! The library's tracks are even. The Gaussian processes resolve only a part of a sleeper's
-//! deviation from its neighbours, and no test on the library shows the rest. The unevenness follows
-//! from the variation of the means along the track beyond their standard deviations, and is at
-//! least [`LEAST`].
+//! The tracks of the library are even. The Gaussian processes resolve only a part of a sleeper's deviation
+//! from its neighbours, and no test on the library shows the rest. The unevenness follows from the
+//! variation of the estimated means along the track beyond their standard deviations, and is at least
+//! [`LEAST`].
 
 use crate::evaluation::{Estimate, Estimates};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
 
-/// Scatter over mean that every track is taken to have at least.
+/// Smallest unevenness that is assumed for any track.
 const LEAST: f64 = 0.05;
-/// Scatter beyond which none is taken to be learned.
+/// Largest unevenness that is estimated.
 const MOST: f64 = 0.6;
-/// Standard deviation of the means along a track over that of the sleepers' own values; measured
-/// with `tracktwin coverage` on tracks of 15 and 30 % scatter (`docs/models.md`).
+/// Ratio of the standard deviation of the estimated means along a track to that of the true values;
+/// measured with `tracktwin coverage` on tracks of 15 and 30 % unevenness (`docs/models.md`).
 const SEEN: f64 = 0.4;
-/// Part of the estimates' variance that differs from sleeper to sleeper on an even track; the rest
-/// is an error common to the track. Measured in the same way.
+/// Share of the variance of the estimates that differs from sleeper to sleeper on an even track; the rest
+/// is an error common to the track. Measured with `tracktwin coverage`.
 const OWN_SHARE: f64 = 0.5;
-/// Part of a sleeper's own deviation that its estimate lacks, measured in the same way.
+/// Share of a sleeper's own deviation that its estimate does not contain; measured with `tracktwin
+/// coverage`.
 const MISSED: f64 = 0.85;
-/// Sleepers below which nothing is learned of the scatter.
+/// Smallest number of sleepers from which the unevenness is estimated.
 const SLEEPERS_MIN: usize = 5;
 /// Parameters that differ from sleeper to sleeper.
 const OWN: [Parameter; 2] = [Parameter::RailpadStiffness, Parameter::BallastStiffness];
 
-/// How much the sleepers of a recording are taken to differ.
+/// Assumed unevenness of the sleepers of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unevenness {
-    /// Standard deviation of railpad and ballast stiffness from sleeper to sleeper over their mean.
+    /// Standard deviation of railpad and ballast stiffness from sleeper to sleeper, divided by the mean.
     pub scatter: f64,
-    /// The least that is ever assumed.
+    /// Smallest value of `scatter` that is assumed.
     pub least: f64,
-    /// The parameter whose means determined it; none if the minimum was assumed.
+    /// The parameter whose means determined `scatter`; `None` if the minimum was assumed.
     pub learned_from: Option<Parameter>,
 }
 
 impl Unevenness {
-    /// The unevenness from the estimates of these sleepers, with the standard deviations of an even
-    /// track.
+    /// Estimates the unevenness from the estimates of these sleepers, which must have the standard
+    /// deviations of an even track.
     ///
-    /// The parameter with the smallest standard deviations is used, because it is the most
-    /// informative.
+    /// The function uses the parameter with the smallest standard deviations, because this parameter is the
+    /// most informative.
     pub(crate) fn of(told: &[&Estimates]) -> Self {
         let learned = OWN
             .into_iter()
@@ -59,8 +60,8 @@ impl Unevenness {
         Self { scatter, least: LEAST, learned_from }
     }
 
-    /// Widens the standard deviations of what differs from sleeper to sleeper; gives those of an
-    /// even track.
+    /// Widens the standard deviations of the parameters that differ from sleeper to sleeper, and returns
+    /// the standard deviations of an even track.
     pub(crate) fn widen(&self, estimates: &mut Estimates) -> BTreeMap<Parameter, f64> {
         let even =
             estimates.iter().map(|(&parameter, estimate)| (parameter, estimate.sd)).collect();
@@ -72,7 +73,7 @@ impl Unevenness {
         even
     }
 
-    /// The assumption in words.
+    /// The assumption as a sentence.
     pub fn sentence(&self) -> String {
         let how = if self.learned_from.is_some() {
             "from the estimates along the track"
@@ -90,9 +91,9 @@ impl Unevenness {
 
 /// Variances of the logarithm along a track.
 struct Variances {
-    /// Of the means.
+    /// Variance of the estimated means.
     seen: f64,
-    /// Variance expected for an even track: that of the estimates.
+    /// Variance of the means expected for an even track, from the standard deviations of the estimates.
     expected: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The features of sleepers: every pass's window, averaged over the passes of one speed.
+//! Features of sleepers: the features of a window, averaged over the passes of one speed.
 
 use crate::{Error, Flag};
 use rayon::prelude::*;
@@ -6,23 +6,23 @@ use std::ops::Range;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureError, Signal};
 
-/// Relative difference between a pass's speed and a model's within which they are one speed.
+/// Relative difference between the speeds of a pass and of a model below which the speeds count as equal.
 ///
-/// A drive holds its speed about that well; two per cent move a track's features by a third of a
-/// bin at most, as positions stay what they are.
+/// A drive holds its speed within about 2 %. This difference moves the features of a track by a third of a
+/// bin at most, because the positions do not change.
 pub(crate) const SPEED_TOLERANCE: f64 = 0.02;
 /// A window counts as complete from this share on: odometers drift by a few millimetres.
 const COMPLETE_SHARE: f64 = 0.98;
-/// A margin counts as short below this share: its last quarter is where the signal fades out
-/// anyway, so that three quarters of it lose only the outermost part of wavelets below 70 Hz.
+/// A margin counts as short below this share. The signal fades out in the last quarter of a margin. Three
+/// quarters of a margin therefore lose only the outermost part of wavelets below 70 Hz.
 const MARGIN_SHARE: f64 = 0.75;
 
 /// Features of a sleeper from all passes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SleeperFeatures {
-    /// Place of the sleeper in [`Recording::sleepers`].
+    /// Index of the sleeper in [`Recording::sleepers`].
     pub sleeper: usize,
-    /// Speeds with at least one pass over it, ascending.
+    /// Speeds with at least one pass over the sleeper, ascending.
     pub speeds: Vec<SpeedFeatures>,
     /// Flags, ascending, each once.
     pub flags: Vec<Flag>,
@@ -31,19 +31,19 @@ pub struct SleeperFeatures {
 /// Features of a sleeper at one speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpeedFeatures {
-    /// Place of the speed among the models' speeds.
+    /// Index of the speed among the speeds of the models.
     pub speed: usize,
-    /// Passes averaged.
+    /// Number of averaged passes.
     pub passes: usize,
-    /// Mean over the passes of the natural logarithm of the LWPS, a value a bin.
+    /// Mean over the passes of the natural logarithm of the LWPS, one value per bin.
     pub log_power: Vec<f64>,
 }
 
-/// Features of every sleeper of the recording; sleepers that no pass covers have no speeds.
+/// Computes the features of every sleeper of the recording; a sleeper that no pass covers has no speeds.
 ///
 /// # Errors
-/// [`Error::UnknownSpeed`] when a pass has a speed that is none of `speeds_km_h`,
-/// [`Error::Features`] when a window has no features.
+/// [`Error::UnknownSpeed`] if the speed of a pass is none of `speeds_km_h`; [`Error::Features`] if the
+/// features of a window cannot be computed.
 pub fn features(
     recording: &Recording,
     extractor: &Extractor,
@@ -60,7 +60,7 @@ pub fn features(
         .collect()
 }
 
-/// Place among the `known` speeds of the one that a pass of the recording has.
+/// Index, among the `known` speeds in km/h, of the speed of a pass of the recording.
 pub(crate) fn speed_index(
     recording: &Recording,
     speed_km_h: f64,
@@ -73,7 +73,7 @@ pub(crate) fn speed_index(
     })
 }
 
-/// Place among the `known` speeds in km/h of the one that this speed is, if any.
+/// Index, among the `known` speeds in km/h, of the speed that equals this one within the tolerance, if any.
 pub(crate) fn speed_among(speed_km_h: f64, known: &[f64]) -> Option<usize> {
     known.iter().position(|speed| (speed_km_h / speed - 1.0).abs() <= SPEED_TOLERANCE)
 }
@@ -100,16 +100,16 @@ fn sleeper_features(
 }
 
 impl SleeperFeatures {
-    /// Of a sleeper before any pass.
+    /// Features of a sleeper without passes.
     pub(crate) const fn none(sleeper: usize) -> Self {
         Self { sleeper, speeds: Vec::new(), flags: Vec::new() }
     }
 
-    /// Takes the window of a pass with this signal, which covers this share of the window with these
-    /// samples, at the speed with this place among the models' speeds.
+    /// Adds the window of a pass. `share` is the covered share of the window, `samples` its range in the
+    /// signal, and `speed` the index among the speeds of the models.
     ///
     /// # Errors
-    /// [`FeatureError`].
+    /// [`FeatureError`] if the features cannot be computed.
     pub(crate) fn take(
         &mut self,
         extractor: &Extractor,
@@ -139,7 +139,7 @@ impl SleeperFeatures {
 }
 
 impl SpeedFeatures {
-    /// Takes one more pass into the mean.
+    /// Adds one more pass to the mean.
     fn add(&mut self, log_power: &[f64]) {
         self.passes += 1;
         let share = 1.0 / self.passes as f64;

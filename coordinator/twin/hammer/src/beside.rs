@@ -1,24 +1,24 @@
-//! Stiffness without load, from a hammer test, beside that under a wheel, from an evaluation.
+//! Comparison of the stiffness without load (hammer test) with the stiffness under a wheel (evaluation).
 
 use crate::record::{HammerRecord, NINETY_PER_CENT};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
 
-/// Compared in the order of pages.
+/// Compared parameters, in the order of the report pages.
 const COMPARED: [Parameter; 2] = [Parameter::RailpadStiffness, Parameter::BallastStiffness];
 
-/// Standard deviations of their difference beyond which two estimates differ beyond chance: by
-/// chance one in 370 does.
+/// Two estimates differ beyond chance if they differ by more than this number of standard deviations of
+/// their difference; by chance one pair in 370 does.
 const BEYOND_CHANCE: f64 = 3.0;
 
-/// Distance in m up to which two sleepers are one, as a share of the spacing.
+/// Largest distance of two positions of the same sleeper, as a share of the spacing.
 const SAME_PLACE: f64 = 0.25;
 
-/// Format of the file of an evaluation.
+/// Required value of the field `format` in the file of an evaluation.
 const FORMAT: &str = "tracktwin-evaluation/1";
 
-/// Flags of sleepers whose estimates are not compared: not valid, or not those of a pressed contact.
+/// Flags of sleepers that are not compared: the estimates are not valid, or the wheel lost contact.
 const NOT_COMPARED: [&str; 2] = ["outside_library", "loss_of_contact"];
 /// Flag of sleepers whose railpad stiffness is only a lower bound.
 const LOWER_BOUND: &str = "railpad_at_least";
@@ -29,16 +29,16 @@ pub struct Loaded {
     format: String,
     /// Name of the recording.
     pub recording: String,
-    /// Its sleepers.
+    /// Sleepers of the recording.
     pub sleepers: Vec<LoadedSleeper>,
 }
 
 /// A sleeper of an evaluation.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct LoadedSleeper {
-    /// Its name.
+    /// Id of the sleeper.
     pub id: String,
-    /// Its place along the track in m.
+    /// Position along the track in m.
     pub x_m: f64,
     #[serde(default)]
     flags: Vec<String>,
@@ -47,44 +47,44 @@ pub struct LoadedSleeper {
     fields: BTreeMap<String, serde_json::Value>,
 }
 
-/// Why an evaluation cannot be compared.
+/// Reason why an evaluation cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum BesideError {
-    /// The file is not one of `evaluate`.
+    /// The text is not the JSON of an evaluation.
     #[error("not a file of `tracktwin evaluate`: {0}")]
     Format(#[from] serde_json::Error),
     /// The file has another format.
     #[error("the format is `{found}`, not `{FORMAT}`; evaluate the recording again")]
     OtherFormat {
-        /// Its format.
+        /// Format found in the file.
         found: String,
     },
 }
 
-/// One parameter without load beside itself under load.
+/// Comparison of one parameter without and under load.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Beside {
     /// The parameter.
     pub parameter: Parameter,
-    /// Sleepers that both say something valid about.
+    /// Number of sleepers with valid estimates in both.
     pub sleepers: usize,
-    /// Those at which both differ beyond chance.
+    /// Ids of the sleepers at which the two estimates differ beyond chance.
     pub differ: Vec<String>,
-    /// Value under load over that without load, mean of the logarithms over the sleepers, and the
-    /// ends of its 90 % interval; the errors of neighbouring sleepers count as one.
+    /// Ratio of the value under load to the value without load (geometric mean over the sleepers), and the
+    /// lower and upper end of its 90 % interval. The errors of neighbouring sleepers count as one error.
     pub ratio: [f64; 3],
-    /// Whether the mean differs from one beyond chance.
+    /// Whether the mean ratio differs from one beyond chance.
     pub mean_differs: bool,
-    /// Whether what differs beyond chance is stiffer under load: the mean, or else those sleepers on
-    /// average.
+    /// Whether the stiffness is higher under load: in the mean if `mean_differs`, otherwise on average over
+    /// the sleepers in `differ`.
     pub is_stiffer: bool,
 }
 
 impl Loaded {
-    /// Reads the text of an `evaluation.json`.
+    /// Parses the text of an `evaluation.json`.
     ///
     /// # Errors
-    /// [`BesideError`] with the error of the parser or with the other format.
+    /// [`BesideError::Format`] with the error of the parser, or [`BesideError::OtherFormat`].
     pub fn parse(text: &str) -> Result<Self, BesideError> {
         let loaded: Self = serde_json::from_str(text)?;
         if loaded.format == FORMAT {
@@ -94,7 +94,7 @@ impl Loaded {
         }
     }
 
-    /// The sleeper at a place in m, on a track of this spacing in m.
+    /// The sleeper at the position `x_m` in m, within a quarter of `spacing_m` (spacing of the track in m).
     pub fn at(&self, x_m: f64, spacing_m: f64) -> Option<&LoadedSleeper> {
         let distance_m = |sleeper: &&LoadedSleeper| (sleeper.x_m - x_m).abs();
         let nearest = self.sleepers.iter().min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
@@ -103,8 +103,8 @@ impl Loaded {
 }
 
 impl LoadedSleeper {
-    /// Mean and standard deviation of a parameter; none where the evaluation is not valid, where the
-    /// wheel lost contact, and for a railpad stiffness that is a lower bound.
+    /// Mean and standard deviation of a parameter, in its unit. `None` if the estimates are not valid, if
+    /// the wheel lost contact, or if a railpad stiffness is only a lower bound.
     pub fn estimate(&self, parameter: Parameter) -> Option<[f64; 2]> {
         let is_bound = parameter == Parameter::RailpadStiffness;
         let is_left_out = |flag: &String| {
@@ -118,7 +118,7 @@ impl LoadedSleeper {
         Some([number("mean")?, number("sd")?])
     }
 
-    /// Logarithm's median and standard deviation of the log-normal estimate.
+    /// Mean and standard deviation of the logarithm, for a log-normal estimate.
     fn logarithm(&self, parameter: Parameter) -> Option<[f64; 2]> {
         let [mean, sd] = self.estimate(parameter)?;
         let variance = (sd / mean).powi(2).ln_1p();
@@ -126,7 +126,7 @@ impl LoadedSleeper {
     }
 }
 
-/// Compares both at every sleeper that both say something about; `spacing_m` is that of the track.
+/// Compares the estimates at every sleeper that is valid in both; `spacing_m` is the sleeper spacing in m.
 pub fn beside(record: &HammerRecord, loaded: &Loaded, spacing_m: f64) -> Vec<Beside> {
     let of = |parameter: Parameter| {
         let mut differ = Vec::new();
@@ -163,12 +163,12 @@ pub fn beside(record: &HammerRecord, loaded: &Loaded, spacing_m: f64) -> Vec<Bes
 }
 
 impl Beside {
-    /// Whether both differ at more sleepers than chance allows, or in the mean.
+    /// Whether the estimates differ at more sleepers than chance allows, or in the mean.
     pub fn differs(&self) -> bool {
         self.sleepers_differ() || self.mean_differs
     }
 
-    /// Whether both differ at more sleepers than chance allows.
+    /// Whether the estimates differ at more sleepers than chance allows.
     fn sleepers_differ(&self) -> bool {
         self.differ.len() > 1 + self.sleepers / 50
     }
@@ -194,7 +194,7 @@ impl Beside {
         format!("{numbers}; beyond chance {places}; possible reason: {}.", self.reason())
     }
 
-    /// Why both may differ.
+    /// Possible reason for the difference.
     const fn reason(&self) -> &'static str {
         let is_railpad = matches!(self.parameter, Parameter::RailpadStiffness);
         match (is_railpad, self.is_stiffer) {

@@ -1,10 +1,10 @@
-//! `estimates.csv` and `estimates.json`.
+//! Files `estimates.csv` and `estimates.json`.
 
 use crate::record::HammerRecord;
 use tracktwin_files::{FileName, FilesError, Output};
 use tracktwin_parameters::Parameter;
 
-/// What `estimates.csv` holds of each sleeper; `estimates.json` holds the dampings too.
+/// Parameters in `estimates.csv`; `estimates.json` also contains the damping.
 const COLUMNS: [Parameter; 3] =
     [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::SleeperBendingStiffness];
 
@@ -17,7 +17,7 @@ impl HammerRecord {
         text
     }
 
-    /// The text of `estimates.csv`: a row a sleeper, units in the heads.
+    /// The text of `estimates.csv`: one row per sleeper, with units in the column names.
     pub fn to_csv(&self) -> String {
         let mut writer = csv::Writer::from_writer(Vec::new());
         let mut head = vec!["id".to_owned(), "x_m".to_owned()];
@@ -43,10 +43,10 @@ impl HammerRecord {
         String::from_utf8(bytes).expect("names and numbers are text")
     }
 
-    /// Adds both files to those of a folder.
+    /// Adds `estimates.csv` and `estimates.json` to the files of a folder.
     ///
     /// # Errors
-    /// [`FilesError`] names the file that cannot be written.
+    /// [`FilesError`] with the file that cannot be written.
     pub fn add_to(&self, output: &mut Output) -> Result<(), FilesError> {
         output.add(&FileName::new("estimates.csv")?, self.to_csv().as_bytes())?;
         output.add(&FileName::new("estimates.json")?, self.to_json().as_bytes())

@@ -1,4 +1,4 @@
-//! The fit of a track to the receptances of a hammer test.
+//! Fit of a track to the receptances of a hammer test.
 
 use crate::forward::{Forward, PointResidual};
 use crate::layout::{Layout, LayoutError};
@@ -8,24 +8,25 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use tracktwin_parameters::Track;
 use tracktwin_track::model::ModelError;
 
-/// Neighbouring values that count as one where the model errs: its errors are alike over a third of
+/// Number of neighbouring values with the same model error: the model error is correlated over a third of
 /// an octave.
 const ALIKE: f64 = 8.0;
 
-/// Standard deviation in nats by which the model errs at a frequency, before the test and at least:
-/// 0.4 dB, by which two simulators of one track differ.
+/// Standard deviation of the model error at a frequency in nats, as prior value and minimum: 0.4 dB, the
+/// difference between two simulators of one track.
 const MODEL_ERROR: f64 = 0.05;
-/// The same at most where misfits are judged: 1.7 dB. Beyond it the track model is called wrong,
-/// whatever the residuals tell.
+/// Largest standard deviation of the model error, in nats, for the judgement of misfits: 1.7 dB. The track
+/// model does not explain larger residuals.
 const MODEL_ERROR_MAX: f64 = 0.2;
 
-/// Distance in m within which two receptances are of one place.
+/// Two receptances within this distance in m count as one position.
 const SAME_PLACE_M: f64 = 1e-3;
 
-/// Rounds in which the model's error and the unevenness are learned.
+/// Number of rounds that estimate the model error and the unevenness.
 const ROUNDS: usize = 4;
 
-/// Most steps of a fit, its first damping, and the fall of the objective in nats that ends it.
+/// Largest number of steps of a fit, its initial and largest damping, and the decrease of the objective in
+/// nats that ends it.
 const STEPS_MAX: usize = 30;
 const DAMPING: f64 = 1e-2;
 const DAMPING_MAX: f64 = 1e8;
@@ -33,39 +34,39 @@ const CONVERGED: f64 = 1e-3;
 
 /// Starts of the means of railpad and ballast stiffness, in standard deviations of the prior.
 const STARTS: [f64; 3] = [-1.0, 0.0, 1.0];
-/// Most steps of a fit of even track, which only chooses a start: from about so many receptances, and
-/// from one of so many frequencies.
+/// Limits of the fit of an even track, which only selects a start: number of steps, approximate number of
+/// receptances, and step in the list of frequencies.
 const START_STEPS: usize = 8;
 const START_POINTS: usize = 8;
 const START_LINES: usize = 4;
 
-/// Why nothing was fitted.
+/// Errors of the fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// The struck places do not make a layout.
+    /// The hit positions do not form a layout.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-    /// The response is against the force.
+    /// Force and response have opposite directions.
     #[error(
         "the receptance at {position_m} m gains energy (its imaginary part is positive): force and \
          response have opposite directions; change the sign of one"
     )]
     Turned {
-        /// Its place in m.
+        /// Position along the track in m.
         position_m: f64,
     },
-    /// Two receptances of one place.
+    /// Two receptances have the same position.
     #[error(
         "two receptances have one place, {first_m} m and {second_m} m: each would count as \
          independent; average the hits at a place in one table"
     )]
     Repeated {
-        /// Place of one in m.
+        /// Position of the first in m.
         first_m: f64,
-        /// Place of the other in m.
+        /// Position of the second in m.
         second_m: f64,
     },
-    /// The track model breaks down.
+    /// The track model cannot be built or solved.
     #[error("the track model cannot be built: {0}")]
     Model(#[from] ModelError),
     /// The normal equations have no solution.
@@ -73,26 +74,26 @@ pub enum FitError {
     NotFinite,
 }
 
-/// A track that explains a hammer test.
+/// Track that was fitted to a hammer test.
 #[derive(Clone, Debug)]
 pub struct Fitted {
     pub(crate) layout: Layout,
     pub(crate) unknowns: Unknowns,
     pub(crate) values: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Standard deviation of the model's error in nats, as the test tells.
+    /// Standard deviation of the model error in nats, estimated from the test.
     pub(crate) model_error: f64,
-    /// Mean square of the whitened residuals of each point.
+    /// Position in m and misfit (normalised mean square of the residuals) of each point.
     point_misfits: Vec<(f64, f64)>,
 }
 
-/// Fits the track: every sleeper near a struck place has its own values.
+/// Fits the track; every sleeper near a hit position has its own values.
 ///
-/// `sleeper_at_m` is the place of a sleeper, in the coordinates of the receptances.
+/// `sleeper_at_m` is the position of one sleeper in m, in the coordinates of the receptances.
 ///
 /// # Errors
-/// [`FitError`] for receptances that do not belong to one stretch of track, gain energy, have one
-/// place or break the fit.
+/// [`FitError`] if the receptances do not belong to one stretch of track, gain energy or share a position,
+/// or if the fit fails.
 pub fn fit(
     track: &Track,
     sleeper_at_m: f64,
@@ -130,7 +131,7 @@ pub fn fit(
     })
 }
 
-/// That force and response have one direction and every receptance its own place.
+/// Checks that force and response have the same direction and that every receptance has its own position.
 fn check(points: &[PointReceptance]) -> Result<(), FitError> {
     if let Some(turned) = points.iter().find(|point| point.is_turned()) {
         return Err(FitError::Turned { position_m: turned.position_m });
@@ -143,8 +144,8 @@ fn check(points: &[PointReceptance]) -> Result<(), FitError> {
     }
 }
 
-/// The best fit of an even track from several starts: receptances have resonances, so the
-/// objective has several minima.
+/// Fits an even track from several starts and returns the best values. Several starts are necessary because
+/// receptances have resonances and the objective has several minima.
 fn best_start(forward: &Forward<'_>, unknowns: &Unknowns) -> Result<DVector<f64>, FitError> {
     let every = forward.points.len().div_ceil(START_POINTS).max(1);
     let thinned = |point: &PointReceptance| {
@@ -172,7 +173,7 @@ fn best_start(forward: &Forward<'_>, unknowns: &Unknowns) -> Result<DVector<f64>
     Ok(best.expect("there are starts").values)
 }
 
-/// Reciprocal variances of a point's residuals, as its rows.
+/// Reciprocal variances of the residuals of a point, in the order of its rows.
 fn weights(point: &PointReceptance, model_error: f64) -> DVector<f64> {
     let lines = point.values.len();
     let of = |row: usize, _| {
@@ -182,8 +183,8 @@ fn weights(point: &PointReceptance, model_error: f64) -> DVector<f64> {
     DVector::from_fn(2 * lines, of)
 }
 
-/// The model's error in nats that makes the mean square of the whitened residuals one, at least
-/// that before the test.
+/// Standard deviation of the model error in nats for which the whitened residuals have a mean square of
+/// one; at least the prior value.
 fn error_of_model(
     forward: &Forward<'_>,
     unknowns: &Unknowns,
@@ -200,7 +201,7 @@ fn error_of_model(
     Ok((sum / f64::max(count, 1.0)).max(MODEL_ERROR * MODEL_ERROR).sqrt())
 }
 
-/// Place of each point in m and the mean square of its residuals over their expected one.
+/// Position of each point in m, and the mean square of its residuals divided by its expectation.
 fn misfits(
     forward: &Forward<'_>,
     unknowns: &Unknowns,
@@ -225,16 +226,16 @@ struct Solve<'a> {
     model_error: f64,
 }
 
-/// Where a problem has its minimum.
+/// Minimum of a problem.
 struct Solved {
     values: DVector<f64>,
     objective: f64,
-    /// Covariance of the posterior, Gaussian about the minimum (Laplace).
+    /// Posterior covariance (Laplace: Gaussian about the minimum).
     covariance: DMatrix<f64>,
 }
 
 impl Solve<'_> {
-    /// Half the sum of squares of the whitened residuals and of the prior's.
+    /// Half the sum of squares of the whitened residuals and of the deviations from the prior.
     fn objective(&self, values: &DVector<f64>) -> Result<f64, FitError> {
         let residuals = self.forward.residuals(self.unknowns, values)?;
         let data: f64 = residuals
@@ -254,7 +255,7 @@ impl Solve<'_> {
         Ok(0.5 * (data + prior))
     }
 
-    /// Minimises over the unknowns that are `free`, by the Levenberg-Marquardt method.
+    /// Minimises over the unknowns for which `free` is true, by the Levenberg–Marquardt method.
     fn minimise(
         &self,
         mut values: DVector<f64>,
@@ -296,7 +297,7 @@ impl Solve<'_> {
         Ok(Solved { values, objective, covariance: factor.inverse() })
     }
 
-    /// Matrix and right-hand side of the normal equations; unknowns that are not free stay.
+    /// Matrix and right-hand side of the normal equations; unknowns that are not free do not change.
     fn normal(
         &self,
         values: &DVector<f64>,
@@ -342,14 +343,15 @@ impl Fitted {
         (self.values[mean] + self.values[own], variance.max(0.0).sqrt())
     }
 
-    /// Standard deviation of what a quantity differs by at the reported sleeper `index`, over that
-    /// before the test.
+    /// Standard deviation of the deviation from the mean at the reported sleeper `index`, divided by its
+    /// prior standard deviation.
     pub(crate) fn own_share(&self, of: Quantity, index: usize) -> f64 {
         let own = self.unknowns.at(of, Layout::own_index(index));
         self.covariance[(own, own)].max(0.0).sqrt() / self.unknowns.unevenness[of as usize]
     }
 
-    /// Mean misfit of the points that belong to the reported sleeper `index`; none if it has none.
+    /// Mean misfit of the points that belong to the reported sleeper `index`; `None` if there is no such
+    /// point.
     pub(crate) fn misfit(&self, index: usize) -> Option<f64> {
         let of = self.point_misfits.iter();
         let near = of.filter(|(x_m, _)| self.layout.near(*x_m).any(|it| it == index));

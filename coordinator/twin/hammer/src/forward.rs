@@ -1,4 +1,4 @@
-//! What the track model predicts of a hammer test: logarithms of receptances and their derivatives.
+//! Prediction of a hammer test by the track model: logarithms of receptances, and their derivatives.
 
 use crate::layout::Layout;
 use crate::measured::PointReceptance;
@@ -9,11 +9,11 @@ use tracktwin_parameters::TrackDesign;
 use tracktwin_track::frequency::{RailReceptances, SeatReceptances, seat_stiffness, shares};
 use tracktwin_track::model::{Mesh, ModelError, Support, TrackModel};
 
-/// Elements of a half sleeper.
+/// Number of elements of a half sleeper.
 const SLEEPER_ELEMENTS: usize = 6;
-/// Rail nodes on either side of a rail seat at which a change of its support is felt: ten spans.
+/// Number of rail nodes on either side of a rail seat that a change of its support affects: ten spans.
 const REACH: usize = 80;
-/// Step of a logarithm for the derivatives of a support.
+/// Step of the logarithm of a support value for numerical derivatives.
 const STEP: f64 = 1e-4;
 
 /// A hammer test and the track that is fitted to it.
@@ -22,19 +22,19 @@ pub(crate) struct Forward<'a> {
     layout: Layout,
     /// The fitted receptances.
     pub(crate) points: &'a [PointReceptance],
-    /// All their frequencies in Hz, ascending, and where those of each point stand among them.
+    /// All frequencies in Hz, ascending, and, for each point, the indices of its frequencies.
     frequencies_hz: Vec<f64>,
     places: Vec<Vec<usize>>,
 }
 
-/// Residuals of one point with their derivatives.
+/// Residuals of one point, with derivatives.
 ///
-/// Rows: real parts of all frequencies, then imaginary parts. A residual is the logarithm of the
-/// measured receptance over the predicted one: its real part is that of the magnitudes in nats, its
-/// imaginary part the difference of the phases in rad.
+/// The rows hold the real parts at all frequencies, then the imaginary parts. A residual is the logarithm
+/// of the ratio of measured to predicted receptance: its real part is the difference of the log magnitudes
+/// in nats, its imaginary part is the difference of the phases in rad.
 pub(crate) struct PointResidual {
     pub(crate) residual: DVector<f64>,
-    /// Derivatives of the predicted logarithm, a column for each of `unknowns`.
+    /// Derivatives of the predicted logarithm, one column for each of `unknowns`.
     pub(crate) jacobian: DMatrix<f64>,
     pub(crate) unknowns: Vec<usize>,
 }
@@ -73,7 +73,7 @@ impl<'a> Forward<'a> {
         unknowns.supports(values, self.layout.spans() - 1, Layout::first_own())
     }
 
-    /// Residuals without derivatives, of each point in turn.
+    /// Residuals without derivatives, one vector per point.
     pub(crate) fn residuals(
         &self,
         unknowns: &Unknowns,
@@ -90,11 +90,11 @@ impl<'a> Forward<'a> {
         Ok(self.points.iter().zip(&self.places).map(of).collect())
     }
 
-    /// Residuals and derivatives of each point in turn.
+    /// Residuals and derivatives, one item per point.
     ///
-    /// A change `dZ` of the dynamic stiffness at a rail seat changes a point receptance `a` by
-    /// `-a_s^2 dZ`, where `a_s` is the receptance between seat and point. Mean values act far beyond the
-    /// seats near a point: their derivatives are differences.
+    /// A change `dZ` of the dynamic stiffness at a rail seat changes a point receptance `a` by `-a_s^2 dZ`,
+    /// where `a_s` is the receptance between seat and point. Mean values affect seats far from the point;
+    /// the derivatives by the means are therefore numerical differences.
     pub(crate) fn linearised(
         &self,
         unknowns: &Unknowns,
@@ -124,7 +124,7 @@ impl<'a> Forward<'a> {
         Ok(all)
     }
 
-    /// Derivatives of the dynamic stiffness of each support by the logarithm of each quantity:
+    /// Derivatives of the dynamic stiffness of each support with respect to the logarithm of each quantity:
     /// `[quantity][frequency][sleeper]`.
     fn variations(
         &self,
@@ -203,7 +203,7 @@ impl<'a> Forward<'a> {
     }
 }
 
-/// The direct receptance at a place between nodes.
+/// Direct receptance at a position between nodes, interpolated.
 fn direct(line: &[Complex64], nodes: &[(usize, f64)]) -> Complex64 {
     nodes.iter().map(|&(node, share)| line[node] * share).sum()
 }

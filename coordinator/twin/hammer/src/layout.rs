@@ -1,59 +1,61 @@
-//! Which sleepers are estimated, and the stretch of track that is modelled around them.
+//! Layout of a hammer test: the estimated sleepers, and the modelled stretch of track around them.
 
 use tracktwin_parameters::TrackDesign;
 
-/// Most sleepers of a hammer test that are estimated at once.
+/// Largest number of sleepers in one estimation.
 pub const SLEEPERS_MAX: usize = 300;
 
-/// Spans beside the estimated sleepers on either side: what the ends of the model reflect has died
-/// out when it returns.
+/// Number of spans beyond the estimated sleepers on either side, so that reflections from the ends of the
+/// model decay before they return.
 const MARGIN: usize = 40;
 
-/// Distance in sleeper spacings up to which a sleeper belongs to a struck place: midspan and a bit.
+/// Largest distance of a sleeper from a hit position that belongs to it, in sleeper spacings: slightly
+/// beyond midspan.
 const NEAR: f64 = 0.6;
 
-/// Sleepers beside the reported ones that have values of their own.
+/// Number of sleepers on either side of the reported ones that have their own values.
 const BESIDE: i64 = 1;
 
-/// A stretch of track: sleepers by their number, counted from the one whose place is known.
+/// Stretch of track. Sleepers have numbers; sleeper 0 is the one with known position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// Distance of neighbouring sleepers in m.
+    /// Sleeper spacing in m.
     pub spacing_m: f64,
-    /// Place of sleeper 0 in m.
+    /// Position of sleeper 0 in m.
     pub sleeper_at_m: f64,
-    /// Number of the first sleeper that is reported, and how many are.
+    /// Number of the first reported sleeper.
     pub first: i64,
-    /// How many sleepers are reported.
+    /// Number of reported sleepers.
     pub reported: usize,
 }
 
-/// Why there is no layout.
+/// Reason why no layout exists.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LayoutError {
-    /// Nothing was struck.
+    /// There is no hit position.
     #[error("no receptance is left to be fitted")]
     Nothing,
-    /// Struck places lie too far apart.
+    /// The hit positions are too far apart.
     #[error(
         "the receptances lie at {from_m} to {to_m} m, over {sleepers} sleepers; evaluate at most \
          {SLEEPERS_MAX} sleepers at once"
     )]
     TooLong {
-        /// First place in m.
+        /// First position in m.
         from_m: f64,
-        /// Last place in m.
+        /// Last position in m.
         to_m: f64,
-        /// Sleepers between them.
+        /// Number of sleepers between the positions.
         sleepers: i64,
     },
 }
 
 impl Layout {
-    /// The sleepers near places in m that were struck, on a track with a sleeper at `sleeper_at_m`.
+    /// Makes the layout for hit positions `struck_m` in m, on a track with a sleeper at `sleeper_at_m`.
     ///
     /// # Errors
-    /// [`LayoutError`] when there are no places or they lie too far apart.
+    /// [`LayoutError::Nothing`] without a position; [`LayoutError::TooLong`] for more than [`SLEEPERS_MAX`]
+    /// sleepers.
     pub fn new(
         design: &TrackDesign,
         sleeper_at_m: f64,
@@ -73,37 +75,37 @@ impl Layout {
         Ok(Self { spacing_m, sleeper_at_m, first, reported })
     }
 
-    /// Spans of the modelled track.
+    /// Number of spans of the modelled track.
     pub(crate) fn spans(&self) -> usize {
         self.own() + 2 * MARGIN + 1
     }
 
-    /// Sleepers with values of their own; the others have the mean values.
+    /// Number of sleepers with their own values; all other sleepers have the mean values.
     pub(crate) const fn own(&self) -> usize {
         self.reported + 2 * BESIDE.unsigned_abs() as usize
     }
 
-    /// Index in the model of the first sleeper with values of its own.
+    /// Index in the model of the first sleeper with its own values.
     pub(crate) const fn first_own() -> usize {
         MARGIN
     }
 
-    /// Place in m of the model's begin.
+    /// Position of the start of the model in m.
     pub(crate) fn origin_m(&self) -> f64 {
         self.place_m(self.first - BESIDE) - (MARGIN + 1) as f64 * self.spacing_m
     }
 
-    /// Index among the sleepers with values of their own of the reported sleeper `index`.
+    /// Index of the reported sleeper `index` among the sleepers with their own values.
     pub(crate) const fn own_index(index: usize) -> usize {
         index + BESIDE.unsigned_abs() as usize
     }
 
-    /// Place in m of a sleeper by its number.
+    /// Position in m of the sleeper with this number.
     pub fn place_m(&self, number: i64) -> f64 {
         self.sleeper_at_m + number as f64 * self.spacing_m
     }
 
-    /// Indices of the reported sleepers that a place in m belongs to.
+    /// Indices of the reported sleepers to which the position `x_m` in m belongs.
     pub(crate) fn near(&self, x_m: f64) -> impl Iterator<Item = usize> + '_ {
         let reach_m = NEAR * self.spacing_m;
         let numbers = (0..self.reported).zip(self.first..);
@@ -111,7 +113,7 @@ impl Layout {
         numbers.filter_map(move |(index, number)| is_near(number).then_some(index))
     }
 
-    /// Rail elements of every span: fine where the rail may be struck.
+    /// Number of rail elements of every span; the mesh is fine where the rail may be hit.
     pub(crate) fn rail_elements(&self) -> Vec<usize> {
         let fine = MARGIN - 1..self.spans() - MARGIN + 1;
         (0..self.spans()).map(|span| if fine.contains(&span) { 8 } else { 4 }).collect()

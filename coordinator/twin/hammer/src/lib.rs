@@ -1,8 +1,8 @@
-//! The hammer test: from receptances of the rail to the stiffness under every sleeper.
+//! Hammer test: estimates of the stiffness under every sleeper from receptances of the rail.
 //!
-//! Owns the files of a hammer test as text, the fit of the track model to receptances, and the
-//! record that says the outcome. The receptances of a track are `tracktwin-track`'s; where files
-//! lie and how results look is left to others.
+//! This crate reads and writes the text of hammer-test files, fits the track model to receptances, and
+//! makes the record of the result. The crate `tracktwin-track` computes the receptances of a track. Other
+//! crates choose paths of files and present results.
 
 mod beside;
 mod files;

@@ -1,54 +1,53 @@
-//! Receptances as they were measured, and the part of them that is fitted.
+//! Measured receptances, and the selection of values for the fit.
 
 use num_complex::Complex64;
 use tracktwin_parameters::TrackDesign;
 
-/// Least coherence of a value that is fitted.
+/// Smallest coherence of a fitted value.
 pub const COHERENCE_MIN: f64 = 0.9;
 
-/// Lowest and highest frequency in Hz that is fitted on a track of V-Track's lengths: above 4 kHz the
-/// paper's model and measurement differ (Shen et al. 2023, Fig. 9). On a track whose lengths are
-/// larger by a ratio both are lower by it.
+/// Lowest and highest fitted frequency in Hz for V-Track: above 4 kHz the paper's model and measurement
+/// differ (Shen et al. 2023, Fig. 9). For other tracks both are divided by the length ratio.
 const USUAL_HZ: [f64; 2] = [100.0, 4000.0];
 
-/// Frequencies that are fitted in an octave.
+/// Number of fitted frequencies per octave.
 const PER_OCTAVE: f64 = 24.0;
 
-/// A point receptance of the rail: force and displacement at one place, positive in one direction.
+/// Point receptance of the rail: force and displacement at one position, positive in the same direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointReceptance {
-    /// Place along the track in m.
+    /// Position along the track in m.
     pub position_m: f64,
     /// Frequencies in Hz, ascending and positive.
     pub frequencies_hz: Vec<f64>,
-    /// Displacement per unit force in m/N at each of them, in the convention `exp(+i w t)`.
+    /// Displacement per unit force in m/N at each frequency, for the time dependence `exp(+i w t)`.
     pub values: Vec<Complex64>,
-    /// Coherence of force and response at each of them, 0 to 1; none where it is not known.
+    /// Coherence of force and response at each frequency, 0 to 1; `None` if unknown.
     pub coherence: Option<Vec<f64>>,
-    /// Hits that were averaged; none where it is not known.
+    /// Number of averaged hits; `None` if unknown.
     pub hits: Option<usize>,
 }
 
-/// Which frequencies are fitted.
+/// Criteria for fitted frequencies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
-    /// Lowest and highest in Hz.
+    /// Lowest and highest frequency in Hz.
     pub range_hz: [f64; 2],
-    /// Least coherence.
+    /// Smallest coherence, 0 to 1.
     pub coherence: f64,
 }
 
-/// What is fitted of all measured receptances, and what was left out.
+/// Selected values of all measured receptances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Selected {
     /// Receptances at the fitted frequencies.
     pub points: Vec<PointReceptance>,
-    /// What to keep in mind, in sentences.
+    /// Notes on values that were left out, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl Selection {
-    /// The usual range on a track of this design.
+    /// The default criteria for a track of this design.
     pub fn usual(design: &TrackDesign) -> Self {
         let ratio = design.length_ratio();
         Self { range_hz: USUAL_HZ.map(|hz| hz / ratio), coherence: COHERENCE_MIN }
@@ -56,23 +55,24 @@ impl Selection {
 }
 
 impl PointReceptance {
-    /// Whether more than half of the values gain energy: the imaginary part of a point receptance is
-    /// negative, so force and response have opposite directions.
+    /// Whether force and response have opposite directions. The imaginary part of a point receptance must
+    /// be negative; the function tests whether it is positive (energy gain) for more than half of the
+    /// values.
     pub fn is_turned(&self) -> bool {
         let gaining = self.values.iter().filter(|value| value.im > 0.0).count();
         2 * gaining > self.values.len()
     }
 
-    /// Standard deviation of the logarithm's real and imaginary part at a frequency that the
-    /// coherence tells: `sqrt((1 - g) / (2 g n))` for the coherence `g` of `n` hits (Bendat and
-    /// Piersol, *Random Data*, 4th ed., section 9.1); zero where it is not known.
+    /// Standard deviation of the real and imaginary part of the logarithm at a frequency, from the
+    /// coherence: `sqrt((1 - g) / (2 g n))` for the coherence `g` of `n` hits (Bendat and Piersol, *Random
+    /// Data*, 4th ed., section 9.1). Zero if the coherence is unknown.
     pub(crate) fn deviation(&self, index: usize) -> f64 {
         let Some(coherence) = self.coherence.as_ref().map(|it| it[index]) else { return 0.0 };
         let hits = self.hits.unwrap_or(1).max(1) as f64;
         ((1.0 - coherence) / (2.0 * coherence * hits)).max(0.0).sqrt()
     }
 
-    /// The values of these indices.
+    /// The receptance at the frequencies with these indices.
     pub(crate) fn kept(&self, indices: &[usize]) -> Self {
         Self {
             position_m: self.position_m,
@@ -87,10 +87,10 @@ impl PointReceptance {
     }
 }
 
-/// Selects what is fitted: inside the range, coherent, and at most 24 frequencies an octave, those
-/// nearest to equal steps of the logarithm.
+/// Selects the values for the fit: inside the frequency range, coherent, and at most 24 frequencies per
+/// octave. Of several frequencies the function selects those nearest to equal steps of the logarithm.
 ///
-/// Points without such a frequency are left out. Notes say what was left out.
+/// A point without such a frequency is left out. The notes list everything that was left out.
 pub fn select(points: &[PointReceptance], selection: &Selection) -> Selected {
     let [low, high] = selection.range_hz;
     let mut notes = Vec::new();
@@ -134,7 +134,7 @@ pub fn select(points: &[PointReceptance], selection: &Selection) -> Selected {
     Selected { points: kept_points, notes }
 }
 
-/// Of these indices those whose frequencies are nearest to equal steps of the logarithm.
+/// The indices whose frequencies are nearest to equal steps of the logarithm.
 fn nearest(frequencies_hz: &[f64], indices: &[usize], [low, high]: [f64; 2]) -> Vec<usize> {
     let steps = ((high / low).log2() * PER_OCTAVE).floor().max(0.0) as usize;
     let mut kept = Vec::new();

@@ -1,4 +1,4 @@
-//! What a hammer test says of a track: the record that files and pages are made of.
+//! Record of the estimates of a hammer test, from which files and pages are made.
 
 use crate::fit::Fitted;
 use crate::unknowns::Quantity;
@@ -6,72 +6,73 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
 
-/// Format of `estimates.json`.
+/// Value of the field `format` in `estimates.json`.
 pub const FORMAT: &str = "tracktwin-hammer/1";
 
-/// Standard deviations of a normal distribution to either end of its 90 % interval.
+/// Half width of the 90 % interval of a normal distribution, in standard deviations.
 pub const NINETY_PER_CENT: f64 = 1.645;
 
-/// Standard deviation after the test over that before below which the test tells a value.
+/// A value is resolved if its posterior standard deviation is below this share of the prior one.
 const RESOLVED: f64 = 0.5;
-/// The same of what a sleeper differs by from the mean.
+/// A sleeper's deviation from the mean is resolved if its posterior standard deviation is below this share
+/// of the prior one.
 const OWN: f64 = 0.8;
 
-/// Mean square of a sleeper's residuals over its expectation above which the track model does not
-/// explain them.
+/// Limit of a sleeper's misfit (mean square of its residuals over its expectation); above it the track
+/// model does not explain the receptances.
 const MISFIT_MAX: f64 = 4.0;
 
 /// The estimates of a hammer test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HammerRecord {
-    /// [`FORMAT`].
+    /// Always [`FORMAT`].
     pub format: &'static str,
     /// Version of this program.
     pub code_version: &'static str,
     /// Name of the track description.
     pub track: String,
-    /// Receptances that were fitted.
+    /// Number of fitted receptances.
     pub receptances: usize,
-    /// Lowest and highest frequency that was fitted, in Hz.
+    /// Lowest and highest fitted frequency in Hz.
     #[serde(rename = "range_Hz")]
     pub range_hz: [f64; 2],
-    /// Standard deviation by which the model errs, as the test tells, in dB.
+    /// Standard deviation of the model error in dB, estimated from the test.
     #[serde(rename = "model_error_dB")]
     pub model_error_db: f64,
-    /// Standard deviation of the logarithm of a stiffness from sleeper to sleeper, as the test tells.
+    /// Standard deviation of the logarithm of a stiffness from sleeper to sleeper, estimated from the test.
     pub unevenness: BTreeMap<Parameter, f64>,
-    /// Median and standard deviation of the logarithm before the test.
+    /// Prior: median in SI units, and standard deviation of the logarithm.
     pub prior: BTreeMap<Parameter, [f64; 2]>,
     /// The sleepers along the track.
     pub sleepers: Vec<Sleeper>,
-    /// What to keep in mind, in sentences.
+    /// Notes on the result, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// A sleeper and what the test says of it.
+/// Estimates of one sleeper.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sleeper {
-    /// Its name.
+    /// Id of the sleeper.
     pub id: String,
-    /// Its place along the track in m.
+    /// Position along the track in m.
     pub x_m: f64,
     /// Estimates by parameter.
     #[serde(flatten)]
     pub estimates: BTreeMap<Parameter, Interval>,
-    /// Mean square of the residuals of its receptances over their expectation: about one where the
-    /// track model holds. None if it was not struck.
+    /// Mean square of the residuals of the sleeper's receptances, divided by its expectation; about one if
+    /// the track model is valid. `None` if there was no hit near the sleeper.
     pub misfit: Option<f64>,
-    /// What to keep in mind about it.
+    /// Flags of the estimates.
     pub flags: Vec<SleeperFlag>,
 }
 
-/// What to keep in mind about a sleeper.
+/// Limitation of the estimates of a sleeper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SleeperFlag {
-    /// No receptance was measured above it or at midspan beside it.
+    /// No receptance was measured above the sleeper or at midspan beside it.
     NotStruck,
-    /// The track model does not explain its receptances: the estimates are not valid.
+    /// The track model does not explain the receptances of the sleeper; the estimates are not valid.
     Unexplained,
 }
 
@@ -80,18 +81,19 @@ pub enum SleeperFlag {
 pub struct Interval {
     /// Median of the posterior.
     pub estimate: f64,
-    /// Ends of the 90 % interval.
+    /// Lower end of the 90 % interval.
     pub lower: f64,
-    /// See `lower`.
+    /// Upper end of the 90 % interval.
     pub upper: f64,
-    /// Whether the test tells it: its standard deviation is less than half of that before the test.
+    /// Whether the test resolves the value: the posterior standard deviation is less than half of the prior
+    /// one.
     pub resolved: bool,
-    /// Whether the test tells the sleeper apart from the mean of all.
+    /// Whether the test resolves the sleeper's deviation from the mean of all sleepers.
     pub own: bool,
 }
 
 impl Interval {
-    /// Of a logarithm and its standard deviation.
+    /// Interval from the mean and the standard deviation of the logarithm.
     fn new(logarithm: f64, deviation: f64) -> Self {
         let end = |way: f64| (logarithm + way * NINETY_PER_CENT * deviation).exp();
         Self {
@@ -110,14 +112,14 @@ impl Interval {
 }
 
 impl Sleeper {
-    /// Whether its estimates mean anything.
+    /// Whether the estimates are valid.
     pub fn is_valid(&self) -> bool {
         !self.flags.contains(&SleeperFlag::Unexplained)
     }
 }
 
 impl SleeperFlag {
-    /// Its name in files.
+    /// Name of the flag in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::NotStruck => "not_struck",
@@ -127,7 +129,8 @@ impl SleeperFlag {
 }
 
 impl HammerRecord {
-    /// Of a fitted track; `names` gives a sleeper its name by its number and its place in m.
+    /// Makes the record of a fitted track. `names` maps the number and the position in m of a sleeper to
+    /// its id.
     pub fn new(
         fitted: &Fitted,
         track: &str,
@@ -164,7 +167,8 @@ impl HammerRecord {
         record
     }
 
-    /// What the model does not explain and what the test does not tell, in sentences.
+    /// Sentences on receptances that the model does not explain and on values that the test does not
+    /// resolve.
     fn sentences(&self) -> Vec<String> {
         let flagged = |flag: SleeperFlag| -> Vec<&str> {
             let all = self.sleepers.iter().filter(|sleeper| sleeper.flags.contains(&flag));
@@ -204,7 +208,7 @@ impl HammerRecord {
 }
 
 impl Fitted {
-    /// A reported sleeper without its name and place.
+    /// A reported sleeper without id and position.
     fn sleeper(&self, index: usize) -> Sleeper {
         let estimate = |of: Quantity| {
             let (logarithm, deviation) = self.logarithm(of, index);

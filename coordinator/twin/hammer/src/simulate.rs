@@ -1,4 +1,4 @@
-//! A hammer test of the track model itself: a table to try the evaluation with.
+//! Simulation of a hammer test with the track model, as test data for the evaluation.
 
 use crate::measured::PointReceptance;
 use num_complex::Complex64;
@@ -11,46 +11,48 @@ use tracktwin_parameters::TrackDesign;
 use tracktwin_track::frequency::{FrequencyError, ReceptancePoint, receptance};
 use tracktwin_track::model::{Mesh, ModelError, Support, TrackModel};
 
-/// Rail elements of a span and elements of a half sleeper: finer than those of the fit.
+/// Numbers of rail elements per span and of elements per half sleeper; the mesh is finer than that of the
+/// fit.
 const RAIL_ELEMENTS: usize = 10;
 const SLEEPER_ELEMENTS: usize = 8;
-/// Spans beside the struck sleepers on either side.
+/// Number of spans beyond the tested sleepers on either side.
 pub(crate) const BESIDE: usize = 50;
 
-/// What is struck, and how noisy it is.
+/// Sleepers and noise of a simulated hammer test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HammerTest {
-    /// Supports of the struck sleepers, sleeper 0 first.
+    /// Supports of the tested sleepers; sleeper 0 comes first.
     pub supports: Vec<Support>,
     /// Support of all other sleepers.
     pub others: Support,
     /// Frequencies in Hz.
     pub frequencies_hz: Vec<f64>,
-    /// Hits that are averaged at a place.
+    /// Number of averaged hits per position.
     pub hits: usize,
-    /// Standard deviation of the noise of one hit over the receptance, in its real and imaginary part.
+    /// Standard deviation of the noise of one hit divided by the receptance, for the real and the imaginary
+    /// part.
     pub noise: f64,
-    /// Seed of the noise.
+    /// Random seed of the noise.
     pub seed: u64,
 }
 
-/// Why no test can be simulated.
+/// Errors of the simulation of a hammer test.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulateError {
     /// The track cannot be built.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The track has no receptance.
+    /// The receptance of the track cannot be computed.
     #[error(transparent)]
     Frequency(#[from] FrequencyError),
 }
 
 impl HammerTest {
-    /// Receptances above every struck sleeper and at midspan behind it; sleeper `i` stands at `i`
-    /// spacings.
+    /// Receptances above every tested sleeper and at midspan after it. Sleeper `i` has the position `i`
+    /// times the spacing.
     ///
     /// # Errors
-    /// [`SimulateError`] for a track that cannot be built or has no receptance.
+    /// [`SimulateError::Model`] or [`SimulateError::Frequency`].
     pub fn receptances(&self, design: &TrackDesign) -> Result<Vec<PointReceptance>, SimulateError> {
         let struck = self.supports.len();
         let mut supports = vec![self.others; struck + 2 * BESIDE];
@@ -68,7 +70,7 @@ impl HammerTest {
         (0..2 * struck).into_par_iter().map(of).collect()
     }
 
-    /// With the noise that remains after averaging, and its coherence.
+    /// Adds the noise that remains after averaging, and its coherence.
     fn measured(&self, position_m: f64, exact: &[Complex64], half: usize) -> PointReceptance {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         // Stream 0 of the seed draws the unevenness.
@@ -91,7 +93,7 @@ impl HammerTest {
     }
 }
 
-/// Receptances as a table that [`crate::read`] reads.
+/// The receptances as the text of a CSV table that [`crate::read`] accepts.
 pub fn table(points: &[PointReceptance]) -> String {
     let mut text =
         "position_m,frequency_Hz,receptance_real_m_N,receptance_imag_m_N,coherence,hits\n"
@@ -110,7 +112,7 @@ pub fn table(points: &[PointReceptance]) -> String {
     text
 }
 
-/// The true values of the struck sleepers as a table.
+/// The true values of the tested sleepers as the text of a CSV table, with units in the column names.
 pub fn truth(test: &HammerTest, design: &TrackDesign) -> String {
     let mut text = "id,x_m,railpad_stiffness_N_m,ballast_stiffness_N_m,sleeper_EI_N_m2,railpad_damping_N_s_m,ballast_damping_N_s_m\n".to_owned();
     for (number, support) in test.supports.iter().enumerate() {

@@ -1,20 +1,20 @@
-//! The unknown logarithms of a track: means, and what each sleeper differs from them by.
+//! Unknown logarithms of a track: means, and the deviation of each sleeper from the means.
 
 use nalgebra::DVector;
 use tracktwin_parameters::{Parameter, Prior};
 use tracktwin_track::model::Support;
 
-/// Standard deviation of the logarithm from sleeper to sleeper before a test: of the stiffnesses,
-/// which the test tells, and of the others, which it hardly does.
+/// Prior standard deviation of the logarithm from sleeper to sleeper. A test determines those of the
+/// stiffnesses and hardly affects the others.
 const UNEVENNESS: [f64; Quantity::COUNT] = [0.15, 0.15, 0.05, 0.15, 0.15];
 
-/// Sleepers whose weight the unevenness before the test has.
+/// Weight of the prior unevenness, as a number of sleepers.
 const UNEVENNESS_WEIGHT: f64 = 4.0;
 
-/// Ends of what is learned of the unevenness.
+/// Lower and upper limit of the estimated unevenness.
 const UNEVENNESS_ENDS: [f64; 2] = [0.01, 1.0];
 
-/// A quantity that every sleeper has.
+/// Estimated quantity of a sleeper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Railpad stiffness `k_p`.
@@ -30,10 +30,10 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// How many there are.
+    /// Number of quantities.
     pub(crate) const COUNT: usize = 5;
 
-    /// All, in the order of the unknowns.
+    /// All quantities, in the order of the unknowns.
     pub const ALL: [Self; Self::COUNT] = [
         Self::RailpadStiffness,
         Self::BallastStiffness,
@@ -42,10 +42,10 @@ impl Quantity {
         Self::BallastDamping,
     ];
 
-    /// Those whose unevenness is learned.
+    /// Quantities whose unevenness is estimated.
     pub(crate) const LEARNED: [Self; 2] = [Self::RailpadStiffness, Self::BallastStiffness];
 
-    /// Its row of the catalogue.
+    /// The parameter in the catalogue.
     pub const fn parameter(self) -> Parameter {
         match self {
             Self::RailpadStiffness => Parameter::RailpadStiffness,
@@ -56,7 +56,7 @@ impl Quantity {
         }
     }
 
-    /// Its value in a support.
+    /// Value of the quantity in a support.
     pub(crate) const fn of(self, support: &mut Support) -> &mut f64 {
         match self {
             Self::RailpadStiffness => &mut support.railpad_stiffness,
@@ -68,13 +68,13 @@ impl Quantity {
     }
 }
 
-/// Where each unknown stands, and what is known of it before the test.
+/// Indices of the unknowns, and their priors.
 ///
-/// First the logarithms of the means, then, quantity by quantity, the logarithm of each sleeper's
-/// value over the mean.
+/// The vector begins with the logarithms of the means. For every quantity, the logarithm of the ratio of
+/// each sleeper's value to the mean follows.
 #[derive(Clone, Debug)]
 pub(crate) struct Unknowns {
-    /// Sleepers with values of their own.
+    /// Number of sleepers with their own values.
     pub(crate) own: usize,
     medians: [f64; Quantity::COUNT],
     deviations: [f64; Quantity::COUNT],
@@ -96,17 +96,17 @@ impl Unknowns {
         Quantity::COUNT * (1 + self.own)
     }
 
-    /// Place of a mean.
+    /// Index of the mean of a quantity.
     pub(crate) const fn mean(of: Quantity) -> usize {
         of as usize
     }
 
-    /// Place of what a sleeper differs by.
+    /// Index of the deviation of a sleeper from the mean.
     pub(crate) const fn at(&self, of: Quantity, own: usize) -> usize {
         Quantity::COUNT + of as usize * self.own + own
     }
 
-    /// Median of every unknown before the test.
+    /// Prior median of every unknown.
     pub(crate) fn start(&self) -> DVector<f64> {
         let mut start = DVector::zeros(self.count());
         for of in Quantity::ALL {
@@ -115,7 +115,7 @@ impl Unknowns {
         start
     }
 
-    /// Reciprocal variance of every unknown before the test.
+    /// Prior reciprocal variance of every unknown.
     pub(crate) fn precision(&self) -> DVector<f64> {
         let mut precision = DVector::zeros(self.count());
         for of in Quantity::ALL {
@@ -127,17 +127,17 @@ impl Unknowns {
         precision
     }
 
-    /// Standard deviation of a sleeper's logarithm before the test.
+    /// Prior standard deviation of a sleeper's logarithm.
     pub(crate) fn prior_deviation(&self, of: Quantity) -> f64 {
         self.deviations[of as usize].hypot(self.unevenness[of as usize])
     }
 
-    /// Median of a quantity before the test.
+    /// Prior median of a quantity, in SI units.
     pub(crate) fn median(&self, of: Quantity) -> f64 {
         self.medians[of as usize].exp()
     }
 
-    /// Supports of `sleepers` sleepers, of which those from `first_own` on have values of their own.
+    /// Supports of `sleepers` sleepers; those from index `first_own` on have their own values.
     pub(crate) fn supports(
         &self,
         values: &DVector<f64>,
@@ -158,9 +158,9 @@ impl Unknowns {
         (0..sleepers).map(support).collect()
     }
 
-    /// Sets the unevenness of the stiffnesses to what the sleepers tell: one step of the
-    /// expectation-maximisation algorithm for the variance, with the value before the test as
-    /// four further sleepers.
+    /// Estimates the unevenness of the stiffnesses from the sleepers: one step of the
+    /// expectation-maximisation algorithm for the variance, in which the prior value counts as four further
+    /// sleepers.
     ///
     /// Source: A. P. Dempster, N. M. Laird and D. B. Rubin, *J. R. Stat. Soc. B* 39 (1977), 4.
     pub(crate) fn learn(&mut self, values: &DVector<f64>, variances: &DVector<f64>) {

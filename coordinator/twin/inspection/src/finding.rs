@@ -2,31 +2,31 @@
 
 use std::collections::BTreeMap;
 
-/// Where on the track something was found.
+/// Position of a finding on the track.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
-    /// Everywhere, or not on the track at all.
+    /// Everywhere, or not on the track.
     Everywhere,
-    /// From here to there along the track in m.
+    /// A stretch along the track in m.
     Stretch {
-        /// First place in m.
+        /// First position in m.
         from_m: f64,
-        /// Last place in m.
+        /// Last position in m.
         to_m: f64,
     },
 }
 
-/// One kind of physics, or a fault of the measuring chain, found by one test.
+/// Result of a positive test: a kind of physics, or a fault of the measuring chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// Its name in the catalogue, such as `wheel_flat`.
+    /// Name of the kind in the catalogue, such as `wheel_flat`.
     pub physics: &'static str,
-    /// Probability to see as much without it.
+    /// False-alarm rate: probability of such a result without this kind.
     pub p_value: f64,
-    /// Where.
+    /// Position on the track.
     pub place: Place,
     /// Estimated parameters by their catalogue names, each with mean and standard deviation.
     pub parameters: BTreeMap<&'static str, (f64, f64)>,
-    /// The sentence a reader sees: what was seen, in numbers.
+    /// Measured quantities as a sentence.
     pub evidence: String,
 }

@@ -1,8 +1,8 @@
-//! Tests of a recording's passes without a track model.
+//! Inspection: tests of the passes of a recording that need no track model.
 //!
-//! Owns impacts, waves and the wheel's turns, faults of the measuring chain, and the first look that
-//! puts them together. Pure: a recording goes in, findings come out. What a model of the track explains
-//! is the diagnosis's.
+//! This crate detects impacts, periodic waves, defects of the wheel and faults of the measuring chain, and
+//! combines the tests into one inspection. The functions are pure: they take a recording and return
+//! findings. The crate `tracktwin-diagnosis` contains all tests that need a track model.
 
 mod along;
 pub mod chain;

@@ -1,4 +1,4 @@
-//! Sections that were fitted, put together to one track.
+//! Combination of fitted sections into one track.
 
 use crate::fit::Fitted;
 use crate::record::{Along, Inversion, Prior, Provenance, Sleeper, log_normal};
@@ -8,16 +8,18 @@ use tracktwin_evaluation::{Estimates, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::recording::Recording;
 
-/// Mean square of a sleeper's residual over its expectation above which the model does not hold.
+/// Limit of a sleeper's misfit (mean square of the residual over its expectation); above it the estimates
+/// are not valid.
 const MISFIT_MAX: f64 = 2.0;
 
-/// Railpad stiffness in N/m above which a stiffer one hardly changes a recording of V-Track; on a track
-/// whose lengths are larger it is larger as they are (docs/inversion.md; paper, Table D1).
+/// Largest railpad stiffness in N/m that a recording of V-Track resolves; a stiffer railpad hardly changes
+/// the recording. For other tracks it is multiplied by the length ratio (docs/inversion.md; paper, Table
+/// D1).
 const RAILPAD_RESOLVED: f64 = 2e8;
 
 impl Inversion {
-    /// The track of a recording from its sections, which lie in order. Of a sleeper in several
-    /// sections the one speaks in which it lies farthest from an end.
+    /// Combines the sections of a recording, which must be in order. A sleeper that lies in several
+    /// sections takes its estimates from the section in which its distance from an end is largest.
     pub fn of(recording: &Recording, sections: &[(PreparedRecording, Fitted)]) -> Self {
         let covered = |(prepared, _): &(PreparedRecording, Fitted)| {
             prepared.first_sleeper..prepared.first_sleeper + prepared.forward.section.sleepers
@@ -65,7 +67,7 @@ impl Fitted {
     }
 }
 
-/// Where the values of a sleeper stand.
+/// Parameters of a sleeper with the indices of their values.
 fn places(unknowns: &Unknowns, sleeper: usize) -> impl Iterator<Item = (Parameter, usize)> {
     let own = Own::ALL.map(|it| (own(it), unknowns.at(it, sleeper)));
     let common = Common::ALL.map(|it| (common(it), unknowns.common(it)));

@@ -1,25 +1,25 @@
-//! An evaluation by the physics beside one by a library's models: where they contradict each other.
+//! Comparison of an inversion with an evaluation by the Gaussian processes of a library.
 
 use crate::record::{Inversion, PER_SLEEPER};
 use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
 use tracktwin_parameters::Parameter;
 
-/// Standard deviations of their difference from which two estimates contradict each other: by chance
-/// one in 370 does.
+/// Two estimates contradict each other if they differ by more than this number of standard deviations of
+/// their difference; by chance one pair in 370 does.
 const BEYOND_CHANCE: f64 = 3.0;
 
-/// How two evaluations of one parameter agree.
+/// Agreement of two evaluations of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Beside {
     /// The parameter.
     pub parameter: Parameter,
-    /// Sleepers that both evaluate validly.
+    /// Number of sleepers with valid estimates in both evaluations.
     pub sleepers: usize,
-    /// Those at which they contradict each other beyond chance.
+    /// Ids of the sleepers at which the estimates contradict each other beyond chance.
     pub contradict: Vec<String>,
 }
 
-/// Compares both at every sleeper that both evaluate.
+/// Compares two evaluations at every sleeper that is valid in both; one entry per parameter.
 pub fn beside(inversion: &Inversion, models: &Evaluation) -> Vec<Beside> {
     let valid = |id: &str| -> Option<&SleeperEvaluation> {
         models.sleepers.iter().find(|it| it.id == id && it.is_valid())
@@ -42,7 +42,7 @@ pub fn beside(inversion: &Inversion, models: &Evaluation) -> Vec<Beside> {
 }
 
 impl Beside {
-    /// Whether they contradict each other at more sleepers than chance allows.
+    /// Whether the estimates contradict each other at more sleepers than chance allows.
     pub fn contradicts(&self) -> bool {
         self.contradict.len() > 1 + self.sleepers / 50
     }

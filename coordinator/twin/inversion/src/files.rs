@@ -1,4 +1,4 @@
-//! `evaluation.json` and `evaluation.csv` of an evaluation by the physics.
+//! Files `evaluation.json` and `evaluation.csv` of an inversion.
 
 use crate::record::Inversion;
 use tracktwin_files::{FileName, FilesError, Output};
@@ -13,7 +13,7 @@ impl Inversion {
         text
     }
 
-    /// The text of `evaluation.csv`: a row a sleeper, units in the heads.
+    /// The text of `evaluation.csv`: one row per sleeper, with units in the column names.
     pub fn to_csv(&self) -> String {
         let parameters = self.parameters();
         let mut writer = csv::Writer::from_writer(Vec::new());
@@ -34,10 +34,10 @@ impl Inversion {
         String::from_utf8(bytes).expect("names and numbers are text")
     }
 
-    /// Adds both files under a name (`evaluation`) to the files of a folder.
+    /// Adds `{name}.csv` and `{name}.json` to the files of a folder; `name` is usually `evaluation`.
     ///
     /// # Errors
-    /// [`FilesError`] names the file that cannot be written.
+    /// [`FilesError`] with the file that cannot be written.
     pub fn add_to(&self, output: &mut Output, name: &str) -> Result<(), FilesError> {
         output.add(&FileName::new(&format!("{name}.csv"))?, self.to_csv().as_bytes())?;
         output.add(&FileName::new(&format!("{name}.json"))?, self.to_json().as_bytes())

@@ -9,57 +9,60 @@ use tracktwin_diagnosis::{
 use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
 
-/// Times that the variation is learned and the track fitted anew.
+/// Number of rounds; each round estimates the variation and fits the track again.
 const ROUNDS: usize = 2;
 
-/// Mean square of a sleeper's residual where the model holds: below one, for the fit takes up a part and
-/// the covariance allows for an error of the prediction.
+/// Expected mean square of a sleeper's residual if the model is valid. It is below one, because the fit
+/// absorbs a part and the covariance includes an error of the prediction.
 const EXPECTED: f64 = 0.7;
 
 /// Error of the predicted levels that all sleepers share, in nats: 0.4 dB, by which two simulators of
 /// one track differ (docs/accuracy.md).
 const RESPONSE: f64 = 0.09;
 
-/// Part of the variation along the track that a sleeper's estimate misplaces beside its posterior, for
-/// the model is not nature's; measured with `tracktwin coverage --method inversion`.
+/// Error of a sleeper's estimate in addition to its posterior, as a share of the variation along the track.
+/// It covers the difference between model and reality; measured with `tracktwin coverage --method
+/// inversion`.
 const MISPLACED: f64 = 0.35;
 
-/// Error of the logarithm of what a section's sleepers have in common, beside its posterior: real sleepers
-/// taper and differ, and their shear stiffness is assumed.
+/// Error of the logarithm of the quantities common to a section's sleepers, in addition to the posterior:
+/// real sleepers taper and differ, and their shear stiffness is assumed.
 const COMMON_ERROR: f64 = 0.08;
 
-/// Step of the logarithm of the mean railpad stiffness along the posterior's valley, most steps on either
-/// side, and the log weight in nats below the highest that is negligible.
+/// Grid along the valley of the posterior: step of the logarithm of the mean railpad stiffness, largest
+/// number of steps on either side, and distance of the log weight from its maximum, in nats, at which a
+/// point is negligible.
 const STEP: f64 = 0.2;
 const STEPS_MAX: u32 = 5;
 const NEGLIGIBLE: f64 = 3.0;
 
-/// Standard deviation of the logarithm of a mean that is held.
+/// Standard deviation of the logarithm of a mean that is held fixed.
 const HELD: f64 = 0.02;
 
-/// Sleepers of a section, and sleepers that two neighbouring sections share.
+/// Number of sleepers of a section, and number of sleepers that two neighbouring sections share.
 const LENGTH: usize = 24;
 const OVERLAP: usize = 8;
 
-/// A track that explains a section of a recording.
+/// Fitted unknowns of one section of a recording.
 #[derive(Clone, Debug)]
 pub struct Fitted {
-    /// Where each value stands, and the variation that was learned.
+    /// Index of each value, and the estimated variation along the track.
     pub unknowns: Unknowns,
-    /// Logarithms of the values of greatest posterior probability. A level is that of a surface of
-    /// eq. B.6 (Shen et al. 2023) whose power is, in the mean over wave numbers, the one found.
+    /// Natural logarithms of the values of greatest posterior probability, in SI units. An irregularity
+    /// level refers to a surface with the spectrum of eq. B.6 (Shen et al. 2023) and the same mean power
+    /// over the wave numbers.
     pub values: DVector<f64>,
     /// Standard deviations of these logarithms.
     pub deviations: DVector<f64>,
-    /// Sum of squares of each sleeper's whitened residual over the number of its log powers: one on
-    /// average where the model holds.
+    /// Misfit of every sleeper: sum of squares of its whitened residual, divided by the number of its log
+    /// powers; one on average if the model is valid.
     pub misfit: Vec<f64>,
 }
 
-/// A recording in sections that are fitted one by one.
+/// Splits a recording into sections that are fitted one by one.
 ///
 /// # Errors
-/// [`PreparationError`] says what the recording lacks.
+/// [`PreparationError`] if the recording lacks required data.
 pub fn sections(
     recording: &Recording,
     track: &Track,
@@ -67,11 +70,11 @@ pub fn sections(
     PreparedRecording::sections(recording, track, LENGTH, OVERLAP)
 }
 
-/// Fits a section; `start` is [`tracktwin_diagnosis::first_calibration`]'s answer, and the subject's
-/// forward model allows for what lies beyond.
+/// Fits a section. `start` must be the result of [`tracktwin_diagnosis::first_calibration`], and the
+/// forward model of `prepared` must include the track beyond the section ([`Forward::allow_beyond`]).
 ///
 /// # Errors
-/// [`CalibrationError`] when the model breaks down on the way.
+/// [`CalibrationError`] if the fit fails or a number is not finite.
 pub fn fit(
     prepared: &PreparedRecording,
     null: &NullModel,
@@ -104,19 +107,19 @@ pub fn fit(
     Ok(Fitted::of(forward.unknowns, posterior, misfit))
 }
 
-/// A fit with the mean railpad stiffness held, and the logarithm of its weight.
+/// A fit with fixed mean railpad stiffness, and the logarithm of its weight in nats.
 struct Held {
     log_weight: f64,
     calibration: Calibration,
 }
 
-/// Fits with the mean railpad stiffness held at values on either side of the best fit's, as far as they
-/// have weight.
+/// Fits with the mean railpad stiffness fixed at values on either side of the best fit, until the weight is
+/// negligible.
 ///
-/// Stiffer railpads with more damping on softer sleepers leave nearly the same levels: the posterior is a
-/// long valley, often with several bottoms, and a normal distribution about one of them is too narrow. So
-/// the posterior is integrated over the mean by its values on a grid; all else is normal given the mean
-/// (a nested Laplace approximation).
+/// Stiffer railpads with more damping on softer sleepers give nearly the same levels. The posterior is
+/// therefore a long valley, often with several minima, and a normal distribution about one of them is too
+/// narrow. The function integrates the posterior over the mean railpad stiffness on a grid. All other
+/// unknowns are normally distributed given this mean (nested Laplace approximation).
 fn along_valley(
     fit: impl Fn(&Forward, DVector<f64>) -> Result<Calibration, CalibrationError> + Sync,
     forward: &Forward,
@@ -182,8 +185,8 @@ impl Posterior {
     }
 }
 
-/// Sum of squares of each sleeper's residual over the number of its compared log powers, with the covariance as it
-/// was before it was multiplied by `factors`.
+/// Misfit of every sleeper: sum of squares of its residual, divided by the number of its compared log
+/// powers. The covariance is the one before multiplication by `factors`.
 fn misfit(calibration: &Calibration, factors: &[f64], compared: usize) -> Vec<f64> {
     let each = calibration.residual.len() / factors.len();
     let of = |(sleeper, factor): (usize, &f64)| {
@@ -192,8 +195,8 @@ fn misfit(calibration: &Calibration, factors: &[f64], compared: usize) -> Vec<f6
     factors.iter().enumerate().map(of).collect()
 }
 
-/// What a sleeper's covariance is multiplied by where the model explains it badly: the weight of a
-/// multivariate Student distribution, whose scale is learned sleeper by sleeper.
+/// Factor on the covariance of a sleeper with a large misfit: the weight of a multivariate Student
+/// distribution whose scale is estimated for every sleeper.
 fn factor(misfit: f64) -> f64 {
     (misfit / EXPECTED).max(1.0)
 }

@@ -1,17 +1,17 @@
-//! Evaluation by the physics: the track that explains a recording, sleeper by sleeper.
+//! Evaluation by inversion: fits the track model to a recording, with a posterior for every sleeper.
 //!
-//! All passes and speeds tell together. The frequency-domain model predicts the mean log powers of
-//! every sleeper and band; the unknowns are each sleeper's ballast stiffness, railpad stiffness and
-//! irregularity level, and what is common to all (bending stiffness, dampings, the surface's
-//! spectrum, gains). How much sleepers differ is learned from the recording itself. The posterior is
-//! Gaussian in the logarithms (Laplace's approximation).
+//! The fit uses all passes and speeds together. The frequency-domain model predicts the mean log power of
+//! every sleeper and band. Each sleeper has its own unknowns: ballast stiffness, railpad stiffness and
+//! irregularity level. All sleepers share the other unknowns: bending stiffness, damping, spectrum of the
+//! surface, gains. The variation of the stiffness between sleepers is estimated from the recording itself.
+//! The posterior is Gaussian in the logarithms (Laplace's approximation).
 //!
-//! Owns what is learned of the variation along the track and the record of the outcome; the forward
-//! model and the fit are the diagnosis's.
+//! This crate contains the estimation of the variation along the track and the record of the result. The
+//! forward model and the fit belong to the crate `tracktwin-diagnosis`.
 //!
 //! # Example: stiffness of a track from a recording
 //!
-//! The bundled sample is of a simulated track whose ballast has 14 MN/m, and 8 MN/m from SN13 to SN20.
+//! The bundled sample is simulated. Its ballast stiffness is 14 MN/m, and 8 MN/m from SN13 to SN20.
 //!
 //! ```
 //! use std::path::Path;

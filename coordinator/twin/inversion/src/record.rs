@@ -1,4 +1,4 @@
-//! What an evaluation by the physics says: the record that files and pages are made of.
+//! Record of an inversion, from which files and pages are made.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -6,50 +6,50 @@ use tracktwin_diagnosis::Variation;
 use tracktwin_evaluation::{Estimate, Estimates, FORMAT, Flag, Unevaluated};
 use tracktwin_parameters::Parameter;
 
-/// How the estimates were made, as `evaluation.json` has it.
+/// Value of the field `method` in `evaluation.json`.
 pub const METHOD: &str = "inversion";
 
-/// What differs from sleeper to sleeper, in the order of pages.
+/// Parameters that differ from sleeper to sleeper, in the order of the report pages.
 pub const PER_SLEEPER: [Parameter; 3] =
     [Parameter::RailpadStiffness, Parameter::BallastStiffness, Parameter::IrregularityLevel];
 
-/// What the sleepers of a section have in common, in the order of pages.
+/// Parameters that all sleepers of a section share, in the order of the report pages.
 pub const COMMON: [Parameter; 3] =
     [Parameter::SleeperBendingStiffness, Parameter::RailpadDamping, Parameter::BallastDamping];
 
 /// The track's parameters along a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inversion {
-    /// [`FORMAT`].
+    /// Always [`FORMAT`].
     pub format: &'static str,
-    /// The recording's name.
+    /// Name of the recording.
     pub recording: String,
-    /// [`METHOD`].
+    /// Always [`METHOD`].
     pub method: &'static str,
-    /// What the estimates rest on.
+    /// Data and priors of the estimates.
     pub provenance: Provenance,
     /// The sleepers, along the track.
     pub sleepers: Vec<Sleeper>,
-    /// The sleepers that not every pass covers with a margin.
+    /// Sleepers without estimates: not every pass covers their window with a margin.
     pub unevaluated: Vec<Unevaluated>,
-    /// What of the recording the track model does not explain.
+    /// Part of the recording that the track model does not explain.
     pub outside_library: Unexplained,
-    /// What to keep in mind, in sentences.
+    /// Notes on the result, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// What the estimates rest on.
+/// Data and priors of the estimates.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Provenance {
     /// Version of this program.
     pub code_version: &'static str,
     /// Speeds of the passes in km/h, ascending.
     pub speeds_km_h: Vec<f64>,
-    /// Passes at each of them.
+    /// Number of passes at each of `speeds_km_h`.
     pub passes: Vec<usize>,
-    /// What was known of each parameter's mean before the recording.
+    /// Prior of the mean of every parameter.
     pub prior: BTreeMap<Parameter, Prior>,
-    /// How much sleepers differ, as the recording tells.
+    /// Variation between sleepers, estimated from the recording.
     pub variation: BTreeMap<Parameter, Along>,
 }
 
@@ -62,14 +62,14 @@ pub struct Prior {
     pub log_sd: f64,
 }
 
-/// Variation of the natural logarithm along the track.
+/// Variation of the natural logarithm of a parameter along the track.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Along {
     /// Standard deviation of the smooth part.
     pub smooth: f64,
-    /// Its correlation length in sleepers.
+    /// Correlation length of the smooth part, in sleepers.
     pub length_sleepers: f64,
-    /// Standard deviation of what differs from sleeper to sleeper.
+    /// Standard deviation of the part that is independent from sleeper to sleeper.
     pub independent: f64,
 }
 
@@ -82,50 +82,50 @@ impl From<Variation> for Along {
 /// A sleeper that was evaluated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sleeper {
-    /// Its name.
+    /// Id of the sleeper.
     pub id: String,
-    /// Its place along the track in m.
+    /// Position along the track in m.
     pub x_m: f64,
-    /// Posterior mean and standard deviation. Bending stiffness and dampings are common to the
-    /// sleepers of a section.
+    /// Posterior mean and standard deviation of every parameter. Bending stiffness and damping are common
+    /// to the sleepers of a section.
     #[serde(flatten)]
     pub estimates: Estimates,
-    /// Mean square of the residual between measured and predicted levels over what it is expected to
-    /// be: about one where the track model holds.
+    /// Mean square of the residual between measured and predicted levels, divided by its expectation; about
+    /// one if the track model is valid.
     pub misfit: f64,
-    /// What to keep in mind about it.
+    /// Flags of the estimates.
     pub flags: Vec<Flag>,
 }
 
-/// What of a recording the track model does not explain; the name of the fields is that of an
-/// evaluation by a library's models.
+/// Part of a recording that the track model does not explain. The field names are those of an evaluation by
+/// Gaussian processes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Unexplained {
     /// Share of the evaluated sleepers, 0 to 1.
     pub share: f64,
-    /// Parameters whose range must be wider: none, for the prior has no ends.
+    /// Parameters whose range must be wider: always empty, because the prior has no limits.
     pub widen: Vec<Parameter>,
 }
 
 impl Unexplained {
-    /// Share of the sleepers from which the answer as a whole is negative.
+    /// Share of unexplained sleepers from which the result as a whole is invalid.
     const MOST: f64 = 0.5;
 
-    /// Whether most of the track is not explained.
+    /// Whether the model does not explain half of the sleepers or more.
     pub fn is_most(&self) -> bool {
         self.share >= Self::MOST
     }
 }
 
 impl Sleeper {
-    /// Whether the estimates mean anything.
+    /// Whether the estimates are valid.
     pub fn is_valid(&self) -> bool {
         !self.flags.contains(&Flag::OutsideLibrary)
     }
 }
 
 impl Inversion {
-    /// The record of these parts.
+    /// Makes the record from its parts.
     pub(crate) fn new(
         recording: String,
         provenance: Provenance,
@@ -148,7 +148,8 @@ impl Inversion {
         inversion
     }
 
-    /// What the track model does not explain, and what lies apart from its neighbours, in sentences.
+    /// Sentences on sleepers that the track model does not explain, that differ from their neighbours, or
+    /// whose railpad stiffness is a lower bound.
     pub fn sentences(&self) -> Vec<String> {
         let unexplained = self.with(Flag::OutsideLibrary);
         let apart = self.with(Flag::UnlikeNeighbours);
@@ -185,14 +186,14 @@ impl Inversion {
     }
 }
 
-/// The first names, and how many more.
+/// The first ids, and the number of further ids.
 fn listed(ids: &[&str]) -> String {
     const SHOWN: usize = 6;
     let first = ids[..ids.len().min(SHOWN)].join(", ");
     if ids.len() > SHOWN { format!("{first} and {} more", ids.len() - SHOWN) } else { first }
 }
 
-/// A log-normal value in its unit: mean and standard deviation.
+/// Mean and standard deviation of a log-normal variable, from mean and standard deviation of its logarithm.
 pub(crate) fn log_normal(logarithm: f64, deviation: f64) -> Estimate {
     let variance = deviation * deviation;
     let mean = (logarithm + 0.5 * variance).exp();

@@ -1,16 +1,17 @@
-//! How much the sleepers of a recording differ: the prior's variation, learned by its evidence.
+//! Variation between the sleepers of a recording: the prior's variation that maximises the evidence.
 //!
-//! At a fitted track the data's log likelihood is quadratic in the unknowns. Then the evidence of
-//! any Gaussian prior has a closed form (Laplace), and no forward model is needed to compare two.
+//! Near a fitted track the log likelihood of the data is quadratic in the unknowns. The evidence of any
+//! Gaussian prior then has a closed form (Laplace), and no forward model is needed to compare two priors.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use tracktwin_diagnosis::{Calibration, Exception, Own, Unknowns, Variation};
 
-/// Factors on a deviation or a length that are tried from where the search stands.
+/// Factors on a deviation or a length that the search tries.
 const FACTORS: [f64; 4] = [0.5, 0.75, 1.35, 2.0];
 
-/// Deviations and lengths stay inside: an odometer's error alone makes sleepers differ by a per cent
-/// or two, and nothing on a track varies by more than a factor of three about its mean.
+/// Bounds of deviations (of the logarithm) and of lengths (in sleepers). The error of an odometer alone
+/// makes sleepers differ by 1 to 2 %, and no stiffness of a track varies by more than a factor of three
+/// about its mean.
 const DEVIATION: [f64; 2] = [0.01, 1.0];
 const LENGTH: [f64; 2] = [1.5, 12.0];
 
@@ -19,17 +20,17 @@ const LENGTH: [f64; 2] = [1.5, 12.0];
 const MEDIAN: [f64; 3] = [0.15, 0.12, 3.0];
 const SPREAD: [f64; 3] = [0.8, 0.8, 0.5];
 
-/// Rounds over all deviations and lengths.
+/// Largest number of rounds over all deviations and lengths.
 const ROUNDS: usize = 6;
 
-/// Nats by which an exception must raise the evidence: its prior probability is about one in a
+/// Increase of the log evidence, in nats, that an exception needs: its prior probability is about one in a
 /// hundred sleepers.
 const EXCEPTION_NATS: f64 = 5.0;
 
-/// Most sleepers that are exceptions in one quantity, as a share of all.
+/// Largest number of exceptions in one quantity, as a share of all sleepers.
 const EXCEPTIONS_MAX: f64 = 0.2;
 
-/// The log likelihood about a fitted track: `-0.5 x' H x + b' x` up to a constant.
+/// Quadratic log likelihood near a fitted track: `-0.5 x' H x + b' x` plus a constant.
 pub(super) struct Quadratic {
     information: DMatrix<f64>,
     slope: DVector<f64>,
@@ -37,7 +38,8 @@ pub(super) struct Quadratic {
 }
 
 impl Quadratic {
-    /// Of a fit's whitened residual and derivatives; `x` is the distance from the prior's mean.
+    /// Makes it from the whitened residual and derivatives of a fit; `x` is the distance from the prior's
+    /// mean.
     pub(super) fn new(calibration: &Calibration, mean: DVector<f64>) -> Self {
         let jacobian = &calibration.jacobian;
         let at_mean = &calibration.residual + jacobian * (&calibration.values - &mean);
@@ -45,7 +47,7 @@ impl Quadratic {
         Self { information, slope: jacobian.tr_mul(&at_mean), mean }
     }
 
-    /// Logarithm of the evidence of a prior, up to a constant of the data, in nats.
+    /// Log evidence of a prior in nats, up to a constant of the data.
     fn log_evidence(&self, unknowns: &Unknowns) -> f64 {
         let precision = unknowns.precision();
         let Some(prior) = Cholesky::new(precision.clone()) else { return f64::NEG_INFINITY };
@@ -73,7 +75,7 @@ fn log_prior(variation: &Variation) -> f64 {
     [smooth, independent, length].into_iter().zip(MEDIAN.into_iter().zip(SPREAD)).map(of).sum()
 }
 
-/// Sets the variation and the exceptions of `unknowns` to what has the greatest evidence.
+/// Sets the variation and the exceptions of `unknowns` to the values with the greatest evidence.
 pub(super) fn learn(unknowns: &mut Unknowns, data: &Quadratic) {
     unknowns.exceptions.clear();
     vary(unknowns, data);
@@ -83,7 +85,7 @@ pub(super) fn learn(unknowns: &mut Unknowns, data: &Quadratic) {
     }
 }
 
-/// Raises the evidence by one deviation or length after the other until none raises it.
+/// Changes one deviation or length after the other while the evidence rises.
 fn vary(unknowns: &mut Unknowns, data: &Quadratic) {
     let mut best = data.log_evidence(unknowns);
     for _ in 0..ROUNDS {
@@ -117,7 +119,8 @@ fn scale(variation: &mut Variation, which: usize, factor: f64) {
     *value = (*value * factor).clamp(low, high);
 }
 
-/// Takes the sleepers as exceptions that raise the evidence enough, the best first; whether any does.
+/// Adds sleepers as exceptions while the evidence rises enough, the best one first; returns whether there
+/// are any.
 fn except(unknowns: &mut Unknowns, data: &Quadratic) -> bool {
     let sleepers = unknowns.ballast().len();
     let most = (EXCEPTIONS_MAX * sleepers as f64).ceil() as usize;

@@ -1,7 +1,8 @@
-//! Feature vectors in eight bits a number, and bounds on their distances.
+//! Feature vectors rounded to eight bits per number, and bounds on their distances.
 //!
-//! A search has to read all of a library; an eighth of its bytes take an eighth of the time. What
-//! rounding to eight bits takes off a vector is known, so that no distance errs by more than that.
+//! An exhaustive search reads the whole library. Eight-bit numbers need one eighth of the bytes and of the
+//! time of double precision. The length of the rounding error of every vector is stored; it bounds the
+//! error of every distance.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -12,31 +13,31 @@ const LARGEST: f64 = 127.0;
 /// are clipped, which counts as rounding.
 const REACH: f64 = 4.0;
 
-/// How many times finer an observed vector is rounded, which is read but once.
+/// Ratio of the rounding step of the library rows to the finer step of the observed vector.
 const FINER: f64 = 16.0;
 
-/// Rows are whole numbers of this many: no register is left half full.
+/// Every row is filled up to a multiple of this length, so that every SIMD register is full.
 const STRIDE: usize = 64;
 
-/// What a thousand roundings of double precision come to, as a share of a vector's length.
+/// Bound on the error of a thousand roundings in double precision, as a share of a vector's length.
 const DOUBLE_ROUNDING: f64 = 1e-12;
 
-/// Rows of a library, rounded.
+/// Rounded rows of a library.
 pub(crate) struct Coarse {
-    /// Mean row: what is centred at it is small, and so is its rounding.
+    /// Mean row. It is subtracted from every row, because small numbers have small rounding errors.
     centre: Vec<f64>,
-    /// Value of a one in `rows`.
+    /// Step of the rounding: the feature value that corresponds to 1 in `rows`.
     step: f64,
-    /// Each row filled up with zeros to whole [`STRIDE`]s.
+    /// Rounded rows, one after the other; each is filled with zeros up to a multiple of [`STRIDE`].
     rows: Vec<i8>,
     /// Square lengths of the rounded rows in units of `step²`.
     squares: Vec<f64>,
-    /// Length of what was rounded off each row.
+    /// Norm of the rounding error of every row, in the unit of the features.
     rounded_off: Vec<f64>,
 }
 
 impl Coarse {
-    /// Rounds `rows` of this `dimension`.
+    /// Rounds `rows` (row-major, `dimension` numbers per row).
     pub(crate) fn new(rows: &[f64], dimension: usize) -> Self {
         let count = (rows.len() / dimension) as f64;
         let mut centre = vec![0.0; dimension];
@@ -60,7 +61,7 @@ impl Coarse {
         out
     }
 
-    /// Lowest and highest distance that each row may have from `observed`.
+    /// Lower and upper bound of the distance of each row from `observed`, in the unit of the features.
     pub(crate) fn bounds(&self, observed: &[f64]) -> impl Iterator<Item = [f64; 2]> {
         let padded = observed.len().next_multiple_of(STRIDE) as f64;
         // No sum of products may leave 32 bits.
@@ -96,7 +97,7 @@ impl Coarse {
 struct Rounded {
     values: Vec<f64>,
     square: f64,
-    /// Length of what is left out, in the unit of the features.
+    /// Norm of the rounding error, in the unit of the features.
     off: f64,
 }
 

@@ -4,11 +4,11 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, get_global_parallelism};
 use rayon::prelude::*;
 
-/// Distances between the rows of `a` (n x d) and those of `b` (m x d): n x m.
+/// Euclidean distances (n x m) between the rows of `a` (n x d) and the rows of `b` (m x d).
 ///
-/// By `|a|² + |b|² - 2 a·b`: a hundred times faster than differences, and exact to about 1e-8 of
-/// the rows' norms. Equal rows may get a distance of that size instead of zero, so that
-/// [`distances_within`] exists. Centre the rows first.
+/// The function evaluates `|a|² + |b|² - 2 a·b`. This is a hundred times faster than differences of rows,
+/// with an error of about 1e-8 of the rows' norms. Two equal rows may get a distance of that size instead
+/// of zero; [`distances_within`] sets its diagonal to zero. Centre the rows first.
 pub fn distances(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = Mat::zeros(a.nrows(), b.nrows());
     matmul(out.as_mut(), Accum::Replace, a, b.transpose(), -2.0, get_global_parallelism());

@@ -1,18 +1,18 @@
-//! Why models cannot be trained, used or loaded.
+//! Errors of training, prediction and loading of models.
 
 use std::path::PathBuf;
 
 /// Errors of training and prediction.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A table has another number of rows or columns than stated.
+    /// A table has a wrong number of rows or columns.
     #[error("{what}: {found} numbers instead of {expected}")]
     Shape {
         /// The table.
         what: &'static str,
-        /// Numbers it should hold.
+        /// Expected count.
         expected: usize,
-        /// Numbers it holds.
+        /// Count found.
         found: usize,
     },
     /// A number of the training set is NaN or infinite.
@@ -20,21 +20,21 @@ pub enum Error {
     NotFinite {
         /// The table.
         what: String,
-        /// Row of the library.
+        /// Row of the library, from 0.
         entry: usize,
     },
     /// Too few entries to fit and to validate.
     #[error("{found} cases are too few for training; at least {least} are needed")]
     TooFewEntries {
-        /// Entries there are.
+        /// Number of entries found.
         found: usize,
-        /// Entries needed.
+        /// Smallest number of entries needed.
         least: usize,
     },
-    /// A parameter never changes.
+    /// A parameter has the same value in all entries.
     #[error("{0} has the same value in every library entry")]
     Constant(String),
-    /// Feature columns outside the bins.
+    /// Feature columns that are empty or exceed the number of bins.
     #[error("feature {feature}: columns {start}..{end} lie outside the {bins} bins")]
     Columns {
         /// Name of the feature set.
@@ -43,25 +43,25 @@ pub enum Error {
         start: usize,
         /// Column after the last.
         end: usize,
-        /// Bins there are.
+        /// Number of bins.
         bins: usize,
     },
-    /// An undefined feature set.
+    /// No feature set has this name.
     #[error("unknown feature set {0}")]
     UnknownFeature(String),
-    /// The covariance has a pivot that is not positive.
+    /// The Cholesky factorisation of a matrix found a pivot that is not positive.
     #[error("the covariance matrix of {entries} library entries is not positive definite")]
     NotPositiveDefinite {
-        /// Its size.
+        /// Number of rows of the matrix.
         entries: usize,
     },
     /// An eigenvalue iteration did not converge.
     #[error("the eigenvalues of a {size} x {size} matrix were not found")]
     NoEigenvalues {
-        /// Its size.
+        /// Number of rows of the matrix.
         size: usize,
     },
-    /// A file is not written, or not read for where it is.
+    /// A file cannot be written, or its path cannot be read.
     #[error("{0}")]
     Files(#[source] tracktwin_files::FilesError),
     /// A file cannot be read.
@@ -69,15 +69,15 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// Error of the system.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The content of a file does not match its name.
+    /// The content of a file has the wrong format.
     #[error("{path}: {reason}")]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Reason.
         reason: String,
     },
     /// A file was changed after it was written.

@@ -1,22 +1,22 @@
-//! The exponential of many numbers at once.
+//! Vectorised exponential function.
 //!
-//! A covariance of 5000 entries holds twelve million exponentials, which one at a time take as long
-//! as a quarter of its factorisation.
+//! A covariance of 5000 entries needs twelve million exponentials. The scalar function would take a quarter
+//! of the time of the factorisation.
 
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::LOG2_E;
 
-/// Added to a number of less than 2^51 it leaves the nearest integer in the last bits.
+/// If this constant is added to a number below 2^51, the last bits of the sum hold the nearest integer.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
 
-/// `ln 2` to 33 bits, whose products with exponents are exact, and the rest of it.
+/// The first 33 bits of `ln 2`, whose products with exponents are exact; `LN_2_LOW` is the rest.
 const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
-/// Below it the exponential is less than the smallest normal number and counts as zero.
+/// Below this argument the exponential is less than the smallest normal number and is set to zero.
 const LEAST: f64 = -708.0;
 
-/// `1 / k!`, from k = 13 down: what is left out of the series is below 4e-18.
+/// `1 / k!` for k = 13 down to 0. The truncation error of the series is below 4e-18.
 const SERIES: [f64; 14] = [
     1.0 / 6_227_020_800.0,
     1.0 / 479_001_600.0,
@@ -34,9 +34,7 @@ const SERIES: [f64; 14] = [
     1.0,
 ];
 
-/// Replaces distances `r` by their correlations `exp(-r / length)`.
-///
-/// To within two roundings.
+/// Replaces distances `r` by their correlations `exp(-r / length)`, with an error of at most two roundings.
 pub(crate) fn correlate(distances: &mut [f64], length: f64) {
     Arch::new().dispatch(Correlate { distances, factor: -1.0 / length });
 }
@@ -58,7 +56,7 @@ impl WithSimd for Correlate<'_> {
     }
 }
 
-/// `exp(x)` of a number that is not positive, without branches.
+/// `exp(x)` for `x <= 0`, without branches.
 #[expect(clippy::inline_always, reason = "must be compiled for each instruction set")]
 #[inline(always)]
 fn exponential(x: f64) -> f64 {

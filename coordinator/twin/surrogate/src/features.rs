@@ -1,25 +1,25 @@
-//! Feature sets as names and ranges of bins; which frequencies those are is the signal crate's.
+//! Feature sets: names with ranges of bins. The signal crate defines the frequencies of the bins.
 
 use crate::Error;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// A feature set: contiguous bins of the ln-power of one speed (paper, eq. 9).
+/// A feature set: contiguous bins of the ln-power at one speed (paper, eq. 9).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FeatureColumns {
-    /// `GF`, `LF1` ...
+    /// Name, e.g. `GF` or `LF1`.
     pub name: String,
-    /// Its bins.
+    /// Range of bins.
     pub columns: Range<usize>,
 }
 
 impl FeatureColumns {
-    /// The feature set of that name and those bins.
+    /// A feature set with this name and these bins.
     pub fn new(name: impl Into<String>, columns: Range<usize>) -> Self {
         Self { name: name.into(), columns }
     }
 
-    /// The bins whose frequencies lie in the closed band from `low_hz` to `high_hz`.
+    /// The bins with frequencies from `low_hz` to `high_hz`, both ends included.
     pub fn in_band(
         name: impl Into<String>,
         frequencies_hz: &[f64],
@@ -31,7 +31,7 @@ impl FeatureColumns {
         Self::new(name, start..end.max(start))
     }
 
-    /// Refuses a range that is empty or reaches beyond `bins`.
+    /// Returns [`Error::Columns`] if the range is empty or exceeds `bins`.
     pub(crate) fn check(&self, bins: usize) -> Result<(), Error> {
         if self.columns.is_empty() || self.columns.end > bins {
             return Err(Error::Columns {

@@ -1,4 +1,4 @@
-//! Finds the input scaling by the errors on held-out entries, and the hyper-parameters by the
+//! Choice of the input scaling by the errors on held-out entries, and of the hyper-parameters by the
 //! marginal likelihood.
 
 use crate::distance::{distances, distances_within};
@@ -9,39 +9,40 @@ use crate::{Error, Factor, Hyperparameters, InputMap, InputScaling};
 use faer::{Mat, MatRef};
 use serde::{Deserialize, Serialize};
 
-/// Where the search begins: a length of four typical distances, noise a sixteenth of the signal.
+/// Start of the search: a length of four typical distances and a noise ratio of 1/16.
 const START: Rung = [4, -4];
-/// Entries that decide the hyper-parameters. Twice as many move the top of the likelihood by less
-/// than the ladder's step, at eight times the cost.
+/// Largest number of entries for the search of the hyper-parameters. Twice as many entries move the maximum
+/// of the likelihood by less than a step of the ladder, at eight times the cost.
 const CLIMBERS_MAX: usize = 2500;
-/// Rungs a step of the first, coarse climb takes.
+/// Step of the first, coarse search, in rungs.
 const COARSE: i32 = 3;
 
-/// The mean around which a process varies.
+/// Mean function of a Gaussian process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MeanFunction {
     /// One constant.
     Constant,
-    /// A constant and a slope an input.
+    /// A constant and one slope per input.
     Linear,
 }
 
-/// Everything that is found before the final weights.
+/// Result of [`fit`]: all quantities needed to compute the weights.
 pub struct HyperparameterFit {
-    /// From features to inputs.
+    /// Map from features to inputs.
     pub input_map: InputMap,
-    /// The mean.
+    /// The mean function.
     pub mean: MeanFunction,
     /// Mapped inputs of the training entries, n x m.
     pub inputs: Mat<f64>,
-    /// Hyper-parameters of every target; equal where targets can share.
+    /// Hyper-parameters of every target, in the order of the targets; targets share a pair where the
+    /// likelihood permits.
     pub hyperparameters: Vec<Hyperparameters>,
 }
 
 impl MeanFunction {
-    /// The mean that goes with a scaling: linear in whitened inputs, which are few and
-    /// independent; constant over bins, which are many and nearly collinear.
+    /// The mean function for a scaling: linear in whitened inputs, which are few and independent; constant
+    /// for bins, which are many and nearly collinear.
     pub fn around(scaling: InputScaling) -> Self {
         match scaling {
             InputScaling::Whitened { .. } => Self::Linear,
@@ -49,7 +50,7 @@ impl MeanFunction {
         }
     }
 
-    /// Values of the basis at `inputs` (n x m): n x 1 or n x (1 + m).
+    /// Basis of the mean at `inputs` (n x m): n x 1 if constant, n x (1 + m) if linear.
     pub fn basis(self, inputs: MatRef<'_, f64>) -> Mat<f64> {
         let columns = match self {
             Self::Constant => 1,
@@ -59,16 +60,16 @@ impl MeanFunction {
     }
 }
 
-/// Fits processes from `features` (n x d) to `targets` (n x p), with the scaling among `scalings`
-/// that predicts `subset` entries best.
+/// Fits Gaussian processes from `features` (n x d) to `targets` (n x p). The function selects the scaling
+/// among `scalings` that predicts `subset` held-out entries best.
 ///
-/// The entries must be in random order: the first ones judge the scalings. A scaling is learned
-/// from other entries than those that judge it, because a likelihood of the entries it was made of
-/// would flatter the ones that learn most. Scalings whose mean would use up more than half of the
-/// `subset`'s degrees of freedom are left out.
+/// The entries must be in random order: the first ones are held out to compare the scalings. A scaling is
+/// fitted to other entries, because a likelihood over its own training entries would favour the scaling
+/// that overfits most. A scaling is left out if its mean function needs more than half of the `subset`'s
+/// degrees of freedom.
 ///
 /// # Errors
-/// Those of [`InputMap::fit`] and [`Factor::new`]; [`Error::TooFewEntries`] when no scaling is left.
+/// The errors of [`InputMap::fit`] and [`Factor::new`]; [`Error::TooFewEntries`] if no scaling is left.
 pub fn fit(
     features: MatRef<'_, f64>,
     targets: MatRef<'_, f64>,
@@ -89,7 +90,7 @@ pub fn fit(
     Ok(HyperparameterFit { input_map, mean, inputs, hyperparameters })
 }
 
-/// The scaling with the smallest errors, and the most likely rungs under it.
+/// The scaling with the smallest held-out error, and the most likely rungs for this scaling.
 fn choose(
     features: MatRef<'_, f64>,
     targets: MatRef<'_, f64>,
@@ -129,9 +130,9 @@ fn choose(
     best.map(|(_, scaling, rungs)| (scaling, rungs)).ok_or(too_few)
 }
 
-/// Sum over the targets of the logarithm of their mean absolute error, when processes of the
-/// `trained` inputs and targets predict the `judging` ones: every target counts by the share of
-/// its error that is saved.
+/// Sum over the targets of the logarithm of their mean absolute error. Processes fitted to the `trained`
+/// inputs and targets predict the `judging` targets. The logarithm weights every target by its relative
+/// reduction of the error.
 fn log_errors(
     mean: MeanFunction,
     at: &[Hyperparameters],
@@ -155,7 +156,7 @@ fn log_errors(
     Ok(sum)
 }
 
-/// Inputs and targets whose likelihood is asked for again and again.
+/// Inputs and targets of repeated evaluations of the likelihood.
 struct LikelihoodSearch<'a> {
     distances: Mat<f64>,
     basis: Mat<f64>,
@@ -178,7 +179,7 @@ impl<'a> LikelihoodSearch<'a> {
     }
 }
 
-/// Mean distance from the first two hundred entries to all others: a typical one.
+/// Mean distance from the first two hundred entries to all others, as a typical distance.
 fn mean_distance(distances: MatRef<'_, f64>) -> f64 {
     let n = distances.nrows();
     let sample = n.min(200);

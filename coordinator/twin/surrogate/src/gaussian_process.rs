@@ -1,8 +1,8 @@
-//! One factorisation of a covariance, and what follows from it for any number of targets.
+//! One factorisation of a covariance, used for any number of targets.
 //!
-//! The covariance is `s² K`, `K = E(l) + rho I`, around a mean `H b` that is linear in a basis.
-//! Neither `s²` nor `b` shapes `K`, so that they come in closed form, and one factor serves all
-//! parameters that share `l` and `rho`.
+//! The covariance is `s² K` with `K = E(l) + rho I`, around a mean `H b` that is linear in a basis `H`. `K`
+//! depends neither on `s²` nor on `b`. Both therefore have a closed form, and all parameters with the same
+//! `l` and `rho` share one factor.
 
 use crate::Error;
 use crate::cholesky::Cholesky;
@@ -12,7 +12,7 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, ColRef, Mat, MatRef, get_global_parallelism};
 use rayon::prelude::*;
 
-/// Factor of the training inputs' covariance.
+/// Cholesky factor of the covariance of the training inputs.
 pub struct Factor {
     at: Hyperparameters,
     cholesky: Cholesky,
@@ -26,26 +26,26 @@ pub struct Factor {
     log_determinants: f64,
 }
 
-/// Solution with the factor for several targets at once (p of them).
+/// Solution for p targets with one factor.
 #[derive(Clone, Debug)]
 pub struct Weights {
     /// `K⁻¹ (y - H b)`, n x p.
     pub weights: Mat<f64>,
     /// Mean coefficients `b` by generalised least squares, q x p.
     pub coefficients: Mat<f64>,
-    /// Signal variances `s²` that maximise the likelihood.
+    /// Signal variances `s²` that maximise the likelihood, p values.
     pub signal_variances: Vec<f64>,
-    /// Log marginal likelihoods at those variances, in nats.
+    /// Log marginal likelihoods at those variances, in nats, p values.
     pub log_likelihoods: Vec<f64>,
 }
 
 impl Factor {
-    /// Factorises the covariance of inputs at these `distances` (n x n) around a mean with this
-    /// `basis` (n x q; q may be 0: a mean of zero).
+    /// Factorises the covariance of training inputs with these `distances` (n x n) around a mean with this
+    /// `basis` (n x q). With q = 0 the mean is zero.
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when inputs coincide without noise, or the basis is singular,
-    /// [`Error::TooFewEntries`] when the mean alone passes through all of them.
+    /// [`Error::NotPositiveDefinite`] if two inputs coincide and the noise is zero, or if the basis is
+    /// singular; [`Error::TooFewEntries`] if n is not larger than q.
     pub fn new(
         distances: MatRef<'_, f64>,
         basis: MatRef<'_, f64>,
@@ -64,22 +64,22 @@ impl Factor {
         Ok(Self { at, cholesky, basis, solved_basis, information, log_determinants })
     }
 
-    /// Where on the kernel's map this factor is.
+    /// Hyper-parameters of this factor.
     pub fn hyperparameters(&self) -> Hyperparameters {
         self.at
     }
 
-    /// How many entries it was trained on.
+    /// Number n of training entries.
     pub fn entries(&self) -> usize {
         self.basis.nrows()
     }
 
-    /// Weights, mean, signal variance and likelihood of each of the `targets` (n x p).
+    /// Weights, mean coefficients, signal variance and likelihood of each of the `targets` (n x p).
     ///
-    /// The likelihood is the restricted one (mean coefficients integrated out, Rasmussen &
-    /// Williams 2006, eq. 2.45) with `ln|H' H|` added, so that it does not depend on the basis'
-    /// scale: `-((n - q) (ln 2 pi s² + 1) + ln|K| + ln|H' K⁻¹ H| - ln|H' H|) / 2`. Without a basis
-    /// it is the plain log marginal likelihood.
+    /// The likelihood is the restricted one (mean coefficients integrated out, Rasmussen & Williams 2006,
+    /// eq. 2.45) with `ln|H' H|` added, which makes it independent of the scale of the basis: `-((n - q)
+    /// (ln 2 pi s² + 1) + ln|K| + ln|H' K⁻¹ H| - ln|H' H|) / 2`. Without a basis it is the ordinary log
+    /// marginal likelihood.
     pub fn weights(&self, targets: MatRef<'_, f64>) -> Weights {
         let solved = self.cholesky.solve(targets);
         let projected = self.basis.transpose() * &solved;
@@ -99,11 +99,12 @@ impl Factor {
         Weights { weights, coefficients, signal_variances, log_likelihoods }
     }
 
-    /// Variances of new observations in units of `s²`, the noise of their own included, at
-    /// `distances` (n x t) from the training inputs, with the mean's basis there (t x q).
+    /// Predictive variances of t new observations in units of `s²`, including their noise. `distances` (n x
+    /// t) are the distances from the training inputs; `basis` (t x q) is the basis of the mean at the new
+    /// inputs.
     ///
-    /// `1 + rho - k' K⁻¹ k + r' (H' K⁻¹ H)⁻¹ r` with `r = h - H' K⁻¹ k` (Rasmussen & Williams
-    /// 2006, eq. 2.41), by triangular solves; no inverse is formed.
+    /// The variance is `1 + rho - k' K⁻¹ k + r' (H' K⁻¹ H)⁻¹ r` with `r = h - H' K⁻¹ k` (Rasmussen &
+    /// Williams 2006, eq. 2.41). The function uses triangular solves and forms no inverse.
     pub fn variances(&self, distances: MatRef<'_, f64>, basis: MatRef<'_, f64>) -> Vec<f64> {
         let k = correlations(distances, self.at.length);
         let r = basis.transpose() - self.solved_basis.transpose() * &k;
@@ -118,8 +119,8 @@ impl Factor {
             .collect()
     }
 
-    /// `Q = K⁻¹ - K⁻¹ H (H' K⁻¹ H)⁻¹ H' K⁻¹`, n x n, lower triangle: what is left of the inverse
-    /// when the mean is fitted too.
+    /// `Q = K⁻¹ - K⁻¹ H (H' K⁻¹ H)⁻¹ H' K⁻¹` (n x n, lower triangle): the inverse of `K`, projected against
+    /// the mean.
     pub(crate) fn projected_inverse(&self) -> Mat<f64> {
         let mut out = self.cholesky.inverse();
         let half = self.information.half_solve(self.solved_basis.transpose().to_owned());
@@ -137,12 +138,12 @@ impl Factor {
         out
     }
 
-    /// Derivatives of the targets' log-likelihoods by `ln l` and by `ln rho`, given the
-    /// `distances` (n x n) that the factor was made from.
+    /// Derivatives `[by ln l, by ln rho]` of the log-likelihood of every target. `distances` (n x n) must
+    /// be those from which the factor was made.
     ///
-    /// `(a' K' a / s² - tr(Q K')) / 2` with the weights `a`, the derivative `K'` of `K` and the
-    /// inverse `Q` projected against the mean (Rasmussen & Williams 2006, eq. 5.9, with `s²`
-    /// profiled out). Costs an inverse: three times the likelihood.
+    /// The derivative is `(a' K' a / s² - tr(Q K')) / 2` with the weights `a`, the derivative `K'` of `K`
+    /// and the inverse `Q` projected against the mean (Rasmussen & Williams 2006, eq. 5.9, with `s²`
+    /// profiled out). The function computes an inverse and costs three times as much as the likelihood.
     pub fn gradients(&self, distances: MatRef<'_, f64>, weights: &Weights) -> Vec<[f64; 2]> {
         let projected_inverse = self.projected_inverse();
         let projected_inverse = projected_inverse.as_ref();
@@ -164,8 +165,8 @@ impl Factor {
             .collect()
     }
 
-    /// What column `j` adds to `tr(Q K')` and to `a' K' a` of every target, `K'` by `ln l`: both
-    /// triangles at once, the diagonal of `K'` being zero.
+    /// Contribution of column `j` to `tr(Q K')` and to `a' K' a` of every target, where `K'` is the
+    /// derivative by `ln l`. The sum covers both triangles at once; the diagonal of `K'` is zero.
     fn length_terms<'a>(
         &self,
         distances: MatRef<'a, f64>,

@@ -1,4 +1,4 @@
-//! Models that share their inputs: one speed (or all) and one feature set, a model a parameter.
+//! Models with common inputs: one speed (or all speeds) and one feature set, with one model per parameter.
 
 use crate::distance::distances_within;
 use crate::kernel::correlations;
@@ -9,66 +9,66 @@ use std::ops::Range;
 use std::sync::OnceLock;
 use tracktwin_parameters::Parameter;
 
-/// True and predicted values of a parameter, in its unit.
+/// Pairs (true value, predicted value) of a parameter, in the unit of the parameter.
 pub type Tested = (Parameter, Vec<(f64, f64)>);
 
-/// Which features a group of models reads.
+/// Speeds and feature set of a group of models.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroupKey {
-    /// Speeds in km/h whose features are concatenated, in this order.
+    /// Speeds in km/h; their features are concatenated in this order.
     pub speeds_km_h: Vec<f64>,
     /// Name of the feature set.
     pub feature: String,
-    /// Its bins at every speed.
+    /// Range of bins of the feature set, the same at every speed.
     pub columns: Range<usize>,
 }
 
-/// How good one model is.
+/// Error measures of one model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ModelScore {
-    /// MASE (paper, eq. 11) over the folds of the training set; 0.05 is 5 %.
+    /// MASE (paper, eq. 11) over the folds of the training set, as a share of the range: 0.05 is 5 %.
     pub mase_folds: f64,
-    /// MASE over the test set.
+    /// MASE over the test set, as a share of the range.
     pub mase_test: f64,
-    /// Mean of prediction minus truth over the test set, as a share of the range.
+    /// Mean of prediction minus true value over the test set, as a share of the range.
     pub bias_test: f64,
-    /// Share of the test set inside its 90 % interval.
+    /// Share of the test set inside the predicted 90 % interval.
     pub coverage_90_test: f64,
 }
 
 /// A Gaussian process for one parameter.
 ///
-/// Internally the parameter is mapped onto [0, 1] by its range in the library.
+/// The parameter is mapped internally onto [0, 1] by its range in the library.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterModel {
-    /// What it predicts.
+    /// The predicted parameter.
     pub parameter: Parameter,
     /// Lowest and highest value in the library, in the parameter's unit.
     pub range: [f64; 2],
-    /// Length and noise ratio.
+    /// Length and noise ratio of the kernel.
     pub hyperparameters: Hyperparameters,
     /// Signal variance `s²`, of the parameter mapped onto [0, 1].
     pub signal_variance: f64,
     /// Log marginal likelihood in nats.
     pub log_likelihood: f64,
-    /// Correction of the standard deviation, over the parameter mapped onto [0, 1].
+    /// Factor on the standard deviation as a function of the parameter mapped onto [0, 1].
     pub spread: Spread,
-    /// How good it is.
+    /// Error measures of the model.
     pub score: ModelScore,
 }
 
-/// A predicted value, in the parameter's unit.
+/// Predicted mean and standard deviation of a parameter, in the unit of the parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// The parameter.
     pub parameter: Parameter,
-    /// Its expected value, kept within the library's range.
+    /// Expected value, clamped to the range of the library.
     pub mean: f64,
-    /// Standard deviation of a new case's value around it.
+    /// Standard deviation of the value of a new case around `mean`.
     pub sd: f64,
 }
 
-/// Models of all parameters over the same inputs.
+/// Models of all parameters for the same inputs.
 pub struct ModelGroup {
     pub(crate) key: GroupKey,
     pub(crate) bins: usize,
@@ -81,12 +81,12 @@ pub struct ModelGroup {
     /// q x p.
     pub(crate) coefficients: Mat<f64>,
     pub(crate) models: Vec<ParameterModel>,
-    /// A factor for every different pair of hyper-parameters, made when first asked for.
+    /// One factor per distinct pair of hyper-parameters, computed at its first use.
     pub(crate) factors: Vec<(Hyperparameters, OnceLock<Factor>)>,
 }
 
 impl ModelGroup {
-    /// Which features the group reads.
+    /// Speeds and feature set of the group.
     pub fn key(&self) -> &GroupKey {
         &self.key
     }
@@ -96,34 +96,35 @@ impl ModelGroup {
         &self.models
     }
 
-    /// How features become inputs.
+    /// Map from features to inputs.
     pub fn input_map(&self) -> &InputMap {
         &self.input_map
     }
 
-    /// How many entries it was trained on.
+    /// Number of training entries.
     pub fn entries(&self) -> usize {
         self.inputs.nrows()
     }
 
-    /// Predicts every parameter for every one of the `observations`: ln-powers of all bins, the
-    /// group's speeds side by side (speeds x bins numbers each).
+    /// Predicts every parameter for each of the `observations`. An observation holds the ln-powers of all
+    /// bins, with the speeds of the group one after the other (speeds * bins numbers).
     ///
-    /// Batches cost far less than single observations. The first call factorises covariances
-    /// (half a second each for 5000 entries).
+    /// A batch costs far less than the same number of single observations. The first call factorises the
+    /// covariances (half a second each for 5000 entries).
     ///
     /// # Errors
-    /// [`Error::Shape`] when an observation has another number of bins.
+    /// [`Error::Shape`] if an observation has another length; [`Error::NotPositiveDefinite`] if a
+    /// covariance cannot be factorised.
     pub fn predict(&self, observations: &[Vec<f64>]) -> Result<Vec<Vec<Prediction>>, Error> {
         let (means, sds) = self.predict_features(self.features(observations)?.as_ref())?;
         Ok((0..observations.len()).map(|t| self.in_units(&means, &sds, t)).collect())
     }
 
-    /// What the processes read of every one of the `observations` (as for [`Self::predict`]): the
+    /// Inputs of the Gaussian processes for each of the `observations` (as for [`Self::predict`]): the
     /// features after the input map, m numbers each.
     ///
     /// # Errors
-    /// [`Error::Shape`] when an observation has another number of bins.
+    /// [`Error::Shape`] if an observation has another length.
     pub fn inputs_of(&self, observations: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Error> {
         let inputs = self.input_map.apply(self.features(observations)?.as_ref());
         Ok(inputs.row_iter().map(|row| row.iter().copied().collect()).collect())
@@ -172,7 +173,7 @@ impl ModelGroup {
         self.models.iter().enumerate().filter(move |(_, model)| model.hyperparameters == at)
     }
 
-    /// Makes the factors that are not there yet.
+    /// Computes the missing factors and returns all factors.
     fn factors(&self) -> Result<Vec<&Factor>, Error> {
         if self.factors.iter().any(|(_, slot)| slot.get().is_none()) {
             let away = distances_within(self.inputs.as_ref());
@@ -201,7 +202,7 @@ impl ModelGroup {
     }
 }
 
-/// The different ones among the models' hyper-parameters, in order of appearance.
+/// The distinct hyper-parameters of the models, in order of appearance.
 pub(crate) fn different(all: &[Hyperparameters]) -> Vec<Hyperparameters> {
     let mut out: Vec<Hyperparameters> = Vec::new();
     for at in all {

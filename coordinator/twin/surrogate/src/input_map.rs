@@ -1,23 +1,25 @@
-//! From ln-powers to the inputs of a process: centred, then multiplied by a matrix.
+//! Linear map from ln-powers to the inputs of a Gaussian process: subtract the mean, then multiply by a
+//! matrix.
 
 use crate::{Error, whitening};
 use faer::{Mat, MatRef};
 use serde::{Deserialize, Serialize};
 
-/// How the inputs of a process are made of a feature vector.
+/// Method that computes the inputs of a Gaussian process from a feature vector.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum InputScaling {
-    /// The feature vector itself (the paper's way).
+    /// The feature vector itself, as in the paper.
     Raw,
-    /// Every bin divided by its standard deviation over the training set; one that never changes
-    /// is left out.
+    /// Every bin is divided by its standard deviation over the training set; a bin with zero standard
+    /// deviation gets weight zero.
     Standardised,
-    /// Projected on the directions that separate parameters, in units of the surface's scatter.
+    /// Projection on the directions that separate parameters, scaled by the standard deviation that the
+    /// random surface causes.
     Whitened {
-        /// How many directions.
+        /// Number of directions.
         components: usize,
-        /// What is added to every bin's scatter, as a share of the mean over the bins.
+        /// Share of the mean variance over all bins that is added to the variance of every bin.
         shrinkage: f64,
     },
 }
@@ -25,21 +27,20 @@ pub enum InputScaling {
 /// `z = (x - offset) projection`.
 #[derive(Clone, Debug)]
 pub struct InputMap {
-    /// How the projection was made.
+    /// Method of the projection.
     pub scaling: InputScaling,
     /// Mean feature vector of the training set, d values.
     pub offset: Vec<f64>,
-    /// d x m.
+    /// Projection matrix, d x m.
     pub projection: Mat<f64>,
 }
 
 impl InputMap {
-    /// The map of that kind for training `features` (n x d) of cases with these `parameters`
-    /// (n x p).
+    /// Fits the map to training `features` (n x d) of cases with these `parameters` (n x p).
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when entries are too few to whiten by;
-    /// [`Error::NoEigenvalues`].
+    /// For [`InputScaling::Whitened`]: [`Error::NotPositiveDefinite`] if there are too few entries or a
+    /// parameter is constant; [`Error::NoEigenvalues`] if the eigenvalue iteration does not converge.
     pub fn fit(
         scaling: InputScaling,
         features: MatRef<'_, f64>,

@@ -5,23 +5,23 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What shapes a covariance `s² (E(l) + rho I)`, `E = exp(-r / l)`; the signal variance `s²`
+/// Hyper-parameters of a covariance `s² (E(l) + rho I)` with `E = exp(-r / l)`. The signal variance `s²`
 /// follows from the data in closed form.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hyperparameters {
-    /// Length `l`, in the unit of the inputs' distances.
+    /// Length `l`, in the unit of the distances between inputs.
     pub length: f64,
-    /// Noise variance as a multiple `rho` of the signal variance.
+    /// Ratio `rho` of the noise variance to the signal variance.
     pub noise_ratio: f64,
 }
 
-/// Correlation `exp(-r / l)` of two points at a Euclidean `distance` r (paper, 6.1.2: the
-/// exponential kernel; Rasmussen & Williams 2006, eq. 4.18 with nu = 1/2).
+/// Correlation `exp(-r / l)` of two points at a Euclidean `distance` r for a kernel of `length` l (paper,
+/// 6.1.2: the exponential kernel; Rasmussen & Williams 2006, eq. 4.18 with nu = 1/2).
 pub fn correlation(distance: f64, length: f64) -> f64 {
     (-distance / length).exp()
 }
 
-/// Correlations of all `distances`, of the same shape.
+/// Correlations of all `distances`, as a matrix of the same shape.
 pub(crate) fn correlations(distances: MatRef<'_, f64>, length: f64) -> Mat<f64> {
     let mut out = distances.to_owned();
     out.as_mut().par_col_iter_mut().for_each(|column| {

@@ -1,26 +1,26 @@
-//! The search for hyper-parameters: on a ladder, so that parameters can share a factorisation.
+//! Search for hyper-parameters on a grid (ladder), which lets parameters share a factorisation.
 //!
-//! The likelihood is flat near its top and falls off along a ridge (a longer length with a larger
-//! signal variance explains much the same), so that fixed steps lose little, bounds are needed,
-//! and a factor computed for one parameter is often good for another.
+//! The likelihood is flat near its maximum and decreases along a ridge: a longer length with a larger
+//! signal variance fits nearly as well. A fixed step therefore loses little, the search needs bounds, and a
+//! factor computed for one parameter often serves another.
 
 use crate::{Error, Hyperparameters};
 use std::collections::BTreeMap;
 
-/// Log-likelihood that two sets of hyper-parameters may differ by and still be as good: half the
-/// 95 % quantile of chi-squared with two degrees of freedom (likelihood-ratio test).
+/// Two sets of hyper-parameters count as equally good if their log-likelihoods differ by at most this: half
+/// the 95 % quantile of chi-squared with two degrees of freedom (likelihood-ratio test).
 const INDISTINGUISHABLE: f64 = 3.0;
 
-/// A place on the ladder, `[length, noise]`.
+/// A point of the ladder, `[length, noise]`.
 pub(crate) type Rung = [i32; 2];
 
-/// Rungs for the length, half an octave each: from a quarter of the unit to 64 of it.
+/// Rungs of the length, half an octave each: from a quarter of the unit to 64 units.
 const LENGTH_RUNGS: std::ops::RangeInclusive<i32> = -4..=12;
-/// Rungs for the noise ratio, an octave each: 6e-5 (inputs' own noise dominates) to 16 (no
+/// Rungs of the noise ratio, an octave each, from 6e-5 (inputs' own noise dominates) to 16 (no
 /// information).
 const NOISE_RUNGS: std::ops::RangeInclusive<i32> = -14..=4;
 
-/// Meaning of a rung: lengths in units of a typical distance.
+/// Conversion of rungs to hyper-parameters; `unit` is a typical distance.
 #[derive(Clone, Copy)]
 pub(crate) struct Ladder {
     pub(crate) unit: f64,
@@ -35,14 +35,15 @@ impl Ladder {
     }
 }
 
-/// Log-likelihoods of every target at every rung tried.
+/// Log-likelihoods of every target at every evaluated rung.
 #[derive(Default)]
 pub(crate) struct Tried(BTreeMap<Rung, Vec<f64>>);
 
 impl Tried {
-    /// Climbs for every target from its start until no neighbour `stride` rungs away is better.
+    /// Climbs for every target from `starts` until no neighbour at a distance of `stride` rungs has a
+    /// higher likelihood.
     ///
-    /// All targets share what is evaluated; the ladder is finite, hence so is the climb.
+    /// All targets share the evaluated rungs. The ladder is finite; the climb therefore ends.
     pub(crate) fn climb(
         &mut self,
         starts: &[Rung],
@@ -64,13 +65,13 @@ impl Tried {
         }
     }
 
-    /// The best rung of every target.
+    /// The rung with the highest likelihood of every target.
     pub(crate) fn best(&self) -> Vec<Rung> {
         (0..self.targets()).map(|target| self.best_of(target).0).collect()
     }
 
-    /// Rungs as good as the best of every target, but as few different ones as a greedy choice
-    /// finds.
+    /// A rung for every target that is as good as its best rung. A greedy choice keeps the number of
+    /// distinct rungs small.
     pub(crate) fn shared(&self) -> Vec<Rung> {
         let mut chosen = self.best();
         let mut open: Vec<usize> = (0..self.targets()).collect();

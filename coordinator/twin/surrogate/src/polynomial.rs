@@ -1,22 +1,22 @@
-//! Polynomials in the parameters of a library: what features are expected of a track.
+//! Polynomials in the parameters of a library, for the expected features of a track.
 
 use faer::{Mat, MatRef};
 
-/// Entries per polynomial coefficient below which the degree is lowered.
+/// Smallest number of entries per coefficient; the degree is lowered until it is reached.
 const ENTRIES_PER_COEFFICIENT: usize = 8;
-/// A parameter whose range spans more than this ratio enters by its logarithm: what stiffness and
-/// level do to a spectrum saturates or multiplies.
+/// The logarithm of a parameter is used if its range spans more than this ratio: the effect of stiffness
+/// and irregularity level on a spectrum saturates or is multiplicative.
 const LOGARITHMIC_FROM: f64 = 4.0;
 
 /// All monomials up to a total degree, in parameters mapped onto [-1, 1].
 #[derive(Clone, Debug)]
 pub(crate) struct Polynomial {
     axes: Vec<UnitAxis>,
-    /// Each the sorted list of its factors.
+    /// Every monomial is the sorted list of the axes that are its factors.
     monomials: Vec<Vec<usize>>,
 }
 
-/// A parameter's range, mapped onto [-1, 1].
+/// Range of a parameter, or of its logarithm, that is mapped onto [-1, 1].
 #[derive(Clone, Copy, Debug)]
 struct UnitAxis {
     low: f64,
@@ -38,12 +38,12 @@ impl Polynomial {
         Self { axes, monomials }
     }
 
-    /// How many coefficients there are.
+    /// Number of coefficients.
     pub(crate) fn coefficients(&self) -> usize {
         self.monomials.len()
     }
 
-    /// Parameters (n x p) mapped onto [-1, 1] by the ranges.
+    /// Maps parameters (n x p) onto [-1, 1] by their ranges.
     pub(crate) fn unit(&self, parameters: MatRef<'_, f64>) -> Mat<f64> {
         Mat::from_fn(parameters.nrows(), self.axes.len(), |i, j| {
             self.axes[j].unit(parameters[(i, j)])
@@ -57,7 +57,8 @@ impl Polynomial {
         })
     }
 
-    /// Derivatives of the monomials (p x coefficients) by the mapped parameters, at a point.
+    /// Derivatives of the monomials (p x coefficients) with respect to the mapped parameters, at the point
+    /// `unit`.
     pub(crate) fn slopes(&self, unit: &[f64]) -> Mat<f64> {
         Mat::from_fn(self.axes.len(), self.monomials.len(), |axis, k| {
             let monomial = &self.monomials[k];

@@ -1,29 +1,30 @@
-//! The model selector: the library entries whose features are nearest (paper, 2.4.3.1).
+//! Model selector: search for the library entries with the nearest features (paper, 2.4.3.1).
 
 use crate::Error;
 use crate::coarse::Coarse;
 
-/// Feature vectors of a library, searched exhaustively and exactly.
+/// Exact exhaustive search over the feature vectors of a library.
 ///
-/// All entries are measured in eight bits a number, which is an eighth of the bytes to read; those
-/// that rounding leaves in doubt are measured again in double precision, so that the order is exact.
-/// Trees are slower in so many dimensions.
+/// A first pass computes bounds of all distances from vectors of eight bits per number, which need one
+/// eighth of the memory bandwidth. A second pass recomputes, in double precision, the distances of the
+/// entries that the bounds leave undecided. The order is therefore exact. Trees are slower in spaces of
+/// high dimension.
 pub struct Selector {
     features: Vec<f64>,
     dimension: usize,
     coarse: Coarse,
 }
 
-/// A library entry and how far its feature vector is.
+/// A library entry and the distance of its feature vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
-    /// Row of the library.
+    /// Row of the library, from 0.
     pub entry: usize,
     /// Euclidean distance, in the unit of the features (paper, eq. 7).
     pub distance: f64,
 }
 
-/// Mean and deviation of one parameter over the nearest entries.
+/// Mean and standard deviation of one parameter over the nearest entries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
     /// Mean over the entries (paper, eq. 8).
@@ -33,10 +34,10 @@ pub struct Selection {
 }
 
 impl Selector {
-    /// A selector over rows of `features` (n x `dimension`, row-major).
+    /// Makes a selector over the rows of `features` (n x `dimension`, row-major).
     ///
     /// # Errors
-    /// [`Error::Shape`] when the numbers do not fill whole rows.
+    /// [`Error::Shape`] if `features` is empty or its length is no multiple of `dimension`.
     pub fn new(features: Vec<f64>, dimension: usize) -> Result<Self, Error> {
         let rows = features.len().checked_div(dimension).unwrap_or(0);
         if features.is_empty() || rows * dimension != features.len() {
@@ -47,20 +48,20 @@ impl Selector {
         Ok(Self { features, dimension, coarse })
     }
 
-    /// How many entries there are.
+    /// Number of entries.
     pub fn entries(&self) -> usize {
         self.features.len() / self.dimension
     }
 
-    /// The feature vector of an entry.
+    /// Feature vector of an entry (row of the library). Panics if there is no such row.
     pub fn features(&self, entry: usize) -> &[f64] {
         &self.features[entry * self.dimension..][..self.dimension]
     }
 
-    /// The `count` nearest entries, the nearest first; equal distances by row.
+    /// The `count` nearest entries, sorted by distance; equal distances are sorted by row.
     ///
     /// # Errors
-    /// [`Error::Shape`] when `observed` has another dimension.
+    /// [`Error::Shape`] if `observed` has another dimension.
     pub fn nearest(&self, observed: &[f64], count: usize) -> Result<Vec<Neighbour>, Error> {
         if observed.len() != self.dimension {
             let (expected, found) = (self.dimension, observed.len());
@@ -78,7 +79,7 @@ impl Selector {
         Ok(nearest)
     }
 
-    /// Entries that may be among the `count` nearest, whatever rounding hides.
+    /// Entries that may be among the `count` nearest within the bounds of the rounding.
     fn candidates(&self, observed: &[f64], count: usize) -> Vec<usize> {
         let mut candidates: Vec<(f64, usize)> = Vec::new();
         // The smallest distances that entries do not exceed for certain, ascending.
@@ -100,7 +101,8 @@ impl Selector {
 }
 
 impl Selection {
-    /// Mean and spread of a parameter's `values` (one a library row) over the nearest entries.
+    /// Mean and standard deviation of a parameter's `values` (one per library row) over the nearest
+    /// entries.
     pub fn of(nearest: &[Neighbour], values: &[f64]) -> Self {
         let n = nearest.len() as f64;
         let mean = nearest.iter().map(|neighbour| values[neighbour.entry]).sum::<f64>() / n;
@@ -111,8 +113,8 @@ impl Selection {
     }
 }
 
-/// Natural logarithm of the square of 1 m/s2 over that of the reference of acceleration levels,
-/// 1 um/s2 (ISO 1683).
+/// Natural logarithm of the squared ratio of 1 m/s2 to the reference of acceleration levels, 1 um/s2 (ISO
+/// 1683).
 const REFERENCE: f64 = 27.631_021_115_928_547;
 
 /// Mean absolute percentage error of `simulated` features against `measured` ones, as natural logarithms of

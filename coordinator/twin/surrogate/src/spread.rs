@@ -1,13 +1,13 @@
 //! Ratio of the errors to the standard deviations of the process, along the range of a parameter.
 //!
-//! A Gaussian process gives nearly the same standard deviation everywhere. Errors are not like
-//! that: a stiff railpad is harder to estimate than a soft one (paper, 3.4). The errors of the
-//! folds determine a factor that multiplies every standard deviation.
+//! A Gaussian process gives nearly the same standard deviation everywhere, but the errors vary: a stiff
+//! railpad is harder to estimate than a soft one (paper, 3.4). The errors of the folds determine a factor
+//! that multiplies every standard deviation.
 
 use serde::{Deserialize, Serialize};
 
-/// Groups of equal size in which the errors are compared: each holds 600 of 5000 entries, enough
-/// for a factor within 3 %, and the eight still follow a trend along the range.
+/// Number of groups of equal size in which the errors are compared. Of 5000 entries each group holds 600,
+/// enough for a factor within 3 %; eight groups still follow a trend along the range.
 const GROUPS: usize = 8;
 
 /// A factor on the standard deviation as a function of the predicted value, piecewise linear.
@@ -15,17 +15,18 @@ const GROUPS: usize = 8;
 pub struct Spread {
     /// Predicted values, ascending.
     pub at: Vec<f64>,
-    /// Factors there; constant beyond the first and the last.
+    /// Factors at these values; constant below the first and above the last value.
     pub factors: Vec<f64>,
 }
 
 impl Spread {
-    /// No correction.
+    /// No correction: a factor of one.
     pub fn none() -> Self {
         Self { at: vec![0.0], factors: vec![1.0] }
     }
 
-    /// Root mean square of the `standardised` errors among entries of similar `predicted` value.
+    /// Fits the factors: root mean square of the `standardised` errors over groups of entries with similar
+    /// `predicted` values.
     pub fn fit(predicted: &[f64], standardised: &[f64]) -> Self {
         let mut order: Vec<usize> = (0..predicted.len()).collect();
         order.sort_by(|&i, &j| predicted[i].total_cmp(&predicted[j]));

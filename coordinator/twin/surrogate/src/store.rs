@@ -1,4 +1,4 @@
-//! Trained models, and the folder they are kept in.
+//! Trained models, and the folder in which they are stored.
 //!
 //! `models.json` contains everything except the large tables: format, campaign, digest of the
 //! library, feature definition, hyper-parameters, scores. Beside it is one safetensors file per
@@ -30,7 +30,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 use tracktwin_files::{FileName, Kind, Names, Output, inside};
 
-/// The format of `models.json`.
+/// Value of the field `format` in `models.json`.
 pub const FORMAT: &str = "tracktwin-models/1";
 const INDEX: &str = "models.json";
 
@@ -100,7 +100,7 @@ impl Trained {
         &self.about.library_digest
     }
 
-    /// How features were made in training; the same must be done to what is predicted from.
+    /// Definition of the features in training; a recording must be evaluated with the same definition.
     pub fn feature_definition(&self) -> &serde_json::Value {
         &self.about.feature_definition
     }
@@ -115,12 +115,12 @@ impl Trained {
         &self.about.speeds_km_h
     }
 
-    /// Entries of the library, those kept for testing included.
+    /// Number of entries of the library, including the test half.
     pub fn entries(&self) -> usize {
         self.about.entries
     }
 
-    /// Decides, with [`Self::entries`], which entries trained ([`crate::Split::halves`]).
+    /// Random seed that selects, with [`Self::entries`], the training half ([`crate::Split::halves`]).
     pub fn split_seed(&self) -> u64 {
         self.about.split_seed
     }
@@ -130,17 +130,17 @@ impl Trained {
         &self.groups
     }
 
-    /// The group that reads `feature` at exactly these speeds, if it was trained.
+    /// The group for `feature` at exactly these speeds in km/h, or `None` if it was not trained.
     pub fn group(&self, speeds_km_h: &[f64], feature: &str) -> Option<&ModelGroup> {
         self.groups
             .iter()
             .find(|group| group.key.feature == feature && group.key.speeds_km_h == speeds_km_h)
     }
 
-    /// Refuses a library other than the one the models were trained on.
+    /// Checks that the models were trained on the library with this digest.
     ///
     /// # Errors
-    /// [`Error::OtherLibrary`] names both.
+    /// [`Error::OtherLibrary`] with both digests.
     pub fn belongs_to(&self, library_digest: &str) -> Result<(), Error> {
         if self.about.library_digest == library_digest {
             return Ok(());
@@ -151,21 +151,23 @@ impl Trained {
         })
     }
 
-    /// Writes the models into `folder`, which is made if need be: all of them or none.
+    /// Writes the models into `folder` and creates the folder if necessary. Either all files are written or
+    /// none.
     ///
     /// # Errors
-    /// [`Error::Files`] names the file that cannot be written, or that exists already.
+    /// [`Error::Files`] with the file that cannot be written or already exists.
     pub fn save(&self, folder: &Path) -> Result<(), Error> {
         let mut output = Output::begin(folder, Kind::Models, false).map_err(Error::Files)?;
         self.add_to(&mut output)?;
         output.commit().map_err(Error::Files)
     }
 
-    /// Adds the models to the files of a folder. No file replaces another until the index does, which
-    /// names them all: a folder has the old models or the new ones.
+    /// Adds the models to the files of an output folder. The manifest names all files and is replaced last;
+    /// until then no file replaces another. The folder therefore holds either the old models or the new
+    /// ones.
     ///
     /// # Errors
-    /// [`Error::Files`] names what cannot be written.
+    /// [`Error::Files`] with the file that cannot be written.
     pub fn add_to(&self, output: &mut Output) -> Result<(), Error> {
         let mut names = Names::default();
         let rows = self.groups.iter().map(|group| add_group(group, &mut names, output));
@@ -179,8 +181,8 @@ impl Trained {
     /// Reads models from `folder`.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Malformed`] or [`Error::Changed`] names the file that cannot be
-    /// read, has another format, or is not the one that was saved.
+    /// [`Error::Files`] or [`Error::File`] if a file cannot be read, [`Error::Malformed`] if it has another
+    /// format, [`Error::Changed`] if it differs from the file that was saved. Each error names the file.
     pub fn load(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(INDEX);
         let malformed = |reason: String| Error::Malformed { path: path.clone(), reason };
@@ -271,7 +273,7 @@ fn load_group(row: GroupRow, bins: usize, folder: &Path) -> Result<ModelGroup, E
     })
 }
 
-/// Numbers row by row, eight little-endian bytes each.
+/// Numbers in row-major order, eight little-endian bytes each.
 fn little_endian(table: MatRef<'_, f64>) -> Vec<u8> {
     table
         .row_iter()

@@ -1,4 +1,4 @@
-//! Trains and tests every group of models.
+//! Training and test of every group of models.
 
 use crate::distance::distances_within;
 use crate::group::different;
@@ -10,9 +10,10 @@ use crate::{
 use faer::Mat;
 use std::sync::OnceLock;
 
-/// Standard deviations on either side that hold 90 % of a normal distribution.
+/// Half width of the 90 % interval of a normal distribution, in standard deviations.
 const WIDTH_90: f64 = 1.644_853_626_951_472_7;
-/// Fewest entries worth training on: a hundred to find hyper-parameters, a hundred to test.
+/// Smallest number of entries for a training: a hundred for the hyper-parameters and a hundred for the
+/// test.
 pub const ENTRIES_MIN: usize = 200;
 
 /// Options of a training.
@@ -20,20 +21,20 @@ pub const ENTRIES_MIN: usize = 200;
 pub struct TrainOptions {
     /// Feature sets, each trained at every speed.
     pub features: Vec<FeatureColumns>,
-    /// The one of them that is also trained on all speeds together.
+    /// Name of the feature set that is also trained on all speeds together.
     pub all_speeds: Option<String>,
-    /// Scalings of the inputs to choose from.
+    /// Candidate scalings of the inputs.
     pub scalings: Vec<InputScaling>,
-    /// Entries that judge the scalings.
+    /// Number of held-out entries that compare the scalings.
     pub subset: usize,
-    /// Folds of the validation.
+    /// Number of folds of the cross-validation.
     pub folds: usize,
-    /// Decides which half of the entries trains.
+    /// Random seed of the split into training and test half.
     pub seed: u64,
 }
 
 impl TrainOptions {
-    /// The usual options for these feature sets: five folds (paper, 2.5.5), every scaling.
+    /// Default options for these feature sets: five folds (paper, 2.5.5) and all scalings.
     pub fn new(features: Vec<FeatureColumns>) -> Self {
         let whitened = [(16, 0.01), (8, 0.1), (16, 0.1), (32, 0.1), (8, 1.0), (16, 1.0), (32, 1.0)]
             .map(|(components, shrinkage)| InputScaling::Whitened { components, shrinkage });
@@ -52,18 +53,20 @@ impl TrainOptions {
 /// Progress of a training.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
-    /// Groups finished.
+    /// Number of groups that are finished.
     pub finished: usize,
-    /// Groups there are.
+    /// Total number of groups.
     pub groups: usize,
-    /// The group that begins; none at the end.
+    /// The group that begins; `None` at the end.
     pub next: Option<&'a GroupKey>,
 }
 
-/// Trains on a random half of the entries and tests on the other (paper, 2.5.5 and 3.4).
+/// Trains on a random half of the entries and tests on the other half (paper, 2.5.5 and 3.4).
 ///
 /// # Errors
-/// [`Error`] states what is wrong with the training set or the options.
+/// [`Error::Shape`], [`Error::NotFinite`] or [`Error::Constant`] if the training set is invalid;
+/// [`Error::TooFewEntries`]; [`Error::Columns`] or [`Error::UnknownFeature`] if the options do not match
+/// the set; otherwise the errors of [`fit()`].
 pub fn train(
     set: &TrainingSet,
     options: &TrainOptions,
@@ -84,7 +87,7 @@ pub fn train(
     Ok(Trained::new(set, options.seed, groups))
 }
 
-/// The groups to train: every feature set at every speed, then the one on all speeds.
+/// Keys of the groups to train: every feature set at every speed, then the one for all speeds.
 fn keys(set: &TrainingSet, options: &TrainOptions) -> Result<Vec<GroupKey>, Error> {
     let key = |speeds_km_h: &[f64], feature: &FeatureColumns| {
         feature.check(set.frequencies_hz.len())?;
@@ -150,7 +153,7 @@ fn speed_indices(set: &TrainingSet, key: &GroupKey) -> Vec<usize> {
         .collect()
 }
 
-/// Results of the folds at each of the hyper-parameters.
+/// Cross-validation results for each of the hyper-parameters.
 fn held_out(
     features: &Mat<f64>,
     targets: &Mat<f64>,
@@ -217,7 +220,7 @@ fn weigh(
     })
 }
 
-/// Error and spread over the folds, for the models with these hyper-parameters.
+/// Computes cross-validation error and spread of the models with these hyper-parameters.
 fn calibrate(group: &mut ModelGroup, at: Hyperparameters, folds: &Folds, targets: &Mat<f64>) {
     let models = group.models.iter_mut().enumerate();
     for (j, model) in models.filter(|(_, model)| model.hyperparameters == at) {
@@ -235,7 +238,7 @@ fn calibrate(group: &mut ModelGroup, at: Hyperparameters, folds: &Folds, targets
     }
 }
 
-/// Predictions for entries that no step of the training saw.
+/// Computes the scores on the test entries, which no step of the training used.
 fn test(group: &mut ModelGroup, features: &Mat<f64>, targets: &Mat<f64>) -> Result<(), Error> {
     let (means, sds) = group.predict_features(features.as_ref())?;
     let column = |of: &Mat<f64>, j: usize| of.col(j).iter().copied().collect::<Vec<f64>>();

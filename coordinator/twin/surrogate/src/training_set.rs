@@ -1,4 +1,4 @@
-//! The training set of models, checked once.
+//! Training set of the models, and its check.
 
 use crate::Error;
 use faer::Mat;
@@ -7,28 +7,28 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::ops::Range;
 use tracktwin_parameters::Parameter;
 
-/// The finished cases of a library: parameters in, ln-powers out.
+/// Finished cases of a library: parameters and simulated ln-powers.
 #[derive(Clone, Debug)]
 pub struct TrainingSet {
     /// Frequencies of the bins in Hz, ascending.
     pub frequencies_hz: Vec<f64>,
     /// Speeds in km/h.
     pub speeds_km_h: Vec<f64>,
-    /// A table a speed: natural logarithms of the bins' power, entries x bins, row-major.
+    /// One table per speed: natural logarithms of the power of the bins, entries x bins, row-major.
     pub log_power: Vec<Vec<f64>>,
     /// The parameters that vary.
     pub varied: Vec<Parameter>,
-    /// Their values in SI units, entries x varied, row-major.
+    /// Values of the varied parameters in SI units, entries x varied, row-major.
     pub parameters: Vec<f64>,
     /// Name of the campaign.
     pub campaign: String,
     /// Digest of the library's results.
     pub library_digest: String,
-    /// How features were made, as the library recorded it.
+    /// Definition of the features, as recorded in the library.
     pub feature_definition: serde_json::Value,
 }
 
-/// Which entries train and which test.
+/// Split of the entries into training and test half.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Split {
     /// Entries to train on, in random order.
@@ -38,12 +38,12 @@ pub struct Split {
 }
 
 impl TrainingSet {
-    /// How many entries there are.
+    /// Number of entries.
     pub fn entries(&self) -> usize {
         self.parameters.len().checked_div(self.varied.len()).unwrap_or(0)
     }
 
-    /// Refuses tables of the wrong size and numbers that are not finite.
+    /// Returns an error if a table has a wrong size, a number is not finite or a parameter is constant.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let entries = self.entries();
         let size = |what, table: &[f64], columns: usize| {
@@ -69,13 +69,14 @@ impl TrainingSet {
         Ok(())
     }
 
-    /// Lowest and highest value of a varied parameter.
+    /// Lowest and highest value of a varied parameter, in SI units; `column` is its index in `varied`.
     pub fn range(&self, column: usize) -> [f64; 2] {
         let values = self.parameters.iter().skip(column).step_by(self.varied.len());
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
     }
 
-    /// Chosen columns of chosen entries, the speeds (by index) side by side.
+    /// Given columns of given entries, with the speeds (indices) one after the other: entries x (speeds *
+    /// columns).
     pub(crate) fn features(
         &self,
         entries: &[usize],
@@ -88,7 +89,7 @@ impl TrainingSet {
         })
     }
 
-    /// Parameter values of chosen entries, entries x varied.
+    /// Parameter values of given entries, entries x varied.
     pub(crate) fn values(&self, entries: &[usize]) -> Mat<f64> {
         let p = self.varied.len();
         Mat::from_fn(entries.len(), p, |i, j| self.parameters[entries[i] * p + j])
@@ -96,7 +97,7 @@ impl TrainingSet {
 }
 
 impl Split {
-    /// A random half of `entries` to train on, the rest to test; `seed` decides.
+    /// Splits `entries` at random into a training half and a test half; `seed` fixes the order.
     pub fn halves(entries: usize, seed: u64) -> Self {
         let mut order: Vec<usize> = (0..entries).collect();
         let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -1,4 +1,4 @@
-//! How good predictions are: folds, scaled errors, coverage.
+//! Quality of predictions: cross-validation, scaled errors, coverage.
 
 use crate::cholesky::Cholesky;
 use crate::kernel::correlations;
@@ -8,7 +8,7 @@ use crate::{
 };
 use faer::{Mat, MatRef};
 
-/// What every entry's prediction would have been without the entries of its own fold.
+/// Cross-validation results: every entry is predicted from the entries outside its own fold.
 #[derive(Clone, Debug)]
 pub struct Folds {
     /// Target minus prediction, n x p.
@@ -17,14 +17,14 @@ pub struct Folds {
     pub variances: Vec<f64>,
 }
 
-/// Results of `count` folds (entry `i` belongs to fold `i % count`), each with an input map and a
-/// factor of its own.
+/// Results of `count` folds (entry `i` belongs to fold `i % count`), each with its own input map and
+/// factor.
 ///
-/// What a whitened map learned from an entry helps to predict that entry, so that [`folds`] with
-/// the map of all entries would flatter: by a tenth for 80 bins and 800 entries.
+/// A whitened map contains information on the entries that it was fitted to. [`folds`] with the map of all
+/// entries would therefore underestimate the errors: by a tenth for 80 bins and 800 entries.
 ///
 /// # Errors
-/// Those of [`InputMap::fit`] and [`Factor::new`].
+/// The errors of [`InputMap::fit`] and [`Factor::new`].
 pub(crate) fn folds_with_own_maps(
     features: MatRef<'_, f64>,
     targets: MatRef<'_, f64>,
@@ -68,14 +68,12 @@ fn rows(of: MatRef<'_, f64>, rows: &[usize]) -> Mat<f64> {
 
 /// Results of `count` folds (entry `i` belongs to fold `i % count`) without refitting.
 ///
-/// With `Q` the inverse of the covariance less the part that the mean takes, the errors of fold
-/// `F` are `Q_FF⁻¹ (Q y)_F` and their covariance is `Q_FF⁻¹` (Dubrule 1983, eq. 11; Rasmussen &
-/// Williams 2006, 5.4.2). `Q y` are the `weights` (n x p). The mean is refitted in every fold,
-/// hyper-parameters stay.
+/// With `Q` the inverse of the covariance projected against the mean, the errors of fold `F` are `Q_FF⁻¹ (Q
+/// y)_F` and their covariance is `Q_FF⁻¹` (Dubrule 1983, eq. 11; Rasmussen & Williams 2006, 5.4.2).
+/// `weights` (n x p) are `Q y`. The mean is refitted in every fold; the hyper-parameters are not.
 ///
 /// # Errors
-/// [`Error::NotPositiveDefinite`] when a fold holds too many entries for the others to determine
-/// the mean.
+/// [`Error::NotPositiveDefinite`] if the entries outside a fold are too few to determine the mean.
 pub fn folds(factor: &Factor, weights: MatRef<'_, f64>, count: usize) -> Result<Folds, Error> {
     let q = factor.projected_inverse();
     let (n, p) = (weights.nrows(), weights.ncols());
@@ -97,15 +95,15 @@ pub fn folds(factor: &Factor, weights: MatRef<'_, f64>, count: usize) -> Result<
     Ok(out)
 }
 
-/// Mean absolute error as a share of the range (paper, eq. 11; 0.05 is 5 %).
+/// Mean absolute error divided by `range` (paper, eq. 11); 0.05 is 5 %.
 pub fn mase(truth: &[f64], predicted: &[f64], range: f64) -> f64 {
     let sum: f64 = truth.iter().zip(predicted).map(|(t, p)| (t - p).abs()).sum();
     sum / range / truth.len() as f64
 }
 
-/// Share of truths within `widths` standard deviations of their prediction.
+/// Share of the true values within `widths` standard deviations of their prediction.
 ///
-/// 90 % intervals are 1.645 wide on either side.
+/// A 90 % interval has `widths` = 1.645.
 pub fn coverage(truth: &[f64], predicted: &[f64], sd: &[f64], widths: f64) -> f64 {
     let inside = truth
         .iter()

@@ -1,10 +1,11 @@
-//! The directions in which features separate parameters, in units of their noise.
+//! Directions in which features separate parameters, scaled by the standard deviation of their random
+//! variation.
 //!
-//! One case sees one random surface, so that its ln-powers scatter around what its parameters make
-//! expected, and the scatter of neighbouring bins is alike. Both are estimated from the training
-//! set: a polynomial in the parameters for the expectation, its residuals for the scatter. In
-//! units of the scatter, few directions carry all that the parameters do (Fisher's discriminant
-//! analysis with a continuous class).
+//! Every case has one random surface. Its ln-powers therefore deviate from the values expected for its
+//! parameters, and the deviations of neighbouring bins are correlated. The training set gives both: a
+//! polynomial in the parameters for the expectation, and its residuals for the covariance of the
+//! deviations. After whitening by this covariance, few directions carry the whole effect of the parameters
+//! (Fisher's discriminant analysis with a continuous class).
 
 use crate::Error;
 use crate::cholesky::Cholesky;
@@ -14,16 +15,17 @@ use faer::{Mat, MatRef, Side};
 /// Highest total degree of the polynomial in the parameters.
 const DEGREE_MAX: usize = 3;
 
-/// Directions (d x m, m at most `components`), the most telling first, along which the scatter of
-/// the centred `features` (n x d) at fixed `parameters` (n x p) has variance one.
+/// Directions (d x m, m at most `components`), sorted by the effect of the parameters, largest first. Along
+/// each direction the deviations of the centred `features` (n x d) at fixed `parameters` (n x p) have
+/// variance one.
 ///
-/// To every bin's scatter `shrinkage` times the mean over the bins is added. Without it the
-/// directions make use of every accident of the entries they are learned from; with much of it
-/// they become the principal components of the expected features.
+/// The function adds `shrinkage` times the mean variance over the bins to the variance of every bin.
+/// Without shrinkage the directions overfit the training entries; with large shrinkage they become the
+/// principal components of the expected features.
 ///
 /// # Errors
-/// [`Error::NotPositiveDefinite`] when a parameter is constant or entries are fewer than bins
-/// allow; [`Error::NoEigenvalues`].
+/// [`Error::NotPositiveDefinite`] if a parameter is constant or there are too few entries for the number of
+/// bins; [`Error::NoEigenvalues`] if the eigenvalue iteration does not converge.
 pub(crate) fn directions(
     features: MatRef<'_, f64>,
     parameters: MatRef<'_, f64>,

@@ -1,4 +1,4 @@
-//! Judging features against what a library's tracks can have, on a library of one resonance.
+//! Domain check of features, with a library of one resonance.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -8,7 +8,7 @@ use tracktwin_surrogate::{Beyond, Domain, Judgement, Side, TrainingSet};
 const BINS: usize = 32;
 const ENTRIES: usize = 600;
 
-/// Numbers from -0.5 to 0.5 that say nothing.
+/// Pseudo-random numbers from -0.5 to 0.5.
 fn noise(index: usize) -> f64 {
     ((index as f64 + 1.0) * 12.9898).sin() * 43_758.545_3 % 1.0 * 0.5
 }
@@ -42,7 +42,7 @@ fn library() -> TrainingSet {
     }
 }
 
-/// What is judged of seven windows of a track that the library's noise has not seen.
+/// Result of the domain check for seven windows of a track with noise that the library does not contain.
 fn judged(domain: &Domain, track: usize, window: impl Fn(usize) -> Vec<f64>) -> Judgement {
     let mut mean = vec![0.0; domain.coordinates(&window(0)).unwrap().len()];
     for number in 0..7 {

@@ -21,8 +21,8 @@ fn chance(i: usize, j: usize) -> f64 {
     (x ^ (x >> 31)) as f64 / u64::MAX as f64
 }
 
-/// A resonance whose frequency tells the ballast stiffness, over a level that tells the
-/// irregularity, with scatter that neighbouring bins and speeds share, as one random surface gives.
+/// A resonance whose frequency depends on the ballast stiffness, above a level that depends on the
+/// irregularity. Its random variation is common to neighbouring bins and speeds, as for one random surface.
 fn spectra() -> TrainingSet {
     let unit: Vec<[f64; 2]> = (0..ENTRIES).map(|i| [chance(i, 0), chance(i, 1)]).collect();
     let ln_power = |i: usize, bin: usize, speed: usize| {
@@ -61,7 +61,7 @@ fn options() -> TrainOptions {
     }
 }
 
-/// Trained once: what the tests ask of it is read only.
+/// Models that are trained once; the tests only read them.
 fn trained() -> &'static (TrainingSet, Trained) {
     static TRAINED: OnceLock<(TrainingSet, Trained)> = OnceLock::new();
     TRAINED.get_or_init(|| {

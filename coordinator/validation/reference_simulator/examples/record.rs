@@ -1,7 +1,7 @@
 //! Makes a recording of a scene: `record SCENE.json FOLDER`, or `record typical:SEED FOLDER`.
 //!
-//! With a second file, `record typical:SEED FOLDER HIDDEN.json`, the effects listed there are hidden
-//! in the scene. What the scene was is printed, for the recording does not tell.
+//! With a second file, `record typical:SEED FOLDER HIDDEN.json`, the effects listed there are hidden in
+//! the scene. The program prints the scene, because the recording does not contain the truth.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,6 +1,7 @@
-//! What a simulation assumes where nature has more than one answer: shapes of effects, steel, modes.
+//! Assumptions of a simulation that can be chosen in more than one way: shapes of effects, damping of
+//! steel, modes.
 //!
-//! Owns the choices and their formulas; which of them a scene makes is its own plain data.
+//! This module contains the choices and their formulas. The data of a scene select among them.
 
 use crate::TruthError;
 use crate::scene::{not_negative, positive};
@@ -20,13 +21,13 @@ const BRANCH_SPREAD: f64 = 3.0;
 /// Width of a one-sided dip before and behind its joint, of the length `l`.
 const ONE_SIDED: [f64; 2] = [0.1, 1.9];
 
-/// What a scene's simulation assumes; the default is what the catalogue of extensions says.
+/// Assumptions of the simulation of a scene. The default is that of the catalogue of extensions.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct Assumptions {
-    /// Modes of the rail to a span.
+    /// Number of modes of the rail per span.
     pub modes_per_span: usize,
-    /// Damping of every mode of rail and sleepers over critical damping.
+    /// Damping ratio of every mode of rail and sleepers.
     pub steel_damping_ratio: f64,
     /// Dip of a rail joint.
     pub joint: JointDip,
@@ -54,7 +55,7 @@ impl Default for Assumptions {
     }
 }
 
-/// Dip of a joint by depth `d` and length `l`; all have the area `2 d l`.
+/// Shape of the dip of a joint of depth `d` and length `l`. All shapes have the area `2 d l`.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum JointDip {
@@ -84,7 +85,7 @@ impl JointDip {
     }
 }
 
-/// Hollow of a squat by depth `d` and length `l`; both have the area `d l / 2`.
+/// Shape of the hollow of a squat of depth `d` and length `l`. Both shapes have the area `d l / 2`.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum SquatHollow {
@@ -106,13 +107,13 @@ impl SquatHollow {
     }
 }
 
-/// Waves `sin p + h sin 2 p` whose wave number grows evenly over the stretch.
+/// Waves `sin p + h sin 2 p` whose wave number increases linearly over the stretch.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct Waves {
-    /// Wave number at the end less that at the begin, over their mean.
+    /// Difference of the wave numbers at end and start, divided by their mean.
     pub drift: f64,
-    /// Amplitude `h` of the second harmonic over that of the first.
+    /// Ratio `h` of the amplitude of the second harmonic to that of the first.
     pub harmonic: f64,
 }
 
@@ -132,7 +133,7 @@ impl Waves {
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct Void {
-    /// Share of the ballast's damping that acts over the gap too, 0 to 1.
+    /// Share of the ballast damping that also acts while the gap is open, 0 to 1.
     pub damping_share: f64,
     /// Whether the gap is too deep to close.
     pub stays_open: bool,

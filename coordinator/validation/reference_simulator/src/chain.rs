@@ -1,4 +1,4 @@
-//! The measuring chain: what is recorded of what the wheel did.
+//! The measuring chain: from the motion of the wheel to the recorded signal.
 
 use crate::filter::halve_rate;
 use crate::hidden::Hidden;
@@ -69,8 +69,8 @@ fn concerns(hidden: &Hidden, pass: usize) -> bool {
     }
 }
 
-/// What a sensor feels that is a mass on a spring and damper, shaken at its foot: with `r` its
-/// motion against the foot, `r'' + 2 zeta w r' + w² r = -a`, it feels `-2 zeta w r' - w² r`.
+/// Acceleration of a sensor on a spring and damper with base excitation. The motion `r` relative to the
+/// base follows `r'' + 2 zeta w r' + w² r = -a`; the sensor measures `-2 zeta w r' - w² r`.
 fn mounted(shaken: &[f64], omega: f64, damping_ratio: f64, step_s: f64) -> Vec<f64> {
     let (damping, stiffness) = (2.0 * damping_ratio * omega, omega * omega);
     let sensor = LinearSystem::oscillator(1.0, damping, stiffness, step_s);

@@ -26,8 +26,9 @@ impl Contact {
         (force_n / self.coefficient).powf(2.0 / 3.0)
     }
 
-    /// Force in N between bodies that would overlap by `overlap_m` without it and give way by
-    /// `compliance` in m/N under it: the root of `a² + compliance C a³ = overlap`, `a² = delta`.
+    /// Force in N between two bodies: from the root of `a² + compliance C a³ = overlap` with
+    /// `a² = delta`. `overlap_m` is the overlap without contact force; `compliance` in m/N is the common
+    /// displacement per unit force.
     ///
     /// The left side is convex and grows, so that Newton's method from above cannot fail. None where
     /// the overlap is no number.

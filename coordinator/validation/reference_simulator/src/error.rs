@@ -1,54 +1,54 @@
-//! Why a scene gives no recording, in one line each.
+//! Errors of scenes and recordings, one line each.
 
 use tracktwin_files::FilesError;
 
-/// A scene that cannot be, or a recording that cannot be written.
+/// A scene is invalid, or a recording cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum TruthError {
-    /// A value is no number of its kind.
+    /// A value is not allowed for its field.
     #[error("{field} is {value}; it must be {form}")]
     Value {
-        /// The field's name in files.
+        /// Name of the field in files.
         field: &'static str,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// Allowed values, to follow "must be".
         form: &'static str,
     },
-    /// A value is beyond what can be simulated.
+    /// A value is too large to be simulated.
     #[error("{field} is {value}; it must be at most {most}")]
     TooLarge {
-        /// The field's name in files.
+        /// Name of the field in files.
         field: &'static str,
         /// Its value.
         value: f64,
-        /// The largest that can be.
+        /// Largest allowed value.
         most: f64,
     },
-    /// There are not as many sleepers as the spans have between them.
+    /// The number of sleepers does not match the number of spans.
     #[error("a track of {spans} spans has one sleeper fewer, not {given}")]
     Sleepers {
-        /// Sleepers given.
+        /// Number of given sleepers.
         given: usize,
-        /// Spans of the track.
+        /// Number of spans of the track.
         spans: usize,
     },
-    /// What is recorded is shorter than a span or too near to an end of the track.
+    /// The recorded stretch is shorter than a span or too near to an end of the track.
     #[error(
         "{from_m} to {to_m} m cannot be recorded: record at least one span, at least \
              {end_m} m from the ends of the track of {length_m} m"
     )]
     Recorded {
-        /// Begin in m.
+        /// Start of the stretch in m.
         from_m: f64,
-        /// End in m.
+        /// End of the stretch in m.
         to_m: f64,
-        /// Least distance from the ends in m.
+        /// Smallest distance from the ends of the track in m.
         end_m: f64,
         /// Length of the track in m.
         length_m: f64,
     },
-    /// There is nothing to record.
+    /// The scene has no passes.
     #[error("the scene has no passes; add one")]
     NoPasses,
     /// A hidden effect is not on the track.
@@ -58,16 +58,16 @@ pub enum TruthError {
         physics: &'static str,
         /// Length of the track in m.
         length_m: f64,
-        /// Sleepers of the track.
+        /// Number of sleepers of the track.
         sleepers: usize,
     },
-    /// The motion is not finite any more: something carries nothing.
+    /// The motion became NaN or infinite: a part of the track is unsupported.
     #[error("the motion of the wheel diverges at {position_m} m")]
     Diverged {
-        /// Where in m.
+        /// Position of the wheel in m.
         position_m: f64,
     },
-    /// A place that is struck is not on the rail.
+    /// The place of a hammer hit is not on the rail.
     #[error("{x_m} m is not on the track of {length_m} m")]
     OffTrack {
         /// The place in m.
@@ -75,7 +75,7 @@ pub enum TruthError {
         /// Length of the track in m.
         length_m: f64,
     },
-    /// A hidden effect that receptances do not hold.
+    /// The receptance of a hidden effect cannot be computed.
     #[error("the receptance of a track with {physics} is not known")]
     NoReceptance {
         /// Name of the effect.

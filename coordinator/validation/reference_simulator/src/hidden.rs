@@ -1,35 +1,37 @@
 //! Hidden physics of a scene: kinds, places and sizes, as in the files of truth.
 //!
-//! Owns the list; what each entry does to track, vehicle, surface or recording is left to those.
+//! This module contains the list of effects. Other modules apply each effect to track, vehicle, surface
+//! or recording.
 
 use crate::vtrack::SPACING_M;
 use serde::{Deserialize, Serialize};
 
 /// One hidden effect.
 ///
-/// In JSON the name stands as `physics` beside the values, with the names and meanings of the
-/// catalogue of extensions: `{"physics": "sleeper_bolt", "sleepers": [8], "stiffness_N_per_m": 3e7}`.
-/// Sleeper `i`, from 0, stands at `(i + 1)` spacings; a point of the rail has both `x_m` equal.
+/// In JSON the name is the field `physics` of the object with the values. Names and meanings are those
+/// of the catalogue of extensions:
+/// `{"physics": "sleeper_bolt", "sleepers": [8], "stiffness_N_per_m": 3e7}`. Sleeper `i`, from 0, is at
+/// `(i + 1)` spacings. A point of the rail has two equal values of `x_m`.
 #[derive(Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[serde(tag = "physics", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Hidden {
     /// Dip `d exp(-|x - x0| / l)` of the surface over a rail that bends more easily.
     RailJoint {
-        /// Its place in m, twice.
+        /// Position in m; both values are equal.
         x_m: [f64; 2],
         /// Depth `d` of the dip in m.
         dip_m: f64,
         /// Distance `l` in m over which the dip falls to 1/e.
         length_m: f64,
-        /// What remains of the rail's bending stiffness, 0 to 1.
+        /// Ratio of the bending stiffness at the joint to that of the rail, 0 to 1.
         bending_factor: f64,
-        /// Length in m of the rail that is softened.
+        /// Length in m of the softened part of the rail.
         #[serde(default = "joint_bending_length_m")]
         bending_length_m: f64,
     },
     /// Hollow `d/2 (1 + cos 2 pi (x - x0) / l)` of the railhead over the length `l`.
     Squat {
-        /// Its place in m, twice.
+        /// Position in m; both values are equal.
         x_m: [f64; 2],
         /// Depth `d` in m.
         depth_m: f64,
@@ -38,7 +40,7 @@ pub enum Hidden {
     },
     /// Waves `A sin(2 pi x / L)` of the surface on a stretch, faded over two waves at its ends.
     Corrugation {
-        /// From where to where in m.
+        /// Start and end of the stretch in m.
         x_m: [f64; 2],
         /// Wavelength `L` in m.
         wavelength_m: f64,
@@ -53,14 +55,14 @@ pub enum Hidden {
     },
     /// Waves `a cos(n x / R + phi)` around the tread, `phi` another in every pass.
     WheelOutOfRound {
-        /// Waves on a turn.
+        /// Number of waves per revolution.
         order: u32,
         /// Amplitude in m.
         amplitude_m: f64,
     },
     /// Springs beside the railpad and against the rail's rotation at some sleepers.
     FasteningClamp {
-        /// Numbers of the sleepers.
+        /// Indices of the sleepers, from 0.
         sleepers: Vec<usize>,
         /// Stiffness beside the railpad in N/m.
         #[serde(rename = "vertical_N_per_m")]
@@ -71,15 +73,15 @@ pub enum Hidden {
     },
     /// Railpads that have lost most of their stiffness, and damping in proportion.
     MissingRailpad {
-        /// Numbers of the sleepers.
+        /// Indices of the sleepers, from 0.
         sleepers: Vec<usize>,
-        /// What stiffness remains in N/m.
+        /// Remaining stiffness in N/m.
         #[serde(rename = "stiffness_N_per_m")]
         stiffness_n_per_m: f64,
     },
     /// Springs that hold the free ends of sleepers to the ground.
     SleeperBolt {
-        /// Numbers of the sleepers.
+        /// Indices of the sleepers, from 0.
         sleepers: Vec<usize>,
         /// Stiffness of a bolt in N/m.
         #[serde(rename = "stiffness_N_per_m")]
@@ -87,14 +89,14 @@ pub enum Hidden {
     },
     /// Sleepers with a gap between them and the ballast, which only pushes.
     HangingSleeper {
-        /// Numbers of the sleepers.
+        /// Indices of the sleepers, from 0.
         sleepers: Vec<usize>,
         /// Gap of the unloaded track in m.
         gap_m: f64,
     },
     /// A mass under the ballast of a half sleeper, on a spring and damper of its own.
     SubgradeLayer {
-        /// Numbers of the sleepers; all where there are none.
+        /// Indices of the sleepers, from 0. `None`: all sleepers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         sleepers: Option<Vec<usize>>,
         /// Mass in kg.
@@ -151,7 +153,7 @@ pub enum Hidden {
         /// Resonance in Hz.
         #[serde(rename = "frequency_Hz")]
         frequency_hz: f64,
-        /// Damping over critical damping.
+        /// Damping ratio.
         damping_ratio: f64,
     },
     /// Accelerations beyond a limit are recorded as the limit.
@@ -159,11 +161,11 @@ pub enum Hidden {
         /// The limit in m/s2.
         limit_m_s2: f64,
     },
-    /// Recorded over true acceleration.
+    /// A wrong gain: ratio of recorded to true acceleration.
     GainError {
         /// The factor.
         factor: f64,
-        /// Index of the pass; all where there is none.
+        /// Index of the pass. `None`: all passes.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pass: Option<usize>,
     },
@@ -171,13 +173,13 @@ pub enum Hidden {
     PositionError {
         /// Recorded minus true position at the first sample in m.
         offset_m: f64,
-        /// Recorded over true way, minus one.
+        /// Ratio of recorded to true distance, minus one.
         scale: f64,
-        /// Index of the pass; all where there is none.
+        /// Index of the pass. `None`: all passes.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pass: Option<usize>,
     },
-    /// A tone from the mains, of another phase in every pass.
+    /// Hum of the electrical mains, with another phase in every pass.
     ElectricalHum {
         /// Its frequency in Hz.
         #[serde(rename = "frequency_Hz")]
@@ -187,27 +189,27 @@ pub enum Hidden {
     },
     /// A mass on a damped spring under the rail. Not in the catalogue.
     RailAbsorber {
-        /// Its place in m, twice.
+        /// Position in m; both values are equal.
         x_m: [f64; 2],
         /// Mass in kg.
         mass_kg: f64,
         /// Frequency in Hz to which it is tuned.
         #[serde(rename = "frequency_Hz")]
         frequency_hz: f64,
-        /// Damping over critical damping.
+        /// Damping ratio.
         damping_ratio: f64,
     },
     /// Sleepers that are cracked under the rail: 20 mm of them keep a share of their bending
     /// stiffness. Not in the catalogue.
     CrackedSleeper {
-        /// Numbers of the sleepers.
+        /// Indices of the sleepers, from 0.
         sleepers: Vec<usize>,
-        /// What remains of the bending stiffness there, 0 to 1.
+        /// Ratio of the bending stiffness at the crack to that of the sleeper, 0 to 1.
         bending_factor: f64,
     },
     /// A spring between the rail seats of two sleepers. Not in the catalogue.
     LinkedSleepers {
-        /// Numbers of the two.
+        /// Indices of the two sleepers, from 0.
         sleepers: [usize; 2],
         /// Stiffness in N/m.
         #[serde(rename = "stiffness_N_per_m")]
@@ -221,18 +223,18 @@ pub enum Hidden {
         frequency_hz: f64,
         /// Modal mass at the contact in kg.
         mass_kg: f64,
-        /// Damping over critical damping.
+        /// Damping ratio.
         damping_ratio: f64,
     },
 }
 
-/// Length in m of the softened rail of a joint where nothing is said.
+/// Default length in m of the softened part of the rail at a joint.
 const fn joint_bending_length_m() -> f64 {
     0.025
 }
 
 impl Hidden {
-    /// Its name, as files have it.
+    /// Name of the effect in files.
     pub const fn physics(&self) -> &'static str {
         match self {
             Self::RailJoint { .. } => "rail_joint",
@@ -261,7 +263,7 @@ impl Hidden {
         }
     }
 
-    /// The sleepers it is tied to, if it is tied to some.
+    /// Indices of the sleepers of the effect, if it acts at sleepers.
     pub fn sleepers(&self) -> Option<&[usize]> {
         match self {
             Self::FasteningClamp { sleepers, .. }
@@ -275,8 +277,8 @@ impl Hidden {
         }
     }
 
-    /// From where to where it is along the track in m, if it has a place: that of its rail, or
-    /// from its first to its last sleeper.
+    /// Start and end of the effect along the track in m, if it has a place: the stretch of rail, or the
+    /// distance from its first to its last sleeper.
     pub fn place(&self) -> Option<[f64; 2]> {
         match self {
             Self::RailJoint { x_m, .. }

@@ -1,10 +1,9 @@
-//! Recordings whose truth is known: passes over a track with hidden physics.
+//! Simulator of recordings with known truth: passes over a track with hidden physics.
 //!
-//! An independent simulator, which shares neither code nor discretisation with the twin's: sine
-//! modes of the rail and Ritz modes of the sleepers instead of finite elements, steps that are
-//! exact for the modes instead of Newmark's, and an irregularity of its own making. Whether a
-//! diagnosis finds what is hidden is left to those who diagnose. Method and checks:
-//! `docs/reference-simulator.md`.
+//! This simulator is independent: it shares neither code nor discretisation with the track model. It
+//! uses sine modes of the rail and Ritz modes of the sleepers instead of finite elements, time steps
+//! that are exact for the modes instead of Newmark's method, and its own synthesis of the irregularity.
+//! Method and tests: `docs/reference-simulator.md`.
 
 mod assumptions;
 mod chain;

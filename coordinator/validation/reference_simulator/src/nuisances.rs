@@ -1,6 +1,8 @@
-//! Small things that every track, wheel and recorder has, and that no diagnosis should name.
+//! Nuisances: small imperfections of every track, wheel and recorder. A diagnosis should not report
+//! them.
 //!
-//! Owns the plain data and the formulas of wheel, patch and recorder; railpads are `track`'s.
+//! This module contains the data, and the formulas of wheel, contact patch and recorder. The module
+//! `track` contains those of the railpads.
 
 use crate::TruthError;
 use crate::scene::{not_negative, positive};
@@ -19,29 +21,29 @@ pub(crate) const REFERENCE_LOAD_N: f64 = 1500.0;
 /// Furthest that a true value is from its nominal one.
 const OFF_NOMINAL_MAX: f64 = 0.1;
 
-/// Nuisances of a scene; the default is none.
+/// Nuisances of a scene. The default has none.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct Nuisances {
-    /// Exponent of the stiffness of every railpad by its load.
+    /// Exponent of the load dependence of the stiffness of every railpad.
     pub railpad_exponent: f64,
-    /// Stiffness of a Maxwell branch beside every railpad over that of the railpad.
+    /// Ratio of the stiffness of a Maxwell branch, parallel to every railpad, to that of the railpad.
     pub railpad_relaxation: f64,
-    /// Its relaxation time in s.
+    /// Relaxation time of this branch in s.
     pub railpad_relaxation_time_s: f64,
-    /// Half of the length in m over which the contact averages the irregularity.
+    /// Half of the length of the contact patch in m, over which the contact averages the irregularity.
     pub patch_half_length_m: f64,
-    /// Waves around the tread, from one wave a turn up.
+    /// Waves around the tread, from one wave per revolution up.
     pub wheel_orders: [WheelOrder; 4],
-    /// What the recorder's response differs from one.
+    /// Frequency response of the recorder. `None`: equal to one.
     pub response: Option<Response>,
     /// Standard deviation in m/s2 of noise below some 30 Hz.
     pub slow_noise_m_s2: f64,
-    /// True over nominal mass of the wheel.
+    /// Ratio of true to nominal mass of the wheel.
     pub wheel_mass_factor: f64,
-    /// True over nominal coefficient of the contact.
+    /// Ratio of true to nominal Hertzian coefficient of the contact.
     pub contact_factor: f64,
-    /// True over nominal mass of the sleepers.
+    /// Ratio of true to nominal mass of the sleepers.
     pub sleeper_mass_factor: f64,
 }
 

@@ -10,25 +10,25 @@ use std::f64::consts::PI;
 /// Time in s over which the surface grows from nothing, so that the wheel begins without a jump.
 const EASE_S: f64 = 4e-3;
 
-/// How the wheel is driven.
+/// Speed and stretch of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
     /// True speed in m/s.
     pub speed_m_s: f64,
-    /// Where the wheel starts, at rest on the track, in m.
+    /// Start position of the wheel in m. The wheel starts in static equilibrium.
     pub start_m: f64,
-    /// Where the pass ends in m.
+    /// End position of the pass in m.
     pub end_m: f64,
-    /// Which side of the wheel is down.
+    /// Initial angle of the wheel.
     pub angle: WheelAngle,
 }
 
-/// What the wheel did: a sample after every step.
+/// Record of a pass: one sample after every time step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Driven {
     /// Time between samples in s.
     pub time_step_s: f64,
-    /// Acceleration that a sensor at the axle box feels in m/s2, positive downwards.
+    /// Acceleration at the sensor on the axle box in m/s2, positive downwards.
     pub acceleration_m_s2: Vec<f64>,
     /// Contact force in N.
     pub contact_force_n: Vec<f64>,
@@ -36,11 +36,11 @@ pub struct Driven {
     pub position_m: Vec<f64>,
 }
 
-/// Drives the wheel over the track of a scene and over a surface of this height in m, positive
-/// downwards, to which hidden shapes are added.
+/// Simulates a pass over the track of a scene. `height_m` returns the height of the surface in m,
+/// positive downwards, at a position in m. The function adds the shapes of hidden effects.
 ///
 /// # Errors
-/// [`TruthError`] where the scene cannot be, or its motion does not stay finite.
+/// [`TruthError`] if the scene is invalid or the motion does not remain finite.
 pub fn drive(
     scene: &Scene,
     drive: &Drive,
@@ -50,7 +50,7 @@ pub fn drive(
     run(&Track::new(scene), scene, drive, height_m)
 }
 
-/// The same over a track that is made already.
+/// Simulates a pass over an existing track.
 pub(crate) fn run(
     track: &Track,
     scene: &Scene,

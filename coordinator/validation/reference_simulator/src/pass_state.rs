@@ -1,6 +1,7 @@
 //! A wheel on its way over a track: state, and one time step.
 //!
-//! Owns the order in which a step is solved; what the ports do is `ports`'.
+//! This module defines the order of the solution in a step. The module `ports` computes the forces of
+//! the ports.
 
 use crate::ports::PortState;
 use crate::rail_state::RailState;
@@ -9,7 +10,7 @@ use crate::system::dot;
 use crate::track::Track;
 use crate::vtrack::WHEEL_LOAD_N;
 
-/// What a step gives: what the sensor feels in m/s2 and the contact force in N.
+/// Result of a step: acceleration at the sensor in m/s2 and contact force in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Felt {
     pub(crate) acceleration_m_s2: f64,

@@ -1,7 +1,7 @@
-//! Where something joins the rail: its place, its law of force, what lies behind it.
+//! A port of the rail: its place, its force law, and the system behind it.
 //!
-//! Owns railpads, clamps, softened joints and absorbers as ports; solving for their forces is
-//! `track`'s and `pass_state`'s.
+//! This module contains railpads, clamps, softened joints and absorbers as ports. The modules `track`
+//! and `pass_state` solve for their forces.
 
 use crate::rail::{self, RailModes};
 use crate::sleeper::Sleeper;
@@ -57,7 +57,7 @@ impl Law {
         self.power.is_some() || self.gain() > 0.0
     }
 
-    /// What all branches add to the stiffness within a step, in N/m.
+    /// Contribution of all branches to the stiffness within a step, in N/m.
     pub(crate) fn gain(&self) -> f64 {
         self.branches.iter().map(|branch| branch.gain).sum()
     }
@@ -83,7 +83,7 @@ impl PowerLaw {
     }
 }
 
-/// What moves behind a port, driven by its force.
+/// System behind a port, driven by the force of the port.
 #[derive(Clone, Debug)]
 pub(crate) enum Behind {
     /// Nothing: the ground, or the rail itself.
@@ -104,7 +104,7 @@ impl Behind {
         }
     }
 
-    /// Static flexibility in m/N of what is behind.
+    /// Static flexibility in m/N of the system behind the port.
     pub(crate) fn flexibility(&self) -> f64 {
         match self {
             Self::Sleeper(sleeper) => sleeper.flexibility,

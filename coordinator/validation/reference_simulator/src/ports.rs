@@ -7,14 +7,14 @@ use crate::system::dot;
 use crate::track::{Track, seat_m};
 use crate::vtrack::SPACING_M;
 
-/// Distance in m from the wheel within which seats feel what the modes leave out.
+/// Distance in m from the wheel within which the residual flexibility of the modes acts on seats.
 const NEAR_M: f64 = 0.25;
 
-/// Forces of the ports, and the motion of what is behind them.
+/// Forces of the ports, and the motion of the systems behind them.
 #[derive(Clone, Debug)]
 pub(crate) struct PortState {
     forces: Vec<f64>,
-    /// What is behind each port: its state, and room for the next.
+    /// State of the system behind each port, now and at the next step.
     states: Vec<[Vec<f64>; 2]>,
     /// Forces on it at the step's begin: the port's, then the ballast's behind a gap.
     pushes: Vec<Vec<f64>>,
@@ -33,7 +33,7 @@ pub(crate) struct PortState {
     folded: Vec<f64>,
 }
 
-/// Compressions, where some law asks for more than its linear part.
+/// Compressions, if a law is more than its linear part.
 #[derive(Clone, Debug)]
 struct Follow {
     /// In m, now and a step before.
@@ -105,7 +105,7 @@ impl PortState {
         }
     }
 
-    /// What a port's force would be if no port had one at the step's end.
+    /// Free force of each port: with zero force of all ports at the end of the step.
     #[inline]
     fn ask(&self, track: &Track, port: usize, foreseen_n: f64) -> f64 {
         let law = &track.laws[port];
@@ -176,7 +176,8 @@ impl PortState {
         dot(&self.lines, &self.forces)
     }
 
-    /// Moves what is behind the ports under their forces; the rail has moved under all.
+    /// Updates the systems behind the ports under the forces of the ports. The rail has already been
+    /// updated.
     #[inline]
     pub(crate) fn finish(&mut self, track: &Track, rail: &RailState, force_n: f64) {
         for (port, behind) in track.behind.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The rail: sine modes of a simply supported Timoshenko beam, and what they leave out.
+//! The rail: sine modes of a simply supported Timoshenko beam, and their residual flexibility.
 
 use crate::system::LinearSystem;
 use crate::vtrack::{

@@ -1,4 +1,4 @@
-//! The rail on its way: its modes, and what a time step does to them.
+//! State of the modes of the rail, and its update in a time step.
 
 use crate::rest::Rest;
 use crate::track::Track;

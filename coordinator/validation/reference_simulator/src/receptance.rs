@@ -1,4 +1,4 @@
-//! What a hammer test measures: receptances of the track without a wheel.
+//! Receptances of the track without a wheel, as measured in a hammer test.
 
 use crate::hidden::Hidden;
 use crate::rail::RailModes;
@@ -17,8 +17,8 @@ use std::f64::consts::TAU;
 /// a sleeper above a gap has no ballast.
 ///
 /// # Errors
-/// [`TruthError`] for a scene that cannot be, a place off the rail, or an effect that adds
-/// something to the rail beside its seats.
+/// [`TruthError`] if the scene is invalid, if a place is not on the rail, or if an effect acts on the
+/// rail outside the rail seats.
 pub fn receptance(
     scene: &Scene,
     places_m: &[f64],
@@ -172,7 +172,7 @@ impl<'a> Struck<'a> {
         modes.map(gain).collect()
     }
 
-    /// What a support gives way in m/N: railpad and sleeper in series.
+    /// Flexibility of a support in m/N: railpad and sleeper in series.
     fn support(&self, seat: usize, omega: f64) -> Complex<f64> {
         let (bed, crack) = bed(self.scene, seat, &self.scene.sleepers[seat]);
         let law = railpad(self.scene, seat, STEP_S);

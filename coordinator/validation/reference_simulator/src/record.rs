@@ -23,22 +23,22 @@ const RUN_IN_M: f64 = 3.0 * SPACING_M;
 /// Way in m behind it, so that the filter has something to hold on to.
 const RUN_OUT_M: f64 = 0.002;
 
-/// Simulates every pass of a scene and writes the recording's folder: `recording.json` and one
-/// Parquet file a pass.
+/// Simulates every pass of a scene and writes the folder of the recording: `recording.json` and one
+/// Parquet file per pass.
 ///
-/// Passes run in parallel; the scene alone, with its seed, decides every number.
+/// Passes run in parallel. All results depend only on the scene and its seed.
 ///
 /// # Errors
-/// [`TruthError`] where the scene cannot be or the folder cannot be written.
+/// [`TruthError`] if the scene is invalid or the folder cannot be written.
 pub fn record(scene: &Scene, folder: &Path) -> Result<(), TruthError> {
     let recording = simulate(scene)?;
     Ok(recording.write(folder)?)
 }
 
-/// The same recording in memory, without a name.
+/// Simulates every pass of a scene. Returns the recording in memory, without a name.
 ///
 /// # Errors
-/// [`TruthError`] where the scene cannot be.
+/// [`TruthError`] if the scene is invalid.
 pub fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
     scene.check()?;
     let track = Track::new(scene);

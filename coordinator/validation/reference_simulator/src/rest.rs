@@ -1,4 +1,4 @@
-//! The track at rest under the standing wheel: where a pass begins.
+//! Static equilibrium of the track under the standing wheel: the initial state of a pass.
 
 use crate::track::Track;
 use crate::vtrack::WHEEL_LOAD_N;

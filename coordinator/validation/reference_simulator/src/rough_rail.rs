@@ -1,4 +1,5 @@
-//! Rails that are rougher than the rest: more of all waves, and more still of a band of them.
+//! Rails that are rougher than the others: at all wavelengths, and more strongly in a band of
+//! wavelengths.
 
 use crate::scene::RoughRail;
 use crate::surface::Irregularity;

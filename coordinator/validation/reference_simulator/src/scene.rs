@@ -1,6 +1,7 @@
-//! A track, its passes, its measuring chain and what is hidden: all that decides a recording.
+//! A scene: track, passes, measuring chain and hidden effects. The scene determines the recording
+//! completely.
 //!
-//! Owns the plain data and its checks; drawing a scene is `typical`'s.
+//! This module contains the data and their checks. The module `typical` draws random scenes.
 
 use crate::TruthError;
 use crate::assumptions::Assumptions;
@@ -12,22 +13,22 @@ use serde::{Deserialize, Serialize};
 /// Least distance in m of what is recorded from the track's ends: room for the run-in.
 const END_M: f64 = 4.0 * SPACING_M;
 
-/// A track with its passes and what is hidden in it.
+/// A track with its passes and hidden effects.
 ///
 /// The same scene gives the same recording, to the bit on one machine.
 #[derive(Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// Sleeper spans of the track, 0.125 m each.
+    /// Number of spans of the track, 0.125 m each.
     pub spans: usize,
-    /// Seed of the surface, of what differs from pass to pass and of the noise.
+    /// Seed of the surface, of the differences between passes and of the noise.
     pub seed: u64,
     /// Level of the irregularity in 1e-4 m2 rad/m (eq. B.6).
     pub irregularity_level: f64,
-    /// Rails whose surface is rougher; everywhere else it is that of the level above.
+    /// Rails with a rougher surface. Everywhere else the surface has the level `irregularity_level`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rough_rails: Vec<RoughRail>,
-    /// Every sleeper, `spans - 1` of them; sleeper `i`, from 0, stands at `(i + 1)` spacings.
+    /// All sleepers, `spans - 1` of them. Sleeper `i`, from 0, is at `(i + 1)` spacings.
     pub sleepers: Vec<SleeperTruth>,
     /// Damping of each railpad in N s/m.
     #[serde(rename = "railpad_damping_N_s_m")]
@@ -35,19 +36,19 @@ pub struct Scene {
     /// Damping of the ballast under each half sleeper in N s/m.
     #[serde(rename = "ballast_damping_N_s_m")]
     pub ballast_damping_n_s_m: f64,
-    /// The passes, in the order in which they are written.
+    /// The passes, in the order of the recording.
     pub passes: Vec<PassPlan>,
-    /// From where to where is recorded in m.
+    /// Start and end of the recorded stretch in m.
     pub recorded_m: [f64; 2],
-    /// What is hidden.
+    /// Hidden effects.
     #[serde(default)]
     pub left_out: Vec<Hidden>,
-    /// How it is measured.
+    /// Measuring chain.
     pub chain: Chain,
-    /// What the simulation assumes of effects, steel and modes.
+    /// Assumptions on effects, steel and modes.
     #[serde(default, skip_serializing_if = "Assumptions::are_usual")]
     pub assumptions: Assumptions,
-    /// Small things that are no hidden effects.
+    /// Nuisances, which are not hidden effects.
     #[serde(default, skip_serializing_if = "Nuisances::are_none")]
     pub nuisances: Nuisances,
 }
@@ -71,12 +72,13 @@ pub struct SleeperTruth {
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct RoughRail {
-    /// From where to where in m.
+    /// Start and end of the stretch in m.
     pub x_m: [f64; 2],
-    /// Power of all waves over that of the scene's level.
+    /// Ratio of the power of all waves to that of the level of the scene.
     pub level_factor: f64,
-    /// Power of waves from 0.9 to 5.2 mm over that of eq. B.6 at this rail's level, from 1 up. At
-    /// 13 km/h these waves give frequencies from 700 to 4000 Hz (paper, section 5.1 and Fig. 21).
+    /// Ratio of the power of waves from 0.9 to 5.2 mm to that of eq. B.6 at the level of this rail, at
+    /// least 1. At 13 km/h these waves give frequencies from 700 to 4000 Hz (paper, section 5.1 and Fig.
+    /// 21).
     pub band_factor: f64,
 }
 
@@ -84,7 +86,7 @@ pub struct RoughRail {
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct PassPlan {
-    /// Speed in km/h that the recording states; the true one is a little off.
+    /// Nominal speed in km/h, which the recording states. The true speed differs slightly.
     pub speed_km_h: f64,
 }
 
@@ -94,18 +96,18 @@ pub struct PassPlan {
 pub struct Chain {
     /// Standard deviation of the white noise in m/s2.
     pub noise_m_s2: f64,
-    /// Steps in m/s2 in which accelerations are recorded; 0 for none.
+    /// Resolution of the recorded accelerations in m/s2. 0: no rounding.
     pub step_m_s2: f64,
-    /// How far the odometer wanders at most in m.
+    /// Largest error of the odometer in m.
     pub wander_m: f64,
-    /// Standard deviation of true over stated speed.
+    /// Standard deviation of the ratio of true to nominal speed.
     pub speed_deviation: f64,
-    /// Share of the surface's power that differs from pass to pass, 0 to 1.
+    /// Share of the power of the surface that differs from pass to pass, 0 to 1.
     pub unrepeated: f64,
 }
 
 impl Default for Chain {
-    /// What a careful set-up of accelerometer and odometer reaches.
+    /// A measuring chain with carefully installed accelerometer and odometer.
     fn default() -> Self {
         Self {
             noise_m_s2: 0.05,
@@ -118,7 +120,7 @@ impl Default for Chain {
 }
 
 impl Chain {
-    /// A chain without noise, steps, wander, and of passes that are all alike.
+    /// An ideal measuring chain: no noise, rounding or odometer error, and equal passes.
     pub const fn ideal() -> Self {
         Self {
             noise_m_s2: 0.0,
@@ -131,7 +133,7 @@ impl Chain {
 }
 
 impl Scene {
-    /// A track of equal sleepers that nothing is hidden in, measured ideally.
+    /// A track with equal sleepers, without hidden effects, and with an ideal measuring chain.
     pub fn uniform(spans: usize, sleeper: SleeperTruth) -> Self {
         let length_m = spans as f64 * SPACING_M;
         Self {
@@ -156,10 +158,10 @@ impl Scene {
         self.spans as f64 * SPACING_M
     }
 
-    /// That everything is a number that can be, and lies on the track.
+    /// Checks that all numbers are in their ranges and all places are on the track.
     ///
     /// # Errors
-    /// [`TruthError`] names the field that cannot be.
+    /// [`TruthError`] names the invalid field.
     pub fn check(&self) -> Result<(), TruthError> {
         let length_m = self.length_m();
         if self.sleepers.len() + 1 != self.spans {

@@ -1,4 +1,4 @@
-//! The surface that the wheel feels: random irregularity, and the shapes that are hidden.
+//! The surface under the wheel: random irregularity, and the shapes of hidden effects.
 
 use crate::assumptions::{Assumptions, SquatHollow};
 use crate::hidden::Hidden;
@@ -101,10 +101,10 @@ impl Irregularity {
     }
 }
 
-/// Which side of the wheel is down where a pass begins to count.
+/// Angle of the wheel at the origin of the track.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WheelAngle {
-    /// How far the wheel had rolled when it came to the track's origin, in m.
+    /// Distance in m that the wheel rolled before it reached the origin of the track.
     pub rolled_m: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Small linear systems, moved on exactly under forces that are linear over a time step.
+//! Small linear systems with an exact time step for forces that are linear over the step.
 
 use nalgebra::DMatrix;
 

@@ -1,4 +1,4 @@
-//! A scene's track and vehicle, ready to be driven over: modes, ports and how ports share forces.
+//! Track and vehicle of a scene, prepared for passes: modes, ports, and the coupling of the port forces.
 
 use crate::assumptions::Void;
 use crate::contact::Contact;
@@ -128,8 +128,9 @@ impl Track {
         }
     }
 
-    /// Every port's force `p` follows from its law and from what all forces do to its compression
-    /// within a step: `p_i + sum_j G_ij p_j = what the free motion asks for`. The inverse.
+    /// Inverse of the matrix of the port forces `p`. Within a step they satisfy
+    /// `p_i + sum_j G_ij p_j = f_i` with the forces `f` from the free motion. `G` contains the law of
+    /// each port and the effect of all forces on its compression.
     fn sharing_matrix(&self) -> Vec<f64> {
         let shapes = self.shapes();
         let ports = shapes.len();
@@ -153,7 +154,7 @@ impl Track {
         inverse.transpose().as_slice().to_vec()
     }
 
-    /// Displacement and velocity of what is behind a port, under a unit force at a step's end.
+    /// Displacement and velocity of the system behind a port, per unit force at the end of a step.
     fn gain_behind(&self, port: usize) -> [f64; 2] {
         let Some((system, shape)) = self.behind[port].system() else { return [0.0; 2] };
         let gain = system.gain(0);

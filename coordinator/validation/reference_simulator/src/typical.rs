@@ -1,4 +1,5 @@
-//! Tracks as they come: means inside the ranges of Table D1, scatter, now and then a trend or step.
+//! Typical random tracks: means inside the ranges of Table D1, unevenness, and sometimes a trend or a
+//! step.
 
 use crate::assumptions::Assumptions;
 use crate::nuisances::Nuisances;
@@ -46,12 +47,12 @@ impl Run {
 }
 
 impl Scene {
-    /// A track that nothing is hidden in, drawn by its seed: 40 spans, two passes at each of 13,
-    /// 10 and 7 km/h, a usual measuring chain.
+    /// A random track without hidden effects, drawn from a seed: 40 spans, two passes at each of 13, 10
+    /// and 7 km/h, and a usual measuring chain.
     ///
-    /// Means lie inside the ranges of Table D1 (Shen et al. 2023). Stiffness scatters by 5 % from
-    /// sleeper to sleeper. On two tracks of five the ballast stiffness has a trend or a step of up
-    /// to 30 %, which the twin's model holds: nothing is left out.
+    /// Means are inside the ranges of Table D1 (Shen et al. 2023). The unevenness of the stiffnesses is
+    /// 5 %. On two tracks of five the ballast stiffness has a trend or a step of up to 30 %. The track
+    /// model of the diagnosis includes these variations, so they are not left-out physics.
     pub fn typical(seed: u64) -> Self {
         let random = &mut ChaCha12Rng::seed_from_u64(seed);
         let [railpad, ballast, bending] =

@@ -1,4 +1,4 @@
-//! What stands on the rail: the wheel, and what may hang on it.
+//! The vehicle on the rail: the wheel, and the parts connected to it.
 
 use crate::hidden::Hidden;
 use crate::system::LinearSystem;
@@ -15,7 +15,7 @@ pub(crate) struct Vehicle {
     pub(crate) system: LinearSystem,
     /// Displacement of the contact point by degree of freedom; velocities follow as zeros.
     pub(crate) contact: Vec<f64>,
-    /// Degree of freedom that the sensor feels.
+    /// Degree of freedom of the sensor.
     pub(crate) sensor: usize,
 }
 
@@ -34,7 +34,7 @@ impl Series {
 }
 
 impl Vehicle {
-    /// A wheel of a mass in kg with what is hidden in it.
+    /// A wheel with this mass in kg and the hidden effects of the vehicle.
     pub(crate) fn new(left_out: &[Hidden], wheel_kg: f64, step_s: f64) -> Self {
         let series: Vec<Series> = left_out.iter().flat_map(series_of).collect();
         let axle_box = left_out.iter().find_map(|hidden| match hidden {

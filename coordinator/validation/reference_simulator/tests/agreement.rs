@@ -1,6 +1,7 @@
-//! Where nothing is hidden, this simulator and the twin's hear the same over the same surface.
+//! Without hidden effects, this simulator and the track model give the same levels over the same
+//! surface.
 //!
-//! Both drive over one and the same irregularity, so that no level differs by chance.
+//! Both use the same irregularity, so levels have no random difference.
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 

@@ -1,4 +1,4 @@
-//! Whether estimates agree with the truth, as far as they claim to.
+//! Agreement of estimates with the truth, relative to their stated uncertainty.
 
 use crate::average::DEVIATIONS;
 use crate::picture::{Picture, Scale, Style};
@@ -14,8 +14,8 @@ const CHANCE: f64 = 0.05;
 /// Standard deviation of a parameter of which only the range is known, as a share of it.
 const UNKNOWN: f64 = 0.288_675;
 
-/// Estimates must be surer than this share of the range to be called correct: twice as sure as who
-/// only knows the range. Others agree with anything.
+/// Largest standard deviation, as a share of the range, of estimates that can count as correct: half
+/// that of a uniform distribution over the range. Less certain estimates would agree with any truth.
 pub const SURE: f64 = 0.5 * UNKNOWN;
 
 /// Estimates beside the truth.

@@ -1,4 +1,4 @@
-//! Fig. 11: the model selector's ten best matches by each feature vector.
+//! Fig. 11: the ten best matches of the model selector for each feature vector.
 
 use crate::average::Average;
 use crate::picture::{Picture, Scale, Style};

@@ -1,4 +1,4 @@
-//! The least error that is possible at one speed over one sleeper spacing.
+//! The smallest possible error for one speed and one sleeper spacing.
 
 use tracktwin_parameters::Parameter::{
     self, BallastStiffness, IrregularityLevel, RailpadStiffness, SleeperBendingStiffness,
@@ -23,7 +23,7 @@ const ONE_SPACING: [(Parameter, f64); 4] = [
 /// Name of the bound in legends and rows.
 pub(crate) const NAME: &str = "Bayes bound";
 
-/// The bound of a parameter in per cent of its range; not a number if it was not computed.
+/// The bound of a parameter in per cent of its range. NaN if it was not computed.
 pub(crate) fn of(parameter: Parameter) -> f64 {
     let known = ONE_SPACING.iter().find(|known| known.0 == parameter);
     known.map_or(f64::NAN, |known| known.1)

@@ -1,4 +1,4 @@
-//! Fig. 25: Gaussian processes beside other regressions on the same halves of the library.
+//! Fig. 25: comparison of Gaussian processes with other regressions on the same halves of the library.
 
 use crate::average::{Average, all};
 use crate::regression::{Regression, SVM_CASES};

@@ -5,17 +5,17 @@ use crate::Figure;
 /// Errors of a reproduction.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The library has not the speed of the paper's figure.
+    /// The library lacks the speed of the figure of the paper.
     #[error("{figure} is at {wanted} km/h; the library has {} km/h", join(known))]
     NoSpeed {
         /// The figure.
         figure: Figure,
         /// The speed in km/h.
         wanted: f64,
-        /// Those of the library in km/h.
+        /// Speeds of the library in km/h.
         known: Vec<f64>,
     },
-    /// One speed cannot be compared with another.
+    /// The library has only one speed, but the figure compares speeds.
     #[error("{figure} compares speeds, but the library has one; use a campaign with several")]
     OneSpeed {
         /// The figure.
@@ -34,9 +34,9 @@ pub enum Error {
     TooFewCases {
         /// The figure.
         figure: Figure,
-        /// Finished cases.
+        /// Number of finished cases.
         found: usize,
-        /// How many it takes.
+        /// Smallest sufficient number of cases.
         least: usize,
     },
     /// There is no such model.
@@ -49,7 +49,7 @@ pub enum Error {
         /// The speed in km/h.
         speed_km_h: f64,
     },
-    /// An example's recording has no estimate at some of its sleepers.
+    /// An estimate is missing at a sleeper of an example.
     #[error("{figure}: sleeper {sleeper} of an example has no estimate of {symbol}")]
     NotEstimated {
         /// The figure.
@@ -59,14 +59,14 @@ pub enum Error {
         /// The parameter's symbol.
         symbol: &'static str,
     },
-    /// A regression beside the Gaussian processes cannot be fitted.
+    /// A regression other than the Gaussian processes cannot be fitted.
     #[error("{figure}: {method}: {message}; use a library with more cases")]
     Regression {
         /// The figure.
         figure: Figure,
         /// The regression.
         method: &'static str,
-        /// What its crate reports.
+        /// Error message of the crate of the regression.
         message: String,
     },
     /// The track cannot be built.
@@ -75,7 +75,7 @@ pub enum Error {
     /// A pass over an example cannot be simulated.
     #[error("an example's pass: {0}")]
     Pass(#[from] tracktwin_track::time::PassError),
-    /// Its acceleration or its surface is no signal.
+    /// The acceleration or the surface of an example is not a valid signal.
     #[error("an example: {0}")]
     Signal(#[from] tracktwin_signal::SignalError),
     /// A surface is too short for its spectrum.
@@ -92,10 +92,10 @@ pub enum Error {
         /// Number of the sleeper, from 1.
         sleeper: usize,
     },
-    /// It has no receptance.
+    /// The receptance of the track cannot be computed.
     #[error(transparent)]
     Frequency(#[from] tracktwin_track::frequency::FrequencyError),
-    /// The model selector or a model refuses.
+    /// Error of the model selector or a model.
     #[error(transparent)]
     Surrogate(#[from] tracktwin_surrogate::Error),
 }

@@ -40,9 +40,9 @@ pub(crate) const REDUCED: [std::ops::RangeInclusive<usize>; 3] = [4..=4, 4..=6, 
 /// A track section of nine sleepers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Example {
-    /// The figure it belongs to.
+    /// Figure that the example belongs to.
     pub figure: Figure,
-    /// What the paper's column shows.
+    /// Title of the column in the figure of the paper.
     pub name: String,
     /// The parameters at each sleeper.
     pub sleepers: Vec<ParameterSet>,
@@ -50,7 +50,7 @@ pub struct Example {
     pub seed: u64,
 }
 
-/// The examples of a figure, a column each; none for figures that have none.
+/// The examples of a figure, one per column. Empty for figures without examples.
 pub fn examples(figure: Figure) -> Vec<Example> {
     let example = |name: String, of: &dyn Fn(usize) -> ParameterSet| Example {
         figure,
@@ -115,7 +115,8 @@ fn set(row: usize) -> ParameterSet {
 }
 
 impl Example {
-    /// Rail elements between a sleeper, counted from 1, and the next, `spacing_m` on.
+    /// Number of rail elements between a sleeper, counted from 1, and the next sleeper at the distance
+    /// `spacing_m`.
     pub fn elements(sleeper: usize, spacing_m: f64) -> usize {
         let length_m = if sleeper < 5 { ELEMENTS_M[0] } else { ELEMENTS_M[1] };
         (spacing_m / length_m).round() as usize
@@ -132,7 +133,7 @@ impl Example {
 pub struct EvaluatedExample {
     /// The truth.
     pub example: Example,
-    /// Estimates, a sleeper each.
+    /// Estimates, one per sleeper.
     pub sleepers: Vec<tracktwin_evaluation::Estimates>,
 }
 
@@ -140,7 +141,7 @@ impl EvaluatedExample {
     /// The estimates of an evaluation of the example's recording.
     ///
     /// # Errors
-    /// [`Error::NotEstimated`] names a sleeper or a parameter that it lacks.
+    /// [`Error::NotEstimated`] names the sleeper and the parameter without an estimate.
     pub fn new(example: Example, evaluation: &Evaluation) -> Result<Self, Error> {
         let figure = example.figure;
         let of = |number: usize| {

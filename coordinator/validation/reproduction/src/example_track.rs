@@ -24,15 +24,15 @@ const SECTION_SPANS: usize = 8;
 /// and the run-in fit in, and the ends are about as far off as in the library.
 const END_SPANS: usize = 8;
 
-/// Fewest spans of a campaign's track in which an example fits.
+/// Smallest number of spans of the track of a campaign that contains an example.
 pub const EXAMPLE_SPANS: usize = SECTION_SPANS + 2 * END_SPANS;
 
-/// Recordings of these figures' examples, each over the surface of its seed, the same at all
-/// speeds: the speeds of the experiment for figures that ask models, else that of the paper's
-/// figures. `at` gets the share that is done.
+/// Recordings of the examples of these figures. Each example has one surface from its seed, the same at
+/// all speeds. Figures that use models have the speeds of the experiment, other figures the speed of the
+/// paper. `at` receives the completed share, 0 to 1.
 ///
 /// # Errors
-/// [`Error::Model`], [`Error::Pass`] or [`Error::Signal`].
+/// [`Error::Model`], [`Error::Pass`] or [`Error::Signal`] if a track, a pass or a signal is invalid.
 pub fn recordings(
     figures: &[Figure],
     experiment: &Experiment,

@@ -16,13 +16,13 @@ pub enum Figure {
     Fig9,
     /// LWPS at several speeds.
     Fig10,
-    /// The model selector's best matches.
+    /// Best matches of the model selector.
     Fig11,
     /// Sensitivity of the LWPS to each parameter.
     Fig12,
-    /// The model selector's error by size of the library.
+    /// Error of the model selector by size of the library.
     Fig13,
-    /// The models' errors on the test half.
+    /// Errors of the models on the test half.
     Fig14,
     /// The tracks of the numerical examples.
     Fig15,
@@ -34,12 +34,12 @@ pub enum Figure {
     Fig18,
     /// Numerical example: stiffness reduced at one, three and five sleepers.
     Fig19,
-    /// Gaussian processes beside other regressions.
+    /// Comparison of Gaussian processes with other regressions.
     Fig25,
 }
 
 impl Figure {
-    /// All of them, in the paper's order.
+    /// All figures, in the order of the paper.
     pub const ALL: [Self; 15] = [
         Self::Fig2,
         Self::Fig3,
@@ -58,7 +58,7 @@ impl Figure {
         Self::Fig25,
     ];
 
-    /// The name used at every border.
+    /// Name of the figure in files and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fig2 => "fig2",
@@ -79,7 +79,7 @@ impl Figure {
         }
     }
 
-    /// What it shows.
+    /// Title of the figure.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Fig2 => "Acceleration, CWT and SSWT of five bays",

@@ -1,8 +1,9 @@
-//! The results of the source paper (Shen et al. 2023) beside what this program gets, row by row.
+//! Comparison of the results of the source paper (Shen et al. 2023) with those of this program, row by
+//! row.
 //!
-//! Owns the paper's claims, the tolerances behind a verdict, the tracks of its numerical examples
-//! and the passes over them; goes from data to rows and plain pictures. Leaves to others where the
-//! data come from (library, surrogate, evaluation) and how a page looks (report).
+//! This crate contains the claims of the paper, the tolerances of the verdicts, the tracks of the
+//! numerical examples, and the passes over these tracks. It converts data to rows and pictures. Other
+//! crates provide the data (library, surrogate, evaluation) and make the pages (report).
 
 mod agreement;
 mod average;

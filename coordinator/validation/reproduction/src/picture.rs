@@ -1,52 +1,52 @@
-//! Pictures as plain data; how they look is the page's.
+//! Pictures as plain data. The page defines their appearance.
 
 use tracktwin_signal::TimeFrequencyMap;
 
 /// A chart: curves over two axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// What it shows.
+    /// Title of the picture.
     pub title: String,
     /// The horizontal axis.
     pub x: Scale,
     /// The vertical axis.
     pub y: Scale,
-    /// What is drawn, in this order.
+    /// Curves, in the order of drawing.
     pub curves: Vec<Curve>,
-    /// Names at places of the horizontal axis, in place of numbers.
+    /// Positions and names on the horizontal axis, instead of numbers.
     pub names: Vec<(f64, String)>,
-    /// Places of the horizontal axis with a thin vertical line.
+    /// Positions on the horizontal axis with a thin vertical line.
     pub marks: Vec<f64>,
-    /// Whether it takes the page's width.
+    /// Whether the picture has the full width of the page.
     pub wide: bool,
 }
 
 /// An axis.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scale {
-    /// What it shows, with the unit.
+    /// Quantity of the axis, with its unit.
     pub label: String,
-    /// Logarithmic, or linear.
+    /// Whether the axis is logarithmic; otherwise it is linear.
     pub logarithmic: bool,
 }
 
 /// Points of one kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// What the legend calls it; empty for no entry.
+    /// Name in the legend. Empty: no entry.
     pub name: String,
-    /// How it is drawn.
+    /// Style of drawing.
     pub style: Style,
-    /// Its points.
+    /// Points of the curve, as (x, y).
     pub points: Vec<(f64, f64)>,
 }
 
-/// How points are drawn.
+/// Style of drawing of a curve.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Style {
     /// As a line in a colour of its own.
     Line,
-    /// As a line in the colour of the text: what is true.
+    /// As a line in the colour of the text, for the truth.
     Truth,
     /// As a thin line, one of many of the same kind.
     Thin,
@@ -58,7 +58,8 @@ pub enum Style {
     Points,
     /// As bars from zero.
     Bars,
-    /// As a map of magnitudes in dB; the points are its lower left and its upper right corner.
+    /// As a map of magnitudes in dB. The points are the lower left and the upper right corner of the
+    /// map.
     Map(TimeFrequencyMap),
 }
 

@@ -24,7 +24,7 @@ impl ClaimVerdict {
         if yes { Self::Reproduced } else { Self::Differs }
     }
 
-    /// A few words for a person.
+    /// Text of the verdict for readers.
     pub const fn label(self) -> &'static str {
         match self {
             Self::Reproduced => "reproduced",
@@ -34,33 +34,33 @@ impl ClaimVerdict {
     }
 }
 
-/// A claim of the paper beside what this program gets.
+/// A claim of the paper, compared with the result of this program.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ClaimRow {
-    /// The figure it belongs to.
+    /// Figure that the claim belongs to.
     pub figure: Figure,
     /// Statement of the paper.
     pub claim: String,
-    /// Its number or finding.
+    /// Number or finding of the paper.
     pub paper: String,
-    /// Ours.
+    /// Number or finding of this program.
     pub ours: String,
-    /// How the two compare.
+    /// Verdict of the comparison.
     pub verdict: ClaimVerdict,
-    /// The tolerance, and the reason for a difference where it is known.
+    /// Tolerance, and the reason for a difference if it is known.
     pub why: String,
 }
 
-/// A figure's rows and pictures.
+/// Rows and pictures of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compared {
     /// The figure.
     pub figure: Figure,
-    /// A row a claim.
+    /// One row per claim.
     pub rows: Vec<ClaimRow>,
-    /// Ours, drawn as the paper does.
+    /// Pictures of the results of this program, drawn like those of the paper.
     pub pictures: Vec<Picture>,
-    /// What is to be seen in them.
+    /// Caption of the pictures.
     pub caption: String,
 }
 
@@ -89,21 +89,21 @@ pub struct Provenance {
     pub code_version: &'static str,
     /// The campaign.
     pub campaign: String,
-    /// Digest of its results.
+    /// Digest of the results of the campaign.
     pub library_digest: String,
-    /// Its finished cases.
+    /// Number of finished cases of the campaign.
     pub library_entries: usize,
 }
 
-/// The paper's results beside ours.
+/// Comparison of the results of the paper with those of this program.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reproduction {
     /// [`FORMAT`].
     pub format: &'static str,
-    /// Where ours come from.
+    /// Provenance of the results of this program.
     #[serde(flatten)]
     pub provenance: Provenance,
-    /// A row a claim, in the paper's order.
+    /// One row per claim, in the order of the paper.
     pub rows: Vec<ClaimRow>,
     /// The figures with their pictures, for a page.
     #[serde(skip)]
@@ -117,7 +117,7 @@ impl Reproduction {
         Self { format: FORMAT, provenance, rows, figures }
     }
 
-    /// How many rows came out so.
+    /// Number of rows with this verdict.
     pub fn count(&self, verdict: ClaimVerdict) -> usize {
         self.rows.iter().filter(|row| row.verdict == verdict).count()
     }

@@ -22,7 +22,7 @@ const MOST: f64 = 0.9;
 /// digit are 1000.
 const BALLAST_BELOW_HZ: [f64; 2] = [950.0, 1500.0];
 
-/// What the paper evaluates, and what it calls without effect.
+/// Parameters that the paper evaluates, and the one that it calls without effect.
 const TOLD: [Parameter; 4] =
     [BallastStiffness, IrregularityLevel, RailpadStiffness, SleeperBendingStiffness];
 
@@ -81,7 +81,7 @@ impl Effect {
         (0..bins).map(|bin| variance(self.groups.iter().map(|group| group[bin]))).collect()
     }
 
-    /// Root mean square over the bins of what it moves the LWPS by, in dB.
+    /// Root mean square over the bins of the change of the LWPS by the parameter, in dB.
     fn size_db(&self) -> f64 {
         root_mean(&self.variances())
     }

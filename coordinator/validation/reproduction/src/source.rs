@@ -1,4 +1,4 @@
-//! What each figure is drawn from, and by what.
+//! Source of the data of each figure, and the function that compares it.
 
 use crate::best_matches::best_matches;
 use crate::compared_regressions::compared_regressions;
@@ -22,31 +22,31 @@ use crate::time_frequency::time_frequency;
 use tracktwin_experiment::Experiment;
 use tracktwin_surrogate::{Tested, Trained, TrainingSet};
 
-/// What a figure is drawn from.
+/// Source of the data of a figure.
 #[derive(Clone, Copy, Debug)]
 pub enum Source {
     /// The experiment and the results of a library.
     Results(fn(&Results<'_>) -> Result<Compared, Error>),
-    /// Trained models and the results that none of them has seen.
+    /// Trained models, and results that were not used for training.
     Models(fn(&Predictions<'_>) -> Result<Compared, Error>),
     /// Simulated passes over examples.
     Passes(fn(&Experiment, &[RecordedExample]) -> Result<Compared, Error>),
-    /// What trained models estimate from simulated passes.
+    /// Estimates of trained models from simulated passes.
     Examples(fn(&[EvaluatedExample]) -> Compared),
 }
 
-/// A library's results, and how they were made.
+/// Results of a library, with their experiment.
 #[derive(Debug)]
 pub struct Results<'a> {
     /// Track, vehicle and features of the cases.
     pub experiment: &'a Experiment,
     /// The results.
     pub set: &'a TrainingSet,
-    /// Decides which half of them is searched.
+    /// Seed that selects the half of the results that is searched.
     pub seed: u64,
 }
 
-/// Trained models, and what they predict for cases that none of them has seen.
+/// Trained models, and their predictions for cases that were not used for training.
 pub struct Predictions<'a> {
     /// The results that the models were trained and tested on.
     pub results: &'a Results<'a>,
@@ -57,7 +57,7 @@ pub struct Predictions<'a> {
 }
 
 impl Figure {
-    /// What it is drawn from.
+    /// Source of the data of the figure.
     pub const fn source(self) -> Source {
         match self {
             Self::Fig2 => Source::Passes(time_frequency),
@@ -82,17 +82,17 @@ impl Figure {
         }
     }
 
-    /// Whether it asks trained models.
+    /// Whether the figure needs trained models.
     pub const fn needs_models(self) -> bool {
         matches!(self.source(), Source::Models(_) | Source::Examples(_))
     }
 
-    /// Whether it needs simulated passes over tracks of its own.
+    /// Whether the figure needs simulated passes over its own tracks.
     pub fn needs_passes(self) -> bool {
         !examples(self).is_empty()
     }
 
-    /// Whether a campaign's track must be long enough for an example.
+    /// Whether the track of a campaign must be long enough for an example.
     pub fn needs_example_track(self) -> bool {
         self.needs_passes() || self == Self::Fig15
     }

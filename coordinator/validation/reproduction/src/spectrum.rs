@@ -5,7 +5,7 @@ use crate::{Error, Figure};
 use std::f64::consts::LN_10;
 use tracktwin_surrogate::TrainingSet;
 
-/// The speed of the paper's figures where they show one, in km/h.
+/// Speed in km/h of the figures of the paper that show only one speed.
 pub const SPEED_KM_H: f64 = 13.0;
 
 /// Decibels a unit of the natural logarithm of a power.

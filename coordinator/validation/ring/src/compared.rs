@@ -1,4 +1,5 @@
-//! Estimates against the truth: error, interval, and place. The paper had no truth to compare with.
+//! Comparison of estimates with the truth: error, interval and place. The paper had no truth for this
+//! comparison.
 
 use crate::estimates::{correlation, holds, median, sd_share};
 use crate::parameters::STIFFNESSES;

@@ -1,4 +1,4 @@
-//! What the diagnosis of each lap names, beside what the ring has.
+//! Comparison of the diagnosis of each lap with the truth of the ring.
 
 use crate::statement::{Found, Statement};
 use crate::{Method, Study};
@@ -13,13 +13,13 @@ const NAMED: f64 = 0.75;
 struct Accepted {
     /// Kind of physics, or unknown physics.
     physics: String,
-    /// The sleepers there; none for what has no place.
+    /// Sleepers of the hypothesis. Empty if the hypothesis has no place.
     sleepers: Vec<String>,
     /// Its probability.
     probability: f64,
 }
 
-/// What the diagnoses of the laps accept; a lap is diagnosed section by section.
+/// Accepted hypotheses of the diagnoses of all laps. Each lap is diagnosed section by section.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Diagnoses {
     laps: Vec<Vec<Accepted>>,

@@ -1,11 +1,11 @@
-//! Why there is no ring, or nothing to say about it.
+//! Errors of a ring study.
 
 use crate::plan::SLEEPERS;
 
 /// Errors of a ring study.
 #[derive(Debug, thiserror::Error)]
 pub enum RingError {
-    /// The text names no stretch.
+    /// The text does not describe a stretch.
     #[error("`{text}` is no stretch of the ring; write it as FIRST-LAST, for example 86-98")]
     NoStretch {
         /// The text.
@@ -19,12 +19,12 @@ pub enum RingError {
     Stretch {
         /// Number of the first sleeper.
         first: usize,
-        /// Number of the last one.
+        /// Number of the last sleeper.
         last: usize,
-        /// Sleepers that an evaluation needs.
+        /// Smallest number of sleepers for an evaluation.
         least: usize,
     },
-    /// There is no speed.
+    /// No speed is given.
     #[error("a ring needs at least one speed")]
     NoSpeed,
     /// A speed is too low or too high.
@@ -39,7 +39,7 @@ pub enum RingError {
         /// The speed.
         speed_km_h: f64,
     },
-    /// A file of estimates has another content than an evaluation.
+    /// The content of a file of estimates is not an evaluation.
     #[error("not an evaluation: {0}")]
     NoEvaluation(#[from] serde_json::Error),
     /// An evaluation lacks its sleepers.

@@ -28,15 +28,15 @@ impl Estimated {
     /// Reads the text of an `evaluation.json`.
     ///
     /// # Errors
-    /// [`RingError`] for a text that is no evaluation.
+    /// [`RingError`] if the text is not an evaluation.
     pub fn read(text: &str) -> Result<Self, RingError> {
         Self::from_sleepers(text, |sleeper| Some(sleeper))
     }
 
-    /// Reads the estimates of the model selector; none where the method has no selector.
+    /// Reads the estimates of the model selector. `None` if the method has no selector.
     ///
     /// # Errors
-    /// [`RingError`] for a text that is no evaluation.
+    /// [`RingError`] if the text is not an evaluation.
     pub fn read_selector(text: &str) -> Result<Option<Self>, RingError> {
         let estimated = Self::from_sleepers(text, |sleeper| sleeper.get("selector"))?;
         Ok((!estimated.sleepers.is_empty()).then_some(estimated))
@@ -68,7 +68,7 @@ impl Estimated {
         self.sleeper(id)?.values.get(&parameter).copied()
     }
 
-    /// The same where it is valid.
+    /// The estimate of a parameter at a sleeper, if it is valid.
     pub(crate) fn valid(&self, id: &str, parameter: Parameter) -> Option<Estimate> {
         let sleeper = self.sleeper(id)?;
         sleeper.values.get(&parameter).copied().filter(|_| sleeper.valid)
@@ -100,7 +100,7 @@ pub(crate) fn agree(one: Estimate, other: Estimate) -> bool {
     (one.mean - other.mean).abs() <= WIDTH_90 * one.sd.hypot(other.sd)
 }
 
-/// Median of some values; none of none.
+/// Median of the values. `None` without values.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
@@ -112,13 +112,13 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     }
 }
 
-/// Mean of some values; none of none.
+/// Mean of the values. `None` without values.
 pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), it| (sum + it, count + 1));
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// Correlation of pairs; none where one side does not vary.
+/// Correlation coefficient of pairs. `None` if one of the variables is constant.
 pub fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     let count = pairs.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;

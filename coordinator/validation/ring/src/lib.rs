@@ -1,9 +1,9 @@
 //! A replica of the test ring of the source paper (Shen et al. 2023), recorded by the reference
-//! simulator, and the paper's statements about the ring beside what evaluations of it give.
+//! simulator, and a comparison of its evaluations with the statements of the paper.
 //!
-//! Owns the description of the ring ([`Ring`], [`Plan`]), its truth, the statements with their
-//! tolerances and the table of all sleepers. Leaves to others who evaluates and diagnoses the
-//! recording, where files are kept, and how a page looks.
+//! This crate contains the description of the ring ([`Ring`], [`Plan`]), its truth, the statements with
+//! their tolerances, and the table of all sleepers. Other crates evaluate and diagnose the recording,
+//! write files and make pages.
 
 mod compared;
 mod diagnosed;

@@ -1,4 +1,4 @@
-//! Which ring is recorded: its seed, laps, speeds and the stretch of it.
+//! Plan of a ring recording: seed, laps, speeds and stretch.
 
 use crate::RingError;
 use serde::{Deserialize, Serialize};
@@ -14,12 +14,12 @@ const LEAST: usize = 6;
 /// Speeds in km/h that can be simulated; V-Track runs at up to 40 km/h (paper, section 2.1).
 const SPEEDS_KM_H: [f64; 2] = [3.0, 40.0];
 
-/// A stretch of the ring: sleepers from the first to the last, both counted.
+/// A stretch of the ring: sleepers from the first to the last, both included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stretch {
     /// Number of the first sleeper, from 1.
     pub first: usize,
-    /// Number of the last one.
+    /// Number of the last sleeper.
     pub last: usize,
 }
 
@@ -27,7 +27,7 @@ impl Stretch {
     /// The whole ring.
     pub const WHOLE: Self = Self { first: 1, last: SLEEPERS };
 
-    /// Sleepers in it.
+    /// Number of sleepers of the stretch.
     pub const fn sleepers(self) -> usize {
         self.last + 1 - self.first
     }
@@ -55,16 +55,16 @@ impl Display for Stretch {
     }
 }
 
-/// All that decides the recording of a ring.
+/// All settings that determine the recording of a ring.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Seed of the sleepers' scatter, of the surface and of the measuring chain.
+    /// Seed of the variation of the sleepers, the surface and the measuring chain.
     pub seed: u64,
-    /// How often every speed is run.
+    /// Number of laps, each with one pass at every speed.
     pub laps: usize,
     /// Speeds in km/h, ascending.
     pub speeds_km_h: Vec<f64>,
-    /// The sleepers that are recorded.
+    /// Recorded stretch of the ring.
     pub stretch: Stretch,
 }
 
@@ -72,7 +72,8 @@ impl Plan {
     /// A plan with its speeds in order.
     ///
     /// # Errors
-    /// [`RingError`] for speeds that are missing, given twice or beyond what V-Track runs.
+    /// [`RingError`] if there is no speed, if a speed is given twice, or if a speed is outside the range
+    /// of V-Track.
     pub fn new(
         seed: u64,
         laps: usize,

@@ -1,4 +1,5 @@
-//! The ring as the paper describes it (sections 2.1 and 5), with numbers where it gives none.
+//! The ring as the paper describes it (sections 2.1 and 5), with assumed numbers where the paper states
+//! none.
 
 use crate::plan::{Plan, SLEEPERS, Stretch};
 use rand_chacha::ChaCha12Rng;
@@ -20,10 +21,10 @@ const MARGIN_SPANS: usize = 3;
 
 /// Railpad stiffness without clamp in N/m, inside Table D1.
 const RAILPAD_N_M: f64 = 8e7;
-/// What a clamp adds to it in N/m, and its stiffness against rotation in N m/rad.
+/// Additional vertical stiffness of a clamp in N/m, and its stiffness against rotation in N m/rad.
 const CLAMP_N_M: f64 = 7e7;
 const CLAMP_N_M_RAD: f64 = 5e4;
-/// What remains where the railpad is missing, in N/m: the lower bound of Table D1.
+/// Remaining stiffness at a missing railpad in N/m: the lower bound of Table D1.
 const MISSING_N_M: f64 = 1e7;
 /// Bending stiffness of a sleeper without bolts in N m2: 1.125e-8 m4 of steel (paper: 2300 N m2).
 const BENDING_N_M2: f64 = 2362.5;
@@ -59,13 +60,13 @@ const BOARDS: [(usize, f64); 6] =
 pub struct Joint {
     /// `J1` to `J4`.
     pub name: &'static str,
-    /// Number of the sleeper before it.
+    /// Number of the sleeper before the joint.
     pub after: usize,
-    /// Depth of its dip in m.
+    /// Depth of the dip in m.
     pub dip_m: f64,
     /// Length in m over which the dip falls to 1/e.
     pub length_m: f64,
-    /// What remains of the rail's bending stiffness.
+    /// Ratio of the bending stiffness at the joint to that of the rail.
     pub bending_factor: f64,
 }
 
@@ -80,27 +81,27 @@ const JOINTS: [Joint; 4] = [
 /// Softened length of the rail at a joint in m.
 const JOINT_LENGTH_M: f64 = 0.025;
 
-/// What a sleeper of the ring is.
+/// Truth of one sleeper of the ring.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SleeperTruth {
     /// `SN1` to `SN100`.
     pub id: String,
-    /// Its number.
+    /// Number of the sleeper, from 1.
     pub number: usize,
-    /// Its place in m, SN1 at 0 (paper, section 2.2).
+    /// Position of the sleeper in m, with SN1 at 0 (paper, section 2.2).
     pub x_m: f64,
-    /// Number of the rail above it, 1 to 4.
+    /// Number of the rail above the sleeper, 1 to 4.
     pub rail: usize,
-    /// The joint beside it, if there is one.
+    /// Name of the joint next to the sleeper, if there is one.
     pub joint: Option<&'static str>,
-    /// Whether it has a clamp.
+    /// Whether the sleeper has a clamp.
     pub clamp: bool,
-    /// Whether its railpad is missing.
+    /// Whether the railpad is missing.
     pub missing_railpad: bool,
-    /// Whether it has bolts.
+    /// Whether the sleeper has bolts.
     pub bolt: bool,
-    /// Its true values. The railpad stiffness includes the clamp; the irregularity level of rails 1
-    /// and 3 is that outside their rough band.
+    /// True values of the parameters. The railpad stiffness includes the clamp. The irregularity level
+    /// of rails 1 and 3 is that outside their rough band.
     #[serde(flatten)]
     pub values: BTreeMap<Parameter, f64>,
 }
@@ -110,11 +111,11 @@ pub struct SleeperTruth {
 pub struct Truth {
     /// The sleepers.
     pub sleepers: Vec<SleeperTruth>,
-    /// The joints between them.
+    /// The joints between these sleepers.
     pub joints: Vec<Joint>,
-    /// Sleepers before the gaps of the plywood.
+    /// Numbers of the sleepers before the plywood gaps.
     pub gaps: Vec<usize>,
-    /// Power on rails 1 and 3 of waves from 0.9 to 5.2 mm over that of eq. B.6.
+    /// Ratio of the power of waves from 0.9 to 5.2 mm on rails 1 and 3 to that of eq. B.6.
     pub rough_band_factor: f64,
 }
 
@@ -151,7 +152,7 @@ fn position_m(number: usize) -> f64 {
 }
 
 impl Ring {
-    /// The ring of a plan; the seed alone decides the values of its sleepers.
+    /// The ring of a plan. The values of the sleepers depend only on the seed.
     pub fn new(plan: Plan) -> Self {
         let mut random = ChaCha12Rng::seed_from_u64(plan.seed);
         let mut scattered = |value: f64| {
@@ -214,11 +215,11 @@ impl Ring {
 
     /// Simulates the passes: lap by lap, in each a pass at every speed.
     ///
-    /// The ring is cut open beyond the stretch and continued by its own next sleepers, on a straight
-    /// track. Positions are those of the ring, SN1 at 0.
+    /// The simulated track is straight. Beyond the stretch it continues with the next sleepers of the
+    /// ring. Positions are those of the ring, with SN1 at 0.
     ///
     /// # Errors
-    /// Those of [`simulate`].
+    /// The errors of [`simulate`].
     pub fn record(&self) -> Result<Recording, TruthError> {
         let mut recording = simulate(&self.scene())?;
         let origin_m = self.origin_m();

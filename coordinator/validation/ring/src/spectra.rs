@@ -10,7 +10,7 @@ use tracktwin_number::rounded;
 /// The band in Hz in which the paper's rails differ most.
 const BAND_HZ: [f64; 2] = [700.0, 4000.0];
 
-/// Mean LWPS of each rail at one speed, joints left out.
+/// Mean LWPS of each rail at one speed, without the sleepers at joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RailSpectra {
     /// The speed in km/h.

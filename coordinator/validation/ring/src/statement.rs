@@ -1,4 +1,4 @@
-//! A statement about the ring: what the paper says, what an evaluation gives, and the verdict.
+//! A statement about the ring: finding of the paper, finding of an evaluation, and verdict.
 
 use crate::Method;
 use crate::estimates::median;
@@ -12,15 +12,15 @@ use tracktwin_reproduction::{ClaimVerdict, SURE};
 pub struct Statement {
     /// Figure or section of the paper that it belongs to.
     pub figure: &'static str,
-    /// The method whose estimates are judged.
+    /// The method whose estimates are compared.
     pub method: &'static str,
     /// The statement.
     pub claim: String,
-    /// What the paper says of it, or the truth.
+    /// Finding of the paper, or the truth.
     pub expected: String,
-    /// What was found.
+    /// Finding of the evaluation.
     pub found: String,
-    /// The tolerance that decides.
+    /// Tolerance of the verdict.
     pub tolerance: String,
     /// Whether the statement holds.
     pub verdict: ClaimVerdict,

@@ -12,7 +12,7 @@ use tracktwin_reproduction::{ClaimVerdict, Picture};
 /// The format of `ring.json`.
 const FORMAT: &str = "tracktwin-ring/1";
 
-/// What estimates come from.
+/// Source of estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Method {
     /// Fit of the track model to all passes.
@@ -28,7 +28,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// Its name in tables of data.
+    /// Name of the method in data files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Inversion => "inversion",
@@ -39,7 +39,7 @@ impl Method {
         }
     }
 
-    /// A few words for a person.
+    /// Name of the method for readers.
     pub const fn label(self) -> &'static str {
         match self {
             Self::Inversion => "inversion",
@@ -51,14 +51,14 @@ impl Method {
     }
 }
 
-/// A ring with everything that was found of it.
+/// A ring with all estimates and diagnoses.
 #[derive(Clone, Debug)]
 pub struct Study {
     /// The plan.
     pub plan: Plan,
     /// The truth.
     pub truth: Truth,
-    /// Estimates from all passes, a method each.
+    /// Estimates from all passes, by method.
     pub methods: Vec<(Method, Estimated)>,
     /// Estimates of the inversion from each lap.
     pub laps: Vec<Estimated>,
@@ -66,7 +66,7 @@ pub struct Study {
     pub speeds: Vec<(f64, Estimated)>,
     /// Spectra of the rails at the highest speed.
     pub spectra: Option<RailSpectra>,
-    /// What the diagnosis of each lap names.
+    /// Diagnoses of all laps.
     pub diagnoses: Diagnoses,
 }
 
@@ -119,7 +119,7 @@ impl Study {
         pictures::pictures(self)
     }
 
-    /// How many of some statements have a verdict.
+    /// Number of statements with this verdict.
     pub fn count(statements: &[Statement], verdict: ClaimVerdict) -> usize {
         statements.iter().filter(|statement| statement.verdict == verdict).count()
     }

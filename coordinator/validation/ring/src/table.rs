@@ -1,4 +1,4 @@
-//! `truth.csv` and `ring.csv`: a row a sleeper.
+//! `truth.csv` and `ring.csv`, with one row per sleeper.
 
 use crate::estimates::WIDTH_90;
 use crate::{SleeperTruth, Study, Truth};

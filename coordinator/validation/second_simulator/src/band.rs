@@ -1,6 +1,6 @@
 //! Symmetric matrices with two diagonals beside the main one.
 //!
-//! Owns assembly, factorisation `L D L^T` and solution for two right-hand sides at once.
+//! This module contains assembly, factorisation `L D L^T` and solution for two right-hand sides at once.
 
 /// A symmetric matrix of half-bandwidth two.
 #[derive(Clone, Debug)]

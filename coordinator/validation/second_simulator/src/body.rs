@@ -1,6 +1,7 @@
-//! What hangs on the rail at one place: a sleeper with its support, or an absorber.
+//! A body connected to the rail at one place: a sleeper with its support, or an absorber.
 //!
-//! Owns the elimination of the body's own coordinates, so that the rail's equations stay narrow.
+//! This module eliminates the coordinates of the body, so that the matrix of the rail keeps its small
+//! bandwidth.
 
 use crate::scheme::Weights;
 use crate::system::{Matrices, System};
@@ -30,7 +31,7 @@ struct Elimination {
     coupling: Vec<f64>,
     /// Own coordinates per coordinate of the rail, with the sign changed.
     follow: Vec<f64>,
-    /// What the rail feels.
+    /// Coefficient of the reduced system at the coordinate of the rail.
     stiffness: f64,
 }
 

@@ -93,7 +93,7 @@ fn add_noise(values: &mut [f64], deviation: f64, random: &mut Random) {
     }
 }
 
-/// What the odometer says.
+/// Positions recorded by the odometer.
 fn positions(scene: &Scene, true_m: &[f64], pass: usize, random: &mut Random) -> Vec<f64> {
     let Some(&first_m) = true_m.first() else {
         return Vec::new();

@@ -1,6 +1,6 @@
 //! Shapes of hidden defects on rail and wheel.
 //!
-//! Owns the depth of the surface below its ideal, in m, downwards positive.
+//! This module computes the depth of the surface below its ideal in m, positive downwards.
 
 use crate::nuisance::Nuisances;
 use crate::random::{Random, Topic};

@@ -1,7 +1,8 @@
-//! Forces between points of the track that are taken from where the points will be.
+//! Forces between points of the track, computed from extrapolated displacements.
 //!
-//! Owns what is not linear, and what ties neighbours together. A force follows from displacements that are
-//! extrapolated over one step of 10 us, with an error of third order; so the track's matrix never changes.
+//! This module contains nonlinear forces and the forces between neighbouring sleepers. A force follows
+//! from displacements that are extrapolated over one step of 10 us, with an error of third order. The
+//! matrix of the track is therefore constant.
 
 use crate::scheme::NEW;
 

@@ -1,7 +1,8 @@
 //! A second simulator of axle-box acceleration over V-Track, with hidden physics.
 //!
-//! A blind trial is worth what its truths do not share with the twin. This simulator has the scenes, effects
-//! and errors of `tracktwin_reference_simulator` as data, and assumptions of its own:
+//! A blind trial is meaningful only if its simulator is independent of the track model. This simulator
+//! uses the data types of scenes, effects and errors of `tracktwin_reference_simulator`, and its own
+//! assumptions:
 //!
 //! | Part | Assumption |
 //! |---|---|

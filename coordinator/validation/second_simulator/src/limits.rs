@@ -1,4 +1,4 @@
-//! Sizes of hidden effects that this simulator can carry.
+//! Limits of the hidden effects of this simulator.
 
 use tracktwin_reference_simulator::{Hidden, Scene, TruthError};
 
@@ -9,7 +9,7 @@ const RESONANCE_MAX_HZ: f64 = 20_000.0;
 /// No largest value.
 const ANY: f64 = f64::MAX;
 
-/// That every hidden effect has a size that can be.
+/// Checks that the values of every hidden effect are within their limits.
 ///
 /// # Errors
 /// [`TruthError`] names the effect and its value.

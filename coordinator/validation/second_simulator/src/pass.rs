@@ -9,7 +9,7 @@ use crate::track::Track;
 use crate::vehicle::Vehicle;
 use tracktwin_reference_simulator::{Scene, TruthError};
 
-/// Way in m before what is recorded.
+/// Distance in m before the recorded stretch.
 const RUN_IN_M: f64 = 0.4;
 /// Way in m over which the surface rises from a plane as the wheel sets off.
 const FADE_M: f64 = 0.15;
@@ -43,7 +43,7 @@ impl Rig {
     /// Rolls the wheel over the scene in pass `pass`.
     ///
     /// # Errors
-    /// [`TruthError::Diverged`] where the motion is not finite any more.
+    /// [`TruthError::Diverged`] if the motion becomes NaN or infinite.
     pub(crate) fn ride(
         &self,
         scene: &Scene,

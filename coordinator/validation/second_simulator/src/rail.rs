@@ -1,7 +1,8 @@
 //! The rail: a Timoshenko beam by finite differences on a staggered grid.
 //!
-//! Owns the grid, the beam's matrix and the forces within it. Displacements stand at the nodes, rotations
-//! between them; rail seats are nodes. Coordinates alternate: node, cell, node, and so on.
+//! This module contains the grid, the matrix of the beam and its internal forces. Displacements are at
+//! the nodes, rotations in the cells between the nodes. Rail seats are nodes. Coordinates alternate:
+//! node, cell, node, and so on.
 
 use crate::band::Band;
 use crate::scheme::{Motion, Weights};

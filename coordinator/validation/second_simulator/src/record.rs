@@ -1,4 +1,4 @@
-//! From a scene to a recording.
+//! Simulation of the recording of a scene.
 
 use crate::chain::{Recorded, recorded};
 use crate::contact::Contact;
@@ -19,21 +19,21 @@ use tracktwin_reference_simulator::{SPACING_M, Scene, TruthError};
 use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 
-/// Simulates every pass of a scene and writes the recording's folder: `recording.json` and one Parquet file a
-/// pass.
+/// Simulates every pass of a scene and writes the folder of the recording: `recording.json` and one
+/// Parquet file per pass.
 ///
-/// Passes run in parallel; the scene alone, with its seed, decides every number.
+/// Passes run in parallel. All results depend only on the scene and its seed.
 ///
 /// # Errors
-/// [`TruthError`] where the scene cannot be or the folder cannot be written.
+/// [`TruthError`] if the scene is invalid or the folder cannot be written.
 pub fn record(scene: &Scene, folder: &Path) -> Result<(), TruthError> {
     Ok(simulate(scene)?.write(folder)?)
 }
 
-/// The same recording in memory, without a name.
+/// Simulates every pass of a scene. Returns the recording in memory, without a name.
 ///
 /// # Errors
-/// [`TruthError`] where the scene cannot be.
+/// [`TruthError`] if the scene is invalid.
 pub fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
     scene.check()?;
     limits::check(scene)?;

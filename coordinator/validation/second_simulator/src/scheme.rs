@@ -1,6 +1,7 @@
 //! Integration in time: the generalised-alpha scheme in accelerations.
 //!
-//! Owns the weights and the kinematic relations; equations of motion are left to rail, bodies and vehicle.
+//! This module contains the weights and the kinematic relations. Rail, bodies and vehicle contain the
+//! equations of motion.
 //!
 //! Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
 

@@ -1,6 +1,7 @@
-//! Rail seats: a sleeper's parameters with what is hidden at it.
+//! Rail seats: parameters of each sleeper, changed by the hidden effects at this sleeper.
 //!
-//! Owns which hidden effect changes which parameter; equations are left to the sleeper.
+//! This module defines the parameters that each hidden effect changes. The module `sleeper` contains the
+//! equations.
 
 use crate::nuisance::Nuisances;
 use tracktwin_reference_simulator::{Hidden, SPACING_M, Scene};

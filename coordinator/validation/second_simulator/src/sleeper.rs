@@ -1,6 +1,7 @@
 //! A half sleeper: rigid bars, hinges and shear between lumps, ballast at four points.
 //!
-//! Owns the matrices of a rail seat's body: sleeper, railpad, clamp, bolt, ballast and the layer under it.
+//! This module builds the matrices of the body under a rail seat: sleeper, railpad, clamp, bolt, ballast
+//! and subgrade layer.
 
 use crate::seat::Seat;
 use crate::system::Matrices;

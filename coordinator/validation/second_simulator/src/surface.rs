@@ -1,7 +1,7 @@
 //! The rail's surface: filtered white noise, and hidden defects on it.
 //!
-//! Owns the realisation of eq. B.6: noise that drives two filters of first order along the rail. The paper's
-//! spectrum has no lower limit; here waves beyond 2 m fade.
+//! This module realises eq. B.6 by white noise through two filters of first order along the rail. The
+//! spectrum of the paper has no longest wavelength. Here waves longer than 2 m are attenuated.
 
 use crate::biquad::Biquad;
 use crate::defect::{drift_phase, rail_depth_m};

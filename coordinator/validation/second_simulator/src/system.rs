@@ -1,7 +1,7 @@
 //! Small systems of masses, springs and dampers.
 //!
-//! Owns their matrices, their motion and what a step needs of them; what a system stands for is left to
-//! sleepers and vehicle.
+//! This module contains matrices, motion and time step of the systems. Sleepers and vehicle use these
+//! systems.
 
 use crate::scheme::{Motion, Weights};
 use nalgebra::DMatrix;

@@ -1,6 +1,7 @@
-//! The track in motion: rail, sleepers and what is hidden among them.
+//! The track in motion: rail, sleepers and hidden effects.
 //!
-//! Owns their assembly from a scene and the halves of a time step before and after the contact force is known.
+//! This module assembles the track from a scene. It computes the two parts of a time step: before and
+//! after the contact force is known.
 
 use crate::band::Factor;
 use crate::body::Body;

@@ -1,7 +1,7 @@
 //! The vehicle: wheel and axle box, with what vibrates in the wheel and in the rail's section.
 //!
-//! Owns how the contact force moves contact and sensor. The rail's section stands here, as it is an oscillator
-//! on the contact too.
+//! This module computes the motion of contact and sensor under the contact force. The rail cross-section
+//! is part of the vehicle, because it is also an oscillator on the contact.
 
 use crate::scheme::{REACH, Weights};
 use crate::system::{Matrices, System};
@@ -46,7 +46,7 @@ impl Vehicle {
     /// The vehicle of a scene.
     ///
     /// # Errors
-    /// [`TruthError`] where the wheel has no mass left, or two axle boxes.
+    /// [`TruthError`] if the wheel has no remaining mass, or if there are two axle boxes.
     pub(crate) fn new(scene: &Scene, wheel: &Wheel) -> Result<Self, TruthError> {
         let whole = wheel.mass_kg;
         let parts: Vec<Coordinate> =

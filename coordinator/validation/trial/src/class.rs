@@ -1,8 +1,8 @@
-//! What kinds of cases a trial has.
+//! Classes of the cases of a trial.
 
 use serde::{Deserialize, Serialize};
 
-/// What kind of case it is.
+/// Class of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Class {
@@ -19,7 +19,7 @@ pub enum Class {
 }
 
 impl Class {
-    /// Its name in files.
+    /// Name of the class in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Control => "control",
@@ -30,7 +30,7 @@ impl Class {
         }
     }
 
-    /// How many effects are hidden.
+    /// Number of hidden effects.
     pub(crate) const fn effects(self) -> usize {
         match self {
             Self::Control => 0,

@@ -1,6 +1,6 @@
-//! Hidden physics of a trial's cases, drawn from the seed alone.
+//! Hidden physics of the cases of a trial, drawn from the seed alone.
 //!
-//! Owns shares of classes, places and strengths; what a track looks like is the truth simulator's.
+//! This module draws classes, places and strengths. The reference simulator draws the tracks.
 
 use crate::class::Class;
 use crate::effect::{self, Draw};
@@ -12,19 +12,20 @@ use rand_distr::uniform::Uniform;
 use serde::Serialize;
 use tracktwin_reference_simulator::Scene;
 
-/// Format of what is hidden and scored. Trials of another format are other trials: 2 has makings.
+/// Version of the plans and scores. Trials with different versions are not comparable. Version 2 added
+/// makings.
 pub const FORMAT: u32 = 2;
 
-/// A case of a trial: what is sealed.
+/// Plan of a case of a trial. The seal covers its content.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// Number in the trial, from 0.
     pub number: u32,
-    /// What kind of case it is.
+    /// Class of the case.
     pub class: Class,
-    /// How it is made.
+    /// How the case is simulated.
     pub making: Making,
-    /// Track, passes and what is hidden.
+    /// Track, passes and hidden effects.
     pub scene: Scene,
 }
 
@@ -45,7 +46,7 @@ const BLOCK: u32 = 40;
 const MAKINGS: u64 = 1 << 16;
 const NUISANCES: u64 = 1 << 17;
 
-/// The case of this number in the trial of this seed.
+/// The plan of case `number` in the trial with this seed.
 pub fn plan(seed: u64, number: u32) -> Plan {
     // Streams of their own: a block's order, and each case.
     let mut rng = stream(seed, number / BLOCK, 0);

@@ -1,7 +1,7 @@
-//! Which effects are hidden, where, and how strong: ranges of the catalogue at V-Track scale.
+//! Kind, place and strength of hidden effects, in the ranges of the catalogue at V-Track scale.
 //!
-//! Strengths are drawn evenly in their logarithm (ranges: docs/extensions.md), so that some are
-//! too weak for anybody to see: the scores say how strong each was.
+//! Strengths have a log-uniform distribution (ranges: docs/extensions.md). Some effects are therefore
+//! too weak to be detected. The scores state the strength of each effect.
 
 use crate::class::Class;
 use crate::known::kind;
@@ -46,8 +46,8 @@ const EFFECTS: [Effect; 22] = [
     wheel_mode,
 ];
 
-/// What may be hidden in a class: the twin's catalogue says which effects it knows, and which of
-/// them are faults of the measuring chain.
+/// The effects that a class can hide. The catalogue of the diagnosis determines which effects it
+/// contains, and which of them are faults of the measuring chain.
 pub(crate) fn of(class: Class) -> Vec<Effect> {
     EFFECTS.into_iter().filter(|effect| belongs(&any(*effect), class)).collect()
 }

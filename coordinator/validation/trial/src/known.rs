@@ -1,9 +1,11 @@
-//! What the twin's catalogue knows of a hidden effect: the two simulators share names, and nothing else.
+//! Kind of a hidden effect in the catalogue of the diagnosis. Simulators and catalogue share only the
+//! names.
 
 use tracktwin_reference_simulator::Hidden;
 use tracktwin_track::extension::Kind;
 
-/// The kind of the catalogue, if it has it; if not, the right answer is "unknown".
+/// The kind in the catalogue, if the catalogue contains the effect. If not, the correct result is
+/// "unknown".
 pub(crate) fn kind(hidden: &Hidden) -> Option<&'static Kind> {
     Kind::from_name(hidden.physics())
 }

@@ -1,8 +1,8 @@
 //! Blind trials: recordings with hidden physics, diagnosed without the truth, then scored.
 //!
-//! Owns what is hidden ([`Plan`]), the seals ([`Seals`]) and the scores ([`CaseScore`], [`Summary`]).
-//! The recordings come from simulators that share no discretisation with the diagnosis ([`Making`]);
-//! diagnosing and files belong to the command.
+//! This crate contains the plans of hidden effects ([`Plan`]), the seals ([`Seals`]) and the scores
+//! ([`CaseScore`], [`Summary`]). Simulators that share no discretisation with the diagnosis make the
+//! recordings ([`Making`]). The command `trial` diagnoses the recordings and writes files.
 
 mod class;
 mod draw;

@@ -1,4 +1,4 @@
-//! How a case is made: by which simulator, with what it assumes, and with which nuisances.
+//! Making of a case: simulator, assumptions and nuisances.
 
 use crate::effect::Draw;
 use crate::varied::{add_nuisances, assumptions, vary_track};
@@ -19,10 +19,10 @@ pub enum Making {
 }
 
 impl Making {
-    /// All of them.
+    /// All makings.
     pub const ALL: [Self; 3] = [Self::Plain, Self::Varied, Self::Second];
 
-    /// Its name in files.
+    /// Name of the making in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Plain => "plain",
@@ -34,7 +34,7 @@ impl Making {
     /// Simulates a scene and writes the recording's folder.
     ///
     /// # Errors
-    /// [`TruthError`] where the scene cannot be or the folder cannot be written.
+    /// [`TruthError`] if the scene is invalid or the folder cannot be written.
     pub fn record(self, scene: &Scene, folder: &Path) -> Result<(), TruthError> {
         match self {
             Self::Plain | Self::Varied => tracktwin_reference_simulator::record(scene, folder),

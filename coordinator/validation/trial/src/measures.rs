@@ -18,9 +18,9 @@ pub(crate) struct Measured {
     pub(crate) value: String,
     pub(crate) goal: String,
     pub(crate) reached: Option<bool>,
-    /// The larger, the worse; none where nothing was measured.
+    /// Size for comparisons; a larger value is worse. `None` if nothing was measured.
     pub(crate) badness: Option<f64>,
-    /// How many cases it is of.
+    /// Number of cases of the measure.
     pub(crate) of: u64,
 }
 
@@ -37,7 +37,8 @@ fn singles(scores: &[CaseScore]) -> impl Iterator<Item = (&CaseScore, &Named)> {
     of_class(scores, Class::Single).filter_map(|score| Some((score, score.hidden.first()?)))
 }
 
-/// All measures of the scores of so many planned cases; a case without a score has a failed diagnosis.
+/// All measures of the scores. `planned` is the number of cases; a case without a score is a failed
+/// diagnosis.
 pub(crate) fn measures(planned: usize, scores: &[CaseScore]) -> Vec<Measured> {
     let broken_down = Rate { hits: (planned - scores.len()) as u64, of: planned as u64 };
     let mut all = alarms(scores);
@@ -177,7 +178,7 @@ fn calibration_error(given: &[(f64, bool)]) -> Option<f64> {
     (!given.is_empty()).then(|| sum / given.len() as f64)
 }
 
-/// Errors of the stiffnesses next to effects that were named.
+/// Errors of the stiffnesses next to accepted effects.
 fn bias(scores: &[CaseScore]) -> Measured {
     let named = singles(scores).filter(|(_, named)| named.accepted);
     let biases: Vec<_> = named.filter_map(|(score, _)| score.bias).collect();

@@ -1,4 +1,4 @@
-//! Whether the paper's own pipeline looks content with a recording in which something is hidden.
+//! Test whether the method of the paper gives usual results for a recording with a hidden effect.
 
 use crate::place::near;
 use crate::rate::median;
@@ -14,19 +14,19 @@ const CONTROLS_MIN: usize = 5;
 /// Sleepers from which their median is that of a track.
 const TRACK: usize = 10;
 
-/// What surrogates and model selector say next to what is hidden; everywhere if it is everywhere, or
-/// nothing is hidden.
+/// Results of surrogates and model selector at sleepers next to hidden effects. All sleepers count if an
+/// effect acts everywhere or nothing is hidden.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Paper {
-    /// Mean absolute percentage error of each sleeper's best match (paper, eq. 10; 0.05 is 5 %),
-    /// ascending; of one sleeper at least.
+    /// Mean absolute percentage error of the best match of each sleeper (paper, eq. 10; 0.05 is 5 %),
+    /// ascending. There is at least one value.
     pub mape: Vec<f64>,
-    /// Whether all six parameters of every sleeper lie inside Table D1 of the paper.
+    /// Whether all six parameters of every sleeper are inside the ranges of Table D1 of the paper.
     pub inside: bool,
 }
 
 impl Paper {
-    /// Of an evaluation; none where no sleeper next to it was evaluated.
+    /// The results of an evaluation. `None` if no sleeper next to a hidden effect was evaluated.
     pub fn of(scene: &Scene, evaluation: &Evaluation) -> Option<Self> {
         let near: Vec<&SleeperEvaluation> =
             evaluation.sleepers.iter().filter(|sleeper| near(scene, sleeper.x_m)).collect();
@@ -42,24 +42,25 @@ impl Paper {
     }
 }
 
-/// Errors up to which the selector looks content.
+/// Errors of the model selector that are usual for controls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Usual {
-    /// Of a single sleeper: 95 % of the controls' sleepers have less.
+    /// Limit for a single sleeper: 95 % of the sleepers of controls have a smaller error.
     sleeper: f64,
-    /// Median of a track: 95 % of the controls' have less.
+    /// Limit for the median of a track: 95 % of the controls have a smaller median.
     track: f64,
 }
 
 impl Usual {
-    /// From what controls show; none where they are too few to say.
+    /// The limits from the errors of controls. `None` with too few controls.
     pub(crate) fn of(controls: &[&Paper]) -> Option<Self> {
         let tracks = controls.iter().map(|paper| paper.median()).collect();
         let sleepers = controls.iter().flat_map(|paper| paper.mape.iter().copied()).collect();
         Some(Self { sleeper: most(sleepers, CONTROLS_MIN)?, track: most(tracks, CONTROLS_MIN)? })
     }
 
-    /// Whether the pipeline looks content: with a few sleepers as single ones, with more as a track.
+    /// Whether the results of the paper's method are usual. A few sleepers are tested singly, more of
+    /// them as a track.
     pub(crate) fn is_content(self, paper: &Paper) -> bool {
         let usual = if paper.mape.len() < TRACK { self.sleeper } else { self.track };
         paper.inside && paper.median() <= usual

@@ -1,4 +1,4 @@
-//! Where what is hidden is, and what is next to it.
+//! Places of hidden effects, and the sleepers next to them.
 
 use crate::known::is_artefact;
 use tracktwin_diagnosis::Hypothesis;
@@ -7,10 +7,11 @@ use tracktwin_reference_simulator::{Hidden, Scene};
 /// Spacing of the sleepers in m.
 pub(crate) const SPACING_M: f64 = 0.125;
 
-/// Longest effect in spacings that has a place to be found.
+/// Largest length of a local effect in sleeper spacings.
 const LOCAL_SPACINGS: f64 = 3.0;
 
-/// Whether a hypothesis has an effect's place, within a sleeper; where either is everywhere, it has.
+/// Whether a hypothesis has the place of an effect to within one sleeper spacing. True if either of them
+/// acts everywhere.
 pub(crate) fn is_placed(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
     let (Some([from_m, to_m]), Some(location)) = (hidden.place(), &hypothesis.location) else {
         return true;
@@ -23,8 +24,8 @@ pub(crate) fn local(hidden: &Hidden) -> Option<[f64; 2]> {
     hidden.place().filter(|[from_m, to_m]| to_m - from_m <= LOCAL_SPACINGS * SPACING_M)
 }
 
-/// Whether a place is next to physics that is hidden; all places are if it is everywhere, or none is
-/// hidden.
+/// Whether a place is next to a hidden effect. True for all places if an effect acts everywhere or
+/// nothing is hidden.
 pub(crate) fn near(scene: &Scene, x_m: f64) -> bool {
     let mut physical = scene.left_out.iter().filter(|hidden| !is_artefact(hidden)).peekable();
     let is_near = |hidden: &Hidden| {

@@ -1,4 +1,4 @@
-//! Rates with what chance alone makes of them, and medians.
+//! Rates with their confidence intervals, and medians.
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{Beta, ContinuousCDF};
@@ -9,17 +9,17 @@ pub(crate) fn median(values: Vec<f64>) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())
 }
 
-/// How often something was so.
+/// Relative frequency of an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rate {
-    /// How often.
+    /// Number of events.
     pub hits: u64,
-    /// Of how many.
+    /// Number of observations.
     pub of: u64,
 }
 
 impl Rate {
-    /// Counts what is true.
+    /// Counts the true values.
     pub fn of(answers: impl IntoIterator<Item = bool>) -> Self {
         answers.into_iter().fold(Self::default(), |rate, hit| Self {
             hits: rate.hits + u64::from(hit),
@@ -27,12 +27,13 @@ impl Rate {
         })
     }
 
-    /// The share; none of nothing.
+    /// The share, 0 to 1. `None` without observations.
     pub fn share(self) -> Option<f64> {
         (self.of > 0).then(|| self.hits as f64 / self.of as f64)
     }
 
-    /// Its 95 % interval (Clopper and Pearson, 1934): exact for a binomial count.
+    /// The 95 % confidence interval of the share (Clopper and Pearson, 1934), exact for a binomial
+    /// count.
     #[expect(clippy::missing_panics_doc, reason = "a count and a count plus one are shapes")]
     pub fn interval_95(self) -> [f64; 2] {
         let (hits, misses) = (self.hits as f64, (self.of - self.hits) as f64);
@@ -44,7 +45,7 @@ impl Rate {
         [low, high]
     }
 
-    /// Such as `38 of 40: 95 % (83 to 99)`.
+    /// The rate as text, such as `38 of 40: 95 % (83 to 99)`.
     pub fn to_text(self) -> String {
         let Some(share) = self.share() else { return "none".to_owned() };
         let [low, high] = self.interval_95().map(|limit| 100.0 * limit);

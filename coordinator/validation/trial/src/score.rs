@@ -1,4 +1,4 @@
-//! One diagnosis against its truth.
+//! Score of one diagnosis: comparison with the truth.
 
 use crate::class::Class;
 use crate::draw::Plan;
@@ -11,7 +11,7 @@ use tracktwin_diagnosis::{Diagnosis, Hypothesis, UNKNOWN, Verdict};
 use tracktwin_parameters::{Axis, Parameter, Preset};
 use tracktwin_reference_simulator::{Hidden, Scene};
 
-/// Probability that the set of answers must hold together.
+/// Total probability of the set of names.
 const SET: f64 = 0.9;
 
 /// Probability above which a wrong member of a family is a wrong statement.
@@ -25,27 +25,28 @@ const CELL_DEVIATIONS: f64 = 3.5;
 pub struct CaseScore {
     /// Number of the case.
     pub number: u32,
-    /// What kind of case it is.
+    /// Class of the case.
     pub class: Class,
-    /// How it was made.
+    /// Making of the case.
     pub making: Making,
     /// Result of the diagnosis.
     pub verdict: Verdict,
-    /// Names that it accepted.
+    /// Kinds of the accepted hypotheses.
     pub accepted: Vec<String>,
     /// Results of the hidden effects.
     pub hidden: Vec<Named>,
-    /// Each probability that was given, and whether it was so.
+    /// Each stated probability, and whether the statement is true.
     pub probabilities: Vec<(f64, bool)>,
-    /// Whether a kind of the catalogue was stated above 90 % that is not hidden there.
+    /// Whether the diagnosis gave a kind of the catalogue more than 90 % at a place where this kind is
+    /// not hidden.
     pub wrong_member: bool,
-    /// Gain on the speeds held out in nats; none where nothing was accepted.
+    /// Held-out gain in nats. `None` if no hypothesis was accepted.
     pub held_out_gain_nats: Option<f64>,
-    /// Errors of the stiffnesses next to the effect; none where nothing was hidden.
+    /// Errors of the stiffnesses next to the effect. `None` if nothing was hidden.
     pub bias: Option<Bias>,
-    /// Whether the re-tuned baseline looks well: parameters inside Table D1.
+    /// Whether the parameters of the fitted baseline are inside the ranges of Table D1.
     pub parameters_inside: bool,
-    /// Whether no cell of the re-tuned baseline is far beyond chance.
+    /// Whether no cell of the residual of the fitted baseline is far beyond the random variation.
     pub cells_inside: bool,
     /// CPU time of the diagnosis in s.
     pub cpu_s: f64,
@@ -59,14 +60,14 @@ pub struct CaseScore {
     pub paper: Option<Paper>,
 }
 
-/// Result of an effect whose kind is missing in the catalogue.
+/// Result of a knock-out: a diagnosis without the hidden kind in the catalogue.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnockedOut {
     /// The verdict.
     pub verdict: Verdict,
-    /// Whether it was "unknown", as it should be.
+    /// Whether the verdict was "unknown", which is correct.
     pub unknown: bool,
-    /// How well the effect was placed; none where it has no place.
+    /// Accuracy of the place of the effect. `None` if the effect has no place.
     pub place: Option<Placed>,
 }
 
@@ -74,32 +75,33 @@ pub struct KnockedOut {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an answer to a question of its own")]
 pub struct Named {
-    /// What it is.
+    /// Kind of the effect.
     pub physics: String,
-    /// Length of its trace over the scatter of nulls after re-tuning; none for what the model has
-    /// no part for.
+    /// Detectability `d'` of the effect after the baseline was fitted again. `None` if the track model
+    /// does not contain the effect.
     pub detectability: Option<f64>,
-    /// Whether it is the first name.
+    /// Whether the effect is the first accepted hypothesis.
     pub first: bool,
-    /// Whether the first name is of its family; for what the catalogue lacks, `unknown_physics`.
+    /// Whether the first accepted hypothesis is of the family of the effect. For effects that the
+    /// catalogue lacks, the correct name is `unknown_physics`.
     pub family_first: bool,
-    /// Whether it is in the set of names that hold 90 % together.
+    /// Whether the effect is in the smallest set of hypotheses with a total probability of 90 %.
     pub in_set: bool,
-    /// Whether it was accepted, at any rank.
+    /// Whether the effect was accepted, at any rank.
     pub accepted: bool,
-    /// How well it was placed; none where it has no place.
+    /// Accuracy of the place of the effect. `None` if the effect has no place.
     pub place: Option<Placed>,
 }
 
-/// How well a local effect was placed.
+/// Accuracy of the place of a local effect.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placed {
-    /// Distance in sleeper spacings to the nearest accepted place; none if there is none.
+    /// Distance to the nearest accepted place in sleeper spacings. `None` if no place was accepted.
     pub error_spacings: Option<f64>,
 }
 
 impl Placed {
-    /// Whether it is right to within a sleeper.
+    /// Whether the error is at most one sleeper spacing.
     pub fn within_a_sleeper(self) -> bool {
         self.error_spacings.is_some_and(|error| error <= 1.0)
     }
@@ -108,27 +110,27 @@ impl Placed {
 /// Mean absolute error of the logarithms of railpad and ballast stiffness.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bias {
-    /// By the re-tuned baseline.
+    /// Error of the fitted baseline.
     pub before: f64,
-    /// With what was named.
+    /// Error with the accepted hypotheses in the model.
     pub after: f64,
 }
 
 impl CaseScore {
-    /// Whether the knock-out test applies: one effect, found and named.
+    /// Whether the knock-out test applies: a single hidden effect, detected and accepted.
     pub fn can_be_knocked_out(&self) -> bool {
         self.class == Class::Single && self.hidden.iter().all(|named| named.accepted)
     }
 
-    /// Whether the shuffle test applies: one local effect, found.
+    /// Whether the shuffle test applies: a single local effect, detected.
     pub fn can_be_shuffled(&self) -> bool {
         self.class == Class::Single
             && self.verdict != Verdict::Consistent
             && self.hidden.iter().all(|named| named.place.is_some())
     }
 
-    /// Whether the diagnosis is perfect: the accepted hypotheses are the hidden effects, faults of
-    /// the chain are not called physics, and nothing is accepted where nothing is hidden.
+    /// Whether the diagnosis is completely correct: the accepted hypotheses are the hidden effects, no
+    /// fault of the measuring chain is called physics, and no hypothesis is accepted for a control.
     pub fn is_right(&self) -> bool {
         match self.class {
             Class::Control => self.verdict == Verdict::Consistent,
@@ -174,7 +176,7 @@ pub fn score(
     }
 }
 
-/// How well a diagnosis places the first hidden effect that has a place.
+/// Accuracy with which a diagnosis places the first hidden effect that has a place.
 pub fn placed(scene: &Scene, diagnosis: &Diagnosis) -> Option<Placed> {
     let place = scene.left_out.iter().find_map(local)?;
     let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
@@ -214,12 +216,13 @@ fn becomes(
     }
 }
 
-/// Whether a name is right; for what the catalogue lacks it is "unknown".
+/// Whether a name is correct. For effects that the catalogue lacks, the correct name is "unknown".
 fn is_it(hidden: &Hidden, physics: &str) -> bool {
     physics == kind(hidden).map_or(UNKNOWN, |kind| kind.physics)
 }
 
-/// Whether a name is of the family of what is hidden; for what the catalogue lacks it is "unknown".
+/// Whether a hypothesis is of the family of the hidden effect. For effects that the catalogue lacks, the
+/// correct name is "unknown".
 fn is_family(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
     match kind(hidden) {
         Some(kind) => hypothesis.family.as_deref() == Some(kind.family.name()),
@@ -227,14 +230,14 @@ fn is_family(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
     }
 }
 
-/// Whether something hidden has a hypothesis's name and place.
+/// Whether a hidden effect has the name and place of the hypothesis.
 fn is_there(left_out: &[Hidden], hypothesis: &Hypothesis) -> bool {
     let is_so =
         |hidden: &Hidden| is_it(hidden, &hypothesis.physics) && is_placed(hidden, hypothesis);
     left_out.iter().any(is_so)
 }
 
-/// Whether a kind is as good as certain that is not hidden where it is said to be.
+/// Whether a kind has more than 90 % probability at a place where this kind is not hidden.
 fn is_member_wrong(left_out: &[Hidden], hypotheses: &[Hypothesis]) -> bool {
     hypotheses.iter().any(|hypothesis| {
         hypothesis.physics != UNKNOWN
@@ -243,7 +246,7 @@ fn is_member_wrong(left_out: &[Hidden], hypotheses: &[Hypothesis]) -> bool {
     })
 }
 
-/// The most probable names that hold 90 % of all probability together.
+/// The smallest set of the most probable hypotheses with a total probability of 90 %.
 fn set(hypotheses: &[Hypothesis]) -> &[Hypothesis] {
     let all: f64 = hypotheses.iter().map(|hypothesis| hypothesis.probability).sum();
     let mut held = 0.0;
@@ -265,7 +268,7 @@ fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Ve
     all
 }
 
-/// Errors at the sleepers next to all that is hidden; everywhere if it is everywhere.
+/// Errors at the sleepers next to hidden effects. All sleepers count if an effect acts everywhere.
 fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
     if scene.left_out.iter().all(is_artefact) {
         return None;

@@ -1,4 +1,4 @@
-//! Seals: the truth is fixed before any diagnosis runs, and anybody can check that it was.
+//! Seals. They fix the truth before any diagnosis, and every reader can verify this.
 
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -8,13 +8,13 @@ use std::fmt::Write;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Seals(BTreeMap<String, String>);
 
-/// A seal that is broken, or none.
+/// A seal is broken or missing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SealError {
     /// A file was never sealed.
     #[error("{0}: not sealed; the trial was started without it")]
     NotSealed(String),
-    /// A file is another than the one that was sealed.
+    /// The content of a file differs from the sealed content.
     #[error("{0}: changed after sealing; start a new trial in another folder")]
     Broken(String),
     /// A line of the file of seals can't be read.
@@ -23,15 +23,15 @@ pub enum SealError {
 }
 
 impl Seals {
-    /// Seals what a file holds.
+    /// Seals the content of a file.
     pub fn seal(&mut self, name: &str, content: &[u8]) {
         self.0.insert(name.to_owned(), sha256(content));
     }
 
-    /// Makes sure that a file holds what was sealed.
+    /// Checks that the content of a file equals the sealed content.
     ///
     /// # Errors
-    /// [`SealError`] when it doesn't.
+    /// [`SealError::NotSealed`] or [`SealError::Broken`] with the name of the file.
     pub fn open(&self, name: &str, content: &[u8]) -> Result<(), SealError> {
         match self.0.get(name) {
             None => Err(SealError::NotSealed(name.to_owned())),
@@ -40,10 +40,10 @@ impl Seals {
         }
     }
 
-    /// Makes sure that what both have sealed is the same.
+    /// Checks that both sets of seals agree for all files that they have in common.
     ///
     /// # Errors
-    /// [`SealError::Broken`] names the first file that isn't.
+    /// [`SealError::Broken`] names the first file that differs.
     pub fn agree(&self, other: &Self) -> Result<(), SealError> {
         let differs = |(name, digest): &(&String, &String)| {
             other.0.get(*name).is_some_and(|other| other != *digest)
@@ -59,17 +59,17 @@ impl Seals {
         self.0.values().map(String::as_str)
     }
 
-    /// How many files are sealed.
+    /// Number of sealed files.
     pub fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// As `sha256sum` writes and checks them: `sha256sum -c`.
+    /// The seals in the format of `sha256sum`, for `sha256sum -c`.
     pub fn to_text(&self) -> String {
         self.0.iter().fold(String::new(), |text, (name, digest)| text + digest + "  " + name + "\n")
     }
 
-    /// From such a text.
+    /// Reads seals in the format of `sha256sum`.
     ///
     /// # Errors
     /// [`SealError::Line`] names the invalid line.
@@ -81,7 +81,7 @@ impl Seals {
         text.lines().map(line).collect::<Result<_, _>>().map(Self)
     }
 
-    /// SHA-256 of all seals: who knows it beforehand knows that no truth was changed.
+    /// SHA-256 of all seals. Its publication before the diagnosis proves that no truth was changed.
     pub fn digest(&self) -> String {
         sha256(self.to_text().as_bytes())
     }

@@ -1,4 +1,4 @@
-//! Summary of a trial: its measures over all cases and by making, and what became of each kind.
+//! Summary of a trial: measures over all cases and by making, and results by kind.
 
 use crate::class::Class;
 use crate::making::Making;
@@ -19,53 +19,55 @@ pub struct Summary {
     pub cases: usize,
     /// Makings of the cases.
     pub makings: BTreeSet<Making>,
-    /// A row a measure.
+    /// One row per measure.
     pub rows: Vec<MeasureRow>,
-    /// A row a kind of physics.
+    /// One row per kind of physics.
     pub kinds: Vec<KindRow>,
 }
 
 /// A measure, its value and its goal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasureRow {
-    /// What is measured.
+    /// Name of the measure.
     pub measure: String,
-    /// What came out, of all cases.
+    /// Value over all cases.
     pub value: String,
-    /// The same of the cases of each making.
+    /// Value over the cases of each making.
     pub by_making: BTreeMap<Making, String>,
-    /// The making with the worst value, of those with five cases or more; none where fewer than two
-    /// have as many, or all are alike.
+    /// The making with the worst value, among those with at least five cases. `None` if fewer than two
+    /// makings have so many cases, or if all values are equal.
     pub worst: Option<Making>,
-    /// What was asked.
+    /// Goal of the measure.
     pub goal: String,
-    /// Whether it was reached by all cases together; none where nothing was measured.
+    /// Whether all cases together reach the goal. `None` if nothing was measured.
     pub reached: Option<bool>,
 }
 
-/// What became of one kind of physics.
+/// Results of one kind of physics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KindRow {
-    /// Its name.
+    /// Name of the kind.
     pub physics: String,
-    /// How often it raised an alarm.
+    /// Rate of alarms.
     pub detected: Rate,
-    /// How often it was the first name.
+    /// Rate of cases in which the kind was the first accepted hypothesis.
     pub first: Rate,
-    /// How often it was placed within one sleeper, of those with a place.
+    /// Rate of places correct to within one sleeper, among effects with a place.
     pub placed: Rate,
     /// Median of `d'`.
     pub detectability: Option<f64>,
-    /// How often the re-tuned baseline looked well: parameters inside Table D1, no cell far out.
+    /// Rate of cases in which the fitted baseline does not show the effect: parameters inside Table D1,
+    /// and no cell far beyond the random variation.
     pub concealed: Rate,
-    /// How often the paper's own pipeline looked content: parameters inside Table D1, the selector's
-    /// error usual on controls; of none where it was not asked.
+    /// Rate of cases in which the method of the paper does not show the effect: parameters inside Table
+    /// D1, and an error of the model selector as usual for controls. Without observations if the method
+    /// was not tested.
     pub content: Rate,
 }
 
 impl Summary {
-    /// Summary of the scores of a trial whose cases are made like this; a case without a score has a
-    /// failed diagnosis.
+    /// Summary of the scores of a trial. `planned` has the making of every case. A case without a score
+    /// is a failed diagnosis.
     pub fn new(planned: &[Making], scores: &[CaseScore]) -> Self {
         let makings: BTreeSet<Making> = planned.iter().copied().collect();
         let of = |making: Making| {
@@ -84,7 +86,7 @@ impl Summary {
     }
 }
 
-/// A measure of all cases beside that of each making.
+/// A row with the measure of all cases and that of each making.
 fn side_by_side(all: Measured, parts: &[(Making, &Measured)]) -> MeasureRow {
     MeasureRow {
         measure: all.measure.to_owned(),

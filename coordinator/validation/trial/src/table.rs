@@ -1,4 +1,4 @@
-//! A trial's outcome as a page of Markdown.
+//! The result of a trial as a page of Markdown.
 
 use crate::making::Making;
 use crate::rate::Rate;
@@ -7,7 +7,7 @@ use crate::summary::{KindRow, MeasureRow, Summary};
 use std::fmt::Write;
 
 impl Summary {
-    /// The tables, with a line a case that did not come out as it should.
+    /// The tables, with one line for each case whose diagnosis is not completely correct.
     pub fn to_markdown(&self, scores: &[CaseScore]) -> String {
         let makings: Vec<_> = self.makings.iter().map(|making| making.name()).collect();
         let makings = makings.join(" | ");

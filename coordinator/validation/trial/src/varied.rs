@@ -1,6 +1,7 @@
-//! What is drawn for the makings other than the plain one: assumptions and nuisances.
+//! Random assumptions and nuisances of the makings `varied` and `second`.
 //!
-//! Nuisances are small and in every such case, controls too; they are never hidden effects.
+//! Nuisances are small. Every case of these makings has them, including controls. They are not hidden
+//! effects.
 
 use crate::effect::Draw;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,6 +1,6 @@
-//! How visible a hidden effect was: its trace over the scatter of nulls, after re-tuning.
+//! Detectability `d'` of a hidden effect after the baseline was fitted again.
 //!
-//! Opens the truth, so it comes after the diagnosis was written down.
+//! This module reads the truth. It must run only after the result of the diagnosis was stored.
 
 use crate::known::kind;
 use nalgebra::DVector;
@@ -9,10 +9,10 @@ use tracktwin_reference_simulator::{Hidden, Scene};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::ExtensionInstance;
 
-/// `d'` of a hidden effect; none for what the forward model does not have.
+/// `d'` of a hidden effect. `None` if the forward model does not contain the effect.
 ///
 /// # Errors
-/// [`CalibrationError`] when the true values make no track.
+/// [`CalibrationError`] if no track can be built from the true values.
 pub fn detectability(
     recording: &Recording,
     prepared: &PreparedRecording,

@@ -1,4 +1,4 @@
-//! The track file as it is written.
+//! Reading and writing of a track file.
 
 use super::limits::check_parameter;
 use super::{TRACK_FORMAT, Track, TrackError};
@@ -8,7 +8,7 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The file as it is written.
+/// Structure of the file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
@@ -95,7 +95,7 @@ impl Track {
     /// Reads a track file.
     ///
     /// # Errors
-    /// [`TrackError`] says in a line what is wrong, where, and what can be.
+    /// [`TrackError`] states the fault, its place and the allowed values in one line.
     pub fn parse(text: &str) -> Result<Self, TrackError> {
         let file: File = toml::from_str(text).map_err(|error| {
             let (line, message) = toml_fault(text, &error);
@@ -221,8 +221,7 @@ impl File {
     }
 }
 
-/// The line, from 1, at which a text is not what TOML should be there, and the parser's message in one
-/// line.
+/// The line number, from 1, of a syntax error in a TOML text, and the message of the parser in one line.
 pub fn toml_fault(text: &str, error: &toml::de::Error) -> (usize, String) {
     let start = error.span().map_or(0, |span| span.start.min(text.len()));
     let message = error.message().lines().collect::<Vec<_>>().join(" ");

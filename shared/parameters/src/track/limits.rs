@@ -1,11 +1,11 @@
-//! What the numbers of a track file can be, each and together.
+//! Limits of the numbers of a track file, singly and in combination.
 
 use super::file::{File, SleeperTable};
 use super::{TRACK_FORMAT, TrackError};
 use crate::Parameter;
 use crate::quantity::SPEED;
 
-/// What a number of the file is, and the values that it can have.
+/// A number of the file and its allowed values.
 struct Limit {
     key: &'static str,
     unit: &'static str,
@@ -13,8 +13,8 @@ struct Limit {
     of: fn(&File) -> f64,
 }
 
-/// Limits of single numbers: a tenth of what the smallest test rig has to ten times what the largest
-/// railway has, so that a mistake of units by a thousand is seen.
+/// Limits of single numbers: from a tenth of the value of the smallest test rig to ten times that of the
+/// largest railway. They detect an error of units by a factor of a thousand.
 const LIMITS: [Limit; 20] = [
     limit("track.railhead_radius_m", "m", [5e-3, 5.0], |it| it.track.railhead_radius_m),
     limit("track.rail.area_m2", "m2", [1e-4, 5e-2], |it| it.track.rail.area_m2),
@@ -146,7 +146,7 @@ pub(super) fn check_parameter(
     Ok(())
 }
 
-/// What is probably wrong with a value outside a range.
+/// Probable cause of a value outside its range.
 fn hint(value: f64, [low, high]: [f64; 2]) -> &'static str {
     let inside = |value: f64| (low..=high).contains(&value);
     if value < 0.0 && inside(-value) {

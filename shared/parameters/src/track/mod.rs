@@ -1,4 +1,4 @@
-//! A track as a user describes it: a file in TOML, or one that comes with the program.
+//! The track description: a TOML file, or a preset of the program.
 
 mod file;
 mod limits;
@@ -10,11 +10,10 @@ use crate::{Axis, Parameter, ParameterSet, ParameterSpace, Preset, Prior, Scale,
 /// Format of a track file.
 pub const TRACK_FORMAT: &str = "tracktwin-track/1";
 
-/// A track, its vehicle and its measurement, with what is known of the parameters before anything is
-/// measured.
+/// A track description: track, vehicle, measurement, and priors of the parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// What it is called.
+    /// Name of the track.
     pub name: String,
     /// Sections, masses, spacing and load.
     pub design: TrackDesign,
@@ -24,7 +23,7 @@ pub struct Track {
     pub ranges: [[f64; 2]; Parameter::COUNT],
     /// How campaigns sample each range, in catalogue order.
     pub scales: [Scale; Parameter::COUNT],
-    /// What is known of the parameters before a recording is evaluated.
+    /// Prior of the parameters.
     pub prior: Prior,
     /// Shortest and longest wavelength of the irregularity in m.
     pub wavelengths_m: [f64; 2],
@@ -32,7 +31,7 @@ pub struct Track {
     pub speeds_km_h: Vec<f64>,
 }
 
-/// Why a track file is refused; one line each.
+/// Why a track file is invalid. Each message has one line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
     /// Not TOML, an unknown key, or a value of the wrong type.
@@ -46,7 +45,7 @@ pub enum TrackError {
     /// The file has another format.
     #[error("format: {0:?} is not known; this version reads {TRACK_FORMAT:?}")]
     Format(String),
-    /// A number that cannot be what it is given for.
+    /// A number is outside its allowed range.
     #[error("{key}: {value} {unit} cannot be; it must lie in {low} to {high} {unit}{hint}")]
     OutOfRange {
         /// The key.
@@ -59,18 +58,18 @@ pub enum TrackError {
         low: f64,
         /// Highest possible value.
         high: f64,
-        /// A guess at the mistake.
+        /// Probable cause.
         hint: &'static str,
     },
-    /// Two numbers that cannot go together.
+    /// Two numbers contradict each other.
     #[error("{key}: {message}")]
     Inconsistent {
         /// The key.
         key: &'static str,
-        /// What is wrong, and what to do.
+        /// The contradiction and its remedy.
         message: String,
     },
-    /// A parameter without a value.
+    /// A parameter has no value.
     #[error("parameters.{0}: is missing; give {{ nominal = VALUE, range = [LOW, HIGH] }}")]
     Missing(Parameter),
 }
@@ -82,13 +81,14 @@ impl Track {
         Axis { parameter, low, high, scale: self.scales[parameter.index()] }
     }
 
-    /// All six parameters over their usual ranges.
+    /// The space of all six parameters over their usual ranges.
     pub fn space(&self) -> ParameterSpace {
         let axes = Parameter::ALL.iter().map(|&parameter| self.axis(parameter)).collect();
         ParameterSpace::new(axes).expect("ranges are checked")
     }
 
-    /// The same track with another design; a stated section gives the sleeper's bending stiffness.
+    /// The track with another design. Nominal value, prior median and range of the bending stiffness of
+    /// the sleeper scale with the section of the design.
     #[must_use]
     pub fn with_design(mut self, design: TrackDesign) -> Self {
         let index = Parameter::SleeperBendingStiffness.index();
@@ -100,8 +100,8 @@ impl Track {
         Self { design, ..self }
     }
 
-    /// What comes with the program and has this design, or else the one whose sleepers are spaced most
-    /// like it, with this design.
+    /// The preset with this design. If there is none: the preset with the most similar sleeper spacing,
+    /// with its design replaced by this one.
     pub fn of(design: TrackDesign) -> Self {
         let presets = Preset::ALL.iter().map(|preset| preset.track());
         let mut all: Vec<Self> = presets.collect();

@@ -1,8 +1,8 @@
-//! A signal about as an axle box sounds, from a fixed seed.
+//! A signal similar to an axle-box acceleration, from a fixed seed.
 
 use tracktwin_signal::Signal;
 
-/// A resonance at 115 Hz and another at 900 Hz under white noise, about as an axle box sounds.
+/// Two resonances, at 115 Hz and 900 Hz, excited by white noise: similar to an axle-box acceleration.
 pub(crate) fn axle_box(samples: usize) -> Signal {
     let mut state = 1_u64;
     let mut resonators =

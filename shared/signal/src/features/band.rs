@@ -16,11 +16,11 @@ const FIRST_EXPONENT: u32 = 17;
 pub struct ThirdOctave(u32);
 
 impl ThirdOctave {
-    /// How many there are.
+    /// Number of bands.
     pub const COUNT: usize = NOMINAL_HZ.len();
 
-    /// All of them, by ascending frequency: the order of
-    /// [`Features::band_levels_db`](crate::Features::band_levels_db).
+    /// All bands, by ascending frequency. [`Features::band_levels_db`](crate::Features::band_levels_db)
+    /// has the same order.
     pub fn all() -> impl ExactSizeIterator<Item = Self> {
         (0..20).map(Self)
     }
@@ -30,14 +30,14 @@ impl ThirdOctave {
         NOMINAL_HZ[self.0 as usize]
     }
 
-    /// Lower (belongs to the band) and upper edge (does not) in Hz: a twentieth of a decade on
-    /// either side of the exact centre (IEC 61260-1, base ten).
+    /// Lower edge (included) and upper edge (excluded) in Hz: a twentieth of a decade on either side of
+    /// the exact centre (IEC 61260-1, base ten).
     pub fn edges_hz(self) -> [f64; 2] {
         let exponent = f64::from(FIRST_EXPONENT + self.0);
         [-0.5, 0.5].map(|side| 10_f64.powf((exponent + side) / 10.0))
     }
 
-    /// The name of its level in files and tables, `level_1000_Hz_dB`.
+    /// Name of the level of the band in files and tables, such as `level_1000_Hz_dB`.
     pub fn level_name(self) -> String {
         format!("level_{}_Hz_dB", self.nominal_hz())
     }

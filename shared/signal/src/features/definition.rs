@@ -5,11 +5,11 @@ use crate::wavelet::Morlet;
 use serde::{Deserialize, Serialize};
 use tracktwin_number::rounded;
 
-/// Everything that decides the value of a feature.
+/// All settings that determine the value of a feature.
 ///
-/// Scales and bins follow from [`reference_rate_hz`](Self::reference_rate_hz), never from the
-/// recording's own sample rate: features of one definition are comparable across sample rates,
-/// features of two definitions never are.
+/// Scales and bins follow from [`reference_rate_hz`](Self::reference_rate_hz), not from the sample rate
+/// of the recording. Features of one definition are therefore comparable across sample rates. Features
+/// of two definitions are not comparable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FeatureDefinition {
@@ -19,29 +19,30 @@ pub struct FeatureDefinition {
     pub voices_per_octave: u32,
     /// The rate `f_s` in Hz in the base scale `s_0 = 2 / f_s` (paper, eq. A.2).
     pub reference_rate_hz: f64,
-    /// Lowest frequency in Hz a bin may have (paper, eq. 9).
+    /// Lowest allowed frequency of a bin in Hz (paper, eq. 9).
     pub lowest_hz: f64,
-    /// Highest frequency in Hz a bin may have (paper, eq. 9).
+    /// Highest allowed frequency of a bin in Hz (paper, eq. 9).
     pub highest_hz: f64,
-    /// Instants per second at which the transform is taken in the window, in Hz.
+    /// Number of instants per second, in Hz, at which the transform is computed in the window.
     ///
-    /// A quarter of 100 kHz: six instants a period at 4 kHz. It is taken on the recording's own
-    /// clock, rounded so that instants divide the transformed stretch evenly (by less than 1e-4).
+    /// The default is a quarter of 100 kHz: six instants per period at 4 kHz. The transform rounds this
+    /// rate, by less than 1e-4, so that the instants are evenly spaced in the transformed stretch.
     pub instant_rate_hz: f64,
-    /// Whether low bins take fewer instants: half as many three octaves below the highest
-    /// frequency, and half as many again for every octave and a half from there.
+    /// Whether bins of low frequency have fewer instants: half as many from three octaves below the
+    /// highest frequency, and half as many again for every further octave and a half.
     ///
-    /// The lower a bin, the slower its power changes. Thinned out like this, all bins err about
-    /// alike by the instants left out.
+    /// The power of a bin changes more slowly at a lower frequency. With this rule, the omitted instants
+    /// cause about the same error in all bins.
     pub thinned: bool,
-    /// Real signal used on either side of the window, in s, as far as there is any.
+    /// Length in s of the signal on either side of the window that the transform uses. It is shorter if
+    /// the signal ends earlier.
     ///
-    /// Three standard deviations (19 ms) of the wavelet at 50 Hz.
+    /// The default is three standard deviations (of 19 ms) of the wavelet at 50 Hz.
     pub margin_s: f64,
-    /// Floor of the LWPS in (m/s2)^2: the logarithm is taken of the larger of the two, so that an
-    /// empty bin has this value.
+    /// Floor of the LWPS in (m/s2)^2. Smaller values are replaced by this floor before the logarithm is
+    /// computed.
     ///
-    /// The default is an amplitude of 10 um/s2, beneath the noise of any accelerometer.
+    /// The default is an amplitude of 10 um/s2, below the noise of any accelerometer.
     pub floor_m2_s4: f64,
 }
 
@@ -61,24 +62,25 @@ impl Default for FeatureDefinition {
     }
 }
 
-/// Instants of a margin: memory goes by their number, and by that of the bins.
+/// Largest number of instants of a margin. The required memory is proportional to this number and to
+/// that of the bins.
 const INSTANTS_MAX: f64 = 1e5;
 
 /// Part of a voice by which a point may lie outside a range: one that is meant to lie on the
 /// border is not lost to rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Octaves over which the instants of a thinned definition are halved, the first time after twice
-/// as many.
+/// Octaves over which a thinned definition halves the instants. The first halving comes after twice as
+/// many octaves.
 const OCTAVES_A_HALVING: f64 = 1.5;
 
-/// Why a definition is refused.
+/// Why a definition is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DefinitionError {
-    /// A value lies outside what the transform can do.
+    /// A value is outside its allowed range.
     #[error("{name} is {value}, but must lie in {low} .. {high}")]
     OutOfRange {
-        /// The field of [`FeatureDefinition`].
+        /// Name of the field of [`FeatureDefinition`].
         name: &'static str,
         /// Its value.
         value: f64,
@@ -102,8 +104,8 @@ pub enum DefinitionError {
 }
 
 impl FeatureDefinition {
-    /// Frequencies in Hz of the bins, ascending: `f_l = mu / (2 pi a_l)` in
-    /// `lowest_hz ..= highest_hz`. Empty for a definition that [`check`](Self::check) refuses.
+    /// Frequencies of the bins in Hz, ascending: `f_l = mu / (2 pi a_l)` in `lowest_hz ..= highest_hz`.
+    /// Empty if a field is out of the range of [`check`](Self::check).
     pub fn frequencies_hz(&self) -> Vec<f64> {
         if self.check_ranges().is_err() {
             return Vec::new();
@@ -126,10 +128,10 @@ impl FeatureDefinition {
             })
     }
 
-    /// Refuses what cannot be transformed.
+    /// Checks that every field is in its allowed range and that there is at least one bin.
     ///
     /// # Errors
-    /// [`DefinitionError`] names the first field that is wrong.
+    /// [`DefinitionError`] names the first invalid field.
     pub fn check(&self) -> Result<(), DefinitionError> {
         self.check_ranges()?;
         if self.frequencies_hz().is_empty() {
@@ -139,7 +141,7 @@ impl FeatureDefinition {
         Ok(())
     }
 
-    /// The same definition with all instants in every bin.
+    /// The definition with all instants in every bin.
     pub(crate) fn unthinned(&self) -> Self {
         Self { thinned: false, ..self.clone() }
     }
@@ -170,15 +172,15 @@ impl FeatureDefinition {
         Morlet::new(self.wavelet_centre_rad)
     }
 
-    /// What a tone of amplitude one adds to the voice at its own frequency, when all voices
-    /// together give the signal back.
+    /// Amplitude of the voice at the frequency of a tone of amplitude one, normalised so that the sum of
+    /// all voices is the signal.
     pub(crate) fn height_of_a_tone(&self) -> f64 {
         let wavelet = self.wavelet();
         0.5 * wavelet.share_of_a_voice(self.voices_per_octave)
             * wavelet.fourier(wavelet.centre_rad())
     }
 
-    /// How often the instants of a bin at this frequency in Hz are halved.
+    /// Number of halvings of the instants of a bin at this frequency in Hz.
     pub(crate) fn halvings(&self, frequency_hz: f64) -> u32 {
         let octaves_below = (self.highest_hz / frequency_hz).log2().max(0.0);
         let steps = (octaves_below / OCTAVES_A_HALVING) as u32;

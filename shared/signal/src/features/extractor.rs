@@ -1,4 +1,5 @@
-//! Features of a window, by the quick way: an octave of voices at a time, reassigned as they come.
+//! Fast computation of the features of a window: one octave of voices at a time, with immediate
+//! reassignment.
 
 use super::{
     DefinitionError, FeatureDefinition,
@@ -15,38 +16,38 @@ use std::{
 };
 use tracktwin_number::rounded;
 
-/// Sample rate that the highest frequency needs, in units of it: two by Nyquist, and room for the
+/// Required ratio of the sample rate to the highest frequency: two by Nyquist, plus a margin for the
 /// upper half of the highest band and an anti-aliasing filter.
 pub const SAMPLES_A_PERIOD: f64 = 2.5;
 
 /// Relative difference below which two frequencies are the same point of the grid.
 const GRID_ROUNDING: f64 = 1e-9;
 
-/// Plans kept. A campaign has a handful of speeds, each with one or two lengths of window.
+/// Number of cached plans. A campaign has a few speeds, each with one or two lengths of window.
 const PLANS_KEPT: usize = 32;
 
 /// The features of one window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Features {
-    /// Natural logarithm of the LWPS in (m/s2)^2, one value a frequency of
+    /// Natural logarithm of the LWPS in (m/s2)^2, one value per frequency of
     /// [`FeatureDefinition::frequencies_hz`] (paper, eq. 4 and 9).
     ///
     /// A steady tone of amplitude `A` gives `2 ln A` in its bin. A bin below
-    /// [`FeatureDefinition::floor_m2_s4`] has the floor's logarithm.
+    /// [`FeatureDefinition::floor_m2_s4`] has the logarithm of this floor.
     pub log_power: Vec<f64>,
     /// Level of each band of [`FeatureDefinition::bands`] in dB re 1 (m/s2)^2: ten times the
     /// decimal logarithm of half the sum of the LWPS over the band's bins.
     ///
-    /// Half, because a tone of amplitude `A` has the mean square `A^2 / 2`: its level is then
-    /// that of its mean square. The level of noise is 10.8 dB below that of its mean square, in
-    /// every band: power adds up along a ridge, and noise has none for longer than a period.
+    /// The factor one half makes the level of a tone of amplitude `A` equal to that of its mean square
+    /// `A^2 / 2`. The level of noise is 10.8 dB below that of its mean square in every band, because
+    /// reassignment adds coefficients along ridges, and noise has no ridge longer than a period.
     pub band_levels_db: Vec<f64>,
 }
 
 /// Why a window has no features.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FeatureError {
-    /// The definition cannot be transformed.
+    /// The definition is invalid.
     #[error("feature definition: {0}")]
     Definition(#[from] DefinitionError),
     /// The window is empty or reaches beyond the signal.
@@ -54,12 +55,12 @@ pub enum FeatureError {
     Window {
         /// First sample of the window.
         start: usize,
-        /// The sample behind its last.
+        /// Index after the last sample of the window.
         end: usize,
-        /// Samples of the signal.
+        /// Number of samples of the signal.
         samples: usize,
     },
-    /// The signal does not hold the definition's frequencies.
+    /// The sample rate of the signal is too low for the frequencies of the definition.
     #[error(
         "a sample rate of {} Hz is too low; at least {} Hz is needed",
         rounded(*sample_rate_hz, 8),
@@ -73,7 +74,8 @@ pub enum FeatureError {
     },
 }
 
-/// Takes the features of windows. One serves all threads; plans are kept by length inside.
+/// Computes the features of windows. All threads can share one extractor. The extractor caches its plans
+/// by length.
 pub struct Extractor {
     definition: FeatureDefinition,
     /// Descending: high voices first.
@@ -91,10 +93,10 @@ pub struct Extractor {
 }
 
 impl Extractor {
-    /// An extractor of these features.
+    /// Creates an extractor for the features of this definition.
     ///
     /// # Errors
-    /// [`FeatureError::Definition`] when [`FeatureDefinition::check`] refuses it.
+    /// [`FeatureError::Definition`] if [`FeatureDefinition::check`] fails.
     pub fn new(definition: &FeatureDefinition) -> Result<Self, FeatureError> {
         definition.check()?;
         let [low_hz, high_hz] = definition.span_hz();
@@ -130,8 +132,8 @@ impl Extractor {
         &self.definition
     }
 
-    /// Samples of a signal at this rate in Hz, on either side of a window, that its features depend
-    /// on.
+    /// Number of samples on either side of a window on which its features depend, for a signal with this
+    /// sample rate in Hz.
     pub fn margin_samples(&self, sample_rate_hz: f64) -> usize {
         in_samples(self.definition.margin_s, sample_rate_hz)
     }
@@ -164,7 +166,8 @@ impl Extractor {
     /// each margin. If the signal ends earlier, the margin is shorter.
     ///
     /// # Errors
-    /// [`FeatureError::Window`] and [`FeatureError::SampleRate`].
+    /// [`FeatureError::Window`] if the window is empty or reaches beyond the signal;
+    /// [`FeatureError::SampleRate`] if the sample rate is too low.
     pub fn extract(&self, signal: &Signal, window: Range<usize>) -> Result<Features, FeatureError> {
         self.squeeze(signal, window, &self.definition, |squeezed| {
             let lwps: Vec<_> =
@@ -256,10 +259,10 @@ impl Extractor {
         self.check_rate(signal.sample_rate_hz())
     }
 
-    /// Refuses signals at a rate in Hz that does not hold the highest frequency.
+    /// Checks that a sample rate in Hz is high enough for the highest frequency of the definition.
     ///
     /// # Errors
-    /// [`FeatureError::SampleRate`].
+    /// [`FeatureError::SampleRate`] if the rate is too low.
     pub fn check_rate(&self, sample_rate_hz: f64) -> Result<(), FeatureError> {
         let needed_hz = SAMPLES_A_PERIOD * self.definition.highest_hz;
         if sample_rate_hz < needed_hz {
@@ -290,7 +293,8 @@ impl Extractor {
     }
 }
 
-/// Buffers and plans stay good when a thread panics: nothing is half-written that is read later.
+/// Locks a mutex, also after a panic of another thread. Buffers and plans stay valid, because no later
+/// read depends on partly written data.
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,19 +1,20 @@
-//! Features of a window, a literal implementation of the formulas: reference for the fast one.
+//! Features of a window by a literal implementation of the formulas: the reference for the fast
+//! implementation.
 
 use super::{Extractor, FeatureError, Features};
 use crate::{Conventions, Cwt, Normalisation, Padding, Signal, squeeze};
 use std::ops::Range;
 
 impl Extractor {
-    /// The same features by the literal transform of the whole stretch, at every sample of the
-    /// window, some hundred times slower.
+    /// Computes the features by the literal transform of the whole stretch, at every sample of the
+    /// window. This is about a hundred times slower than [`Extractor::extract`].
     ///
-    /// [`Extractor::extract`] differs from it in the instants it takes, a choice of the
-    /// definition; with an instant a sample the two agree to the wavelet's reach (the quick way
-    /// leaves out 4e-6 of a wavelet's weight).
+    /// [`Extractor::extract`] uses only the instants of the definition. With one instant per sample both
+    /// functions agree up to the truncation of the wavelet: the fast implementation omits 4e-6 of the
+    /// weight of a wavelet.
     ///
     /// # Errors
-    /// As [`Extractor::extract`].
+    /// The errors of [`Extractor::extract`].
     pub fn extract_literally(
         &self,
         signal: &Signal,

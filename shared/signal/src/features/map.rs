@@ -1,24 +1,24 @@
-//! Pictures of the transforms over time and frequency (paper, Fig. 2).
+//! Maps of the transforms over time and frequency (paper, Fig. 2).
 
 use super::{Extractor, FeatureError};
 use crate::Signal;
 use rustfft::num_complex::Complex64;
 use std::ops::Range;
 
-/// Magnitudes over frequency and time, thinned out for a picture.
+/// Magnitudes over frequency and time, with reduced time resolution for a plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeFrequencyMap {
-    /// Middle of each column in s, from the window's first sample.
+    /// Centre time of each column in s, from the first sample of the window.
     pub times_s: Vec<f64>,
-    /// Frequency of each row in Hz, ascending: that of the features.
+    /// Frequency of each row in Hz, ascending. These are the frequencies of the features.
     pub frequencies_hz: Vec<f64>,
-    /// Magnitudes in m/s2, row by row; root of the mean square over a column's instants, so that
-    /// a narrow ridge is thinned out but not lost.
+    /// Magnitudes in m/s2, row by row. Each value is the root mean square over the instants of its
+    /// column, so a narrow ridge remains visible.
     pub magnitudes: Vec<f64>,
 }
 
 impl TimeFrequencyMap {
-    /// The magnitudes at one frequency, one a column.
+    /// The magnitudes in m/s2 at the frequency with this index, one value per column.
     pub fn row(&self, index: usize) -> &[f64] {
         &self.magnitudes[index * self.times_s.len()..][..self.times_s.len()]
     }
@@ -49,11 +49,11 @@ impl Columns {
 }
 
 impl Extractor {
-    /// Magnitude `|T|` of the synchrosqueezed transform over a window, in at most `columns`
-    /// columns. A steady tone of amplitude `A` is a line of height `A`.
+    /// Magnitude `|T|` in m/s2 of the synchrosqueezed transform over a window, in at most `columns`
+    /// columns. A steady tone of amplitude `A` gives a line with the value `A`.
     ///
     /// # Errors
-    /// As [`Extractor::extract`].
+    /// The errors of [`Extractor::extract`].
     pub fn sswt_map(
         &self,
         signal: &Signal,
@@ -69,11 +69,11 @@ impl Extractor {
         Ok(map)
     }
 
-    /// Magnitude of the wavelet transform over a window, in at most `columns` columns, as
-    /// `2 |W| / (sqrt(a) psihat(mu))`: a steady tone of amplitude `A` is a hill of height `A`.
+    /// Magnitude `2 |W| / (sqrt(a) psihat(mu))` in m/s2 of the wavelet transform over a window, in at
+    /// most `columns` columns. A steady tone of amplitude `A` gives a peak with the value `A`.
     ///
     /// # Errors
-    /// As [`Extractor::extract`].
+    /// The errors of [`Extractor::extract`].
     pub fn cwt_map(
         &self,
         signal: &Signal,

@@ -1,4 +1,4 @@
-//! How the voices of a stretch are computed: what depends on lengths and the sample rate alone.
+//! Plan for the computation of the voices of a stretch. It depends only on lengths and sample rate.
 //!
 //! A voice of high frequency depends on a short stretch around the window. A voice of low frequency has a
 //! small bandwidth. The plan therefore processes the voices by octave. For each octave, it uses a circular
@@ -13,11 +13,11 @@ use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner, num_complex::Complex64};
 use std::{f64::consts::TAU, ops::Range, sync::Arc};
 
-/// Voices that matter to a bin lie within this many standard deviations of the wavelet; farther
-/// ones hold less than 0.2 % of a tone.
+/// Distance, in standard deviations of the wavelet, up to which voices contribute to a bin. Farther
+/// voices contain less than 0.2 % of a tone.
 pub(super) const VOICE_REACH: f64 = 3.0;
 
-/// How far a wavelet reaches, in its standard deviations: beyond, 4e-6 of its weight.
+/// Truncation of a wavelet in its standard deviations. The weight beyond is 4e-6.
 const REACH: f64 = 5.0;
 
 /// Half the band of a voice around its centre, in rad: beyond, the wavelet is below 5e-9.
@@ -39,7 +39,7 @@ pub(super) struct Instants {
 }
 
 impl Instants {
-    /// Those of a window of `samples`, about `rate_hz` a second.
+    /// The instants of a window of `samples` samples, at about `rate_hz` per second.
     pub(super) fn new(samples: usize, sample_rate_hz: f64, rate_hz: f64) -> Self {
         let parts = PARTS_OF_A_SAMPLE as f64 * sample_rate_hz / rate_hz;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive")]
@@ -47,12 +47,12 @@ impl Instants {
         Self { parts, count: (samples * PARTS_OF_A_SAMPLE).div_ceil(parts) }
     }
 
-    /// The same for a window as long as any that shares the plan.
+    /// The instants of the longest window that shares the plan.
     pub(super) const fn planned(self) -> Self {
         Self { parts: self.parts, count: self.count.next_multiple_of(INSTANTS_STEP) }
     }
 
-    /// Every second, fourth ... of them, halved so often.
+    /// Every `2^halvings`-th instant.
     const fn halved(self, halvings: u32) -> Self {
         Self { parts: self.parts << halvings, count: self.count.div_ceil(1 << halvings) }
     }
@@ -62,8 +62,8 @@ impl Instants {
         self.parts as f64 / PARTS_OF_A_SAMPLE as f64 / sample_rate_hz
     }
 
-    /// Instants, and samples, on the shortest circle that holds `samples` beside the window and is
-    /// quick to transform.
+    /// Numbers of instants and samples of the shortest circular buffer that holds the window and
+    /// `samples` further samples, with a length suitable for a fast transform.
     fn circle(self, samples: usize) -> (usize, usize) {
         let needed = self.count + (samples * PARTS_OF_A_SAMPLE).div_ceil(self.parts);
         let instants = quick_length(needed.div_ceil(PARTS_OF_A_SAMPLE)) * PARTS_OF_A_SAMPLE;
@@ -143,11 +143,11 @@ impl Plan {
         Self { octaves }
     }
 
-    /// Passes every voice to `take`, from the highest frequency to the lowest: how often its
-    /// instants are halved, its values at them (from the window's start on; more than the window
-    /// has), and the values with each frequency weighted by itself in Hz.
+    /// Passes every voice to `take`, from the highest frequency to the lowest. The arguments are the
+    /// number of halvings of the instants, the values at the instants (from the start of the window, and
+    /// more of them than the window has), and the values with each frequency weighted by itself in Hz.
     ///
-    /// A value is a voice's share in the signal: over all voices they sum to the analytic signal.
+    /// The sum of the values over all voices is the analytic signal.
     pub(super) fn run(
         &self,
         stretch: &Stretch,
@@ -165,7 +165,8 @@ impl Plan {
     }
 }
 
-/// How often the instants of a voice are halved: no more than those of any bin that it matters to.
+/// Number of halvings of the instants of a voice: at most that of any bin to which the voice
+/// contributes.
 fn halvings(definition: &FeatureDefinition, voice_hz: f64) -> u32 {
     let centre = definition.wavelet_centre_rad;
     definition.halvings(voice_hz * (centre + VOICE_REACH) / centre)

@@ -1,12 +1,12 @@
-//! Where a coefficient goes: the bin nearest to its instantaneous frequency, without logarithms.
+//! Reassignment of a coefficient to the bin nearest to its instantaneous frequency, without logarithms.
 
 use rustfft::num_complex::Complex64;
 
 /// Bins that are evenly spaced in the logarithm of frequency, as a table over the leading bits of
 /// a floating-point number.
 ///
-/// A cell of the table is narrower than a bin, so at most one border lies in it: the bin is the
-/// cell's, or the next. Row 0 and the last row stand for frequencies outside all bins.
+/// A cell of the table is narrower than a bin and therefore contains at most one border. The bin is that
+/// of the cell or the next one. Row 0 and the last row represent frequencies outside all bins.
 #[derive(Debug)]
 pub(super) struct Bins {
     /// Bits of the mantissa that a cell leaves out.
@@ -58,11 +58,11 @@ impl Bins {
     }
 }
 
-/// The synchrosqueezed transform while it is summed: a row a bin, and in each an instant out of
-/// 1, 2, 4 ... of the window's.
+/// Accumulator of the synchrosqueezed transform: one row per bin, with every instant of the window, or
+/// every second, fourth, ... of them.
 #[derive(Debug, Default)]
 pub(super) struct Squeezed {
-    /// Where what belongs to no bin or instant goes, then the bins' values, row after row.
+    /// First the cells for values without a bin or instant, then the values of the bins, row by row.
     values: Vec<Complex64>,
     rows: Vec<Row>,
     /// Instants of the window when none is left out.
@@ -70,7 +70,7 @@ pub(super) struct Squeezed {
     frequencies_hz: Vec<f64>,
     places: Vec<u32>,
     targets: Vec<Target>,
-    /// The halvings of the voices that the targets are for.
+    /// Number of halvings of the voices for which the targets are valid.
     targets_for: Option<u32>,
 }
 
@@ -78,7 +78,7 @@ pub(super) struct Squeezed {
 #[derive(Clone, Copy, Debug)]
 struct Row {
     first: usize,
-    /// How often its instants are halved.
+    /// Number of halvings of the instants of the row.
     halvings: u32,
     count: usize,
 }
@@ -93,7 +93,8 @@ struct Target {
     halvings: u32,
 }
 
-/// Places for what is dropped: several, so that an addition need not wait for the one before.
+/// Number of cells for omitted values. With several cells an addition does not wait for the previous
+/// one.
 const DROPPED: u32 = 8;
 
 /// No row: nothing is added anywhere but there.
@@ -129,7 +130,7 @@ impl Squeezed {
     /// Adds a voice whose instants are halved so often, given with its frequency-weighted twin (in
     /// Hz), at its instantaneous frequencies (paper, eq. A.3, A.4).
     ///
-    /// A bin that has more instants than the voice lies beyond its reach and gets nothing of it.
+    /// A bin with more instants than the voice is beyond the reach of the voice and receives nothing.
     pub(super) fn add(
         &mut self,
         bins: &Bins,

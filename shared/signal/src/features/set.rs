@@ -19,7 +19,7 @@ pub enum FeatureSet {
     /// third characteristic frequency of Fig. 3.
     #[serde(rename = "LF3")]
     Lf3,
-    /// The fourth local feature, 2500 to 4000 Hz: what LF3 leaves of the printed range.
+    /// The fourth local feature, 2500 to 4000 Hz: the printed range without LF3.
     #[serde(rename = "LF4")]
     Lf4,
     /// LF4 as printed, 1500 to 4000 Hz.
@@ -32,7 +32,7 @@ impl FeatureSet {
     pub const ALL: [Self; 6] =
         [Self::Gf, Self::Lf1, Self::Lf2, Self::Lf3, Self::Lf4, Self::Lf4Printed];
 
-    /// The name used at every border.
+    /// Name of the set in files, on the command line and in the library.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Gf => "GF",
@@ -44,7 +44,7 @@ impl FeatureSet {
         }
     }
 
-    /// Lowest and highest frequency in Hz; both belong to the set.
+    /// Lowest and highest frequency in Hz, both included.
     pub const fn range_hz(self) -> [f64; 2] {
         match self {
             Self::Gf => [50.0, 4000.0],
@@ -56,22 +56,22 @@ impl FeatureSet {
         }
     }
 
-    /// The set of that name, if there is one.
+    /// The set with this name, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|set| set.name() == name)
     }
 
-    /// Places of the set's bins among `frequencies_hz`, which ascend.
+    /// Indices of the bins of the set in `frequencies_hz`, which must be ascending.
     pub fn bins(self, frequencies_hz: &[f64]) -> Range<usize> {
         let [low, high] = self.range_hz();
         let first = frequencies_hz.partition_point(|&f| f < low);
         first..frequencies_hz.partition_point(|&f| f <= high).max(first)
     }
 
-    /// The feature vector: the part of `log_power` (one value a frequency) that the set takes.
+    /// The feature vector: the part of `log_power` (one value per frequency) that belongs to the set.
     ///
     /// # Panics
-    /// When there are fewer values than frequencies.
+    /// If `log_power` has fewer values than `frequencies_hz`.
     pub fn select<'a>(self, frequencies_hz: &[f64], log_power: &'a [f64]) -> &'a [f64] {
         &log_power[self.bins(frequencies_hz)]
     }

@@ -1,12 +1,12 @@
-//! The stretch of a signal that a window's transform may see.
+//! The stretch of a signal that the transform of a window uses.
 
 use crate::Signal;
 use std::{f64::consts::PI, ops::Range};
 
 /// The part of a margin, at its far end, over which the signal fades out.
 ///
-/// A cut through the signal is a step, which has power at every frequency; a fade over the last
-/// quarter affects the lowest voices only, which reach that far with less than 8 % of their weight.
+/// Without the fade the signal would end in a step, which has power at every frequency. A fade over the
+/// last quarter affects only the lowest voices, and these have less than 8 % of their weight there.
 const FADED_PART: f64 = 0.25;
 
 /// A window and the real signal around it, without its mean, faded out at both ends; zero beyond.
@@ -20,8 +20,8 @@ pub(super) struct Stretch {
 impl Stretch {
     /// The window with up to `margin` samples on either side, as far as the signal goes.
     ///
-    /// The mean goes because an accelerometer's offset is no vibration, yet would be a step at
-    /// either end.
+    /// The function subtracts the mean, because the offset of an accelerometer would be a step at both
+    /// ends.
     pub(super) fn new(signal: &Signal, window: &Range<usize>, margin: usize) -> Self {
         let start = window.start.saturating_sub(margin);
         let end = (window.end + margin).min(signal.len());

@@ -1,4 +1,4 @@
-//! Do a pass's times, positions, rate and speed agree with one another?
+//! Checks that times, positions, sample rate and speed of a pass agree.
 
 use super::clock::SampleClock;
 use super::columns::Columns;
@@ -8,18 +8,18 @@ use std::path::Path;
 
 /// Relative difference allowed between the declared sample rate and that of `time_s`.
 ///
-/// Clocks of recorders are off by parts in a hundred thousand; a wrong rate is off by much more.
+/// The clocks of recorders have errors of some 1e-5. A wrong rate has a much larger error.
 pub const RATE_TOLERANCE: f64 = 1e-3;
 /// Relative difference of a declared step from the median one below which it is the one expected.
 const STEP_TOLERANCE: f64 = 0.5;
 /// Relative difference allowed between nominal speed and mean speed of a pass.
 ///
-/// A drive holds its speed within a few per cent; a file under the wrong speed is further off.
+/// A drive holds its speed within a few per cent. A file with the wrong speed differs by more.
 const SPEED_TOLERANCE: f64 = 0.1;
 /// Metres per second in a kilometre per hour.
 const KM_PER_H: f64 = 1.0 / 3.6;
 
-/// The times advance evenly and at the declared rate (the field of `manifest`).
+/// Checks that the times advance evenly and at the declared rate (the field of `manifest`).
 pub(super) fn times(
     manifest: &Path,
     path: &Path,
@@ -36,7 +36,7 @@ pub(super) fn times(
     Ok(clock)
 }
 
-/// The expected step follows from the declared rate, unless that is wrong too.
+/// Computes the expected step from the declared rate, unless this rate is wrong too.
 fn known_rate(fault: Fault, declared: f64) -> Fault {
     match fault {
         Fault::UnevenTime { row, step, expected }
@@ -48,7 +48,7 @@ fn known_rate(fault: Fault, declared: f64) -> Fault {
     }
 }
 
-/// The passes that are copies of an earlier one, an error each.
+/// One error for each pass that is a copy of an earlier one.
 pub(super) fn copies<'a>(
     passes: impl Iterator<Item = (&'a Path, &'a [f64])>,
 ) -> Vec<RecordingError> {
@@ -64,7 +64,7 @@ pub(super) fn copies<'a>(
     (0..passes.len()).filter_map(earlier).collect()
 }
 
-/// The declared speed (the `field` of `manifest`) is that of the positions.
+/// Checks that the declared speed (the `field` of `manifest`) agrees with the positions.
 pub(super) fn speed(
     manifest: &Path,
     field: &str,
@@ -82,7 +82,7 @@ pub(super) fn speed(
     Err(RecordingError::new(manifest, field, fault))
 }
 
-/// The pass covers a sleeper's window.
+/// Checks that the pass covers the window of a sleeper.
 pub(super) fn length(path: &Path, positions: &[f64], spacing_m: f64) -> Result<(), RecordingError> {
     let length_m = positions[positions.len() - 1] - positions[0];
     if length_m >= spacing_m {

@@ -1,10 +1,10 @@
-//! The pace of a column of times: even, in coarse steps, with jitter, or with gaps.
+//! Timing of a column of times: even, in coarse steps, with jitter, or with gaps.
 
 use super::error::Fault;
 
 /// Deviation of a single time step, in sample intervals, that rounded times may show.
 pub const STEP_TOLERANCE: f64 = 0.5;
-/// Sample intervals by which a stamp may be off where its clock trembles.
+/// Largest error of a time stamp with jitter, in sample intervals.
 const JITTER_MAX: f64 = 1.0;
 /// Sample intervals from which on steps of the clock are coarse: a repeated row makes steps of one.
 const COARSE_MIN: f64 = 1.1;
@@ -18,14 +18,14 @@ pub(super) struct SampleClock {
     pub rate_hz: f64,
     /// Relative uncertainty of that rate.
     pub uncertainty: f64,
-    /// What the stamps are off from even times.
+    /// Deviation of the time stamps from even times.
     pub stamps: Stamps,
 }
 
-/// How far stamps of time can be trusted one by one.
+/// Accuracy of single time stamps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Stamps {
-    /// As even as rounding allows.
+    /// Even up to rounding.
     Even,
     /// The clock advances in steps of this length in s, longer than a sample interval.
     Coarse(f64),
@@ -34,10 +34,10 @@ pub(super) enum Stamps {
 }
 
 impl SampleClock {
-    /// The pace of `times` in s, of which there are two at least.
+    /// Determines the timing of `times` in s. There must be at least two times.
     ///
     /// # Errors
-    /// [`Fault::UnevenTime`] where samples are missing, repeated or out of order.
+    /// [`Fault::UnevenTime`] if samples are missing, repeated or out of order.
     pub(super) fn of(times: &[f64]) -> Result<Self, Fault> {
         let last = times.len() - 1;
         let mean = (times[last] - times[0]) / last as f64;
@@ -78,7 +78,7 @@ fn coarse(times: &[f64], mean: f64) -> Option<SampleClock> {
     Some(SampleClock { rate_hz: 1.0 / interval, uncertainty, stamps: Stamps::Coarse(step_s) })
 }
 
-/// Stamps that tremble about even times.
+/// Time stamps with jitter about even times.
 fn jitter(times: &[f64], mean: f64) -> Option<SampleClock> {
     let off = farthest(times, 0, mean);
     let advances = times.windows(2).all(|pair| pair[1] > pair[0]);
@@ -90,7 +90,7 @@ fn jitter(times: &[f64], mean: f64) -> Option<SampleClock> {
     })
 }
 
-/// The greatest distance in s from times that are even from row `first` on.
+/// The largest deviation in s from times that are even from row `first` on.
 fn farthest(times: &[f64], first: usize, interval: f64) -> f64 {
     let off = |(row, time): (usize, &f64)| {
         (time - times[first] - (row as f64 - first as f64) * interval).abs()

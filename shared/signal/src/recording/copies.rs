@@ -1,13 +1,14 @@
-//! Passes that are one and the same, which must not count as repeats of each other.
+//! Copies of a pass. They must not count as repeated passes.
 
 /// Samples that are compared first.
 const WINDOW: usize = 64;
-/// Relative difference of signals that rounding to single precision and to few decimals makes.
+/// Relative difference between two copies of a signal by rounding to single precision or to few
+/// decimals.
 const ALIKE: f64 = 1e-3;
 
-/// The factor between two signals of which one is the other, scaled, shifted or cut.
+/// The factor between two signals, if one is a scaled, shifted or shortened copy of the other.
 ///
-/// Two passes over one track always differ by more: by the sensor's noise, the clock and the speed.
+/// Two passes over one track always differ more, by sensor noise, clock and speed.
 pub(super) fn factor(first: &[f64], second: &[f64]) -> Option<f64> {
     let (long, short) = if first.len() < second.len() { (second, first) } else { (first, second) };
     if short.len() <= WINDOW {
@@ -25,7 +26,7 @@ pub(super) fn factor(first: &[f64], second: &[f64]) -> Option<f64> {
     Some(if first.len() < second.len() { factor } else { 1.0 / factor })
 }
 
-/// Where a window of the signal's loudest changes begins.
+/// Start of the window with the largest changes of the signal.
 fn loudest(samples: &[f64]) -> usize {
     let change = |index: usize| (samples[index + 1] - samples[index]).abs();
     let places = 0..samples.len() - WINDOW;
@@ -40,9 +41,9 @@ fn is_near(part: &[f64], other: &[f64]) -> bool {
         && scale(part, other).is_some()
 }
 
-/// The factor that makes the changes of `b` from those of `a`, if one does.
+/// The factor between the changes of `a` and those of `b`, if there is one.
 ///
-/// Changes, for a constant offset may have been taken out of either.
+/// The function compares changes, because a constant offset may have been removed from either signal.
 fn scale(a: &[f64], b: &[f64]) -> Option<f64> {
     let pairs = || a.windows(2).zip(b.windows(2)).map(|(a, b)| (a[1] - a[0], b[1] - b[0]));
     let (square, cross) = pairs().fold((0.0, 0.0), |(s, c), (a, b)| (s + a * a, c + a * b));

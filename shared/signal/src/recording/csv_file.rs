@@ -1,9 +1,9 @@
-//! Columns of numbers in CSV files with a line of names; knows nothing of what they mean.
+//! Reads columns of numbers from CSV files with a header line, independent of their meaning.
 
 use super::error::{Fault, RecordingError};
 use std::path::Path;
 
-/// Reads the named columns; other columns are passed over.
+/// Reads the named columns and ignores other columns.
 pub(super) fn read<const N: usize>(
     path: &Path,
     names: &[&str; N],

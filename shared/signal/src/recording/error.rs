@@ -25,19 +25,19 @@ impl RecordingError {
 /// Faults of a field of a recording, with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
-    /// Nothing lies where a file should.
+    /// The file does not exist.
     #[error("the file does not exist; add it or correct its name")]
     NoSuchFile,
     /// The operating system or the decoder refuses the file.
     #[error("unreadable ({reason}); generate it again from its source")]
     Unreadable {
-        /// The words of the operating system or of the decoder.
+        /// Message of the operating system or of the decoder.
         reason: String,
     },
-    /// A number can't be what it is given for.
+    /// A number is outside the limits of its quantity.
     #[error("{0}")]
     OutOfRange(QuantityError),
-    /// A file has more numbers than are held in memory.
+    /// A file has more numbers than fit into memory.
     #[error(
         "has {:.1} GB of numbers, but the limit is {:.1} GB; split it into passes",
         1e-9 * *bytes as f64, 1e-9 * *most as f64
@@ -45,7 +45,7 @@ pub enum Fault {
     TooLarge {
         /// Bytes of its numbers.
         bytes: u64,
-        /// The most.
+        /// Largest allowed number of bytes.
         most: u64,
     },
     /// A pass's file lies outside the recording's folder.
@@ -57,7 +57,7 @@ pub enum Fault {
     /// `recording.json` is not JSON.
     #[error("is not valid JSON ({reason}); correct the text there")]
     NotJson {
-        /// The parser's words, with line and column.
+        /// Message of the parser, with line and column.
         reason: String,
     },
     /// The format's name is absent or another one.
@@ -82,7 +82,7 @@ pub enum Fault {
         /// The expected value.
         expected: &'static str,
     },
-    /// Two sleepers bear one name.
+    /// Two sleepers have the same name.
     #[error("duplicate sleeper id {id}; give every sleeper a unique id")]
     SleeperTwice {
         /// The name.
@@ -91,27 +91,27 @@ pub enum Fault {
     /// A file instead of a folder.
     #[error("is a file, but a recording is a folder; create one with `tracktwin import`")]
     NoFolder,
-    /// Columns of a CSV file are separated by something else than commas.
+    /// The columns of a CSV file are not separated by commas.
     #[error("the columns are not separated by commas; convert the file with `tracktwin import`")]
     Separator,
-    /// The kind of file is not one that is read.
+    /// The file format is unknown.
     #[error("the extension is neither .parquet nor .csv; convert the file to one of these formats")]
     UnknownKind,
-    /// The kind of table is not one that can be imported.
+    /// The format of the table cannot be imported.
     #[error(
         "the extension is not one of .csv .txt .tsv .dat .parquet .npy .npz .mat; convert \
              the file to one of these formats"
     )]
     UnknownTable,
-    /// The file is of a known kind that is not read.
+    /// The file has a known format that is not supported.
     #[error("is {kind}, which is not supported; {remedy}")]
     Foreign {
         /// What it is.
         kind: &'static str,
-        /// How it becomes something that is read.
+        /// How to convert the file to a supported format.
         remedy: &'static str,
     },
-    /// A text table holds bytes that no text has.
+    /// A text table contains bytes that are not text.
     #[error("is not text (byte {byte} is {value:#04x}); export the data as CSV")]
     NoText {
         /// The place of the first such byte, counted from 1.
@@ -142,7 +142,7 @@ pub enum Fault {
         /// How many names there are.
         names: usize,
     },
-    /// Two columns bear one name.
+    /// Two columns have the same name.
     #[error("columns {} have this name; give each column a unique name", list(places))]
     ColumnTwice {
         /// Their columns, counted from 1.
@@ -155,7 +155,7 @@ pub enum Fault {
         unit: String,
         /// The units that are known.
         known: String,
-        /// How to say which it is.
+        /// How to state the unit.
         remedy: &'static str,
     },
     /// A column that is needed is absent.
@@ -164,7 +164,7 @@ pub enum Fault {
         /// The existing columns.
         present: Vec<String>,
     },
-    /// A column holds something else than numbers.
+    /// A column is not numeric.
     #[error("holds {kind}; store it as numbers")]
     NotNumeric {
         /// What it holds.
@@ -232,7 +232,7 @@ pub enum Fault {
     WrongSampleRate {
         /// The declared rate in Hz.
         declared: f64,
-        /// The rate in Hz that the times say.
+        /// The sample rate of the times in Hz.
         observed: f64,
         /// The file of the times.
         file: String,
@@ -266,7 +266,7 @@ pub enum Fault {
         /// The position in m of that row.
         after: f64,
     },
-    /// The position decreases from begin to end.
+    /// The position decreases from start to end.
     #[error(
         "decreases along the pass, from {} m to {} m; change the sign of the positions, \
              also those of the sleepers",
@@ -313,9 +313,9 @@ pub enum Fault {
     /// The wheel is at rest.
     #[error("does not change {}; keep only the part where the wheel rolls", standing(*from_s, *to_s))]
     StandsStill {
-        /// From when on, in s from the first row.
+        /// Start of the standstill in s from the first row.
         from_s: f64,
-        /// Until when in s; to the end if there is none.
+        /// End of the standstill in s. `None`: until the end of the pass.
         to_s: Option<f64>,
     },
     /// The position changes too rarely to be straightened.
@@ -339,10 +339,10 @@ pub enum Fault {
     CoarsePosition {
         /// The median step in m.
         step_m: f64,
-        /// The longest that would do, in m.
+        /// Largest sufficient step in m.
         needed_m: f64,
     },
-    /// Two passes are one.
+    /// A pass is a copy of another pass.
     #[error(
         "is a copy of {of}{}; a copy is no second pass: remove one of the two",
         if (*factor - 1.0).abs() < 1e-6 { String::new() } else { format!(", times {}", significant(*factor, 4)) }
@@ -350,7 +350,7 @@ pub enum Fault {
     Copy {
         /// The other pass's file.
         of: String,
-        /// What its samples are multiplied by.
+        /// Factor between the samples of the two passes.
         factor: f64,
     },
     /// Two statements about one thing disagree.
@@ -369,35 +369,35 @@ pub enum Fault {
     WrongSpeed {
         /// The declared speed in km/h.
         declared: f64,
-        /// The mean speed in km/h that the positions say.
+        /// The mean speed of the positions in km/h.
         observed: f64,
         /// The file of the positions.
         file: String,
     },
-    /// The positions advance at a speed that no train has.
+    /// The speed of the positions is not plausible for a train.
     #[error(
         "advances at {} km/h in {unit}, which no pass does; {remedy}",
         rounded(*observed, 3)
     )]
     Impossible {
-        /// The mean speed in km/h that the positions say.
+        /// The mean speed of the positions in km/h.
         observed: f64,
-        /// The unit that they were taken for.
+        /// The assumed unit.
         unit: &'static str,
-        /// What to do.
+        /// Remedy.
         remedy: String,
     },
-    /// The times advance at a rate at which no acceleration is recorded.
+    /// The sample rate of the times is not plausible for accelerations.
     #[error(
         "advances at {} Hz in {unit}, at which no acceleration is recorded; {remedy}",
         rounded(*observed, 3)
     )]
     ImpossibleRate {
-        /// The rate in Hz that the times say.
+        /// The sample rate of the times in Hz.
         observed: f64,
-        /// The unit that they were taken for.
+        /// The assumed unit.
         unit: &'static str,
-        /// What to do.
+        /// Remedy.
         remedy: String,
     },
     /// The pass is shorter than a sleeper's window.

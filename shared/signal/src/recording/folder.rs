@@ -1,4 +1,4 @@
-//! A recording in memory and as a folder: what was measured, where, over which sleepers.
+//! A recording in memory and as a folder: passes, sleepers and measured quantity.
 
 use super::columns::{Columns, NAMES};
 use super::error::{Fault, RecordingError};
@@ -17,37 +17,37 @@ use tracktwin_number::significant;
 /// Axle-box accelerations of one vehicle over one stretch of track, in several passes.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// What the recording is called: the name of its folder.
+    /// Name of the recording: that of its folder.
     pub name: String,
     /// Samples per second of every pass, in Hz.
     pub sample_rate_hz: f64,
-    /// What was measured, in words.
+    /// Description of the measured quantity.
     pub channel: String,
-    /// The passes, in the order in which they are listed.
+    /// The passes, in the order of `recording.json`.
     pub passes: Vec<Pass>,
-    /// The sleepers, along the track; none where their places are not known.
+    /// The sleepers, along the track. Empty if their positions are unknown.
     pub sleepers: Vec<Sleeper>,
-    /// What is known of rail, sleeper and wheel, as `recording.json` has it.
+    /// Nominal values of rail, sleeper and wheel: `nominal` of `recording.json`.
     pub nominal: Map<String, Value>,
-    /// Distance of the sleepers in m: the length of a sleeper's window.
+    /// Sleeper spacing in m: the length of the window of a sleeper.
     pub spacing_m: f64,
-    /// Corrections made while reading, and doubts: a sentence each.
+    /// Corrections made while reading, and doubts about the data: one sentence each.
     pub doubts: Vec<String>,
 }
 
 /// One run of the wheel along the track.
 #[derive(Clone, Debug)]
 pub struct Pass {
-    /// The file it was read from; empty for a pass that was computed.
+    /// The file from which the pass was read. Empty for a simulated pass.
     pub file: String,
     /// Nominal speed in km/h.
     pub speed_km_h: f64,
     /// Vertical axle-box acceleration in m/s2, positive downwards.
     pub signal: Signal,
-    /// Position of the wheel along the track in m at every sample; does not decrease.
+    /// Position of the wheel along the track in m at every sample. Positions do not decrease.
     pub position_m: Vec<f64>,
-    /// Share of the time, 0 to 1, in which the wheel did not touch the rail: known of simulated passes only,
-    /// and read by no test of a recording.
+    /// Share of the time with contact loss, 0 to 1. Only simulated passes have this value. No test of a
+    /// recording uses it.
     pub contact_loss_share: Option<f64>,
 }
 
@@ -82,8 +82,8 @@ impl Recording {
         Ok(recording)
     }
 
-    /// What the `recording.json` in the folder `path` states, without passes, which it need not have:
-    /// sample rate, sleepers and track, for samples that come in another way.
+    /// Reads `recording.json` in the folder `path` without passes: sample rate, sleepers and track. The
+    /// file may have no passes. A stream uses this, because its samples come from another source.
     ///
     /// # Errors
     /// The first error: its file, its field and the remedy.
@@ -107,13 +107,14 @@ impl Recording {
         }
     }
 
-    /// Writes the recording as a folder: `recording.json` and one Parquet file a pass.
+    /// Writes the recording as a folder: `recording.json` and one Parquet file per pass.
     ///
-    /// Accelerations are stored in single precision, times count from zero. The folder has the
-    /// whole recording or none; an existing recording is kept, unless it was computed too.
+    /// Accelerations are stored in single precision; times start at zero. The folder is written
+    /// completely or not at all. The function replaces an existing recording only if that recording was
+    /// also simulated.
     ///
     /// # Errors
-    /// [`FilesError`] names the file that cannot be written, or that exists already.
+    /// [`FilesError`] names the file that cannot be written or already exists.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FilesError> {
         let mut output = Output::begin(path.as_ref(), Kind::SimulatedRecording, false)?;
         self.add_to(&mut output)?;
@@ -137,12 +138,12 @@ impl Recording {
     /// The samples of pass `pass` while the wheel was within half a spacing of sleeper `sleeper`
     /// (indices into [`Recording::passes`] and [`Recording::sleepers`]; paper, section 2.3).
     ///
-    /// None where the pass covers less than two fifths of that window.
+    /// `None` if the pass covers less than two fifths of this window.
     pub fn window(&self, pass: usize, sleeper: usize) -> Option<Range<usize>> {
         self.sleeper_window(sleeper).samples(&self.passes[pass].position_m)
     }
 
-    /// Which part of the sleeper's window the pass covers, 0 to 1.
+    /// Share of the window of the sleeper that the pass covers, 0 to 1.
     pub fn window_share(&self, pass: usize, sleeper: usize) -> f64 {
         self.sleeper_window(sleeper).share(&self.passes[pass].position_m)
     }
@@ -152,7 +153,7 @@ impl Recording {
         SleeperWindow::around(self.sleepers[sleeper].x_m, self.spacing_m)
     }
 
-    /// The speeds of the passes in km/h, ascending, each once.
+    /// The speeds of the passes in km/h, ascending, without duplicates.
     pub fn speeds_km_h(&self) -> Vec<f64> {
         let mut speeds: Vec<f64> = self.passes.iter().map(|pass| pass.speed_km_h).collect();
         speeds.sort_by(f64::total_cmp);
@@ -160,17 +161,18 @@ impl Recording {
         speeds
     }
 
-    /// Whether accelerations are in m/s2: everywhere but where `nominal.gain_known` is false.
+    /// Whether accelerations are in m/s2. False only if `nominal.gain_known` is false.
     pub fn gain_known(&self) -> bool {
         self.nominal.get("gain_known") != Some(&Value::Bool(false))
     }
 
-    /// What is known of a quantity `name` of `part`, such as `mass_kg` of the `wheel`.
+    /// The nominal value of the quantity `name` of `part`, such as `mass_kg` of the `wheel`, if it is
+    /// stated.
     pub fn nominal_value(&self, part: &str, name: &str) -> Option<f64> {
         self.nominal.get(part)?.get(name)?.as_f64()
     }
 
-    /// Median distance of neighbouring sleepers in m; none with fewer than two.
+    /// Median distance of neighbouring sleepers in m. `None` with fewer than two sleepers.
     pub fn median_distance_m(&self) -> Option<f64> {
         median_distance_m(&self.sleepers)
     }
@@ -237,7 +239,7 @@ fn stated(
     Ok((path, manifest, spacing_m))
 }
 
-/// Where a pass lies: in the recording's folder, and nowhere else.
+/// Path of the file of a pass, which must lie in the folder of the recording.
 fn pass_path(
     folder: &Path,
     manifest: &Path,
@@ -250,7 +252,7 @@ fn pass_path(
     })
 }
 
-/// A pass, and the length in m of the steps that its positions came in.
+/// A pass, and the length in m of the steps of its positions, if these were interpolated.
 fn read_pass(
     path: &Path,
     manifest_path: &Path,
@@ -277,7 +279,7 @@ fn read_pass(
     Ok((Pass { file, speed_km_h, signal, position_m, contact_loss_share }, step_m))
 }
 
-/// What was done to positions in steps.
+/// Note that the steps of the positions were interpolated.
 pub(super) fn straightened(file: &str, step_m: f64) -> String {
     let step = significant(step_m, 2);
     format!(

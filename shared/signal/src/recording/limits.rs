@@ -37,7 +37,7 @@ const NOMINAL: [(&str, &str, Quantity); 11] = [
     ("wheel", "radius_m", WHEEL_RADIUS),
 ];
 
-/// That every number of `recording.json` can be what it is given for.
+/// Checks that every number of `recording.json` is within its limits.
 pub(super) fn manifest(path: &Path, manifest: &Manifest) -> Result<(), RecordingError> {
     let check = |field: &str, of: Quantity, value: f64| {
         let checked = of.check(value);
@@ -66,7 +66,7 @@ fn stated(nominal: &Map<String, Value>, part: &str, name: &str) -> Option<f64> {
     nominal.get(part)?.get(name)?.as_f64()
 }
 
-/// That a file's numbers fit into memory, for they are held there all at once.
+/// Checks that the numbers of a file fit into memory, because all of them are loaded at once.
 pub(super) fn file(path: &Path) -> Result<(), RecordingError> {
     // Values of another type are refused by the reader.
     let bytes = unpacked(path).unwrap_or_default();

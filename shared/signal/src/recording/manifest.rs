@@ -1,4 +1,4 @@
-//! `recording.json`: tolerant of fields it does not know, strict about those it needs.
+//! `recording.json`. The reader ignores unknown fields and checks the required fields strictly.
 
 use super::error::{Fault, RecordingError};
 use super::sleeper::Sleeper;

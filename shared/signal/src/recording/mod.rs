@@ -1,7 +1,8 @@
-//! Recordings of axle-box acceleration: folders of `recording.json` and one file a pass.
+//! Recordings of axle-box acceleration: folders with `recording.json` and one file per pass.
 //!
-//! Owns reading, checking, importing and writing of recordings, which samples of a pass belong to which
-//! sleeper, and whether a recording is of a track of a certain design. What is computed from the samples is left to the transforms and features.
+//! This module reads, checks, imports and writes recordings. It assigns the samples of a pass to
+//! sleepers and compares the track of a recording with a design. Transforms and features of the samples
+//! are in other modules.
 
 mod check;
 mod clock;

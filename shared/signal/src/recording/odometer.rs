@@ -1,7 +1,7 @@
-//! Positions as an odometer, a counter or a satellite receiver gives them: in steps, or finely.
+//! Positions from an odometer, a counter or a satellite receiver, in steps or with fine resolution.
 //!
-//! Checks a position column alone: steps are interpolated, impossible motion is refused. Agreement
-//! with times and speeds is checked elsewhere.
+//! This module checks a position column alone. It interpolates steps and returns an error for an
+//! impossible motion. Other modules check the agreement with times and speeds.
 
 use super::error::Fault;
 
@@ -12,9 +12,9 @@ const STEPS_MIN: usize = 4;
 /// Share of the usual speed below which a wheel is at rest, and the shortest time of rest in s.
 const STANDING: f64 = 0.1;
 const STANDING_S: f64 = 0.2;
-/// Times the usual speed above which a position jumps.
+/// Ratio to the usual speed above which a change of position is a jump.
 pub const JUMP: f64 = 5.0;
-/// The least jump of a position in m.
+/// Smallest change of position in m that counts as a jump.
 pub const JUMP_M: f64 = 0.01;
 /// Share of a pass's length by which a restarted position falls back.
 const RESTART: f64 = 0.5;
@@ -23,20 +23,20 @@ const STEPS_A_SPACING: f64 = 4.0;
 /// Steps at either end of a pass whose speed is taken for what lies outside them.
 const END_STEPS: usize = 8;
 
-/// Positions of a pass, and how they came.
+/// Positions of a pass, and the length of their original steps.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Odometer {
-    /// Places of the wheel in m at every sample; they do not decrease.
+    /// Position of the wheel in m at every sample. Positions do not decrease.
     pub position_m: Vec<f64>,
-    /// Length in m of the steps that they came in, where these were straightened.
+    /// Length in m of the original steps, if these were interpolated.
     pub step_m: Option<f64>,
 }
 
 impl Odometer {
-    /// What positions in m at even times say, along the direction of travel.
+    /// Checks and interpolates positions in m at even times, along the direction of travel.
     ///
-    /// Steps become straight lines through the instants at which the position changes: there it is
-    /// known to half a step, between them the speed is taken as constant.
+    /// Steps become straight lines between the instants at which the position changes. At these instants
+    /// the position is known to half a step; between them the speed is assumed constant.
     ///
     /// # Errors
     /// [`Fault::StandsStill`], [`Fault::Decreases`], [`Fault::RunsBack`], [`Fault::Restarts`],
@@ -58,7 +58,7 @@ impl Odometer {
     /// Whether steps of this length separate sleepers at this spacing.
     ///
     /// # Errors
-    /// [`Fault::CoarsePosition`] where they do not.
+    /// [`Fault::CoarsePosition`] if the steps are too long.
     pub(super) fn tells_sleepers(&self, spacing_m: f64) -> Result<(), Fault> {
         match self.step_m {
             Some(step_m) if step_m > spacing_m / STEPS_A_SPACING => {

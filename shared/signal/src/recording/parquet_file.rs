@@ -1,4 +1,4 @@
-//! Columns of numbers in Parquet files; knows nothing of what they mean.
+//! Reads and writes columns of numbers in Parquet files, independent of their meaning.
 
 use super::error::{Fault, RecordingError};
 use super::import::{Column, Oddity};
@@ -19,7 +19,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Reads the named columns; other columns are passed over and nulls become not-a-number.
+/// Reads the named columns and ignores other columns. Null values become NaN.
 pub(super) fn read<const N: usize>(
     path: &Path,
     names: &[&str; N],
@@ -45,7 +45,7 @@ pub(super) fn read<const N: usize>(
     Ok(columns)
 }
 
-/// Reads all columns; those that hold no numbers say what they hold.
+/// Reads all columns. A column that is not numeric states its type.
 ///
 /// Times, timestamps and durations become seconds; timestamps count from the first.
 pub(super) fn read_all(path: &Path) -> Result<Vec<Column>, RecordingError> {
@@ -74,7 +74,7 @@ pub(super) fn read_all(path: &Path) -> Result<Vec<Column>, RecordingError> {
     Ok(columns)
 }
 
-/// What the values of a column are.
+/// Type of the values of a column.
 #[derive(Clone, Debug, PartialEq)]
 enum Kind {
     /// Numbers without conversion.

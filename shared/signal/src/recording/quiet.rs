@@ -1,17 +1,17 @@
-//! Is there anything in a pass's signal that a rolling wheel makes?
+//! Checks whether the signal of a pass contains the acceleration of a rolling wheel.
 
 use super::Pass;
 use tracktwin_number::{rounded, significant};
 
-/// Acceleration in m/s2, as a root mean square, for every km/h, below which no axle box of a rolling
-/// wheel lies: ground rail and round wheels give a hundred times as much.
+/// Root mean square acceleration in m/s2 per km/h below which no wheel can have rolled. Ground rails and
+/// round wheels give a hundred times as much.
 const QUIET: f64 = 5e-3;
 /// Steps of the recorder below which a signal is mostly rounding.
 const STEPS_MIN: f64 = 2.0;
 /// Number of samples examined for the resolution of the recorder.
 const LOOKED_AT: usize = 20_000;
 
-/// What makes it doubtful that the wheel rolled, or that the sensor was on.
+/// Reason to doubt that the wheel rolled or that the sensor was on, if there is one.
 pub(super) fn doubt(pass: &Pass, gain_known: bool) -> Option<String> {
     let (samples, speed) = (pass.signal.samples(), pass.speed_km_h);
     let mean = samples.iter().sum::<f64>() / samples.len() as f64;

@@ -1,10 +1,10 @@
 //! Sleepers of a recording's track.
 
-/// A sleeper and its place.
+/// A sleeper and its position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sleeper {
-    /// Its name, such as `SN8`.
+    /// Name of the sleeper, such as `SN8`.
     pub id: String,
-    /// Its place along the track in m, on the scale of the passes' positions.
+    /// Position of the sleeper along the track in m, on the scale of the positions of the passes.
     pub x_m: f64,
 }

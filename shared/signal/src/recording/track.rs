@@ -1,10 +1,10 @@
-//! What a recording states of track and vehicle, and whether a design has it.
+//! Track and vehicle stated by a recording, and their comparison with a design.
 
 use super::Recording;
 use serde_json::{Map, Value, json};
 use tracktwin_parameters::{Preset, Track, TrackDesign};
 
-/// Relative difference up to which two tracks are alike.
+/// Largest relative difference between two tracks that count as equal.
 const ALIKE: f64 = 0.02;
 
 /// A quantity that `nominal` of `recording.json` may state.
@@ -69,8 +69,8 @@ const QUANTITIES: [Quantity; 15] = [
     Quantity::new(WHEEL, "radius_m", "m", |it| &mut it.wheel.radius_m),
 ];
 
-/// What a recording may state beside them: the sleeper's bending stiffness is one of the parameters, so
-/// that no two tracks differ by it, and the rail's damping is seldom known.
+/// Further quantities that a recording may state. They are not compared: the bending stiffness of the
+/// sleeper is one of the parameters, and the damping of the rail is seldom known.
 const FURTHER: [Quantity; 5] = [
     Quantity::new(None, "rail_damping_s", "s", |it| &mut it.rail_damping_s),
     Quantity::new(SLEEPER, "second_moment_m4", "m4", |it| &mut it.sleeper.section.second_moment_m4),
@@ -79,21 +79,21 @@ const FURTHER: [Quantity; 5] = [
     Quantity::new(SLEEPER, "shear_coefficient", "", |it| &mut it.sleeper.section.shear_coefficient),
 ];
 
-/// What a recording must state to be recognised as one of a preset.
+/// Quantities that a recording must state to be recognised as a recording of a preset.
 const MASSES: [(&str, &str); 2] = [("rail", "area_m2"), ("wheel", "mass_kg")];
 
-/// Distance in m of the recorded wheel from the other one of its bogie, which runs behind it.
+/// Distance in m between the recorded wheel and the other wheel of its bogie, which runs behind it.
 const WHEELBASE: &str = "wheelbase_m";
 
 /// A quantity in which two tracks differ by more than 2 %.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{quantity} {}, not {}", with_unit(*found, unit), with_unit(*known, unit))]
 pub struct OtherTrack {
-    /// What differs, with its verb: `nominal.wheel.mass_kg is`.
+    /// Name of the quantity, with a verb: `nominal.wheel.mass_kg is`.
     pub quantity: String,
-    /// Its value on the one track.
+    /// Value of the quantity on the checked track.
     pub found: f64,
-    /// Its value on the track that is known.
+    /// Value of the quantity on the reference track.
     pub known: f64,
     /// Unit of both; empty for a plain number.
     pub unit: &'static str,
@@ -124,8 +124,8 @@ fn with_unit(value: f64, unit: &str) -> String {
 }
 
 impl Recording {
-    /// Compares what the recording states of its track and vehicle with a design, and the distances
-    /// of its sleepers. What it does not state is not compared.
+    /// Compares the stated track and vehicle, and the distances of the sleepers, with a design.
+    /// Quantities that the recording does not state are not compared.
     ///
     /// # Errors
     /// [`OtherTrack`] with the first quantity that differs by more than 2 %.
@@ -148,8 +148,8 @@ impl Recording {
         Ok(())
     }
 
-    /// The track and vehicle that the recording states, and what it leaves open: that is taken from the
-    /// track of the program whose sleepers are spaced most like it.
+    /// The track and vehicle that the recording states. Missing values come from the preset with the
+    /// most similar sleeper spacing.
     pub fn stated_track(&self) -> StatedTrack {
         // A preset is recognised by its masses: a spacing alone could be any track's.
         let states_masses = MASSES.iter().all(|key| self.states(*key));
@@ -194,13 +194,13 @@ impl Recording {
 pub struct StatedTrack {
     /// The track.
     pub track: Track,
-    /// Where that comes from which the recording does not state.
+    /// Preset from which the missing values come.
     pub preset: Preset,
-    /// Keys of `recording.json` that it does not state.
+    /// Keys that `recording.json` does not state.
     pub assumed: Vec<String>,
 }
 
-/// Compares two designs in all that recordings state.
+/// Compares two designs in all quantities that a recording can state.
 ///
 /// # Errors
 /// [`OtherTrack`] with the first quantity in which `found` differs from `known` by more than 2 %.
@@ -211,7 +211,7 @@ pub fn compare_designs(found: &TrackDesign, known: &TrackDesign) -> Result<(), O
     })
 }
 
-/// What a recording on a track of this design states, as `nominal` of `recording.json`.
+/// The content of `nominal` in `recording.json` for a track of this design.
 pub fn nominal(design: &TrackDesign) -> Map<String, Value> {
     let mut nominal = json!({});
     for quantity in &QUANTITIES {

@@ -2,17 +2,18 @@
 
 use std::ops::Range;
 
-/// Least part of a sleeper's window that a pass must cover to say something about the sleeper.
+/// Smallest share of the window of a sleeper that a pass must cover to be evaluated for this sleeper.
 ///
-/// The sleepers at a recording's two ends have half a window, give or take the odometer's drift.
+/// The first and last sleeper of a recording have about half a window; odometer drift changes this share
+/// slightly.
 const SHARE_MIN: f64 = 0.4;
 
 /// A sleeper's window: the track within half a spacing of it (paper, section 2.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SleeperWindow {
-    /// Where it begins along the track in m.
+    /// Start of the window along the track in m.
     pub from_m: f64,
-    /// Where it ends in m.
+    /// End of the window along the track in m.
     pub to_m: f64,
     spacing_m: f64,
 }
@@ -23,9 +24,10 @@ impl SleeperWindow {
         Self { from_m: x_m - 0.5 * spacing_m, to_m: x_m + 0.5 * spacing_m, spacing_m }
     }
 
-    /// The samples, by their positions in m, at which the wheel is inside; positions do not decrease.
+    /// Range of the samples at which the wheel is inside the window. `position_m` has one position in m
+    /// per sample and must not decrease.
     ///
-    /// None where the positions cover less than two fifths of the window.
+    /// `None` if the positions cover less than two fifths of the window.
     pub fn samples(&self, position_m: &[f64]) -> Option<Range<usize>> {
         if self.share(position_m) < SHARE_MIN {
             return None;
@@ -35,7 +37,7 @@ impl SleeperWindow {
         (start < end).then_some(start..end)
     }
 
-    /// Which part of the window the positions in m cover, 0 to 1.
+    /// Share of the window that the positions in m cover, 0 to 1.
     pub fn share(&self, position_m: &[f64]) -> f64 {
         let (Some(first), Some(last)) = (position_m.first(), position_m.last()) else { return 0.0 };
         let covered = self.to_m.min(*last) - self.from_m.max(*first);

@@ -32,12 +32,12 @@ pub enum SamplesError {
     Values {
         /// Number of the line.
         line: u64,
-        /// Values of the line.
+        /// Number of values of the line.
         found: usize,
-        /// Names of the first line.
+        /// Number of names in the first line.
         expected: usize,
     },
-    /// A value is no number.
+    /// A value is not a number.
     #[error(
         "line {line}: {name}: \"{found}\" is not a number; write NaN where a sample is missing"
     )]
@@ -54,13 +54,13 @@ pub enum SamplesError {
     LongLine {
         /// Number of the line.
         line: u64,
-        /// Bytes that a line may have.
+        /// Largest allowed number of bytes of a line.
         most: usize,
     },
 }
 
 impl SamplesError {
-    /// Whether the samples are wrong, and not the machine or the network that brings them.
+    /// Whether the input is wrong. False for a failure of the machine or the network.
     pub const fn is_wrong_input(&self) -> bool {
         !matches!(self, Self::Read(_))
     }

@@ -1,7 +1,7 @@
-//! Samples of a pass one after the other, while it is recorded.
+//! Samples of a stream: the samples of a pass in their order, while the pass is recorded.
 //!
-//! Owns the two framings in which samples come: lines of CSV and binary records. What the samples
-//! say about the track is left to others.
+//! This module reads the two framings of samples: lines of CSV and binary records. Other crates evaluate
+//! the samples.
 
 mod error;
 mod reader;

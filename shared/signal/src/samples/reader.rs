@@ -10,7 +10,7 @@ const RECORD_BYTES: usize = 24;
 /// Characters of the input that an error repeats.
 const SHOWN: usize = 40;
 
-/// What some programs write before the first line of a text in UTF-8.
+/// Byte-order mark that some programs write before the first line of a text in UTF-8.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
 /// The columns, in the order of a binary record.
@@ -19,28 +19,27 @@ const NAMES: [&str; 3] = ["time_s", "position_m", "acceleration_m_s2"];
 /// One sample of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Its time in s; NaN where times are not known.
+    /// Time of the sample in s. NaN if unknown.
     pub time_s: f64,
-    /// Position of the wheel along the track in m; not finite where the sample is missing.
+    /// Position of the wheel along the track in m. Not finite if the sample is missing.
     pub position_m: f64,
-    /// Vertical axle-box acceleration in m/s2, positive downwards; not finite where the sample is
-    /// missing.
+    /// Vertical axle-box acceleration in m/s2, positive downwards. Not finite if the sample is missing.
     pub acceleration_m_s2: f64,
 }
 
-/// How samples follow each other in a stream.
+/// Format of the samples in a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Framing {
-    /// Lines of CSV. The first line names the columns: `position_m`, `acceleration_m_s2` and, if
-    /// known, `time_s`; others are passed over, as are lines that begin with `#`. An empty value or
-    /// `NaN` is a missing sample.
+    /// Lines of CSV. The first line names the columns: `position_m`, `acceleration_m_s2` and, if known,
+    /// `time_s`. The reader ignores other columns and lines that begin with `#`. An empty value or `NaN`
+    /// marks a missing sample.
     Csv,
     /// Records of three little-endian 64-bit floating-point numbers: time in s (NaN where it is not
     /// known), position in m, acceleration in m/s2.
     Binary,
 }
 
-/// Reads samples as they come. Memory is bounded: it holds one line.
+/// Reads samples one after another. Memory is bounded, because the reader holds only one line.
 #[derive(Debug)]
 pub struct SampleReader<R> {
     input: R,
@@ -60,15 +59,15 @@ impl<R: BufRead> SampleReader<R> {
         Self { input, framing, line: Vec::new(), number: 0, columns: None, is_cut: false }
     }
 
-    /// Whether the stream ended inside a line or a record, which was left out.
+    /// Whether the stream ended inside a line or a record. The reader ignores such an incomplete part.
     pub const fn is_cut(&self) -> bool {
         self.is_cut
     }
 
-    /// The next sample; none at the end of the stream.
+    /// The next sample. `None` at the end of the stream.
     ///
     /// # Errors
-    /// [`SamplesError`] with the line.
+    /// [`SamplesError`] with the number of the line.
     pub fn next_sample(&mut self) -> Result<Option<Sample>, SamplesError> {
         match self.framing {
             Framing::Csv => self.next_of_csv(),

@@ -103,8 +103,8 @@ impl BeamElement {
 
     /// Deflection in m/N under a unit force at `xi = x / L` with both ends clamped.
     ///
-    /// It is what the shape functions leave out of the deflection below a load inside the
-    /// element. Found by splitting the element at the load: statically exact.
+    /// The shape functions omit this part of the deflection below a load inside the element. The value
+    /// follows from a split of the element at the load and is statically exact.
     pub fn clamped_flexibility(&self, xi: f64) -> f64 {
         let (left, right) = (xi * self.length, (1.0 - xi) * self.length);
         // Shorter than a millionth of the element the part is as stiff as the clamp.

@@ -1,4 +1,4 @@
-//! Single elements: their matrices and shape functions; where they stand is the model's.
+//! Single elements: matrices and shape functions. The model defines the positions of the elements.
 
 mod beam;
 mod spring_damper;

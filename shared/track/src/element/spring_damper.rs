@@ -13,7 +13,7 @@ pub struct SpringDamper {
 }
 
 impl SpringDamper {
-    /// The part of it that falls to a `share` of what it supports.
+    /// The element scaled by `share`: stiffness and damping of a part of the support.
     #[must_use]
     pub fn share(self, share: f64) -> Self {
         Self { stiffness: self.stiffness * share, damping: self.damping * share }

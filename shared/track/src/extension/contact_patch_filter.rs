@@ -26,8 +26,8 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// A patch of another length than the design's. It filters the random irregularity, not what other kinds add
-/// to it.
+/// A contact patch whose length differs from that of the design. The patch filters the random
+/// irregularity only, not the profiles that other kinds add to the surface.
 #[derive(Debug)]
 struct ContactPatchFilter {
     half_length_m: f64,

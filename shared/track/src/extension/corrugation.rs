@@ -45,7 +45,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// Waves that a band is made of.
+/// Number of waves in a band.
 const WAVES: usize = 16;
 
 /// Irrational share of a turn: phases spread evenly and repeat nowhere (golden section).

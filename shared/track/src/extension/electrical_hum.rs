@@ -1,4 +1,4 @@
-//! The mains in the signal.
+//! Hum of the electrical mains in the signal.
 
 use super::{
     Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, Measured,

@@ -74,10 +74,10 @@ const TRIALS: Trials = Trials::Grid(&[
 /// Two masses `m_1 + m_2 = m_w` with a spring between, the contact on the first and the sensor on
 /// one of them.
 ///
-/// Their relative motion `r = u_1 - u_2` is an oscillator of its own, of the reduced mass
-/// `mu = m_1 m_2 / m_w`, driven by `-mu F / m_1`. In terms of `q = -r m_2 / m_w`, by which the
-/// contact gives way, all its coefficients are multiplied by `(m_w / m_2)²`; a sensor on the second
-/// feels `u_c + q m_1 / m_2`, one on the first `u_c - q`.
+/// The relative motion `r = u_1 - u_2` is an oscillator of the reduced mass `mu = m_1 m_2 / m_w`, driven
+/// by `-mu F / m_1`. The contact point is displaced by `q = -r m_2 / m_w`. Written in `q`, all
+/// coefficients of the oscillator are multiplied by `(m_w / m_2)²`. A sensor on the second mass measures
+/// the motion `u_c + q m_1 / m_2`, a sensor on the first mass `u_c - q`.
 #[derive(Debug)]
 struct FlexibleAxleBox {
     box_kg: f64,

@@ -1,4 +1,4 @@
-//! Sleepers that hang on the rail over a void.
+//! Sleepers that hang on the rail, with a gap between sleeper and ballast.
 
 use super::{
     Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
@@ -45,14 +45,15 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// Further closing in m over which the ballast's damper takes hold, so that the force has no jump
-/// that no time step could meet; a hundredth of usual gaps.
+/// Distance in m after the closing of the gap over which the damping of the ballast rises from zero.
+/// Without this transition the force would jump, and no time step could satisfy the equations. A
+/// hundredth of usual gaps.
 const ONSET_M: f64 = 1e-6;
 
 /// Ballast that pushes `k_b (u - g) + c_b u'` where the sleeper has sunk by more than the gap `g`,
 /// and never pulls (Lundqvist & Dahlberg 2005).
 ///
-/// The matrices hold the ballast if the gap closes under a wheel that stands on the sleeper.
+/// The matrices contain the ballast if the gap closes under a wheel that stands on the sleeper.
 #[derive(Debug)]
 struct HangingSleeper {
     sleepers: Vec<usize>,

@@ -1,4 +1,4 @@
-//! One extension with its place and values, as files have it.
+//! One extension with its place and the values of its parameters, as written in files.
 
 use super::{Extension, Kind, PlaceKind};
 use serde::{Deserialize, Serialize};
@@ -6,29 +6,29 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tracktwin_parameters::{QuantityError, TrackDesign};
 
-/// An extension by the name of its kind, where it is, and what its parameters are.
+/// An extension: name of its kind, place and values of its parameters.
 ///
-/// In JSON and TOML the parameters stand beside the name:
+/// In JSON and TOML the parameters are fields of the same object as the name:
 /// `{"physics": "sleeper_bolt", "sleepers": [8, 9], "stiffness_N_per_m": 3e7}`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ExtensionInstance {
     /// Name of the kind.
     pub physics: String,
-    /// From where to where it is along the track in m; twice the same for a point.
+    /// Start and end of the extension along the track in m. Both are equal for a point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x_m: Option<[f64; 2]>,
-    /// Numbers of its sleepers, from 0; sleeper `i` stands at `(i + 1) * spacing`.
+    /// Indices of the sleepers, from 0. Sleeper `i` is at `(i + 1) * spacing`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sleepers: Option<Vec<usize>>,
-    /// Values of its parameters, in the units that stand in their names.
+    /// Values of the parameters by name. The name of a parameter contains its unit.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, f64>,
 }
 
-/// Why something is no extension of a track.
+/// Why an [`ExtensionInstance`] is not valid for a track.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InstanceError {
-    /// No kind has the name.
+    /// No kind has this name.
     #[error("unknown extension `{physics}`; known extensions: {}", known_kinds())]
     Unknown {
         /// The name.
@@ -42,19 +42,19 @@ pub enum InstanceError {
         /// Name of the parameter.
         parameter: String,
     },
-    /// A parameter without a default was not given.
+    /// The value of a parameter without a default is missing.
     #[error("{physics}: needs {parameter}, {meaning}; for example {parameter} = {typical:e}")]
     MissingParameter {
         /// Name of the kind.
         physics: String,
         /// Name of the parameter.
         parameter: &'static str,
-        /// What it is.
+        /// Meaning of the parameter.
         meaning: &'static str,
-        /// A value on V-Track.
+        /// Typical value on V-Track.
         typical: f64,
     },
-    /// A value can't be.
+    /// The value of a parameter is not allowed.
     #[error("{physics}: {parameter} is {value} but must be {form}")]
     Value {
         /// Name of the kind.
@@ -63,85 +63,87 @@ pub enum InstanceError {
         parameter: String,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// Allowed values, to follow "must be".
         form: &'static str,
     },
-    /// A value is of another size than such physics can have.
+    /// The value of a parameter is far outside its physical range.
     #[error("{physics}: {parameter}: {source}")]
     Number {
         /// Name of the kind.
         physics: String,
         /// Name of the parameter.
         parameter: &'static str,
-        /// Why not.
+        /// The violated limit.
         source: QuantityError,
     },
-    /// The place is missing, of another kind or not on the track.
+    /// The place is missing, has another [`PlaceKind`] than the kind requires, or is not on the track.
     #[error(
         "{physics}: its place must be {form}, on the track of {length_m} m and {sleepers} sleepers"
     )]
     ReceptancePoint {
         /// Name of the kind.
         physics: String,
-        /// What place it must have.
+        /// Required form of the place.
         form: &'static str,
         /// Length of the track in m.
         length_m: f64,
-        /// How many sleepers it has.
+        /// Number of sleepers of the track.
         sleepers: usize,
     },
 }
 
-/// What a kind is built from: all checked.
+/// The checked inputs from which a kind is built.
 #[derive(Debug)]
 pub struct Inputs<'a> {
     kind: &'static Kind,
     instance: &'a ExtensionInstance,
-    /// What the track and the wheel are.
+    /// Design of track and wheel.
     pub design: &'a TrackDesign,
     spans: usize,
 }
 
 impl ExtensionInstance {
-    /// An extension of this kind without place and values.
+    /// An extension of the kind `physics`, without place and values.
     pub fn new(physics: &str) -> Self {
         Self { physics: physics.to_owned(), ..Self::default() }
     }
 
-    /// At a point of the rail, or on a stretch of it.
+    /// Sets the place to a stretch of the rail, `[from, to]` in m. For a point both are equal.
     #[must_use]
     pub fn at(mut self, x_m: [f64; 2]) -> Self {
         self.x_m = Some(x_m);
         self
     }
 
-    /// At sleepers of these numbers.
+    /// Sets the place to these sleepers, by index from 0.
     #[must_use]
     pub fn on(mut self, sleepers: impl IntoIterator<Item = usize>) -> Self {
         self.sleepers = Some(sleepers.into_iter().collect());
         self
     }
 
-    /// With a parameter's value.
+    /// Sets the value of a parameter, in the unit that its name contains.
     #[must_use]
     pub fn with(mut self, parameter: &str, value: f64) -> Self {
         self.parameters.insert(parameter.to_owned(), value);
         self
     }
 
-    /// The row of the registry that it names.
+    /// The kind in the registry that has the name `physics`.
     ///
     /// # Errors
-    /// [`InstanceError::Unknown`] lists the names that there are.
+    /// [`InstanceError::Unknown`] if no kind has this name; the message lists all names.
     pub fn kind(&self) -> Result<&'static Kind, InstanceError> {
         Kind::from_name(&self.physics)
             .ok_or_else(|| InstanceError::Unknown { physics: self.physics.clone() })
     }
 
-    /// That its numbers are of a size that such physics can have.
+    /// Checks that every value is within the physical range of its parameter. The function ignores
+    /// unknown parameters.
     ///
     /// # Errors
-    /// [`InstanceError::Number`] names the parameter that is not.
+    /// [`InstanceError::Unknown`] for an unknown kind; [`InstanceError::Number`] names a parameter out
+    /// of range.
     pub fn check_numbers(&self) -> Result<(), InstanceError> {
         for (name, &value) in &self.parameters {
             // One that is not known is refused where it is built.
@@ -155,10 +157,10 @@ impl ExtensionInstance {
         Ok(())
     }
 
-    /// Makes the extension for a track of this design and so many spans.
+    /// Builds the extension for a track of this design with `spans` spans.
     ///
     /// # Errors
-    /// [`InstanceError`] names the parameter or the place that can't be.
+    /// [`InstanceError`] names the invalid kind, parameter or place.
     pub fn build(
         &self,
         design: &TrackDesign,
@@ -172,30 +174,30 @@ impl ExtensionInstance {
 }
 
 impl Inputs<'_> {
-    /// The value of a parameter of the kind: given, or else its default.
+    /// The value of a parameter of the kind: the given value, otherwise the default.
     pub fn value(&self, name: &str) -> f64 {
         let default = self.kind.parameter(name).and_then(|parameter| parameter.default);
         let given = self.instance.parameters.get(name).copied();
         given.or(default).expect("parameters were checked against the registry")
     }
 
-    /// The point of the rail in m.
+    /// Position of the point on the rail in m.
     pub fn point_m(&self) -> f64 {
         self.stretch_m()[0]
     }
 
-    /// The stretch of the rail in m.
+    /// Start and end of the stretch of rail in m. Without a given place: the whole track.
     pub fn stretch_m(&self) -> [f64; 2] {
         self.instance.x_m.unwrap_or([0.0, self.length_m()])
     }
 
-    /// Numbers of the sleepers.
+    /// Indices of the sleepers, from 0. Without a given place: all sleepers.
     pub fn sleepers(&self) -> Vec<usize> {
         let all = || (0..self.sleeper_count()).collect();
         self.instance.sleepers.clone().unwrap_or_else(all)
     }
 
-    /// Refuses the value of a parameter.
+    /// The error for an invalid value of `parameter`; `form` states the allowed values.
     pub fn refuse(&self, parameter: &str, form: &'static str) -> InstanceError {
         InstanceError::Value {
             physics: self.kind.physics.to_owned(),

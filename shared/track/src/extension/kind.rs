@@ -1,48 +1,48 @@
-//! What a kind of extension is: name, class, place, parameters, how to build it.
+//! Definition of a kind of extension: name, class, place, parameters, and the function that builds it.
 
 use super::{Extension, Inputs, InstanceError, Screening, registry};
 use std::sync::Arc;
 use tracktwin_parameters::Quantity;
 
-/// How many times larger or smaller than expected a parameter may be.
+/// Largest allowed ratio between a parameter and the ends of its expected range.
 const SIZE: f64 = 1e3;
 
-/// Length ratio to V-Track from which a track is a line: the geometric middle of 1 and 8.
+/// Ratio of lengths to V-Track from which a track counts as real scale: the geometric mean of 1 and 8.
 const REAL_RATIO: f64 = 2.8;
 
-/// Largest seed: whole numbers up to it have a place among the floating-point numbers.
+/// Largest seed: an `f64` represents all whole numbers up to this value exactly.
 const SEED_MAX: f64 = 9_007_199_254_740_992.0;
 
-/// A row of the registry.
+/// A kind of extension: one row of the registry.
 #[derive(Debug)]
 pub struct Kind {
-    /// Its name at every border.
+    /// Name of the kind in files, on the command line and in the library.
     pub physics: &'static str,
-    /// What it is, in a sentence without a full stop.
+    /// Description of the kind: one sentence without a full stop.
     pub summary: &'static str,
-    /// The part of track, vehicle or measurement that it belongs to.
+    /// The part of track, vehicle or measurement that the kind belongs to.
     pub family: EffectFamily,
-    /// The kinds that it is weighed with.
+    /// Group of look-alike kinds, which the diagnosis weighs as one first.
     pub group: LookAlikeGroup,
-    /// What stays and what moves when speed, place or load change.
+    /// How the signature depends on speed, place and load.
     pub classes: &'static [Class],
-    /// Where it is.
+    /// Form of place that the kind requires.
     pub place: PlaceKind,
-    /// Whether it is a fault of the measuring chain, and not physics of vehicle or track.
+    /// Whether the kind is a fault of the measuring chain and not physics of vehicle or track.
     pub measuring_chain: bool,
-    /// Its parameters.
+    /// Parameters of the kind.
     pub parameters: &'static [KindParameter],
-    /// Kinds that look alike in a recording.
+    /// Names of kinds that predict nearly the same features.
     pub look_alikes: &'static [&'static str],
-    /// Measurement that separates it from them.
+    /// Measurement that separates the kind from its look-alikes.
     pub would_separate: &'static str,
-    /// How a recording is searched for it.
+    /// How the diagnosis searches a recording for the kind.
     pub screening: Screening,
-    /// Makes it, once the registry has checked what it is made of.
+    /// Builds the extension from inputs that the registry has checked.
     pub build: fn(&Inputs<'_>) -> Result<Arc<dyn Extension>, InstanceError>,
 }
 
-/// What an effect is of: the part of track, vehicle or measurement that differs.
+/// Family of a kind: the part of track, vehicle or measurement that differs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EffectFamily {
     /// Support of the sleepers: lost, soft or layered.
@@ -72,7 +72,7 @@ pub enum EffectFamily {
 }
 
 impl EffectFamily {
-    /// Its name in files.
+    /// Name of the family in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Support => "support",
@@ -90,7 +90,7 @@ impl EffectFamily {
         }
     }
 
-    /// What there is if one of them is left out, for a sentence.
+    /// Phrase for the effect of left-out physics of this family, for use in a sentence.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Support => "a support of sleepers that is lost, soft or layered",
@@ -109,12 +109,13 @@ impl EffectFamily {
     }
 }
 
-/// Kinds that a recording separates less surely than others. The diagnosis weighs them as one first.
+/// Group of kinds that a recording separates less reliably than other kinds. The diagnosis weighs each
+/// group as one first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LookAlikeGroup {
     /// A defect of the rail at a place: joint, weld, squat.
     RailDefect,
-    /// The rail's surface over a stretch or all along.
+    /// The surface of the rail over a stretch or along the whole track.
     RailSurface,
     /// The rail's cross section.
     RailSection,
@@ -126,7 +127,7 @@ pub enum LookAlikeGroup {
     Vehicle,
     /// Rail fastening and railpad.
     Fastening,
-    /// What holds sleepers down.
+    /// Parts that hold the sleepers down.
     HoldDown,
     /// Support under the sleepers: lost, soft or layered.
     Support,
@@ -134,7 +135,7 @@ pub enum LookAlikeGroup {
     MeasuringChain,
 }
 
-/// How the trace of an effect behaves over passes: a letter of its bar-code.
+/// How the signature of a kind changes between passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// Fixed in frequency when the speed changes.
@@ -143,7 +144,7 @@ pub enum Class {
     Wavelength,
     /// Tied to a place of the track.
     Local,
-    /// The same everywhere.
+    /// The same at every place.
     Global,
     /// Tied to the wheel's angle.
     WheelAngle,
@@ -151,12 +152,12 @@ pub enum Class {
     Load,
     /// Concentrated inside a span.
     Concentrated,
-    /// Not the same from pass to pass.
+    /// Different from pass to pass.
     Noise,
 }
 
 impl Class {
-    /// Its code: F, L, X, G, PHI, W, C or N.
+    /// Code of the class: F, L, X, G, PHI, W, C or N.
     pub const fn code(self) -> &'static str {
         match self {
             Self::Frequency => "F",
@@ -171,21 +172,21 @@ impl Class {
     }
 }
 
-/// What place a kind has.
+/// Form of place that a kind requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlaceKind {
-    /// None: it is everywhere, on the vehicle or in the measuring chain.
+    /// No place: the extension acts on the whole track, the vehicle or the measuring chain.
     Nowhere,
     /// A point of the rail, `x_m = [x, x]`.
     Point,
-    /// A stretch of the rail, `x_m = [from, to]`; the whole track where none is given.
+    /// A stretch of the rail, `x_m = [from, to]`. Without `x_m`: the whole track.
     Stretch,
-    /// Sleepers by their numbers; all where none are given.
+    /// Sleepers by index. Without indices: all sleepers.
     Sleepers,
 }
 
 impl PlaceKind {
-    /// How it is written.
+    /// Text form of the place, for messages.
     pub const fn form(self) -> &'static str {
         match self {
             Self::Nowhere => "no place",
@@ -196,7 +197,7 @@ impl PlaceKind {
     }
 }
 
-/// Which numbers a parameter may be.
+/// Numbers that a parameter may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     /// Any finite number.
@@ -205,12 +206,12 @@ pub enum Bound {
     NotNegative,
     /// More than zero.
     Positive,
-    /// From zero up to, but not, one.
+    /// At least zero and less than one.
     Share,
 }
 
 impl Bound {
-    /// Whether a value keeps it.
+    /// Whether `value` satisfies the bound.
     pub fn holds(self, value: f64) -> bool {
         value.is_finite()
             && match self {
@@ -221,7 +222,7 @@ impl Bound {
             }
     }
 
-    /// What it asks for, to follow "must be".
+    /// Description of the bound, to follow "must be".
     pub const fn form(self) -> &'static str {
         match self {
             Self::Any => "a number",
@@ -235,21 +236,21 @@ impl Bound {
 /// A parameter of a kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KindParameter {
-    /// Its name, with the unit last.
+    /// Name of the parameter; ends with the unit.
     pub name: &'static str,
-    /// The unit, as plain text.
+    /// Unit of the parameter, as plain text.
     pub unit: &'static str,
-    /// What it is.
+    /// Meaning of the parameter.
     pub meaning: &'static str,
-    /// Lowest and highest value to expect on V-Track.
+    /// Lowest and highest expected value on V-Track.
     pub v_track: [f64; 2],
-    /// Lowest and highest value to expect at real scale.
+    /// Lowest and highest expected value at real scale.
     pub real_scale: [f64; 2],
-    /// A value on V-Track to start from.
+    /// Typical value on V-Track, from which a search starts.
     pub typical: f64,
-    /// Its value where none is given; without one it must be given.
+    /// Default value. `None`: the parameter is required.
     pub default: Option<f64>,
-    /// Which values make sense at all.
+    /// Numbers that the parameter may have.
     pub bound: Bound,
     /// Tolerance outside the range: the largest natural logarithm of the ratio between a value and the end of
     /// its range. A value further outside has a similar effect but belongs to another kind.
@@ -257,7 +258,7 @@ pub struct KindParameter {
 }
 
 impl KindParameter {
-    /// A parameter that must be given, and be more than zero.
+    /// A required parameter that must be more than zero.
     pub const fn new(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self {
             name,
@@ -272,7 +273,8 @@ impl KindParameter {
         }
     }
 
-    /// Lowest and highest value to expect on a track whose lengths are `length_ratio` times V-Track's.
+    /// Lowest and highest expected value on a track whose lengths are `length_ratio` times those of
+    /// V-Track.
     pub const fn range(&self, length_ratio: f64) -> [f64; 2] {
         if length_ratio < REAL_RATIO { self.v_track } else { self.real_scale }
     }
@@ -292,7 +294,8 @@ impl KindParameter {
         value * to[1] / from[1]
     }
 
-    /// What it can be: up to a thousand times, and down to a thousandth, of what is to be expected.
+    /// Name, unit and limits of the parameter. The limits are a thousand times, and a thousandth of, the
+    /// ends of the expected ranges.
     pub fn quantity(&self) -> Quantity {
         let ends = [self.v_track, self.real_scale].concat();
         let sizes = ends.iter().map(|end| end.abs()).filter(|size| *size > 0.0);
@@ -311,7 +314,7 @@ impl KindParameter {
         Quantity::new(self.meaning, self.unit, [low, high], usual)
     }
 
-    /// With its ranges on V-Track and at real scale, and a typical value on V-Track.
+    /// Sets the expected ranges on V-Track and at real scale, and a typical value on V-Track.
     #[must_use]
     pub const fn ranges(mut self, v_track: [f64; 2], real_scale: [f64; 2], typical: f64) -> Self {
         self.v_track = v_track;
@@ -320,21 +323,21 @@ impl KindParameter {
         self
     }
 
-    /// With another slack than a factor of e.
+    /// Sets the slack. Without this call the slack is 1: a factor of e.
     #[must_use]
     pub const fn slack(mut self, slack: f64) -> Self {
         self.slack = slack;
         self
     }
 
-    /// With a value that holds where none is given.
+    /// Sets the default value. The parameter is then optional.
     #[must_use]
     pub const fn or(mut self, default: f64) -> Self {
         self.default = Some(default);
         self
     }
 
-    /// With another bound.
+    /// Sets the bound. Without this call the bound is [`Bound::Positive`].
     #[must_use]
     pub const fn bound(mut self, bound: Bound) -> Self {
         self.bound = bound;
@@ -348,24 +351,23 @@ impl Kind {
         registry::KINDS.iter().chain(registry::ADDED.get().copied())
     }
 
-    /// The kind of that name, if there is one.
+    /// The kind with the name `physics`, if there is one.
     pub fn from_name(physics: &str) -> Option<&'static Self> {
         Self::all().find(|kind| kind.physics == physics)
     }
 
-    /// Adds one kind to the catalogue of this process; a second one is handed back.
+    /// Adds one kind to the catalogue of this process. A process can add only one kind.
     ///
-    /// For tests of what follows from a kind's definition alone: a kind that stays is a line in the
-    /// registry.
+    /// For tests. A permanent kind needs a line in the registry.
     ///
     /// # Errors
-    /// The kind, where another one has been added.
+    /// Returns `kind` if another kind has already been added.
     #[doc(hidden)]
     pub fn add(kind: &'static Self) -> Result<(), &'static Self> {
         registry::ADDED.set(kind)
     }
 
-    /// The parameter of that name, if the kind has it.
+    /// The parameter with this name, if the kind has it.
     pub fn parameter(&self, name: &str) -> Option<&'static KindParameter> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }

@@ -1,9 +1,10 @@
-//! A pass as the measuring chain sees it.
+//! A pass as the measuring chain records it.
 
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex64;
 
-/// Acceleration and position of a pass on their way through the measuring chain.
+/// Acceleration and position of a pass inside the measuring chain. Each fault of the chain changes them
+/// in turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// Time between samples in s.
@@ -15,10 +16,11 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Sends the acceleration through a linear filter: `transfer` is the ratio of output to input
-    /// at a frequency in Hz, for the convention `exp(+i w t)`.
+    /// Applies a linear filter to the acceleration. `transfer` is the ratio of output to input at a
+    /// frequency in Hz, in the convention `exp(+i w t)`.
     ///
-    /// The signal is continued by as many zeros, into which the filter may ring.
+    /// The function pads the signal with the same number of zeros, so that the response after the end of
+    /// the signal does not wrap around.
     pub(super) fn filter(&mut self, transfer: impl Fn(f64) -> Complex64) {
         let samples = self.acceleration_m_s2.len();
         let points = (2 * samples).next_power_of_two();

@@ -32,7 +32,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// Another stiffness of some railpads; their damping changes in proportion.
+/// A changed stiffness of some railpads. Their damping changes in proportion.
 #[derive(Debug)]
 struct MissingRailpad {
     sleepers: Vec<usize>,

@@ -1,8 +1,9 @@
-//! Physics beyond the paper's model: one definition for both solvers, the library and the report.
+//! Extensions: physics beyond the model of the paper. Solvers, library and report use the same
+//! definition.
 //!
-//! Owns the trait, the registry of kinds and one file a kind. An extension adds itself to the
-//! [`TrackModel`](crate::model::TrackModel). Solvers read the model and do not depend on the kinds. The
-//! diagnosis decides which extension explains a recording.
+//! This module contains the trait, the registry of kinds and one file per kind. An extension adds itself
+//! to the [`TrackModel`](crate::model::TrackModel). Solvers read the model and do not depend on the
+//! kinds. The diagnosis decides which extension explains a recording.
 
 mod instance;
 mod kind;
@@ -53,28 +54,29 @@ use crate::model::{Assembly, Vehicle};
 use rustfft::num_complex::Complex64;
 use std::fmt::Debug;
 
-/// A piece of physics that the paper's model leaves out, or a fault of the measuring chain.
+/// Physics that the model of the paper leaves out, or a fault of the measuring chain.
 ///
-/// Every method has a default that changes nothing: a kind overrides what concerns it.
+/// The default of every method changes nothing. A kind overrides the methods that it needs.
 pub trait Extension: Debug + Send + Sync {
     /// Adds its linear terms, degrees of freedom and force laws to the track being assembled.
     fn assemble(&self, _assembly: &mut Assembly) {}
 
-    /// Changes what rolls over the track.
+    /// Changes the vehicle.
     fn equip(&self, _vehicle: &mut Vehicle) {}
 
-    /// Height in m that it adds to the surface at `x_m`, positive downwards: a dip is positive.
+    /// Height in m that the extension adds to the surface at `x_m`, positive downwards: a dip is
+    /// positive.
     fn profile_m(&self, _x_m: f64) -> f64 {
         0.0
     }
 
-    /// Height in m that the wheel's own shape adds after it has rolled `rolled_m` from the
-    /// track's origin, positive downwards: a flat is positive.
+    /// Height in m that the shape of the wheel adds, positive downwards: a flat is positive. `rolled_m`
+    /// is the distance that the wheel has rolled from the origin of the track.
     fn wheel_profile_m(&self, _rolled_m: f64) -> f64 {
         0.0
     }
 
-    /// By what it multiplies the spectral density of the irregularity at a wave number in rad/m.
+    /// Factor on the spectral density of the irregularity at a wave number in rad/m.
     fn roughness_gain(&self, _wave_number_rad_m: f64) -> f64 {
         1.0
     }

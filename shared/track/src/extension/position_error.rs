@@ -1,4 +1,4 @@
-//! An odometer that is off.
+//! An odometer with a wrong offset or scale.
 
 use super::{
     Bound, Class, EffectFamily, Extension, Kind, KindParameter, LookAlikeGroup, Measured,

@@ -88,7 +88,7 @@ mod tests {
     use crate::model::{Mesh, Support, TrackModel};
     use tracktwin_parameters::TrackDesign;
 
-    /// A support that carries next to nothing: the rail is a beam on its two ends.
+    /// A support with almost no stiffness: the rail is a beam on its two ends.
     const NOTHING: Support = Support {
         railpad_stiffness: 0.0,
         railpad_damping: 0.0,

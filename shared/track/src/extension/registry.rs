@@ -1,4 +1,4 @@
-//! The kinds of extensions that there are.
+//! The registry of all kinds of extension.
 
 use super::Kind;
 use std::sync::OnceLock;

@@ -8,24 +8,24 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tracktwin_parameters::{Scale, TrackDesign, unit};
 
-/// An extension that a share of the cases has, with values drawn in their ranges.
+/// An extension that a share of the cases has. Its values are drawn from their ranges.
 ///
-/// In TOML its parameters stand beside its name, each as a number, `[low, high]` or
-/// `{ low, high, scale }`.
+/// In TOML the parameters are fields of the same table as the name. Each parameter is a number,
+/// `[low, high]` or `{ low, high, scale }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SampledExtension {
     /// Name of the kind.
     pub physics: String,
-    /// From where to where it is along the track in m; twice the same for a point.
+    /// Start and end of the extension along the track in m. Both are equal for a point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x_m: Option<[f64; 2]>,
-    /// Numbers of its sleepers, from 0.
+    /// Indices of the sleepers, from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sleepers: Option<Vec<usize>>,
-    /// Share of the cases that have it, 0 to 1.
+    /// Share of the cases that have the extension, 0 to 1.
     #[serde(default = "every_case")]
     pub share: f64,
-    /// Values of its parameters or their ranges.
+    /// Value or range of each parameter, by name.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, SampledValue>,
 }
@@ -34,17 +34,17 @@ pub struct SampledExtension {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected a number, [low, high] or { low, high, scale }")]
 pub enum SampledValue {
-    /// The same in all cases that have it.
+    /// The same value in all cases that have the extension.
     Fixed(f64),
-    /// Drawn evenly between two values.
+    /// Drawn from a uniform distribution between two values.
     Between([f64; 2]),
-    /// Drawn between two values, evenly on the given scale.
+    /// Drawn from a distribution between two values that is uniform on the given scale.
     Scaled {
         /// Lowest value.
         low: f64,
         /// Highest value.
         high: f64,
-        /// What is even.
+        /// Scale on which the distribution is uniform.
         scale: Scale,
     },
 }
@@ -54,7 +54,7 @@ const fn every_case() -> f64 {
 }
 
 impl SampledValue {
-    /// The value at a place from 0 (lowest) to 1 (highest).
+    /// The value at a relative position in the range, from 0 (lowest) to 1 (highest).
     fn at(self, share: f64) -> f64 {
         match self {
             Self::Fixed(value) => value,
@@ -63,8 +63,8 @@ impl SampledValue {
         }
     }
 
-    /// What can't be drawn from: a range whose end lies before its begin, or a logarithm of what is not
-    /// positive.
+    /// The invalid value, and the requirement on it: `low` above `high`, or a logarithmic scale whose
+    /// `low` is not positive.
     fn fault(self) -> Option<(f64, &'static str)> {
         match self {
             Self::Between([low, high]) | Self::Scaled { low, high, .. } if low > high => {
@@ -79,7 +79,7 @@ impl SampledValue {
 }
 
 impl SampledExtension {
-    /// The extension of the case of this seed; `None` if the case goes without.
+    /// The extension of the case with this seed. `None` if the case has no such extension.
     pub fn draw(&self, seed: u64) -> Option<ExtensionInstance> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut unit = || unit(random.next_u64());
@@ -89,10 +89,10 @@ impl SampledExtension {
         present.then_some(instance)
     }
 
-    /// That it can be built at either end of all its ranges on a track of this design.
+    /// Checks that the extension can be built at both ends of all ranges on a track of this design.
     ///
     /// # Errors
-    /// [`InstanceError`] names the parameter or the place that can't be.
+    /// [`InstanceError`] names the invalid kind, share, parameter or place.
     pub fn check(&self, design: &TrackDesign, spans: usize) -> Result<(), InstanceError> {
         if !(0.0..=1.0).contains(&self.share) {
             return Err(InstanceError::Value {
@@ -120,7 +120,7 @@ impl SampledExtension {
         built(0.0).and_then(|_| built(1.0)).map(|_| ())
     }
 
-    /// With every value at the place in its range that `unit` says.
+    /// The extension with every value at the relative position in its range that `unit` returns.
     fn instance(&self, unit: &mut impl FnMut() -> f64) -> ExtensionInstance {
         let parameters = self.parameters.iter();
         let parameters = parameters.map(|(name, value)| (name.clone(), value.at(unit()))).collect();

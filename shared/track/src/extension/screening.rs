@@ -1,37 +1,38 @@
-//! How a recording is searched for a kind: at which places, with which parameters, from which values.
+//! How the diagnosis searches a recording for a kind: places, free parameters and trial values.
 
 use tracktwin_parameters::TrackDesign;
 
-/// How a kind is searched for.
+/// How the diagnosis searches a recording for a kind.
 #[derive(Debug)]
 pub struct Screening {
-    /// What the model of the track is tried with.
+    /// Families of candidates that the screening evaluates.
     pub families: &'static [Family],
-    /// Parameters that are fitted where the passes alone suggest the kind; none where they never do.
+    /// Parameters that are fitted if the passes suggest the kind without a track model. Empty if the
+    /// passes never suggest the kind.
     pub suggested: &'static [&'static str],
-    /// Why it is neither tried nor suggested.
+    /// Reason why the kind is neither screened nor suggested.
     pub not_tried: Option<&'static str>,
-    /// Whether the track's description states it already, so that it cannot be left out.
+    /// Whether the track description already contains the kind. Such a kind cannot be left-out physics.
     pub is_stated: fn(&TrackDesign) -> bool,
 }
 
-/// Candidates of a kind that differ in nothing but their place.
+/// Candidates of a kind that differ only in their place.
 #[derive(Debug)]
 pub struct Family {
-    /// Where.
+    /// Places of the candidates.
     pub places: Places,
-    /// Parameters held at a value.
+    /// Parameters with a fixed value.
     pub held: &'static [(&'static str, f64)],
-    /// Parameters to be fitted, inside their ranges.
+    /// Parameters that are fitted within their ranges.
     pub free: &'static [&'static str],
-    /// Values of the free parameters that screening tries.
+    /// Values of the free parameters that the screening evaluates.
     pub trials: Trials,
 }
 
-/// The places that a family is tried at.
+/// Places at which the screening evaluates a family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Places {
-    /// Everywhere at once: all along the track, at the wheel or in the sensor.
+    /// No single place: the whole track, the wheel or the sensor.
     Everywhere,
     /// Every sleeper.
     Sleepers,
@@ -39,37 +40,38 @@ pub enum Places {
     SleepersAndPairs,
     /// Every sleeper and every middle of a span, as points of the rail.
     Points,
-    /// Every second, third, fourth and fifth sleeper, each pattern from each of its first sleepers.
+    /// Every second, third, fourth and fifth sleeper. Each pattern is tested from each possible first
+    /// sleeper.
     Patterns,
 }
 
-/// Values of the free parameters that are tried.
+/// Values of the free parameters that the screening evaluates.
 #[derive(Clone, Copy, Debug)]
 pub enum Trials {
-    /// All combinations of one value from each list, a list a parameter.
+    /// All combinations of one value from each list, with one list per parameter.
     Grid(&'static [&'static [f64]]),
-    /// These values, each of all parameters.
+    /// These sets of values, each with one value per parameter.
     List(&'static [&'static [f64]]),
 }
 
 impl Screening {
-    /// Tried with these families, and never suggested by the passes alone.
+    /// The kind is screened with these families. The passes alone never suggest the kind.
     pub const fn tried(families: &'static [Family]) -> Self {
         Self { families, suggested: &[], not_tried: None, is_stated: |_| false }
     }
 
-    /// Neither tried nor suggested, for this reason.
+    /// The kind is neither screened nor suggested, for this reason.
     pub const fn not_tried(reason: &'static str) -> Self {
         Self { families: &[], suggested: &[], not_tried: Some(reason), is_stated: |_| false }
     }
 
-    /// Not tried on tracks whose description states it.
+    /// The kind is not screened on tracks whose description already contains the kind.
     #[must_use]
     pub const fn unless_stated(self, is_stated: fn(&TrackDesign) -> bool) -> Self {
         Self { is_stated, ..self }
     }
 
-    /// Suggested by the passes alone, with these parameters to be fitted.
+    /// The passes alone can suggest the kind. These parameters are then fitted.
     #[must_use]
     pub const fn suggested(self, free: &'static [&'static str]) -> Self {
         Self { suggested: free, ..self }
@@ -82,7 +84,7 @@ impl Family {
         Self { places, held: &[], free, trials }
     }
 
-    /// With parameters held at a value.
+    /// Sets parameters with a fixed value.
     #[must_use]
     pub const fn held(self, held: &'static [(&'static str, f64)]) -> Self {
         Self { held, ..self }
@@ -90,7 +92,7 @@ impl Family {
 }
 
 impl Trials {
-    /// Every set of values, in the order of the free parameters.
+    /// Every set of values, each in the order of the free parameters.
     pub fn values(self) -> Vec<Vec<f64>> {
         match self {
             Self::List(list) => list.iter().map(|values| values.to_vec()).collect(),

@@ -7,8 +7,8 @@ use super::{
 use crate::model::Vehicle;
 use std::sync::Arc;
 
-/// Distances that are tried, in m: the rail's waves at 1 kHz are 15 steps long. As far as the track is
-/// modelled beyond what is compared.
+/// Trial distances in m. The wavelength of the rail at 1 kHz is 15 steps. The largest distance is the
+/// length of track that is modelled beyond the compared stretch.
 const DISTANCES_M: [f64; 46] = {
     let mut distances_m = [0.0; 46];
     let mut step = 0;

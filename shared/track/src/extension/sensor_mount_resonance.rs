@@ -47,7 +47,7 @@ pub(super) const KIND: Kind = Kind {
     },
 };
 
-/// The sensor as a mass on a spring and damper, shaken at its foot:
+/// The sensor as a mass on a spring and damper with base excitation:
 /// `(1 + 2 i zeta r) / (1 - r² + 2 i zeta r)` with `r = f / f_s`.
 #[derive(Debug)]
 struct SensorMountResonance {

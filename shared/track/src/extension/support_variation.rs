@@ -74,7 +74,7 @@ impl Extension for SupportVariation {
 }
 
 impl SupportVariation {
-    /// Factors of mean one and coefficient of variation `cv`, one a sleeper.
+    /// Factors of mean one and coefficient of variation `cv`, one per sleeper.
     fn factors(&self, random: &mut impl Rng, cv: f64) -> Vec<f64> {
         let variance = (1.0 + cv * cv).ln();
         let mut value = standard_normal(random);

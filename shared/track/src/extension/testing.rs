@@ -63,7 +63,8 @@ pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     (difference / power(&mut b.iter().copied())).sqrt()
 }
 
-/// That a pass runs alike through both solvers, and otherwise than without the extension.
+/// Checks that both solvers give the same pass, and that this pass differs from one without the
+/// extension.
 pub(super) fn assert_felt_alike_in_both_solvers(instance: &ExtensionInstance) {
     let pass = Pass { end_m: 0.8, ..pass_at(13.0 / 3.6) };
     let surface = Surface::rough(1, 3.0, 1.5);
@@ -79,12 +80,13 @@ pub(super) fn assert_felt_alike_in_both_solvers(instance: &ExtensionInstance) {
     assert!(difference < 1e-6, "{}: {difference}", instance.physics);
 }
 
-/// That a wheel which rolls slowly over a long shape follows it: its acceleration is the speed's
-/// square times the shape's curvature.
+/// Checks that a wheel that rolls slowly over a long shape follows the shape: the acceleration is the
+/// square of the speed times the curvature of the shape.
 ///
-/// At 1 m/s a shape of 0.1 m is passed at 10 Hz, far below the wheel on the track at 115 Hz, whose
-/// part in it is below one in a hundred. It rings where the curvature jumps; what is compared is
-/// the share of the curvature in the acceleration, in which ringing averages out.
+/// At 1 m/s a shape of 0.1 m excites the wheel at 10 Hz, far below the resonance of wheel and track at
+/// 115 Hz. The dynamic part is below one in a hundred. Jumps of the curvature excite the resonance. The
+/// test therefore compares the projection of the acceleration on the curvature, in which this vibration
+/// averages out.
 pub(super) fn assert_followed(instance: &ExtensionInstance, height_m: impl Fn(f64) -> f64) {
     let pass = Pass { time_step_s: 1e-4, ..pass_at(1.0) };
     let (without, with) = (track(&[]), track(std::slice::from_ref(instance)));

@@ -1,13 +1,13 @@
 //! Extensions on a command line: `NAME[@PLACE][:PARAMETER=VALUE,...]`.
 //!
-//! A place is a point (`2.43m`), a stretch (`2m-3m`), or sleepers (`SN18`, `SN10-SN30`, every
-//! fourth of them `SN10-SN30/4`, several such `SN10,SN14-SN16`).
+//! A place is a point (`2.43m`), a stretch (`2m-3m`), or sleepers: one (`SN18`), a range (`SN10-SN30`),
+//! every fourth sleeper of a range (`SN10-SN30/4`), or a list of these (`SN10,SN14-SN16`).
 
 use super::ExtensionInstance;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// Why a text is no extension.
+/// Why a text does not describe an extension.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InstanceTextError {
     /// The name is missing.
@@ -19,10 +19,10 @@ pub enum InstanceTextError {
     /// A parameter is not `NAME=NUMBER`.
     #[error("`{0}` is not a parameter; write NAME=NUMBER")]
     Parameter(String),
-    /// A duplicate parameter.
+    /// A parameter occurs twice.
     #[error("duplicate parameter `{0}`")]
     Twice(String),
-    /// The place is none.
+    /// The text of the place has none of the valid forms.
     #[error(
         "`{0}` is not a place; write `2.43m`, `2m-3m`, `SN18`, `SN10-SN30`, `SN10-SN30/4` \
              or several sleepers separated by commas"

@@ -1,5 +1,4 @@
-//! The rail's receptances between two places a fixed distance apart, for two wheels that may stand
-//! anywhere.
+//! Receptances of the rail between two places at a fixed distance, for two wheels at any position.
 
 use super::lane::{LANES, Lane, omega};
 use super::rail::Partition;
@@ -7,8 +6,9 @@ use crate::model::TrackModel;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-/// Receptances in m/N between every rail node and the place so far ahead of it (negative: behind):
-/// `[frequency][node]`, zero where that is not on the rail. Between nodes they are interpolated.
+/// Receptances in m/N between every rail node and the place `distance_m` ahead of the node (negative:
+/// behind), as `[frequency][node]`. The value is zero where that place is not on the rail. Between nodes
+/// the function interpolates.
 pub fn receptances_ahead(
     model: &TrackModel,
     frequencies_hz: &[f64],
@@ -31,7 +31,8 @@ pub fn receptances_ahead(
     chunks.collect()
 }
 
-/// The nodes about a place, each with its share; none off the rail.
+/// The two nodes next to the place `x_m`, each with its weight for linear interpolation. Empty if the
+/// place is not on the rail.
 pub fn shares(nodes_m: &[f64], x_m: f64) -> Vec<(usize, f64)> {
     let after = nodes_m.partition_point(|node_m| *node_m <= x_m);
     if after == 0 || after == nodes_m.len() {

@@ -1,4 +1,4 @@
-//! Symmetric banded matrices, and the entries of their inverses that are asked for.
+//! Symmetric banded matrices, and the required entries of their inverses.
 
 use super::lane::Lane;
 
@@ -11,7 +11,7 @@ pub(super) struct Banded {
 }
 
 impl Banded {
-    /// A matrix of zeros with so many entries beside the diagonal.
+    /// A matrix of zeros with `width` entries beside the diagonal.
     pub(super) fn zeros(size: usize, width: usize) -> Self {
         Self { size, width, entries: vec![Lane::default(); size * (width + 1)] }
     }
@@ -120,7 +120,8 @@ impl Banded {
     }
 }
 
-/// The inverse of a banded matrix: its entries in the band, and what others follow from.
+/// The inverse of a banded matrix: its entries in the band, and the factor from which the other entries
+/// follow.
 pub(super) struct Inverse {
     factor: Banded,
     band: Banded,

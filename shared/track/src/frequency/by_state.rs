@@ -1,7 +1,7 @@
 //! The rail's receptances in each state of a track with force laws.
 //!
-//! The states differ at the few places of the rail that the laws' sleepers hang on. So one of them is
-//! solved, and the others follow from it.
+//! The states differ only at the few places of the rail above sleepers with force laws. The solver
+//! therefore solves one state and derives the others.
 
 use super::lane::{LANES, Lane, omega};
 use super::rail::{Near, Partition, Solved, deflections, near_seats};
@@ -15,20 +15,21 @@ use rustfft::num_complex::Complex64;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Direct receptances of the rail in each state that the place of the wheel gives a track.
+/// Direct receptances of the rail in each state of the track. The state depends on the position of the
+/// wheel.
 #[derive(Clone, Debug)]
 pub struct StateReceptances {
     tracks: Vec<TrackModel>,
     holds: Vec<Hold>,
     /// The nodes at which the states are known.
     nodes: Range<usize>,
-    /// Those in the first state in m/N, `[frequency][node]`.
+    /// Direct receptances in the first state in m/N, `[frequency][node]`.
     first: Vec<Vec<Complex64>>,
     /// Reduction of each further state at these nodes: `[frequency][state - 1][node]`.
     reductions: Vec<Vec<Vec<Complex64>>>,
 }
 
-/// Reduction of receptances at one frequency: by how much they are less in a state than in the first.
+/// Reduction of receptances at one frequency: value in the first state minus value in another state.
 struct Reduction {
     /// Receptances from the places that change to the nodes from the first of the columns' on, a row
     /// a node.
@@ -42,7 +43,7 @@ struct Reduction {
 struct Mixed {
     direct: Vec<Complex64>,
     from_seats: Vec<SeatReceptances>,
-    /// Direct ones in the first state.
+    /// Direct receptances in the first state.
     first: Vec<Complex64>,
     /// Reduction of each further state at the nodes near the laws.
     reductions: Vec<Vec<Complex64>>,
@@ -63,8 +64,9 @@ impl Reduction {
 }
 
 impl States {
-    /// Receptances at each node of the track in the state that it has while the wheel is there, with those
-    /// from the rail seats to so many nodes on either side where `reach` says it.
+    /// Receptances at each node, with the track in the state that it has while the wheel is at this
+    /// node. With `reach`, the result also contains the receptances from each rail seat to `reach` nodes
+    /// on either side.
     pub(super) fn receptances(
         self,
         frequencies_hz: &[f64],
@@ -88,8 +90,8 @@ impl States {
         RailReceptances { direct, from_seats, by_state: Some(Arc::new(by_state)) }
     }
 
-    /// How each further state differs from the first, at the same degrees of freedom; none where that is not
-    /// quicker than to solve each state.
+    /// Differences of each further state from the first, at the same degrees of freedom. `None` if a
+    /// separate solution of each state is as fast.
     fn differences(&self) -> Option<Vec<Difference<'_>>> {
         let first = &self.tracks[0];
         let others = self.tracks[1..].iter();
@@ -107,7 +109,7 @@ impl States {
         (is_small && beyond.all(is_first)).then_some(differences)
     }
 
-    /// Receptances at each frequency, the first state solved and the others from it.
+    /// Receptances at each frequency. The function solves the first state and derives the others.
     fn beside_the_first(
         &self,
         differences: &[Difference<'_>],
@@ -170,9 +172,10 @@ impl States {
 }
 
 impl StateReceptances {
-    /// Direct receptances in m/N, `[frequency][node]`, where the laws take hold as they do on another track
-    /// on the same mesh, which differs little. None where it has a state that this track does not have, or,
-    /// if they must be `alike`, one with other matrices.
+    /// Direct receptances in m/N, `[frequency][node]`, with the force laws active at the same positions
+    /// of the wheel as on the track `other`. `other` must have the same mesh and nearly the same values.
+    /// `None` if `other` has a state that this track does not have or, with `alike`, a state whose
+    /// matrices differ.
     pub fn direct_where(&self, other: &TrackModel, alike: bool) -> Option<Vec<Vec<Complex64>>> {
         let other = States::new(other)?;
         let state = |hold: &Hold| self.holds.iter().position(|own| own == hold);

@@ -1,4 +1,4 @@
-//! Eight complex numbers side by side, one a frequency.
+//! Eight complex numbers in one vector, one per frequency.
 
 use rustfft::num_complex::Complex64;
 use std::array;

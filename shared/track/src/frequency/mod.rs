@@ -1,6 +1,7 @@
-//! The track in the frequency domain: what a hammer test measures.
+//! The track in the frequency domain: the receptances that a hammer test measures.
 //!
-//! Works on the matrices that the time domain runs on; draws nothing and names no resonance.
+//! This module uses the same matrices as the time domain. It does not plot receptances or identify
+//! resonances.
 
 #![expect(
     clippy::inline_always,

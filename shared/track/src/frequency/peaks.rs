@@ -5,17 +5,17 @@
 pub struct Peak {
     /// Frequency in Hz.
     pub frequency_hz: f64,
-    /// The magnitude there, in its own unit.
+    /// Magnitude at the peak, in the unit of the input.
     pub magnitude: f64,
-    /// How far it stands out, in dB: down to the higher of the lowest points between it and a
-    /// higher value on either side.
+    /// Prominence in dB. On either side, find the lowest point between the peak and a higher value; the
+    /// prominence is the height of the peak above the higher of these two points.
     pub prominence_db: f64,
 }
 
-/// The maxima that stand out by at least `prominence_db`, by ascending frequency.
+/// The maxima with a prominence of at least `prominence_db`, by ascending frequency.
 ///
-/// Values at the ends of the range are no maxima. A parabola through the neighbours of a maximum
-/// places it between the given frequencies.
+/// Values at the ends of the range do not count as maxima. A parabola through a maximum and its
+/// neighbours gives the position of the peak between the given frequencies.
 pub fn peaks(frequencies_hz: &[f64], magnitudes: &[f64], prominence_db: f64) -> Vec<Peak> {
     let levels: Vec<f64> = magnitudes.iter().map(|value| 20.0 * value.log10()).collect();
     let last = levels.len().min(frequencies_hz.len()).saturating_sub(1);

@@ -1,17 +1,17 @@
-//! What hangs on the rail, piece by piece.
+//! Parts of the track that are connected to the rail.
 
 use super::banded::Banded;
 use super::lane::Lane;
 use crate::model::Matrices;
 
-/// Degrees of freedom off the rail that hang together, such as a sleeper's.
+/// A group of connected degrees of freedom outside the rail, such as those of a sleeper.
 pub(super) struct Piece {
     /// Its degrees of freedom, the last ones next to the rail.
     pub(super) dofs: Vec<usize>,
     pub(super) width: usize,
     /// Places in the matrices, with local row and column, of the lower triangle.
     pub(super) inner: Vec<(usize, usize, usize)>,
-    /// Rail degrees of freedom that it touches, each with local rows and places.
+    /// Rail degrees of freedom connected to the piece, each with local rows and places in the matrices.
     pub(super) touched: Vec<(usize, Vec<(usize, usize)>)>,
 }
 
@@ -23,7 +23,8 @@ impl Piece {
         }
     }
 
-    /// How far apart the rail's degrees of freedom are that it joins.
+    /// Largest distance, in degrees of freedom, between the rail degrees of freedom that the piece
+    /// connects.
     pub(super) fn reach(&self) -> usize {
         let dofs = self.touched.iter().map(|(dof, _)| *dof);
         dofs.clone().max().unwrap_or(0) - dofs.min().unwrap_or(0)
@@ -64,7 +65,8 @@ impl Piece {
     }
 }
 
-/// Groups of degrees of freedom off the rail that hang together, those next to the rail last.
+/// Groups of connected degrees of freedom outside the rail. In each group, those next to the rail come
+/// last.
 pub(super) fn pieces(matrices: &Matrices, rail_dofs: usize) -> Vec<Piece> {
     let mut seen = vec![false; matrices.size()];
     let mut pieces = Vec::new();

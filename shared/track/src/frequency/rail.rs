@@ -1,4 +1,4 @@
-//! The rail's receptances everywhere at once, for a wheel that may stand at any node.
+//! Receptances of the rail at all nodes, for a wheel at any node.
 //!
 //! The solver condenses the parts connected to the rail onto the rail, one after the other. A matrix of small
 //! bandwidth remains. The solver computes only the required entries of its inverse. This is a hundred times
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use std::ops::Range;
 
-/// How the matrices of a track come apart into the rail and what hangs on it.
+/// Partition of the matrices of a track into the rail and the pieces connected to it.
 pub(super) struct Partition<'a> {
     pub(super) matrices: &'a Matrices,
     pub(super) rail_dofs: usize,
@@ -25,8 +25,9 @@ pub(super) struct Partition<'a> {
 }
 
 impl RailReceptances {
-    /// Works them out, with those from every rail seat to so many nodes on either side where `reach` says
-    /// it: at each node those of the track as it is while the wheel stands there.
+    /// Computes the receptances of all rail nodes. With `reach`, the result also contains those from
+    /// each rail seat to `reach` nodes on either side. At each node, force laws have the state that they
+    /// have with the wheel at this node.
     ///
     /// Solves `K + i w C - w^2 M` on the model's own matrices, in the convention `exp(+i w t)`.
     pub fn new(model: &TrackModel, frequencies_hz: &[f64], reach: Option<usize>) -> Self {
@@ -36,7 +37,8 @@ impl RailReceptances {
         }
     }
 
-    /// The same on the model's matrices, wherever the wheel stands.
+    /// Computes the receptances from the matrices of the model alone, independent of the position of the
+    /// wheel.
     pub(super) fn of_matrices(
         model: &TrackModel,
         frequencies_hz: &[f64],
@@ -58,7 +60,7 @@ impl RailReceptances {
     }
 }
 
-/// Every rail seat with the nodes up to so many from it.
+/// Every rail seat with the nodes at most `reach` nodes from it.
 pub(super) fn near_seats(model: &TrackModel, reach: usize) -> Vec<Near> {
     let layout = model.layout();
     let count = layout.rail_nodes_m().len();
@@ -69,17 +71,17 @@ pub(super) fn near_seats(model: &TrackModel, reach: usize) -> Vec<Near> {
     layout.sleepers().iter().map(|sleeper| near(sleeper.rail_node)).collect()
 }
 
-/// Degrees of freedom of the deflection of every rail node, of held nodes none.
+/// Degree of freedom of the deflection of every rail node; `None` for held nodes.
 pub(super) fn deflections(model: &TrackModel) -> Vec<Option<usize>> {
     let layout = model.layout();
     (0..layout.rail_nodes_m().len()).map(|node| layout.rail_node_dofs(node)[0]).collect()
 }
 
-/// Dynamic stiffness in N/m that acts on the rail's deflection at each rail seat, rail elements and
-/// whatever hangs on the rail together: `[frequency][sleeper]`, zero where the rail is held.
+/// Dynamic stiffness in N/m on the deflection of the rail at each rail seat: the sum of rail elements
+/// and all parts connected to the rail. `[frequency][sleeper]`, zero where the rail is held.
 ///
-/// Of two tracks that differ in nothing but supports, the difference is that of the supports'
-/// dynamic stiffness.
+/// For two tracks that differ only in their supports, the difference of the results is the difference of
+/// the dynamic stiffness of the supports.
 pub fn seat_stiffness(model: &TrackModel, frequencies_hz: &[f64]) -> Vec<Vec<Complex64>> {
     let partition = Partition::new(model);
     let layout = model.layout();
@@ -132,7 +134,7 @@ impl Near {
     }
 }
 
-/// What is known at [`LANES`] frequencies.
+/// Results at [`LANES`] frequencies.
 pub(super) struct Solved {
     direct: Vec<Lane>,
     from_seats: Vec<Vec<Lane>>,
@@ -221,7 +223,7 @@ impl<'a> Partition<'a> {
         }
     }
 
-    /// The rail with all that hangs on it.
+    /// The dynamic stiffness of the rail with all connected pieces.
     #[inline(always)]
     fn rail(&self, value: &impl Fn(usize) -> Lane) -> Banded {
         let mut rail = Banded::zeros(self.rail_dofs, self.width);
@@ -234,13 +236,13 @@ impl<'a> Partition<'a> {
         rail
     }
 
-    /// The inverse of the rail with all that hangs on it.
+    /// The inverse of the dynamic stiffness of the rail with all connected pieces.
     #[inline(always)]
     pub(super) fn inverted(&self, omega: impl Fn(usize) -> f64) -> Inverse {
         Inverse::new(self.rail(&self.dynamic_stiffness(omega)))
     }
 
-    /// The same, and the inverse of the mirrored rail.
+    /// The inverse of the dynamic stiffness of the rail, and that of the mirrored rail.
     #[inline(always)]
     pub(super) fn inverted_both(&self, omega: impl Fn(usize) -> f64) -> [Inverse; 2] {
         let rail = self.rail(&self.dynamic_stiffness(omega));

@@ -8,7 +8,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use rustfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Where the track is struck or its motion observed, both positive downwards.
+/// Point where the force acts or the displacement is observed. Both are positive downwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ReceptancePoint {
     /// The rail at this position along the track in m.
@@ -19,7 +19,7 @@ pub enum ReceptancePoint {
     SleeperTip(usize),
 }
 
-/// Why there is no receptance.
+/// Why a receptance cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FrequencyError {
     /// The place does not belong to the track.
@@ -29,26 +29,26 @@ pub enum FrequencyError {
         place: ReceptancePoint,
         /// Length of the track in m.
         length_m: f64,
-        /// How many sleepers it has.
+        /// Number of sleepers of the track.
         sleepers: usize,
     },
     /// A frequency is negative, NaN or infinite.
     #[error("{0} Hz is not a valid excitation frequency")]
     Frequency(f64),
-    /// The dynamic stiffness has no inverse there: an undamped resonance.
+    /// The dynamic stiffness is singular at this frequency in Hz: an undamped resonance.
     #[error("the track has an undamped resonance at {0} Hz")]
     Singular(f64),
 }
 
-/// Receptance in m/N from a unit force at `excite` to the displacement at `observe`, a value a
+/// Receptance in m/N from a unit force at `excite` to the displacement at `observe`: one value per
 /// frequency, in the convention `exp(+i w t)`.
 ///
-/// Solves `(K + i w C - w^2 M) u = b` on the model's own matrices. Where a force and its own
-/// displacement meet at one place of the rail, the static flexibility that the element's shape
-/// functions leave out is added: without it a point between nodes is too stiff.
+/// Solves `(K + i w C - w^2 M) u = b` with the matrices of the model. If `excite` and `observe` are the
+/// same point of the rail, the function adds the static flexibility that the shape functions of the
+/// element omit. Without this term a point between nodes is too stiff.
 ///
 /// # Errors
-/// [`FrequencyError`] names the place or frequency that does not fit.
+/// [`FrequencyError`] names the invalid place or frequency.
 pub fn receptance(
     model: &TrackModel,
     excite: ReceptancePoint,

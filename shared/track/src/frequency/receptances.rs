@@ -10,9 +10,11 @@ use std::sync::Arc;
 pub struct RailReceptances {
     /// Direct receptance of every rail node: `[frequency][node]`, zero where the rail is held.
     pub direct: Vec<Vec<Complex64>>,
-    /// From a force at each rail seat to the nodes near it: `[frequency][sleeper]`; empty unless asked for.
+    /// Receptances from a force at each rail seat to the nodes near it: `[frequency][sleeper]`. Empty if
+    /// they were not requested.
     pub from_seats: Vec<Vec<SeatReceptances>>,
-    /// Those of each state that force laws give the track; none where there is only one.
+    /// Direct receptances in each state of a track with force laws. `None` if the track has only one
+    /// state.
     pub by_state: Option<Arc<StateReceptances>>,
 }
 
@@ -21,12 +23,12 @@ pub struct RailReceptances {
 pub struct SeatReceptances {
     /// The first of these nodes.
     pub first: usize,
-    /// Its value and those of the nodes after it, zero where the rail is held.
+    /// Receptance of the first node and of the nodes after it, zero where the rail is held.
     pub values: Vec<Complex64>,
 }
 
 impl SeatReceptances {
-    /// At these nodes.
+    /// The receptances at these nodes.
     pub fn at(&self, nodes: Range<usize>) -> &[Complex64] {
         &self.values[nodes.start - self.first..nodes.end - self.first]
     }

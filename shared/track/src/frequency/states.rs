@@ -6,14 +6,14 @@ use crate::time::StaticSolution;
 use rustfft::num_complex::Complex64;
 use std::ops::Range;
 
-/// Halvings of the way between two nodes by which it is found where a law takes hold: a place is
-/// then known to a millionth of the way.
+/// Number of bisections between two nodes that locate the position where a law becomes active: to a
+/// millionth of the distance.
 const HALVINGS: usize = 20;
 
-/// Spans on either side of a force law in which a standing wheel is felt.
+/// Number of spans on either side of a force law within which a standing wheel can change its state.
 const REACH_SPANS: f64 = 4.0;
 
-/// Which force laws take hold.
+/// Which force laws are active.
 pub(super) type Hold = Vec<bool>;
 
 /// The track linearised for small motions, with the wheel at each node of the rail.
@@ -21,18 +21,18 @@ pub(super) type Hold = Vec<bool>;
 /// Ballast under a gap supports the sleeper only if the wheel is near enough to close the gap. An active law
 /// has the linearisation that it has under a wheel directly above it.
 pub(super) struct States {
-    /// The track in each of its states; first that in which it is while the wheel is far away.
+    /// The track in each of its states. The first state is the one with the wheel far away.
     pub(super) tracks: Vec<TrackModel>,
-    /// Which laws take hold in each of them.
+    /// Which laws are active in each state.
     pub(super) holds: Vec<Hold>,
-    /// Shares of the states in the half bays about each node: `[node][state]`.
+    /// Share of each state in the halves of the rail elements next to each node: `[node][state]`.
     pub(super) shares: Vec<Vec<f64>>,
-    /// The nodes near the laws: beyond them the track is in the state that it has at their ends.
+    /// The nodes near the laws. Beyond these nodes the track has the state of the nearest of them.
     pub(super) near: Range<usize>,
 }
 
 impl States {
-    /// `None` for a track that is the same wherever the wheel stands.
+    /// `None` if the track is the same for every position of the wheel.
     pub(super) fn new(model: &TrackModel) -> Option<Self> {
         if model.force_laws().is_empty() {
             return None;
@@ -55,7 +55,8 @@ impl States {
         Some(Self { tracks, holds: holds.into_iter().cloned().collect(), shares, near })
     }
 
-    /// Receptances at each node of the track in the state that it has while the wheel is there.
+    /// Receptances at each node, with the track in the state that it has while the wheel is at this
+    /// node.
     pub(super) fn mix(&self, of: impl Fn(&TrackModel) -> RailReceptances) -> RailReceptances {
         let states: Vec<RailReceptances> = self.tracks.iter().map(of).collect();
         let mut mixed = states[0].clone();
@@ -91,7 +92,8 @@ fn near(model: &TrackModel) -> Range<usize> {
     first..nodes_m.partition_point(|x_m| *x_m <= to_m).max(first + 1)
 }
 
-/// Which laws hold while the wheel stands at each node; beyond the nodes near them as at their end.
+/// Which laws are active with the wheel at each node. Beyond the nodes near the laws: the same as at the
+/// nearest of these nodes.
 fn at_nodes(
     nodes_m: &[f64],
     near: &Range<usize>,
@@ -134,7 +136,7 @@ fn holds_above(law: &ForceLaw) -> bool {
     law.linear.stiffness > 0.0
 }
 
-/// The track with just these laws holding, from a node where they do.
+/// The track with exactly these laws active, linearised with the wheel at a node where they are.
 fn in_state(
     model: &TrackModel,
     hold: &Hold,
@@ -152,7 +154,8 @@ fn in_state(
     Some(model.clone().with_tangents(&tangents))
 }
 
-/// Where between two places something ends that is so at the first.
+/// The position in m between two places at which a condition that is true at the first place becomes
+/// false.
 fn change_m([mut from_m, mut to_m]: [f64; 2], is_so: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle_m = 0.5 * (from_m + to_m);
@@ -165,7 +168,7 @@ fn change_m([mut from_m, mut to_m]: [f64; 2], is_so: impl Fn(f64) -> bool) -> f6
     0.5 * (from_m + to_m)
 }
 
-/// Shares of each state in the half bays about each node, from stretches that follow one another.
+/// Share of each state in the halves of the rail elements next to each node, from consecutive stretches.
 fn shares(nodes_m: &[f64], stretches: &[(usize, f64)], states: usize) -> Vec<Vec<f64>> {
     let last = nodes_m.len() - 1;
     let middle_m = |node: usize| 0.5 * (nodes_m[node] + nodes_m[node + 1]);

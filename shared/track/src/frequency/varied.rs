@@ -1,7 +1,7 @@
-//! Receptances of tracks that differ from a known one at a few places of the rail.
+//! Receptances of tracks that differ from a solved track at a few places of the rail.
 //!
-//! Whatever differs, seen from the rail, changes its dynamic stiffness at a few degrees of freedom: the
-//! receptances follow from the known ones without a solution of the whole track.
+//! The differences change the dynamic stiffness of the rail at a few degrees of freedom only. The
+//! receptances follow from those of the solved track by a low-rank update.
 
 use super::banded::Inverse;
 use super::lane::{LANES, Lane, omega};
@@ -16,32 +16,33 @@ use rustfft::num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-/// Most degrees of freedom of the rail that may change: with more of them a whole solution is as quick.
+/// Largest number of changed degrees of freedom of the rail. With more of them, a complete solution is
+/// as fast.
 pub(super) const CHANGED_MAX: usize = 12;
 
-/// A track whose receptances are known.
+/// A solved track, from which the receptances of similar tracks follow.
 pub struct KnownRail {
     model: TrackModel,
     frequencies_hz: Vec<f64>,
-    /// Of each group of frequencies the rail's inverse and that of the mirrored rail.
+    /// For each group of frequencies, the inverse of the rail and that of the mirrored rail.
     inverses: Vec<[Inverse; 2]>,
     direct: Vec<Vec<Complex64>>,
 }
 
-/// What a track has in place of what the known one has.
+/// Differences between another track and the known track.
 pub(super) struct Difference<'a> {
     known: Partition<'a>,
     other: Partition<'a>,
-    /// Numbers of the pieces that the other track lacks, and of those that it has instead.
+    /// Indices of the pieces that only the known track has, and of those that only the other track has.
     pieces: [Vec<usize>; 2],
     /// Numbers of the rail's own entries that differ.
     rail: Vec<usize>,
-    /// Degrees of freedom of the rail that are touched, in order.
+    /// Degrees of freedom of the rail that change, in order.
     pub(super) dofs: Vec<usize>,
 }
 
 impl KnownRail {
-    /// Solves a track, on its own matrices: with force laws as they are under a wheel above them.
+    /// Solves a track with the matrices of `model`. Force laws are linearised under a wheel above them.
     pub fn new(model: &TrackModel, frequencies_hz: &[f64]) -> Self {
         let (partition, nodes) = (Partition::new(model), deflections(model));
         let solved = frequencies_hz.par_chunks(LANES).map(|chunk| {
@@ -60,8 +61,9 @@ impl KnownRail {
         }
     }
 
-    /// Direct receptances of every rail node in m/N, `[frequency][node]`, of a track on the same mesh:
-    /// up to `reach` nodes from what differs; further away the known ones.
+    /// Direct receptances of every rail node in m/N, `[frequency][node]`, of a track on the same mesh.
+    /// The function computes the nodes within `reach` nodes of a difference. Farther nodes keep the
+    /// values of the known track.
     pub fn direct_of(&self, model: &TrackModel, reach: usize) -> Vec<Vec<Complex64>> {
         let of = |track: &TrackModel| RailReceptances {
             direct: self.of_matrices(track, reach),
@@ -118,9 +120,9 @@ pub(super) fn resisted(
     resisting.lu().solve(changes).unwrap_or_else(none)
 }
 
-/// Adds `changes` to the dynamic stiffness at some degrees of freedom: what is direct falls by the diagonal of
-/// `B (1 + Z A)^-1 Z B'`, with the changes `Z`, the receptances `A` between these degrees of freedom and `B`
-/// from them to each node.
+/// Adds `changes` to the dynamic stiffness at some degrees of freedom. The direct receptances decrease
+/// by the diagonal of `B (1 + Z A)^-1 Z B'`, with the changes `Z`, the receptances `A` between these
+/// degrees of freedom, and the receptances `B` from these degrees of freedom to each node.
 fn lower(
     direct: &mut [Complex64],
     changes: &DMatrix<Complex64>,
@@ -139,16 +141,16 @@ fn lower(
     }
 }
 
-/// Columns of the known inverse, one a degree of freedom that is touched.
+/// Columns of the inverse of the known rail, one per changed degree of freedom.
 pub(super) struct Columns {
     /// Between these degrees of freedom.
     pub(super) at_dofs: DMatrix<Lane>,
-    /// At the nodes near them, a row a node.
+    /// At the nodes near these degrees of freedom, one row per node.
     pub(super) at_nodes: DMatrix<Lane>,
 }
 
 impl<'a> Difference<'a> {
-    /// None where the tracks' rails do not have entries in the same places.
+    /// `None` if the matrices of the two rails have different sparsity patterns.
     pub(super) fn new(known: &'a TrackModel, other: &'a TrackModel) -> Option<Self> {
         let [known, other] = [known, other].map(Partition::new);
         let places = |it: &Partition<'_>| -> Vec<(usize, usize)> {
@@ -191,7 +193,7 @@ impl<'a> Difference<'a> {
         Some(Self { known, other, pieces, rail, dofs: dofs.into_iter().collect() })
     }
 
-    /// The nodes up to so many from what is touched.
+    /// The nodes at most `reach` nodes from a changed degree of freedom.
     fn near(&self, dofs: &[Option<usize>], reach: usize) -> Range<usize> {
         let (from, to) = (self.dofs[0], self.dofs[self.dofs.len() - 1]);
         let first = dofs.iter().position(|dof| dof.is_some_and(|dof| dof >= from)).unwrap_or(0);
@@ -200,7 +202,7 @@ impl<'a> Difference<'a> {
         first.min(last).saturating_sub(reach)..(first.max(last) + reach + 1).min(dofs.len())
     }
 
-    /// Changes of the dynamic stiffness between the degrees of freedom that are touched.
+    /// Changes of the dynamic stiffness between the changed degrees of freedom.
     #[inline(always)]
     pub(super) fn changes(&self, omega: &impl Fn(usize) -> f64) -> DMatrix<Lane> {
         let count = self.dofs.len();
@@ -228,7 +230,8 @@ impl<'a> Difference<'a> {
         changes
     }
 
-    /// Columns of the inverse of the known rail, the second of these that of the mirrored one.
+    /// Columns of the inverse of the known rail. `inverses` has the inverse of the rail and that of the
+    /// mirrored rail.
     #[inline(always)]
     pub(super) fn columns(
         &self,
@@ -269,7 +272,7 @@ fn values(matrices: &Matrices, place: usize) -> [f64; 3] {
 }
 
 impl Piece {
-    /// Whether a piece of another track's matrices is the same.
+    /// Whether a piece has the same values as a piece of another track.
     fn is_as(&self, other: &Self, [own, others]: [&Matrices; 2]) -> bool {
         let is_as = |one: usize, other: usize| values(own, one) == values(others, other);
         let inner = self.inner.iter().zip(&other.inner);

@@ -1,11 +1,11 @@
-//! Puts elements and extensions together into the three matrices.
+//! Assembly of elements and extensions into mass, damping and stiffness matrix.
 
 use super::matrices::{Matrices, Term};
 use super::{ForceLaw, Layout, Support};
 use crate::element::{BeamElement, ElementMatrix, SpringDamper};
 use tracktwin_parameters::TrackDesign;
 
-/// A relative motion `bᵀ u` that something acts on: the entries of the sparse vector `b`.
+/// A relative motion `bᵀ u` on which an element acts, stored as the entries of the sparse vector `b`.
 ///
 /// An element of stiffness `k` on the port adds `k b bᵀ`.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,12 +19,12 @@ impl Port {
         &self.entries
     }
 
-    /// The relative motion for displacements of all degrees of freedom.
+    /// The relative motion `bᵀ u`, from the displacements `u` of all degrees of freedom.
     pub fn motion(&self, displacement: &[f64]) -> f64 {
         self.entries.iter().map(|&(dof, weight)| weight * displacement[dof]).sum()
     }
 
-    /// The motion of this port relative to another's.
+    /// The port of the relative motion between this port and another.
     #[must_use]
     pub fn minus(mut self, other: &Port) -> Self {
         self.entries.extend(other.entries.iter().map(|&(dof, weight)| (dof, -weight)));
@@ -49,7 +49,7 @@ pub struct Assembly {
     force_laws: Vec<ForceLaw>,
 }
 
-/// What an [`Assembly`] ends as.
+/// The result of an [`Assembly`].
 pub(super) struct Assembled {
     pub(super) layout: Layout,
     pub(super) matrices: Matrices,
@@ -76,22 +76,22 @@ impl Assembly {
         assembly
     }
 
-    /// What the track is made of, supports apart.
+    /// Design of the track. The supports are separate.
     pub fn design(&self) -> &TrackDesign {
         &self.design
     }
 
-    /// Where everything stands.
+    /// Positions and degrees of freedom of the track.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// What stands under each rail seat.
+    /// Railpad, half sleeper and ballast of each sleeper.
     pub fn supports(&self) -> &[Support] {
         &self.supports
     }
 
-    /// Replaces railpad and ballast of sleeper `index` (from 0); the sleeper stays as it is.
+    /// Replaces railpad and ballast of sleeper `index` (from 0). The sleeper itself does not change.
     ///
     /// # Panics
     /// When the track has no such sleeper.
@@ -115,11 +115,10 @@ impl Assembly {
         shares.into_iter().enumerate().map(of).collect()
     }
 
-    /// Takes part of the rail's bending stiffness away between two places in m: there it keeps
-    /// the `factor`.
+    /// Multiplies the bending stiffness of the rail by `factor` between two places in m.
     ///
-    /// An element that is softened on a part of its length gets the bending stiffness whose
-    /// flexibility is the mean of both; its shear stiffness stays.
+    /// An element that lies partly in this range gets the bending stiffness whose flexibility is the
+    /// weighted mean of both parts. The shear stiffness does not change.
     pub fn soften_rail(&mut self, [from_m, to_m]: [f64; 2], factor: f64) {
         for element in 0..self.layout.rail_elements().len() {
             let [start, end] = [0, 1].map(|side| self.layout.rail_nodes_m()[element + side]);
@@ -135,18 +134,18 @@ impl Assembly {
         }
     }
 
-    /// Adds a force that no matrix holds, in place of the linear terms that it names.
+    /// Adds a force law. Its field `linear` is the part that the matrices contain for it.
     pub fn add_force_law(&mut self, law: ForceLaw) {
         self.force_laws.push(law);
     }
 
-    /// Appends a degree of freedom, which nothing holds yet, and returns its port.
+    /// Appends a degree of freedom without stiffness and mass, and returns its port.
     pub fn append_dof(&mut self) -> Port {
         self.dofs += 1;
         Port::from_iter([(self.dofs - 1, 1.0)])
     }
 
-    /// Adds a spring and damper on a port.
+    /// Adds a spring and a damper on a port.
     pub fn add_spring_damper(&mut self, port: &Port, element: SpringDamper) {
         self.add_on_port(port, 0.0, element.damping, element.stiffness);
     }
@@ -156,7 +155,7 @@ impl Assembly {
         self.add_on_port(port, mass_kg, 0.0, 0.0);
     }
 
-    /// What has been put together.
+    /// The assembled matrices and force laws.
     pub(super) fn finish(self) -> Assembled {
         let matrices = Matrices::from_terms(self.dofs, self.terms);
         Assembled { layout: self.layout, matrices, force_laws: self.force_laws }
@@ -183,7 +182,7 @@ impl Assembly {
         }
     }
 
-    /// Adds a rail element as it is now, `factor` times.
+    /// Adds a rail element with its present stiffness, multiplied by `factor`.
     fn add_rail_element(&mut self, element: usize, factor: f64) {
         let beam = self.layout.rail_elements()[element];
         let dofs = self.layout.rail_element_dofs(element);

@@ -36,7 +36,7 @@ impl HertzContact {
         self.coefficient * compressed * compressed.sqrt()
     }
 
-    /// Approach in m that goes with a contact force in N.
+    /// Approach in m under a contact force in N.
     pub fn approach(&self, force_n: f64) -> f64 {
         (force_n / self.coefficient).powf(2.0 / 3.0)
     }
@@ -46,8 +46,9 @@ impl HertzContact {
         1.5 * force_n / self.approach(force_n)
     }
 
-    /// Contact force in N between bodies that would overlap by `overlap_m` without it and that
-    /// together give way by `compliance` in m/N: the root of `δ + compliance F(δ) = overlap`.
+    /// Contact force in N between two bodies: the root of `δ + compliance F(δ) = overlap`. `overlap_m`
+    /// is the overlap of the bodies without contact force; `compliance` in m/N is their common
+    /// displacement per unit contact force.
     ///
     /// The function is convex and increasing, and the iteration starts right of the root, so
     /// that Newton's method cannot fail; `None` if the input is not a number.
@@ -93,7 +94,7 @@ impl ContactPatch {
         Self { half_length_m: mean_m * (wheel_m / rail_m).powf(0.5 * ELLIPSE_EXPONENT) }
     }
 
-    /// By what it multiplies the irregularity's spectral density at a wave number in rad/m:
+    /// Factor on the spectral density of the irregularity at a wave number in rad/m:
     /// `|H|² = 1 / (1 + pi/4 (kappa a)³)` for a half length `a` (Remington 1976).
     pub fn gain(&self, wave_number_rad_m: f64) -> f64 {
         1.0 / (1.0 + FRAC_PI_4 * (wave_number_rad_m * self.half_length_m).powi(3))

@@ -1,11 +1,11 @@
-//! What the matrices cannot hold: forces that are no linear function of motion.
+//! Forces that are not a linear function of the motion. The matrices cannot contain them.
 
 use super::Port;
 use crate::element::SpringDamper;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// A force at one relative motion, with its slopes.
+/// A force at one relative motion, with its derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reaction {
     /// Force in N that resists a positive motion.
@@ -25,12 +25,12 @@ pub trait Law: Debug + Send + Sync {
     fn reaction(&self, displacement_m: f64, velocity_m_s: f64) -> Reaction;
 }
 
-/// A law on a port, in place of the spring and damper that the matrices hold for it.
+/// A force law on a port. It replaces the spring and damper that the matrices contain for this port.
 #[derive(Clone, Debug)]
 pub struct ForceLaw {
     /// The motion that it resists.
     pub port: Port,
-    /// Where along the track it acts, in m: a wheel there loads it most.
+    /// Position of the law along the track in m. A wheel at this position loads the law most.
     pub place_m: f64,
     /// Linear terms that represent the law in the matrices. During assembly they are the terms of its
     /// extension, afterwards the slopes of the law under the standing wheel.
@@ -40,7 +40,7 @@ pub struct ForceLaw {
 }
 
 impl ForceLaw {
-    /// What the law adds to the linear terms in the matrices.
+    /// Difference between the law and its linear terms in the matrices.
     pub(crate) fn correction(&self, displacement_m: f64, velocity_m_s: f64) -> Reaction {
         let Reaction { force, stiffness, damping } =
             self.law.reaction(displacement_m, velocity_m_s);

@@ -1,6 +1,7 @@
-//! The irregularity of the rail's surface: a spectrum, a seed, a height at every place.
+//! The irregularity of the railhead: spectrum, seed, and height at every place.
 //!
-//! Owns eq. B.6 and its synthesis; what a wheel does on the surface is `time`'s.
+//! This module implements eq. B.6 and the synthesis of a surface. The module `time` simulates the wheel
+//! on the surface.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -25,7 +26,7 @@ const LEVEL_UNIT: f64 = 1e-4;
 /// the grid: 1.4 % of the shortest, 0.1 % of one half as long again, far less of all others.
 const POINTS_PER_SHORTEST_WAVE: f64 = 4.0;
 
-/// What a rough surface is drawn from: the paper's spectrum at a level, between two wavelengths.
+/// Distribution of random surfaces: the spectrum of the paper at a level, between two wavelengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Roughness {
     /// Level `A_irr` in 1e-4 m2 rad/m.
@@ -72,8 +73,8 @@ impl Roughness {
         self.shaped_surface(seed, length_m, |_| 1.0)
     }
 
-    /// The surface of this seed whose spectral density is `gain` times eq. B.6; `gain` is asked
-    /// at wave numbers in rad/m.
+    /// The surface of this seed whose spectral density is `gain` times eq. B.6. The argument of `gain`
+    /// is a wave number in rad/m.
     ///
     /// The phases are those of [`Roughness::surface`]: a gain of one gives the same surface.
     pub fn shaped_surface(&self, seed: u64, length_m: f64, gain: impl Fn(f64) -> f64) -> Surface {
@@ -123,11 +124,11 @@ impl Surface {
         Roughness::new(level).surface(seed, length_m)
     }
 
-    /// The surface with a `share` (0..1) of its power replaced by that of an independent one: the
-    /// mean level stays as it was.
+    /// The surface with a `share` (0..1) of its power replaced by the power of an independent surface.
+    /// The mean level does not change.
     ///
     /// # Panics
-    /// If the two were made for different lengths or wavelengths.
+    /// If the two surfaces have different lengths or wavelengths.
     #[must_use]
     pub fn blend(&self, independent: &Self, share: f64) -> Self {
         assert_eq!(self.coefficients.len(), independent.coefficients.len(), "unequal surfaces");

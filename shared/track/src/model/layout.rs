@@ -1,4 +1,4 @@
-//! Which degree of freedom stands where.
+//! Positions and numbers of the degrees of freedom.
 
 use super::{Mesh, Port};
 use crate::element::BeamElement;
@@ -6,8 +6,9 @@ use tracktwin_parameters::TrackDesign;
 
 /// Geometry of the meshed track and the numbers of its degrees of freedom.
 ///
-/// The rail comes first, from left to right, then sleeper after sleeper, each from the symmetry
-/// plane to its tip, then whatever extensions appended. A held degree of freedom has no number.
+/// Order: the rail from left to right, the sleepers one after another, each from the symmetry plane to
+/// its tip, and last the degrees of freedom that extensions append. A held degree of freedom has no
+/// number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     rail_nodes_m: Vec<f64>,
@@ -30,14 +31,14 @@ pub struct SleeperLayout {
     first_dof: usize,
 }
 
-/// A point of the rail as a load or an observer meets it.
+/// A point of the rail where a load acts or a displacement is observed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RailPoint {
     /// The element that the point lies in.
     pub element: usize,
     /// The element's degrees of freedom `w₁ θ₁ w₂ θ₂`; `None` where held.
     pub dofs: [Option<usize>; 4],
-    /// Deflection at the point for a unit value of each.
+    /// Deflection at the point for a unit value of each degree of freedom.
     pub shape: [f64; 4],
     /// Deflection in m/N under a unit load that the shape functions leave out
     /// ([`BeamElement::clamped_flexibility`]).
@@ -57,18 +58,19 @@ impl RailPoint {
 }
 
 impl SleeperLayout {
-    /// Number of the deflection at a node.
+    /// Number of the degree of freedom of the deflection at a node.
     pub fn deflection_dof(&self, node: usize) -> usize {
         // The rotation at the symmetry plane is held and has no number.
         if node == 0 { self.first_dof } else { self.first_dof + 2 * node - 1 }
     }
 
-    /// Number of the rotation at a node; the symmetry plane (node 0) holds it.
+    /// Number of the degree of freedom of the rotation at a node. `None` at the symmetry plane (node 0),
+    /// which holds the rotation.
     pub fn rotation_dof(&self, node: usize) -> Option<usize> {
         (node > 0).then_some(self.first_dof + 2 * node)
     }
 
-    /// Numbers of all its degrees of freedom, extensions' apart.
+    /// Numbers of all degrees of freedom of the sleeper, without those of extensions.
     pub fn dofs(&self) -> std::ops::Range<usize> {
         self.first_dof..self.first_dof + 2 * self.nodes_m.len() - 1
     }
@@ -148,17 +150,18 @@ impl Layout {
         self.rail_nodes_m[self.rail_nodes_m.len() - 1]
     }
 
-    /// Degrees of freedom of rail and sleepers, extensions' apart.
+    /// Number of degrees of freedom of rail and sleepers, without those of extensions.
     pub fn structural_dofs(&self) -> usize {
         self.structural_dofs
     }
 
-    /// Degrees of freedom of the rail.
+    /// Number of degrees of freedom of the rail.
     pub fn rail_dofs(&self) -> usize {
         2 * self.rail_elements.len()
     }
 
-    /// Numbers of deflection and rotation at a rail node; both end nodes hold the deflection.
+    /// Numbers of the degrees of freedom of deflection and rotation at a rail node. The deflection is
+    /// held at both end nodes and is then `None`.
     pub fn rail_node_dofs(&self, node: usize) -> [Option<usize>; 2] {
         let last = self.rail_elements.len();
         match node {
@@ -183,7 +186,7 @@ impl Layout {
         ]
     }
 
-    /// The rail at `x_m`; the ends of the track stand for whatever lies beyond them.
+    /// The point of the rail at `x_m`. A position beyond an end of the track gives that end.
     pub fn rail_point(&self, x_m: f64) -> RailPoint {
         let after = self.rail_nodes_m.partition_point(|&node| node <= x_m);
         let element = after.clamp(1, self.rail_elements.len()) - 1;

@@ -1,4 +1,4 @@
-//! Mass, damping and stiffness on one common sparsity pattern.
+//! Mass, damping and stiffness matrix on one common sparsity pattern.
 
 use super::Port;
 use crate::element::SpringDamper;
@@ -56,7 +56,7 @@ impl Matrices {
         matrices
     }
 
-    /// The same with springs and dampers on ports added.
+    /// The matrices with springs and dampers on ports added.
     pub(super) fn with(&self, elements: &[(&Port, SpringDamper)]) -> Self {
         let (mass, damping, stiffness) = (&self.mass, &self.damping, &self.stiffness);
         let present = self.places().map(|(row, column, place)| Term {
@@ -78,7 +78,7 @@ impl Matrices {
         Self::from_terms(self.size(), terms)
     }
 
-    /// Whether entries stand in the same places.
+    /// Whether both have the same sparsity pattern.
     pub(super) fn has_pattern_of(&self, other: &Self) -> bool {
         self.row_starts == other.row_starts && self.columns == other.columns
     }
@@ -98,22 +98,22 @@ impl Matrices {
         &self.columns
     }
 
-    /// Mass matrix, an entry a place of the pattern, in kg, kg m and kg m2.
+    /// Mass matrix, one entry per place of the pattern, in kg, kg m and kg m2.
     pub fn mass(&self) -> &[f64] {
         &self.mass
     }
 
-    /// Damping matrix, an entry a place of the pattern, in N s/m, N s and N m s.
+    /// Damping matrix, one entry per place of the pattern, in N s/m, N s and N m s.
     pub fn damping(&self) -> &[f64] {
         &self.damping
     }
 
-    /// Stiffness matrix, an entry a place of the pattern, in N/m, N and N m.
+    /// Stiffness matrix, one entry per place of the pattern, in N/m, N and N m.
     pub fn stiffness(&self) -> &[f64] {
         &self.stiffness
     }
 
-    /// The values of `m M + c C + k K`, an entry a place of the pattern.
+    /// The values of `m M + c C + k K`, one entry per place of the pattern.
     pub fn combination(&self, m: f64, c: f64, k: f64) -> Vec<f64> {
         let damped =
             self.mass.iter().zip(&self.damping).map(|(mass, damping)| m * mass + c * damping);

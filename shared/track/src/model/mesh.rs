@@ -1,11 +1,11 @@
-//! How finely rail and sleepers are divided.
+//! Numbers of elements of rail and sleepers.
 
 /// Elements of the rail, span by span, and of every sleeper.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mesh {
-    /// Rail elements in each span; as many entries as the track has spans.
+    /// Number of rail elements in each span, one entry per span.
     pub rail_elements: Vec<usize>,
-    /// Elements of every half sleeper.
+    /// Number of elements of every half sleeper.
     pub sleeper_elements: usize,
 }
 
@@ -15,7 +15,7 @@ impl Mesh {
         Self { rail_elements: vec![rail_elements; spans], sleeper_elements }
     }
 
-    /// How many spans the track has.
+    /// Number of spans of the track.
     pub fn spans(&self) -> usize {
         self.rail_elements.len()
     }

@@ -1,6 +1,7 @@
 //! The track as equations of motion: geometry, supports, contact, assembled matrices.
 //!
-//! The solvers treat time and frequency. An [`Extension`] adds physics beyond the paper.
+//! The modules `time` and `frequency` solve the equations. An [`Extension`] adds physics beyond the
+//! paper.
 //!
 //! [`Extension`]: crate::extension::Extension
 

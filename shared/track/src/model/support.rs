@@ -1,4 +1,4 @@
-//! What stands under one rail seat.
+//! The support under one rail seat.
 
 use crate::element::SpringDamper;
 use tracktwin_parameters::{Parameter, ParameterSet};

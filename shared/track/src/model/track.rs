@@ -28,29 +28,29 @@ pub struct TrackModel {
     vehicle: Vehicle,
     /// The contact patch that filters the irregularity, if the design has one.
     contact_patch: Option<ContactPatch>,
-    /// How far the first wheel had rolled before it came to the track's origin, in m.
+    /// Distance in m that the first wheel rolled before it reached the origin of the track.
     wheel_turned_m: f64,
     extensions: Vec<Arc<dyn Extension>>,
 }
 
-/// Why no track can be built.
+/// Why a track cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// A track has at least one sleeper, a span at least one element, and a sleeper too.
+    /// The track has no sleeper, or a span or the sleepers have no element.
     #[error("the mesh needs at least two spans, and at least one element per span and per sleeper")]
     Mesh,
-    /// There must be a support a sleeper.
+    /// The number of supports differs from the number of sleepers.
     #[error("{spans} spans have {} sleepers, but {supports} supports are given", spans - 1)]
     Supports {
-        /// Spans of the mesh.
+        /// Number of spans of the mesh.
         spans: usize,
-        /// Supports given.
+        /// Number of given supports.
         supports: usize,
     },
-    /// A stiffness or damping is negative or no number, or a sleeper has no bending stiffness.
+    /// A stiffness or damping is negative, NaN or infinite, or a sleeper has no bending stiffness.
     #[error("the support of sleeper {sleeper} is not physical: {support:?}")]
     Support {
-        /// The sleeper, from 0.
+        /// Index of the sleeper, from 0.
         sleeper: usize,
         /// Its support.
         support: Support,
@@ -66,8 +66,7 @@ pub enum ModelError {
 }
 
 impl TrackModel {
-    /// Assembles the track: a support for every sleeper between the spans, then the extensions in
-    /// their order.
+    /// Assembles the track from one support per sleeper, then adds the extensions in their order.
     ///
     /// # Errors
     /// [`ModelError`] names the invalid input.
@@ -101,9 +100,10 @@ impl TrackModel {
         Ok(assembled.linearised())
     }
 
-    /// With every force law linearised where the wheel stands above it.
+    /// The track with every force law linearised for a wheel directly above the law.
     ///
-    /// A track that carries no wheel keeps what it has: a pass over it says so.
+    /// If the track cannot carry a wheel, its matrices do not change. A pass over this track then
+    /// returns the error.
     fn linearised(self) -> Self {
         if self.force_laws.is_empty() {
             return self;
@@ -116,7 +116,7 @@ impl TrackModel {
         }
     }
 
-    /// The same with each force law linearised to this spring and damper.
+    /// The track with each force law linearised to the given spring and damper.
     pub(crate) fn with_tangents(mut self, tangents: &[SpringDamper]) -> Self {
         let change = |(law, tangent): (&ForceLaw, &SpringDamper)| SpringDamper {
             stiffness: tangent.stiffness - law.linear.stiffness,
@@ -131,17 +131,17 @@ impl TrackModel {
         self
     }
 
-    /// What it was built from, supports apart.
+    /// Design from which the track was built. The supports are separate.
     pub fn design(&self) -> &TrackDesign {
         &self.design
     }
 
-    /// Where its degrees of freedom stand.
+    /// Positions and numbers of the degrees of freedom.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// Whether both tracks differ in nothing but the values in their matrices.
+    /// Whether both tracks differ only in the values of their matrices.
     pub(crate) fn has_pattern_of(&self, other: &Self) -> bool {
         self.design == other.design
             && self.layout == other.layout
@@ -149,22 +149,22 @@ impl TrackModel {
             && self.matrices.has_pattern_of(&other.matrices)
     }
 
-    /// Its mass, damping and stiffness; force laws by their linearisation.
+    /// Mass, damping and stiffness matrix. They contain the force laws in linearised form.
     pub fn matrices(&self) -> &Matrices {
         &self.matrices
     }
 
-    /// The forces that no matrix holds.
+    /// The force laws: forces that are not linear.
     pub fn force_laws(&self) -> &[ForceLaw] {
         &self.force_laws
     }
 
-    /// What rolls over it.
+    /// The vehicle on the track.
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
     }
 
-    /// Whether its matrices, and one rigid wheel, are all that moves.
+    /// Whether the track is linear: no force laws, and one rigid wheel as the vehicle.
     pub fn is_linear(&self) -> bool {
         self.force_laws.is_empty() && self.vehicle.is_rigid_wheel()
     }
@@ -180,16 +180,16 @@ impl TrackModel {
         self.extensions.iter().map(|extension| extension.wheel_profile_m(rolled_m)).sum()
     }
 
-    /// The same with a first wheel that has rolled so many metres more: in every pass it comes to
-    /// the track with another side down.
+    /// The track with a first wheel that has rolled `rolled_m` metres farther. The wheel then enters the
+    /// track at another angle.
     #[must_use]
     pub fn with_wheel_turned(mut self, rolled_m: f64) -> Self {
         self.wheel_turned_m += rolled_m;
         self
     }
 
-    /// By what the design's contact patch and the extensions multiply the spectral density of the
-    /// irregularity at a wave number in rad/m.
+    /// Factor of contact patch and extensions on the spectral density of the irregularity at a wave
+    /// number in rad/m.
     pub fn roughness_gain(&self, wave_number_rad_m: f64) -> f64 {
         let gain = |extension: &Arc<dyn Extension>| extension.roughness_gain(wave_number_rad_m);
         let by_extensions: f64 = self.extensions.iter().map(gain).product();
@@ -197,8 +197,8 @@ impl TrackModel {
         by_extensions * by_patch
     }
 
-    /// The irregularity of this seed, of the given roughness as extensions change it, along the
-    /// whole track; [`TrackModel::profile_m`] is not in it.
+    /// The irregularity along the whole track, from this seed and the given roughness, with the changes
+    /// by extensions. It does not contain [`TrackModel::profile_m`].
     pub fn surface(&self, roughness: &Roughness, seed: u64) -> Surface {
         let gain = |wave_number| self.roughness_gain(wave_number);
         roughness.shaped_surface(seed, self.layout.length_m(), gain)

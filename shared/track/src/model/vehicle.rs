@@ -3,7 +3,7 @@
 use rustfft::num_complex::Complex64;
 use tracktwin_parameters::Wheel;
 
-/// A wheel, whatever moves with it, and further wheels on the same rail.
+/// A wheel with the parts that move with it, and further wheels on the same rail.
 ///
 /// Springs connect some parts to the wheel. Some parts of the rail deform under the contact at every place.
 /// The model separates the motion of these parts into two: the motion of the wheel as a whole, and
@@ -11,11 +11,11 @@ use tracktwin_parameters::Wheel;
 /// the contact is `u_wheel - q_1 - q_2 ... - u_rail - z`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vehicle {
-    /// Mass and load of the wheel with all that it carries.
+    /// Mass and load of the wheel, with all parts that it carries.
     pub wheel: Wheel,
-    /// What gives way beside the wheel's mass.
+    /// Oscillators that the contact force drives, in addition to the mass of the wheel.
     pub oscillators: Vec<ContactOscillator>,
-    /// Places of further wheels of the same kind, in m ahead of the first.
+    /// Positions of further identical wheels, in m ahead of the first.
     pub further_wheels_m: Vec<f64>,
 }
 
@@ -28,8 +28,8 @@ pub struct ContactOscillator {
     pub damping_n_s_m: f64,
     /// Stiffness `k` in N/m.
     pub stiffness_n_m: f64,
-    /// How much of `q` the sensor feels, beside the motion of the vehicle's centre of mass;
-    /// positive downwards.
+    /// Share of `q` in the motion of the sensor, in addition to the motion of the centre of mass of the
+    /// vehicle. Positive downwards.
     pub sensed: f64,
 }
 
@@ -53,14 +53,14 @@ impl Vehicle {
         self.oscillators.is_empty() && self.further_wheels_m.is_empty()
     }
 
-    /// How far the wheel's contact point gives way upwards, in m/N, under a unit contact force at
-    /// an angular frequency in rad/s, oscillators included: `-1 / (m w²) + ...`.
+    /// Upward displacement of the contact point of the wheel per unit contact force, in m/N, at an
+    /// angular frequency in rad/s. The value includes the oscillators: `-1 / (m w²) + ...`.
     pub fn receptance(&self, omega: f64) -> Complex64 {
         let wheel = Complex64::from(-1.0 / (self.wheel.mass_kg * omega * omega));
         wheel + self.oscillators.iter().map(|part| part.receptance(omega)).sum::<Complex64>()
     }
 
-    /// What the sensor feels, in m/s2 per N of contact force, at an angular frequency in rad/s.
+    /// Acceleration at the sensor in m/s2 per N of contact force, at an angular frequency in rad/s.
     ///
     /// A positive contact force pushes the wheel upwards: on a rigid wheel this is `-1 / m`.
     pub fn acceleration_per_force(&self, omega: f64) -> Complex64 {

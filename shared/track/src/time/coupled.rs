@@ -1,4 +1,4 @@
-//! Contacts and force laws that push on one track: their forces at the end of a step.
+//! Forces of all contacts and force laws on one track at the end of a time step.
 
 use super::kinematics::Kinematics;
 use crate::model::{ForceLaw, HertzContact, Reaction};
@@ -7,16 +7,17 @@ use nalgebra::{DMatrix, DVector};
 /// Change of the motions, relative to the largest of them, at which Newton's iteration has
 /// converged: some hundred roundings of a double.
 const TOLERANCE: f64 = 1e-13;
-/// Newton's steps; laws without jumps take three to ten, more means that they do not fit.
+/// Largest number of Newton steps. Continuous laws need three to ten; more steps mean that there is no
+/// solution.
 const STEPS_MAX: usize = 100;
-/// Halvings of a step that makes things worse.
+/// Largest number of halvings of a Newton step that does not reduce the residual.
 const HALVINGS_MAX: usize = 30;
 
-/// What resists a motion.
+/// A force that resists a motion.
 pub(super) enum Resistance<'a> {
     /// A wheel's contact, at its approach.
     Contact(HertzContact),
-    /// A force law on the track, with its motion so far and the time step; at rest without one.
+    /// A force law on the track, with its state and the time step. `None`: at rest.
     Law(&'a ForceLaw, Kinematics, Option<f64>),
 }
 
@@ -41,7 +42,7 @@ impl Resistance<'_> {
         }
     }
 
-    /// Whether there is no force at a motion, nor near it.
+    /// Whether the force is zero at a motion and near this motion.
     pub(super) fn rests_at(&self, motion_m: f64) -> bool {
         self.at(motion_m) == (0.0, 0.0)
     }
@@ -50,7 +51,7 @@ impl Resistance<'_> {
 /// Motions `y` in m and forces `R(y)` in N with `y + S R(y) = free`, by Newton's method with
 /// shortened steps; `S` in m/N, starting from a guess of the motions.
 ///
-/// `None` if no motions are found that fit, as when something is not a number.
+/// `None` if the iteration does not converge, for example because an input is NaN.
 pub(super) fn solve(
     resistances: &[Resistance],
     compliance: &DMatrix<f64>,

@@ -1,4 +1,4 @@
-//! The vehicle at rest on the track: where every pass starts.
+//! Static equilibrium of vehicle and track: the initial state of every pass.
 
 use super::statics::Statics;
 use super::{Pass, PassError};

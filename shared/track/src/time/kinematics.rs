@@ -13,7 +13,7 @@ impl Kinematics {
         Self { displacement, ..Self::default() }
     }
 
-    /// Moves on to a new displacement under constant average acceleration.
+    /// Updates the state to a new displacement under constant average acceleration.
     pub(super) fn advance(&mut self, displacement: f64, dt: f64) {
         let velocity = self.velocity_at(displacement, dt);
         self.acceleration = 2.0 / dt * (velocity - self.velocity) - self.acceleration;
@@ -21,23 +21,23 @@ impl Kinematics {
         self.displacement = displacement;
     }
 
-    /// The velocity that goes with a new displacement.
+    /// The velocity after a step to a new displacement.
     pub(super) fn velocity_at(&self, displacement: f64, dt: f64) -> f64 {
         2.0 / dt * (displacement - self.displacement) - self.velocity
     }
 
-    /// What the mass would have to be pushed with to stay at displacement zero, per mass.
+    /// Force per unit mass from the previous state: `4 u / dt² + 4 v / dt + a`.
     pub(super) fn inertia(&self, dt: f64) -> f64 {
         4.0 / (dt * dt) * self.displacement + 4.0 / dt * self.velocity + self.acceleration
     }
 
-    /// The same for a damper, per damping.
+    /// Force per unit damping from the previous state: `2 u / dt + v`.
     pub(super) fn resistance(&self, dt: f64) -> f64 {
         2.0 / dt * self.displacement + self.velocity
     }
 }
 
-/// A degree of freedom that hangs on nothing but itself and one force.
+/// A single degree of freedom with mass, damper and spring, on which one force acts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Single {
     mass: f64,

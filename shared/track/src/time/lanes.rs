@@ -1,9 +1,9 @@
-//! The fast solver: many cases at once, eight side by side in the lanes of vector registers.
+//! The fast solver: many cases at once, eight in the lanes of one vector register.
 //!
-//! The same scheme on the same matrices as the plain solver, in one of two ways. A track whose
-//! sleepers hang on single places of the rail, as all do without extensions that join them, is
-//! condensed to its rail; any other is eliminated as a whole. Either way the wheel stands at the
-//! same place in all cases, so that its shape functions are scalars.
+//! The fast solver uses the same scheme and the same matrices as the plain solver. If each sleeper is
+//! connected to one degree of freedom of the rail, the track is condensed to its rail. This is the case
+//! without extensions that connect sleepers. Any other track is eliminated as a whole. The wheel is at
+//! the same place in all cases, so its shape functions are scalars.
 
 #![expect(
     clippy::inline_always,
@@ -21,14 +21,14 @@ use crate::model::{Surface, TrackModel};
 use block::{Block, LANES};
 use std::array;
 
-/// Runs the wheel over many tracks, each with its own surface; the records come in their order.
+/// Runs the wheel over many tracks, each with its own surface. The records have the order of the tracks.
 ///
-/// Equal to [`super::pass`] case by case, up to rounding; equal to the last bit however the cases
-/// are grouped and ordered. Cases of one design, mesh and kind of extensions share their work,
-/// eight at a time; others are computed apart.
+/// Each record equals that of [`super::pass`] up to rounding. Order and grouping of the cases do not
+/// change a single bit. Cases with the same design, mesh and kinds of extension are computed in groups
+/// of eight, other cases separately.
 ///
 /// # Errors
-/// [`PassError`] of the first case that has one.
+/// [`PassError`] of the first case that fails.
 pub(super) fn passes(
     models: &[TrackModel],
     pass: &Pass,
@@ -61,14 +61,14 @@ pub(super) fn passes(
     Ok(records.into_iter().flatten().collect())
 }
 
-/// A track, its surface, and what hangs under its rail where it can be condensed.
+/// A track, its surface and, if the track can be condensed to the rail, its substructures.
 struct Case<'a> {
     model: &'a TrackModel,
     surface: &'a Surface,
     hanging: Option<condensed::Hanging>,
 }
 
-/// Indices of the cases that may run side by side: equal in all but their values.
+/// Indices of the cases that can share one vector register: those that differ only in their values.
 fn families(cases: &[Case]) -> Vec<Vec<usize>> {
     let mut families: Vec<Vec<usize>> = Vec::new();
     for (index, case) in cases.iter().enumerate() {

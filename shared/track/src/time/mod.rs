@@ -1,7 +1,7 @@
-//! A wheel runs over the track: what its axle box feels.
+//! Time domain: a wheel runs over the track; the result is the axle-box acceleration.
 //!
-//! [`pass`] is the reference solver, one case at a time. What the accelerations mean is
-//! `tracktwin-signal`'s.
+//! [`pass`] is the reference solver, one case at a time. The crate `tracktwin-signal` evaluates the
+//! accelerations.
 
 mod cholesky;
 mod coupled;
@@ -19,7 +19,7 @@ pub use passes::passes;
 pub use run::{Pass, PassError, PassRecord};
 pub(crate) use statics::StaticSolution;
 
-/// Where the contact point of the standing wheel is on a smooth rail, in m.
+/// Displacement in m of the contact point of the standing wheel on a smooth rail.
 #[cfg(test)]
 pub(crate) fn standing(model: &crate::model::TrackModel, pass: &Pass) -> f64 {
     equilibrium::Equilibrium::new(model, pass, &[0.0]).unwrap().contacts_m[0]

@@ -1,4 +1,4 @@
-//! The plain solver: one case, one step after the other, as the equations say it.
+//! The plain solver: one case, step by step, directly from the equations.
 
 use super::cholesky::Cholesky;
 use super::coupled::{self, Resistance};
@@ -11,12 +11,12 @@ use nalgebra::{DMatrix, DVector};
 
 /// Runs the vehicle over the track.
 ///
-/// Average acceleration (Newmark, `β = 1/4`, `γ = 1/2`) for track and vehicle; contact forces, and
-/// the forces of laws that no matrix holds, are found by Newton's method on their own motions
-/// alone, to which track and vehicle are condensed. Source: paper, Appendix B.
+/// Average acceleration (Newmark, `β = 1/4`, `γ = 1/2`) for track and vehicle. Track and vehicle are
+/// condensed to the motions of contacts and force laws; Newton's method gives the forces. Source: paper,
+/// Appendix B.
 ///
 /// # Errors
-/// [`PassError`] if the pass leaves the track, or the track or its surface makes no sense.
+/// [`PassError`] if the pass leaves the track, or if track or surface are invalid.
 pub fn pass(model: &TrackModel, pass: &Pass, surface: &Surface) -> Result<PassRecord, PassError> {
     pass.check(model)?;
     let mut motion = NewmarkState::start(model, pass, surface)?;
@@ -28,14 +28,14 @@ pub fn pass(model: &TrackModel, pass: &Pass, surface: &Surface) -> Result<PassRe
     Ok(record)
 }
 
-/// Heights of the surface under all wheels after so many steps.
+/// Heights of the surface in m under all wheels after `step` steps.
 fn heights_m(model: &TrackModel, pass: &Pass, surface: &Surface, step: usize) -> Vec<f64> {
     let further = model.vehicle().further_wheels_m.iter();
     let further = further.map(|&ahead_m| pass.further_height_m(model, surface, step, ahead_m));
     [pass.height_m(model, surface, step)].into_iter().chain(further).collect()
 }
 
-/// A force law on its way.
+/// State of a force law during a pass.
 struct Resisting<'a> {
     law: &'a ForceLaw,
     motion: Kinematics,
@@ -43,7 +43,7 @@ struct Resisting<'a> {
     unit: Vec<f64>,
 }
 
-/// Vehicle and track on their way.
+/// State of vehicle and track during a pass.
 struct NewmarkState<'a> {
     model: &'a TrackModel,
     contact: HertzContact,
@@ -60,7 +60,7 @@ struct NewmarkState<'a> {
     force_n: f64,
 }
 
-/// What stands on the rail in one step, and what it would do there alone.
+/// Wheels on the rail in one step, and the motions without contact forces.
 struct FreeMotion {
     points: Vec<RailPoint>,
     /// Displacements of the track per unit contact force of each wheel.
@@ -131,8 +131,7 @@ impl<'a> NewmarkState<'a> {
         FreeMotion { points, units, overlaps, free }
     }
 
-    /// The contact force if there is one wheel and all laws are at rest; not a number if the
-    /// input is not.
+    /// The contact force if there is one wheel and all laws have zero force. NaN if an input is NaN.
     fn forces_of_one_contact(&self, free_motion: &FreeMotion) -> Option<f64> {
         let ([overlap], [unit]) = (&free_motion.overlaps[..], &free_motion.units[..]) else {
             return None;
@@ -146,7 +145,7 @@ impl<'a> NewmarkState<'a> {
         self.laws.iter().all(at_rest).then_some(force)
     }
 
-    /// How far one wheel and the track below it give way to each other's unit force.
+    /// Displacement of one wheel relative to the track below it per unit contact force, in m/N.
     fn compliance(&self, free_motion: &FreeMotion, wheel: usize) -> f64 {
         let point = &free_motion.points[wheel];
         let local = if self.local_flexibility { point.local_flexibility } else { 0.0 };
@@ -180,7 +179,7 @@ impl<'a> NewmarkState<'a> {
         Some(forces.iter().copied().collect())
     }
 
-    /// Moves everything on under contact forces and, behind them, forces of laws.
+    /// Updates all states. `forces` has the contact forces, then the forces of the laws.
     fn push(&mut self, free_motion: FreeMotion, forces: &[f64]) {
         let mut displacement = free_motion.free;
         let mut add = |factor: f64, unit: &[f64]| {
@@ -203,7 +202,7 @@ impl<'a> NewmarkState<'a> {
         }
     }
 
-    /// Displacements at the end of the step if the wheel lifted off.
+    /// Displacements at the end of the step without contact force.
     fn track_without_contact(&self) -> Vec<f64> {
         let matrices = self.model.matrices();
         let inertia: Vec<_> = self.track.iter().map(|dof| dof.inertia(self.dt)).collect();

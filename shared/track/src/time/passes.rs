@@ -1,17 +1,17 @@
-//! Many passes: each by the solver that its track needs.
+//! Many passes, each computed by the solver that its track needs.
 
 use super::{Pass, PassError, PassRecord, lanes, newmark};
 use crate::model::{Surface, TrackModel};
 
-/// Runs the vehicle over many tracks, each with its own surface; the records come in their order.
+/// Runs the vehicle over many tracks, each with its own surface. The records have the order of the
+/// tracks.
 ///
-/// Equal to [`super::pass`] case by case, up to rounding; equal to the last bit however the cases
-/// are grouped and ordered. Tracks that matrices and one rigid wheel describe go through the fast
-/// solver side by side ([`TrackModel::is_linear`]); those with force laws, a second wheel or parts
-/// that hang on the wheel go through the plain one.
+/// Each record equals that of [`super::pass`] up to rounding. Order and grouping of the cases do not
+/// change a single bit. The fast solver computes linear tracks ([`TrackModel::is_linear`]) in groups.
+/// The plain solver computes tracks with force laws, a second wheel or parts that move on the wheel.
 ///
 /// # Errors
-/// [`PassError`] of a case that has one.
+/// [`PassError`] of a case that fails.
 pub fn passes(
     models: &[TrackModel],
     pass: &Pass,

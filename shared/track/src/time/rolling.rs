@@ -1,16 +1,16 @@
-//! The vehicle on its way: wheels and what hangs on them.
+//! State of the vehicle during a pass: wheels and their oscillators.
 
 use super::kinematics::Single;
 use crate::model::{ContactOscillator, Vehicle};
 
 /// A wheel, and the oscillators that its contact force drives.
 pub(super) struct Rolling {
-    /// How far ahead of the first wheel it runs, in m.
+    /// Distance of the wheel ahead of the first wheel in m.
     pub(super) ahead_m: f64,
     load_n: f64,
     wheel: Single,
     oscillators: Vec<(ContactOscillator, Single)>,
-    /// Where wheel and oscillators would be at the end of the step without contact.
+    /// Displacements of wheel and oscillators at the end of the step without contact force.
     free: Vec<f64>,
 }
 
@@ -47,13 +47,13 @@ impl Rolling {
         Self { ahead_m, load_n, wheel, oscillators, free }
     }
 
-    /// How far the contact point gives way in a step under a unit contact force, in m/N.
+    /// Displacement of the contact point in one step per unit contact force, in m/N.
     pub(super) fn compliance(&self) -> f64 {
         let oscillators = self.oscillators.iter().map(|(_, state)| state.compliance);
         self.wheel.compliance + oscillators.sum::<f64>()
     }
 
-    /// Where the contact point would be at the end of the step without contact, in m.
+    /// Displacement of the contact point in m at the end of the step without contact force.
     pub(super) fn lift_off(&mut self, dt: f64) -> f64 {
         self.free[0] = self.wheel.free(self.load_n, dt);
         for (free, (_, state)) in self.free[1..].iter_mut().zip(&self.oscillators) {
@@ -62,7 +62,7 @@ impl Rolling {
         self.free[0] - self.free[1..].iter().sum::<f64>()
     }
 
-    /// Moves on under the contact force of the step that [`Rolling::lift_off`] began.
+    /// Completes the step that [`Rolling::lift_off`] started, with the contact force in N.
     pub(super) fn advance(&mut self, force_n: f64, dt: f64) {
         self.wheel.advance(self.free[0] - force_n * self.wheel.compliance, dt);
         for (free, (_, state)) in self.free[1..].iter().zip(&mut self.oscillators) {
@@ -70,7 +70,7 @@ impl Rolling {
         }
     }
 
-    /// What the sensor feels, in m/s2.
+    /// Acceleration at the sensor in m/s2.
     pub(super) fn acceleration(&self) -> f64 {
         let parts = self.oscillators.iter().map(|(part, state)| part.sensed * state.acceleration());
         self.wheel.acceleration() + parts.sum::<f64>()

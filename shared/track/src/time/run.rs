@@ -1,8 +1,9 @@
-//! What a pass is and what it leaves behind.
+//! Definition and record of a pass.
 
 use crate::model::{Surface, TrackModel};
 
-/// Time over which the irregularity grows from nothing, so that the wheel meets no step.
+/// Time in s over which the irregularity increases from zero at the start, to avoid a step under the
+/// wheel.
 const RAMP_S: f64 = 2e-3;
 
 /// One run of the wheel over the track at constant speed.
@@ -10,15 +11,16 @@ const RAMP_S: f64 = 2e-3;
 pub struct Pass {
     /// Speed in m/s.
     pub speed_m_s: f64,
-    /// Where the wheel starts, in static equilibrium, in m.
+    /// Start position of the wheel in m. The wheel starts in static equilibrium.
     pub start_m: f64,
-    /// Where the pass ends in m.
+    /// End position of the wheel in m.
     pub end_m: f64,
     /// Time step in s.
     pub time_step_s: f64,
-    /// Whether the contact gives way by the flexibility inside the loaded rail element too.
+    /// Whether the contact includes the local flexibility inside the loaded rail element.
     ///
-    /// Without it the scheme is the paper's, and the mesh is a false roughness of the rail.
+    /// Without this flexibility the scheme is that of the paper, and the mesh acts as a false roughness
+    /// of the rail.
     pub local_flexibility: bool,
 }
 
@@ -38,7 +40,7 @@ pub struct PassRecord {
 }
 
 impl PassRecord {
-    /// Where the wheel was at sample `index`, in m.
+    /// Position of the wheel in m at sample `index`.
     pub fn position_m(&self, index: usize) -> f64 {
         self.start_m + index as f64 * self.speed_m_s * self.time_step_s
     }
@@ -52,10 +54,10 @@ impl PassRecord {
     }
 }
 
-/// Why a pass has no result.
+/// Why a pass cannot be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PassError {
-    /// A wheel leaves the track, stands still, runs backwards or has no time step.
+    /// A wheel leaves the track, or speed, distance or time step are not positive.
     #[error(
         "a pass from {} to {} m at {} m/s exceeds the track of {length_m} m with at least \
              one wheel",
@@ -69,21 +71,21 @@ pub enum PassError {
         /// Length of the track in m.
         length_m: f64,
     },
-    /// Something carries nothing: stiffness or inertia is not positive definite.
+    /// The stiffness or inertia matrix is not positive definite: a part of the track is unsupported.
     #[error("the stiffness matrix of the track is not positive definite (unsupported track?)")]
     Unstable,
-    /// The contact force is not a number any more.
+    /// The contact force became NaN or infinite.
     #[error("the contact force is not a number at {position_m} m")]
     NotFinite {
-        /// Where the wheel stood in m.
+        /// Position of the wheel in m.
         position_m: f64,
     },
-    /// Cases and surfaces must come in pairs.
+    /// The number of surfaces differs from the number of track models.
     #[error("{models} tracks need {models} surfaces, not {surfaces}")]
     Surfaces {
-        /// Track models given.
+        /// Number of given track models.
         models: usize,
-        /// Surfaces given.
+        /// Number of given surfaces.
         surfaces: usize,
     },
 }
@@ -96,20 +98,20 @@ impl Pass {
         (steps + 1e-6).floor() as usize
     }
 
-    /// Position of the wheel in m after so many steps.
+    /// Position of the wheel in m after `step` time steps.
     pub fn position_m(&self, step: usize) -> f64 {
         self.start_m + self.speed_m_s * self.time_step_s * step as f64
     }
 
-    /// Height in m of the surface under the wheel after so many steps, with what extensions add
-    /// to it, eased in from its height at the start.
+    /// Height in m of the surface under the wheel after `step` time steps, with the profiles of
+    /// extensions. A ramp of [`RAMP_S`] starts from the height at the first sample.
     pub(super) fn height_m(&self, model: &TrackModel, surface: &Surface, step: usize) -> f64 {
         let height =
             |x_m: f64| surface.height(x_m) + model.profile_m(x_m) + model.wheel_profile_m(x_m);
         self.eased_in(step, height)
     }
 
-    /// The same under a further wheel, `ahead_m` before the first and round.
+    /// Height in m under a further wheel, `ahead_m` ahead of the first. A further wheel is round.
     pub(super) fn further_height_m(
         &self,
         model: &TrackModel,
@@ -139,7 +141,7 @@ impl Pass {
         first + ramp * (height(self.position_m(step)) - first)
     }
 
-    /// That the pass lies on the track and goes forward.
+    /// Checks that the pass lies on the track and goes forward.
     pub(super) fn check(&self, model: &TrackModel) -> Result<(), PassError> {
         let length_m = model.layout().length_m();
         let wheels = [0.0].into_iter().chain(model.vehicle().further_wheels_m.iter().copied());

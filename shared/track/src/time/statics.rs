@@ -14,7 +14,7 @@ pub(super) struct Statics<'a> {
     stiffness: Cholesky,
     /// Displacements of the track per unit force of each law.
     units: Vec<Vec<f64>>,
-    /// How far each law gives way to a unit force of each.
+    /// Motion at each law per unit force of each law, in m/N.
     compliance: DMatrix<f64>,
 }
 
@@ -54,7 +54,7 @@ impl<'a> Statics<'a> {
         Some(motions.iter().copied().collect())
     }
 
-    /// Lets the force laws push back on displacements that were found without them.
+    /// Adds the effect of the force laws to displacements computed without them.
     fn resist(&self, track: &mut [f64]) -> Option<()> {
         let laws = self.model.force_laws();
         if laws.is_empty() {
@@ -85,15 +85,15 @@ impl<'a> StaticSolution<'a> {
         Statics::new(model).ok().map(Self)
     }
 
-    /// Spring and damper that each force law is to a small motion while the wheel stands there.
+    /// Spring and damper that each force law equals for small motions while the wheel is at `x_m`.
     pub(crate) fn tangents(&self, x_m: f64) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
         let motions = statics.law_motions(statics.model.vehicle().wheel.load_n, x_m)?;
         Some(self.tangents_at(motions.into_iter()))
     }
 
-    /// The same by the displacements of the whole track, on whose last digits the version of the physics
-    /// rests.
+    /// Computes the tangents from the displacements of the whole track. The version of the physics
+    /// depends on the last digits of this result.
     fn tangents_by_track(&self, x_m: f64) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
         let track = statics.under(statics.model.vehicle().wheel.load_n, &[x_m]).ok()?;
@@ -108,7 +108,7 @@ impl<'a> StaticSolution<'a> {
         self.0.model.force_laws().iter().zip(motions_m).map(tangent).collect()
     }
 
-    /// The same for each law while the wheel stands above it.
+    /// Tangents of each law with the wheel directly above the law.
     pub(crate) fn tangents_above(&self) -> Option<Vec<SpringDamper>> {
         let Self(statics) = self;
         let mut latest: Option<(f64, Vec<SpringDamper>)> = None;

@@ -10,15 +10,15 @@ use tracktwin_surrogate::{
     TrainingSet, train,
 };
 
-/// Speeds of the paper's campaign in km/h.
+/// Speeds of the paper's campaign, in km/h.
 const SPEEDS_KM_H: [f64; 3] = [7.0, 10.0, 13.0];
-/// Sleepers of a lap, and their spacing in m.
+/// Number of sleepers of a lap, and their spacing in m.
 const SLEEPERS: u16 = 100;
 const SPACING_M: f64 = 0.125;
-/// Samples a second.
+/// Sample rate in Hz.
 const RATE_HZ: f64 = 1e5;
 
-/// Models of the global feature over `set`, by the scaling that training usually chooses.
+/// Models of the global feature for `set`, with the scaling that training usually selects.
 fn models(set: &TrainingSet) -> Result<Trained, Error> {
     let all = FeatureColumns::new("GF", 0..set.frequencies_hz.len());
     let scalings = vec![InputScaling::Whitened { components: 16, shrinkage: 0.1 }];
@@ -77,7 +77,7 @@ pub(crate) fn selector() -> Result<Vec<Line>, Error> {
     Ok(vec![Line::new("selector: ten of 10,000 x 304", each, accuracy)])
 }
 
-/// All entries, the nearest first.
+/// All entries, ordered by distance.
 fn sorted(selector: &Selector, observed: &[f64]) -> Vec<Neighbour> {
     let distance = |entry| {
         let pairs = selector.features(entry).iter().zip(observed);

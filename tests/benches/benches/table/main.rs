@@ -1,6 +1,6 @@
-//! Every row of the table in `docs/performance.md`, as tab-separated lines:
-//! `cargo bench -p tracktwin-benches --bench table [-- WORD ...]` measures the rows whose name
-//! holds one of the words, or all of them.
+//! Measures the rows of the table in `docs/performance.md` and prints them as tab-separated lines. `cargo
+//! bench -p tracktwin-benches --bench table [-- WORD ...]` measures the rows whose name contains one of the
+//! words; without words, all rows.
 
 mod evaluation;
 mod regression;
@@ -11,10 +11,10 @@ use tracktwin_benches::Cost;
 
 type Error = Box<dyn std::error::Error>;
 
-/// Entries that models are trained on, half a library of the paper's size.
+/// Number of training entries: half of a library of the paper's size.
 const ENTRIES: usize = 5000;
 
-/// One row: its name and what measures it.
+/// A row: its name, and the function that measures it.
 type Row = (&'static str, fn() -> Result<Vec<Line>, Error>);
 
 const ROWS: [Row; 8] = [

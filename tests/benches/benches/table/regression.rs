@@ -7,7 +7,7 @@ use tracktwin_surrogate::{
     Factor, FeatureColumns, Hyperparameters, ModelGroup, TrainOptions, distances_within, train,
 };
 
-/// Steps of a difference quotient of the likelihood, in logarithms of length and noise.
+/// Step of a difference quotient of the likelihood, in the logarithms of length and noise.
 const STEP: f64 = 1e-4;
 
 /// One target and a typical pair of hyper-parameters.
@@ -53,8 +53,8 @@ pub(crate) fn likelihood() -> Result<Vec<Line>, Error> {
     ])
 }
 
-/// The five feature vectors of the paper at one speed, six parameters each, scalings,
-/// hyper-parameters, folds and test included.
+/// Training of the paper's five feature vectors at one speed, with six parameters each. It includes
+/// scalings, hyper-parameters, folds and test.
 pub(crate) fn training() -> Result<Vec<Line>, Error> {
     let set = library(2 * ENTRIES, &[13.0]);
     let bands = [("GF", 50.0, 4000.0), ("LF1", 400.0, 700.0), ("LF2", 800.0, 1500.0)]

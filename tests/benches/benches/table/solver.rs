@@ -1,4 +1,4 @@
-//! The time steps, and what a worker does for a case.
+//! Time steps, and the work of a worker for one case.
 
 use super::{Error, Line};
 use tracktwin_benches::{Track, cases, cost};
@@ -26,15 +26,15 @@ pub(crate) fn time_steps() -> Result<Vec<Line>, Error> {
     Ok(lines)
 }
 
-/// Root mean square of the difference over that of the reference.
+/// Root mean square of the difference, divided by that of the reference.
 fn relative(values: &[f64], reference: &[f64]) -> f64 {
     let power = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>();
     let difference = power(&mut values.iter().zip(reference).map(|(a, b)| a - b));
     (difference / power(&mut reference.iter().copied())).sqrt()
 }
 
-/// What a worker does for a case of a campaign, in groups of eight: at every speed two spans of
-/// run-in, the window and its margins, then the features.
+/// Work for a case of a campaign, in groups of eight: at every speed two spans of run-in, the window and
+/// its margins, then the features.
 pub(crate) fn case() -> Result<Vec<Line>, Error> {
     let track = Track { spans: 40, rail_elements: 4, sleeper_elements: 8 };
     let extractor = Extractor::new(&FeatureDefinition::default())?;

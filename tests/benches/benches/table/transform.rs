@@ -1,4 +1,4 @@
-//! The features of a window.
+//! Computing the features of a window.
 
 use super::{Error, Line};
 use tracktwin_benches::{axle_box, cost};

@@ -1,4 +1,4 @@
-//! Campaign files that are understood, and those that are refused.
+//! Tests of campaign files: valid files are parsed, invalid files are refused.
 
 use super::*;
 

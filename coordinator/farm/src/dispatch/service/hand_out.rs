@@ -1,4 +1,4 @@
-//! Cases for workers.
+//! Leases cases to workers.
 
 use super::{Dispatch, unix_ms};
 use crate::dispatch::campaigns::{DispatchError, Served};
@@ -10,17 +10,17 @@ use tonic::Status;
 use tracktwin_library::{self as library, LeaseRequest};
 use tracktwin_protocol::{CaseLease, Lease, LeasedCase};
 
-/// After the library had no case to give, it is not asked again for so long.
+/// Minimum pause before the next query, after the library had no waiting case.
 const NOTHING: Duration = Duration::from_millis(100);
 
-/// Longest waiting time of a worker without work, so that it soon finds new campaigns.
+/// Maximum pause between the lease requests of an idle worker. It bounds the delay of a new campaign.
 const WAIT_MAX: Duration = Duration::from_mins(1);
 
-/// Workers without work that may ask once a second all together.
+/// Target for the lease requests per second of all idle workers together.
 const IDLE_CALLS_S: f64 = 400.0;
 
 impl Dispatch {
-    /// Cases for a worker that is to have some.
+    /// Leases cases to a worker that may get cases.
     pub(super) async fn hand_out(&self, worker: &str, cases_max: u32) -> Result<Lease, Status> {
         let failed = |error: &DispatchError| {
             tracing::error!("cannot lease cases: {error}");
@@ -66,7 +66,7 @@ impl Dispatch {
         }
     }
 
-    /// A campaign that this version can't do must not hold up the others.
+    /// Pauses a campaign that this version cannot simulate, so that other campaigns are served.
     async fn give_up_campaign(&self, worker: &str, leased: &library::Lease) {
         let held = leased.cases.iter();
         let held = held.map(|it| library::Held { index: it.case.index, epoch: it.epoch });
@@ -79,7 +79,7 @@ impl Dispatch {
         );
     }
 
-    /// Cases of the campaign that the worker in this process holds.
+    /// Cases of the campaign that the worker of this process holds.
     fn held_here(&self) -> Vec<library::Held> {
         let (Some(own), Some(scope)) = (&self.settings.own, &self.settings.scope) else {
             return Vec::new();
@@ -93,7 +93,7 @@ impl Dispatch {
         until.is_some_and(|until| until > Instant::now())
     }
 
-    /// The more workers have nothing to do, the less often each asks.
+    /// Response without cases. The pause it contains is longer if more workers are present.
     fn none_now(&self) -> Lease {
         let (workers, cores) = self.roster.present();
         let crowd = f64::from(cores).max(workers as f64) / IDLE_CALLS_S;
@@ -104,7 +104,7 @@ impl Dispatch {
 }
 
 impl Served {
-    /// These cases as a lease message.
+    /// The lease message with these cases.
     pub(crate) fn lease(&self, cases: Vec<LeasedCase>) -> CaseLease {
         CaseLease {
             campaign: self.record.id.clone(),

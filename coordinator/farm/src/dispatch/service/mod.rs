@@ -1,4 +1,4 @@
-//! The gRPC service: messages in, library calls, messages out.
+//! The gRPC service: it converts messages to library calls, and their results to messages.
 
 mod hand_out;
 mod take_in;
@@ -19,7 +19,7 @@ use tracktwin_protocol::farm::farm_server::Farm;
 use tracktwin_protocol::{BadMessage, CaseReport, Lease, Registration, farm, held_to_messages};
 use tracktwin_traces::Step;
 
-/// The farm's service, for the campaigns of a library.
+/// The gRPC service of the farm, for the campaigns of a library.
 pub struct Dispatch {
     library: Library,
     settings: Settings,
@@ -31,7 +31,7 @@ pub struct Dispatch {
 }
 
 impl Dispatch {
-    /// A service that hands out what `settings` say of a library.
+    /// Creates a service that leases cases of `library` according to `settings`.
     pub fn new(library: Library, settings: Settings, counts: Counts) -> Self {
         Self {
             campaigns: Campaigns::new(library.clone()),
@@ -44,10 +44,10 @@ impl Dispatch {
         }
     }
 
-    /// Whether this version can do a campaign's experiment.
+    /// Checks whether this version can simulate a campaign's experiment.
     ///
     /// # Errors
-    /// [`DispatchError`] when it can't, or the library can't be read.
+    /// Returns [`DispatchError`] if it cannot, or if the library cannot be read.
     pub async fn check(&self, campaign: &str) -> Result<(), DispatchError> {
         self.campaigns.of(campaign).await.map(drop)
     }
@@ -59,7 +59,7 @@ impl Dispatch {
         }
     }
 
-    /// Eligibility of a worker; an unregistered one gets an error.
+    /// Eligibility of a worker; an error status if the worker is not registered.
     async fn eligibility(&self, worker: &str) -> Result<WorkerEligibility, Status> {
         let not_registered = || Status::unauthenticated("register first");
         let eligibility = self.roster.eligibility(worker).ok_or_else(not_registered)?;
@@ -220,7 +220,7 @@ impl Farm for Dispatch {
     }
 }
 
-/// A worker's name and a campaign's, fit for the library.
+/// Checks the names of a worker and of a campaign in a message, and returns both.
 fn names(worker: String, campaign_id: String) -> Result<[String; 2], Status> {
     let checked = |field, text| tracktwin_protocol::name(field, text).map_err(|it| malformed(&it));
     Ok([checked("worker", worker)?, checked("campaign_id", campaign_id)?])

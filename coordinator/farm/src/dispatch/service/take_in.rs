@@ -1,4 +1,4 @@
-//! Workers' results, into the library.
+//! Checks the reports of workers and stores them in the library.
 
 use super::Dispatch;
 use crate::dispatch::ATTEMPTS_MAX;
@@ -14,8 +14,8 @@ use tracktwin_protocol::{CaseReport, farm};
 use tracktwin_traces::Step;
 
 impl Dispatch {
-    /// Stores checked reports; those of audits are compared instead, and those that arrived damaged (none)
-    /// stay with their worker.
+    /// Stores the checked reports, and compares the reports of audits. `None` is a report that was damaged
+    /// in transmission; its worker must send it again. Returns one verdict per report.
     pub(super) async fn take_in(
         &self,
         worker: &str,

@@ -1,4 +1,4 @@
-//! Cases and what belongs to them, as the schema promises it.
+//! Verification of cases, and of the rows that belong to them, against the constraints of the schema.
 
 use super::{Fault, Survey};
 use crate::case::case_of;

@@ -1,4 +1,4 @@
-//! The file of a library, and its schema.
+//! Verification of a library's file and of its schema.
 
 use super::Survey;
 use crate::LibraryError;
@@ -29,7 +29,7 @@ impl<F: FnMut()> Survey<'_, F> {
         Ok(())
     }
 
-    /// Tables, views, indices and triggers are those that this program makes.
+    /// Checks that the tables, views, indices and triggers are those of this program.
     async fn schema(&mut self) -> Result<(), LibraryError> {
         let name = self.library.name();
         let ask = sql("select type as kind, name, sql from sqlite_schema where sql is not null");
@@ -60,7 +60,8 @@ impl<F: FnMut()> Survey<'_, F> {
         Ok(())
     }
 
-    /// Rows that refer to others which are not there: a program that doesn't look may have left them.
+    /// Finds rows that refer to missing rows. A program that does not check foreign keys may have left such
+    /// rows.
     async fn references(&mut self) -> Result<(), LibraryError> {
         let name = self.library.name();
         let ask =
@@ -79,7 +80,7 @@ impl<F: FnMut()> Survey<'_, F> {
     }
 }
 
-/// Whether two statements differ by blanks at most.
+/// Whether two statements are equal except for white space.
 fn same(a: &str, b: &str) -> bool {
     a.split_whitespace().eq(b.split_whitespace())
 }

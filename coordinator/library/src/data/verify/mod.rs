@@ -1,6 +1,6 @@
 //! Verification of a library's integrity.
 //!
-//! Unreadable data are findings as well, and the verification continues after them.
+//! Unreadable data is reported as a fault, and the verification continues with the remaining data.
 
 mod cases;
 mod file;
@@ -12,16 +12,16 @@ use crate::{CampaignRecord, Library, LibraryError};
 use std::error::Error;
 use tokio_stream::StreamExt;
 
-/// Something that is wrong, and how often.
+/// A fault of one kind, with the number of its occurrences.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IntegrityFault {
-    /// Where: a campaign, or the library.
+    /// Location: id of a campaign, or name of the library.
     pub place: String,
-    /// What.
+    /// Description of the fault.
     pub what: String,
-    /// How often.
+    /// Number of occurrences.
     pub count: u64,
-    /// The first case that shows it.
+    /// Lowest index of an affected case, if cases are affected.
     pub first_index: Option<u32>,
 }
 
@@ -30,21 +30,22 @@ pub struct IntegrityFault {
 pub struct Verified {
     /// Faults; empty for an intact library.
     pub findings: Vec<IntegrityFault>,
-    /// Cases whose results have the checksum that came with them.
+    /// Number of cases whose results match their checksum.
     pub attested: u64,
-    /// Cases whose results have no checksum, so that alterations cannot be detected.
+    /// Number of cases whose results have no checksum, so that alterations cannot be detected.
     pub unattested: u64,
-    /// What was not verified, and why.
+    /// Parts that were not verified, each with the reason.
     pub notes: Vec<String>,
 }
 
 impl Library {
-    /// Verifies everything: the file with `SQLite`, the schema, readability, checksums, hashes,
-    /// gaps, duplicates, NaN and infinite values, and counts. `looked_at` is called for each case
-    /// whose results were verified.
+    /// Verifies the whole library: the file with `SQLite`, the schema, readability, checksums, hashes,
+    /// gaps, duplicates, NaN and infinite values, and counts. Calls `looked_at` after the verification of
+    /// each case with results.
     ///
     /// # Errors
-    /// [`LibraryError`] when the library does not answer; what is wrong with it is a finding.
+    /// Returns [`LibraryError`] if the library does not respond. Faults of the library are findings, not
+    /// errors.
     pub async fn verify(&self, looked_at: impl FnMut()) -> Result<Verified, LibraryError> {
         let mut survey = Survey { library: self, found: Verified::default(), looked_at };
         match self.readers().dialect() {
@@ -64,7 +65,7 @@ impl Library {
     }
 }
 
-/// A verification in progress.
+/// State of a verification in progress.
 struct Survey<'a, F> {
     library: &'a Library,
     found: Verified,
@@ -77,7 +78,7 @@ impl<F: FnMut()> Survey<'_, F> {
         self.found.findings.push(IntegrityFault { place, what, count, first_index });
     }
 
-    /// Takes a failure to read for a finding, unless the library is only away.
+    /// Adds an error of reading as a fault. Returns the error if the library is only unavailable.
     fn unreadable(
         &mut self,
         place: &str,
@@ -112,7 +113,7 @@ impl<F: FnMut()> Survey<'_, F> {
         }
     }
 
-    /// Reads every row of the tables that nothing else here reads whole.
+    /// Reads every row of the tables that no other check reads completely.
     async fn tables(&mut self) -> Result<(), LibraryError> {
         for table in super::Table::ALL {
             if ["campaign", "campaign_case", "result"].contains(&table.name) {
@@ -133,7 +134,7 @@ impl<F: FnMut()> Survey<'_, F> {
     }
 }
 
-/// The error of the database as one line.
+/// Message of the database's error, in one line.
 pub(super) fn reason(error: &LibraryError) -> String {
     let mut reason = error.to_string();
     if let LibraryError::Malformed { reason: said } = error {
@@ -150,7 +151,7 @@ pub(super) fn reason(error: &LibraryError) -> String {
     reason.replace('\n', " ")
 }
 
-/// How often a fault was met.
+/// Number of occurrences of a fault.
 #[derive(Default)]
 struct Fault {
     count: u64,

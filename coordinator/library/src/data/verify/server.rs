@@ -4,8 +4,8 @@ use super::Survey;
 use crate::LibraryError;
 use crate::engine::sql;
 
-/// Statements that count what lies about in a server's library, where no foreign key looks for a result's case
-/// or a series' result (docs/decisions/0035), and find its first index.
+/// Statements that count orphaned rows and find the lowest index of one. PostgreSQL has no foreign key from
+/// a result to its case, nor from a series to its result (docs/decisions/0035).
 const LOOSE: [(&str, &str); 3] = [
     (
         "orphaned results: their case is missing",
@@ -27,7 +27,7 @@ const LOOSE: [(&str, &str); 3] = [
     ),
 ];
 
-/// Relations of the schema that are not read completely: a table or view, and one of its columns.
+/// Relations of the schema that are not read completely: name of a table or view, and one of its columns.
 const RELATIONS: [(&str, &str); 9] = [
     ("case_result", "checksum"),
     ("case_series", "log_power"),
@@ -40,7 +40,7 @@ const RELATIONS: [(&str, &str); 9] = [
     ("campaign_progress", "finished"),
 ];
 
-/// Triggers of the counts of cases.
+/// Triggers that maintain the counts of cases.
 const TRIGGERS: [&str; 3] = ["count_inserted_case", "count_updated_case", "count_deleted_case"];
 
 impl<F: FnMut()> Survey<'_, F> {
@@ -83,7 +83,7 @@ impl<F: FnMut()> Survey<'_, F> {
         Ok(())
     }
 
-    /// Has the server look over its indexes, where its extension `amcheck` was added to the database.
+    /// Lets the server check its indexes if the extension `amcheck` is installed in the database.
     async fn indexes(&mut self) -> Result<(), LibraryError> {
         let (readers, name) = (self.library.readers(), self.library.name());
         let there = "select extname as name from pg_extension where extname = 'amcheck'";

@@ -1,4 +1,4 @@
-//! Results, number by number.
+//! Verification of every number of the results.
 
 use super::{Fault, Survey};
 use crate::engine::sql;
@@ -15,7 +15,7 @@ struct Faults {
 }
 
 impl<F: FnMut()> Survey<'_, F> {
-    /// Holds every result against its checksum, and its numbers against what they can be.
+    /// Compares every result with its checksum, and its numbers with their valid range.
     pub(super) async fn values(&mut self, campaign: &CampaignRecord) -> Result<(), LibraryError> {
         let library = self.library;
         let bins = library.bins(&campaign.experiment_hash).await.unwrap_or(0);

@@ -1,22 +1,22 @@
-//! Ranges that some of the values searched for keep to.
+//! Ranges that restrict some of the searched values.
 
 use super::Calibration;
 use nalgebra::{Cholesky, DVector};
 
-/// A logarithm so near to the end of its range is at it.
+/// A logarithm is at the end of its range if its distance from the end is smaller.
 const AT_END: f64 = 1e-9;
 
 /// Ranges of the last values; all others are free.
 #[derive(Default)]
 pub(super) struct Ranges {
-    /// Number of the first value with a range.
+    /// Index of the first value with a range.
     pub(super) first: usize,
-    /// Lowest and highest of each.
+    /// Lowest and highest value of each.
     pub(super) each: Vec<[f64; 2]>,
 }
 
 impl Ranges {
-    /// Moves values into their ranges.
+    /// Clamps values to their ranges.
     pub(super) fn confine(&self, values: &mut DVector<f64>) {
         for (offset, [low, high]) in self.each.iter().enumerate() {
             let value = &mut values[self.first + offset];
@@ -24,8 +24,8 @@ impl Ranges {
         }
     }
 
-    /// The step to where a state's gradient vanishes, as far as it stays inside: what is at its
-    /// range's end and would leave is kept there, and the others' step is found without it.
+    /// The Gauss-Newton step of a state, limited to the ranges. A value at the end of its range that would
+    /// leave the range is held, and the step of the other values is computed without it.
     pub(super) fn step(&self, state: &Calibration) -> Option<DVector<f64>> {
         let mut step = state.precision.solve(&state.gradient);
         let factor = state.precision.l();
@@ -45,7 +45,7 @@ impl Ranges {
         Some(&step * inside.fold(1.0, f64::min))
     }
 
-    /// A value at its range's end that a step would take out of it.
+    /// Index of a value at the end of its range that the step would move out of the range.
     fn leaving(&self, values: &DVector<f64>, step: &DVector<f64>) -> Option<usize> {
         let leaves = |(offset, [low, high]): (usize, &[f64; 2])| {
             let index = self.first + offset;
@@ -58,7 +58,7 @@ impl Ranges {
     }
 }
 
-/// The part of a step after which a value comes to the end of its range, at most one.
+/// Share of a step, at most one, that keeps a value inside its range.
 fn part_inside([low, high]: [f64; 2], value: f64, step: f64) -> f64 {
     let room = if step < 0.0 { low - value } else { high - value };
     if step == 0.0 { 1.0 } else { (room / step).min(1.0) }

@@ -12,11 +12,11 @@ use tracktwin_inspection::{Finding, Place};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{Kind, WHEEL_OUT_OF_ROUND};
 
-/// The diagnosis of a recording that has no track to compare with, for the reason given; none where
-/// the passes show nothing for sure.
+/// The diagnosis of a recording that cannot be compared with a track, for the given reason. `None` if no
+/// hypothesis is accepted.
 ///
-/// Accepted are findings tested on withheld blocks, and faults of the measuring chain; all others
-/// are possibilities.
+/// The function accepts findings that were tested on withheld blocks, and faults of the measuring chain;
+/// all other findings are alternatives.
 pub fn passes_alone(
     recording: &Recording,
     inspection: &Inspection,

@@ -1,4 +1,4 @@
-//! Findings of the passes alone, as hypotheses beside those of the model.
+//! Findings of an inspection as hypotheses, in addition to those of the model.
 
 use super::{Evidence, FAILED_SHARE, names};
 use crate::estimate::Estimate;
@@ -7,12 +7,12 @@ use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, Kind};
 
-/// Sleeper spacings from an accepted effect within which its own trace may look like a finding.
+/// Distance in sleeper spacings within which the signature of an accepted extension may resemble a finding.
 const REACH_SPANS: f64 = 3.0;
 
 impl Evidence<'_> {
-    /// A finding of the passes alone is a separate hypothesis if the model has not found it as
-    /// well.
+    /// Adds a finding of the inspection as a separate hypothesis, unless the search with the model also
+    /// found it.
     pub(super) fn add_finding(&self, finding: &Finding, all: &mut Vec<Hypothesis>) {
         let Some(kind) = Kind::from_name(finding.physics) else { return };
         let probability = probability(finding);
@@ -46,8 +46,8 @@ impl Evidence<'_> {
     }
 }
 
-/// Whether an accepted effect accounts for a finding of this kind at a place: not for one that lies farther
-/// away than its trace reaches, nor for one that repeats with every turn of the wheel.
+/// Whether an accepted extension explains a finding of this kind at a location. It explains neither a
+/// finding beyond the reach of its signature nor one that repeats with every turn of the wheel.
 fn explains(known: &Hypothesis, kind: &Kind, place: Option<&Location>, reach_m: f64) -> bool {
     let at_wheel = |kind: &Kind| kind.classes.contains(&Class::WheelAngle);
     let known_at_wheel = Kind::from_name(&known.physics).is_some_and(at_wheel);

@@ -1,4 +1,4 @@
-//! How well baseline and extended model agree with the recording, and what they say of the track.
+//! Agreement of baseline and extended model with the recording, and their track parameters.
 
 use super::Evidence;
 use crate::calibration::{Calibration, CalibrationError, Problem};
@@ -87,7 +87,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// Parameters at the place of what was accepted, or everywhere.
+    /// Parameters without and with the accepted physics, at its location or on the whole section.
     pub(super) fn bias_removed(
         &self,
         hypotheses: &[Hypothesis],

@@ -1,4 +1,4 @@
-//! From a search to the diagnosis that is written down.
+//! Conclusion: the diagnosis that follows from a search.
 
 mod alone;
 mod finding;
@@ -22,47 +22,47 @@ use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{Kind, LookAlikeGroup};
 
-/// Greatest probability where nothing could be tested on a speed that was not fitted: structure and
-/// geometry look alike at one speed.
+/// Largest probability if no held-out speed could be tested: at a single speed, structure and geometry have
+/// the same effect.
 const ONE_SPEED_MAX: f64 = 0.5;
 
-/// Greatest probability where no pass repeats another: how far passes differ had to be assumed.
+/// Largest probability if no pass repeats another: the variation between passes is then an assumption.
 const ONE_PASS_MAX: f64 = 0.9;
 
-/// Greatest probability of anything: the model that it rests on may be wrong.
+/// Largest probability of any hypothesis: the model itself may be wrong.
 const MODEL_MAX: f64 = 0.97;
 
-/// Greatest probability of something unknown on a track on which error rates were not measured: of two
-/// unknowns on recordings of a line one was at the right place (docs/diagnosis-examples.md).
+/// Largest probability of unknown physics on a track without measured error rates: of two unknown
+/// hypotheses on recordings of a railway line, one had the correct location (docs/diagnosis-examples.md).
 const UNMEASURED_UNKNOWN_MAX: f64 = 0.5;
 
-/// Share of a family's probability that the name has which the passes alone suggest.
+/// Share of a group's probability that belongs to the kind which the inspection suggests.
 const NAMED_SHARE: f64 = 0.65;
 
-/// What is left of a name's probability when it does not predict withheld speeds better, or a shape
-/// that it does not have shows.
+/// Factor on the probability of a hypothesis that does not predict withheld speeds better, or that lacks a
+/// detected shape.
 const FAILED_SHARE: f64 = 0.1;
 
-/// Hypotheses of less probability are not worth a line.
+/// Hypotheses with a smaller probability are not reported.
 const PROBABILITY_MIN: f64 = 0.001;
 
-/// Everything that a conclusion is drawn from.
+/// Input of a conclusion.
 pub struct Evidence<'a> {
     /// The recording.
     pub recording: &'a Recording,
-    /// What was compared.
+    /// The prepared recording.
     pub prepared: &'a PreparedRecording,
-    /// Inspection of the passes alone.
+    /// Inspection of the passes without a track model.
     pub inspection: &'a Inspection,
-    /// Result of the search with the model.
+    /// Result of the search with the track model.
     pub search: &'a SearchOutcome,
 }
 
 impl Evidence<'_> {
-    /// The diagnosis.
+    /// Draws the conclusion.
     ///
     /// # Errors
-    /// [`CalibrationError`] when a calibrated track makes no model.
+    /// [`CalibrationError`] if no model exists for the values of a calibrated track.
     pub fn conclude(&self) -> Result<Diagnosis, CalibrationError> {
         let mut hypotheses = self.hypotheses();
         self.add_patch(&mut hypotheses);
@@ -116,7 +116,7 @@ impl Evidence<'_> {
         self.prepared.forward.section.track.design == TrackDesign::v_track()
     }
 
-    /// As sure as the recording lets anybody be.
+    /// Largest probability that the recording permits.
     fn probability_max(&self) -> f64 {
         if self.speeds() == 1 {
             ONE_SPEED_MAX
@@ -127,7 +127,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// Probability that nothing is left out, beside these hypotheses.
+    /// Probability that nothing is left out, given these hypotheses.
     fn nothing(&self, hypotheses: &[Hypothesis]) -> f64 {
         let first = self.search.rounds.first().map_or(1.0, |round| round.probabilities().nothing);
         let accepted = hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
@@ -187,8 +187,9 @@ impl Evidence<'_> {
     }
 }
 
-/// A shape of the rail that the passes alone show, and no fit of the model beside its siblings, tells its
-/// group more surely than its name: a joint may bend more easily, or be a dip alone.
+/// Divides the probability of a rail shape that only the inspection detected among the kinds of its group.
+/// Without a fit the group is more certain than the kind: a rail joint may have a reduced bending
+/// stiffness, or only a dip.
 fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
     let mut siblings = Vec::new();
     for index in 0..hypotheses.len() {
@@ -227,7 +228,7 @@ fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
     hypotheses.extend(siblings);
 }
 
-/// Probability of each hypothesis's family at its place: members exclude each other there.
+/// Sets the probability of each hypothesis's family at its location; its members exclude each other there.
 fn add_families(hypotheses: &mut [Hypothesis], most: f64) {
     let all: Vec<_> = hypotheses
         .iter()
@@ -255,7 +256,7 @@ fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
     }
 }
 
-/// That the wheel is in the air somewhere, which no fit knows.
+/// Sentence on contact loss, which no fit includes.
 fn airborne(inspection: &Inspection) -> String {
     let Some(lost) = &inspection.loss_of_contact else { return String::new() };
     let [from_m, to_m] = lost.reach_m();

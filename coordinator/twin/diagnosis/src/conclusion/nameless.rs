@@ -1,4 +1,4 @@
-//! Findings of the passes alone whose kind is not in the catalogue.
+//! Findings of an inspection whose kind is not in the catalogue.
 
 use super::finding::seen;
 use super::{Evidence, FAILED_SHARE};
@@ -9,12 +9,12 @@ use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
 use tracktwin_track::extension::{Class, EffectFamily, Kind};
 
-/// Probability of such a patch by chance up to which it is reported.
+/// Largest probability by chance of a patch that is reported.
 const PATCH_ALARM: f64 = 0.01;
 
 impl Evidence<'_> {
-    /// A finding without a name is unknown, at its place, unless something other than a shape of
-    /// rail or wheel was accepted: another shape's name is not given to it.
+    /// Adds a finding of a missing kind as unknown physics at its location, unless an extension other than
+    /// a shape of rail or wheel was accepted. A shape of another kind at this location is rejected.
     pub(super) fn add_nameless(&self, finding: &Finding, all: &mut Vec<Hypothesis>) {
         let Some(kind) = Kind::from_name(finding.physics).filter(|kind| !kind.measuring_chain)
         else {
@@ -54,8 +54,8 @@ impl Evidence<'_> {
 }
 
 impl Evidence<'_> {
-    /// What the final model does not explain though an eye would see it: unknown, with its class, where
-    /// nothing was accepted.
+    /// Adds a visible patch of the final residual as unknown physics with its family, if nothing was
+    /// accepted.
     pub(super) fn add_patch(&self, all: &mut Vec<Hypothesis>) {
         let Some((patch, p_value)) = &self.search.patch else { return };
         if *p_value > PATCH_ALARM || all.iter().any(|known| known.accepted) {

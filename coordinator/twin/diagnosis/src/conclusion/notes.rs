@@ -1,4 +1,4 @@
-//! Notes beside the hypotheses.
+//! Notes of a diagnosis.
 
 use super::{Evidence, ONE_PASS_MAX, ONE_SPEED_MAX};
 use crate::outcome::{Hypothesis, meet};
@@ -7,7 +7,7 @@ use tracktwin_inspection::{Finding, Inspection};
 use tracktwin_number::chance;
 use tracktwin_signal::recording::Recording;
 
-/// Ratio of two speeds that separates structure from geometry well.
+/// Ratio of two speeds that separates effects of structure and geometry well.
 const SPEED_RATIO: f64 = 1.35;
 
 impl Evidence<'_> {
@@ -30,7 +30,7 @@ impl Evidence<'_> {
         notes
     }
 
-    /// Residual evidence after the last search.
+    /// Note on the significant residual after the last search.
     fn remainder(&self, hypotheses: &[Hypothesis]) -> Option<String> {
         let round = self.search.rounds.last().filter(|round| round.is_significant())?;
         let place = round.port.as_ref().map_or(String::new(), |port| match &port.place {
@@ -66,7 +66,7 @@ impl Evidence<'_> {
         (!round.accepted && !named).then_some(left)
     }
 
-    /// Whether the passes alone show an accepted effect at a place, which the model did not fit.
+    /// Whether the inspection gave an accepted hypothesis at this port that the model did not fit.
     fn is_found_at(&self, place: &PortPlace, hypotheses: &[Hypothesis]) -> bool {
         let Some(place) = self.location_of_port(place) else { return false };
         let is_fitted = |physics: &str| {
@@ -79,7 +79,7 @@ impl Evidence<'_> {
     }
 }
 
-/// Where the wheel is in the air.
+/// Note on contact loss.
 pub(super) fn lost(inspection: &Inspection, recording: &Recording) -> Option<String> {
     let lost = inspection.loss_of_contact.as_ref()?;
     Some(format!(

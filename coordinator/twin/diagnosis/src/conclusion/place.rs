@@ -1,4 +1,4 @@
-//! Where something is: in metres, sleepers and frequencies.
+//! Locations of hypotheses and mismatches: in metres, sleepers and frequencies.
 
 use super::Evidence;
 use crate::candidate::Candidate;
@@ -9,10 +9,10 @@ use std::ops::Range;
 use tracktwin_inspection::{Finding, Place};
 use tracktwin_track::extension::PlaceKind;
 
-/// Share of a trace's square by which a sleeper belongs to the place of a mismatch.
+/// Share of the largest squared signature from which a sleeper or band belongs to a mismatch.
 const PLACE_SHARE: f64 = 0.1;
 
-/// Error of a place on the recording's scale in sleeper spacings: odometers wander by millimetres.
+/// Position error in sleeper spacings: odometers deviate by millimetres.
 const PLACE_ERROR: f64 = 0.04;
 
 impl Evidence<'_> {
@@ -26,7 +26,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// None at the wheel or where it is everywhere.
+    /// `None` at the wheel or if the stiffness is everywhere.
     pub(super) fn location_of_port(&self, place: &PortPlace) -> Option<Location> {
         let everywhere = self.prepared.forward.section.sleepers;
         match place {
@@ -36,7 +36,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// From the first of some sleepers, of which there is one at least, to the last.
+    /// Location from the first to the last of some sleepers; the list must not be empty.
     pub(super) fn location(&self, sleepers: &[usize]) -> Location {
         let section = &self.prepared.forward.section;
         let [first, last] = [sleepers[0], sleepers[sleepers.len() - 1]];
@@ -46,7 +46,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// A stretch with the sleepers whose half bays it touches.
+    /// A stretch in m, with the sleepers that are at most half a spacing away.
     pub(super) fn location_between(&self, from_m: f64, to_m: f64) -> Location {
         let section = &self.prepared.forward.section;
         let half_m = (0.5 + PLACE_ERROR) * section.track.design.sleeper.spacing_m;
@@ -83,7 +83,7 @@ impl Evidence<'_> {
         found.take(self.search.accepted.len().max(1)).collect()
     }
 
-    /// Sleepers and bands where a whitened change of the prediction is greatest.
+    /// Sleepers and bands in which a whitened change of the prediction is greatest.
     fn mismatch(&self, change: &DVector<f64>, p_value: f64, levels: &Levels) -> Mismatch {
         let forward = &self.prepared.forward;
         let square = |row: usize| change[row].powi(2);
@@ -119,7 +119,7 @@ impl Evidence<'_> {
     }
 }
 
-/// The stretch of entries that hold a good share of the sum.
+/// Range of the entries above [`PLACE_SHARE`] of the largest entry.
 fn loud(squares: &[f64]) -> Range<usize> {
     let highest = squares.iter().copied().fold(0.0, f64::max);
     let part = |square: &f64| *square >= PLACE_SHARE * highest;

@@ -1,4 +1,4 @@
-//! Fits of a search as hypotheses.
+//! Hypotheses from the fits of a search.
 
 use super::{Evidence, FAILED_SHARE, names};
 use crate::behaviour::Behaviour;
@@ -8,24 +8,24 @@ use crate::port_scan::UnknownElement;
 use crate::search::{Fitted, Probabilities, Round};
 use std::collections::BTreeMap;
 
-/// Probability of such evidence for an unknown stiffness by chance up to which it is reported.
+/// Largest probability by chance of the evidence for an unknown stiffness that is reported.
 const PORT_ALARM: f64 = 0.01;
 
-/// Probability of nothing at all below which something is left out even if no name predicts a
-/// withheld speed better.
+/// If the probability of nothing is below this, physics is left out even if no kind predicts a withheld
+/// speed better.
 const NOTHING_LEFT: f64 = 0.02;
 
-/// Probability that what is left beside a named effect is something new.
+/// Probability that a residual in addition to an accepted extension is new physics.
 const REMAINDER_PRIOR: f64 = 0.2;
 
-/// Names that are given beside something unknown.
+/// Largest number of similar kinds that are listed for unknown physics.
 const NEAREST_MAX: usize = 3;
 
-/// The parameter that counts waves around the wheel.
+/// Name of the parameter for the number of waves around the wheel.
 const ORDER: &str = "order";
 
 impl Evidence<'_> {
-    /// Fits of one search as hypotheses.
+    /// Hypotheses from the fits of one search.
     pub(super) fn of_round(&self, round: &Round) -> Vec<Hypothesis> {
         let Probabilities { named, group, unknown, nothing } = round.probabilities();
         // What is left beside a named effect may be its model's error as well as something new.
@@ -76,7 +76,7 @@ impl Evidence<'_> {
         hypotheses
     }
 
-    /// Something unknown.
+    /// Hypothesis of unknown physics.
     fn without_name(&self, port: &UnknownElement, probability: f64) -> Hypothesis {
         let behaviour = port.behaviour.as_ref();
         Hypothesis {
@@ -97,8 +97,8 @@ impl Evidence<'_> {
         }
     }
 
-    /// Gives the accepted one, which is the first, what the same name has at its place: another
-    /// fit of the same thing.
+    /// Adds to the accepted hypothesis, which is the first, the probabilities of other fits of the same
+    /// kind at its location.
     fn gather(&self, hypotheses: &mut Vec<Hypothesis>) {
         let mut accepted = hypotheses.remove(0);
         let others = std::mem::take(hypotheses).into_iter();
@@ -109,7 +109,7 @@ impl Evidence<'_> {
         hypotheses.extend(different);
     }
 
-    /// Whether two hypotheses are one: the same name at the same place, or beside an accepted one.
+    /// Whether two hypotheses are the same: the same kind at the same location, or next to an accepted one.
     pub(super) fn is_same(&self, known: &Hypothesis, other: &Hypothesis) -> bool {
         let is_fit = known.accepted && !other.accepted;
         let are_beside = match (&known.location, &other.location) {
@@ -154,7 +154,7 @@ impl Evidence<'_> {
     }
 }
 
-/// Names that what a search found may have, though none predicts withheld speeds better.
+/// Kinds that are similar to unknown physics, although none of them predicts withheld speeds better.
 fn nearest(round: &Round) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for fitted in &round.fitted {

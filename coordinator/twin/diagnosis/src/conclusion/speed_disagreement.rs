@@ -1,4 +1,4 @@
-//! Speeds that do not agree about the track.
+//! Disagreement of speeds about the track.
 
 use super::{Evidence, FAILED_SHARE};
 use crate::outcome::Hypothesis;
@@ -7,8 +7,8 @@ use tracktwin_inspection::{Finding, Place};
 use tracktwin_track::extension::{CLIPPING, POSITION_ERROR};
 
 impl Evidence<'_> {
-    /// Nothing is named on a track that the speeds do not agree about: their positions are wrong, if
-    /// no other fault of the measuring chain makes them differ.
+    /// Rejects all hypotheses if the speeds disagree about the track. A position error is then added,
+    /// unless another fault of the measuring chain explains the disagreement.
     pub(super) fn add_speed_disagreement(&self, all: &mut Vec<Hypothesis>) {
         if !self.search.speeds_disagree() {
             return;
@@ -28,8 +28,8 @@ impl Evidence<'_> {
         self.add_finding(&finding, all);
     }
 
-    /// Note on the disagreement, if there is one. Clipped passes always disagree: the faster they
-    /// are, the more is missing.
+    /// Note on the disagreement, if there is one. Clipped passes always disagree, because clipping
+    /// increases with the speed.
     pub(super) fn speed_disagreement(&self) -> Option<String> {
         let are_cut =
             self.inspection.findings.iter().any(|finding| finding.physics == CLIPPING.physics);

@@ -1,7 +1,8 @@
-//! The track beyond the sleepers compared: the position of its ends, and the supports of the next sleepers.
+//! Track beyond the compared sleepers: position of its ends, and supports of the next sleepers.
 //!
-//! No measurement shows them, but they affect the first and last sleepers compared. The forward model
-//! computes their effect once, on a track with typical values. Afterwards it treats the effect as linear.
+//! No measurement shows these quantities, but they affect the first and last compared sleepers. The forward
+//! model computes their effect once, on a track with typical values. Afterwards it treats the effect as
+//! linear.
 
 use super::Forward;
 use crate::baseline::{ENDS_SPANS, Outer};
@@ -12,15 +13,15 @@ use std::sync::Arc;
 use tracktwin_track::extension::Extension;
 use tracktwin_track::model::{Assembly, ModelError, Support};
 
-/// Change of a logarithm either way from which its slope is taken: about the deviation that it has.
+/// Change of a logarithm in either direction for a numerical derivative; about its standard deviation.
 const STEP: f64 = 0.25;
 
 impl Forward {
-    /// Lets the track end at any of the distances that it may end at, and its next sleepers be held as
-    /// they may be: what that changes is taken from a track of these values.
+    /// Includes the unknown ends of the track and the unknown supports of its next sleepers. Their linear
+    /// effect on the log powers is computed on a track with these values.
     ///
     /// # Errors
-    /// As [`Forward::log_power`].
+    /// The errors of [`Forward::log_power`].
     pub fn allow_beyond(&mut self, values: &DVector<f64>) -> Result<(), ModelError> {
         let plain = self.log_power(values, &[])?;
         let ends = ENDS_SPANS.into_par_iter().map(|spans| {
@@ -52,10 +53,10 @@ impl Forward {
     }
 }
 
-/// Sleepers whose railpads or ballast are stiffer by a factor.
+/// Sleepers whose railpad or ballast stiffness is multiplied by a factor.
 #[derive(Debug)]
 struct Held {
-    /// Their numbers in the track.
+    /// Indices in the track.
     sleepers: Range<usize>,
     is_railpad: bool,
     factor: f64,

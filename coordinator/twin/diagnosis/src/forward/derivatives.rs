@@ -15,13 +15,13 @@ use tracktwin_track::extension::Extension;
 use tracktwin_track::frequency::seat_stiffness;
 use tracktwin_track::model::{ModelError, Support, TrackModel};
 
-/// Relative step by which stiffnesses are varied for derivatives.
+/// Relative change of stiffnesses and damping for numerical derivatives.
 const STEP: f64 = 1e-4;
 
-/// Varies a support by [`STEP`].
+/// Changes a value of a support by the factor 1 + [`STEP`].
 type Vary = fn(&mut Support);
 
-/// What is varied of a support: which unknown it is, and its step.
+/// Varied values of a support: the unknown and the function that changes the value.
 const VARIATIONS: [(Quantity, Vary); VARIED] = [
     (Quantity::Own(Own::BallastStiffness), |it| it.ballast_stiffness *= 1.0 + STEP),
     (Quantity::Own(Own::RailpadStiffness), |it| it.railpad_stiffness *= 1.0 + STEP),
@@ -32,46 +32,48 @@ const VARIATIONS: [(Quantity, Vary); VARIED] = [
     (Quantity::Common(Common::BallastDamping), |it| it.ballast_damping *= 1.0 + STEP),
 ];
 
-/// A prediction and its derivatives by the baseline's unknowns.
+/// A prediction with its derivatives with respect to the baseline's unknowns.
 pub struct Linearised {
     /// Predicted log powers.
     pub log_power: DVector<f64>,
-    /// A row for each of them, a column for each unknown.
+    /// Derivatives: one row per log power, one column per unknown.
     pub jacobian: DMatrix<f64>,
-    /// The transfer from which they are predicted.
+    /// The transfer from which the log powers are predicted.
     pub(crate) transfer: Transfer,
 }
 
-/// Changes of the log powers by unknown dynamic stiffnesses, relative to the existing stiffness: a
-/// row for each log power, a column for each shape over the lines.
+/// Changes of the log powers from unknown dynamic stiffnesses, relative to the existing stiffness: one row
+/// per log power, one column per shape over the lines.
 pub(crate) struct PortColumns {
-    /// Under the rail seat of each sleeper of the whole track.
+    /// For a stiffness under the rail seat of each sleeper of the whole track.
     pub(crate) seats: Vec<DMatrix<f64>>,
-    /// Between the rail seats of each compared sleeper but the first and the one before it.
+    /// For a stiffness between the rail seats of each compared sleeper (except the first) and the one
+    /// before it.
     pub(crate) between: Vec<DMatrix<f64>>,
-    /// Between wheel and ground.
+    /// For a stiffness between wheel and ground.
     pub(crate) wheel: DMatrix<f64>,
-    /// Magnitudes of the receptances that stiffnesses at the seats are in parts of, in m/N:
-    /// `[sleeper of the whole track][line]`.
+    /// Magnitudes of the receptances in m/N to which the stiffnesses at the seats refer: `[sleeper of the
+    /// whole track][line]`.
     pub(crate) seat_receptances: Vec<Vec<f64>>,
-    /// The wheel's receptance in m/N at each line.
+    /// Receptance of the wheel in m/N at each line.
     pub(crate) wheel_receptance: Vec<Complex64>,
 }
 
-/// A track with what its derivatives are made of.
+/// State of a track from which derivatives are computed.
 struct State {
     transfer: Transfer,
-    /// Changes by `k_b`, `k_p`, `EI_s`, `c_p` and `c_b` of each support.
+    /// Changes from `k_b`, `k_p`, `EI_s`, `c_p` and `c_b` of each support.
     supports: SupportChanges,
     /// Spectrum of the surface: `[speed][line]`.
     excitation: Vec<Vec<f64>>,
 }
 
 impl Forward {
-    /// Log powers of a baseline with extensions, and their derivatives by the baseline's unknowns.
+    /// Log powers of a baseline with extensions, and their derivatives with respect to the baseline's
+    /// unknowns.
     ///
     /// # Errors
-    /// As [`Forward::log_power`].
+    /// The errors of [`Forward::log_power`].
     pub fn linearised(
         &self,
         values: &DVector<f64>,
@@ -95,11 +97,11 @@ impl Forward {
         Ok(Linearised { log_power, jacobian, transfer: state.transfer })
     }
 
-    /// Changes of the log powers by dynamic stiffnesses added under each sleeper's rail seat,
+    /// Changes of the log powers from dynamic stiffnesses that are added under each sleeper's rail seat,
     /// between the seats of compared neighbours, and between wheel and ground.
     ///
     /// # Errors
-    /// As [`Forward::log_power`].
+    /// The errors of [`Forward::log_power`].
     pub(crate) fn port_columns(
         &self,
         values: &DVector<f64>,
@@ -144,8 +146,9 @@ impl Forward {
         Ok(PortColumns { seats, between, wheel, seat_receptances, wheel_receptance })
     }
 
-    /// Changes of the log powers by a stiffness of the given shapes; `sensitivity` says by what one of its
-    /// own size changes the mean power over a sleeper's window at a line, if it is felt there.
+    /// Changes of the log powers from a stiffness with the given shapes. `sensitivity` is the change of the
+    /// mean power over a sleeper's window at a line from a stiffness of relative size one; `None` if there
+    /// is no effect.
     fn columns(
         &self,
         shares: &[f64],
@@ -168,7 +171,7 @@ impl Forward {
         columns
     }
 
-    /// Part of a row's power that a change of the random power is divided by, times its scale.
+    /// Factor that converts a change of the random power to a change of the log power of a row.
     fn share(
         &self,
         transfer: &Transfer,
@@ -184,10 +187,10 @@ impl Forward {
         scale * mean(shapes, |shape| (floor + shape).recip())
     }
 
-    /// Derivatives of each sleeper's dynamic stiffness under the rail by the logarithms of `k_b`,
-    /// `k_p`, `EI_s`, `c_p` and `c_b`: `[parameter][line][sleeper of the track]`.
+    /// Derivatives of each sleeper's dynamic stiffness under the rail with respect to the logarithms of
+    /// `k_b`, `k_p`, `EI_s`, `c_p` and `c_b`: `[parameter][line][sleeper of the track]`.
     ///
-    /// Taken from the model with its extensions, which may stand in series with a support.
+    /// They are computed on the model with its extensions, which may be in series with a support.
     fn variations(
         &self,
         values: &DVector<f64>,
@@ -260,8 +263,8 @@ impl Forward {
         (log_power, derivatives)
     }
 
-    /// Sleepers of the track near a compared one: number in the track, and the compared one whose
-    /// values it has.
+    /// Sleepers of the track near a compared one, as pairs: index in the track, and index of the compared
+    /// sleeper whose values it takes.
     fn near(&self, sleeper: usize) -> Vec<(usize, usize)> {
         let middle = self.section.in_track(sleeper);
         self.section

@@ -1,8 +1,8 @@
-//! Mean log powers that a track model predicts, without any time simulation.
+//! Mean log powers that a track model predicts, without a time simulation.
 //!
-//! The wheel at `x` is excited by the surface through the quasi-static transfer
-//! `|H| = 1 / (m |1/k_H + alpha_r(x, x) + alpha_w|)`; the mean power in a band over a sleeper is
-//! the surface's spectrum times `|H|^2`, averaged over band and window (docs/diagnosis.md, eq. 3, 4).
+//! The surface excites the wheel at position `x` through the quasi-static transfer `|H| = 1 / (m |1/k_H +
+//! alpha_r(x, x) + alpha_w|)`. The mean power in a band over a sleeper is the surface spectrum times
+//! `|H|^2`, averaged over band and window (docs/diagnosis.md, eq. 3, 4).
 
 mod beyond;
 mod derivatives;
@@ -25,32 +25,33 @@ use std::sync::Arc;
 use tracktwin_track::extension::Extension;
 use tracktwin_track::model::{ModelError, Roughness, TrackModel};
 
-/// Predicts the log powers over a section: `[sleeper][speed][band]`, one after the other.
+/// Forward model: predicts the log powers of a section as one vector in the order `[sleeper][speed][band]`.
 #[derive(Clone, Debug)]
 pub struct Forward {
-    /// The stretch of track.
+    /// The compared stretch of track.
     pub section: Section,
     /// The bands.
     pub bands: Bands,
     /// Speeds in m/s.
     pub speeds_m_s: Vec<f64>,
-    /// What a baseline leaves free.
+    /// Unknowns of the baseline.
     pub unknowns: Unknowns,
-    /// One-sided power spectral density in m2/s3 of the sensor's noise at each speed.
+    /// One-sided power spectral density of the sensor noise in m2/s3 at each speed.
     pub noise_density: Vec<f64>,
-    /// Where on the model's track the wheel begins a turn, in m: `[speed][pass]`; empty if unknown.
+    /// Position on the model's track in m at which a turn of the wheel begins, `[speed][pass]`; empty if
+    /// unknown.
     pub wheel_starts_m: Vec<Vec<f64>>,
-    /// Changes of the log powers by what lies beyond the sleepers compared, a column for each unknown
-    /// of [`Unknowns::beyond`]; zero until [`Forward::allow_beyond`].
+    /// Changes of the log powers from the track beyond the compared sleepers, one column for each unknown
+    /// of [`Unknowns::beyond`]; zero before [`Forward::allow_beyond`].
     beyond: DMatrix<f64>,
-    /// `[speed][sleeper][band]`: the nodes of the rail that are seen.
+    /// Rail nodes that contribute to each window, `[speed][sleeper][band]`.
     windows: Vec<Vec<Vec<Window>>>,
-    /// Spectrum of the surface at level one in m2/Hz at each speed and line.
+    /// Spectrum of the surface at level one in m2/Hz, `[speed][line]`.
     surface: Vec<Vec<f64>>,
 }
 
 impl Forward {
-    /// A predictor for these speeds in km/h with the sensor's noise densities.
+    /// A forward model for these speeds in km/h, with noise densities in m2/s3, one per speed.
     pub fn new(
         section: Section,
         bands: Bands,
@@ -87,7 +88,7 @@ impl Forward {
         }
     }
 
-    /// The same predictor for a track that ends this number of spans beyond the sleepers compared.
+    /// The same model for a track that ends `spans_beyond` spans beyond the compared sleepers.
     #[must_use]
     pub fn with_ends(&self, spans_beyond: usize) -> Self {
         let section = Section { spans_beyond, ..self.section.clone() };
@@ -95,20 +96,20 @@ impl Forward {
         Self::new(section, self.bands.clone(), &speeds, self.noise_density.clone())
     }
 
-    /// How many log powers there are.
+    /// Number of log powers.
     pub fn count(&self) -> usize {
         self.section.sleepers * self.per_sleeper()
     }
 
-    /// Log powers of one sleeper.
+    /// Number of log powers per sleeper.
     pub fn per_sleeper(&self) -> usize {
         self.speeds_m_s.len() * self.bands.count()
     }
 
-    /// Log powers of a baseline with extensions.
+    /// Predicts the log powers of a baseline with extensions.
     ///
     /// # Errors
-    /// [`ModelError`] when values and extensions make no track.
+    /// [`ModelError`] if no track model exists for values and extensions.
     pub fn log_power(
         &self,
         values: &DVector<f64>,
@@ -117,12 +118,12 @@ impl Forward {
         Ok(self.levels(&self.transfer(values, extensions, false)?, values))
     }
 
-    /// The same from a transfer.
+    /// Log powers from a transfer.
     pub(crate) fn levels(&self, transfer: &Transfer, values: &DVector<f64>) -> DVector<f64> {
         self.levels_at(transfer, values, 0..self.section.sleepers)
     }
 
-    /// The same at these sleepers.
+    /// Log powers from a transfer at a range of sleepers.
     pub(crate) fn levels_at(
         &self,
         transfer: &Transfer,
@@ -144,11 +145,11 @@ impl Forward {
         all + changes * values.rows(beyond.start, beyond.len())
     }
 
-    /// The transfer of a baseline with extensions: those of a known one of the same baseline and
-    /// further ones, which may change little.
+    /// Transfer of a baseline with extensions, computed from a `known` transfer of the same baseline. The
+    /// further extensions should change little.
     ///
     /// # Errors
-    /// As [`Forward::log_power`].
+    /// The errors of [`Forward::log_power`].
     pub(crate) fn transfer_beside(
         &self,
         known: &Transfer,
@@ -159,12 +160,12 @@ impl Forward {
         Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
     }
 
-    /// Log powers where force laws take hold as they do with varied values, and nothing else varies; none
-    /// where that is not known from the transfer, or, if the tracks must be `alike`, where they differ in
-    /// more.
+    /// Log powers with the force laws active as for the varied values, and everything else as for the given
+    /// values. `None` if the transfer does not contain this state or, with `alike`, if the tracks differ in
+    /// anything else.
     ///
     /// # Errors
-    /// As [`Forward::log_power`].
+    /// The errors of [`Forward::log_power`].
     pub(crate) fn with_laws_of(
         &self,
         known: &Transfer,
@@ -178,13 +179,13 @@ impl Forward {
         Ok(transfer.map(with_shapes).map(|transfer| self.levels(&transfer, values)))
     }
 
-    /// Sleeper, speed and band of a row.
+    /// Indices of sleeper, speed and band of a row.
     pub fn place(&self, row: usize) -> (usize, usize, usize) {
         let (sleeper, rest) = (row / self.per_sleeper(), row % self.per_sleeper());
         (sleeper, rest / self.bands.count(), rest % self.bands.count())
     }
 
-    /// Fills rows from `first` on.
+    /// Fills the rows, which begin with the row `first`.
     fn fill(
         &self,
         rows: &mut DVector<f64>,
@@ -197,10 +198,10 @@ impl Forward {
         });
     }
 
-    /// The transfer of a baseline with extensions, with what derivatives need if `from_seats`.
+    /// Transfer of a baseline with extensions; `from_seats` adds the data for derivatives.
     ///
     /// # Errors
-    /// As [`Forward::log_power`].
+    /// The errors of [`Forward::log_power`].
     pub(crate) fn transfer(
         &self,
         values: &DVector<f64>,
@@ -213,10 +214,10 @@ impl Forward {
         Ok(transfer.with_shapes(&self.section, &self.wheel_starts_m))
     }
 
-    /// The transfer that [`Forward::transfer_beside`] is quick from.
+    /// Transfer that makes [`Forward::transfer_beside`] fast.
     ///
     /// # Errors
-    /// As [`Forward::log_power`].
+    /// The errors of [`Forward::log_power`].
     pub(crate) fn transfer_to_vary(
         &self,
         values: &DVector<f64>,
@@ -226,8 +227,8 @@ impl Forward {
         Ok(transfer.with_known_rail(self.bands.lines_hz(), self.reach_nodes()))
     }
 
-    /// The compared sleepers at which something from here to there, in spacings from the first of them,
-    /// is felt, under any of the description's wheels.
+    /// Compared sleepers that an effect on a stretch affects, under any wheel of the track description. The
+    /// stretch is in spacings from the first compared sleeper.
     pub(crate) fn felt_at(&self, [from, to]: [f64; 2]) -> Range<usize> {
         let design = &self.section.track.design;
         let furthest_m = design.wheel.further_wheels_m.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -238,8 +239,8 @@ impl Forward {
         first.min(end)..end
     }
 
-    /// Nodes on either side of a rail seat up to the last one in the window of a sleeper that it is felt
-    /// at.
+    /// Number of nodes on either side of a rail seat, up to the last node in the window of a sleeper that
+    /// the seat affects.
     fn reach_nodes(&self) -> usize {
         let windows = self.windows.iter().flatten().flatten();
         let widest = windows.map(|window| window.shares.len()).max().unwrap_or(0);
@@ -260,8 +261,8 @@ impl Forward {
         bandwidth * self.noise_density[speed]
     }
 
-    /// Power in m2/s4 that the shapes of rail and wheel add, a value a pass; a single one where all
-    /// passes meet the same.
+    /// Power in m2/s4 from the shapes of rail and wheel, one value per pass; a single value if it is the
+    /// same in all passes.
     fn shape_powers(
         &self,
         transfer: &Transfer,
@@ -300,7 +301,7 @@ impl Forward {
         wheel.iter().map(|wheel| rail + power(wheel, &own)).collect()
     }
 
-    /// Density of the surface at every line, at level one with the baseline's spectrum, in m2/Hz:
+    /// Power spectral density of the surface in m2/Hz, at level one with the baseline's spectrum:
     /// `[speed][line]`.
     fn excitation(&self, transfer: &Transfer, values: &DVector<f64>) -> Vec<Vec<f64>> {
         let of_line = |speed_m_s: f64, (&hz, &surface): (&f64, &f64)| {
@@ -316,7 +317,7 @@ impl Forward {
         self.speeds_m_s.iter().zip(&self.surface).map(of_speed).collect()
     }
 
-    /// Power in m2/s4 of a speed's excitation in a band over a sleeper, at level one.
+    /// Power in m2/s4 of the excitation of one speed in a band over a sleeper, at level one.
     fn power(
         &self,
         transfer: &Transfer,
@@ -330,13 +331,13 @@ impl Forward {
             .sum()
     }
 
-    /// Logarithm of what the sensor makes of the power in a band.
+    /// Logarithm of the sensor's power response in a band.
     fn response(&self, values: &DVector<f64>, band: usize) -> f64 {
         let shares = self.unknowns.response_shares(self.bands.centres_hz()[band]);
         shares.iter().map(|&(knot, share)| share * values[knot]).sum()
     }
 
-    /// Level at the sleeper and gain of the speed.
+    /// Product of the level at the sleeper and the gain of the speed.
     fn scale(&self, values: &DVector<f64>, sleeper: usize, speed: usize) -> f64 {
         let unknowns = &self.unknowns;
         (values[unknowns.at(Own::Level, sleeper)] + values[unknowns.gain(speed)]).exp()

@@ -1,7 +1,7 @@
-//! How the power over every window changes with the support under every sleeper near it.
+//! Changes of the power over every window from the supports of the sleepers near it.
 //!
-//! The sum over a window's nodes and a band's lines is taken lines first, on stretches of the rail:
-//! node by node, as [`Transfer::sensitivity`] has it, it takes several times as long.
+//! The sum over a window's nodes and a band's lines runs over lines first, on stretches of the rail. A sum
+//! node by node, as in [`Transfer::sensitivity`], takes several times as long.
 
 use super::Forward;
 use crate::section::Window;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use std::ops::Range;
 
-/// Values of a support that vary.
+/// Number of varied values of a support.
 pub(super) const VARIED: usize = 5;
 
 /// Number of sleepers on either side whose supports affect a sleeper's window.
@@ -19,14 +19,14 @@ pub(super) const NEIGHBOURS: usize = 9;
 /// Change of the dynamic stiffness at the rail seats: `[line][sleeper of the track]`.
 pub(super) type Variation = Vec<Vec<Complex64>>;
 
-/// Changes of the power at level one: by sleeper of the track.
+/// Changes of the power at level one, by sleeper of the track.
 pub(super) struct SupportChanges {
     by_sleeper: Vec<FromSleeper>,
-    /// Powers of one window: speeds times bands.
+    /// Number of powers per window: speeds times bands.
     per_sleeper: usize,
 }
 
-/// Those by one sleeper's support, over the windows near it.
+/// Changes from the support of one sleeper, over the windows near it.
 struct FromSleeper {
     near: Range<usize>,
     /// `[compared sleeper near][speed and band][value]`.
@@ -34,8 +34,8 @@ struct FromSleeper {
 }
 
 impl SupportChanges {
-    /// Of a track whose seats' stiffness varies so, under this spectrum of the surface,
-    /// `[speed][line]`.
+    /// Computes the changes from the variations of the stiffness at the seats and the spectrum of the
+    /// surface, `[speed][line]`.
     pub(super) fn new(
         forward: &Forward,
         transfer: &Transfer,
@@ -48,8 +48,8 @@ impl SupportChanges {
         Self { by_sleeper, per_sleeper: forward.per_sleeper() }
     }
 
-    /// Over a compared sleeper's window, at a speed and band counted together, by the support of a
-    /// sleeper of the track near it.
+    /// Changes over the window of a compared sleeper from the support of the sleeper `in_track`. `row`
+    /// counts speeds and bands.
     pub(super) fn at(&self, in_track: usize, compared: usize, row: usize) -> &[f64; VARIED] {
         let FromSleeper { near, changes } = &self.by_sleeper[in_track];
         &changes[(compared - near.start) * self.per_sleeper + row]
@@ -82,7 +82,7 @@ impl FromSleeper {
     }
 }
 
-/// Changes of the power at each node by a sleeper's support: `[line][value][node]`.
+/// Changes of the power at each node from the support of one sleeper: `[line][value][node]`.
 #[expect(clippy::inline_always, reason = "must be compiled for each instruction set")]
 #[inline(always)]
 fn by_line(
@@ -104,7 +104,7 @@ fn by_line(
     changes
 }
 
-/// Their sums over the windows of sleepers near: `[sleeper near][speed and band][value]`.
+/// Sums of these changes over the windows of nearby sleepers: `[sleeper near][speed and band][value]`.
 #[expect(clippy::inline_always, reason = "must be compiled for each instruction set")]
 #[inline(always)]
 fn over_windows(
@@ -135,7 +135,7 @@ fn over_windows(
     changes
 }
 
-/// All nodes that some sleepers' windows see.
+/// Range of all nodes in the windows of some sleepers.
 fn nodes(forward: &Forward, sleepers: Range<usize>) -> Range<usize> {
     let speeds = forward.windows.iter();
     let seen = speeds.flat_map(|speed| speed[sleepers.clone()].iter().flatten().map(Window::nodes));

@@ -1,20 +1,20 @@
-//! The functions of frequency that an unknown dynamic stiffness is made of.
+//! Basis functions of frequency for an unknown dynamic stiffness.
 
 use rustfft::num_complex::Complex64;
 
-/// Bumps over the logarithm of the frequency that the stiffness is made of.
+/// Number of basis functions over the logarithm of the frequency.
 pub(super) const BUMPS: usize = 14;
 
 /// Overlapping triangles over the logarithm of the frequency.
 pub(super) struct Bumps {
-    /// Where each is highest, in Hz.
+    /// Centre of each in Hz.
     pub(super) centres_hz: Vec<f64>,
-    /// Real and imaginary part of each in turn, at every line: `[2 × bump + part][line]`.
+    /// Real and imaginary part of each at every line: `[2 × bump + part][line]`.
     pub(super) shapes: Vec<Vec<Complex64>>,
 }
 
 impl Bumps {
-    /// From the first of some lines in Hz to the last.
+    /// Basis functions from the first to the last of the lines in Hz.
     pub(super) fn over(lines_hz: &[f64]) -> Self {
         let (from, to) = (lines_hz[0].ln(), lines_hz[lines_hz.len() - 1].ln());
         let width = (to - from) / (BUMPS - 1) as f64;
@@ -28,7 +28,7 @@ impl Bumps {
         Self { centres_hz: centres.into_iter().map(f64::exp).collect(), shapes }
     }
 
-    /// Mean over each bump of values at all lines.
+    /// Weighted mean over each basis function of the values at all lines.
     pub(super) fn mean(&self, values: &[Complex64]) -> Vec<Complex64> {
         let mean = |shape: &Vec<Complex64>| {
             let weighted = shape.iter().zip(values).map(|(weight, value)| weight * value);

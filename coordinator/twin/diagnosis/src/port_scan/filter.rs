@@ -7,29 +7,30 @@ use crate::calibration::Calibration;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rustfft::num_complex::Complex64;
 
-/// What an unknown dynamic stiffness changes at one place.
+/// Signature of an unknown dynamic stiffness at one port.
 pub(super) struct Trace {
-    /// Where it acts.
+    /// Port.
     pub(super) place: PortPlace,
-    /// Change of the whitened log powers by each bump's two parts: `[row][2 × bump + part]`.
+    /// Change of the whitened log powers from the two parts of each basis function: `[row][2 × bump +
+    /// part]`.
     pub(super) columns: DMatrix<f64>,
-    /// Receptance in m/N that the bumps' heights are in parts of, mean over each bump.
+    /// Receptance in m/N to which the heights of the basis functions refer, as mean over each function.
     pub(super) receptance: Vec<Complex64>,
 }
 
-/// All that the evidence at one place needs of the track.
+/// Data for the evidence at one port.
 pub(super) struct Filter {
     pub(super) trace: Trace,
-    /// The baseline's part in its columns: what it is multiplied with for a residual's projection.
+    /// Factor that projects a residual onto the part of the columns that the baseline reproduces.
     imitated: DMatrix<f64>,
-    /// Square of the columns less the baseline's part.
+    /// Squared columns minus the part that the baseline reproduces.
     square: DMatrix<f64>,
-    /// What the bumps' heights may be beforehand, each with their posterior precision, factored.
+    /// Priors of the heights, each with the Cholesky factor of its posterior precision.
     priors: Vec<(Prior, Cholesky<f64, Dyn>)>,
 }
 
 impl Filter {
-    /// None where a precision is not positive definite.
+    /// `None` if a precision is not positive definite.
     pub(super) fn new(
         trace: Trace,
         current: &Calibration,
@@ -48,7 +49,7 @@ impl Filter {
         Some(Self { trace, imitated, square, priors })
     }
 
-    /// What something with these heights behaves like.
+    /// Element that the dynamic stiffness with these heights resembles.
     pub(super) fn behaviour(
         &self,
         residual: &DVector<f64>,
@@ -61,12 +62,12 @@ impl Filter {
         PortEvidence { along, square, receptance, centres_hz }.behaviour(0.5 * along.dot(heights))
     }
 
-    /// Slope of the log likelihood with the bumps' heights.
+    /// Derivative of the log likelihood with respect to the heights.
     fn along(&self, residual: &DVector<f64>, projected_gradient: &DVector<f64>) -> DVector<f64> {
         self.trace.columns.tr_mul(residual) - self.imitated.tr_mul(projected_gradient)
     }
 
-    /// Log evidence averaged over the priors, and the bumps' most probable heights.
+    /// Log evidence averaged over the priors, and the most probable heights.
     pub(super) fn evidence(
         &self,
         residual: &DVector<f64>,

@@ -1,10 +1,10 @@
 //! Port scan: test for an unknown dynamic stiffness under rail seats, between two of them or at the
 //! wheel.
 //!
-//! Left-out physics of a sleeper, its railpad or its ballast acts on the rail as an additional
-//! dynamic stiffness at the rail seat, free in every frequency; a link of two sleepers acts between
-//! their seats; physics of the vehicle acts at the wheel. The signature is linear in that
-//! stiffness, so that its evidence has a closed form (docs/diagnosis.md, eq. 13).
+//! Left-out physics of a sleeper, its railpad or its ballast acts on the rail as an additional dynamic
+//! stiffness at the rail seat, which is free at every frequency. A link between two sleepers acts between
+//! their seats, and physics of the vehicle acts at the wheel. The signature is linear in this stiffness;
+//! the evidence therefore has a closed form (docs/diagnosis.md, eq. 13).
 
 mod bumps;
 mod filter;
@@ -21,16 +21,16 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-/// Evidence for an unknown dynamic stiffness.
+/// Evidence for an unknown dynamic stiffness at one port.
 #[derive(Clone, Debug)]
 pub struct UnknownElement {
-    /// Where it acts.
+    /// Port at which it acts.
     pub place: PortPlace,
-    /// Logarithm of the evidence against the model without it, in nats.
+    /// Log ratio of the evidence to the model without it, in nats.
     pub log_evidence: f64,
     /// Element that the dynamic stiffness resembles, if any.
     pub behaviour: Option<Behaviour>,
-    /// Its trace: whitened change of the log powers.
+    /// Signature: whitened change of the log powers.
     pub change: DVector<f64>,
 }
 
@@ -41,18 +41,18 @@ pub struct PortScan {
 }
 
 impl PortScan {
-    /// Computes the signatures on a calibrated track.
+    /// Computes the signatures for a calibrated track.
     ///
     /// # Errors
-    /// [`CalibrationError`] when the calibrated track makes no model.
+    /// [`CalibrationError`] if no model exists for the calibrated values.
     pub fn new(problem: &Problem<'_>, current: &Calibration) -> Result<Self, CalibrationError> {
         Self::of(problem, current, |_| true)
     }
 
-    /// The same for one place.
+    /// As [`PortScan::new`], for one port.
     ///
     /// # Errors
-    /// As [`PortScan::new`].
+    /// The errors of [`PortScan::new`].
     pub fn at(
         place: &PortPlace,
         problem: &Problem<'_>,
@@ -75,8 +75,8 @@ impl PortScan {
         Ok(Self { filters, centres_hz: bumps.centres_hz })
     }
 
-    /// The best port for a whitened residual; `projected_gradient` is its product with the baseline's
-    /// derivatives.
+    /// The best port for a whitened residual. `projected_gradient` is the product of the residual with the
+    /// baseline's derivatives.
     pub fn best(
         &self,
         residual: &DVector<f64>,
@@ -85,7 +85,7 @@ impl PortScan {
         self.best_where(residual, projected_gradient, |_| true)
     }
 
-    /// The best of some places.
+    /// As [`PortScan::best`], among the ports for which `is_one` is true.
     pub fn best_where(
         &self,
         residual: &DVector<f64>,
@@ -106,7 +106,7 @@ impl PortScan {
     }
 }
 
-/// Signature of each bump at every place.
+/// Signatures of the basis functions at every port.
 fn traces(
     problem: &Problem<'_>,
     current: &Calibration,

@@ -1,4 +1,4 @@
-//! Where an unknown dynamic stiffness may act.
+//! Possible ports of an unknown dynamic stiffness.
 
 use crate::section::Section;
 use tracktwin_track::extension::EffectFamily;
@@ -6,20 +6,20 @@ use tracktwin_track::extension::EffectFamily;
 /// Longest period of a pattern of sleepers, in sleepers.
 const EVERY_MAX: usize = 5;
 
-/// Where an unknown dynamic stiffness acts.
+/// Port of an unknown dynamic stiffness.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PortPlace {
-    /// Under the rail seats of these compared sleepers, the same under each: one, two neighbours,
-    /// every second to fifth, or all.
+    /// Under the rail seats of these compared sleepers, with the same stiffness under each: one, two
+    /// neighbours, every second to fifth, or all.
     Seats(Vec<usize>),
-    /// Between the rail seats of two neighbours.
+    /// Between the rail seats of two neighbouring compared sleepers.
     Between([usize; 2]),
     /// Between wheel and ground.
     Wheel,
 }
 
 impl PortPlace {
-    /// What a diagnosis calls it.
+    /// Name of the port in a diagnosis.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Seats(_) => "rail_seat",
@@ -28,7 +28,7 @@ impl PortPlace {
         }
     }
 
-    /// What the unknown is of.
+    /// Family of the unknown physics.
     pub const fn family(&self) -> EffectFamily {
         match self {
             Self::Seats(_) | Self::Between(_) => EffectFamily::UnknownStructure,
@@ -36,7 +36,7 @@ impl PortPlace {
         }
     }
 
-    /// The measurement that would say what acts there.
+    /// The measurement that would identify the element at this port.
     pub const fn would_separate(&self) -> &'static str {
         match self {
             Self::Seats(_) => "a hammer test at the place: its receptance names the element",
@@ -48,9 +48,8 @@ impl PortPlace {
     }
 }
 
-/// Sleepers under which something unknown may be the same: the compared ones, and the same and
-/// others by their numbers in the whole track. A pattern ends with the compared sleepers, or
-/// continues.
+/// Groups of sleepers that may have the same unknown stiffness: indices of the compared ones, and indices
+/// in the whole track. A periodic group ends at the compared sleepers, or continues beyond them.
 pub(super) fn seats_together(section: &Section) -> Vec<(Vec<usize>, Vec<usize>)> {
     let count = section.sleepers;
     let single = (0..count).map(|sleeper| vec![sleeper]);

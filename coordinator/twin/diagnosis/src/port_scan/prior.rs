@@ -1,18 +1,18 @@
-//! What an unknown dynamic stiffness may be before anything is measured.
+//! Priors of an unknown dynamic stiffness.
 
 use super::bumps::BUMPS;
 use nalgebra::DMatrix;
 
-/// Prior deviations of a bump's height over the track's own stiffness there.
+/// Prior standard deviations of a height relative to the local stiffness of the track.
 const SCALES: [f64; 3] = [0.1, 0.3, 1.0];
 
-/// Prior correlations of neighbouring bumps: of a resonance none, of a spring or a mass much.
+/// Prior correlations of neighbouring basis functions: zero for a resonance, high for a spring or a mass.
 const CORRELATIONS: [f64; 2] = [0.0, 0.9];
 
-/// Normal prior of the bumps' heights.
+/// Normal prior of the heights of the basis functions.
 pub(super) struct Prior {
     pub(super) precision: DMatrix<f64>,
-    /// Half the logarithm of the precision's determinant.
+    /// Half the logarithm of the determinant of the precision.
     pub(super) half_ln_determinant: f64,
 }
 

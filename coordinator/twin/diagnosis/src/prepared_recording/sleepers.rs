@@ -1,4 +1,4 @@
-//! Which sleepers are compared, and sections of them.
+//! Selection of the compared sleepers, and their division into sections.
 
 use super::MARGIN_SPANS;
 use std::ops::Range;

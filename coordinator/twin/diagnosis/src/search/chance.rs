@@ -1,4 +1,4 @@
-//! How probable such evidence is if nothing is left out: from simulations of nothing left out.
+//! Probability of evidence by chance, from null simulations.
 
 use crate::calibration::Calibration;
 use crate::observation::Observation;
@@ -6,15 +6,15 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use tracktwin_inspection::median;
 
-/// A null simulation as the calibration sees it.
+/// A null simulation relative to a calibration.
 pub(super) struct Null {
     /// Whitened difference from the prediction.
     pub(super) residual: DVector<f64>,
-    /// Its product with the derivatives.
+    /// Product of the residual with the derivatives.
     pub(super) projected_gradient: DVector<f64>,
 }
 
-/// Null differences as a calibration sees them, whitened.
+/// Whitens the differences of null simulations for a calibration.
 pub(super) fn whitened(
     nulls: &[DVector<f64>],
     observation: &Observation,
@@ -28,8 +28,8 @@ pub(super) fn whitened(
     nulls.par_iter().map(of).collect()
 }
 
-/// By how much the recording scatters about the model more than null simulations about theirs,
-/// at least one: the median over the sleepers, which one place does not change.
+/// Ratio, at least one, of the squared residual of the recording to that of null simulations: median over
+/// the sleepers, which a local effect does not change.
 pub(super) fn excess(current: &Calibration, nulls: &[Null], sleepers: usize) -> f64 {
     let square = |residual: &DVector<f64>| median(squares(residual, sleepers));
     let fitted = |null: &Null| {
@@ -42,8 +42,8 @@ pub(super) fn excess(current: &Calibration, nulls: &[Null], sleepers: usize) -> 
     (square(&current.residual) / usual).max(1.0)
 }
 
-/// Probability of evidence as great as `found` if nothing is left out: from the greatest evidence
-/// in each null simulation, by a Gumbel distribution.
+/// Probability of evidence of at least `found` if nothing is left out. A Gumbel distribution is fitted to
+/// the greatest evidence in each null simulation.
 pub(super) fn tail_probability(
     nulls: &[Null],
     found: f64,
@@ -56,7 +56,7 @@ pub(super) fn tail_probability(
     gumbel_tail(&maxima, found)
 }
 
-/// Probability that a maximum is as high as `value`, from a sample of maxima.
+/// Probability that a maximum reaches `value`, from a sample of maxima.
 fn gumbel_tail(maxima: &[f64], value: f64) -> f64 {
     let count = maxima.len() as f64;
     let mean = maxima.iter().sum::<f64>() / count;
@@ -67,7 +67,7 @@ fn gumbel_tail(maxima: &[f64], value: f64) -> f64 {
     -(-(-(value - location) / scale).exp()).exp_m1()
 }
 
-/// Sum of a whitened residual's squares at each sleeper.
+/// Sum of squares of a whitened residual at each sleeper.
 pub(super) fn squares(residual: &DVector<f64>, sleepers: usize) -> Vec<f64> {
     let size = residual.len() / sleepers;
     (0..sleepers).map(|sleeper| residual.rows(sleeper * size, size).norm_squared()).collect()

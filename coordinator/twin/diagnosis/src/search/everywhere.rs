@@ -1,5 +1,5 @@
-//! Trials from which fits of what is everywhere begin: on a typical track, for the fitted baseline imitates
-//! what is everywhere by values far from the track's.
+//! Start values for candidates without a location, on a typical track: the fitted baseline reproduces the
+//! effect of such a candidate by values far from those of the track.
 
 use crate::calibration::{CalibrationError, Problem};
 use crate::candidate::Candidate;
@@ -7,11 +7,11 @@ use crate::screen::Template;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-/// Of each candidate that is everywhere and one of `may_be`, the trial that explains the recording best
-/// together with a linear change of a track with the values `typical`.
+/// Selects the best trial of each candidate without a location for which `may_be` is true. The trial is
+/// combined with a linear change of a track with the values `typical`.
 ///
 /// # Errors
-/// [`CalibrationError`] when the values make no track.
+/// [`CalibrationError`] if no track exists for the values.
 pub(super) fn everywhere<'t>(
     problem: &Problem<'_>,
     typical: &DVector<f64>,

@@ -1,13 +1,13 @@
-//! Where along the sleepers something is, and where it is felt.
+//! Extent of an effect along the sleepers, and its reach.
 
 use crate::candidate::Candidate;
 use crate::port_scan::PortPlace;
 use crate::section::Section;
 
-/// Spans on either side in which an effect at a place is felt.
+/// Reach of a local effect on either side, in spans.
 const REACH_SPANS: f64 = 2.0;
 
-/// From where to where, in spacings from the first sleeper compared.
+/// Start and end of an effect, in spacings from the first compared sleeper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Extent {
     from: f64,
@@ -15,7 +15,7 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    /// Where a candidate is.
+    /// Extent of a candidate.
     pub(crate) fn of(candidate: &Candidate, section: &Section) -> Self {
         match (&candidate.extension.sleepers, candidate.extension.x_m) {
             (Some(sleepers), _) => Self::of_sleepers(sleepers, section),
@@ -28,7 +28,7 @@ impl Extent {
         }
     }
 
-    /// Where something unknown is.
+    /// Extent of unknown physics.
     pub(super) fn of_port(place: &PortPlace, section: &Section) -> Self {
         match place {
             PortPlace::Seats(seats) => Self::of_sleepers(seats, section),
@@ -48,12 +48,12 @@ impl Extent {
         Self { from: 0.0, to: (section.sleepers - 1) as f64 }
     }
 
-    /// Where it is felt.
+    /// The extent including its reach on either side.
     pub(crate) fn with_reach(self) -> Self {
         Self { from: self.from - REACH_SPANS, to: self.to + REACH_SPANS }
     }
 
-    /// From where to where.
+    /// Start and end in spacings from the first compared sleeper.
     pub(crate) const fn spacings(self) -> [f64; 2] {
         [self.from, self.to]
     }
@@ -62,12 +62,12 @@ impl Extent {
         self.to - self.from
     }
 
-    /// Whether the two have something in common.
+    /// Whether the two extents overlap.
     pub(super) fn meets(self, other: Self) -> bool {
         self.from <= other.to && other.from <= self.to
     }
 
-    /// Whether the two are the same up to a spacing at either end.
+    /// Whether the two extents are equal within one spacing at either end.
     pub(super) fn is_about(self, other: Self) -> bool {
         (self.from - other.from).abs() <= 1.0 && (self.to - other.to).abs() <= 1.0
     }

@@ -1,4 +1,4 @@
-//! Candidates fitted together with the baseline, and the baseline anew from where they came out.
+//! Fits of candidates together with the baseline, and new fits of the baseline from their results.
 
 use super::{Fitted, Stage};
 use crate::calibration::{Calibration, CalibrationError, Descent, Problem};
@@ -8,24 +8,24 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Share of the best name's log evidence from which another kind may still be better, and how often
-/// both are taken up again.
+/// Share of the best log evidence from which a candidate of another kind is fitted further; `RIVAL_FITS` is
+/// the largest number of such fits.
 const RIVAL_SHARE: f64 = 0.7;
 const RIVAL_FITS: usize = 3;
 
-/// Share of the best fit's gain that another must be predicted to reach, less this share of the
-/// objective, for the doubt in a prediction: on dev-12, 13 fits are given up, and all came out as less than
-/// nothing when they were taken to their end.
+/// A fit is continued only if its predicted gain reaches this share of the best gain, minus `DOUBT` times
+/// the objective for the uncertainty of the prediction. In the recording dev-12 this ends 13 fits early;
+/// all had negative evidence when they were continued to the end.
 const RACE_SHARE: f64 = 0.3;
 const DOUBT: f64 = 0.1;
 
-/// Fitted candidates from whose values the model without them is fitted anew.
+/// Number of fitted candidates whose values serve as start of a new fit without the candidate.
 const RESTARTS: usize = 3;
 
-/// Nats by which such a fit must be better to take its place.
+/// Improvement in nats from which a new fit replaces the old one.
 const BETTER: f64 = 3.0;
 
-/// The better fit of each candidate, from fits in order.
+/// The best fit of each candidate, from fits in descending order.
 fn once_each(fitted: Vec<Fitted>) -> Vec<Fitted> {
     let mut kept: Vec<Fitted> = Vec::new();
     for fitted in fitted {
@@ -36,10 +36,10 @@ fn once_each(fitted: Vec<Fitted>) -> Vec<Fitted> {
     kept
 }
 
-/// Fits candidates from these values; the fits, best first.
+/// Fits candidates from the start values; returns the fits, the best first.
 ///
-/// After the first steps the linearisation predicts how far each fit will come: those that cannot rival
-/// the best are not taken to their end.
+/// After the first steps the linearisation predicts the result of each fit. A fit that cannot approach the
+/// best one is not continued.
 pub(super) fn fit(
     problem: &Problem<'_>,
     current: &Calibration,
@@ -78,8 +78,8 @@ pub(super) fn fit(
     to_the_end(problem, current, once_each(fitted))
 }
 
-/// Fits the best candidate and what comes near it once more, from where they came out, if that is of
-/// another kind: between look-alikes the last nats decide.
+/// Continues the fits of the best candidate and of its competitors, if one of these is of another kind: the
+/// last nats decide between look-alikes.
 fn to_the_end(problem: &Problem<'_>, current: &Calibration, fitted: Vec<Fitted>) -> Vec<Fitted> {
     let Some(best) = fitted.first() else { return fitted };
     let (kind, least) = (best.candidate.kind, RIVAL_SHARE * best.log_evidence);
@@ -96,7 +96,7 @@ fn to_the_end(problem: &Problem<'_>, current: &Calibration, fitted: Vec<Fitted>)
     fitted
 }
 
-/// Takes a fit up again until it gains no more, in its parameters' ranges.
+/// Continues a fit, with its parameters inside their ranges, until it gains no more.
 fn further(problem: &Problem<'_>, current: &Calibration, mut fitted: Fitted) -> Fitted {
     let candidates = [problem.candidates, std::slice::from_ref(&fitted.candidate)].concat();
     let with = Problem { candidates: &candidates, ..*problem };
@@ -114,10 +114,10 @@ fn further(problem: &Problem<'_>, current: &Calibration, mut fitted: Fitted) -> 
     fitted
 }
 
-/// First steps of a candidate's fit, together with the baseline and what was accepted before.
+/// First steps of a candidate's fit, together with the baseline and the accepted extensions.
 struct Begun<'t> {
     template: &'t Template,
-    /// All in the model; the candidate is the last.
+    /// All candidates in the model; the new one is the last.
     candidates: Vec<Candidate>,
     start: DVector<f64>,
     descent: Descent,
@@ -139,14 +139,14 @@ impl<'t> Begun<'t> {
         Ok(Self { template, candidates, start, descent })
     }
 
-    /// Whether the fit may end near the best, by what its derivatives predict; `best` is the greatest gain
-    /// that some fit has already.
+    /// Whether the predicted result of the fit may approach the best one; `best` is the greatest gain of
+    /// all fits so far.
     fn may_come_near(&self, best: f64, current: &Calibration) -> bool {
         let predicted = current.objective - self.descent.state.predicted_objective();
         predicted >= RACE_SHARE * best - DOUBT * current.objective
     }
 
-    /// The fit as it will be predicted to end.
+    /// The fit with its predicted result, without further steps.
     fn given_up(self, current: &Calibration) -> Fitted {
         let calibration = self.descent.state;
         let gain = calibration.objective - calibration.predicted_objective();
@@ -154,7 +154,7 @@ impl<'t> Begun<'t> {
         Self::fitted(self.template, self.candidates, calibration, log_evidence)
     }
 
-    /// The fit, in its parameters' ranges if it would end far beyond.
+    /// Continues the fit to its end; restricts its parameters to their ranges if the result is implausible.
     fn finish(
         self,
         problem: &Problem<'_>,
@@ -192,7 +192,7 @@ impl<'t> Begun<'t> {
     }
 }
 
-/// The model without the candidates, fitted anew from where they came out, if that is better.
+/// Fits the model without the candidates again, from the values of their fits; `None` if no fit is better.
 pub(super) fn retuned(
     problem: &Problem<'_>,
     current: &Calibration,

@@ -1,10 +1,10 @@
-//! What several steps of a diagnosis must agree on.
+//! Limits that several steps of a diagnosis share.
 
-/// Least gain in nats of a name on passes that it was not fitted to.
+/// Smallest gain in nats of a kind on passes that were not fitted.
 pub(crate) const HELD_OUT_MIN: f64 = 4.0;
 
-/// Probability of a false alarm on a recording without anything left out.
+/// False-alarm rate on a recording with nothing left out.
 pub(super) const FALSE_ALARM: f64 = 0.05;
 
-/// Candidates of one kind that are fitted together with the baseline.
+/// Largest number of candidates of one kind that are fitted together with the baseline.
 pub(super) const REFINED_PER_KIND: usize = 2;

@@ -1,4 +1,4 @@
-//! The whole way from a recording to a name: baseline, alarm, candidates, acceptance.
+//! Search for left-out physics: baseline, alarm, candidates, acceptance.
 
 mod chance;
 mod everywhere;
@@ -34,89 +34,89 @@ use crate::prepared_recording::PreparedRecording;
 use crate::section::Section;
 use nalgebra::{DMatrix, DVector};
 
-/// Effects that are looked for one after the other.
+/// Largest number of successive searches.
 const EFFECTS_MAX: usize = 3;
 
-/// Share of the best candidate's log evidence from which another may predict a speed that is held out,
-/// and how many do.
+/// Share of the best candidate's log evidence from which another candidate may predict a held-out speed;
+/// `NESTED_MAX` is the largest number of these candidates.
 const NESTED_SHARE: f64 = 0.5;
 const NESTED_MAX: usize = 3;
 
-/// Log evidence in nats below which a kind that is everywhere is not tried again in the next search.
+/// A kind without a location whose log evidence in nats is lower is not tested in the next search.
 const HOPELESS: f64 = -100.0;
 
-/// What is going on, for a progress bar.
+/// Stage of a search, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// The baseline is fitted.
+    /// Fit of the baseline.
     Baseline,
-    /// Candidates are screened.
+    /// Screening of the candidates.
     Screening,
-    /// The best are fitted together with the baseline.
+    /// Fit of the best candidates together with the baseline.
     Refinement,
-    /// Speeds are held out and predicted.
+    /// Prediction of held-out speeds.
     HeldOut,
 }
 
 /// A candidate that was fitted together with the baseline.
 #[derive(Clone, Debug)]
 pub struct Fitted {
-    /// What and where.
+    /// The candidate: kind and location.
     pub candidate: Candidate,
-    /// Baseline and parameters.
+    /// Fit of the baseline with the candidate's parameters.
     pub calibration: Calibration,
-    /// Log evidence for it against the model without it, in nats.
+    /// Log ratio of the evidence to the model without the candidate, in nats.
     pub log_evidence: f64,
-    /// Length of its trace after re-tuning, `d'`, in the trial screened.
+    /// Detectability `d'` of the screened trial.
     pub detectability: f64,
-    /// Its trace: whitened change of the log powers.
+    /// Signature: whitened change of the log powers.
     pub change: DVector<f64>,
 }
 
-/// One search for an effect.
+/// One search for an extension.
 #[derive(Clone, Debug, Default)]
 pub struct Round {
-    /// Probability to see such evidence for anything if nothing is left out.
+    /// Probability of the greatest evidence if nothing is left out.
     pub p_value: f64,
-    /// Share of the catalogue that would not be seen in this recording.
+    /// Share of the catalogue that would not be detected in this recording.
     pub unseen: f64,
-    /// What was fitted, best first.
+    /// Fitted candidates, the best first.
     pub fitted: Vec<Fitted>,
-    /// What an unknown dynamic stiffness under a rail seat would explain.
+    /// Best unknown dynamic stiffness of the port scan.
     pub port: Option<UnknownElement>,
-    /// Probability to see as much evidence for one if nothing is left out.
+    /// Probability of its evidence if nothing is left out.
     pub port_p_value: f64,
-    /// What an unknown dynamic stiffness at the place of the last name before explains, where no more
-    /// is accepted.
+    /// Unknown dynamic stiffness in the residual at the location of the last accepted candidate, if no
+    /// further one is accepted.
     pub unknown_residual: Option<UnknownElement>,
-    /// Gain of an unknown dynamic stiffness on each speed held out, in nats, its place chosen without that
-    /// speed; asked in the first search where nothing is named.
+    /// Gain of an unknown dynamic stiffness at each held-out speed, in nats; its port is selected without
+    /// this speed. Computed in the first search if no candidate is accepted.
     pub unknown_gain: Vec<f64>,
-    /// Gain of the best on each speed held out, in nats.
+    /// Gain of the best candidate at each held-out speed, in nats.
     pub held_out_gain: Vec<f64>,
-    /// Whether the best was accepted.
+    /// Whether the best candidate was accepted.
     pub accepted: bool,
-    /// Evidence in nats for something unknown that is left at the best's place, if it speaks against
-    /// the best.
+    /// Evidence in nats for unknown physics in the residual at the best candidate's location, if it led to
+    /// the rejection of the candidate.
     pub remainder: Option<f64>,
 }
 
 impl Round {
-    /// Whether such evidence is rarer, where nothing is left out, than a false alarm may be.
+    /// Whether the evidence by chance is rarer than the false-alarm rate.
     pub fn is_significant(&self) -> bool {
         self.p_value <= FALSE_ALARM
     }
 
-    /// Whether an unknown dynamic stiffness predicts speeds that were held out.
+    /// Whether an unknown dynamic stiffness predicts held-out speeds.
     pub fn unknown_is_predictive(&self) -> bool {
         unknown_is_predicted(&self.unknown_gain)
     }
 }
 
-/// What was found.
+/// Result of a search for left-out physics.
 #[derive(Clone, Debug)]
 pub struct SearchOutcome {
-    /// The re-tuned baseline.
+    /// The calibrated baseline.
     pub baseline: Calibration,
     /// The baseline with all accepted extensions.
     pub last: Calibration,
@@ -124,21 +124,22 @@ pub struct SearchOutcome {
     pub accepted: Vec<Candidate>,
     /// Each search, in order.
     pub rounds: Vec<Round>,
-    /// What was observed, with its covariance.
+    /// The observed log powers with their covariance.
     pub observation: Observation,
-    /// Scatter to expect of each log power of a sleeper.
+    /// Expected standard deviation of each log power of a sleeper, in nats.
     pub deviation: DVector<f64>,
     /// Gain of a model with a separate track and surface for each speed, in nats, over a model of one track
     /// with all accepted physics. It is negative if all speeds passed the same track.
     pub speed_disagreement: f64,
-    /// What the final model does not explain, though an eye would see it, and the probability to see as
-    /// much if nothing is left out; none where it does not predict speeds that were held out.
+    /// Visible patch in the residual of the final model, with the probability of such a patch if nothing is
+    /// left out; `None` if there is none, or if it does not predict held-out speeds.
     pub patch: Option<(Patch, f64)>,
-    /// Log density of each speed when it is held out, in nats a log power: baseline, extended.
+    /// Mean log density of held-out log powers in nats, for baseline and extended model; zero for a single
+    /// speed.
     pub held_out: [f64; 2],
 }
 
-/// A rough covariance for the first calibration, before null simulations of that track.
+/// A rough covariance for the first calibration, before the null simulations of that track.
 fn rough_covariance(prepared: &PreparedRecording) -> DMatrix<f64> {
     let (size, bands) = (prepared.forward.per_sleeper(), prepared.forward.bands.count());
     DMatrix::from_fn(size, size, |i, j| {
@@ -149,10 +150,11 @@ fn rough_covariance(prepared: &PreparedRecording) -> DMatrix<f64> {
     })
 }
 
-/// The track's parameters to simulate null cases with.
+/// Calibrates the baseline with a rough covariance; the result serves as parameters of the null
+/// simulations.
 ///
 /// # Errors
-/// [`CalibrationError`] when no baseline is found.
+/// [`CalibrationError`] if the calibration fails.
 pub fn first_calibration(prepared: &PreparedRecording) -> Result<DVector<f64>, CalibrationError> {
     let covariance = prepared.of_compared(rough_covariance(prepared));
     let observation = Observation::new(prepared.log_power.clone(), &covariance, |_| false)
@@ -162,13 +164,13 @@ pub fn first_calibration(prepared: &PreparedRecording) -> Result<DVector<f64>, C
     Ok(problem.calibrate(prepared.forward.unknowns.typical())?.values)
 }
 
-/// Looks for physics that was left out.
+/// Searches for left-out physics.
 ///
-/// `all` is what may be left out: usually the [`crate::candidates`] of the section and what other
-/// tests of the recording suggest.
+/// `all` are the candidates: usually the [`crate::candidates`] of the section and those that an inspection
+/// suggests.
 ///
 /// # Errors
-/// [`CalibrationError`] when the model breaks down on the way.
+/// [`CalibrationError`] if a calibration fails.
 pub fn search(
     prepared: &PreparedRecording,
     null: &NullModel,
@@ -222,7 +224,7 @@ fn log_densities(scores: &[HeldOutScore]) -> Vec<f64> {
 }
 
 impl Round {
-    /// Kinds that are far worse than nothing where they are everywhere.
+    /// Kinds without a location whose evidence is so low that they need not be tested again.
     fn hopeless(&self) -> Vec<&'static str> {
         let is_far =
             |fitted: &&Fitted| fitted.candidate.is_everywhere() && fitted.log_evidence < HOPELESS;
@@ -231,7 +233,7 @@ impl Round {
 }
 
 impl SearchOutcome {
-    /// Waves on the rail that the baseline's residual shows, as candidates.
+    /// Corrugation candidates from patches of the baseline's residual.
     fn waves(&self, setting: &Setting<'_>) -> Vec<Candidate> {
         let forward = &setting.prepared.forward;
         let problem = Problem { forward, observation: &self.observation, candidates: &[] };
@@ -244,8 +246,8 @@ impl SearchOutcome {
         wave.filter(|wave| setting.prepared.may_be_named(wave.kind)).into_iter().collect()
     }
 
-    /// Looks for one effect more; whether one was accepted. `densities` are those of each speed when
-    /// it is held out, by the baseline and with one more effect each.
+    /// Searches for one more extension; returns whether one was accepted. `densities` are the log densities
+    /// of each held-out speed, for the baseline and for each number of accepted extensions.
     fn search_round(
         &mut self,
         setting: &Setting<'_>,
@@ -301,11 +303,11 @@ impl SearchOutcome {
         Ok(found_another)
     }
 
-    /// What one effect more gains in log density at each speed when it is held out; the best candidate is
-    /// accepted if they are predicted better.
+    /// Tests the best candidate on held-out speeds and accepts it if it predicts them better. Returns the
+    /// gain in log density at each speed, in nats.
     ///
-    /// Which candidate predicts a speed is decided without that speed, among those that come near the
-    /// best: the gain tests the choice of kind and place as well as the values.
+    /// The candidate that predicts a speed is selected without this speed, among those with nearly the best
+    /// evidence. The gain therefore tests the choice of kind and location as well as the values.
     fn accept_if_predictive(
         &mut self,
         best: &Fitted,
@@ -342,8 +344,9 @@ impl SearchOutcome {
         Ok(gains)
     }
 
-    /// The unknown that the best candidate of a search is compared with. Beside what is accepted it is
-    /// the best where the candidate is felt: elsewhere it is another effect, not another name.
+    /// Unknown physics that competes with the best candidate of a search. If extensions were accepted
+    /// before, only ports within the reach of the candidate compete; elsewhere an unknown would be another
+    /// effect.
     fn competing_unknown(
         &self,
         round: &Round,

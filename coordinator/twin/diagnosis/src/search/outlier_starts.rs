@@ -1,9 +1,10 @@
-//! What the baseline imitates by stiffness: effects under single sleepers that lie far from their
-//! neighbours and under a run of sleepers that lies far from all others, tried from the others' values.
+//! Start values at outliers of the stiffness: single sleepers that differ much from their neighbours, and
+//! runs of sleepers that differ much from all others. The candidates there start from the stiffness of the
+//! other sleepers.
 //!
-//! A sleeper that is bolted down is stiff, and so is one on a railpad of a tenth of the stiffness
-//! to a wheel that hardly feels what is below; beside such a railpad no trial of bolts gains
-//! anything.
+//! The baseline reproduces many effects by a stiffness. Sleeper bolts, for example, have nearly the same
+//! effect on the wheel as a railpad with a tenth of the stiffness. At such a railpad stiffness no trial of
+//! bolts improves the fit.
 
 use super::limits::REFINED_PER_KIND;
 use crate::baseline::Unknowns;
@@ -14,29 +15,30 @@ use nalgebra::DVector;
 use std::ops::Range;
 use tracktwin_inspection::median;
 
-/// Logarithm of a stiffness over its neighbours' from which it is far: three deviations of what
-/// varies from railpad to railpad.
+/// Smallest log ratio of an outlier's stiffness to that of its neighbours: three standard deviations of the
+/// variation between railpads.
 const FAR: f64 = 0.6;
 
-/// Sleepers on either side that a sleeper is compared with.
+/// Number of sleepers on either side with which a sleeper is compared.
 const NEIGHBOURS: usize = 3;
 
-/// Sleepers of the shortest run: five lie within reach of one or two effects at single sleepers.
+/// Smallest number of sleepers of a run: five lie within the reach of one or two effects at single
+/// sleepers.
 const SHORTEST: usize = 6;
 
-/// Least number of sleepers beside a run.
+/// Smallest number of sleepers outside a run.
 const REST: usize = 3;
 
-/// Standard deviations inside a run and outside of it by which their means differ at least.
+/// Smallest difference of the means inside and outside a run, in standard deviations.
 const DEVIATIONS: f64 = 3.0;
 
-/// Sleepers whose stiffness lies far from the others'.
+/// Outliers of the stiffness along a section.
 pub(super) struct Far {
-    /// The unknowns, with the others' stiffness under them.
+    /// The unknowns, with the typical stiffness of the other sleepers at the outliers.
     values: DVector<f64>,
-    /// Those that lie far from their neighbours.
+    /// Sleepers that differ much from their neighbours.
     sleepers: Vec<usize>,
-    /// Runs that lie far from the rest of the track.
+    /// Runs that differ much from the rest of the track.
     runs: Vec<Range<usize>>,
 }
 
@@ -68,7 +70,7 @@ impl Far {
         far
     }
 
-    /// Of each kind that may act at single sleepers, without a force law, the same at each run.
+    /// Candidates on each run, one of each kind that acts at single sleepers without a force law.
     pub(super) fn on_runs(&self, all: &[Candidate]) -> Vec<Candidate> {
         let at_first = |candidate: &&Candidate| {
             let acts = candidate.extension.sleepers.as_deref() == Some(&[0]);
@@ -91,8 +93,8 @@ impl Far {
     }
 }
 
-/// The run of sleepers whose stiffness, as logarithms, differs most from that of all others; none where
-/// that may be their scatter.
+/// The run of sleepers whose log stiffness differs most from that of all others; `None` if the difference
+/// may be random variation.
 fn run_apart(stiffness: &[f64]) -> Option<Range<usize>> {
     let count = stiffness.len();
     let runs = (0..count).flat_map(|from| (from + SHORTEST..=count).map(move |to| from..to));
@@ -113,19 +115,19 @@ fn run_apart(stiffness: &[f64]) -> Option<Range<usize>> {
     best.map(|(_, run)| run)
 }
 
-/// Trials of effects under sleepers that lie far from the others.
+/// Trials of candidates at outliers.
 pub(super) struct OutlierStarts {
     far: Far,
     templates: Vec<Template>,
-    /// Typical values of the baseline's unknowns.
+    /// The unknowns at their prior mean.
     typical: DVector<f64>,
 }
 
 impl OutlierStarts {
-    /// What such sleepers may have instead, best of each kind.
+    /// Selects the best trials of each kind at the outliers.
     ///
     /// # Errors
-    /// [`CalibrationError`] when the others' stiffness makes no track.
+    /// [`CalibrationError`] if no track exists for the stiffness of the other sleepers.
     pub(super) fn new(
         problem: &Problem<'_>,
         far: Far,
@@ -159,8 +161,8 @@ impl OutlierStarts {
         Ok(Self { far, templates: best, typical })
     }
 
-    /// Trials to be fitted, each with the values that it is fitted from; where a run is far, also from
-    /// typical values: all along the track the baseline imitates it.
+    /// Trials to be fitted, each with its start values. If there is a run, each trial also starts from
+    /// typical values, because the baseline reproduces a run all along the track.
     pub(super) fn starts(&self) -> impl Iterator<Item = (&Template, DVector<f64>)> {
         let typical = (!self.far.runs.is_empty()).then_some(&self.typical);
         let from = move || [Some(&self.far.values), typical].into_iter().flatten().cloned();

@@ -1,4 +1,4 @@
-//! How probable each explanation of a search is: evidence, tempered, times prior.
+//! Probability of each explanation of a search: tempered evidence times prior.
 
 use super::{Fitted, Round};
 use crate::port_scan::UnknownElement;
@@ -6,50 +6,51 @@ use crate::screen::STRENGTHS;
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{Kind, LookAlikeGroup};
 
-/// Nats by which the likelihood is tempered: the model is not exact, and its errors hang together.
+/// Divisor of log evidence (tempering): the model is not exact, and its errors are correlated.
 pub(super) const EVIDENCE_TEMPERING: f64 = 3.0;
 
-/// By how much more it is tempered for each nat of the greatest evidence: what is not exact in the
-/// model of an effect grows with the effect.
+/// Increase of the tempering per nat of the greatest evidence: the error of an extension's model grows with
+/// the extension.
 const INEXACT_SHARE: f64 = 1e-3;
 
-/// By how much more look-alikes of one group are tempered against each other for each nat of their
-/// evidence: another simulator's, or nature's, void or joint is not ours, and what both lack decides.
+/// Increase of the tempering between look-alikes of one group per nat of their evidence. A hanging sleeper
+/// or rail joint of reality or of another simulator differs from ours, and the common error would decide
+/// between look-alikes.
 const MEMBER_SHARE: f64 = 0.03;
 
-/// Probability of an unnamed alternative against a name of equal evidence: most of what goes wrong
-/// on a track is in the catalogue.
+/// Prior of unknown physics relative to a known kind: most faults of a track are in the catalogue.
 const UNKNOWN_PRIOR: f64 = 0.1;
 
-/// Share of the unknown's evidence from which a name explains what it does, if the name's model is not
-/// exact: the unknown is free at every frequency, and fits what is missing there as well. A linear
-/// name that is right explains more than the unknown.
+/// Share of the evidence for unknown physics from which a known kind explains it, if the model of the kind
+/// is not exact. Unknown physics is free at every frequency and fits model errors as well. A correct linear
+/// kind explains more than unknown physics.
 const EXPLAINED_SHARE: f64 = 2.0 / 3.0;
 
-/// Least prior of nothing at all.
+/// Smallest prior of nothing being left out.
 const NOTHING_PRIOR: f64 = 0.5;
 
-/// What a search's explanations are worth; what is missing to one has nothing at all.
+/// Probabilities of the explanations of a search. They sum to less than one; the rest belongs to effects
+/// too weak to detect.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Probabilities {
-    /// Of each candidate that was fitted.
+    /// Probability of each fitted candidate.
     pub(crate) named: Vec<f64>,
-    /// Of the best candidate's group of look-alikes.
+    /// Probability of the best candidate's group of look-alikes.
     pub(crate) group: f64,
-    /// Of an unknown dynamic stiffness.
+    /// Probability of an unknown dynamic stiffness.
     pub(crate) unknown: f64,
-    /// Of nothing at all.
+    /// Probability that nothing is left out.
     pub(crate) nothing: f64,
 }
 
 impl Round {
-    /// Probabilities of what was fitted, of something unknown and of nothing at all; the rest is
-    /// that of something too weak to show.
+    /// Probabilities of the fitted candidates, of unknown physics and of nothing; the rest is that of
+    /// effects too weak to detect.
     pub(crate) fn probabilities(&self) -> Probabilities {
         self.against(self.port.as_ref())
     }
 
-    /// The same with this as the unknown.
+    /// As [`Round::probabilities`], with the given unknown physics.
     pub(super) fn against(&self, unknown: Option<&UnknownElement>) -> Probabilities {
         let of_fitted = |fitted: &Fitted| (fitted.log_evidence, fitted.candidate.kind.group);
         let named: Vec<_> = self.fitted.iter().map(of_fitted).collect();
@@ -59,10 +60,10 @@ impl Round {
     }
 }
 
-/// Share of the catalogue that a recording would not show: what its effects are worth against
-/// nothing, none more than nothing, in the mean of all kinds, places and strengths.
+/// Share of the catalogue that a recording would not show: mean, over all kinds, locations and strengths,
+/// of the evidence relative to nothing, at most one.
 ///
-/// Each trial comes with its kind and its log evidences at several strengths in nats.
+/// Each trial has its kind and its log evidence at several strengths in nats.
 pub(super) fn unseen(trials: impl Iterator<Item = (&'static str, [f64; STRENGTHS.len()])>) -> f64 {
     let mut kinds: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
     for (kind, evidences) in trials {
@@ -76,11 +77,12 @@ pub(super) fn unseen(trials: impl Iterator<Item = (&'static str, [f64; STRENGTHS
     kinds.values().map(|(sum, count)| sum / count).sum::<f64>() / kinds.len().max(1) as f64
 }
 
-/// Log evidences of names and of the unknown against nothing, in nats, the share of the unknown's from
-/// which the best name explains it, and the share of all names that would not be seen.
+/// Computes probabilities from log ratios of the evidence of known kinds and of unknown physics to nothing,
+/// in nats. `explained_share` is the share of the unknown's evidence from which the best kind explains it;
+/// `unseen` is the share of all kinds that would not be detected.
 ///
-/// Names are weighed in two steps: groups of look-alikes against each other and against nothing by their best
-/// member's evidence, then the members of each.
+/// The function weighs groups of look-alikes against each other and against nothing by their best member's
+/// evidence, and then the members of each group.
 fn of(
     named: &[(f64, LookAlikeGroup)],
     unknown: Option<f64>,

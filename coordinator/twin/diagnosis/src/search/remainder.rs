@@ -1,4 +1,4 @@
-//! Names that leave too much unexplained at their own place are taken back.
+//! Rejection of accepted candidates that leave a large residual at their own location.
 
 use super::extent::Extent;
 use super::limits::FALSE_ALARM;
@@ -8,16 +8,16 @@ use crate::candidate::Candidate;
 use crate::port_scan::{PortPlace, PortScan, UnknownElement};
 use crate::section::Section;
 
-/// Share of the evidence for a name from which something unknown that is left at its place speaks
-/// against it: one that is right leaves hardly any.
+/// Share of a candidate's evidence from which unknown physics in the residual at its location leads to
+/// rejection; a correct candidate leaves hardly any residual.
 const LEFT: f64 = 0.1;
 
-/// The same for what acts by laws that the wheel's load decides about: it is modelled with errors,
-/// which grow with the effect.
+/// The corresponding share for candidates with force laws that depend on the wheel load: their model has
+/// errors, which grow with the effect.
 const LEFT_UNDER_LOAD: f64 = 1.0 / 3.0;
 
 impl SearchOutcome {
-    /// Takes the last names back as long as what is left at their place speaks against them.
+    /// Rejects the last accepted candidates while the residual at their location is too large.
     pub(super) fn retract_names(&mut self, section: &Section) {
         let Some(last) = self.rounds.last().filter(|last| !last.accepted) else { return };
         let Some(port) =
@@ -45,7 +45,7 @@ impl SearchOutcome {
         }
     }
 
-    /// What something unknown at the last name's place explains beside all names.
+    /// Unknown physics in the residual at the location of the last accepted candidate.
     pub(super) fn unknown_residual(
         &self,
         ports: &PortScan,
@@ -56,7 +56,7 @@ impl SearchOutcome {
         ports.best_where(&self.last.residual, &self.last.gradient, is_there)
     }
 
-    /// What is accepted, last first, with its evidence, as long as it is at a place.
+    /// Accepted candidates at a location with their log evidence, the last one first.
     fn explained(&self, section: &Section, place: Extent) -> Vec<(&Candidate, f64)> {
         let evidence = |(known, round): (_, &Round)| (known, round.fitted[0].log_evidence);
         let rounds = &self.rounds[..self.accepted.len()];
@@ -66,9 +66,9 @@ impl SearchOutcome {
     }
 }
 
-/// Least evidence in nats for something unknown that speaks against the first of these names, which
-/// are at its place: what others of its kind explain beside it counts as well. None speaks against a
-/// shape, whose phase to the surface the model does not know.
+/// Smallest evidence in nats for unknown physics that leads to the rejection of the first of these
+/// candidates. The evidence of others of its kind at the same location is included. `None` for a shape,
+/// because the model does not include its phase relative to the surface.
 fn retraction_threshold(explained: &[(&Candidate, f64)]) -> Option<f64> {
     let &(last, _) = explained.first()?;
     let is_kind = |(known, _): &&(&Candidate, f64)| known.kind.physics == last.kind.physics;

@@ -1,4 +1,4 @@
-//! One search for an effect: screened, refined, held out, accepted or not.
+//! One search for an extension: screening, fit, test on held-out speeds, acceptance.
 
 use super::chance::{excess, tail_probability, whitened};
 use super::everywhere::everywhere;
@@ -24,28 +24,28 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_number::floored;
 
-/// Logarithm of power by which a patch must differ to be seen in a picture of the residual: 1.5 dB.
+/// Smallest log power ratio of a patch that is visible in a plot of the residual: 1.5 dB.
 const VISIBLE: f64 = 0.35;
 
-/// Candidates in all that are fitted together with the baseline.
+/// Largest number of candidates that are fitted together with the baseline.
 const REFINED_MAX: usize = 8;
 
-/// Least log evidence in screening for a candidate to be fitted.
+/// Smallest log evidence of a fitted candidate in the screening.
 const SCREENED_MIN: f64 = 2.0;
 
-/// Share of the greatest gain by a trial of free size from which a kind is fitted.
+/// Share of the greatest gain of a trial with free strength from which a kind is fitted.
 const ALONG_SHARE_MIN: f64 = 0.25;
 
-/// The same for something unknown: that is free in place and frequency. On recordings of another simulator
-/// one that was there gained 58, and one that was not 5.
+/// Smallest gain in nats of unknown physics on held-out speeds; it is free in location and frequency. On
+/// recordings of another simulator the gain was 58 for a true unknown and 5 for a false one.
 const UNKNOWN_HELD_OUT_MIN: f64 = 8.0;
 
-/// What stays the same through all searches.
+/// Data that all searches share.
 pub(super) struct Setting<'a> {
     pub(super) prepared: &'a PreparedRecording,
     pub(super) log_power: DVector<f64>,
     pub(super) covariance: DMatrix<f64>,
-    /// Differences of null simulations, as they scatter in recordings.
+    /// Differences of null simulations, with the covariance of recordings.
     pub(super) nulls: Vec<DVector<f64>>,
 }
 
@@ -65,7 +65,7 @@ impl<'a> Setting<'a> {
             .ok_or(CalibrationError::NotFinite)
     }
 
-    /// Score of each speed, held out in turn; empty with a single speed.
+    /// Score of each speed, held out in turn; empty for a single speed.
     pub(super) fn held_out(
         &self,
         candidates: &[Candidate],
@@ -77,10 +77,10 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// Gain in nats on each speed, held out in turn, of something unknown at the place that the other speeds
-    /// show; `ports` are those of all speeds on the track of `current`. Empty with a single speed.
+    /// Gain in nats on each speed, held out in turn, of unknown physics at the port that the other speeds
+    /// select. `ports` are those of all speeds on the track of `current`. Empty for a single speed.
     ///
-    /// The log evidence with the speed less that without it is the gain in log predictive density.
+    /// The gain in log predictive density is the log evidence with the speed minus that without it.
     pub(super) fn unknown_gains(
         &self,
         ports: &PortScan,
@@ -100,8 +100,8 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// The patch of the residual that stands out most, with the probability to see as much if nothing is
-    /// left out; none where the passes show nothing that an eye would see.
+    /// The patch of the residual with the largest deviation, and the probability of such a patch if nothing
+    /// is left out; `None` if the patch would not be visible in a plot.
     pub(super) fn patch(
         &self,
         problem: &Problem<'_>,
@@ -122,8 +122,8 @@ impl<'a> Setting<'a> {
         (patch.height.abs() >= VISIBLE).then_some((patch, floored(p_value)))
     }
 
-    /// Gain in nats on each speed, held out in turn, of the patch that the other speeds show most. Empty with
-    /// a single speed.
+    /// Gain in nats on each speed, held out in turn, of the patch that the other speeds select. Empty for a
+    /// single speed.
     pub(super) fn patch_gains(
         &self,
         problem: &Problem<'_>,
@@ -146,7 +146,7 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// What follows without each speed, which is held out; nothing with a single speed.
+    /// Results of `of` for each speed, which is held out; empty for a single speed.
     fn without_each_speed<T: Send>(
         &self,
         of: impl Fn(&Observation) -> Result<T, CalibrationError> + Sync,
@@ -160,7 +160,7 @@ impl<'a> Setting<'a> {
             .collect()
     }
 
-    /// What follows from each speed, all others held out.
+    /// Results of `of` for each speed, with all other speeds held out.
     pub(super) fn at_each_speed<T: Send>(
         &self,
         of: impl Fn(&Observation) -> Result<T, CalibrationError> + Sync,
@@ -172,8 +172,8 @@ impl<'a> Setting<'a> {
             .collect()
     }
 
-    /// One search: all candidates screened and, if there is anything, the best fitted; kinds that are
-    /// `hopeless` are not tried everywhere.
+    /// One search: screens all candidates and, if the evidence is significant, fits the best ones. Kinds in
+    /// `hopeless` are not tested without a location.
     pub(super) fn round(
         &self,
         problem: &Problem<'_>,
@@ -216,7 +216,7 @@ impl<'a> Setting<'a> {
         Ok((round, ports))
     }
 
-    /// How probable the greatest evidence among candidates and ports is if nothing is left out.
+    /// Computes the probability of the greatest evidence among candidates and ports if nothing is left out.
     fn alarm(
         &self,
         problem: &Problem<'_>,
@@ -244,13 +244,13 @@ impl<'a> Setting<'a> {
     }
 }
 
-/// Whether gains on held-out speeds in nats are those of a name; without a second speed nothing
-/// speaks against one.
+/// Whether gains on held-out speeds, in nats, are large enough for a known kind; true for a single speed.
 pub(super) fn is_predicted(gains: &[f64]) -> bool {
     gain_at_least(HELD_OUT_MIN, gains)
 }
 
-/// The same for something unknown.
+/// Whether gains on held-out speeds, in nats, are large enough for unknown physics; true for a single
+/// speed.
 pub(super) fn unknown_is_predicted(gains: &[f64]) -> bool {
     gain_at_least(UNKNOWN_HELD_OUT_MIN, gains)
 }
@@ -260,8 +260,8 @@ fn gain_at_least(least: f64, gains: &[f64]) -> bool {
     gains.is_empty() || (gains.iter().sum::<f64>() >= least && lost <= 1)
 }
 
-/// The best candidate, if its unknown rival does not speak against it and it is sure enough beside
-/// earlier effects.
+/// The best candidate, if it is more probable than the competing unknown physics and has enough evidence in
+/// addition to earlier extensions.
 pub(super) fn accepted_candidate<'r>(
     round: &'r Round,
     competitor: Option<&UnknownElement>,
@@ -278,9 +278,9 @@ pub(super) fn accepted_candidate<'r>(
     (leads && best.log_evidence >= threshold.of(&best.candidate)).then_some(best)
 }
 
-/// Whether a candidate is a shape of the rail that the passes alone show as well, where the unknown
-/// is: the force of a shape adds to the surface's with a phase that mean powers leave out, so that an
-/// unknown fits better beside it.
+/// Whether a candidate is a shape of the rail that the inspection also detected, at the port of the unknown
+/// physics. The force of a shape has a phase relative to the surface, which mean powers omit; unknown
+/// physics may therefore fit better.
 fn is_shape_at(port: &PortPlace, candidate: &Candidate, prepared: &PreparedRecording) -> bool {
     let section = &prepared.forward.section;
     let is_shape = is_local_shape(candidate);
@@ -301,8 +301,8 @@ fn is_shape_at(port: &PortPlace, candidate: &Candidate, prepared: &PreparedRecor
         && prepared.detected_shapes_m.iter().any(is_detected)
 }
 
-/// The best trials: of each candidate one, of each kind a few; then of each kind without any the
-/// one that points best along the residual, for a large effect's trials may miss its size.
+/// The best trials: one of each candidate and a few of each kind; then, for each kind without a trial, the
+/// one with the greatest gain at free strength, because the trials of a large effect may miss its size.
 fn choose<'t>(
     mut screened: Vec<(f64, &'t Template)>,
     all: &[Candidate],
@@ -332,7 +332,7 @@ fn choose<'t>(
     chosen
 }
 
-/// Trials to be fitted, each with the values that it is fitted from.
+/// Trials to be fitted, each with its start values.
 fn starts<'t>(
     problem: &Problem<'_>,
     current: &Calibration,

@@ -1,4 +1,5 @@
-//! Runs of sleepers: what a kind does at three sleepers or more is about the sum of what it does at each.
+//! Runs of sleepers: the signature at three or more sleepers is about the sum of the signatures at single
+//! sleepers.
 
 use crate::calibration::Calibration;
 use crate::candidate::Candidate;
@@ -7,27 +8,27 @@ use nalgebra::DVector;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Sleepers of the shortest run; pairs are screened as they are.
+/// Number of sleepers of the shortest run; pairs are candidates of their own.
 const SHORTEST: usize = 3;
 
-/// Sleepers of the longest run of a kind that the wheel's load decides about: over more of them the rail
-/// sinks until gaps close.
+/// Number of sleepers of the longest run for a kind that depends on the wheel load; over a longer run the
+/// rail deflects until gaps close.
 const LONGEST_UNDER_LOAD: usize = 5;
 
-/// By how much a run must gain more than the kind at a single place to be tried.
+/// Smallest ratio of the gain of a run to that of the kind at a single location.
 const BETTER: f64 = 1.2;
 
-/// Least gain of a run in nats.
+/// Smallest gain of a run in nats.
 const GAIN_MIN: f64 = 4.0;
 
-/// What a kind does at each sleeper, by one trial of one family.
+/// Signatures of a kind at each sleeper, for one trial of one family.
 struct Singles<'a> {
     candidate: &'a Candidate,
-    /// By number of the sleeper.
+    /// Signatures by index of the sleeper.
     templates: BTreeMap<usize, &'a Template>,
 }
 
-/// The best run of each kind that gains more there than at any single place.
+/// The best run of each kind whose gain is larger than at any single location.
 pub(super) fn runs(
     templates: &[Template],
     all: &[Candidate],
@@ -79,7 +80,7 @@ fn singles<'a>(templates: &'a [Template], all: &'a [Candidate]) -> Vec<Singles<'
 }
 
 impl Singles<'_> {
-    /// The run whose summed trace gains most in the residual, and its gain in nats.
+    /// The run whose summed signature gains most in the residual, and its gain in nats.
     fn best_run(&self, current: &Calibration) -> Option<(f64, Range<usize>)> {
         let sleepers: Vec<usize> = self.templates.keys().copied().collect();
         let mut best: Option<(f64, Range<usize>)> = None;
@@ -105,7 +106,7 @@ impl Singles<'_> {
     }
 }
 
-/// Sum of traces: all that is asked of it but its length is linear in them.
+/// Sum of signatures; all its quantities except the norm are linear in them.
 struct Sum {
     change: DVector<f64>,
     projected_gradient: DVector<f64>,
@@ -125,7 +126,7 @@ impl Sum {
         self.imitation += &template.imitation;
     }
 
-    /// Nats that a trace of free size gains in the residual, as [`Template::along`].
+    /// Gain in nats of a signature with free strength in the residual, as [`Template::along`].
     fn gain(&self, current: &Calibration) -> f64 {
         let square = self.change.norm_squared() - self.projected_gradient.dot(&self.imitation);
         let along = self.change.dot(&current.residual).max(0.0);

@@ -1,4 +1,4 @@
-//! Whether all speeds passed the same track.
+//! Test whether all speeds belong to the same track.
 
 use super::chance::squares;
 use super::limits::FALSE_ALARM;
@@ -10,8 +10,8 @@ use tracktwin_inspection::median;
 use tracktwin_number::probability;
 
 impl SearchOutcome {
-    /// Compares what was found with a track of its own for each speed, and takes it back if that is
-    /// surely better: what stays where it is, all speeds pass.
+    /// Compares the result with a model that has a separate track for each speed, and rejects all
+    /// candidates if this model is significantly better: all speeds must pass a fixed cause.
     pub(super) fn compare_speeds(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
         let forward = &setting.prepared.forward;
         if forward.speeds_m_s.len() < 2 {
@@ -46,19 +46,19 @@ impl SearchOutcome {
         Ok(())
     }
 
-    /// Probability of such a difference if all speeds passed the same track.
+    /// Probability of such a difference if all speeds belong to the same track.
     pub fn speed_disagreement_p_value(&self) -> f64 {
         probability(-self.speed_disagreement.max(0.0) / EVIDENCE_TEMPERING)
     }
 
-    /// Whether the speeds did surely not pass the same track.
+    /// Whether the speeds significantly belong to different tracks.
     pub fn speeds_disagree(&self) -> bool {
         self.speed_disagreement_p_value() <= FALSE_ALARM
     }
 }
 
 impl Round {
-    /// The greatest log evidence in nats of all that was tried, none at least.
+    /// The greatest log evidence in nats of all candidates and ports, at least zero.
     fn most(&self) -> f64 {
         let named = self.fitted.first().map(|fitted| fitted.log_evidence);
         let unknown = self.port.as_ref().map(|port| port.log_evidence);

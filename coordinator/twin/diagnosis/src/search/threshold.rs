@@ -1,4 +1,4 @@
-//! How much evidence a name needs, alone and beside what is accepted already.
+//! Smallest evidence of a candidate, alone or in addition to accepted ones.
 
 use super::extent::Extent;
 use super::probability::EVIDENCE_TEMPERING;
@@ -6,28 +6,29 @@ use crate::candidate::Candidate;
 use crate::section::Section;
 use tracktwin_track::extension::Class;
 
-/// Least log evidence for an effect beside one that was accepted before, over the part of that one's
-/// that falls to its place: what a model leaves unexplained looks like a small second effect there, if
-/// not like one that is everywhere beside a shape at a place.
+/// Smallest ratio of a candidate's log evidence to the part of an accepted one's that belongs to its
+/// location. A model error looks like a small second effect there, except for an effect without a location
+/// in addition to a local shape.
 const FURTHER_SHARE_MIN: f64 = 0.25;
 
-/// By how much a candidate may gain more when it is fitted, with all of the baseline, than its best
-/// trial of free size: beside an effect that is accepted what can't get far enough is not fitted.
+/// Largest ratio of the gain of a fit to that of the best trial with free strength. A candidate that cannot
+/// reach the threshold in addition to an accepted one is not fitted.
 const FITTED_GAIN: f64 = 3.0;
 
-/// The least log evidence for a name, beside what is accepted already with its own log evidence.
+/// Smallest log evidence of a candidate, given the accepted ones with their log evidence.
 #[derive(Clone, Copy)]
 pub(super) struct EvidenceThreshold<'a> {
     pub(super) accepted: &'a [(Candidate, f64)],
     pub(super) section: &'a Section,
-    /// Where the passes alone show the rail's own shape, from and to in m.
+    /// Stretches in m in which an inspection detected a shape of the rail.
     pub(super) detected_shapes_m: &'a [[f64; 2]],
 }
 
 impl EvidenceThreshold<'_> {
-    /// The least log evidence for this candidate in nats.
+    /// The smallest log evidence of this candidate in nats.
     ///
-    /// A shape that the passes alone show beside no accepted one is no small rest of another effect.
+    /// A shape that the inspection detected away from all accepted candidates is no residual of another
+    /// effect and needs only the evidence of a first candidate.
     pub(super) fn of(self, candidate: &Candidate) -> f64 {
         let alone = EVIDENCE_TEMPERING * 20_f64.ln();
         if is_local_shape(candidate) && self.is_detected_by_passes(candidate) {
@@ -47,7 +48,7 @@ impl EvidenceThreshold<'_> {
         })
     }
 
-    /// Share of an effect's log evidence that a candidate needs beside it.
+    /// Share of an accepted candidate's log evidence that a further candidate needs.
     fn share(self, known: &Candidate, candidate: &Candidate) -> f64 {
         if candidate.is_everywhere() && is_local_shape(known) {
             return 0.0;
@@ -61,15 +62,15 @@ impl EvidenceThreshold<'_> {
         }
     }
 
-    /// Whether fitting a candidate may give it that much, from the gain in nats of a trial of free
-    /// size.
+    /// Whether the fit of a candidate may reach the threshold, from the gain in nats of a trial with free
+    /// strength.
     pub(super) fn may_be_reached(self, candidate: &Candidate, gain: f64) -> bool {
         self.accepted.is_empty() || FITTED_GAIN * gain >= self.of(candidate)
     }
 }
 
-/// Whether it is a shape of the rail at a place: it adds power there, and what its model lacks does
-/// not look like another track.
+/// Whether a candidate is a local shape of the rail. It adds power there, and its model error does not look
+/// like another track.
 pub(super) fn is_local_shape(candidate: &Candidate) -> bool {
     candidate.kind.classes.contains(&Class::Wavelength) && !candidate.is_everywhere()
 }

@@ -1,9 +1,9 @@
 //! Evaluation of samples while they are recorded, sleeper by sleeper.
 //!
-//! A feature depends on the samples of its window and a margin on either side, and on nothing
-//! else. So a sleeper is evaluated when its right margin is complete, from the samples from its
-//! left margin on: the features are those of the whole pass to the bit. A gap or a sample that is
-//! not finite ends a pass and begins another one, as if a recording had two passes.
+//! A feature depends only on the samples of its window and of a margin on either side. A sleeper is
+//! therefore evaluated as soon as its right margin is complete, from the samples that begin with its left
+//! margin. The features are identical, to the bit, to those of the whole pass. A gap or a sample that is
+//! not finite ends a segment; the result is the same as for a recording with two passes.
 
 mod recent;
 mod row;
@@ -23,9 +23,10 @@ use std::ops::Range;
 use tracktwin_signal::recording::{RATE_TOLERANCE, Recording, SleeperWindow};
 use tracktwin_signal::samples::Sample;
 
-/// Share of a margin from which its speed is compared with that of the window.
+/// The speed over a margin is compared with that over the window if at least this share of the margin is
+/// there.
 const PART_MIN: f64 = 0.25;
-/// Share of the slowest model's speed below which a window is not waited for.
+/// Share of the slowest model's speed; a window that takes longer than at this speed is given up.
 const SLOWEST: f64 = 0.9;
 
 /// Evaluates the sleepers of a section of track in the order in which a wheel rolls over them.
@@ -34,16 +35,16 @@ const SLOWEST: f64 = 0.9;
 pub struct Stream<'a> {
     section: &'a Recording,
     twin: Twin<'a>,
-    /// Samples of a margin.
+    /// Number of samples of a margin.
     margin: usize,
-    /// Samples that a window and its margins have at most.
+    /// Largest number of samples of a window with its margins.
     capacity: usize,
     segment: Segment,
-    /// Place of the first sleeper without a row.
+    /// Index of the first sleeper without a row.
     next: usize,
-    /// Where its window ends among the samples of the segment, once the wheel has passed it.
+    /// Index in the segment at which the window of `next` ends, after the wheel has passed it.
     end: Option<usize>,
-    /// Sleepers that earlier segments cover in part.
+    /// Sleepers that earlier segments cover in part, by index.
     open: BTreeMap<usize, Open>,
     recent: Recent<'a>,
 }
@@ -51,18 +52,18 @@ pub struct Stream<'a> {
 /// A sleeper that has no row yet.
 struct Open {
     features: SleeperFeatures,
-    /// Why a segment gave no features.
+    /// Reason why a segment gave no features.
     reason: Option<Reason>,
 }
 
 impl<'a> Stream<'a> {
-    /// A stream over the sleepers of `section`, whose passes do not matter. Prepares the models of every
-    /// speed, so that no row waits for them. Plans of transforms are made with the rows: the first
-    /// row with a length of samples takes longer.
+    /// Makes a stream over the sleepers of `section`; the passes of `section` are not used. The function
+    /// prepares the models of every speed, so that no row waits for them. The first row with a new number
+    /// of samples takes longer, because its transform is planned then.
     ///
     /// # Errors
-    /// [`Error::OtherFeatures`], [`Error::NoModel`], [`Error::Surrogate`], or [`Error::Rate`] when
-    /// the sample rate of the section is too low for the features.
+    /// [`Error::OtherFeatures`], [`Error::NoModel`], [`Error::Surrogate`], or [`Error::Rate`] if the sample
+    /// rate of the section is too low for the features.
     pub fn new(section: &'a Recording, twin: Twin<'a>) -> Result<Self, Error> {
         check_features(&twin)?;
         twin.models.belongs_to(&twin.library.library_digest)?;
@@ -86,15 +87,15 @@ impl<'a> Stream<'a> {
         })
     }
 
-    /// Samples that are held at most.
+    /// Largest number of samples in memory.
     pub const fn samples_max(&self) -> usize {
         2 * self.capacity
     }
 
-    /// Takes the next sample; the rows of the sleepers that it completes.
+    /// Adds the next sample and returns the rows of the sleepers that this sample completes.
     ///
     /// # Errors
-    /// [`Error::OtherSampleRate`], or what features, models and library report.
+    /// [`Error::OtherSampleRate`], [`Error::Features`] or [`Error::Surrogate`].
     pub fn push(&mut self, sample: &Sample) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
         if self.next == self.section.sleepers.len() {
@@ -121,10 +122,10 @@ impl<'a> Stream<'a> {
         Ok(rows)
     }
 
-    /// Ends the stream; the rows of all sleepers that have none.
+    /// Ends the stream and returns the rows of all remaining sleepers.
     ///
     /// # Errors
-    /// As [`Self::push`].
+    /// The errors of [`Self::push`].
     pub fn finish(mut self) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
         self.interrupt(Reason::NotCovered, &mut rows)?;
@@ -149,8 +150,9 @@ impl<'a> Stream<'a> {
         self.end.is_some_and(|end| positions.len() >= end + self.margin)
     }
 
-    /// Takes what the segment has of every window that it has a part of, at its end; rows of those that
-    /// it has passed. Windows that lie before the segment wait for the next one.
+    /// At the end of a segment, takes the available features of every window that the segment covers in
+    /// part, and adds the rows of the sleepers that the segment has passed. Windows before the segment wait
+    /// for the next segment.
     fn interrupt(&mut self, reason: Reason, rows: &mut Vec<Row>) -> Result<(), Error> {
         let [Some(&first_m), Some(&last_m)] = self.segment.ends_m() else { return Ok(()) };
         let mut sleeper = self.next + self.count_before(first_m);
@@ -165,14 +167,15 @@ impl<'a> Stream<'a> {
         Ok(())
     }
 
-    /// Sleepers without a row whose windows end before a position in m.
+    /// Number of sleepers without a row whose windows end before a position in m.
     fn count_before(&self, position_m: f64) -> usize {
         let left = &self.section.sleepers[self.next..];
         let spacing_m = self.section.spacing_m;
         left.partition_point(|it| SleeperWindow::around(it.x_m, spacing_m).to_m < position_m)
     }
 
-    /// Takes the features of a sleeper from the segment, which something may have `cut`.
+    /// Takes the features of a sleeper from the segment; `cut` is the reason if the segment was
+    /// interrupted.
     fn take(&mut self, sleeper: usize, cut: Option<Reason>) -> Result<(), Error> {
         let window = self.section.sleeper_window(sleeper);
         let Self { segment, twin, open, .. } = self;
@@ -213,13 +216,13 @@ impl<'a> Stream<'a> {
         Ok(Row::new(Outcome::Unevaluated { id: place.id.clone(), x_m: place.x_m, reason }))
     }
 
-    /// What interrupted the stream before the segment, if the next window lies before the segment.
+    /// Reason of the interruption before the segment, if the next window lies before the segment.
     fn reason_before(&self) -> Option<Reason> {
         let [Some(first_m), _] = self.segment.ends_m() else { return None };
         self.segment.after().filter(|_| self.count_before(*first_m) > 0)
     }
 
-    /// Drops samples that no window needs; gives up windows that take too long.
+    /// Drops samples that no window needs, and gives up windows that take too long.
     fn make_room(&mut self, rows: &mut Vec<Row>) -> Result<(), Error> {
         loop {
             let positions = self.segment.position_m();
@@ -249,7 +252,8 @@ impl Open {
     }
 }
 
-/// Place among the `known` speeds of the one that window and margins were passed at, if one only.
+/// Index, among the `known` speeds in km/h, of the speed over window and margins; an error if the speed
+/// changes or is none of them.
 fn speed(
     segment: &Segment,
     samples: &Range<usize>,
@@ -272,7 +276,7 @@ fn speed(
     if segment.is_coarse(samples.clone()) { Err(Reason::CoarsePosition) } else { Ok(speed) }
 }
 
-/// Refuses a sample rate in Hz by the times, given with its relative uncertainty, that contradicts the
+/// Returns an error if the observed sample rate (in Hz, with its relative uncertainty) contradicts the
 /// declared one.
 fn check_rate(observed: Option<(f64, f64)>, declared_hz: f64) -> Result<(), Error> {
     match observed {

@@ -1,4 +1,4 @@
-//! The sleepers evaluated last, against which the next one is judged.
+//! The sleepers evaluated last, which are the reference for the next one.
 
 use super::row::Evaluated;
 use crate::estimate::{estimates, evaluated};
@@ -8,26 +8,27 @@ use crate::outside::judge_last;
 use crate::{Error, SleeperFeatures, SpeedFeatures, Twin, Unevenness};
 use tracktwin_signal::recording::Recording;
 
-/// Sleepers from which unevenness and the domain test of the next one are taken, this one included.
+/// Number of sleepers, including the current one, that determine unevenness and domain check.
 ///
-/// Long enough for the running windows of the domain test and for a variance to a third.
+/// This is enough for the running windows of the domain check and for a variance within a third.
 pub(super) const RECENT_MAX: usize = 25;
 
-/// Evaluates sleepers one by one, each as the last one of a recording of at most [`RECENT_MAX`].
+/// Evaluates sleepers one by one. Each is treated as the last sleeper of a recording of at most
+/// [`RECENT_MAX`] sleepers.
 pub(super) struct Recent<'a> {
     twin: Twin<'a>,
     matcher: Matcher<'a>,
     features: Vec<SleeperFeatures>,
-    /// With the standard deviations of an even track.
+    /// Estimates with the standard deviations of an even track.
     estimates: Vec<Estimates>,
     outside: Vec<bool>,
 }
 
 impl<'a> Recent<'a> {
-    /// Without sleepers; the models of every single speed are ready.
+    /// Makes the evaluator without sleepers and prepares the models of every single speed.
     ///
     /// # Errors
-    /// Those of [`Self::evaluate`].
+    /// The errors of [`Self::evaluate`].
     pub(super) fn new(twin: Twin<'a>, section: &Recording) -> Result<Self, Error> {
         let mut recent = Self {
             twin,
@@ -42,7 +43,7 @@ impl<'a> Recent<'a> {
         Ok(recent)
     }
 
-    /// Evaluates entries of the library, which makes factors, domains and their limits.
+    /// Evaluates entries of the library, so that factors, domains and their limits are computed in advance.
     fn prepare(&mut self, section: &Recording) -> Result<(), Error> {
         let library = self.twin.library;
         let bins = library.frequencies_hz.len();
@@ -59,10 +60,10 @@ impl<'a> Recent<'a> {
         Ok(())
     }
 
-    /// Evaluates the next sleeper of the section from its features, which have a speed.
+    /// Evaluates the next sleeper of the section from its features, which must have at least one speed.
     ///
     /// # Errors
-    /// Those of models and library.
+    /// Errors of the models and of the library.
     pub(super) fn evaluate(
         &mut self,
         section: &Recording,

@@ -1,33 +1,33 @@
-//! What a stream says of a sleeper.
+//! Rows of a stream: the result of one sleeper each.
 
 use crate::SleeperEvaluation;
 use serde::Serialize;
 
-/// The format of a row.
+/// Value of the field `format` of a row.
 const FORMAT: &str = "tracktwin-stream/1";
 
-/// A sleeper of a stream: evaluated, or the reason why not.
+/// Result of one sleeper of a stream.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     format: &'static str,
-    /// What is known of the sleeper.
+    /// Estimates, or the reason for missing estimates.
     #[serde(flatten)]
     pub outcome: Outcome,
 }
 
-/// What is known of a sleeper.
+/// Estimates of a sleeper, or the reason for missing estimates.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Outcome {
-    /// Its estimates.
+    /// The sleeper has estimates.
     Evaluated(Box<Evaluated>),
-    /// There are none.
+    /// The sleeper has no estimates.
     Unevaluated {
-        /// Its name.
+        /// Id of the sleeper.
         id: String,
-        /// Its place along the track in m.
+        /// Position along the track in m.
         x_m: f64,
-        /// Why there are none.
+        /// Reason for the missing estimates.
         #[serde(flatten)]
         reason: Reason,
     },
@@ -39,30 +39,31 @@ pub struct Evaluated {
     /// The sleeper, as in `evaluation.json`.
     #[serde(flatten)]
     pub sleeper: SleeperEvaluation,
-    /// Unevenness of railpads and ballast that is assumed: scatter over mean.
+    /// Assumed unevenness of railpad and ballast stiffness: standard deviation divided by the mean.
     pub unevenness: f64,
 }
 
-/// Why a sleeper has no estimates.
+/// Reason for missing estimates of a sleeper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum Reason {
-    /// The stream begins or ends before two fifths of the window.
+    /// The segments cover less than two fifths of the window, because the stream begins or ends there.
     NotCovered,
-    /// Samples are missing or not finite, and two fifths of the window are not left in one piece.
+    /// Samples are missing or not finite, and no piece covers two fifths of the window.
     NotFinite,
-    /// Times leave out samples, or a position is farther ahead than the wheel can roll.
+    /// The times skip samples, or a position is farther ahead than the wheel can roll in one sample
+    /// interval.
     Gap,
     /// The position decreases.
     RunsBack,
-    /// The speed is that of no model.
+    /// No model has this speed.
     OtherSpeed {
         /// Mean speed over the window and its margins in km/h.
         speed_km_h: f64,
     },
     /// The speeds of window and margins differ by more than 4 %.
     SpeedChanges {
-        /// The lowest and the highest of the three in km/h.
+        /// The lowest and the highest of these speeds in km/h.
         speeds_km_h: [f64; 2],
     },
     /// Positions advance in steps of several samples.
@@ -74,7 +75,7 @@ impl Row {
         Self { format: FORMAT, outcome }
     }
 
-    /// The row as one line of JSON, without the end of the line.
+    /// The row as one line of JSON, without a line break.
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).expect("a record of numbers and names is JSON")
     }

@@ -6,32 +6,31 @@ use tracktwin_signal::Signal;
 use tracktwin_signal::recording::{JUMP, JUMP_M, TIME_STEP_TOLERANCE};
 use tracktwin_signal::samples::Sample;
 
-/// Sample intervals by which a step of the times differs from one where the rate is another one, and
-/// how many such steps in a row tell this rate.
+/// A time step is uneven if it differs from one sample interval by more than [`UNEVEN`] intervals. After
+/// [`UNEVEN_STEPS`] uneven steps in a row the sample rate is computed from the times.
 const UNEVEN: f64 = 0.25;
 const UNEVEN_STEPS: u32 = 100;
 
-/// Samples without a gap. The first ones are dropped when no window needs them any more.
+/// Samples without a gap. The first samples are dropped when no window needs them.
 pub(super) struct Segment {
     sample_rate_hz: f64,
-    /// Longest step of the position from sample to sample in m.
+    /// Largest step of the position between two samples in m.
     step_max_m: f64,
     position_m: Vec<f64>,
     acceleration_m_s2: Vec<f64>,
-    /// Times in s of the first sample, dropped or not, and of the last one.
+    /// Times in s of the first sample of the segment (dropped or not) and of the last one.
     time_s: [f64; 2],
-    /// Samples, dropped or not.
+    /// Number of samples of the segment, including dropped ones.
     count: u64,
-    /// Steps of the times in a row, in all segments, that differ from one sample interval by more than
-    /// [`UNEVEN`], and the time in s before them.
+    /// Number of uneven time steps in a row, over all segments, and the time in s before the first of them.
     uneven: u32,
     uneven_from_s: f64,
-    /// What interrupted the stream before the segment.
+    /// Reason of the interruption before the segment.
     after: Option<Reason>,
 }
 
 impl Segment {
-    /// Without samples; speeds of the models are at most `fastest_m_s`.
+    /// An empty segment; the speeds of the models are at most `fastest_m_s`.
     pub(super) fn new(sample_rate_hz: f64, fastest_m_s: f64) -> Self {
         Self {
             sample_rate_hz,
@@ -51,7 +50,7 @@ impl Segment {
         &self.position_m
     }
 
-    /// The first and the last of them, if any.
+    /// The first and the last position in m, if any.
     pub(super) fn ends_m(&self) -> [Option<&f64>; 2] {
         [self.position_m.first(), self.position_m.last()]
     }
@@ -60,12 +59,12 @@ impl Segment {
         self.position_m.len()
     }
 
-    /// What interrupted the stream before the segment, if anything.
+    /// Reason of the interruption before the segment, if any.
     pub(super) const fn after(&self) -> Option<Reason> {
         self.after
     }
 
-    /// Why a sample does not follow the last one; none for the first.
+    /// Reason why a sample does not continue the segment; `None` for the first sample.
     pub(super) fn interruption(&self, sample: &Sample) -> Option<Reason> {
         if !(sample.position_m.is_finite() && sample.acceleration_m_s2.is_finite()) {
             return Some(Reason::NotFinite);
@@ -109,7 +108,7 @@ impl Segment {
         (time_s - self.time_s[1]) * self.sample_rate_hz
     }
 
-    /// Ends the segment; the next one is empty.
+    /// Ends the segment and begins an empty one.
     pub(super) fn restart(&mut self, after: Reason) {
         self.position_m.clear();
         self.acceleration_m_s2.clear();
@@ -117,7 +116,7 @@ impl Segment {
         self.after = Some(after);
     }
 
-    /// Takes the next sample, which is finite.
+    /// Adds the next sample, which must be finite.
     pub(super) fn push(&mut self, sample: &Sample) {
         if self.count == 0 {
             self.time_s[0] = sample.time_s;
@@ -140,7 +139,7 @@ impl Segment {
             .expect("samples are finite, and there is one")
     }
 
-    /// Mean speed over some samples in km/h; NaN for fewer than two.
+    /// Mean speed over a range of samples in km/h; NaN for fewer than two samples.
     pub(super) fn speed_km_h(&self, samples: Range<usize>) -> f64 {
         let intervals = samples.len() as f64 - 1.0;
         let positions = &self.position_m[samples];
@@ -150,15 +149,15 @@ impl Segment {
         }
     }
 
-    /// Sample rate in Hz by the times of the segment, if these are known, and its relative
-    /// uncertainty.
+    /// Sample rate in Hz and its relative uncertainty, from the times of the segment; `None` without finite
+    /// times.
     pub(super) fn observed_rate_hz(&self) -> Option<(f64, f64)> {
         let intervals = self.count.checked_sub(1).filter(|count| *count > 0)? as f64;
         let rate_hz = intervals / (self.time_s[1] - self.time_s[0]);
         rate_hz.is_finite().then_some((rate_hz, 2.0 / intervals))
     }
 
-    /// Whether positions advance in steps longer than a sample interval.
+    /// Whether at least half of the steps of the position are zero.
     pub(super) fn is_coarse(&self, samples: Range<usize>) -> bool {
         let pairs = self.position_m[samples].windows(2);
         let count = pairs.len();

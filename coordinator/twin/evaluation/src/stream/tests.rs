@@ -1,4 +1,4 @@
-//! A stream gives the numbers of the batch.
+//! A stream gives the same numbers as the evaluation of a whole recording.
 
 use super::recent::RECENT_MAX;
 use super::*;
@@ -8,7 +8,7 @@ use tracktwin_signal::recording::Pass;
 use tracktwin_signal::{Extractor, Signal};
 use tracktwin_surrogate::{Trained, TrainingSet};
 
-/// A prediction of one sleeper and that of many add in another order: rounding only.
+/// Tolerance for rounding: predictions of one and of many sleepers are summed in different orders.
 const ROUNDING: f64 = 1e-9;
 
 struct Models {

@@ -1,4 +1,4 @@
-//! Why a file of a hammer test is refused.
+//! Errors of reading a file of a hammer test.
 
 use tracktwin_parameters::QuantityError;
 
@@ -6,47 +6,47 @@ use tracktwin_parameters::QuantityError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: {fault}")]
 pub struct ReadError {
-    /// The line, from 1.
+    /// Line number, from 1.
     pub line: u64,
-    /// What is wrong.
+    /// Fault in this line.
     pub fault: ReadFault,
 }
 
-/// What is wrong with a line; each ends with the remedy.
+/// Fault in a line; every message ends with the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ReadFault {
-    /// The rows are not those of a table.
+    /// The rows do not form a table.
     #[error("not a table of comma-separated values ({reason}); write one row a line")]
     Table {
-        /// What the parser says.
+        /// Message of the CSV parser.
         reason: String,
     },
-    /// A column whose meaning is not known.
+    /// A column name is unknown.
     #[error("column `{name}` is not known; the columns are {known}")]
     UnknownColumn {
-        /// Its name.
+        /// Name of the column.
         name: String,
-        /// Names of the known ones.
+        /// Names of the known columns.
         known: String,
     },
-    /// A column is missing.
+    /// A required column is missing.
     #[error("column `{name}` is missing; the columns are {known}")]
     MissingColumn {
-        /// Its name.
+        /// Name of the column.
         name: &'static str,
         /// Names of all columns.
         known: String,
     },
-    /// Two columns have one name.
+    /// Two columns have the same name.
     #[error("column `{name}` is there twice; leave one out")]
     RepeatedColumn {
-        /// Their name.
+        /// Name of the columns.
         name: String,
     },
-    /// A position that cannot be.
+    /// A position is outside its permitted range.
     #[error(transparent)]
     Place(#[from] QuantityError),
-    /// A text stands where a number must stand.
+    /// A field that must be a number holds other text.
     #[error("{column}: `{text}` is not a finite number")]
     Number {
         /// The column or field.
@@ -54,17 +54,17 @@ pub enum ReadFault {
         /// The beginning of the text.
         text: String,
     },
-    /// A number is not one of its kind.
+    /// A number is outside its permitted range.
     #[error("{column} is {value}; it must be {form}")]
     Value {
         /// The column or field.
         column: &'static str,
         /// The value.
         value: f64,
-        /// What it must be.
+        /// Permitted range.
         form: &'static str,
     },
-    /// Frequencies or times do not ascend.
+    /// Frequencies or times are not ascending.
     #[error("{column} {value} does not ascend; sort the rows of a receptance or a hit")]
     NotAscending {
         /// The column.
@@ -72,67 +72,67 @@ pub enum ReadFault {
         /// The value.
         value: f64,
     },
-    /// Time steps differ.
+    /// The time steps of a file are not equal.
     #[error("the time step is {step_s} s, the usual one is {usual_s} s; sample in equal steps")]
     UnevenTime {
-        /// The step here in s.
+        /// The time step at this line in s.
         step_s: f64,
-        /// The usual step, or that of the first hit, in s.
+        /// The median time step of the hit, or the time step of the first hit, in s.
         usual_s: f64,
     },
-    /// A hit is too short, or there is none.
+    /// A hit has too few samples.
     #[error("a hit of {samples} samples is too short; record at least {least} samples a hit")]
     ShortHit {
-        /// Its samples.
+        /// Number of samples.
         samples: usize,
-        /// Least samples.
+        /// Smallest number of samples.
         least: usize,
     },
-    /// A hit without force.
+    /// The force of a hit is zero.
     #[error("the force of the hit is zero; check the channel of the hammer")]
     NoForce,
-    /// A hit without response.
+    /// The response to a hit is zero.
     #[error("the acceleration of all hits is zero; check the channel of the sensor")]
     NoResponse,
-    /// A file without a receptance.
+    /// The file contains no receptance.
     #[error("the file holds no receptance; {remedy}")]
     Nothing {
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The file ends within a dataset.
     #[error("the file ends within dataset {dataset}; export it again")]
     Truncated {
-        /// Type of the dataset.
+        /// Number of the dataset type.
         dataset: u32,
     },
-    /// A binary dataset.
+    /// The file contains a binary dataset.
     #[error("the dataset is binary (58b); export it as ASCII (58)")]
     Binary,
-    /// Units other than those of the SI.
+    /// The units are not SI units.
     #[error("the units are those of code {code} (dataset 164); export in SI units, code 1")]
     Units {
-        /// The code.
+        /// Code of the units.
         code: u64,
     },
-    /// A response function that is no point receptance.
+    /// A response function is not a point receptance.
     #[error("{what}; {remedy}")]
     Function {
-        /// What it is.
+        /// Description of the function.
         what: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// A node without a place.
+    /// The position of a node is unknown.
     #[error("node {node} has no position; add dataset 15 to the file or give --node {node}=METRES")]
     Node {
-        /// Its number.
+        /// Number of the node.
         node: u64,
     },
 }
 
 impl ReadError {
-    /// The error of a table's parser.
+    /// Converts an error of the CSV parser.
     pub(super) fn of_table(error: &csv::Error) -> Self {
         let line = error.position().map_or(1, csv::Position::line);
         Self { line, fault: ReadFault::Table { reason: error.to_string() } }

@@ -10,14 +10,14 @@ pub use error::{ReadError, ReadFault};
 use crate::PointReceptance;
 use std::collections::BTreeMap;
 
-/// Place in m of each node of a universal file whose nodes have no places in the file.
+/// Position in m of each node, for a universal file that contains no node positions.
 pub type Nodes = BTreeMap<u64, f64>;
 
-/// The point receptances that a file holds, by its content: a universal file begins with `-1`, a
-/// table with the names of its columns, behind comments.
+/// Reads the point receptances of a file. The content determines the format: a universal file begins with
+/// `-1`; a table begins with the names of its columns, after comments.
 ///
 /// # Errors
-/// [`ReadError`] names the line and what is wrong with it.
+/// [`ReadError`] with the line and its fault.
 pub fn read(text: &str, nodes: &Nodes) -> Result<Vec<PointReceptance>, ReadError> {
     // A mark of the byte order is no part of the text.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -33,16 +33,17 @@ pub fn read(text: &str, nodes: &Nodes) -> Result<Vec<PointReceptance>, ReadError
     }
 }
 
-/// Columns of a table by their names, and its rows.
+/// A table as columns with known names, and its rows.
 struct Rows<'a> {
     reader: csv::Reader<&'a [u8]>,
-    /// Place of each known column in a row.
+    /// Index of each known column in a row.
     places: Vec<Option<usize>>,
     names: &'static [&'static str],
 }
 
 impl<'a> Rows<'a> {
-    /// Reads the names: the first `required` of `names` must be there, and no others, each once.
+    /// Reads the column names. The first `required` of `names` must be present, other names are not
+    /// permitted, and no name may occur twice.
     fn new(
         text: &'a str,
         names: &'static [&'static str],
@@ -71,7 +72,7 @@ impl<'a> Rows<'a> {
         Ok(Self { reader, places, names })
     }
 
-    /// Calls `take` with the number of each line and its values, in the order of the names.
+    /// Calls `take` for every row with its line number and its values, in the order of the names.
     fn each(
         mut self,
         mut take: impl FnMut(u64, &[Option<f64>]) -> Result<(), ReadFault>,
@@ -94,7 +95,7 @@ fn at(line: u64) -> impl Fn(ReadFault) -> ReadError {
     move |fault| ReadError { line, fault }
 }
 
-/// A finite number.
+/// Parses a finite number.
 fn number(text: &str, column: &'static str) -> Result<f64, ReadFault> {
     let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
     value.ok_or_else(|| ReadFault::Number { column, text: text.chars().take(40).collect() })

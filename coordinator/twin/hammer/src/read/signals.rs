@@ -1,4 +1,4 @@
-//! Tables of signals: force and acceleration of several hits, averaged to a receptance.
+//! Tables of signals: force and acceleration of several hits, averaged to receptances.
 
 use super::{ReadError, ReadFault, Rows};
 use crate::PointReceptance;
@@ -7,33 +7,34 @@ use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 use tracktwin_parameters::quantity::PLACE;
 
-/// The column that only tables of signals have.
+/// The column that identifies a table of signals.
 pub(super) const TIME: &str = "time_s";
 
-/// Columns; the number of the hit need not be there.
+/// Columns; only the hit number is optional.
 const COLUMNS: &[&str] = &["position_m", TIME, "force_N", "acceleration_m_s2", "hit"];
 const REQUIRED: usize = 4;
 
-/// Least samples of a hit.
+/// Smallest number of samples of a hit.
 const SAMPLES_MIN: usize = 64;
-/// Greatest relative difference of the mean time steps of two hits.
+/// Largest relative difference between the mean time steps of two hits.
 const UNEVEN_MAX: f64 = 1e-3;
-/// Relative difference of a time step from the usual one that is a gap: written times are rounded.
+/// A time step that differs from the median step by more than this share is a gap; smaller differences come
+/// from rounded times.
 const GAP: f64 = 0.5;
 
 /// One hit.
 struct Hit {
     position_m: f64,
     number: Option<f64>,
-    /// Line of its first sample.
+    /// Line number of the first sample.
     line: u64,
     times_s: Vec<f64>,
     force_n: Vec<f64>,
     acceleration_m_s2: Vec<f64>,
 }
 
-/// Reads the hits and averages those of one place that follow each other. A hit begins where the
-/// time starts again, or where its number or the place changes.
+/// Reads the hits and averages consecutive hits at one position. A new hit begins where the time does not
+/// increase, or where the hit number or the position changes.
 pub(super) fn read(text: &str) -> Result<Vec<PointReceptance>, ReadError> {
     let mut hits: Vec<Hit> = Vec::new();
     Rows::new(text, COLUMNS, REQUIRED)?.each(|line, row| {
@@ -69,10 +70,10 @@ pub(super) fn read(text: &str) -> Result<Vec<PointReceptance>, ReadError> {
     hits.chunk_by(|a, b| a.position_m == b.position_m).map(average).collect()
 }
 
-/// The receptance of several hits: `H1 = G_fa / G_ff` summed over the hits, divided by `-w^2`, with
-/// the coherence `|G_fa|^2 / (G_ff G_aa)` (Bendat and Piersol, *Random Data*, 4th ed., section 6.1).
+/// Receptance of several hits: `H1 = G_fa / G_ff` summed over the hits, divided by `-w^2`, with the
+/// coherence `|G_fa|^2 / (G_ff G_aa)` (Bendat and Piersol, *Random Data*, 4th ed., section 6.1).
 ///
-/// A hit is transformed as a whole, without a window: its record begins and ends at rest.
+/// A hit is transformed as a whole, without a window function, because its record begins and ends at rest.
 fn average(hits: &[Hit]) -> Result<PointReceptance, ReadError> {
     let step_s = step(hits)?;
     let samples = hits.iter().map(|hit| hit.force_n.len()).min().unwrap_or_default();
@@ -126,7 +127,7 @@ fn average(hits: &[Hit]) -> Result<PointReceptance, ReadError> {
     Ok(point)
 }
 
-/// The time step of the hits in s, which is one.
+/// The common time step of the hits in s.
 fn step(hits: &[Hit]) -> Result<f64, ReadError> {
     let mut first = None;
     for hit in hits {
@@ -161,8 +162,8 @@ mod tests {
     const STEP_S: f64 = 1e-3;
     const SAMPLES: usize = 1024;
 
-    /// Signals of an oscillator `m a + c v + k u = f` of 1 kg, hit so many times, with noise of a
-    /// sine that no two hits share.
+    /// Signals of an oscillator `m a + c v + k u = f` with a mass of 1 kg, for `hits` hits. The noise is a
+    /// sine that differs from hit to hit.
     fn signals(hits: usize, noise: f64) -> String {
         let (m, c, k) = (1.0, 20.0, 1e4);
         let mut text = "position_m,time_s,force_N,acceleration_m_s2\n".to_owned();

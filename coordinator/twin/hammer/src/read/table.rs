@@ -1,11 +1,11 @@
-//! Tables of receptances: a row a frequency.
+//! Tables of receptances: one row per frequency.
 
 use super::{ReadError, ReadFault, Rows};
 use crate::PointReceptance;
 use num_complex::Complex64;
 use tracktwin_parameters::quantity::PLACE;
 
-/// Columns; coherence and number of hits need not be there.
+/// Columns; coherence and number of hits are optional.
 const COLUMNS: &[&str] = &[
     "position_m",
     "frequency_Hz",

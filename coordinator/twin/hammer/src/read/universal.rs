@@ -1,8 +1,8 @@
-//! Universal files (ASCII): dataset 58 with frequency responses and coherences, 15 with the places
-//! of nodes, 164 with the units.
+//! Universal files (ASCII): dataset 58 with frequency responses and coherences, dataset 15 with the
+//! positions of nodes, dataset 164 with the units.
 //!
-//! Source: *Universal File Formats*, Structural Dynamics Research Laboratory, University of
-//! Cincinnati: datasets 15, 58 and 164. Fields stand in fixed columns, for numbers may touch.
+//! Source: *Universal File Formats*, Structural Dynamics Research Laboratory, University of Cincinnati:
+//! datasets 15, 58 and 164. Fields have fixed columns, because numbers may have no space between them.
 
 use super::{Nodes, ReadError, ReadFault};
 use crate::PointReceptance;
@@ -17,11 +17,11 @@ const COHERENCE: i64 = 6;
 /// Data types of an axis.
 const FREQUENCY: i64 = 18;
 const FORCE: [i64; 2] = [9, 13];
-/// Response by its data type: the power of `i w` that makes a displacement of it.
+/// Data type of the response, and the power of `i w` that converts the response to a displacement.
 const RESPONSES: [(i64, i32); 3] = [(8, 0), (11, -1), (12, -2)];
-/// Lines of a function's header.
+/// Number of header lines of a function.
 const HEADER: usize = 11;
-/// Frequencies in Hz that differ by less than this share are the same.
+/// Two frequencies in Hz are equal if they differ by less than this share.
 const SAME: f64 = 1e-4;
 
 /// A function of dataset 58.
@@ -30,19 +30,19 @@ struct Function {
     kind: i64,
     nodes: [u64; 2],
     frequencies_hz: Vec<f64>,
-    /// Response per force, or the coherence as real part.
+    /// Response per unit force; for a coherence function, the coherence as real part.
     values: Vec<Complex64>,
     averages: Option<usize>,
 }
 
-/// The lines of a dataset with the number of the first.
+/// The lines of a dataset, and the line number of the first.
 struct Dataset<'a> {
     kind: u32,
     first: u64,
     lines: Vec<&'a str>,
 }
 
-/// Reads the point receptances, each with its coherence if the file has it.
+/// Reads the point receptances, each with its coherence if the file contains it.
 pub(super) fn read(text: &str, places: &Nodes) -> Result<Vec<PointReceptance>, ReadError> {
     let mut nodes = BTreeMap::new();
     let mut functions = Vec::new();
@@ -113,7 +113,7 @@ fn bad(column: &'static str, text: &str, line: u64) -> ReadError {
     ReadError { line, fault: ReadFault::Number { column, text } }
 }
 
-/// A whole number in columns `from..to` of a line.
+/// Parses an integer in columns `from..to` of a line.
 fn whole(
     text: &str,
     [from, to]: [usize; 2],
@@ -124,7 +124,7 @@ fn whole(
     field.parse().map_err(|_| bad(what, field, line))
 }
 
-/// A number in columns `from..to` of a line.
+/// Parses a real number in columns `from..to` of a line.
 fn real(
     text: &str,
     [from, to]: [usize; 2],
@@ -138,7 +138,7 @@ fn real(
 }
 
 impl Dataset<'_> {
-    /// Line `index` from 0 and its number in the file.
+    /// Line `index` (from 0) of the dataset, and its line number in the file.
     fn line(&self, index: usize) -> Result<(&str, u64), ReadError> {
         let number = self.first + index as u64;
         let truncated = ReadFault::Truncated { dataset: self.kind };
@@ -146,7 +146,7 @@ impl Dataset<'_> {
         Ok((line, number))
     }
 
-    /// Adds the place along the track, the x coordinate, of every node.
+    /// Adds the position of every node along the track, its x coordinate.
     fn nodes(&self, nodes: &mut BTreeMap<u64, f64>) -> Result<(), ReadError> {
         for index in 0..self.lines.len() {
             let (text, line) = self.line(index)?;
@@ -224,7 +224,7 @@ impl Dataset<'_> {
         Ok(None)
     }
 
-    /// Checks the axes; the power of `i w` that makes a displacement of the response.
+    /// Checks the axes and returns the power of `i w` that converts the response to a displacement.
     fn response(&self) -> Result<i32, ReadError> {
         let kind = |index: usize, what| -> Result<(i64, u64), ReadError> {
             let (text, line) = self.line(index)?;
@@ -294,7 +294,7 @@ impl Dataset<'_> {
         Ok((frequencies_hz, values))
     }
 
-    /// So many numbers after the header.
+    /// Reads `count` numbers after the header.
     fn cells(&self, layout: &Cells, count: usize) -> Result<Vec<f64>, ReadError> {
         let mut cells = Vec::new();
         let mut index = HEADER;
@@ -317,16 +317,16 @@ impl Dataset<'_> {
     }
 }
 
-/// How values stand in lines.
+/// Arrangement of values in lines.
 struct Cells {
     is_even: bool,
     is_double: bool,
-    /// Numbers of a value: two of a complex one.
+    /// Numbers per value: one if real, two if complex.
     parts: usize,
 }
 
 impl Cells {
-    /// Numbers of a value, with its frequency where that is written.
+    /// Numbers per value, including the frequency if the file contains it.
     fn per_value(&self) -> usize {
         self.parts + usize::from(!self.is_even)
     }
@@ -346,7 +346,7 @@ fn other(what: String, remedy: &'static str, line: u64) -> ReadError {
     ReadError { line, fault: ReadFault::Function { what, remedy } }
 }
 
-/// That force and response stand at one node in one vertical direction.
+/// Checks that force and response have the same node and the same direction.
 fn check_point(
     [response, force]: [u64; 2],
     directions: [i64; 2],
@@ -365,7 +365,7 @@ fn check_point(
 }
 
 impl Function {
-    /// The point receptance with the coherence that the file has for its node.
+    /// The point receptance, with the coherence of the same node if the file contains it.
     fn receptance(&self, position_m: f64, all: &[Self]) -> PointReceptance {
         let is_same = |other: &&Self| {
             let pairs = || self.frequencies_hz.iter().zip(&other.frequencies_hz);

@@ -5,14 +5,14 @@ use rustfft::num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use tracktwin_signal::Signal;
 
-/// Segments a second of signal is cut into: lines every 50 Hz, narrower than the contact's
-/// resonances, long enough for the ringing after an impact.
+/// Number of segments per second of signal. The spectral lines are 50 Hz apart, narrower than the contact
+/// resonances, and a segment is long enough for the ringing after an impact.
 const SEGMENTS_PER_S: f64 = 50.0;
 
-/// Segments below which a median means little.
+/// Smallest number of segments for a median.
 const SEGMENTS_MIN: usize = 8;
 
-/// Time in s over which a pass fades in and out before it is transformed as a whole.
+/// Time in s of the fade-in and fade-out of a pass before the transform.
 const FADE_S: f64 = 0.005;
 
 /// One-sided power spectral density of a pass in the signal's unit squared per Hz.
@@ -23,10 +23,11 @@ pub(crate) struct Background {
 }
 
 impl Background {
-    /// The median over Hann segments that overlap by half, divided by ln 2: the mean if all
-    /// segments are alike, unmoved by impacts in less than half of them.
+    /// Estimates the background as the median over half-overlapping Hann segments, divided by ln 2. This
+    /// equals the mean if all segments are alike, and impacts in less than half of the segments do not
+    /// change it.
     ///
-    /// None if the signal is too short for a median or constant.
+    /// `None` if the signal is too short for a median, or constant.
     pub(crate) fn of(signal: &Signal) -> Option<Self> {
         let rate = signal.sample_rate_hz();
         let segment = ((rate / SEGMENTS_PER_S).round() as usize).max(16) & !1;
@@ -60,7 +61,7 @@ impl Background {
         median(self.density[bins / 2..bins * 9 / 10].to_vec())
     }
 
-    /// Highest frequency in Hz up to which the density is `factor` times above the noise floor.
+    /// Highest frequency in Hz at which the density is `factor` times above the noise floor.
     pub(crate) fn audible_hz(&self, factor: f64) -> f64 {
         let floor = self.floor();
         let last = self.density.iter().rposition(|&value| value > factor * floor);
@@ -90,8 +91,8 @@ fn powers(samples: &[f64], segment: usize) -> Vec<Vec<f64>> {
 
 /// The analytic signal in a band, divided by the square root of the background's density.
 ///
-/// Its squared magnitude is scaled so that the background has mean one. Division by the background
-/// takes the track's resonances out: a short defect becomes a short event.
+/// The background has a mean squared magnitude of one. Division by the background removes the resonances of
+/// the track; a short defect becomes a short event.
 pub(crate) fn whitened(
     signal: &Signal,
     background: &Background,
@@ -121,7 +122,7 @@ pub(crate) fn whitened(
     lines
 }
 
-/// The smallest number not below `length` whose prime factors are 2, 3 and 5: quick to transform.
+/// The smallest number not below `length` with no prime factors except 2, 3 and 5, for a fast transform.
 pub(crate) fn smooth_length(length: usize) -> usize {
     let is_smooth = |mut number: usize| {
         for factor in [2, 3, 5] {
@@ -141,7 +142,7 @@ pub(crate) fn hann(index: usize, length: usize) -> f64 {
     0.5 - 0.5 * (TAU * index as f64 / length as f64).cos()
 }
 
-/// The middle value, the upper of two; zero of none.
+/// Median; the upper of the two middle values for an even count, zero for an empty list.
 pub fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;

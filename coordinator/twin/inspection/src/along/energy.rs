@@ -1,9 +1,9 @@
-//! Power of a whitened pass between any two places.
+//! Power of a whitened pass between any two positions.
 
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::Pass;
 
-/// Power of a pass summed up along the track.
+/// Cumulative power of a pass along the track.
 #[derive(Clone, Debug)]
 pub(crate) struct Energy<'a> {
     position_m: &'a [f64],
@@ -12,7 +12,7 @@ pub(crate) struct Energy<'a> {
 }
 
 impl<'a> Energy<'a> {
-    /// Of a whitened signal of the pass.
+    /// Sums the power of a whitened signal of the pass.
     pub(crate) fn new(pass: &'a Pass, whitened: &[Complex64]) -> Self {
         let mut summed = Vec::with_capacity(whitened.len() + 1);
         let mut sum = 0.0;
@@ -24,12 +24,12 @@ impl<'a> Energy<'a> {
         Self { position_m: &pass.position_m, summed }
     }
 
-    /// First and last place of the pass in m.
+    /// First and last position of the pass in m.
     pub(crate) fn ends(&self) -> [f64; 2] {
         [self.position_m[0], self.position_m[self.position_m.len() - 1]]
     }
 
-    /// Mean power between two places in m; zero where the pass has no sample.
+    /// Mean power between two positions in m; zero if the pass has no sample there.
     pub(crate) fn mean(&self, from_m: f64, to_m: f64) -> f64 {
         let [start, end] =
             [from_m, to_m].map(|place| self.position_m.partition_point(|&x| x < place));
@@ -40,20 +40,20 @@ impl<'a> Energy<'a> {
     }
 }
 
-/// Ratio of two speeds from which on a line in wavelength and one in frequency lie apart: further
-/// than a resonance of track or vehicle is wide.
+/// Smallest ratio of two speeds that separates a line of constant wavelength from a line of constant
+/// frequency by more than the width of a resonance of track or vehicle.
 const SPEED_RATIO: f64 = 1.2;
 
-/// Mean speed of a pass in m/s by its positions.
+/// Mean speed of a pass in m/s, from its positions.
 pub(crate) fn speed_m_s(pass: &Pass) -> f64 {
     let positions = &pass.position_m;
     let length = positions[positions.len() - 1] - positions[0];
     length / (positions.len() - 1) as f64 * pass.signal.sample_rate_hz()
 }
 
-/// Indices of the passes at each speed, fastest first.
+/// Indices of the passes at each speed, the fastest speed first.
 ///
-/// Nominal speeds within 2 % are one: a drive doesn't hold its speed more closely.
+/// Nominal speeds within 2 % count as equal, because a drive holds its speed no more closely.
 pub(crate) fn by_speed(passes: &[Pass]) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..passes.len()).collect();
     order.sort_by(|&a, &b| passes[b].speed_km_h.total_cmp(&passes[a].speed_km_h));

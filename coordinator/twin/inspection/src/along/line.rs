@@ -1,4 +1,4 @@
-//! Lines in the spectrum of a stretch of track, each over what lies beside it.
+//! Spectral lines on a stretch of track, each relative to its neighbouring bins.
 
 use super::background::{hann, median};
 use super::tail::ln_line_tail;
@@ -7,45 +7,46 @@ use rustfft::num_complex::Complex64;
 use std::ops::Range;
 use tracktwin_signal::recording::Pass;
 
-/// Bins to a resolution cell: the transform is padded to twice its length.
+/// Number of bins per resolution cell: the transform is padded to twice its length.
 const PADDING: usize = 2;
 
 /// Resolution cells on either side of a line that belong to the line (Hann's main lobe).
 const LOBE: f64 = 2.5;
 
-/// Resolution cells on either side up to which neighbours are taken by default.
+/// Default distance of the farthest neighbours of a line on either side, in resolution cells.
 const REACH: f64 = 18.0;
 
-/// Bins that are worth one independent value of the neighbours' mean.
+/// Number of bins that count as one independent value in the mean of the neighbours.
 ///
-/// Padding, Hann and the variance of a median make it 6.2. That the louder side counts makes large
-/// ratios rarer: in a million bins of noise those of probability 1e-3 to 1e-5 follow 4.7 or less.
+/// Padding, Hann window and the variance of a median give 6.2. The rule that the side with the higher power
+/// counts makes large ratios rarer: in a million bins of noise, ratios of probability 1e-3 to 1e-5 follow
+/// 4.7 or less.
 const BINS_PER_NEIGHBOUR: f64 = 4.8;
 
-/// A line over what lies beside it.
+/// Power of a spectral line relative to its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Line {
-    /// Power over the neighbours', as a mean: one where there is no line.
+    /// Power divided by the mean power of the neighbours; one on average if there is no line.
     pub ratio: f64,
-    /// How many independent values the neighbours are worth.
+    /// Number of independent values of the neighbours.
     pub neighbours: f64,
     /// Mean power of the neighbours.
     pub beside: f64,
 }
 
 impl Line {
-    /// `ln P` of such a line by chance.
+    /// `ln P` of a line with at least this ratio by chance.
     pub(crate) fn ln_tail(self) -> f64 {
         ln_line_tail(self.neighbours, self.ratio)
     }
 
-    /// Its power.
+    /// Power of the line.
     pub(crate) fn power(self) -> f64 {
         self.ratio * self.beside
     }
 
-    /// The mean of the same line in several passes; no surer than in one of them, for they share
-    /// their surface. None of none.
+    /// Mean of the same line in several passes. The passes share their surface; the mean is therefore no
+    /// more significant than one pass. `None` for an empty list.
     pub(crate) fn mean(lines: &[Self]) -> Option<Self> {
         let least = lines.iter().map(|line| line.neighbours).min_by(f64::total_cmp)?;
         let mean =
@@ -63,8 +64,8 @@ impl Line {
 pub(crate) enum Ruler {
     /// The positions of the recording.
     Odometer,
-    /// The time, at constant speed between the ends of the pass: better where the odometer wanders
-    /// by more than a part of the wavelength.
+    /// The time, with constant speed between the ends of the pass. This is better if the odometer error
+    /// exceeds a fraction of the wavelength.
     Clock,
 }
 
@@ -72,7 +73,7 @@ impl Ruler {
     pub(crate) const BOTH: [Self; 2] = [Self::Odometer, Self::Clock];
 }
 
-/// Values of a pass on `points` even places from `from_m` to `to_m` (excluded).
+/// Values of a pass at `points` equidistant positions from `from_m` (included) to `to_m` (excluded), in m.
 pub(crate) fn on_even_places(
     pass: &Pass,
     values: &[Complex64],
@@ -102,19 +103,20 @@ pub(crate) fn on_even_places(
     (0..points).map(value).collect()
 }
 
-/// Power of a stretch on lines of wave number (or of frequency).
+/// Power spectrum of a stretch, by wave number or by frequency.
 #[derive(Clone, Debug)]
 pub(crate) struct Spectrum {
     step: f64,
     power: Vec<f64>,
-    /// Values that were transformed.
+    /// Number of transformed values.
     length: usize,
-    /// Resolution cells on either side up to which neighbours are taken.
+    /// Distance of the farthest neighbours on either side, in resolution cells.
     reach: f64,
 }
 
 impl Spectrum {
-    /// Of values evenly `step` apart, under a Hann window; of an analytic signal or a real one.
+    /// Spectrum of equidistant values (`step` apart) with a Hann window; the values may be analytic or
+    /// real.
     pub(crate) fn new(values: &[Complex64], step: f64) -> Self {
         let length = values.len();
         let windowed = values.iter().enumerate().map(|(i, value)| value * hann(i, length));
@@ -125,12 +127,12 @@ impl Spectrum {
         Self { step: 1.0 / (step * (PADDING * length) as f64), power, length, reach: REACH }
     }
 
-    /// The same spectrum with neighbours up to this number of resolution cells from a line.
+    /// The same spectrum, with neighbours up to `reach` resolution cells from a line.
     pub(crate) fn reaching(self, reach: f64) -> Self {
         Self { reach, ..self }
     }
 
-    /// Distance of the bins in cycles per unit of `step`.
+    /// Distance of the bins, in cycles per unit of `step`.
     pub(crate) const fn bin_width(&self) -> f64 {
         self.step
     }
@@ -140,21 +142,23 @@ impl Spectrum {
         self.power.len()
     }
 
-    /// The bin next to a wave number or frequency.
+    /// Index of the bin nearest to a wave number or frequency.
     pub(crate) fn bin(&self, place: f64) -> usize {
         ((place / self.step).round() as usize).min(self.power.len() - 1)
     }
 
-    /// Amplitude of a tone in a real signal that has a bin's power.
+    /// Amplitude of a tone in a real signal that has the power of this bin.
     pub(crate) fn amplitude(&self, bin: usize) -> f64 {
         // Half of it is at negative frequencies, and the mean of Hann is one half.
         4.0 * self.power[bin].sqrt() / self.length as f64
     }
 
-    /// Power of a bin over the median of its neighbours', as a mean: one where there is no line.
+    /// Power of a bin relative to the median power of its neighbours, scaled to a mean of one without a
+    /// line.
     ///
-    /// The louder side counts: on the flank of a resonance the other is no background. Neighbours
-    /// that `skip` names don't count; none where too few are left on either side.
+    /// The side with the higher power counts, because on the flank of a resonance the other side is no
+    /// background. Bins for which `skip` is true do not count. `None` if both sides have too few
+    /// neighbours.
     pub(crate) fn line(&self, bin: usize, skip: impl Fn(f64) -> bool) -> Option<Line> {
         let [near, far] = [LOBE, self.reach].map(|cells| (cells * PADDING as f64) as usize);
         let below = bin.saturating_sub(far).max(1)..bin.saturating_sub(near).max(1);
@@ -175,10 +179,10 @@ impl Spectrum {
     }
 }
 
-/// Power that a tone of amplitude `a` has over the mean of noise of one-sided density `s` on a
-/// stretch of length `l`: `a^2 l / (2 * 1.5 s)`; this is `a` from the ratio.
+/// Amplitude `a` of a tone from its power ratio. On a stretch of length `l`, in noise of one-sided density
+/// `s`, the ratio of tone power to mean noise power is `a^2 l / (2 * 1.5 s)`.
 ///
-/// Hann's equivalent noise bandwidth is 1.5 cells.
+/// The equivalent noise bandwidth of the Hann window is 1.5 cells.
 pub(crate) fn amplitude(ratio: f64, density: f64, length: f64) -> f64 {
     (3.0 * density * (ratio - 1.0).max(0.0) / length).sqrt()
 }

@@ -1,7 +1,6 @@
-//! A pass as a function of the place: background, whitened power, lines, tail probabilities.
+//! A pass as a function of position: background, whitened power, lines, tail probabilities.
 //!
-//! Owns what the tests of wheel, impacts and measuring chain have in common; what is concluded is
-//! left to them.
+//! The tests of wheel, impacts and measuring chain share these functions and draw the conclusions.
 
 mod background;
 mod energy;

@@ -1,14 +1,14 @@
-//! Tail probabilities in logarithms, since those of real defects underflow.
+//! Logarithms of tail probabilities; the probabilities of real defects would underflow.
 
 use libm::lgamma as ln_gamma;
 
-/// Terms after which a series or continued fraction is taken as it stands.
+/// Largest number of terms of a series or continued fraction.
 const TERMS_MAX: usize = 500;
 
 /// `ln P(X >= x)` of a gamma variable of this shape and mean one.
 ///
-/// The mean of `shape` independent periodogram values is one. Source: regularised incomplete gamma
-/// function, Abramowitz & Stegun 6.5.29 and 6.5.31.
+/// The mean of `shape` independent periodogram values has this distribution. Source: regularised incomplete
+/// gamma function, Abramowitz & Stegun 6.5.29 and 6.5.31.
 pub(crate) fn ln_gamma_tail(shape: f64, x: f64) -> f64 {
     let x = x * shape;
     if x <= 0.0 {
@@ -41,14 +41,14 @@ pub(crate) fn ln_gamma_tail(shape: f64, x: f64) -> f64 {
     (front + fraction.ln()).min(0.0)
 }
 
-/// `ln P(R >= ratio)` where `R` is a periodogram value over the mean of `neighbours` others.
+/// `ln P(R >= ratio)` for the ratio `R` of a periodogram value to the mean of `neighbours` others.
 ///
-/// The ratio of a chi-square variable with 2 degrees of freedom and one with `2 neighbours`.
+/// `R` is the ratio of a chi-square variable with 2 degrees of freedom to one with `2 neighbours`.
 pub(crate) fn ln_line_tail(neighbours: f64, ratio: f64) -> f64 {
     -neighbours * (ratio.max(0.0) / neighbours).ln_1p()
 }
 
-/// `ln P(T >= t)` of Student's variable with `freedom` degrees of freedom.
+/// `ln P(T >= t)` for a Student variable with `freedom` degrees of freedom.
 pub(crate) fn ln_student_tail(freedom: f64, t: f64) -> f64 {
     if t <= 0.0 {
         return 0.0;
@@ -87,7 +87,7 @@ fn beta_fraction(a: f64, b: f64, x: f64) -> f64 {
     fraction
 }
 
-/// `ln P(N >= hits)` of that many hits in `tries` of probability `chance` each.
+/// `ln P(N >= hits)` for the number `N` of hits in `tries` trials with probability `chance` each.
 pub(crate) fn ln_binomial_tail(hits: usize, tries: usize, chance: f64) -> f64 {
     if hits == 0 {
         return 0.0;
@@ -100,15 +100,16 @@ pub(crate) fn ln_binomial_tail(hits: usize, tries: usize, chance: f64) -> f64 {
     if falling >= 1.0 { 0.0 } else { (first - (-falling).ln_1p()).min(0.0) }
 }
 
-/// A bound on `ln P(Z >= z)` of a standard normal variable, within a factor of three.
+/// Upper bound of `ln P(Z >= z)` for a standard normal variable; the bound of `P` is within a factor of
+/// three.
 pub(crate) fn ln_normal_bound(z: f64) -> f64 {
     if z <= 0.0 { 0.0 } else { -0.5 * z * z - (1.0 + z).ln() }
 }
 
-/// One probability from several that may depend on each other in any way, in logarithms.
+/// Combines probabilities with unknown dependence into one; input and result are logarithms.
 ///
-/// `e` times the geometric mean. Source: Vovk & Wang 2020, *Combining p-values via averaging*,
-/// Biometrika 107, proposition 4.
+/// The result is `e` times the geometric mean. Source: Vovk & Wang 2020, *Combining p-values via
+/// averaging*, Biometrika 107, proposition 4.
 pub(crate) fn combine_dependent_p_values(ln_probabilities: &[f64]) -> f64 {
     if ln_probabilities.len() == 1 {
         return ln_probabilities[0];
@@ -117,7 +118,7 @@ pub(crate) fn combine_dependent_p_values(ln_probabilities: &[f64]) -> f64 {
     (1.0 + mean).min(0.0)
 }
 
-/// The probability that the best of `tries` is as good as that, in logarithms (Bonferroni).
+/// Bonferroni correction: log probability that the best of `tries` trials reaches this log probability.
 pub(crate) fn bonferroni(ln_probability: f64, tries: usize) -> f64 {
     (ln_probability + (tries as f64).ln()).min(0.0)
 }

@@ -15,22 +15,22 @@ pub(crate) fn noise(seed: u64, count: usize) -> Vec<f64> {
     (0..count).map(|_| normal()).collect()
 }
 
-/// What there is of an independent recording: passes of it, and the whole of it.
+/// Recordings of an independent data set: its single passes and the whole, as far as they are available.
 pub(crate) fn independent(name: &str) -> impl Iterator<Item = Recording> {
     test_needs::recordings(name).into_iter().map(|folder| Recording::open(folder).unwrap())
 }
 
-/// What a chain does to a pass: its index, its samples, its positions.
+/// Fault of the measuring chain in a pass: arguments are its index, samples and positions.
 pub(crate) type Chain<'a> = dyn Fn(usize, &mut [f64], &mut [f64]) + 'a;
 
-/// Passes of a wheel that follows the surface: acceleration is the height's second derivative in
-/// time. Level 3 of eq. B.6, shared by all passes; white noise of 0.05 m/s2 of the sensor.
+/// Passes of a wheel that follows the surface: the acceleration is the second time derivative of the
+/// height. All passes share a surface of level 3 of eq. B.6; the sensor adds white noise of 0.05 m/s2.
 pub(crate) struct Rolled<'a> {
     /// Seed of the surface and of the noise.
     pub seed: u64,
-    /// What is added to the surface's height in m in a pass at a place in m.
+    /// Height in m that is added to the surface, as a function of pass and position in m.
     pub height_m: &'a dyn Fn(usize, f64) -> f64,
-    /// What the chain does to the passes.
+    /// Fault of the measuring chain.
     pub chain: &'a Chain<'a>,
 }
 

@@ -1,4 +1,4 @@
-//! Crests that all stop at one height.
+//! Clipping: crests that end at one level.
 
 use super::contact::{airborne, is_at_flight_level};
 use super::plateau::Plateaus;
@@ -9,31 +9,31 @@ use tracktwin_signal::recording::{Pass, Recording};
 /// Thickness of the layer below the greatest value, as a share of it.
 const LAYER: f64 = 0.01;
 
-/// Least level of flat crests, as a share of the greatest value: beyond a recorder's limit there is its noise
-/// alone.
+/// Smallest level of flat crests, as a share of the greatest value: only the recorder's noise exceeds the
+/// limit of a recorder.
 const TOP: f64 = 0.95;
 
-/// A pass whose crests are cut off.
+/// A clipped pass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clipping {
     /// Index of the pass.
     pub pass: usize,
-    /// Acceleration in m/s2 at which it is cut.
+    /// Acceleration in m/s2 at the limit.
     pub level_m_s2: f64,
-    /// Crests that reach it, above or below.
+    /// Number of crests within 1 % of the limit, on its side.
     pub crests: usize,
-    /// Samples within the layer, as a share of all.
+    /// Samples within 1 % of the limit, as a share of all samples.
     pub share: f64,
-    /// Probability of as many crests there without a limit, in logarithm.
+    /// Natural logarithm of the probability of at least this number of crests without a limit.
     pub ln_p: f64,
 }
 
-/// The passes that are cut off, with a probability below `alpha` that none is.
+/// Detects clipped passes, with a false-alarm rate of `alpha` for the recording.
 ///
-/// Heights of crests become rarer with height: of those in two layers of equal thickness below the
-/// greatest, no more than half are in the upper one, but for chance. And no crest is even for longer
-/// than the recorder's steps make it. A side on which the wheel is in the air, or as good as, is no
-/// recorder's: see [`super::loss_of_contact`].
+/// High crests are rarer than low ones. Without a limit, of the crests in two layers of equal thickness
+/// below the greatest value at most half lie in the upper layer, except by chance. Also, no crest is
+/// constant for longer than the steps of the recorder explain. A side on which the wheel loses contact, or
+/// nearly does, is not attributed to the recorder; see [`super::loss_of_contact`].
 pub fn clipping(recording: &Recording, alpha: f64) -> Vec<Clipping> {
     let flying = airborne(recording);
     let is_recorder_s = |pass: usize, sign: f64, level: f64| {
@@ -89,13 +89,13 @@ fn side(index: usize, pass: &Pass, sign: f64) -> Clipping {
     }
 }
 
-/// `ln P` of flat crests at the top of all values; certain without any.
+/// `ln P` of flat crests at the greatest value; 0 without flat crests.
 fn ln_flat(values: &[f64], greatest: f64) -> f64 {
     let found = Plateaus::at_top(values).filter(|found| found.level >= TOP * greatest);
     found.map_or(0.0, |found| found.ln_p().min(0.0))
 }
 
-/// `ln P` of an even crest as long as the longest at the greatest value; certain without one.
+/// `ln P` of a constant crest at the greatest value, as long as the longest one; 0 without such a crest.
 fn ln_even(samples: &[f64], sign: f64) -> f64 {
     let standstill = Standstill::longest(samples);
     if standstill.is_at_limit(samples, sign) { standstill.ln_p.min(0.0) } else { 0.0 }

@@ -1,9 +1,9 @@
-//! Loss of contact: the acceleration of the wheel equals load over unsprung mass, because no other
-//! force acts.
+//! Loss of contact: the acceleration of the wheel equals load over unsprung mass, because no other force
+//! acts.
 //!
-//! A recorder at its limit makes plateaus too. It does so on both sides, or at any level, and
-//! nothing it records lies beyond; loss of contact makes them on one side only, at one level, and
-//! lands with blows that reach further the other way.
+//! A recorder at its limit makes plateaus too, but on both sides or at any level, and no recorded value
+//! exceeds the limit. Loss of contact makes plateaus on one side only and at one level, and the blow of the
+//! landing exceeds this level on the other side.
 
 use super::plateau::Plateaus;
 use super::standstill::Standstill;
@@ -11,72 +11,73 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Relative difference of a level from the load over the unsprung mass up to which it is the same: what is
-/// stated of load, mass and gain is known to a few per cent.
+/// Largest relative difference between a level and the load over the unsprung mass if they are the same:
+/// stated load, mass and gain are accurate to a few per cent.
 const NEAR: f64 = 0.03;
-/// Greatest factor between the two where load, mass or gain are not as stated.
+/// Largest ratio between the two if load, mass or gain are not as stated.
 const OFF_MAX: f64 = 2.0;
-/// Times the level that the recording reaches on the other side, if the level is not its recorder's limit.
+/// Smallest ratio of the extreme value on the other side to the level, if the level is not the limit of the
+/// recorder.
 const BEYOND: f64 = 1.05;
-/// Flat crests in a pass from which a level is known that nothing is stated about; of one that is even, its
-/// probability by chance, in logarithm.
+/// Smallest number of flat crests in a pass that determine a level without a stated value; `EVEN_LN_P` is
+/// the largest log probability of a single constant crest by chance.
 const CRESTS_MIN: usize = 2;
 const EVEN_LN_P: f64 = -20.0;
-/// Share of equal neighbours in a plateau from which a recorder holds the value.
+/// Share of equal neighbours in a plateau from which on a recorder holds the value.
 const HELD: f64 = 0.8;
-/// Parts of a pass in which its noise is looked for.
+/// Number of parts of a pass in which the noise is estimated.
 const PARTS: usize = 16;
-/// Least noise, as a share of the level, from which that can be told: what a wheel on rough rail does leaves
-/// up to 2.3e-4 in simulated passes without noise.
+/// Smallest noise, as a share of the level, for this test. In simulated passes without noise, a wheel on
+/// rough rail gives up to 2.3e-4.
 const NOISE_MIN: f64 = 3e-4;
-/// Sleeper spacings up to which two flights are one stretch.
+/// Largest distance of two contact losses that count as one stretch, in sleeper spacings.
 const APART: f64 = 1.0;
 
 /// Loss of contact between wheel and rail.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LossOfContact {
-    /// Acceleration in m/s2 without contact, with the sign of the recording.
+    /// Acceleration in m/s2 during contact loss, with the sign of the recording.
     pub level_m_s2: f64,
-    /// Load over unsprung mass in m/s2, where the recording states both.
+    /// Load over unsprung mass in m/s2; `None` if the recording does not state both.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub expected_m_s2: Option<f64>,
-    /// Speeds at which contact is lost in km/h, ascending.
+    /// Speeds with contact loss in km/h, ascending.
     pub speeds_km_h: Vec<f64>,
-    /// Stretches of the track in m, over all passes.
+    /// Stretches `[from, to]` of the track in m, over all passes.
     pub x_m: Vec<[f64; 2]>,
-    /// The sleepers in whose windows the wheel is in the air.
+    /// Ids of the sleepers in whose windows the wheel is off the rail.
     pub sleepers: Vec<String>,
-    /// The passes in which contact is lost.
+    /// The passes with contact loss.
     pub passes: Vec<PassLoss>,
 }
 
-/// Loss of contact in one pass.
+/// Contact loss in one pass.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PassLoss {
     /// Number of the pass in the recording, from 1.
     pub pass: usize,
-    /// Its speed in km/h.
+    /// Speed of the pass in km/h.
     pub speed_km_h: f64,
-    /// Share of its time in the air, 0 to 1.
+    /// Share of the time without contact, 0 to 1.
     pub share: f64,
-    /// Longest time in the air at once in s.
+    /// Longest single contact loss in s.
     pub longest_s: f64,
-    /// From where to where in m the wheel is in the air.
+    /// Stretches `[from, to]` in m without contact.
     pub x_m: Vec<[f64; 2]>,
 }
 
 impl LossOfContact {
-    /// The pass that is in the air for the greatest part of its time.
+    /// The pass with the largest share of contact loss.
     pub fn worst(&self) -> Option<&PassLoss> {
         self.passes.iter().max_by(|a, b| a.share.total_cmp(&b.share))
     }
 
-    /// Longest time in the air at once in s.
+    /// Longest single contact loss of all passes in s.
     pub fn longest_s(&self) -> f64 {
         self.passes.iter().map(|pass| pass.longest_s).fold(0.0, f64::max)
     }
 
-    /// A sentence on it, for this number of recorded passes.
+    /// Description as a sentence; `recorded` is the number of passes in the recording.
     pub fn sentence(&self, recorded: usize) -> String {
         let speeds: Vec<String> = self.speeds_km_h.iter().map(|it| format!("{it:.1}")).collect();
         let [from_m, to_m] = self.reach_m();
@@ -92,7 +93,7 @@ impl LossOfContact {
         )
     }
 
-    /// From the first place to the last in m where the wheel is in the air.
+    /// First and last position in m without contact.
     pub fn reach_m(&self) -> [f64; 2] {
         self.x_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[first, last], [from, to]| {
             [first.min(*from), last.max(*to)]
@@ -107,7 +108,7 @@ impl LossOfContact {
         }
     }
 
-    /// The level beside what load and mass say.
+    /// Comparison of the level with load over unsprung mass, as part of the sentence.
     fn compared(&self) -> String {
         let Some(expected) = self.expected_m_s2 else { return String::new() };
         let off = self.level_m_s2.abs() / expected - 1.0;
@@ -124,7 +125,7 @@ impl LossOfContact {
     }
 }
 
-/// Where a recording's wheel loses contact with the rail; none where it does not.
+/// Detects the stretches on which the wheel loses contact with the rail; `None` if there are none.
 pub fn loss_of_contact(recording: &Recording) -> Option<LossOfContact> {
     let airborne = airborne(recording);
     let lost = airborne.iter().enumerate().filter_map(|(pass, it)| Some((pass, it.as_ref()?)));
@@ -151,7 +152,7 @@ pub fn loss_of_contact(recording: &Recording) -> Option<LossOfContact> {
     })
 }
 
-/// Load over unsprung mass in m/s2; none where the recording does not state them or has no unit.
+/// Load over unsprung mass in m/s2; `None` if the recording does not state both or its gain is unknown.
 pub(crate) fn expected_m_s2(recording: &Recording) -> Option<f64> {
     let [load_n, mass_kg] =
         ["load_N", "mass_kg"].map(|name| recording.nominal_value("wheel", name));
@@ -159,13 +160,13 @@ pub(crate) fn expected_m_s2(recording: &Recording) -> Option<f64> {
     (recording.gain_known() && level.is_finite() && level > 0.0).then_some(level)
 }
 
-/// Whether this is the acceleration in m/s2 without contact, by what the recording states: no limit
-/// can be told from it.
+/// Whether the acceleration in m/s2 equals the stated value for contact loss. A recorder limit at this
+/// level cannot be distinguished from contact loss.
 pub(super) fn is_at_flight_level(recording: &Recording, level_m_s2: f64) -> bool {
     expected_m_s2(recording).is_some_and(|level| (level_m_s2 / level - 1.0).abs() <= NEAR)
 }
 
-/// A pass whose wheel is in the air.
+/// Plateaus of a pass with contact loss.
 #[derive(Debug)]
 pub(super) struct Airborne {
     /// Side of the plateaus: 1 for positive accelerations.
@@ -179,13 +180,13 @@ impl Airborne {
         Self { sign, plateaus, samples: pass.signal.len() }
     }
 
-    /// Share of the pass's time in the air, 0 to 1.
+    /// Share of the time of the pass without contact, 0 to 1.
     pub(super) fn share(&self) -> f64 {
         self.plateaus.samples as f64 / self.samples as f64
     }
 }
 
-/// What shows of each pass that its wheel is in the air.
+/// Detects contact loss in every pass; `None` for a pass without it.
 pub(super) fn airborne(recording: &Recording) -> Vec<Option<Airborne>> {
     let (expected, ends) = (expected_m_s2(recording), ends(recording));
     let passes = || recording.passes.iter();
@@ -216,8 +217,8 @@ fn of_pass(pass: &Pass, expected: Option<f64>, [least, greatest]: [f64; 2]) -> O
     Some(Airborne::new(-1.0, plateaus, pass))
 }
 
-/// Plateaus at a level in m/s2 that is known, about zero or about the pass's mean: a sensor may have an
-/// offset, and what a recorder cuts off moves the mean.
+/// Plateaus at a known level in m/s2, relative to zero or to the mean of the pass: a sensor may have an
+/// offset, and clipping changes the mean.
 fn known(samples: &[f64], level: f64, sign: f64) -> Option<Plateaus> {
     let mean = samples.iter().sum::<f64>() / samples.len() as f64;
     let about =
@@ -227,7 +228,7 @@ fn known(samples: &[f64], level: f64, sign: f64) -> Option<Plateaus> {
     [0.0, mean].into_iter().map(|zero| Plateaus::at(&about(zero), level)).find(is_there)
 }
 
-/// Plateaus at a level of which nothing is stated, or not the truth: shape has to tell.
+/// Plateaus at an unknown or wrongly stated level, identified by their shape.
 fn by_shape(pass: &Pass, expected: Option<f64>, least: f64) -> Option<Plateaus> {
     let samples = pass.signal.samples();
     let found = Plateaus::at_top(samples)?;
@@ -241,7 +242,7 @@ fn by_shape(pass: &Pass, expected: Option<f64>, least: f64) -> Option<Plateaus> 
     is_flight.then_some(found)
 }
 
-/// The least and the greatest acceleration of all passes: one recorder has them all.
+/// The least and the greatest acceleration of all passes; all passes have the same recorder.
 fn ends(recording: &Recording) -> [f64; 2] {
     let samples = recording.passes.iter().flat_map(|pass| pass.signal.samples());
     samples.fold([0.0, 0.0], |[least, greatest]: [f64; 2], &sample| {
@@ -249,7 +250,7 @@ fn ends(recording: &Recording) -> [f64; 2] {
     })
 }
 
-/// Whether a recorder holds a value there: neighbouring samples are equal, though the pass has noise.
+/// Whether a recorder holds the value: neighbouring samples are equal although the pass has noise.
 fn is_held(pass: &Pass, crests: &[Range<usize>]) -> bool {
     let samples = pass.signal.samples();
     let inside = crests.iter().flat_map(|crest| samples[crest.clone()].windows(2));
@@ -262,8 +263,8 @@ fn is_held(pass: &Pass, crests: &[Range<usize>]) -> bool {
     f64::from(equal) >= HELD * f64::from(pairs) && noise(samples) > NOISE_MIN * level
 }
 
-/// Standard deviation of a pass's noise, from fourth differences in its quietest part, which
-/// suppress slower components.
+/// Standard deviation of a pass's noise. The estimate uses fourth differences, which suppress slower
+/// components, in the part with the lowest noise.
 fn noise(samples: &[f64]) -> f64 {
     let of_part = |part: &[f64]| {
         let fourth = |w: &[f64]| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
@@ -289,7 +290,7 @@ fn pass_loss(recording: &Recording, index: usize, found: &Airborne) -> PassLoss 
     }
 }
 
-/// Stretches of all flights, those less than `apart_m` from each other as one.
+/// Stretches of all contact losses; those less than `apart_m` from each other are joined.
 fn stretches(passes: &[PassLoss], apart_m: f64) -> Vec<[f64; 2]> {
     let mut flights: Vec<[f64; 2]> = passes.iter().flat_map(|pass| pass.x_m.clone()).collect();
     flights.sort_by(|a, b| a[0].total_cmp(&b[0]));

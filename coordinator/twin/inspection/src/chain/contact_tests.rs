@@ -1,4 +1,4 @@
-//! Simulated passes whose solver knows where the wheel is in the air, and what a chain makes of them.
+//! Simulated passes with contact loss computed by the solver, also after faults of the measuring chain.
 
 use super::*;
 use crate::along::testing::noise;
@@ -98,7 +98,7 @@ fn without_vehicle(mut recording: Recording) -> Recording {
     recording
 }
 
-/// That what is found of a recording is what the solver knew, in all of its passes.
+/// Asserts that the detected contact loss equals that of the solver in all passes of a recording.
 fn assert_found(recording: &Recording) {
     let found = loss_of_contact(recording).expect("the wheel is in the air");
     assert!((found.level_m_s2 / FLIGHT_M_S2 - 1.0).abs() < 0.01, "{found:?}");

@@ -1,48 +1,48 @@
-//! Passes at one speed that differ by a constant factor.
+//! Gain errors: passes at one speed that differ by a constant factor.
 
 use crate::along::{Background, Energy, bonferroni, by_speed, ln_student_tail, median, whitened};
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Bands in Hz whose power is compared; a gain is the same in all.
+/// Bands in Hz whose powers are compared; a gain error is the same in all bands.
 const BANDS_HZ: [[f64; 2]; 3] = [[100.0, 400.0], [400.0, 1200.0], [1200.0, 4000.0]];
-/// Greatest frequency as a share of the sample rate.
+/// Highest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
-/// Difference of two passes in dB that is usual.
+/// Usual difference of two passes in dB.
 const USUAL_DB: f64 = 0.2;
-/// Power of the speed with which levels grow, and how much it differs from surface to surface: spectra fall
-/// with the third or fourth power of the wave number.
+/// Exponent of the power as a function of speed, and its uncertainty: surface spectra decrease with the
+/// third or fourth power of the wave number.
 const SPEED_POWER: f64 = 3.0;
 const SPEED_POWER_UNSURE: f64 = 1.0;
-/// Difference of the bands' gains in dB above which it is no gain but something else.
+/// Largest difference between the gains of the bands in dB; a larger difference is not a gain error.
 const UNIFORM_DB: f64 = 0.6;
-/// Fewest stretches for a mean and its scatter.
+/// Smallest number of stretches for a mean and its standard deviation.
 const STRETCHES_MIN: usize = 6;
 
-/// The gain of a pass over the others at its speed.
+/// Gain of a pass relative to the other passes at its speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gain {
     /// Index of the pass.
     pub pass: usize,
-    /// How many passes there are at this speed, with it.
+    /// Number of passes at this speed, including this one.
     pub passes: usize,
-    /// Level over the median of the other passes at its nominal speed in dB, less what their true speeds
-    /// explain, and its standard deviation.
+    /// Gain in dB and its standard deviation: the level relative to the median of the other passes at this
+    /// nominal speed, corrected for the difference of the true speeds.
     pub gain_db: (f64, f64),
-    /// Greatest difference between bands in dB.
+    /// Largest difference between bands in dB.
     pub spread_db: f64,
-    /// Probability that the pass differs no more than usual, in logarithm, for all passes.
+    /// Natural logarithm of the probability of such a difference among all passes without a gain error.
     pub ln_p: f64,
 }
 
 impl Gain {
-    /// Whether it is a gain at all: the same in every band, and unlikely otherwise.
+    /// Whether this is a gain error: the same in every band, and improbable (`alpha`) otherwise.
     pub fn is_error(&self, alpha: f64) -> bool {
         let uniform = self.spread_db < UNIFORM_DB.max(0.2 * self.gain_db.0.abs());
         uniform && self.ln_p <= alpha.ln()
     }
 }
 
-/// Gains of all passes that have another one at their speed.
+/// Gains of all passes with at least one other pass at their speed.
 pub fn gains(recording: &Recording) -> Vec<Gain> {
     let groups = by_speed(&recording.passes);
     let tries = recording.passes.len();
@@ -76,7 +76,7 @@ fn of_speed(recording: &Recording, group: &[usize]) -> Vec<Gain> {
     (0..group.len()).filter_map(gain).collect()
 }
 
-/// Level of a pass over the median of the others, stretch by stretch, in dB.
+/// Level of a pass relative to the median of the others, one value per stretch, in dB.
 fn differences(levels: &[Vec<Vec<f64>>], this: usize, band: usize) -> Vec<f64> {
     let stretches = levels.iter().map(|pass| pass[band].len()).min().unwrap_or(0);
     let over = |stretch: usize| {
@@ -105,14 +105,14 @@ fn gain(group: &[usize], this: usize, bands: &[Vec<f64>], usual_db: f64) -> Opti
     Some(Gain { pass, passes, gain_db, spread_db: ends[1] - ends[0], ln_p })
 }
 
-/// Mean speed of a pass in m/s, by its positions.
+/// Mean speed of a pass in m/s, from its positions.
 fn mean_speed(pass: &Pass) -> f64 {
     let last = pass.position_m.len() - 1;
     let way_m = pass.position_m[last] - pass.position_m[0];
     way_m * pass.signal.sample_rate_hz() / last as f64
 }
 
-/// Mean and the standard deviation of it.
+/// Mean and its standard error.
 fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -120,7 +120,7 @@ fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, (square / (count - 1.0) / count).sqrt())
 }
 
-/// Levels in dB over one background: by band, by sleeper spacing along the track.
+/// Levels in dB relative to one background, by band and by sleeper spacing along the track.
 fn levels(recording: &Recording, pass: &Pass, background: &Background) -> Vec<Vec<f64>> {
     let top = HIGH_SHARE * pass.signal.sample_rate_hz();
     let spacing = recording.spacing_m;

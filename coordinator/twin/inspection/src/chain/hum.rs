@@ -1,50 +1,51 @@
-//! Mains hum: lines at a fixed frequency at all speeds, narrower than any structural resonance.
+//! Mains hum: lines with the same frequency at all speeds, narrower than any structural resonance.
 
 use crate::along::{Line, Spectrum, bonferroni, by_speed, ln_gamma_tail, speed_m_s};
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Frequencies of electrical supplies in Hz and how many harmonics are looked for: railways of
-/// central Europe (their third is the next one's first), the mains of Europe and of America.
+/// Mains frequencies in Hz and number of tested harmonics: railways of central Europe (the third harmonic
+/// equals the next entry), mains of Europe, mains of America.
 const MAINS_HZ: [(f64, usize); 3] = [(50.0 / 3.0, 2), (50.0, 6), (60.0, 6)];
-/// Duration in s of a segment: longer than this the mains' frequency is not steady.
+/// Duration of a segment in s; over a longer time the mains frequency is not constant.
 const SEGMENT_S: f64 = 4.0;
-/// How far in Hz the mains may be from their nominal frequency.
+/// Largest deviation of the mains from the nominal frequency in Hz.
 const DRIFT_HZ: f64 = 0.1;
-/// Probability of one speed's line without hum above which it is not detected at that speed.
+/// A line is detected at a speed if its probability by chance is below this.
 const EACH_SPEED: f64 = 0.05;
-/// Number of speeds at which it must be detected, if there are that many; at others it may be
+/// Number of speeds at which a line must be detected, if there are that many; at other speeds it may be
 /// hidden.
 const SPEEDS_MIN: usize = 2;
-/// Greatest ratio of a line's amplitudes at two speeds: the mains do not know the train's.
+/// Largest ratio of a line's amplitudes at two speeds: the mains do not depend on the speed of the train.
 const APART_MAX: f64 = 2.0;
-/// Segments from which their mean follows a gamma distribution well enough.
+/// Smallest number of segments whose mean follows a gamma distribution well enough.
 const SEGMENTS_MIN: usize = 4;
-/// Waves in a segment below which a line has no neighbours on its lower side.
+/// Smallest number of waves in a segment; below it a line has no neighbours on its lower side.
 const WAVES_MIN: f64 = 10.0;
-/// Resolution cells on either side of a line up to which it must stand out as well: what a lightly
-/// damped resonance has around its peak is no background.
+/// Distance of the nearer neighbours in resolution cells, relative to which a line must be significant too.
+/// The flanks of a lightly damped resonance are no background.
 const NEAR: f64 = 6.0;
-/// Resolution cells within which a line may be the sleepers' or the blows'.
+/// A line within this number of resolution cells of a sleeper or wheel harmonic may belong to it.
 const CELLS_APART: f64 = 1.5;
 
-/// A line of the mains.
+/// A line at a mains frequency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hum {
-    /// Its frequency in Hz.
+    /// Frequency in Hz.
     pub frequency_hz: f64,
-    /// Its amplitude in m/s2, mean of all passes, and the standard deviation of that.
+    /// Amplitude in m/s2, as mean of all passes, and its standard deviation.
     pub amplitude_m_s2: (f64, f64),
-    /// Power over its neighbours', mean of all speeds.
+    /// Power relative to the neighbours, as mean of all speeds.
     pub ratio: f64,
-    /// Probability of such a line at any mains frequency without hum, in logarithm.
+    /// Natural logarithm of the probability of such a line at any mains frequency without hum.
     pub ln_p: f64,
 }
 
-/// The lines of the mains that are less likely than `alpha` without them, most certain first.
+/// Detects lines at mains frequencies, with a false-alarm rate of `alpha`; the most significant line comes
+/// first.
 ///
-/// `turn_m` is the circumference in m of a wheel that strikes the rail once a turn, if it does: the
-/// blows have lines of their own.
+/// `turn_m` is the circumference in m of a wheel with a flat, if there is one: its blows have their own
+/// lines.
 pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
     let lengths_m: Vec<f64> = turn_m.into_iter().chain([recording.spacing_m]).collect();
     let spectra_of = |group: Vec<usize>| {
@@ -69,7 +70,7 @@ pub fn hum(recording: &Recording, turn_m: Option<f64>, alpha: f64) -> Vec<Hum> {
     found
 }
 
-/// The line nearest to a mains frequency, and the number of bins examined.
+/// The line nearest to a mains frequency, and the number of tested bins.
 fn line(speeds: &[Vec<PassSpectra>], lengths_m: &[f64], frequency: f64) -> (Option<Hum>, usize) {
     let mut tries = 0;
     let (mut each, mut ratios) = (Vec::new(), Vec::new());
@@ -105,21 +106,21 @@ fn line(speeds: &[Vec<PassSpectra>], lengths_m: &[f64], frequency: f64) -> (Opti
     (Some(hum), tries)
 }
 
-/// One probability of all speeds' (Fisher): at one frequency each speed has another wavelength, so
-/// they are independent.
+/// Combines the probabilities of all speeds (Fisher). They are independent, because a fixed frequency
+/// corresponds to a different wavelength at each speed.
 fn of_all(ln_probabilities: &[f64]) -> f64 {
     let count = ln_probabilities.len() as f64;
     ln_gamma_tail(count, -ln_probabilities.iter().sum::<f64>() / count)
 }
 
-/// Whether amplitudes may be those of one line.
+/// Whether the amplitudes may belong to one line.
 fn are_alike(amplitudes: &[f64]) -> bool {
     let [least, most] =
         amplitudes.iter().fold([f64::MAX, 0.0], |[l, m]: [f64; 2], &a| [l.min(a), m.max(a)]);
     most <= APART_MAX * least
 }
 
-/// The spectra of a pass's segments.
+/// Spectra of the segments of a pass.
 struct PassSpectra {
     spectra: Vec<Spectrum>,
     duration_s: f64,
@@ -127,7 +128,7 @@ struct PassSpectra {
     rate_hz: f64,
 }
 
-/// A line in one pass.
+/// Line in one pass.
 struct Tone {
     ratio: f64,
     amplitude: f64,
@@ -153,14 +154,14 @@ impl PassSpectra {
         }
     }
 
-    /// Whether it may be a line of what comes back after every such length.
+    /// Whether the frequency may belong to an effect with this period in m.
     fn may_be_of(&self, frequency: f64, length_m: f64) -> bool {
         let order = frequency * length_m / self.speed_m_s;
         let cell = length_m / self.speed_m_s / self.duration_s;
         order > 0.5 && (order - order.round()).abs() < CELLS_APART * cell
     }
 
-    /// None where the segments are too short for the frequency, or not sampled fast enough.
+    /// `None` if the segments are too short for the frequency or the sample rate is too low.
     fn line(&self, frequency: f64) -> Option<Tone> {
         if frequency > 0.4 * self.rate_hz || frequency * self.duration_s < WAVES_MIN {
             return None;

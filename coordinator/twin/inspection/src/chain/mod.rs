@@ -1,8 +1,8 @@
-//! Faults of sensor, recorder, clock and odometer, not physics of the track.
+//! Faults of sensor, recorder, clock and odometer, as distinct from physics of the track.
 //!
-//! Owns `clipping`, `electrical_hum`, `gain_error` and `position_error`, passes that can't be used
-//! at all, and per pass what a model of the track must know of the chain: noise, gain, offset. A
-//! resonance of the sensor's mounting needs the track's model and is left to it.
+//! This module detects `clipping`, `electrical_hum`, `gain_error`, `position_error` and unusable passes. It
+//! also estimates noise, gain and offset of each pass for the track model. A resonance of the sensor
+//! mounting requires the track model and is tested in the diagnosis.
 
 mod clipping;
 mod contact;
@@ -29,9 +29,10 @@ pub use usable::usable;
 use crate::along::Background;
 use tracktwin_signal::recording::Recording;
 
-/// Density of every pass's noise floor in (m/s2)2/Hz: the median of the upper half of its spectrum.
+/// Power spectral density of the noise floor of every pass in (m/s2)2/Hz: median of the upper half of its
+/// spectrum.
 ///
-/// None for a pass that is too short or constant.
+/// `None` for a pass that is too short or constant.
 pub fn noise_floors(recording: &Recording) -> Vec<Option<f64>> {
     let floor = |pass: &tracktwin_signal::recording::Pass| {
         Background::of(&pass.signal).map(|background| background.floor())

@@ -1,4 +1,4 @@
-//! Offset between the odometers of two passes, from the surface common to both.
+//! Offset between the odometers of two passes, from their common surface.
 
 use crate::along::{
     Background, Ruler, bonferroni, by_speed, ln_normal_bound, median, on_even_places, speed_m_s,
@@ -8,61 +8,60 @@ use rustfft::num_complex::Complex64;
 use std::f64::consts::LN_2;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Lowest frequency of what is compared, the surface's own sound, times the sleeper spacing, in m/s: 500 Hz
-/// on V-Track. A track's frequencies go with the inverse of its lengths.
+/// Lowest compared frequency times the sleeper spacing, in m/s: 500 Hz on V-Track. Above it the surface
+/// dominates the signal. The frequencies of a track scale with the inverse of its lengths.
 const LOW_M_S: f64 = 62.5;
-/// Shortest wave compared, as a share of the sleeper spacing: 1.2 mm on V-Track.
+/// Shortest compared wave, as a share of the sleeper spacing: 1.2 mm on V-Track.
 const SHORTEST: f64 = 9.6e-3;
-/// Greatest frequency as a share of the sample rate.
+/// Highest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
-/// Points on the shortest wave.
+/// Number of points on the shortest wave.
 const POINTS: f64 = 4.0;
-/// Offsets looked for, in sleeper spacings either way.
+/// Largest tested offset in either direction, in sleeper spacings.
 const REACH_SPACINGS: f64 = 0.5;
-/// Logarithm of the probability of a correlation by chance below which a stretch is matched.
+/// A stretch is matched if the log probability of its correlation by chance is below this.
 const MATCHED: f64 = -9.0;
-/// Difference of two odometers that is usual, as a share of the sleeper spacing: each wanders by three
-/// millimetres on V-Track.
+/// Usual difference of two odometers, as a share of the sleeper spacing: each deviates by 3 mm on V-Track.
 const USUAL: f64 = 0.048;
-/// Standard deviation of that limit, as a share of the spacing: an offset is called an error some way beyond
-/// it.
+/// Standard deviation of that limit, as a share of the spacing: an offset is an error only well beyond the
+/// limit.
 const USUAL_DEVIATION: f64 = 8e-3;
 
-/// Where two passes' odometers differ.
+/// Difference between the odometers of two passes at one position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
-    /// Place in m.
+    /// Position in m.
     pub x_m: f64,
     /// Shift in m of the same point of the rail in the second pass.
     pub offset_m: f64,
-    /// Correlation of the two, 0 to 1.
+    /// Correlation of the two passes, 0 to 1.
     pub correlation: f64,
 }
 
-/// All stretches of two passes at one speed.
+/// Offsets between two passes at one speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Offsets {
     /// Indices of the passes.
     pub passes: [usize; 2],
-    /// The stretches that match.
+    /// Offsets of the matched stretches.
     pub matched: Vec<Offset>,
-    /// Stretches that were compared.
+    /// Number of compared stretches.
     pub stretches: usize,
     /// Median correlation over all stretches.
     pub correlation: f64,
-    /// Lowest frequency compared in Hz.
+    /// Lowest compared frequency in Hz.
     pub low_hz: f64,
-    /// Distance of the sleepers in m.
+    /// Sleeper spacing in m.
     spacing_m: f64,
 }
 
 impl Offsets {
-    /// Difference in m of two odometers that is usual.
+    /// Usual difference of two odometers in m.
     pub fn usual_m(&self) -> f64 {
         USUAL * self.spacing_m
     }
 
-    /// Straight line through the offsets: value in m in the middle, slope in m/m.
+    /// Straight line through the offsets: value in the middle in m, and slope in m/m.
     pub fn line(&self) -> (f64, f64) {
         let count = self.matched.len().max(1) as f64;
         let mean = |of: &dyn Fn(&Offset) -> f64| self.matched.iter().map(of).sum::<f64>() / count;
@@ -72,21 +71,21 @@ impl Offsets {
         (offset, if square > 0.0 { cross / square } else { 0.0 })
     }
 
-    /// The offset in m that a tenth of the stretches exceed.
+    /// Absolute offset in m that a tenth of the matched stretches exceed.
     pub fn greatest_m(&self) -> f64 {
         let mut sizes: Vec<f64> = self.matched.iter().map(|o| o.offset_m.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         sizes.get(sizes.len().saturating_sub(1 + sizes.len() / 10)).copied().unwrap_or(0.0)
     }
 
-    /// Probability of offsets as great between usual odometers, in logarithm: the normal tail
-    /// beyond the usual limit.
+    /// Natural logarithm of the probability of such offsets between usual odometers: the normal tail beyond
+    /// the usual limit.
     pub fn ln_p(&self) -> f64 {
         ln_normal_bound((self.greatest_m() - self.usual_m()) / (USUAL_DEVIATION * self.spacing_m))
     }
 }
 
-/// Offsets of every pass against the first at its speed.
+/// Offsets of every pass relative to the first pass at its speed.
 pub fn offsets(recording: &Recording) -> Vec<Offsets> {
     let groups = by_speed(&recording.passes);
     let pairs = groups.iter().flat_map(|group| group[1..].iter().map(|&other| [group[0], other]));
@@ -142,18 +141,18 @@ fn compare(recording: &Recording, passes: [usize; 2]) -> Option<Offsets> {
     Some(all)
 }
 
-/// Where a stretch correlates best with the other pass.
+/// Best correlation of a stretch with the other pass.
 struct Match {
-    /// Lag in points, with a parabola through the peak.
+    /// Lag in points, interpolated with a parabola through the peak.
     lag: f64,
-    /// Correlation there.
+    /// Correlation at this lag.
     correlation: f64,
     /// Median correlation over all lags.
     elsewhere: f64,
 }
 
-/// The lag at which a stretch of one pass, from point `start`, is most like the other, up to `reach`
-/// points either way.
+/// The lag at which a stretch of one pass, from point `start`, correlates best with the other pass; lags go
+/// up to `reach` points in either direction.
 fn best_lag(part: &[Complex64], other: &[Complex64], start: usize, reach: usize) -> Match {
     let norm = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
     let own = norm(part);

@@ -1,4 +1,4 @@
-//! Unusable passes, and why.
+//! Pass defects: reasons why passes are unusable.
 
 use super::contact::{Airborne, airborne};
 use super::offset::Offsets;
@@ -9,85 +9,85 @@ use std::fmt;
 use tracktwin_number::rounded;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Longest stretch in s without a change that a sensor at work shows.
+/// Longest constant stretch in s of a working sensor.
 const STILL_S: f64 = 2e-3;
-/// Logarithm of the probability of a stretch without a change by chance.
+/// Largest log probability by chance of a constant stretch that counts as a drop-out.
 const STILL_LN_P: f64 = -20.0;
-/// Share of samples at the limit above which a pass is saturated.
+/// A pass is saturated if a larger share of its samples is at the limit.
 const SATURATED: f64 = 0.02;
-/// Share of the time without contact above which a pass is unusable.
+/// A pass is unusable if the share of the time without contact is larger.
 const AIRBORNE: f64 = 0.5;
-/// Correlation of two passes at one speed below which they have no track in common.
+/// Two passes at one speed with a smaller correlation have no common track.
 const UNLIKE: f64 = 0.3;
-/// Coherence of passes at two speeds below which they have no surface in common.
+/// Passes at two speeds with a smaller coherence have no common surface.
 const STRANGE: f64 = 0.1;
-/// Ratio to the noise floor above which a pass contains a signal, and frequency times sleeper
-/// spacing in m/s up to which it must (80 Hz on V-Track): below, the signal is of the vehicle, not
-/// of the track.
+/// A pass contains a signal if its power is this ratio above the noise floor at least up to the frequency
+/// `AUDIBLE_M_S` over the sleeper spacing (80 Hz on V-Track). Below this frequency the signal depends on
+/// the vehicle rather than on the track.
 const AUDIBLE: f64 = 4.0;
 const AUDIBLE_M_S: f64 = 10.0;
-/// Sleeper spacings that a pass must cover to be compared with itself elsewhere.
+/// Smallest length of a pass in sleeper spacings.
 const SPANS_MIN: f64 = 4.0;
 
-/// Why a pass can't be used.
+/// Reason why a pass is unusable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PassDefect {
-    /// The signal doesn't change for a while.
+    /// The signal is constant for some time.
     DropOut {
         /// Index of the pass.
         pass: usize,
-        /// Where in m it begins.
+        /// Position in m at which the constant stretch begins.
         from_m: f64,
-        /// For how long in s.
+        /// Duration in s.
         duration_s: f64,
     },
-    /// The signal doesn't change at all.
+    /// The whole signal is constant.
     Dead {
         /// Index of the pass.
         pass: usize,
     },
-    /// The only pass at its speed, and nothing but the noise of sensor and recorder.
+    /// The pass contains only the noise of sensor and recorder, and no other pass has its speed.
     Noise {
         /// Index of the pass.
         pass: usize,
     },
-    /// A large part of the samples is at the recorder's limit.
+    /// A large share of the samples is at the limit of the recorder.
     Saturated {
         /// Index of the pass.
         pass: usize,
-        /// Their share.
+        /// Share of these samples, 0 to 1.
         share: f64,
     },
-    /// The wheel is in the air for most of the time: there is hardly a track in it.
+    /// The wheel is off the rail for most of the time; the signal hardly depends on the track.
     Airborne {
         /// Index of the pass.
         pass: usize,
-        /// Share of the time in the air.
+        /// Share of the time without contact, 0 to 1.
         share: f64,
     },
-    /// Two passes over the same track at one speed have nothing in common: noise, another track, or
-    /// positions that are off by more than half a sleeper spacing.
+    /// Two passes over the same track at one speed are uncorrelated. Possible reasons: noise, another
+    /// track, or position errors of more than half a sleeper spacing.
     UnrelatedPasses {
         /// Indices of the passes.
         passes: [usize; 2],
-        /// Their median correlation.
+        /// Median correlation of the passes, 0 to 1.
         correlation: f64,
-        /// Lowest frequency compared in Hz.
+        /// Lowest compared frequency in Hz.
         low_hz: f64,
     },
-    /// The passes at one speed share no surface with those at any other: noise, another track, or
-    /// positions that are off by more than a sleeper spacing.
+    /// The passes at one speed have no common surface with those at any other speed. Possible reasons:
+    /// noise, another track, or position errors of more than a sleeper spacing.
     UnrelatedSpeed {
         /// Nominal speed in km/h.
         speed_km_h: f64,
-        /// Their greatest coherence with a pass at another speed.
+        /// Greatest coherence of one of these passes with a pass at another speed, at most 1.
         coherence: f64,
     },
     /// The pass covers too few sleepers.
     Short {
         /// Index of the pass.
         pass: usize,
-        /// What it covers in m.
+        /// Length of the pass in m.
         length_m: f64,
     },
 }
@@ -143,7 +143,7 @@ impl fmt::Display for PassDefect {
     }
 }
 
-/// Everything that makes passes unusable; `offsets` are those of the same recording.
+/// All defects of the passes of a recording; `offsets` must belong to the same recording.
 pub fn pass_defects(recording: &Recording, offsets: &[Offsets]) -> Vec<PassDefect> {
     let mut all = of_passes(recording);
     all.extend(between_passes(recording, offsets));
@@ -165,7 +165,7 @@ pub(super) fn of_passes(recording: &Recording) -> Vec<PassDefect> {
     all
 }
 
-/// Passes that have no track in common.
+/// Defects of passes without a common track.
 pub(super) fn between_passes(recording: &Recording, offsets: &[Offsets]) -> Vec<PassDefect> {
     let unlike = |offsets: &&Offsets| {
         // Where half of the stretches match, the rest is noise or a worn clock, not another track.
@@ -219,15 +219,15 @@ fn of_pass(
     all
 }
 
-/// Whether no signal exceeds the noise floor. For repeated passes the comparison between them is
-/// the better test.
+/// Whether the signal does not exceed the noise floor. For repeated passes the comparison of passes is the
+/// better test.
 fn is_noise(pass: &Pass, audible_hz: f64) -> bool {
     let background = Background::of(&pass.signal);
     background.is_some_and(|background| background.audible_hz(AUDIBLE) < audible_hz)
 }
 
-/// Share of samples that have exactly the greatest or the least value; a side on which the wheel is in the
-/// air has no limit.
+/// Share of samples that equal the greatest or the least value. A side on which the wheel loses contact has
+/// no limit.
 fn share_at_limits(samples: &[f64], airborne_sign: Option<f64>) -> f64 {
     let mut ends = samples.iter().fold([f64::MAX, f64::MIN], |e, s| [e[0].min(*s), e[1].max(*s)]);
     match airborne_sign {
@@ -238,7 +238,7 @@ fn share_at_limits(samples: &[f64], airborne_sign: Option<f64>) -> f64 {
     samples.iter().filter(|sample| ends.contains(sample)).count() as f64 / samples.len() as f64
 }
 
-/// The longest stretch without a change, if chance doesn't make it.
+/// The longest constant stretch, if it is too improbable by chance.
 fn drop_out(index: usize, pass: &Pass) -> Option<PassDefect> {
     let samples = pass.signal.samples();
     let standstill = Standstill::longest(samples);

@@ -1,42 +1,44 @@
-//! Crests of a pass that stay at one level: cut off by a recorder, or by loss of contact.
+//! Plateaus: crests of a pass that stay at one level, because of clipping or of contact loss.
 
 use crate::along::{bonferroni, ln_binomial_tail};
 use std::ops::Range;
 
-/// Half the thickness of the layer about a level in which a crest counts as staying there, as a share of the
-/// level.
+/// Half the thickness of the layer about a level, as a share of the level; a crest inside the layer counts
+/// as at the level.
 const LAYER: f64 = 0.03;
-/// Height of a crest's foot below the level, as a share of it.
+/// Height of a crest's foot below the level, as a share of the level.
 const FOOT: f64 = 0.1;
-/// Least part of its time above the foot that a flat crest spends in the layer. A parabola that reaches the
-/// level spends the root of 0.03 over 0.1 of it there, which is 0.55.
+/// Smallest share of its time above the foot that a flat crest is inside the layer. A parabola that reaches
+/// the level is inside the layer for the square root of 0.03 / 0.1, which is 0.55.
 const FLAT: f64 = 0.75;
-/// Fewest samples that make a flat crest.
+/// Smallest number of samples of a flat crest.
 const SAMPLES_MIN: usize = 4;
-/// Cells of the histogram in which a level is looked for, and the part of the greatest value it begins at.
+/// Number of cells of the histogram from which a level is determined, and its start as a share of the
+/// greatest value.
 const CELLS: usize = 20;
 const CELLS_FROM: f64 = 0.8;
 /// Probability that a crest which ends in the layer is flat by chance: of 5,838 such crests in the passes of 18
 /// independent recordings 0.75 % were.
 const FLAT_BY_CHANCE: f64 = 0.01;
-/// Cells at the foot of the histogram that are no level: heights become rarer with height.
+/// Number of lowest cells of the histogram that cannot be a level: low values are more frequent than high
+/// ones.
 const CELLS_LOW: usize = 4;
 
-/// A pass's flat crests at one level.
+/// Flat crests of a pass at one level.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Plateaus {
-    /// The level: the mean of what lies in the layer.
+    /// The level: mean of the values inside the layer.
     pub(super) level: f64,
-    /// Samples of each, from the first in the layer to the last.
+    /// Sample range of each crest, from its first to its last sample inside the layer.
     pub(super) crests: Vec<Range<usize>>,
-    /// Samples in the layer, of all of them.
+    /// Number of samples of all these crests inside the layer.
     pub(super) samples: usize,
-    /// Crests that reach the layer, flat or not.
+    /// Number of crests that reach the layer, flat or not.
     reaching: usize,
 }
 
 impl Plateaus {
-    /// Those at about a level.
+    /// The flat crests near a given level.
     pub(super) fn at(values: &[f64], level: f64) -> Self {
         let in_layer = |value: f64| (value - level).abs() <= LAYER * level;
         let mut found = Self { level, crests: Vec::new(), samples: 0, reaching: 0 };
@@ -63,14 +65,15 @@ impl Plateaus {
         found
     }
 
-    /// Probability of as many flat ones among the crests that reach a level which was looked for, in
-    /// logarithm.
+    /// Natural logarithm of the probability of at least this number of flat crests by chance, for a level
+    /// that was determined from the same pass.
     pub(super) fn ln_p(&self) -> f64 {
         let of_one = ln_binomial_tail(self.crests.len(), self.reaching, FLAT_BY_CHANCE);
         bonferroni(of_one, CELLS)
     }
 
-    /// Those at the level where the highest values gather, if they do.
+    /// The flat crests at the level at which the highest values accumulate; `None` if there is no such
+    /// level.
     pub(super) fn at_top(values: &[f64]) -> Option<Self> {
         let greatest = values.iter().copied().fold(0.0, f64::max);
         let (from, width) = (CELLS_FROM * greatest, (1.0 - CELLS_FROM) * greatest / CELLS as f64);
@@ -85,7 +88,7 @@ impl Plateaus {
     }
 }
 
-/// The first place from `from` on whose value is as asked.
+/// The first index, not below `from`, whose value meets the condition.
 fn next(values: &[f64], from: usize, is: impl Fn(f64) -> bool) -> Option<usize> {
     let place = values[from..].iter().position(|&value| is(value))?;
     Some(from + place)

@@ -1,29 +1,31 @@
-//! Positions that advance at another rate than the stated speeds, by one factor at every speed.
+//! Scale errors: positions that deviate from the stated speeds by the same factor at every speed.
 
 use crate::along::{by_speed, ln_normal_bound, speed_m_s};
 use tracktwin_signal::recording::Recording;
 
-/// How far an odometer usually wanders over a pass, as a share of the sleeper spacing: 3 mm on V-Track.
+/// Usual error of an odometer over a pass, as a share of the sleeper spacing: 3 mm on V-Track.
 const WANDER: f64 = 0.024;
-/// Difference of odometer and stated speed that is usual: drives are calibrated to that.
+/// Usual relative difference between odometer and stated speed; drives are calibrated to this accuracy.
 const USUAL: f64 = 3e-3;
-/// Deviations within which the speeds must agree on the factor: rounded speeds don't.
+/// Largest difference of the factors at single speeds from their mean, in standard deviations; rounded
+/// speeds exceed it.
 const AGREE: f64 = 3.0;
 
-/// A scale that positions have against the stated speeds.
+/// Scale of the positions relative to the stated speeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Recorded over true way, minus one, and its standard deviation.
+    /// Recorded distance over true distance, minus one, and its standard deviation.
     pub scale: (f64, f64),
-    /// Speeds that agree on it.
+    /// Number of speeds with this scale.
     pub speeds: usize,
-    /// Probability of it between a usual odometer and usual speeds, in logarithm.
+    /// Natural logarithm of the probability of such a scale with a usual odometer and usual speeds.
     pub ln_p: f64,
 }
 
-/// The scale that the passes at two speeds or more agree on.
+/// Common scale of the passes at two speeds or more.
 ///
-/// None for a single speed, and where speeds disagree: then their nominal values are rounded.
+/// `None` for a single speed, or if the speeds give different scales: their nominal values are then
+/// rounded.
 pub fn scale(recording: &Recording) -> Option<Scale> {
     let passes = &recording.passes;
     let groups = by_speed(passes);

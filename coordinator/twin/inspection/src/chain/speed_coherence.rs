@@ -1,35 +1,34 @@
-//! Coherence of the passes at one speed with those at others.
+//! Coherence between the passes at one speed and those at other speeds.
 
 use crate::along::{Background, Ruler, by_speed, hann, on_even_places, speed_m_s, whitened};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Waves compared, in waves a sleeper spacing: longer than what a wander of the odometer blurs, and
-/// loud at every speed.
+/// Compared waves, in waves per sleeper spacing: longer than the error of the odometer, and with high power
+/// at every speed.
 const WAVES: [usize; 2] = [1, 10];
-/// Points on the shortest wave.
+/// Number of points on the shortest wave.
 const POINTS: usize = 4;
 /// Length of a segment in sleeper spacings; segments overlap by half.
 const SEGMENT_SPACINGS: usize = 3;
-/// Segments below which chance looks like coherence.
+/// Smallest number of segments; with fewer the coherence by chance is too large.
 const SEGMENTS_MIN: usize = 8;
 
-/// Lines of the waves compared in every segment of a pass.
+/// Spectral lines of the compared waves, for every segment of a pass.
 type Segments = Vec<Vec<Complex64>>;
 
-/// Coherence of the passes at one speed with those at others.
+/// Coherence between the passes at one speed and those at other speeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SpeedCoherence {
     /// Nominal speed in km/h.
     pub(super) speed_km_h: f64,
-    /// Greatest coherence of one of its passes with one at another speed: zero by chance, one if
-    /// both contain the same surface only.
+    /// Greatest coherence of one of these passes with one at another speed: zero on average by chance, one
+    /// if both contain only the same surface.
     pub(super) coherence: f64,
 }
 
-/// The coherence of every speed; none if there is one speed only, or if the common stretch is too
-/// short.
+/// Coherence of every speed; empty if there is only one speed, or if the common stretch is too short.
 pub(super) fn speed_coherences(recording: &Recording) -> Vec<SpeedCoherence> {
     let speeds = by_speed(&recording.passes);
     if speeds.len() < 2 {
@@ -48,7 +47,7 @@ pub(super) fn speed_coherences(recording: &Recording) -> Vec<SpeedCoherence> {
     speeds.iter().map(speed_coherence).collect()
 }
 
-/// Segments of all passes at the same places.
+/// Segments of all passes at the same positions; `None` if the common stretch is too short.
 fn segments(recording: &Recording) -> Option<Vec<Segments>> {
     let ends = |pass: &Pass| [pass.position_m[0], pass.position_m[pass.position_m.len() - 1]];
     let passes = || recording.passes.iter();
@@ -82,10 +81,10 @@ fn lines(values: &[Complex64], length: usize) -> Segments {
     (0..=values.len() - length).step_by(length / 2).map(of_segment).collect()
 }
 
-/// Mean over the waves of the magnitude-squared coherence over the segments, less what chance makes
-/// of so few.
+/// Mean over the waves of the magnitude-squared coherence over the segments, corrected for the coherence
+/// that a small number of segments has by chance.
 ///
-/// What track and speed do to a wave is the same in all segments, as far as the track is even.
+/// The transfer from surface to signal is the same in all segments, as far as the track is even.
 fn coherence(first: &Segments, second: &Segments) -> f64 {
     let waves = first[0].len();
     let of_wave = |wave: usize| {

@@ -1,18 +1,18 @@
 //! The longest constant stretch of a pass.
 
-/// Neighbouring equal samples.
+/// A run of equal neighbouring samples.
 pub(super) struct Standstill {
-    /// The first of them.
+    /// Index of the first sample.
     pub(super) from: usize,
-    /// How many follow it.
+    /// Number of samples after the first.
     pub(super) samples: usize,
-    /// Probability of as long a stretch anywhere in the pass by the recorder's steps alone, in
-    /// logarithm.
+    /// Natural logarithm of the probability of a run of this length anywhere in the pass, from the steps of
+    /// the recorder alone.
     pub(super) ln_p: f64,
 }
 
 impl Standstill {
-    /// The longest of a pass; of a signal that doesn't change, all of it.
+    /// The longest run of a pass; the whole pass if the signal is constant.
     pub(super) fn longest(samples: &[f64]) -> Self {
         let equal = samples.windows(2).filter(|pair| pair[0] == pair[1]).count();
         let (mut run, mut longest, mut end) = (0, 0, 0);
@@ -28,7 +28,7 @@ impl Standstill {
         Self { from: end - longest, samples: longest, ln_p }
     }
 
-    /// Whether no sample of the pass lies above it, or below it with a negative sign.
+    /// Whether no sample of the pass lies above the run (below it for a negative sign).
     pub(super) fn is_at_limit(&self, samples: &[f64], sign: f64) -> bool {
         let at = sign * samples[self.from];
         samples.iter().all(|sample| sign * sample <= at)

@@ -5,8 +5,7 @@ use super::pass_defect::{PassDefect, between_passes, of_passes};
 use crate::along::by_speed;
 use tracktwin_signal::recording::Recording;
 
-/// A recording without its unusable passes, and their defects. A short pass is usable over its
-/// length.
+/// The recording without its unusable passes, and all defects. A short pass stays usable over its length.
 pub fn usable(recording: &Recording) -> (Recording, Vec<PassDefect>) {
     let mut own = of_passes(recording);
     own.retain(|defect| !matches!(defect, PassDefect::Short { .. }));

@@ -1,4 +1,4 @@
-//! A wave of one length in a stretch of rail: a line that stays in wavelength at every speed.
+//! Corrugation: a line with the same wavelength at every speed, on a stretch of rail.
 
 use crate::along::{
     Background, Line, Ruler, Spectrum, amplitude, bonferroni, by_speed, combine_dependent_p_values,
@@ -9,27 +9,27 @@ use std::f64::consts::TAU;
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::model::Roughness;
 
-/// Wavelengths looked for, in sleeper spacings: 2 mm to 62 mm of 125 mm.
+/// Shortest and longest tested wavelength, in sleeper spacings: 2 mm to 62 mm for a spacing of 125 mm.
 const WAVELENGTHS: [f64; 2] = [0.016, 0.5];
-/// Lengths of the stretches examined, in sleeper spacings.
+/// Lengths of the tested stretches, in sleeper spacings.
 const STRETCHES: [f64; 3] = [4.0, 8.0, 16.0];
-/// Lowest and highest frequency in Hz and as a share of the sample rate.
+/// Lowest frequency in Hz, and highest frequency as a share of the sample rate.
 const LOW_HZ: f64 = 60.0;
 const HIGH_SHARE: f64 = 0.4;
-/// Power over the noise floor below which a wave cannot be distinguished from sensor noise.
+/// Smallest ratio of power to noise floor at which a wave can be distinguished from sensor noise.
 const AUDIBLE: f64 = 3.0;
-/// Magnitude at which a whitened signal is held: an impact has lines too, if it repeats.
+/// Limit of the magnitude of a whitened signal, because a repeated impact has lines too.
 const HOLD: f64 = 2.5;
-/// Probability of one speed's line without a wave above which it doesn't repeat at that speed.
+/// A line is present at a speed if its probability by chance is below this.
 const EACH_SPEED: f64 = 0.05;
-/// Harmonics of the sleepers' passing that are not called corrugation, and how near they are in
-/// resolution cells.
+/// Number of harmonics of the sleeper-passing frequency that do not count as corrugation, and the distance
+/// from them in resolution cells.
 const SLEEPER_HARMONICS: f64 = 16.0;
 const CELLS_APART: f64 = 2.0;
-/// Waves on a stretch below which the neighbours of a line lie too far from it: 18 cells are then
-/// two fifths of its wave number, and the track's resonances show.
+/// Smallest number of waves on a stretch. With fewer waves the 18 cells of neighbours exceed two fifths of
+/// the wave number, and resonances of the track affect the ratio.
 const WAVES_MIN: f64 = 45.0;
-/// Level of eq. B.6 that amplitudes are stated for, and the relative deviation of its root.
+/// Irregularity level (eq. B.6) to which amplitudes refer, and the relative deviation of its square root.
 const LEVEL: f64 = 3.0;
 const ROOT_LEVEL_DEVIATION: f64 = 0.23;
 
@@ -38,17 +38,18 @@ const ROOT_LEVEL_DEVIATION: f64 = 0.23;
 pub struct Corrugation {
     /// Wavelength in m and its standard deviation.
     pub wavelength_m: (f64, f64),
-    /// Amplitude in m and its standard deviation, at irregularity level 3; goes with its root.
+    /// Amplitude in m and its standard deviation at irregularity level 3; proportional to the square root
+    /// of the level.
     pub amplitude_m: (f64, f64),
-    /// First and last place in m.
+    /// First and last position in m.
     pub stretch_m: [f64; 2],
-    /// Probability of such a line anywhere on a rail without corrugation, in logarithm.
+    /// Natural logarithm of the probability of such a line anywhere on a rail without corrugation.
     pub ln_p: f64,
-    /// Power of the line over its neighbours' in its stretch.
+    /// Power of the line relative to its neighbours, on its stretch.
     pub ratio: f64,
 }
 
-/// A candidate: where, which bin, how unlikely.
+/// A candidate line with its stretch and probability.
 struct Candidate {
     stretch_m: [f64; 2],
     wave_number: f64,
@@ -57,10 +58,10 @@ struct Candidate {
     ruler: Ruler,
 }
 
-/// The most certain corrugation that is less likely than `alpha` on a rail without.
+/// Detects corrugation with a false-alarm rate of `alpha`, and returns the most significant one.
 ///
-/// None where speeds are too much alike ([`separates_wavelengths`]): a resonance is a line too. `orders_m` is the
-/// circumference of a wheel whose orders are not to be called corrugation.
+/// `None` if the speeds are too similar ([`separates_wavelengths`]), because a resonance then looks like a
+/// wave. `orders_m` is the circumference in m of a wheel whose orders do not count as corrugation.
 pub fn corrugation(
     recording: &Recording,
     alpha: f64,
@@ -95,8 +96,7 @@ pub fn corrugation(
     (ln_p <= alpha.ln()).then(|| search.describe(&best, ln_p))
 }
 
-/// The whitened pass, held at a few times its usual magnitude, and the wave numbers it can be
-/// asked for.
+/// The whitened pass with limited magnitude, and its usable wave numbers `[lowest, highest]` in cycles/m.
 fn held(pass: &Pass, [low, high]: [f64; 2]) -> Option<(Vec<Complex64>, [f64; 2])> {
     let background = Background::of(&pass.signal)?;
     let speed = speed_m_s(pass);
@@ -117,7 +117,7 @@ fn held(pass: &Pass, [low, high]: [f64; 2]) -> Option<(Vec<Complex64>, [f64; 2])
     Some((values, band.map(|frequency| frequency / speed)))
 }
 
-/// Where corrugation is searched for.
+/// Data of a search for corrugation.
 struct CorrugationSearch<'a> {
     recording: &'a Recording,
     whitened: &'a [(Vec<Complex64>, [f64; 2])],
@@ -144,7 +144,7 @@ impl CorrugationSearch<'_> {
         all
     }
 
-    /// Lowest and highest wave number in cycles/m that every pass can be asked for.
+    /// Lowest and highest wave number in cycles/m that is usable in every pass.
     fn band(&self) -> [f64; 2] {
         let ends = self.whitened.iter().map(|(_, band)| *band);
         ends.fold([1.0 / self.lengths[1], 1.0 / self.lengths[0]], |all, one| {
@@ -162,7 +162,7 @@ impl CorrugationSearch<'_> {
         Spectrum::new(&values, length / points as f64)
     }
 
-    /// Belongs to the sleepers or to the wheel.
+    /// Whether the wave number is a harmonic of the sleeper spacing or of the wheel.
     fn is_known(&self, wave_number: f64, cell: f64) -> bool {
         let near = |period: f64, harmonics: f64| {
             let order = wave_number * period;
@@ -175,7 +175,7 @@ impl CorrugationSearch<'_> {
             || self.orders_m.is_some_and(|circumference| near(circumference, f64::INFINITY))
     }
 
-    /// The least likely line of a stretch, and the number of bins examined.
+    /// The least probable line of a stretch, and the number of tested bins.
     fn best_line(&self, stretch_m: [f64; 2], ruler: Ruler) -> (Option<Candidate>, usize) {
         let cell = 1.0 / (stretch_m[1] - stretch_m[0]);
         let speeds: Vec<Vec<Spectrum>> = by_speed(&self.recording.passes)
@@ -234,7 +234,7 @@ impl CorrugationSearch<'_> {
         }
     }
 
-    /// Power of the candidate's line over its neighbours' on a stretch, mean of all passes.
+    /// Power of the candidate's line relative to its neighbours on a stretch, as mean of all passes.
     fn ratio(&self, stretch_m: [f64; 2], best: &Candidate) -> f64 {
         let at = |pass| {
             let spectrum = self.spectrum(pass, stretch_m, best.ruler);
@@ -246,7 +246,7 @@ impl CorrugationSearch<'_> {
         passes.map(at).sum::<f64>() / count
     }
 
-    /// From where to where the line has at least half of its greatest amplitude.
+    /// Stretch `[from, to]` in m on which the line has at least half of its greatest amplitude.
     fn extent(&self, best: &Candidate) -> [f64; 2] {
         let half = 0.5 * STRETCHES[0] * self.recording.spacing_m;
         let [from, to] =

@@ -1,40 +1,41 @@
-//! Impacts that come at the same place of the track in every pass and at every speed.
+//! Local impacts: they occur at the same position of the track in every pass and at every speed.
 
 use super::repeated::{Cells, ImpactKind, cells};
 use super::shape::{Form, Observed, Shape, fit};
 use crate::along::{bonferroni, combine_dependent_p_values};
 use tracktwin_signal::recording::Recording;
 
-/// Probability of one speed's power without an impact above which it doesn't repeat there.
+/// An impact is present at a speed if the probability of its power by chance is below this.
 const EACH_SPEED: f64 = 0.01;
-/// Neighbouring cells that are examined: odometers differ by millimetres between speeds.
+/// Number of neighbouring cells that are tested on either side: odometers differ by millimetres between
+/// speeds.
 const NEIGHBOURS: usize = 1;
-/// Share of the loudest impact's power below which another is its echo: the ringing of the track and
-/// of the band's edges, spans away.
+/// Share of the strongest impact's power below which another impact counts as its echo. Ringing of the
+/// track and of the band's edges causes echoes several spans away.
 const ECHO: f64 = 0.02;
-/// Key of the distance of the bogie's other wheel, and the part of a sleeper spacing within which an impact so
-/// far from a louder one is that of the other wheel at the same place.
+/// Name of the wheelbase in the recording. An impact at this distance from a stronger one belongs to the
+/// other wheel at the same position; `OTHER_WHEEL_SPANS` is the tolerance in sleeper spacings.
 const WHEELBASE: &str = "wheelbase_m";
 const OTHER_WHEEL_SPANS: f64 = 0.1;
-/// Impacts beyond which a rail is rough rather than damaged at places.
+/// Largest number of impacts; with more the rail is rough rather than damaged locally.
 const IMPACTS_MAX: usize = 8;
 
-/// A short event at one place of the track.
+/// A short event at one position of the track.
 #[derive(Clone, Debug)]
 pub struct Impact {
-    /// Its place along the track in m and the standard deviation of that.
+    /// Position along the track in m and its standard deviation.
     pub x_m: (f64, f64),
-    /// Probability to see as much anywhere on a rail without defects, in logarithm.
+    /// Natural logarithm of the probability of such an impact anywhere on a rail without defects.
     pub ln_p: f64,
-    /// Power over what is normal around it, mean of all speeds.
+    /// Power relative to the surroundings, as mean of all speeds.
     pub power_ratio: f64,
-    /// Its shape as a wave of the surface; none if its signal is too weak.
+    /// Shape of the surface at the impact; `None` if the signal is too weak.
     pub shape: Option<Shape>,
 }
 
-/// All impacts that are less likely than `alpha` on a rail without defects, most certain first.
+/// Detects impacts with a false-alarm rate of `alpha`; the most significant one comes first.
 ///
-/// Places in `except` (`[from, to]` in m) are passed over.
+/// Positions in `except` (`[from, to]` in m) are skipped.
 pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Impact> {
     let allowed = |x: f64| !except.iter().any(|[from, to]| (*from..=*to).contains(&x));
     let by_kind = ImpactKind::BOTH.map(|kind| cells(recording, kind, false));
@@ -77,7 +78,7 @@ pub fn impacts(recording: &Recording, alpha: f64, except: &[[f64; 2]]) -> Vec<Im
     found
 }
 
-/// `ln P` of a cell over all speeds: certain (0) where one speed doesn't show it.
+/// `ln P` of a cell over all speeds; 0 if the impact is absent at one speed.
 fn ln_p(speeds: &[Cells], cell: usize) -> f64 {
     let best = |cells: &Cells| {
         let around =
@@ -122,8 +123,8 @@ fn impact(recording: &Recording, speeds: &[Cells], cell: usize, ln_p: f64) -> Im
     Impact { x_m: (place, deviation.hypot(edge)), ln_p, power_ratio, shape }
 }
 
-/// Mean and standard deviation; the passes of one odometer err together, so it is not divided by
-/// the root of their number.
+/// Mean and standard deviation, at least `least`; `None` for an empty list. The standard deviation is not
+/// divided by the root of the count, because the passes of one odometer share their errors.
 fn mean_and_deviation(values: &[f64], least: f64) -> Option<(f64, f64)> {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;

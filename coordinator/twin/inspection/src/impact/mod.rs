@@ -1,7 +1,7 @@
-//! Short defects and waves of the rail's surface, detected from the passes alone.
+//! Short defects and periodic waves of the rail surface, detected from the passes alone.
 //!
-//! Owns impacts that repeat at a place (`squat`, the dip of a `rail_joint`) and `corrugation`.
-//! Effects that repeat with the wheel belong to `wheel`.
+//! This module detects impacts that repeat at one position (`squat`, the dip of a `rail_joint`) and
+//! `corrugation`. The module `wheel` detects effects that repeat with the wheel.
 
 mod corrugation;
 mod local;

@@ -1,45 +1,46 @@
-//! Power in short cells along the track, pass by pass, and how unlikely each is.
+//! Power in short cells along the track for every pass, with tail probabilities.
 
 use crate::along::{Background, Energy, by_speed, ln_gamma_tail, median, speed_m_s, whitened};
 use std::ops::Range;
 use tracktwin_signal::recording::{Pass, Recording};
 
-/// Frequencies in Hz of a blow: above them the surface's own power varies little from place to
-/// place, and the contact rings.
+/// Frequency range of a blow in Hz. In this range the power of the surface itself varies little along the
+/// track, and the contact rings.
 const BLOW_HZ: [f64; 2] = [700.0, 5000.0];
-/// Wave numbers in cycles/m of a hollow of 2 to 10 mm, whose sound is lower the slower the wheel.
+/// Wave numbers in cycles/m of a hollow of 2 to 10 mm; its frequencies are proportional to the speed.
 const HOLLOW_PER_M: [f64; 2] = [100.0, 1000.0];
-/// Lowest frequency in Hz of a hollow: below it the track rings for longer than the wheel takes.
+/// Lowest frequency in Hz of a hollow; below it the ringing of the track is longer than the passage of the
+/// wheel.
 const HOLLOW_LOW_HZ: f64 = 200.0;
 /// Highest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
-/// Power over the noise floor up to which frequencies are used.
+/// Smallest ratio of power to noise floor of a usable frequency.
 const AUDIBLE: f64 = 4.0;
-/// Width of a cell as a share of the sleepers' spacing: 10 mm of 125 mm, the length of a squat and
-/// of the ringing after it.
+/// Width of a cell as a share of the sleeper spacing: 10 mm for a spacing of 125 mm, the length of a squat
+/// and of the ringing after it.
 const CELL_SHARE: f64 = 0.08;
-/// Least product of a cell's duration and bandwidth: below it power is mostly chance.
+/// Smallest product of a cell's duration and bandwidth; below it the power is mostly random.
 const PRODUCT_MIN: f64 = 6.0;
-/// Cells to a step: neighbouring cells overlap by half.
+/// Number of steps per cell: neighbouring cells overlap by half.
 const STEPS: usize = 2;
-/// Distance in sleeper spacings on either side from which a cell's normal power is taken.
+/// Distance on either side, in sleeper spacings, over which the normal power of a cell is determined.
 const NEAR_SPACINGS: f64 = 1.5;
-/// Quartile of the logarithm of a gamma variable over its standard deviation, for a normal one.
+/// Distance between the quartiles of a normal distribution, in standard deviations.
 const QUARTILES: f64 = 1.349;
 
-/// Kind of impact that is searched for.
+/// Kind of impact in a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ImpactKind {
-    /// The same frequencies at all speeds: kinks, edges, everything that rings.
+    /// Impacts with the same frequencies at all speeds: kinks, edges and ringing.
     Blows,
-    /// The same wavelengths at all speeds: hollows that a slow wheel rolls through quietly.
+    /// Impacts with the same wavelengths at all speeds: hollows, which have little power at low speed.
     Hollows,
 }
 
 impl ImpactKind {
     pub(crate) const BOTH: [Self; 2] = [Self::Blows, Self::Hollows];
 
-    /// The band in Hz in a pass; none where it is empty.
+    /// The frequency band in Hz for a pass; `None` if it is empty.
     pub(crate) fn band(self, pass: &Pass, background: &Background) -> Option<[f64; 2]> {
         let speed = speed_m_s(pass);
         let [low, high] = match self {
@@ -55,25 +56,25 @@ impl ImpactKind {
     }
 }
 
-/// Cells of one speed: power over what is normal there, mean of that speed's passes.
+/// Cells of one speed: power relative to the normal power there, as mean of the passes at this speed.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
-    /// Place of the first cell's middle in m.
+    /// Position of the middle of the first cell in m.
     pub first_m: f64,
-    /// Distance of neighbouring cells' middles in m.
+    /// Distance between the middles of neighbouring cells in m.
     pub step_m: f64,
     /// Width of a cell in m.
     pub width_m: f64,
-    /// Power of every cell over the median around it.
+    /// Power of every cell relative to the median around it.
     pub ratio: Vec<f64>,
     /// Shape of the gamma distribution that the ratios follow without impacts.
     pub shape: f64,
-    /// Indices of the passes they come from.
+    /// Indices of the averaged passes.
     pub passes: Vec<usize>,
 }
 
 impl Cells {
-    /// Middle of a cell in m.
+    /// Position of the middle of a cell in m.
     pub(crate) fn place_m(&self, cell: usize) -> f64 {
         self.first_m + cell as f64 * self.step_m
     }
@@ -84,9 +85,9 @@ impl Cells {
     }
 }
 
-/// The cells of every speed (of every pass if `each`) on one grid of places.
+/// The cells of every speed (of every pass if `each`), at common positions.
 ///
-/// Empty where no pass has sound enough above the impacts' lowest frequency.
+/// Empty if a pass has too little power above the lowest frequency of the impacts.
 pub(crate) fn cells(recording: &Recording, kind: ImpactKind, each: bool) -> Vec<Cells> {
     let passes = &recording.passes;
     let groups =
@@ -106,7 +107,7 @@ pub(crate) fn cells(recording: &Recording, kind: ImpactKind, each: bool) -> Vec<
     groups.into_iter().filter_map(|group| grid.cells(passes, group)).collect()
 }
 
-/// The width of a cell in m, wide enough for the fastest pass; none if there is no signal.
+/// The width of a cell in m, wide enough for the fastest pass; `None` if there is no signal.
 fn width(recording: &Recording, kind: ImpactKind) -> Option<f64> {
     let mut width = CELL_SHARE * recording.spacing_m;
     for pass in &recording.passes {
@@ -165,10 +166,10 @@ impl Grid {
     }
 }
 
-/// Shape of the gamma distribution with the quartiles of these ratios; none if they don't vary.
+/// Shape of the gamma distribution with the quartiles of these ratios; `None` if the ratios do not vary.
 ///
-/// The logarithm of a gamma variable has standard deviation `1/sqrt(shape)` and a little more;
-/// quartiles stay what they are when a few cells hold an impact.
+/// The standard deviation of the logarithm of a gamma variable is slightly above `1/sqrt(shape)`; a few
+/// cells with impacts do not change the quartiles.
 fn shape(ratio: &[f64]) -> Option<f64> {
     let mut logs: Vec<f64> = ratio.iter().map(|value| value.max(1e-12).ln()).collect();
     logs.sort_by(f64::total_cmp);

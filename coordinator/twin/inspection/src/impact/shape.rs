@@ -1,8 +1,8 @@
-//! The wave of the surface that an impact is made by, from its spectrum over the background's.
+//! Shape of the surface at an impact, from the ratio of its spectrum to the background spectrum.
 //!
-//! An impact and the irregularity go through the same wheel, contact and track: the ratio of their
-//! spectra is that of their surfaces, `q(f) = |Z(k)|^2 / (pi v S(2 pi k))` with `k = f/v`,
-//! whatever the track is. `S` is eq. B.6; its level scales the depth, not the length.
+//! Impact and irregularity pass through the same wheel, contact and track. The ratio of their spectra is
+//! therefore the ratio of their surfaces, `q(f) = |Z(k)|^2 / (pi v S(2 pi k))` with `k = f/v`, for every
+//! track. `S` is eq. B.6; its level scales the depth and not the length.
 
 use super::repeated::ImpactKind;
 use crate::along::{Background, hann, speed_m_s};
@@ -12,24 +12,24 @@ use std::f64::consts::{PI, TAU};
 use tracktwin_signal::recording::Pass;
 use tracktwin_track::model::Roughness;
 
-/// Time in s before and after the first blow that is examined: later the track rings.
+/// Examined time in s before and after the first blow; afterwards the track rings.
 const BEFORE_S: f64 = 0.005;
 const AFTER_S: f64 = 0.015;
-/// Lowest frequency in Hz of the shape.
+/// Lowest frequency in Hz for the shape.
 const LOW_HZ: f64 = 250.0;
-/// Bands to an octave.
+/// Number of bands per octave.
 const BANDS_PER_OCTAVE: f64 = 6.0;
-/// Standard deviation of the logarithm of a band's ratio: how far the track at a place differs from
-/// the track in the mean, in power (a decibel).
+/// Standard deviation of the logarithm of a band's ratio: difference in power between the track at one
+/// position and the mean track (about 1 dB).
 const MODEL_DEVIATION: f64 = 0.25;
-/// Level of eq. B.6 that depths are stated for, and the relative standard deviation of its square
+/// Irregularity level (eq. B.6) to which depths refer, and the relative standard deviation of its square
 /// root: levels are between 1 and 5.
 const LEVEL: f64 = 3.0;
 const ROOT_LEVEL_DEVIATION: f64 = 0.23;
-/// Fewest bands that say something about a shape.
+/// Smallest number of bands for a shape.
 const BANDS_MIN: usize = 6;
 
-/// What kind of wave.
+/// Form of the surface at an impact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// A kink with long flanks, `d exp(-|x|/l)`: a dipped joint.
@@ -38,34 +38,36 @@ pub enum Form {
     Hollow,
 }
 
-/// A wave that fits an impact.
+/// Surface wave fitted to an impact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
     /// The form that fits best.
     pub form: Form,
-    /// Length in m and its standard deviation: `l` of the form.
+    /// Length `l` of the form in m and its standard deviation.
     pub length_m: (f64, f64),
-    /// Depth in m and its standard deviation, at irregularity level 3; goes with the root of it.
+    /// Depth in m and its standard deviation at irregularity level 3; proportional to the square root of
+    /// the level.
     pub depth_m: (f64, f64),
-    /// Change of slope at the kink in rad at level 3: `2 d/l` of a dip. Known better than either.
+    /// Change of slope at the kink in rad at level 3: `2 d/l` of a dip. More accurate than depth and
+    /// length.
     pub slope_rad: f64,
-    /// How much better than the other form: half the difference of the sums of squares.
+    /// Advantage over the other form in nats: half the difference of the sums of squares.
     pub lead: f64,
 }
 
-/// An impact's spectrum over the background, by band.
+/// Ratio of an impact's spectrum to the background, by band.
 #[derive(Clone, Debug)]
 pub(crate) struct Observed {
-    /// Place of the blow in m.
+    /// Position of the blow in m.
     pub x_m: f64,
-    /// Wave number in cycles/m, `q v` in m and its variance in the logarithm, by band.
+    /// For every band: wave number in cycles/m, `q v` in m, and the variance of the logarithm of `q`.
     bands: Vec<(f64, f64, f64)>,
-    /// `q v` in m that the background alone has.
+    /// `q v` in m of the background alone.
     floor: f64,
 }
 
 impl Observed {
-    /// The blow nearest to `x_m`, within `reach_m`; none where the pass ends too close.
+    /// The blow nearest to `x_m`, within `reach_m`; `None` if the pass ends too close to it.
     pub(crate) fn at(pass: &Pass, x_m: f64, reach_m: f64) -> Option<Self> {
         let background = Background::of(&pass.signal)?;
         let [_, high] = ImpactKind::Blows.band(pass, &background)?;
@@ -98,7 +100,7 @@ impl Observed {
     }
 }
 
-/// The sample of greatest magnitude within reach, of the signal's changes: the blow itself.
+/// Index of the largest change between two samples within reach: the blow itself.
 fn loudest(pass: &Pass, samples: &[f64], x_m: f64, reach_m: f64) -> usize {
     let place = |x: f64| pass.position_m.partition_point(|&position| position < x);
     let range = place(x_m - reach_m).max(1)..place(x_m + reach_m).min(samples.len());
@@ -107,8 +109,8 @@ fn loudest(pass: &Pass, samples: &[f64], x_m: f64, reach_m: f64) -> usize {
     range.max_by(|&a, &b| magnitude(a).total_cmp(&magnitude(b))).unwrap_or(middle)
 }
 
-/// One-sided energy density of a segment and the energy in s of its window: rises before the blow,
-/// falls over the second half.
+/// One-sided energy density of a segment, and the energy of its window in s. The window rises before the
+/// blow and falls over the second half.
 fn spectrum(segment: &[f64], before: usize, rate: f64) -> (Vec<f64>, f64) {
     let length = segment.len();
     let mean = segment.iter().sum::<f64>() / length as f64;
@@ -134,7 +136,7 @@ fn spectrum(segment: &[f64], before: usize, rate: f64) -> (Vec<f64>, f64) {
 }
 
 impl Form {
-    /// `|Z(k)|` in m2 of depth 1 m and length `l` at `k` cycles/m.
+    /// `|Z(k)|` in m2 for a depth of 1 m and the length `l` in m, at `k` cycles/m.
     fn transform(self, length: f64, wave_number: f64) -> f64 {
         let turns = wave_number * length;
         match self {
@@ -157,14 +159,14 @@ impl Form {
     }
 }
 
-/// Sum of squares, length and depth of a form.
+/// Fit of a form with fixed length: sum of squares, length and depth in m.
 struct Fitted {
     squares: f64,
     length: f64,
     depth: f64,
 }
 
-/// The form and size that all the observed blows agree with best.
+/// Fits form and size to all observed blows together; `None` if there are too few bands.
 pub(crate) fn fit(observed: &[Observed]) -> Option<Shape> {
     if observed.iter().map(|seen| seen.bands.len()).sum::<usize>() < BANDS_MIN {
         return None;
@@ -193,7 +195,7 @@ fn best_of(grid: &[Fitted]) -> &Fitted {
     best.expect("a grid of lengths is not empty")
 }
 
-/// Mean and standard deviation of a quantity under the likelihood of the grid.
+/// Mean and standard deviation of a quantity, weighted by the likelihood on the grid.
 fn spread(grid: &[Fitted], least: f64, quantity: impl Fn(&Fitted) -> f64) -> (f64, f64) {
     let weight = |fitted: &Fitted| (-0.5 * (fitted.squares - least)).exp();
     let sum: f64 = grid.iter().map(weight).sum();
@@ -204,7 +206,7 @@ fn spread(grid: &[Fitted], least: f64, quantity: impl Fn(&Fitted) -> f64) -> (f6
     (mean, variance.sqrt().max(0.02 * mean))
 }
 
-/// Every length of the form with the depth that fits it best.
+/// Fits of all lengths of the form, each with its best depth.
 fn grid(form: Form, observed: &[Observed]) -> Vec<Fitted> {
     const LENGTHS: usize = 120;
     let [shortest, longest] = form.lengths_m();

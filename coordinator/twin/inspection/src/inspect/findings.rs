@@ -1,4 +1,4 @@
-//! Findings of each test, with a sentence.
+//! Conversion of test results to findings, with a sentence each.
 
 use crate::along::by_speed;
 use crate::chain::{Clipping, Gain, Hum, Offsets, Scale};
@@ -13,7 +13,7 @@ use tracktwin_track::extension::{
     WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
 };
 
-/// Lead of one form over the other, in nats, below which an impact may be either.
+/// Smallest advantage of one form over the other, in nats, that identifies the form of an impact.
 const FORM_LEAD: f64 = 3.0;
 
 pub(super) fn clipping_finding(
@@ -194,7 +194,7 @@ pub(super) fn comb_finding(comb: &Comb) -> Finding {
     }
 }
 
-/// Passes in which an impact is found.
+/// Description of the passes that contain an impact.
 fn who(passes: &[Pass]) -> &'static str {
     match (passes.len(), by_speed(passes).len()) {
         (1, _) => "the only pass",

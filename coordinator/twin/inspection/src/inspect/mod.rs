@@ -1,6 +1,7 @@
 //! Inspection of a recording without a track model: measuring chain, wheel, impacts.
 //!
-//! Owns the order of the tests, how the false-alarm rate is shared among them, and the sentences.
+//! This module defines the order of the tests, distributes the false-alarm rate among them, and writes the
+//! sentences.
 
 mod findings;
 
@@ -15,55 +16,55 @@ use crate::{chain, impact, wheel};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::POSITION_ERROR;
 
-/// Probability of a false alarm on a recording without defects, all tests together.
+/// False-alarm rate of all tests together, for a recording without defects.
 pub const FALSE_ALARMS: f64 = 0.02;
 
-/// Share of it that each of the nine kinds of test has.
+/// False-alarm rate of each of the nine kinds of test.
 const EACH_TEST: f64 = FALSE_ALARMS / 9.0;
 
-/// Sleeper spacings around a place where the wheel's flat meets the rail in every pass: the signal
-/// there is that of the flat.
+/// Distance in sleeper spacings around a position at which the wheel's flat hits the rail in every pass;
+/// the flat dominates the signal there.
 const AROUND_BLOW: f64 = 0.4;
 
 /// Result of an inspection.
 #[derive(Clone, Debug, Default)]
 pub struct Inspection {
-    /// Findings: chain first, then wheel, then the rail's surface.
+    /// Findings in this order: measuring chain, wheel, rail surface.
     pub findings: Vec<Finding>,
-    /// Findings whose kind is not in the catalogue; see [`Inspection::forget`].
+    /// Findings of kinds that are not in the catalogue; see [`Inspection::forget`].
     pub nameless: Vec<Finding>,
-    /// The wheel's flat with the places of its blows, if it has one.
+    /// The flat of the wheel with the positions of its blows, if there is one.
     pub flat: Option<Flat>,
-    /// Where the wheel loses contact with the rail, if it does: neither chain nor physics of the track, but
-    /// no linear model holds there.
+    /// Contact loss between wheel and rail, if there is any. It is neither a fault of the chain nor physics
+    /// of the track, but no linear model is valid there.
     pub loss_of_contact: Option<LossOfContact>,
-    /// Passes that can't be used, and why.
+    /// Defects of unusable passes.
     pub pass_defects: Vec<PassDefect>,
-    /// Noise floor of each pass in (m/s2)2/Hz.
+    /// Noise floor of each pass in (m/s2)2/Hz; `None` if a pass is too short or constant.
     pub noise_floors: Vec<Option<f64>>,
     /// Gains between passes at one speed.
     pub gains: Vec<Gain>,
     /// Offsets between passes at one speed.
     pub offsets: Vec<Offsets>,
-    /// The comb of a wheel of unknown circumference, of the first pass that has one.
+    /// The comb of wheel orders for a wheel of unknown circumference, from the first pass with a comb.
     pub comb: Option<Comb>,
 }
 
 impl Inspection {
-    /// Takes from the findings the names that are not known.
+    /// Moves the findings whose kind is not in the catalogue (`is_known` is false) to `nameless`.
     pub fn forget(&mut self, is_known: impl Fn(&str) -> bool) {
         let forgotten = self.findings.extract_if(.., |finding| !is_known(finding.physics));
         self.nameless.extend(forgotten);
     }
 
-    /// Forgets what was found and where, without a word of it later.
+    /// Removes all findings and the flat; the result does not mention them.
     pub fn ignore(&mut self) {
         self.findings.clear();
         self.flat = None;
     }
 
-    /// The defect that makes the recording unusable: a pass without a signal, or passes that are
-    /// unrelated to each other or to those at other speeds, unless the odometers explain it.
+    /// The defect that makes the whole recording unusable, if any: a pass without a signal, or passes that
+    /// are unrelated to each other or to those at other speeds, unless a position error was found.
     pub fn refusal(&self) -> Option<&PassDefect> {
         let silent = |defect: &&PassDefect| {
             matches!(defect, PassDefect::Dead { .. } | PassDefect::Noise { .. })
@@ -86,7 +87,7 @@ impl Inspection {
 
 /// Runs all tests of a recording that need no track model.
 ///
-/// On a recording without defects a finding comes up at most with probability [`FALSE_ALARMS`].
+/// For a recording without defects, the probability of any finding is at most [`FALSE_ALARMS`].
 pub fn inspect(recording: &Recording) -> Inspection {
     let unit = unit(recording);
     let gains = chain::gains(recording);
@@ -127,16 +128,17 @@ pub fn inspect(recording: &Recording) -> Inspection {
     }
 }
 
-/// Whether a finding lies where the wheel is in the air or lands: the blow is the landing's.
+/// Whether a finding lies on a stretch without contact or at its end, where the landing of the wheel causes
+/// a blow.
 ///
-/// What throws the wheel up lies before the stretch without contact.
+/// A defect that lifts the wheel lies before the stretch without contact.
 fn is_landing(finding: &Finding, lost: &LossOfContact) -> bool {
     let Place::Stretch { from_m, to_m } = finding.place else { return false };
     let middle_m = 0.5 * (from_m + to_m);
     lost.x_m.iter().any(|&[from_m, to_m]| from_m < middle_m && middle_m <= to_m)
 }
 
-/// The comb of a wheel whose circumference the recording doesn't state.
+/// The comb of wheel orders, if the recording does not state the circumference.
 fn unknown_wheel(recording: &Recording) -> Option<Comb> {
     if wheel::nominal_circumference_m(recording).is_some() {
         return None;
@@ -145,7 +147,7 @@ fn unknown_wheel(recording: &Recording) -> Option<Comb> {
     recording.passes.iter().find_map(|pass| wheel::comb(pass, alpha))
 }
 
-/// Unit of the accelerations, as sentences have it.
+/// Unit of the accelerations in sentences.
 fn unit(recording: &Recording) -> &'static str {
     if recording.gain_known() { "m/s2" } else { "in the unknown unit" }
 }
@@ -177,13 +179,14 @@ fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     (flat, findings)
 }
 
-/// Whether an order's waves are too long to be the flat's own harmonics: four of its lengths.
+/// Whether the waves of an order are longer than four lengths of the flat, and thus no harmonics of the
+/// flat.
 fn is_longer_than(order: &Order, flat: &Flat) -> bool {
     let length = flat.shape.as_ref().map_or(0.0, |shape| shape.length_m.0);
     flat.circumference_m.0 / order.number as f64 > 4.0 * length
 }
 
-/// Stretches around the first pass's blows that every other pass has a blow in too.
+/// Stretches `[from, to]` in m around those blows of the first pass that all other passes share.
 fn common_places(blows_m: &[Vec<f64>], reach_m: f64) -> Vec<[f64; 2]> {
     let Some((first, others)) = blows_m.split_first() else { return Vec::new() };
     let met =

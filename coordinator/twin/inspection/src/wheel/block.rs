@@ -1,37 +1,37 @@
-//! One block of a pass: its periodogram, and what combs explain of it.
+//! One block of a pass: its periodogram, and the power that combs explain.
 
 use crate::along::hann;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 use tracktwin_signal::recording::Pass;
 
-/// Bins to a resolution cell.
+/// Number of bins per resolution cell.
 pub(super) const PADDING: usize = 8;
-/// Combs with teeth between those of the wheel: explained variance by chance.
+/// Number of shifted combs, with teeth between the wheel orders, for the explained variance by chance.
 pub(super) const SHIFTS: usize = 15;
 
-/// One block of a pass.
+/// Comb of wheel orders in one block of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CombBlock {
-    /// Begin in s from the pass's first sample.
+    /// Start of the block in s from the first sample of the pass.
     pub start_s: f64,
     /// Fundamental in Hz.
     pub fundamental_hz: f64,
-    /// Share of the band's variance that the comb explains.
+    /// Share of the band's variance that the comb explains, 0 to 1.
     pub explained: f64,
-    /// The same of a comb between the teeth, the median of several.
+    /// Share that a comb between the teeth explains by chance; median of several combs.
     pub by_chance: f64,
-    /// Whether none of those explains as much.
+    /// Whether the comb explains more than each of these combs.
     pub wins: bool,
 }
 
-/// A block's periodogram in the band.
+/// Periodogram of a block.
 pub(super) struct Block {
     pub start_s: f64,
     pub speed_m_s: f64,
-    /// Distance of bins in Hz.
+    /// Distance of the bins in Hz.
     pub step_hz: f64,
-    /// Power by bin, the first at 0 Hz.
+    /// Power by bin; the first bin is at 0 Hz.
     pub power: Vec<f64>,
 }
 
@@ -63,7 +63,7 @@ impl Block {
         }
     }
 
-    /// Share of the band's power that tones at the teeth `(n + shift) f` explain.
+    /// Share of the band's power that tones at the frequencies `(n + shift) f` explain.
     pub(super) fn explained(&self, fundamental: f64, shift: f64, band_hz: [f64; 2]) -> f64 {
         let bins = self.bins(band_hz);
         let total: f64 = self.power[bins].iter().sum();
@@ -78,14 +78,14 @@ impl Block {
         cell * (first..=last).map(tooth).sum::<f64>() / total.max(f64::MIN_POSITIVE)
     }
 
-    /// Bins of a band.
+    /// Range of bins of a band in Hz.
     pub(super) fn bins(&self, [low, high]: [f64; 2]) -> std::ops::Range<usize> {
         let bin = |frequency: f64| (frequency / self.step_hz).round() as usize;
         bin(low)..bin(high).min(self.power.len())
     }
 }
 
-/// Shifts of the combs between the teeth, as parts of the fundamental.
+/// Shifts of the combs between the teeth, as shares of the fundamental.
 pub(super) fn shifts() -> impl Iterator<Item = f64> {
     (0..SHIFTS).map(|index| 0.2 + 0.6 * index as f64 / (SHIFTS - 1) as f64)
 }

@@ -1,44 +1,44 @@
-//! The comb of a wheel whose circumference isn't known, in a long pass.
+//! Comb of wheel orders in a long pass, for a wheel of unknown circumference.
 
 use super::block::{Block, CombBlock, SHIFTS, shifts};
 use super::order_model::{HeldOut, held_out};
 use crate::along::{ln_binomial_tail, median};
 use tracktwin_signal::recording::Pass;
 
-/// Circumferences in m of railway wheels, from trams to locomotives.
+/// Smallest and largest circumference of railway wheels in m, from trams to locomotives.
 pub const CIRCUMFERENCES_M: [f64; 2] = [1.9, 4.0];
 
-/// Wavelengths in m of the orders that are listened to: longer ones are lost in the vehicle's own
-/// motion, shorter ones lie closer together than the speed is known.
+/// Shortest and longest wavelength in m of the tested orders. Longer waves are masked by the motion of the
+/// vehicle; orders of shorter waves are closer together than the uncertainty of the speed.
 const WAVELENGTHS_M: [f64; 2] = [0.12, 0.42];
-/// Duration in s of a block: a dozen turns, and a speed that hardly changes.
+/// Duration of a block in s: about twelve turns, with nearly constant speed.
 const BLOCK_S: f64 = 2.0;
-/// Blocks that a pass must have to fit on half of them.
+/// Smallest number of blocks of a pass; half of them are fitted.
 const BLOCKS_MIN: usize = 6;
-/// Relative step of the fundamentals tried: a tenth of a cell at the twentieth order.
+/// Relative step of the tested fundamentals: a tenth of a cell at the twentieth order.
 const STEP: f64 = 3e-4;
 
-/// Lines at whole multiples of the wheel's turning, in one pass.
+/// Lines at integer multiples of the wheel's rotation frequency, in one pass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comb {
     /// Circumference in m and its standard deviation.
     pub circumference_m: (f64, f64),
-    /// Fundamental in Hz, mean of the blocks.
+    /// Fundamental in Hz, as median of the blocks.
     pub fundamental_hz: f64,
-    /// Band in Hz that was listened to.
+    /// Tested band in Hz.
     pub band_hz: [f64; 2],
     /// The blocks, in the order of time.
     pub blocks: Vec<CombBlock>,
-    /// Probability of a comb this clear without one, in logarithm.
+    /// Natural logarithm of the probability of such a comb by chance.
     pub ln_p: f64,
-    /// Prediction of every other block by a comb fitted on the blocks between.
+    /// Quality of the prediction of every other block by a comb fitted to the remaining blocks.
     pub held_out: HeldOut,
 }
 
-/// The comb of a wheel in a pass, if less likely than `alpha` without one.
+/// Detects the comb of wheel orders in a pass, with a false-alarm rate of `alpha`.
 ///
-/// Each block of two seconds is searched for the fundamental whose orders explain most of the
-/// band's variance. None for a pass shorter than twelve seconds.
+/// In each block of two seconds the function determines the fundamental whose orders explain most of the
+/// band's variance. `None` for a pass shorter than twelve seconds.
 pub fn comb(pass: &Pass, alpha: f64) -> Option<Comb> {
     let rate = pass.signal.sample_rate_hz();
     let length = (BLOCK_S * rate) as usize;
@@ -78,7 +78,8 @@ pub fn comb(pass: &Pass, alpha: f64) -> Option<Comb> {
 }
 
 impl Block {
-    /// The fundamental that explains most, among those of all wheels.
+    /// The fundamental that explains most of the band's power, among the circumferences of all railway
+    /// wheels.
     fn fit(&self, band_hz: [f64; 2]) -> CombBlock {
         let [shortest, longest] = CIRCUMFERENCES_M;
         let (low, high) = (self.speed_m_s / longest, self.speed_m_s / shortest);

@@ -1,39 +1,39 @@
-//! A flat: one blow a turn of the wheel.
+//! Wheel flat: one blow per turn of the wheel.
 
 use crate::along::{bonferroni, combine_dependent_p_values, ln_gamma_tail};
 use crate::impact::{Cells, ImpactKind, Observed, Shape, cells, fit};
 use tracktwin_signal::recording::Recording;
 
-/// How far wear and an odometer's scale may take the circumference from its nominal value.
+/// Largest relative deviation of the circumference from its nominal value, from wear and odometer scale.
 const TOLERANCE: f64 = 0.02;
-/// Turns that a pass must have: fewer blows are as well the track's.
+/// Smallest number of turns in a pass; with fewer the blows may belong to the track.
 const TURNS_MIN: f64 = 3.0;
-/// The least logarithm that one blow contributes: one or two impacts of the track are no flat.
+/// Lower limit of the log probability of one blow: one or two impacts of the track are no flat.
 const BLOW_MIN: f64 = -7.0;
 
-/// Weight of power beside probability in the choice of phase and circumference: clear blows all
-/// reach the least logarithm, and the right choice is the loudest of these.
+/// Weight of the power relative to the log probability in the choice of phase and circumference. Strong
+/// blows all reach the limit [`BLOW_MIN`]; the choice with the highest power is then correct.
 const LOUDNESS: f64 = 0.01;
 
 /// A flat of the wheel.
 #[derive(Clone, Debug)]
 pub struct Flat {
-    /// Circumference in m by the blows' distances, and its standard deviation.
+    /// Circumference in m from the distances of the blows, and its standard deviation.
     pub circumference_m: (f64, f64),
-    /// Probability of such blows without a flat, in logarithm.
+    /// Natural logarithm of the probability of such blows without a flat.
     pub ln_p: f64,
-    /// Power of the blows over what is normal.
+    /// Power of the blows relative to the normal power.
     pub power_ratio: f64,
-    /// Places of the blows in m in each pass.
+    /// Positions of the blows in m, one list per pass.
     pub blows_m: Vec<Vec<f64>>,
-    /// The wave that the blows look like; its length is the flat's.
+    /// Surface shape that corresponds to the blows; its length is that of the flat.
     pub shape: Option<Shape>,
 }
 
-/// The flat of a wheel of about this circumference, if less likely than `alpha` without one.
+/// Detects a flat of a wheel with about this circumference, with a false-alarm rate of `alpha`.
 ///
-/// Each pass may meet the flat at its own phase. The circumference is searched around the given
-/// one.
+/// Every pass has its own phase of the flat. The function searches the circumference near
+/// `circumference_m`.
 pub fn flat(recording: &Recording, circumference_m: f64, alpha: f64) -> Option<Flat> {
     let passes = cells(recording, ImpactKind::Blows, true);
     let length = passes.first().map(|cells| cells.ratio.len() as f64 * cells.step_m)?;
@@ -56,17 +56,17 @@ pub fn flat(recording: &Recording, circumference_m: f64, alpha: f64) -> Option<F
     Some(describe(recording, &passes, &folds, ln_p))
 }
 
-/// Circumferences apart by what shifts the last blow by half a cell.
+/// Tested circumferences in m; a step shifts the last blow by one cell step.
 fn trials(nominal: f64, length: f64, step_m: f64) -> Vec<f64> {
     let step = step_m * nominal / length;
     let count = (TOLERANCE * nominal / step).ceil() as i32;
     (-count..=count).map(|index| nominal + f64::from(index) * step).collect()
 }
 
-/// The phase of a pass at which blows at one distance are least likely by chance.
+/// The phase of a pass at which equidistant blows are least probable by chance.
 struct Fold {
     ln_p: f64,
-    /// Sum of the roots of the blows' negative logarithms, uncut.
+    /// Sum of the square roots of the blows' negative log probabilities, without the lower limit.
     loudness: f64,
     /// Cells of the blows.
     blows: Vec<usize>,
@@ -120,7 +120,7 @@ fn describe(recording: &Recording, passes: &[Cells], folds: &[Fold], ln_p: f64) 
     }
 }
 
-/// Slope of a straight line through the places of successive blows: one turn in m.
+/// Slope of a straight line through the positions of successive blows: the circumference in m.
 fn slope(places: &[f64]) -> f64 {
     let count = places.len() as f64;
     let middle = 0.5 * (count - 1.0);

@@ -1,8 +1,8 @@
-//! Effects that repeat with the wheel's revolutions, detected from the passes alone.
+//! Effects that repeat with the revolutions of the wheel, detected from the passes alone.
 //!
-//! Owns the flat and the orders of an out-of-round wheel, its circumference where that isn't known,
-//! and how well a model of orders predicts withheld data. What repeats with the track is
-//! `impact`'s.
+//! This module detects a flat and the orders of an out-of-round wheel, estimates an unknown circumference,
+//! and tests how well a model of orders predicts withheld data. The module `impact` detects effects that
+//! repeat with the track.
 
 mod block;
 mod comb;
@@ -19,7 +19,8 @@ pub use out_of_round::{Order, out_of_round};
 use std::f64::consts::TAU;
 use tracktwin_signal::recording::Recording;
 
-/// The wheel's circumference in m by its nominal radius, where the recording states one.
+/// The circumference of the wheel in m from its nominal radius; `None` if the recording states no valid
+/// radius.
 pub fn nominal_circumference_m(recording: &Recording) -> Option<f64> {
     let radius = recording.nominal_value("wheel", "radius_m")?;
     (radius.is_finite() && radius > 0.0).then_some(TAU * radius)

@@ -5,39 +5,39 @@ use crate::along::median;
 
 /// Width in Hz of the bands of the smooth spectrum.
 const SMOOTH_HZ: f64 = 10.0;
-/// Resolution cells on either side of a tooth that hold its power.
+/// Distance from a tooth, in resolution cells, within which bins belong to the tooth.
 const TOOTH_CELLS: f64 = 1.5;
-/// How far in fundamentals the held-out one may be from its neighbours' mean: the share of a
-/// resolution cell that the orders drift in a block.
+/// Largest relative deviation of the held-out fundamental from the mean of its neighbours. It corresponds
+/// to the share of a resolution cell by which the orders drift in a block.
 const FOLLOW: f64 = 1.5e-3;
 
-/// Scores on blocks that nothing was fitted on: odd ones, with the fundamental between those of
-/// the even blocks on either side and the even blocks' powers of order and background.
+/// Scores on the odd blocks, which are not fitted. Their fundamental is the mean of those of the even
+/// blocks on either side; the powers of orders and background come from the even blocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOut {
-    /// Blocks that were held out.
+    /// Number of held-out blocks.
     pub blocks: usize,
-    /// Share of their variance explained, mean.
+    /// Mean share of the variance explained in the held-out blocks, 0 to 1.
     pub explained: f64,
-    /// The same of combs between the teeth.
+    /// Mean share of the variance explained by combs between the teeth.
     pub by_chance: f64,
-    /// Mean gain in log predictive density over a smooth spectrum, in nats a block.
+    /// Mean gain in log predictive density relative to a smooth spectrum, in nats per block.
     pub gain_nats: f64,
-    /// Blocks that are predicted better with the comb.
+    /// Number of blocks that the comb predicts better.
     pub better: usize,
 }
 
-/// Expected spectrum: a smooth one with orders above it.
+/// Expected spectrum: a smooth spectrum plus wheel orders.
 struct OrderModel {
     /// Mean power by band of [`SMOOTH_HZ`], between the teeth.
     smooth: Vec<f64>,
-    /// Mean power by band, teeth and all: what is expected by one who knows of no wheel.
+    /// Mean power by band including the teeth, for a model without wheel orders.
     plain: Vec<f64>,
-    /// Power of every order's tooth, over the smooth one.
+    /// Mean power at the tooth of every order.
     teeth: Vec<f64>,
 }
 
-/// Scores of the odd blocks under a model fitted on the even ones.
+/// Scores of the odd blocks for a model fitted to the even ones.
 pub(super) fn held_out(blocks: &[Block], fitted: &[CombBlock], band_hz: [f64; 2]) -> HeldOut {
     let model = OrderModel::fit(blocks, fitted, band_hz);
     let odd: Vec<usize> = (1..blocks.len()).step_by(2).filter(|i| i + 1 < blocks.len()).collect();
@@ -65,7 +65,7 @@ impl Block {
 }
 
 impl OrderModel {
-    /// Means over the even blocks, each scaled to unit power in the band.
+    /// Fits means over the even blocks, each scaled to a mean power of one in the band.
     fn fit(blocks: &[Block], fitted: &[CombBlock], band_hz: [f64; 2]) -> Self {
         let bands = ((band_hz[1] - band_hz[0]) / SMOOTH_HZ).ceil() as usize;
         let even: Vec<usize> = (0..blocks.len()).step_by(2).collect();
@@ -97,8 +97,8 @@ impl OrderModel {
         Self { smooth: mean(smooth), plain: mean(plain), teeth: mean(teeth) }
     }
 
-    /// Log predictive density of a block with teeth over that without (Whittle's likelihood), in
-    /// nats for the whole block.
+    /// Log ratio of the predictive density of a block with teeth to that without teeth (Whittle's
+    /// likelihood), in nats for the whole block.
     fn gain(&self, block: &Block, fundamental: f64, band_hz: [f64; 2]) -> f64 {
         let mean = block.mean_power(band_hz);
         let gain = |bin: usize| {
@@ -124,7 +124,7 @@ impl Block {
         self.power[bins].iter().sum::<f64>() / count
     }
 
-    /// Band of the smooth spectrum, nearest order, and whether the bin is at its tooth.
+    /// Band of the smooth spectrum, nearest order, and whether the bin belongs to the tooth of this order.
     fn place(&self, bin: usize, fundamental: f64, band_hz: [f64; 2]) -> (usize, usize, bool) {
         let frequency = bin as f64 * self.step_hz;
         let order = (frequency / fundamental).round();

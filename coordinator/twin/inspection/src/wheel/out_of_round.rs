@@ -1,8 +1,8 @@
-//! Orders of an out-of-round wheel: lines at whole numbers of waves to a turn.
+//! Orders of an out-of-round wheel: lines at integer numbers of waves per turn.
 //!
-//! The rail's surface is the same in all passes and drops out of what two of them at one speed
-//! differ by; a wheel that begins each pass with another side down does not. One that always begins
-//! with the same side down appears in the passes themselves.
+//! The rail surface is the same in all passes and cancels in the difference of two passes at one speed. The
+//! orders of the wheel do not cancel if the passes begin with different angles of the wheel. If all passes
+//! begin with the same angle, the orders appear in the passes themselves.
 
 use crate::along::{
     Line, Ruler, Spectrum, amplitude, bonferroni, by_speed, combine_dependent_p_values,
@@ -13,74 +13,77 @@ use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use tracktwin_signal::recording::{Pass, Recording};
 use tracktwin_track::model::Roughness;
 
-/// How far wear and an odometer's scale may take the circumference from its nominal value.
+/// Largest relative deviation of the circumference from its nominal value, from wear and odometer scale.
 ///
-/// Wider, and every short wave is near some order.
+/// With a larger tolerance every short wave would be near some order.
 const TOLERANCE: f64 = 0.005;
-/// Highest order: 10 mm of a wheel of 0.4 m. Beyond it a fifth of an order is within tolerance.
+/// Highest order: waves of 10 mm for a wheel of 0.4 m. Above it the tolerance exceeds a fifth of an order.
 const ORDER_MAX: usize = 40;
-/// Turns that a pass must have for orders to lie apart from what is between them.
+/// Smallest number of turns in a pass that separates the orders from the bins between them.
 const TURNS_MIN: f64 = 5.0;
 /// Lowest frequency in Hz of an order at every speed.
 const LOW_HZ: f64 = 15.0;
 /// Highest frequency as a share of the sample rate.
 const HIGH_SHARE: f64 = 0.4;
-/// Probability of one speed's line without it above which it doesn't repeat at that speed.
+/// A line is present at a speed if its probability by chance is below this.
 const EACH_SPEED: f64 = 0.05;
-/// Speeds at which it must in what passes differ by: two may happen to begin with the same side down.
+/// Smallest number of speeds with the line in the differences: two passes may begin with the same wheel
+/// angle.
 const SPEEDS_APART_MIN: usize = 2;
-/// By how much likelier a line is there than in noise: of forty recordings of another simulator one had a
-/// probability of 0.002 by chance.
+/// Factor by which a line in a difference is more probable than in noise: of forty recordings of another
+/// simulator, one had a probability of 0.002 by chance.
 const UNEVEN: f64 = 10.0;
-/// Resolution cells around an order, or a harmonic of the sleepers' passing, that belong to it.
+/// Half width, in resolution cells, of an order or of a harmonic of the sleeper-passing frequency.
 const CELLS: f64 = 1.5;
-/// Harmonics of the sleepers' passing below which an order cannot be distinguished from it. On a
-/// smooth rail even the first has a hundredth of what the roughness around it makes.
+/// Highest harmonic of the sleeper-passing frequency that cannot be distinguished from an order. On a
+/// smooth rail even the first harmonic has only a hundredth of the power of the irregularity around it.
 const PASSING_MAX: f64 = 4.5;
-/// Resolution cells on either side in which an order's neighbours lie, four orders of a way of nine
-/// turns: only what is between the orders counts.
+/// Distance of the farthest neighbours of an order on either side in resolution cells: four orders for a
+/// stretch of nine turns. Only bins between the orders count.
 const REACH: f64 = 36.0;
-/// Number of parts of the stretch in which an order must appear, and the share of a steady line's
-/// power in each: the wheel is as uneven at the end as at the beginning.
+/// Number of parts of the stretch in which an order must appear, and the smallest share of a steady line's
+/// power in each part: a wheel is out of round along the whole stretch.
 const PARTS: usize = 3;
 const PART_SHARE: f64 = 0.2;
-/// Orders that a line may leak into, and by how much louder it then is: Hann's side lobes five cells away
-/// are 50 dB down.
+/// Largest distance in orders over which a line may leak, and the smallest ratio of its power to the leaked
+/// power: the side lobes of the Hann window at five cells are 50 dB down.
 const LEAKS: usize = 4;
 const LEAKAGE: f64 = 1e3;
-/// Level of eq. B.6 that amplitudes are stated for, and the relative deviation of its root.
+/// Irregularity level (eq. B.6) to which amplitudes refer, and the relative deviation of its square root.
 const LEVEL: f64 = 3.0;
 const ROOT_LEVEL_DEVIATION: f64 = 0.23;
 
 /// One order of an out-of-round wheel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Order {
-    /// Waves to a turn.
+    /// Number of waves per turn.
     pub number: usize,
-    /// Amplitude in m and its standard deviation, at irregularity level 3; goes with its root.
+    /// Amplitude in m and its standard deviation at irregularity level 3; proportional to the square root
+    /// of the level.
     pub amplitude_m: (f64, f64),
-    /// Probability of such a line at any order of a round wheel, in logarithm.
+    /// Natural logarithm of the probability of such a line at any order of a round wheel.
     pub ln_p: f64,
-    /// Power over what lies between the orders, in the passes or in what they differ by, mean of all
+    /// Power relative to the bins between the orders, in the passes or in their differences, as mean of all
     /// speeds.
     pub ratio: f64,
     /// Power of the line at each speed.
     powers: Vec<f64>,
 }
 
-/// Spectra in which an order is searched for.
+/// Signals whose spectra are searched for an order.
 #[derive(Clone, Copy)]
 enum SpectrumSource {
     Passes,
-    /// In what neighbouring passes at one speed differ by.
+    /// Differences of neighbouring passes at one speed.
     Differences,
 }
 
 /// Spectra along a stretch of the track at one speed.
 struct AtSpeed {
-    /// Of each pass.
+    /// Spectra of the passes.
     passes: Vec<Spectrum>,
-    /// Of what neighbouring passes differ by, as loud as in one of them; none of a single pass.
+    /// Spectra of the differences of neighbouring passes, scaled to the power of one pass; empty for a
+    /// single pass.
     differences: Vec<Spectrum>,
 }
 
@@ -93,9 +96,10 @@ impl AtSpeed {
     }
 }
 
-/// The orders that are less likely than `alpha` on a round wheel, lowest first.
+/// Detects orders of an out-of-round wheel, with a false-alarm rate of `alpha`, in ascending order.
 ///
-/// None where speeds are too much alike ([`separates_wavelengths`]): a resonance is a line too.
+/// Empty if the speeds are too similar ([`separates_wavelengths`]), because a resonance then looks like an
+/// order.
 pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> Vec<Order> {
     let passes = &recording.passes;
     let from = passes.iter().map(|pass| pass.position_m[0]).fold(f64::MIN, f64::max);
@@ -139,8 +143,8 @@ pub fn out_of_round(recording: &Recording, circumference_m: f64, alpha: f64) -> 
 }
 
 impl Order {
-    /// Whether a part of the way has its share of the line's power, mean of all speeds: a steady line's
-    /// power grows with the square of the way.
+    /// Whether a part of the stretch has its share of the line's power, as mean of all speeds. The power of
+    /// a steady line is proportional to the square of the length.
     fn is_detected(&self, part: &[AtSpeed], source: SpectrumSource, circumference_m: f64) -> bool {
         let wave_number = self.number as f64 / circumference_m;
         let share = |(speed, power): (&AtSpeed, &f64)| {
@@ -154,7 +158,7 @@ impl Order {
             && shares / self.powers.len() as f64 >= PART_SHARE / (PARTS * PARTS) as f64
     }
 
-    /// Whether another order may be nothing but this one's side lobe.
+    /// Whether `other` may be a side lobe of this order.
     fn leaks_into(&self, other: &Self) -> bool {
         let power = |order: &Self| order.powers.iter().sum::<f64>();
         let distance = self.number.abs_diff(other.number);
@@ -162,7 +166,7 @@ impl Order {
     }
 }
 
-/// Where orders are searched for.
+/// Data of a search for orders.
 struct OrderSearch<'a> {
     recording: &'a Recording,
     circumference_m: f64,
@@ -174,14 +178,14 @@ impl OrderSearch<'_> {
         self.stretch_m[1] - self.stretch_m[0]
     }
 
-    /// The way in equal parts.
+    /// Equal parts of the stretch.
     fn parts(&self) -> [[f64; 2]; PARTS] {
         let part = self.length() / PARTS as f64;
         let start = |index: usize| self.stretch_m[0] + index as f64 * part;
         std::array::from_fn(|index| [start(index), start(index + 1)])
     }
 
-    /// Spectra along a stretch of the track of all passes, by speed.
+    /// Spectra of all passes on a stretch of track, grouped by speed.
     fn spectra(&self, stretch_m: [f64; 2], ruler: Ruler) -> Vec<AtSpeed> {
         let passes = &self.recording.passes;
         let length = stretch_m[1] - stretch_m[0];
@@ -203,13 +207,14 @@ impl OrderSearch<'_> {
         by_speed(passes).into_iter().map(speed).collect()
     }
 
-    /// Lies within two resolution cells of a whole number of waves to `period_m`.
+    /// Whether the wave number lies within [`CELLS`] resolution cells of an integer number of waves per
+    /// `period_m`.
     fn is_multiple(&self, wave_number: f64, period_m: f64) -> bool {
         let order = wave_number * period_m;
         order.round() >= 1.0 && (order - order.round()).abs() < CELLS * period_m / self.length()
     }
 
-    /// The order's least likely line, and the number of bins examined.
+    /// The least probable line of the order, and the number of tested bins.
     fn order(&self, speeds: &[AtSpeed], source: SpectrumSource, number: usize) -> (Order, usize) {
         let middle = number as f64 / self.circumference_m;
         let (amplitude_m, powers) = ((0.0, 0.0), Vec::new());
@@ -248,8 +253,7 @@ impl OrderSearch<'_> {
         (best, tries)
     }
 
-    /// The line in a bin at each speed, if it is an order of that number; none where too little lies
-    /// between the orders.
+    /// The line in a bin at each speed; `None` if too few bins lie between the orders.
     fn lines(
         &self,
         speeds: &[AtSpeed],
@@ -269,8 +273,8 @@ impl OrderSearch<'_> {
         speeds.iter().map(of_speed).collect()
     }
 
-    /// Amplitude of lines at a wave number in waves a metre and its deviation in m, from how loud the
-    /// surface is beside them in the passes.
+    /// Amplitude in m, and its standard deviation, of lines at a wave number in cycles/m. The power of the
+    /// surface beside the lines in the passes is the reference.
     fn amplitude_m(&self, wave_number: f64, lines: &[Line], passes: &[Line]) -> (f64, f64) {
         let over_surface = lines.iter().zip(passes).map(|(line, passes)| {
             passes.ratio.max(1.0 + (line.ratio - 1.0) * line.beside / passes.beside)
@@ -288,8 +292,7 @@ impl OrderSearch<'_> {
     }
 }
 
-/// The acceleration without its mean, averaged over `step_m` of the way: short waves would fold
-/// onto long ones.
+/// The acceleration minus its mean, averaged over `step_m`, so that short waves do not alias to long ones.
 fn smoothed(pass: &Pass, step_m: f64) -> Vec<Complex64> {
     let samples = pass.signal.samples();
     let width = ((step_m / speed_m_s(pass) * pass.signal.sample_rate_hz()) as usize).max(1);
@@ -307,12 +310,12 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// What two passes differ by, as loud as in one of them where they share nothing.
+/// Difference of two passes, scaled to the power of one pass if they are independent.
 fn difference(one: &[Complex64], other: &[Complex64]) -> Vec<Complex64> {
     one.iter().zip(other).map(|(one, other)| (one - other) * FRAC_1_SQRT_2).collect()
 }
 
-/// Running mean of `width` values around each.
+/// Running mean of `width` values around each value.
 fn average(values: &[f64], width: usize) -> Vec<f64> {
     let mut summed = vec![0.0; values.len() + 1];
     for (index, value) in values.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! Coordinates of a window's features in which the scatter of the surface is one and independent.
+//! Linear coordinates of the features of a window, in which the random surface causes independent
+//! deviations of variance one.
 
 use super::discrepancy::discrepancy;
 use super::lack_of_fit::lack_of_fit;
@@ -13,15 +14,15 @@ const DEGREE_MAX: usize = 3;
 const BAND_BINS: [usize; 5] = [4, 8, 16, 32, 64];
 /// Entries per band value below which bands are made wider.
 const ENTRIES_PER_BAND: usize = 4;
-/// Added to every band's scatter, as a share of the mean over the bands.
+/// Shrinkage: share of the mean variance over all bands that is added to the variance of every band.
 const SHRINKAGE: f64 = 0.02;
 
-/// From features to coordinates, and the coordinates expected of parameters.
+/// Map from features to coordinates, and prediction of the coordinates from the parameters.
 ///
-/// Bands of ln-power are regressed on the parameters. In units of the regression's residuals the
-/// first directions carry what the parameters do, as in Fisher's discriminant analysis; in all
-/// others the expectation is zero. The coordinates are then turned so that the discrepancy between
-/// simulators is independent too.
+/// Bands of ln-power are regressed on the parameters. The axes are scaled by the residuals of the
+/// regression. The first directions carry the effect of the parameters, as in Fisher's discriminant
+/// analysis; the expectation is zero in all other directions. A rotation of the coordinates then makes the
+/// discrepancy between simulators independent too.
 pub(super) struct Coordinates {
     speeds: usize,
     bins: usize,
@@ -29,11 +30,12 @@ pub(super) struct Coordinates {
     offset: Vec<f64>,
     /// Band values x d.
     projection: Mat<f64>,
-    /// Variances of what all windows of a track may be off by: what two simulators of one track differ
-    /// by, and what the polynomial can't follow; d values.
+    /// Variances of the systematic error of a track, the same for all its windows: discrepancy between
+    /// simulators plus lack of fit of the polynomial; d values.
     pub(super) discrepancy: Vec<f64>,
     pub(super) polynomial: Polynomial,
-    /// Of the leading directions, which parameters move: coefficients x leading.
+    /// Regression coefficients in the leading directions, which the parameters affect: coefficients x
+    /// leading.
     coefficients: Mat<f64>,
     /// From the leading directions to coordinates: leading x d.
     pub(super) from_leading: Mat<f64>,
@@ -42,7 +44,7 @@ pub(super) struct Coordinates {
 }
 
 impl Coordinates {
-    /// The coordinates that chosen entries of a library define.
+    /// Fits the coordinates to the given entries of a library.
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] when entries are too few or a parameter is constant;
@@ -95,14 +97,14 @@ impl Coordinates {
         })
     }
 
-    /// Coordinates (t x d) of features (t x speeds bins).
+    /// Coordinates (t x d) of features (t x (speeds * bins)).
     pub(super) fn apply(&self, features: MatRef<'_, f64>) -> Mat<f64> {
         let bands = bands(features, self.bins, self.band_bins);
         Mat::from_fn(bands.nrows(), bands.ncols(), |i, j| bands[(i, j)] - self.offset[j])
             * &self.projection
     }
 
-    /// How many numbers the features of a window are.
+    /// Number of features of a window: speeds times bins.
     pub(super) fn features(&self) -> usize {
         self.speeds * self.bins
     }
@@ -114,7 +116,8 @@ impl Coordinates {
         (row * &self.from_leading).row(0).iter().copied().collect()
     }
 
-    /// The same in the leading directions: in all others the expectation is zero.
+    /// Expected coordinates at mapped parameters in the leading directions only; the expectation is zero in
+    /// all other directions.
     pub(super) fn expected_leading(&self, unit: &[f64]) -> Vec<f64> {
         let inside = inside(unit);
         let mut mean: Vec<f64> =
@@ -136,7 +139,7 @@ impl Coordinates {
         self.polynomial.slopes(&inside(unit)) * &self.coefficients
     }
 
-    /// Variance of the expectation in every coordinate: the regression's leverage there.
+    /// Variance of the expectation, the same in every coordinate: the leverage of the regression at `unit`.
     pub(super) fn variance(&self, unit: &[f64]) -> f64 {
         let basis = self.basis(&inside(unit));
         (&basis * &self.inverse_normal * basis.transpose())[(0, 0)]
@@ -147,12 +150,13 @@ impl Coordinates {
     }
 }
 
-/// Mapped parameters, those beyond their ranges at the ends of these.
+/// Mapped parameters, clamped to their ranges.
 fn inside(unit: &[f64]) -> Vec<f64> {
     unit.iter().map(|value| value.clamp(-1.0, 1.0)).collect()
 }
 
-/// The narrowest bands whose scatter half of the library's entries can determine.
+/// Number of bins per band: the narrowest bands whose covariance half of the library's entries can
+/// determine.
 fn band_bins(set: &TrainingSet, speeds: usize) -> usize {
     let values = |band: usize| speeds * set.frequencies_hz.len().div_ceil(band);
     BAND_BINS
@@ -161,10 +165,11 @@ fn band_bins(set: &TrainingSet, speeds: usize) -> usize {
         .unwrap_or(BAND_BINS[BAND_BINS.len() - 1])
 }
 
-/// Directions of unit scatter, those that parameters move most first.
+/// Directions in which the residuals have variance one, sorted by the effect of the parameters, largest
+/// first.
 struct Whitening {
     projection: Mat<f64>,
-    /// How many are moved by more than chance.
+    /// Number of directions in which the parameters have a larger effect than chance.
     leading: usize,
 }
 
@@ -193,7 +198,8 @@ fn whitening(
     Ok(Whitening { projection, leading: leading.max(1) })
 }
 
-/// Means over neighbouring bins, the speeds side by side; the last band may be narrower.
+/// Means over neighbouring bins, with the speeds one after the other; the last band of a speed may be
+/// narrower.
 fn bands(features: MatRef<'_, f64>, bins: usize, band_bins: usize) -> Mat<f64> {
     let per_speed = bins.div_ceil(band_bins);
     let speeds = features.ncols() / bins;

@@ -1,17 +1,17 @@
-//! The parameters, within bounds, whose expected coordinates are nearest to those observed.
+//! Bounded fit: the parameters whose expected coordinates are nearest to the observed coordinates.
 
 use super::coordinates::Coordinates;
 use crate::Error;
 use crate::cholesky::Cholesky;
 use faer::Mat;
 
-/// Steps after which a search ends.
+/// Largest number of steps of a search.
 const STEPS_MAX: usize = 25;
-/// A step that gains less ends the search, in units of chi-square.
+/// The search ends when a step reduces chi-square by less than this.
 const GAIN_MIN: f64 = 1e-3;
-/// Damping at the beginning, and its least value.
+/// Initial damping and smallest damping.
 const DAMPING: [f64; 2] = [1e-3, 1e-7];
-/// Damping beyond which no step helps.
+/// The search ends when the damping exceeds this value.
 const DAMPING_MAX: f64 = 1e6;
 
 /// Bounds of the mapped parameters.
@@ -26,12 +26,12 @@ pub(super) struct Bounds {
 pub(super) struct BoundedFit {
     /// Mapped parameters.
     pub(super) unit: Vec<f64>,
-    /// Weighted sum of squares that is left.
+    /// Weighted sum of squared residuals.
     pub(super) chi_square: f64,
 }
 
 impl Bounds {
-    /// The library's own ranges.
+    /// The ranges of the library: -1 to 1 for every mapped parameter.
     pub(super) fn library(parameters: usize) -> Self {
         Self { low: vec![-1.0; parameters], high: vec![1.0; parameters] }
     }
@@ -41,14 +41,14 @@ impl Bounds {
         unit.iter().zip(bounds).map(|(value, (low, high))| value.clamp(*low, *high)).collect()
     }
 
-    /// Whether a step from `unit` along `axis` would leave the bounds at once.
+    /// Whether `unit` lies at a bound of `axis` and `step` points out of the bounds.
     fn holds_back(&self, unit: f64, step: f64, axis: usize) -> bool {
         (unit <= self.low[axis] && step < 0.0) || (unit >= self.high[axis] && step > 0.0)
     }
 }
 
-/// Observed coordinates and the precision of each, as seen from the leading directions `l`:
-/// chi-square is `square - 2 pull' l + l' metric l`.
+/// Least-squares problem in the leading directions `l`, made from the observed coordinates and their
+/// precisions: chi-square is `square - 2 pull' l + l' metric l`.
 pub(super) struct Problem<'a> {
     coordinates: &'a Coordinates,
     square: f64,
@@ -71,11 +71,11 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Levenberg's and Marquardt's descent from `start`; parameters at a bound that would leave it
-    /// are held.
+    /// Levenberg–Marquardt descent from `start`. A parameter at a bound is held there while its step points
+    /// out of the bounds.
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when numbers are not finite.
+    /// [`Error::NotPositiveDefinite`] if a number is not finite.
     pub(super) fn solve(&self, bounds: &Bounds, start: &[f64]) -> Result<BoundedFit, Error> {
         let mut unit = bounds.clamp(start);
         let mut left = self.left(&unit);
@@ -112,7 +112,8 @@ impl<'a> Problem<'a> {
         Left { residual, chi_square: self.square - explained }
     }
 
-    /// Half the negative slope of chi-square, and half its curvature without second derivatives.
+    /// Half the negative gradient of chi-square, and half its Gauss–Newton curvature (without second
+    /// derivatives).
     fn descent(&self, unit: &[f64], left: &Left) -> (Vec<f64>, Mat<f64>) {
         let slopes = self.coordinates.slopes(unit);
         let along = |axis: usize| {
@@ -122,14 +123,14 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// What a point leaves of the observation.
+/// Residual of the observation at a point.
 struct Left {
     /// Half the negative slope of chi-square by the leading directions.
     residual: Vec<f64>,
     chi_square: f64,
 }
 
-/// The damped step; what a bound holds back stays.
+/// The damped step; parameters that a bound holds back do not move.
 fn step(
     unit: &[f64],
     slope: &[f64],

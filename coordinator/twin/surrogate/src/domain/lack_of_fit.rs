@@ -1,19 +1,21 @@
-//! How far the expected coordinates of a track may be off: what the polynomial can't follow.
+//! Lack of fit of the expected coordinates: the part of the residuals that a more flexible regression would
+//! explain.
 
 use faer::Mat;
 
-/// Entries whose neighbours are looked up.
+/// Largest number of entries whose neighbours are searched.
 const PROBES_MAX: usize = 2000;
-/// Neighbours of each.
+/// Number of neighbours per entry.
 const NEIGHBOURS: usize = 2;
 
-/// Variances of the error of what is expected, d values, from what is left over (`residuals`, n x d,
-/// of scatter one) of entries with these mapped parameters (`unit`, n x p).
+/// Variances of the error of the expected coordinates (d values), from the residuals of the regression
+/// (`residuals`, n x d, of variance one) and the mapped parameters (`unit`, n x p) of the same entries.
 ///
-/// The scatter of two entries is independent, but their lack of fit is nearly the same if their parameters
-/// are close. The mean product of their residuals is therefore the variance of the lack of fit. The fit of
-/// `coefficients` numbers to the same entries reduces this variance. The function therefore adds the ratio of
-/// `coefficients` to entries in every coordinate; this is more than enough where nothing was fitted.
+/// The random deviations of two entries are independent, but their lack of fit is nearly the same if their
+/// parameters are close. The mean product of their residuals is therefore the variance of the lack of fit.
+/// The fit of `coefficients` numbers to the same entries reduces this variance. The function therefore adds
+/// the ratio of `coefficients` to entries in every coordinate; this is more than enough where nothing was
+/// fitted.
 pub(super) fn lack_of_fit(residuals: &Mat<f64>, unit: &Mat<f64>, coefficients: usize) -> Vec<f64> {
     let (n, d) = (residuals.nrows(), residuals.ncols());
     let step = n.div_ceil(PROBES_MAX).max(1);

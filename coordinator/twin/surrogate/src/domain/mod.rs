@@ -1,10 +1,10 @@
 //! Domain check: tests whether a track of the library can produce the observed features.
 //!
 //! The check builds a forward emulator from the library. The expected features are a polynomial in the
-//! parameters; the residuals of the polynomial give the scatter of one window. The check fits the parameters
-//! to the observed features within the ranges of the library. It then asks two questions about the best fit.
-//! Is its residual larger than the residuals of the library's own cases? Does the residual become much
-//! smaller if one parameter may exceed one end of its range?
+//! parameters; the residuals of the polynomial give the random variation of one window. The check fits the
+//! parameters to the observed features within the ranges of the library. Features are outside the library
+//! if the residual of the best fit is larger than the residuals of the library's own cases, or if it
+//! becomes much smaller when one parameter may exceed one end of its range.
 
 mod coordinates;
 mod discrepancy;
@@ -23,23 +23,25 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 use tracktwin_parameters::Parameter;
 
-/// An end that the best fit goes beyond, and the fit there.
+/// An end of a parameter's range that the fit exceeds, and the fit beyond this end.
 type Push = ((usize, Side), BoundedFit);
 
-/// Library entries from which a fit starts.
+/// Number of library entries, the nearest ones, from which a fit starts.
 const STARTS: usize = 3;
-/// Entries nearer to an end than this, from -1 to 1, are where a search beyond it may start.
+/// A search beyond an end may start from entries whose mapped parameter (-1 to 1) exceeds this value
+/// towards the end.
 const NEAR_END: f64 = 0.6;
-/// How far a parameter may go beyond an end, as a share of half its range.
+/// Largest distance of a parameter beyond an end, as a share of half its range.
 const REACH: f64 = 2.0;
-/// Share of the misfit that an end may leave and still be named.
+/// An end is reported only if the fit beyond it leaves at most this share of the chi-square in excess of
+/// the limit.
 const LEFT_MOST: f64 = 0.5;
-/// How far beyond an end a search starts.
+/// Start of a search beyond an end, as a share of half the range.
 const FIRST_STEP: f64 = 0.2;
-/// Nearer to an end than this share of half the range, a fit pushes against it.
+/// A fit lies at an end if its distance from the end is below this share of half the range.
 const AT_END: f64 = 0.02;
-/// Share by which a single window's limit of the gain is raised: its scatter has longer tails than
-/// a normal distribution.
+/// Share by which the limit of the gain is raised for a single window: its deviations have longer tails
+/// than a normal distribution.
 const TAILS: f64 = 0.5;
 
 /// An end of a parameter's range in the library.
@@ -52,49 +54,51 @@ pub enum Side {
     High,
 }
 
-/// What is beyond the library.
+/// An end of a parameter range of the library that the features exceed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Beyond {
     /// The parameter.
     pub parameter: Parameter,
-    /// The end of its range that features lie beyond.
+    /// The end of its range that the features exceed.
     pub side: Side,
 }
 
-/// Whether features are such as one of the library's tracks can have.
+/// Result of the domain check of one feature vector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
-    /// Chi-square of the best fit inside the library over what it may be; more than 1 is outside.
+    /// Chi-square of the best fit inside the library, divided by its limit; above 1 the features are
+    /// outside the library.
     pub misfit: f64,
-    /// The end that the features lie beyond, if one explains them better by more than chance.
+    /// The end that the features exceed, if a fit beyond it is better by more than chance.
     pub beyond: Option<Beyond>,
 }
 
 impl Judgement {
-    /// Whether the library does not know such features.
+    /// Whether the features are outside the library.
     pub fn is_outside(&self) -> bool {
         self.misfit > 1.0 || self.beyond.is_some()
     }
 }
 
-/// The features that a library's tracks can have at certain speeds.
+/// The set of features that the tracks of a library can produce at given speeds.
 pub struct Domain {
     coordinates: Coordinates,
     null: Null,
     varied: Vec<Parameter>,
     /// Coordinates of the entries, n x d.
     entries: Mat<f64>,
-    /// Their mapped parameters, n x p.
+    /// Mapped parameters of the entries, n x p.
     unit: Mat<f64>,
-    /// Limits of chi-square that were asked for, by windows and bits of the probability.
+    /// Limits of chi-square computed so far, by number of windows and bits of the probability.
     limits: Mutex<HashMap<(usize, u64), f64>>,
 }
 
 impl Domain {
-    /// What the library's tracks can have at these `speeds` (places in the set's list).
+    /// Builds the domain of a library at these `speeds` (indices into the speeds of `set`).
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when entries are too few; [`Error::NoEigenvalues`].
+    /// [`Error::NotPositiveDefinite`] if the set has too few entries or a parameter is constant;
+    /// [`Error::NoEigenvalues`] if an eigenvalue iteration does not converge.
     pub fn of(set: &TrainingSet, speeds: &[usize]) -> Result<Self, Error> {
         let all: Vec<usize> = (0..set.entries()).collect();
         let coordinates = Coordinates::of(set, speeds, &all)?;
@@ -109,10 +113,10 @@ impl Domain {
         })
     }
 
-    /// Coordinates of a window's ln-powers, the speeds side by side.
+    /// Coordinates of the ln-powers of a window (speeds * bins numbers, the speeds one after the other).
     ///
     /// # Errors
-    /// [`Error::Shape`] when there are more or fewer bins.
+    /// [`Error::Shape`] if `log_power` has another length.
     pub fn coordinates(&self, log_power: &[f64]) -> Result<Vec<f64>, Error> {
         let (expected, found) = (self.coordinates.features(), log_power.len());
         if expected != found {
@@ -122,11 +126,11 @@ impl Domain {
         Ok(self.coordinates.apply(row).row(0).iter().copied().collect())
     }
 
-    /// Tests the mean coordinates of `windows` windows of a track; a track of the library is
-    /// flagged as outside with about this `probability`.
+    /// Tests the mean coordinates of `windows` windows of one track. The false-alarm rate for a track of
+    /// the library is about `probability`.
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when coordinates are not finite.
+    /// [`Error::NotPositiveDefinite`] if a coordinate is not finite.
     pub fn judge(
         &self,
         mean: &[f64],
@@ -157,7 +161,7 @@ impl Domain {
         *limits.entry(key).or_insert_with(|| self.null.limit(windows, probability))
     }
 
-    /// The best fit inside the library, and the problem with the precision that holds there.
+    /// The best fit inside the library, and the least-squares problem with the precisions at this fit.
     fn inside(
         &self,
         mean: &[f64],
@@ -187,7 +191,8 @@ impl Domain {
         Problem::new(&self.coordinates, observed, &precision)
     }
 
-    /// Mapped parameters of the `count` entries, of those that count, whose coordinates are nearest.
+    /// Mapped parameters of the `count` entries whose coordinates are nearest to `observed`, among the
+    /// entries for which `counts` is true.
     fn nearest(
         &self,
         observed: &[f64],
@@ -212,8 +217,8 @@ impl Domain {
         near.iter().map(|&(_, entry)| self.unit.row(entry).iter().copied().collect()).collect()
     }
 
-    /// The end behind which chi-square falls most, with the fit there; of the ends that the best
-    /// fit lies at, or of all where the coordinates fit `nowhere` inside.
+    /// The end beyond which chi-square is smallest, with the fit there. The search covers the ends at which
+    /// the best fit lies, or all ends if `nowhere` holds coordinates that do not fit inside the library.
     fn push(
         &self,
         problem: &Problem<'_>,
@@ -245,7 +250,7 @@ impl Domain {
     }
 }
 
-/// A mapped parameter, counted towards an end.
+/// A mapped parameter with the sign that makes `side` positive.
 fn towards(side: Side, unit: f64) -> f64 {
     match side {
         Side::Low => -unit,
@@ -253,7 +258,7 @@ fn towards(side: Side, unit: f64) -> f64 {
     }
 }
 
-/// Bounds that hold one parameter beyond an end, and where to start there.
+/// Bounds that keep one parameter beyond an end, and a start within these bounds.
 fn beyond(bounds: &Bounds, unit: &[f64], axis: usize, side: Side) -> (Bounds, Vec<f64>) {
     let (mut further, mut start) = (bounds.clone(), unit.to_vec());
     match side {
@@ -269,9 +274,9 @@ fn beyond(bounds: &Bounds, unit: &[f64], axis: usize, side: Side) -> (Bounds, Ve
     (further, start)
 }
 
-/// What chi-square must fall by when an end is opened, so that a track at that end is called
-/// beyond it with this `probability`: half of a chi-square distribution of one degree of freedom
-/// lies at zero, as the parameter may go only one way.
+/// Reduction of chi-square that is needed when an end is opened, so that a track at that end is flagged
+/// with this `probability`. Half of the chi-square distribution of one degree of freedom lies at zero,
+/// because the parameter may move in one direction only.
 fn gain_needed(probability: f64, windows: usize) -> f64 {
     let one = ChiSquared::new(1.0).expect("one degree of freedom");
     let tails = 1.0 + TAILS / (windows as f64).sqrt();

@@ -1,4 +1,4 @@
-//! Residuals of the library's own cases, in windows and in means of windows.
+//! Residuals of the library's own cases, for single windows and for means of windows.
 
 use super::coordinates::Coordinates;
 use crate::{Error, Split, TrainingSet};
@@ -7,22 +7,22 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use statrs::distribution::{ContinuousCDF, Gamma};
 
-/// Means that are drawn for one limit.
+/// Number of means that are drawn for one limit.
 const DRAWS: usize = 2000;
-/// Decides the halves and the draws.
+/// Random seed of the split into halves and of the draws.
 const SEED: u64 = 0x0d0a_1417;
 
-/// Left-over coordinates of cases that the coordinates were not learned from.
+/// Residual coordinates of cases that were not used to fit the coordinates.
 pub(super) struct Null {
     /// Cases x d.
     residuals: Mat<f64>,
-    /// Variance of what was expected of each.
+    /// Variance of the expected coordinates of every case.
     variances: Vec<f64>,
     discrepancy: Vec<f64>,
 }
 
 impl Null {
-    /// Learns coordinates from one half of the entries and keeps what they leave of the other.
+    /// Fits coordinates to one half of the entries and stores the residuals of the other half.
     ///
     /// # Errors
     /// Those of [`Coordinates::of`].
@@ -43,11 +43,11 @@ impl Null {
         Ok(Self { residuals, variances, discrepancy: coordinates.discrepancy })
     }
 
-    /// Quantile of chi-square of a mean over this number of windows, exceeded with this
+    /// Limit of chi-square of a mean over this number of windows; a mean exceeds it with this
     /// `probability`.
     ///
-    /// Means of left-over coordinates of cases drawn by chance, with a discrepancy drawn by chance
-    /// too, give mean and variance of chi-square; a gamma distribution with both gives its tail.
+    /// Residuals of randomly drawn cases, plus a randomly drawn discrepancy, give the mean and variance of
+    /// chi-square. A gamma distribution with this mean and variance gives the tail.
     pub(super) fn limit(&self, windows: usize, probability: f64) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(SEED);
         let draws: Vec<f64> = (0..DRAWS).map(|_| self.draw(windows, &mut random)).collect();

@@ -1,4 +1,4 @@
-//! Ballast that a sleeper may lift off.
+//! Ballast under a gap, from which a sleeper can lift off.
 
 /// Depth in m over which the damping of closing ballast sets in, so that it begins without a jump.
 const ONSET_M: f64 = 1e-6;

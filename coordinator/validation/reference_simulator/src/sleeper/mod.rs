@@ -1,6 +1,7 @@
 //! Half sleepers: modes of a free Timoshenko beam by Ritz's method, on a continuous bed.
 //!
-//! Owns one sleeper as a linear system that the railpad pushes; the railpad is `port`'s.
+//! This module describes one sleeper as a linear system driven by the force of the railpad. The module
+//! `port` contains the railpad.
 
 mod gap;
 mod ritz;
@@ -218,8 +219,8 @@ impl SleeperModes {
         self.along.iter().zip(&self.weights).map(|(shape, weight)| weight * value(shape)).sum()
     }
 
-    /// Stiffness with which a sleeper over a gap is held where a static state is asked for: a
-    /// thousandth of soft ballast, so that it lies where the railpad carries it.
+    /// Small stiffness that supports a sleeper over a gap in a static state: a thousandth of that of
+    /// soft ballast, so that the railpad determines the position of the sleeper.
     fn weak_ground(&self, dofs: usize) -> DMatrix<f64> {
         let mut ground = DMatrix::zeros(dofs, dofs);
         ground[(0, 0)] = 4e3 * self.seat[0] * self.seat[0];

@@ -1,22 +1,22 @@
-//! Columns of numbers as files hold them.
+//! Columns of numbers in files.
 
 /// A column of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Column {
-    /// Its name in the file, or `column-1`, `column-2` ... where the file has none.
+    /// Name of the column in the file, or `column-1`, `column-2` ... if the file has no names.
     pub name: String,
-    /// Its values; not-a-number where the file has something else.
+    /// Values of the column; NaN where the file has no number.
     pub values: Vec<f64>,
-    /// What in it is no number.
+    /// Reason why the column is not numeric, if it is not.
     pub oddity: Option<Oddity>,
-    /// Its unit, if the file states it beside the name.
+    /// Unit of the column, if the file states one.
     pub unit: Option<String>,
 }
 
 /// Reason why a column is not numeric.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Oddity {
-    /// The first value that is no number.
+    /// The first value that is not a number.
     Value {
         /// Its row, counted from 1.
         row: usize,
@@ -27,12 +27,12 @@ pub enum Oddity {
     Kind(String),
 }
 
-/// What a file holds.
+/// Content of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Content {
-    /// Its columns, in the file's order.
+    /// Columns in the order of the file.
     pub columns: Vec<Column>,
-    /// What was assumed on reading it, a sentence each.
+    /// Assumptions made while reading, one sentence each.
     pub notes: Vec<String>,
 }
 

@@ -1,11 +1,11 @@
-//! Text tables: separated by comma, semicolon, tab or blanks, with or without a line of names.
+//! Text tables, separated by comma, semicolon, tab or blanks, with or without a header line.
 
 use super::super::error::{Fault, RecordingError};
 use super::column::{Column, Content, Oddity};
 use super::text;
 use std::path::Path;
 
-/// Reads all columns; what is no number is noted once a column.
+/// Reads all columns. For each column the first value that is not a number is recorded.
 pub(super) fn read(path: &Path) -> Result<Content, RecordingError> {
     let fail = |fault| RecordingError::new(path, "file", fault);
     let unreadable = |error: std::io::Error| fail(Fault::Unreadable { reason: error.to_string() });

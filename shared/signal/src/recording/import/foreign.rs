@@ -105,7 +105,8 @@ const KINDS: [Kind; 15] = [
     },
 ];
 
-/// What a file is that is not read here, by its beginning and else by its name's `ending`.
+/// The fault of a file of an unsupported format, from its first bytes or otherwise from the `ending` of
+/// its name.
 ///
 /// `holds_zip` for kinds of files that are archives themselves and are read.
 pub(super) fn fault(begin: &[u8], ending: &str, holds_zip: bool) -> Option<Fault> {

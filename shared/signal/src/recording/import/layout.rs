@@ -7,10 +7,10 @@ use tracktwin_parameters::quantity::{PLACE, SAMPLE_RATE, SPACING, SPEED, WHEEL_R
 
 /// Meaning of the columns, from a TOML file or flags.
 ///
-/// The place of the wheel comes from `position`, else from the sum of `speed` (a column), else from
-/// `speed_km_h` at constant speed. The sample rate comes from `sample_rate_hz`, else from `time`.
-/// Values given twice must agree. Units not given here come from the file or the column names, else
-/// they are m/s2, s, m and km/h.
+/// The position of the wheel comes from the column `position`, otherwise from the integral of the column
+/// `speed`, otherwise from the constant speed `speed_km_h`. The sample rate comes from `sample_rate_hz`,
+/// otherwise from `time`. Values given twice must agree. Units that are not given come from the file or
+/// the column names, otherwise they are m/s2, s, m and km/h.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Layout {
@@ -30,22 +30,22 @@ pub struct Layout {
     pub position_unit: Option<PositionUnit>,
     /// Unit of the speed column.
     pub speed_unit: Option<SpeedUnit>,
-    /// Accelerations are positive upwards: their sign is turned.
+    /// Whether the accelerations in the file are positive upwards. The import then changes their sign.
     pub upwards: bool,
     /// Samples per second in Hz.
     #[serde(rename = "sample_rate_Hz")]
     pub sample_rate_hz: Option<f64>,
     /// Speed of all passes in km/h.
     pub speed_km_h: Option<f64>,
-    /// Distance of the sleepers in m.
+    /// Sleeper spacing in m.
     pub spacing_m: f64,
-    /// Place of a sleeper in m; where it isn't known the recording has no sleepers.
+    /// Position of one sleeper in m. `None`: unknown; the recording then has no sleepers.
     pub sleeper_m: Option<f64>,
-    /// Radius of the wheel in m, where it is known.
+    /// Radius of the wheel in m, if known.
     pub wheel_radius_m: Option<f64>,
 }
 
-/// An entry of a layout that can't be.
+/// A value of a layout outside its limits.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{entry}: {source}")]
 pub struct LayoutError {
@@ -56,10 +56,10 @@ pub struct LayoutError {
 }
 
 impl Layout {
-    /// That its numbers can be what they are given for.
+    /// Checks that every number is within its limits.
     ///
     /// # Errors
-    /// [`LayoutError`] names the first that can't.
+    /// [`LayoutError`] names the first value out of limits.
     pub fn check(&self) -> Result<(), LayoutError> {
         let given = [
             ("sample_rate_Hz", self.sample_rate_hz, SAMPLE_RATE),

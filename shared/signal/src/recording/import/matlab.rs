@@ -6,7 +6,8 @@ use super::mat_listing::{Variable, list};
 use matfile::{Array, MatFile, NumericData};
 use std::path::Path;
 
-/// The columns of all arrays, named as these; what is not real numbers is named too.
+/// The columns of all arrays, with the names of the arrays. Arrays that are not real numbers are
+/// included with their type.
 pub(super) fn read(path: &Path) -> Result<Vec<Column>, RecordingError> {
     let unreadable =
         |reason: String| RecordingError::new(path, "file", Fault::Unreadable { reason });

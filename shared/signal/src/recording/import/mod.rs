@@ -1,7 +1,7 @@
-//! Recordings of other makes: tables of any kind, and what their columns mean.
+//! Import of foreign recordings: tables of several formats, and the meaning of their columns.
 //!
-//! Owns reading of CSV, Parquet, NumPy and MATLAB files into named columns, and the way from these
-//! to a recording. What a recording must satisfy is checked where it is opened.
+//! This module reads CSV, Parquet, NumPy and MATLAB files into named columns and converts these columns
+//! to a recording. [`Recording::open`](super::Recording::open) checks the recording.
 
 mod column;
 mod csv_table;

@@ -119,7 +119,7 @@ fn numbers<R: Read>(array: NpyFile<R>) -> Result<Result<Vec<f64>, String>, Error
     }))
 }
 
-/// What values are that are no real numbers.
+/// Type of values that are not real numbers.
 fn other_kind(kind: &str) -> String {
     match kind.chars().next() {
         Some('c') => "complex numbers: save the real part or the magnitude".to_owned(),

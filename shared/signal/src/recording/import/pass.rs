@@ -1,4 +1,4 @@
-//! From tables to a recording.
+//! Conversion of tables to a recording.
 
 use super::super::error::{Fault, RecordingError};
 use super::super::{Pass, Recording, Sleeper, check, quiet};
@@ -9,21 +9,22 @@ use std::path::{Path, PathBuf};
 use tracktwin_parameters::QuantityError;
 use tracktwin_parameters::quantity::SLEEPERS;
 
-/// A recording made of foreign files, and what was done or assumed on the way.
+/// A recording from imported files, with the changes and assumptions of the import.
 #[derive(Clone, Debug)]
 pub struct Imported {
-    /// The column its accelerations come from.
+    /// Column of the accelerations.
     pub column: String,
     /// The recording.
     pub recording: Recording,
-    /// What was changed, assumed or is doubtful, a sentence each.
+    /// Changes, assumptions and doubts, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// One recording for each column of acceleration, with a pass for each file.
+/// Imports `files`: one recording per column of acceleration, each with one pass per file.
 ///
 /// # Errors
-/// The first error, with file, column and row; for an incomplete layout the missing entry.
+/// The first error, with file, column and row. For an incomplete layout, the error names the missing
+/// entry.
 pub fn import(files: &[PathBuf], layout: &Layout) -> Result<Vec<Imported>, RecordingError> {
     let tables: Vec<Table> =
         files.iter().map(|file| Table::read(file)).collect::<Result<_, _>>()?;

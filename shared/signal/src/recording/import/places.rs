@@ -5,7 +5,7 @@ use super::unit::{PositionUnit, SpeedUnit, Unit, of_column};
 use super::{Layout, Table};
 use tracktwin_number::rounded;
 
-/// Relative difference of two statements of one speed that is no contradiction.
+/// Largest relative difference between two consistent values of one speed.
 const ALIKE: f64 = 0.1;
 /// Speeds in km/h within which a pass is plausible; the fastest train ran 575 km/h once.
 const PLAUSIBLE_KM_H: [f64; 2] = [0.5, 500.0];
@@ -105,7 +105,7 @@ impl Places {
         Ok(())
     }
 
-    /// In which unit the speed would be one that trains have.
+    /// The unit in which the speed would be plausible for a train.
     fn other_unit(&self, speed_km_h: f64) -> String {
         let (unit, _) = self.unit;
         let (factors, remedy): (Vec<(&str, f64)>, &str) = if self.name == "position" {

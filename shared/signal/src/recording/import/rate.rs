@@ -1,4 +1,4 @@
-//! The sample rate of a file, from what was stated and from its times.
+//! The sample rate of a file, from the stated rate and the column of times.
 
 use super::super::clock::{SampleClock, Stamps};
 use super::super::error::{Fault, RecordingError};
@@ -7,7 +7,7 @@ use super::unit::{TimeUnit, Unit, bare_name, of_column};
 use super::{Layout, Table};
 use tracktwin_number::{rounded, significant};
 
-/// Relative difference of two statements of one rate that is no contradiction.
+/// Largest relative difference between two consistent values of one sample rate.
 const ALIKE: f64 = 1e-3;
 /// Relative difference from a column that only seems to hold times.
 const NEAR: f64 = 0.02;
@@ -89,7 +89,7 @@ fn in_unit(column: &Column, unit: TimeUnit) -> Result<SampleClock, Fault> {
     SampleClock::of(&times)
 }
 
-/// The unit in which the times would make sense; `per_unit` is how many samples one has.
+/// The unit in which the times would be plausible; `per_unit` is the number of samples per unit.
 fn other_unit(per_unit: f64) -> String {
     let rates = TimeUnit::ALL.iter().map(|(unit, _)| (unit.name(), per_unit / unit.in_si()));
     let range = PLAUSIBLE_HZ[0]..=PLAUSIBLE_HZ[1];
@@ -104,7 +104,7 @@ fn other_unit(per_unit: f64) -> String {
     }
 }
 
-/// A column that looks like times with another rate than the stated one.
+/// Doubt about a column that looks like times with another rate than the stated one.
 fn doubt(table: &Table, stated: f64) -> Option<String> {
     let is_time = |column: &&Column| {
         TIMES.contains(&bare_name(&column.name).to_ascii_lowercase().as_str())

@@ -11,7 +11,7 @@ use crate::Signal;
 use std::path::PathBuf;
 use tracktwin_number::{rounded, significant};
 
-/// A pass as its file has it.
+/// A pass as stored in its file.
 pub(super) struct Raw {
     /// The file.
     pub path: PathBuf,
@@ -52,7 +52,7 @@ impl Raw {
         Ok(raw)
     }
 
-    /// Whether its positions end before they began.
+    /// Whether the last position is smaller than the first.
     pub(super) fn is_backwards(&self) -> bool {
         let places = &self.places.position_m;
         places[places.len() - 1] < places[0]

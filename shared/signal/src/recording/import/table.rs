@@ -16,14 +16,14 @@ const MISSING: [f64; 8] = [999.0, 999.25, 9999.0, 99_999.0, 999_999.0, 9_999_999
 /// Times the span of all other values by which such a number is away from them.
 const FAR: f64 = 3.0;
 
-/// A file's columns.
+/// Columns of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// The file.
     pub path: PathBuf,
-    /// Its columns, in the file's order.
+    /// Columns in the order of the file.
     pub columns: Vec<Column>,
-    /// What was assumed on reading it, a sentence each.
+    /// Assumptions made while reading, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -31,7 +31,7 @@ impl Table {
     /// Reads a `.csv`, `.txt`, `.parquet`, `.npy`, `.npz` or `.mat` file.
     ///
     /// # Errors
-    /// [`Fault::NoSuchFile`], [`Fault::Foreign`], [`Fault::UnknownTable`] or what is wrong inside.
+    /// [`Fault::NoSuchFile`], [`Fault::Foreign`], [`Fault::UnknownTable`] or a fault of the content.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let fail = |fault| RecordingError::new(path, "file", fault);
         if !path.is_file() {
@@ -57,7 +57,8 @@ impl Table {
         Ok(Self { path: path.to_owned(), columns: content.columns, notes: content.notes })
     }
 
-    /// The column of that name, or of that name before its unit: all finite, at least two values.
+    /// The column with this name, with or without a unit in the file. All values are finite, and there
+    /// are at least two.
     ///
     /// # Errors
     /// [`Fault::NoColumn`] with the names there are, [`Fault::ColumnTwice`], [`Fault::NotNumeric`],

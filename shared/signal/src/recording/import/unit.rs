@@ -31,7 +31,7 @@ pub enum AccelerationUnit {
     /// Standard gravity.
     #[serde(rename = "g")]
     G,
-    /// Not known: levels mean something within the recording only.
+    /// Unknown unit. Levels are comparable only within the recording.
     #[serde(rename = "unknown")]
     Unknown,
 }

@@ -1,4 +1,4 @@
-//! Eight numbers side by side, one a case.
+//! Eight numbers in one vector, one per case.
 
 use std::array;
 use std::ops::{Add, Mul, Sub};

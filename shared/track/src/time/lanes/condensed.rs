@@ -1,6 +1,6 @@
-//! A track condensed to its rail: what hangs under it is a sum of second-order sections.
+//! A track condensed to its rail: the parts under the rail are a sum of second-order sections.
 //!
-//! Nothing is left out: the rail's displacements are those of the whole track.
+//! The condensation is exact: the rail has the same displacements as in the complete track.
 
 mod motion;
 mod pair;
@@ -20,7 +20,7 @@ pub(in crate::time::lanes) use substructure::Hanging;
 use supports::Supports;
 use table::Table;
 
-/// What hangs under the rail, if the track can be condensed to it.
+/// The substructures under the rail, if the track can be condensed to the rail.
 pub(super) fn hanging(model: &TrackModel, dt: f64) -> Option<Hanging> {
     let (layout, matrices) = (model.layout(), model.matrices());
     if rail::is_chain(layout, matrices) {
@@ -104,14 +104,14 @@ fn place(layout: &Layout, dof: usize) -> (usize, usize) {
         .expect("a degree of freedom of the rail belongs to a node")
 }
 
-/// Eight tracks and what hangs under their rails.
+/// Eight tracks and their substructures under the rail.
 struct Condensed<'a> {
     models: [&'a TrackModel; LANES],
     hanging: [&'a Hanging; LANES],
 }
 
 impl Condensed<'_> {
-    /// `m M + c C + k K` of the rails by nodes; what is held gets `held` on the diagonal.
+    /// `m M + c C + k K` of the rails by nodes. A held degree of freedom gets `held` on the diagonal.
     fn rows(&self, [m, c, k]: [f64; 3], held: f64) -> Vec<NodeRows> {
         let pattern = self.models[0].matrices();
         node_rows(self.models[0].layout(), held, |row, column| {
@@ -125,7 +125,7 @@ impl Condensed<'_> {
         })
     }
 
-    /// Takes from the diagonal what gives way under the rail.
+    /// Subtracts the relief of the substructures from the diagonal.
     fn relieve(&self, rows: &mut [NodeRows], relief: impl Fn(&Hanging, usize) -> f64) {
         for &dof in self.hanging[0].keys() {
             let (node, motion) = place(self.models[0].layout(), dof);

@@ -1,4 +1,4 @@
-//! What a time step needs to know of the past of one degree of freedom, in all lanes.
+//! State of one degree of freedom at the end of a time step, in all lanes.
 
 use super::block::Block;
 
@@ -17,7 +17,8 @@ impl State {
         Self { inertial: displacement, viscous: displacement }
     }
 
-    /// Moves on to a new displacement `u`: `q` becomes `2 u - q` and `p` twice that less `p`.
+    /// Updates the state to a new displacement `u`: `q` becomes `2 u - q`, and `p` becomes twice the new
+    /// `q` minus `p`.
     #[inline(always)]
     pub(super) fn advance(&mut self, displacement: Block) {
         let two = Block::splat(2.0);

@@ -1,4 +1,4 @@
-//! Wheel, rail and what hangs under it on their way, in all lanes.
+//! Motion of wheel, rail and substructures, in all lanes.
 
 use super::pair;
 use super::rail::{Eliminated, Factor, Node, NodeRows};
@@ -60,7 +60,7 @@ pub(super) struct CondensedState {
     pub(super) factor: Factor,
     pub(super) rail: Vec<NodeState>,
     pub(super) supports: Supports,
-    /// What the past of the supports pushes the nodes with.
+    /// Forces on the nodes from the previous state of the supports.
     pub(super) pushed: Vec<Node>,
     /// What the displacement of an eliminated node would be but for the next node's; after
     /// substitution the displacements.
@@ -131,7 +131,7 @@ impl CondensedState {
         load
     }
 
-    /// What the past pushes a node with: inertia and dampers of the rail, and the supports.
+    /// Force on a node from the previous state: inertia and dampers of the rail, and the supports.
     #[inline(always)]
     fn past(&self, node: usize) -> Node {
         let [before, own, after] = [node - 1, node, node + 1].map(|node| &self.rail[node]);

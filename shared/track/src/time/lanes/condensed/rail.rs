@@ -21,8 +21,8 @@ pub(super) struct NodeRows {
     pub(super) next: [Block; 4],
 }
 
-/// What elimination knows of a node: what it passes on of the node before it, and the inverse of
-/// its own block.
+/// Result of the elimination of a node: the coupling to the node before it, and the inverse of its own
+/// block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Eliminated {
     pub(super) passed: [Block; 4],
@@ -182,7 +182,7 @@ fn eliminated(
     Ok(Eliminated { passed, inverse: inverse(own)? })
 }
 
-/// What a node passes on of the one before it, and what is left of its own block.
+/// The coupling of a node to the one before it, and its own block after the elimination.
 fn passed_on(
     own: [Block; 3],
     coupling: [Block; 4],

@@ -1,9 +1,9 @@
-//! What hangs under one degree of freedom of the rail, as the rail feels it step by step.
+//! The parts under one degree of freedom of the rail, as a discrete transfer function for time steps.
 //!
-//! A railpad with its sleeper, its ballast and whatever extensions added to them is a linear
-//! system that the rail alone drives. Its force on the rail is the rail's motion through a
-//! rational function, and that is a sum of second-order sections, one a degree of freedom. Under
-//! the trapezoidal rule, which is what Newmark's average acceleration is, nothing is left out.
+//! Railpad, sleeper, ballast and their extensions form a linear system that only the rail drives. The
+//! force on the rail follows from the motion of the rail by a rational transfer function: a sum of
+//! second-order sections, one per degree of freedom. The result is exact for the trapezoidal rule, which
+//! equals Newmark's average acceleration.
 
 use crate::model::Matrices;
 use faer::linalg::solvers::{Llt, Solve};
@@ -33,14 +33,15 @@ pub(super) struct SecondOrderSection {
     pub(super) displacement: f64,
 }
 
-/// A substructure by what it does to the rail.
+/// A substructure, reduced to its force on the rail.
 ///
-/// Its force on the rail is `relief u` at once and the sections' of the past.
+/// The force on the rail is `relief u` from the current displacement plus the forces of the sections
+/// from the past.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::time::lanes) struct Substructure {
-    /// What the rail's stiffness at rest is lessened by, in N/m: its inside gives way.
+    /// Reduction of the static stiffness of the rail in N/m by the flexibility of the substructure.
     pub(super) static_relief: f64,
-    /// What the stiffness in a time step is lessened by, in N/m.
+    /// Reduction of the stiffness in a time step in N/m.
     pub(super) step_relief: f64,
     pub(super) sections: Vec<SecondOrderSection>,
 }
@@ -53,14 +54,15 @@ impl Substructure {
     }
 }
 
-/// All substructures of a track by the degree of freedom of the rail that they hang on; several on
-/// one are taken together.
+/// All substructures of a track, by the degree of freedom of the rail to which they are connected.
+/// Several at one degree of freedom are combined.
 pub(in crate::time::lanes) type Hanging = BTreeMap<usize, Substructure>;
 
-/// The substructures under a rail of so many degrees of freedom, the first ones of the matrices.
+/// The substructures under a rail. The first `rail_dofs` degrees of freedom of the matrices are those of
+/// the rail.
 ///
-/// `None` where one hangs on several places of the rail or on none, where its mass reaches into
-/// the rail, or where its poles cannot be told apart: such a track is solved as a whole.
+/// `None` if a substructure is connected to several degrees of freedom of the rail or to none, if its
+/// mass is coupled to the rail, or if its poles cannot be separated. Such a track is solved as a whole.
 pub(super) fn hanging(matrices: &Matrices, rail_dofs: usize, dt: f64) -> Option<Hanging> {
     let mut seen = vec![false; matrices.size()];
     let mut known: HashMap<Vec<u64>, Substructure> = HashMap::new();
@@ -81,8 +83,8 @@ pub(super) fn hanging(matrices: &Matrices, rail_dofs: usize, dt: f64) -> Option<
     Some(hanging)
 }
 
-/// Everything off the rail that hangs together with `start`, ascending, and its one place on the
-/// rail.
+/// All degrees of freedom outside the rail that are connected with `start`, ascending, and the one
+/// degree of freedom of the rail to which they are connected.
 fn connected(
     matrices: &Matrices,
     rail_dofs: usize,

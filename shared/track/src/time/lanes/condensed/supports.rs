@@ -1,4 +1,4 @@
-//! All substructures on their way, in all lanes.
+//! State of all substructures, in all lanes.
 
 use super::rail::Node;
 use super::substructure::{Hanging, SecondOrderSection};
@@ -25,7 +25,7 @@ struct Seat {
     sections: usize,
 }
 
-/// What hangs under the rail: coefficients, and the states of every section.
+/// Substructures under the rail: coefficients, and the state of every section.
 pub(super) struct Supports {
     seats: Vec<Seat>,
     /// The sections of every seat, one seat after the other.
@@ -35,8 +35,8 @@ pub(super) struct Supports {
 }
 
 impl Supports {
-    /// Substructures at rest on a rail of these displacements; `place` says at which node, and
-    /// with which of its motions, a degree of freedom of the rail stands.
+    /// Substructures at rest on a rail with these displacements. `place` returns the node of a degree of
+    /// freedom of the rail, and its motion at this node (0 deflection, 1 rotation).
     pub(super) fn at_rest(
         hanging: [&Hanging; LANES],
         place: impl Fn(usize) -> (usize, usize),

@@ -1,17 +1,17 @@
-//! Coefficients a place, stored once where they repeat themselves.
+//! Coefficients by place; equal coefficients are stored only once.
 
 use crate::time::lanes::block::Block;
 use std::collections::HashMap;
 
-/// A value a place. Rails and sleepers repeat themselves from span to span, and what is stored
-/// once stays in the nearest cache.
+/// One value per place. Rails and sleepers are equal from span to span. Values that are stored only once
+/// stay in the nearest cache.
 #[derive(Clone, Debug)]
 pub(super) struct Table<T> {
     values: Vec<T>,
     places: Vec<u32>,
 }
 
-/// What can be told apart by its bits.
+/// Values that can be compared by their bits.
 pub(super) trait Bits {
     /// The bits of all its numbers.
     fn bits(&self) -> Vec<u64>;

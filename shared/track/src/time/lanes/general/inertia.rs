@@ -1,4 +1,4 @@
-//! What the past pushes with: the right-hand side of a time step.
+//! Forces from the previous state: the right-hand side of a time step.
 
 use super::elimination::Elimination;
 use super::runs::Runs;

@@ -1,4 +1,4 @@
-//! Wheel and track on their way, in all lanes.
+//! Motion of wheel and track, in all lanes.
 
 use super::elimination::Elimination;
 use super::factor::Factor;
@@ -122,7 +122,7 @@ impl LaneState {
         force
     }
 
-    /// Forward elimination of what the past pushes with.
+    /// Forward elimination of the forces from the previous state.
     #[inline(always)]
     fn eliminate_past(&mut self) {
         for row in 0..self.solution.len() {

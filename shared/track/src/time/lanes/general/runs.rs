@@ -43,8 +43,8 @@ struct Run {
 
 /// A sparse matrix as the runs of every row.
 ///
-/// Runs with the same values share them: rails and sleepers repeat themselves from span to span,
-/// and what is stored once stays in the cache.
+/// Runs with equal values share their storage. Rails and sleepers are equal from span to span, so the
+/// values stay in the cache.
 #[derive(Clone, Debug)]
 pub(super) struct Runs<F> {
     all: Vec<Run>,
