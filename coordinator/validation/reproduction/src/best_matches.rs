@@ -2,14 +2,13 @@
 
 use crate::average::Average;
 use crate::picture::{Picture, Scale, Style};
-use crate::selector::{FEATURES, MEASURED};
+use crate::selector::{FEATURES, MEASURED, nearest};
 use crate::spectrum::{DB, enough, log_power, speed_index};
 use crate::{Compared, Error, Figure};
-use rayon::prelude::*;
 use std::ops::Range;
 use tracktwin_evaluation::MATCHES;
 use tracktwin_signal::FeatureSet;
-use tracktwin_surrogate::{Selector, Split, TrainingSet};
+use tracktwin_surrogate::{Split, TrainingSet};
 
 /// Cases that are drawn; the paper draws five sleepers.
 const SHOWN: usize = 3;
@@ -42,8 +41,8 @@ pub(crate) fn best_matches(set: &TrainingSet, seed: u64) -> Result<Compared, Err
     let any = vec![train[..MATCHES].to_vec(); measured.len()];
     let mut matches = Matches { set, speed, measured, by_feature: Vec::new(), any };
     for feature in FEATURES {
-        let found = matches.find(&train, feature)?;
-        matches.by_feature.push(found);
+        let of = |case| feature.select(&set.frequencies_hz, log_power(set, speed, case));
+        matches.by_feature.push(nearest(&train, measured, of)?);
     }
     let caption = "LWPS at 13 km/h of cases of the test half that stand for measurements (dark), \
                    and the ten best matches of the other half (thin): a row a feature vector, a \
@@ -60,18 +59,6 @@ pub(crate) fn best_matches(set: &TrainingSet, seed: u64) -> Result<Compared, Err
 }
 
 impl Matches<'_> {
-    fn find(&self, entries: &[usize], feature: FeatureSet) -> Result<Vec<Vec<usize>>, Error> {
-        let of =
-            |case| feature.select(&self.set.frequencies_hz, log_power(self.set, self.speed, case));
-        let table: Vec<f64> = entries.iter().flat_map(|&entry| of(entry)).copied().collect();
-        let selector = Selector::new(table, of(entries[0]).len())?;
-        let nearest = |&case: &usize| {
-            let nearest = selector.nearest(of(case), MATCHES)?;
-            Ok(nearest.iter().map(|match_| entries[match_.entry]).collect())
-        };
-        self.measured.par_iter().map(nearest).collect()
-    }
-
     /// Bins between two frequencies in Hz.
     fn bins(&self, [low_hz, high_hz]: [f64; 2]) -> Range<usize> {
         let place = |hz: f64| self.set.frequencies_hz.partition_point(|&f| f < hz);
@@ -209,13 +196,8 @@ fn local(compared: &mut Compared, matches: &Matches<'_>, place: usize) {
 mod tests {
     use super::*;
     use crate::ClaimVerdict::{Differs, Reproduced};
-    use crate::testing::{library, random, verdicts};
+    use crate::testing::{library, random, share, verdicts};
     use tracktwin_parameters::{Parameter, ParameterSet};
-
-    fn share(set: &ParameterSet, parameter: Parameter) -> f64 {
-        let [low, high] = parameter.range();
-        (set[parameter] - low) / (high - low)
-    }
 
     /// Every range has a parameter of its own; the lowest has none.
     fn paper(set: &ParameterSet, frequency_hz: f64) -> f64 {

@@ -279,9 +279,9 @@ fn uncertainty(compared: &mut Compared, group: &ModelGroup) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{library, random};
+    use crate::testing::{library, random, share};
     use tracktwin_experiment::Experiment;
-    use tracktwin_parameters::{ParameterSet, TrackDesign};
+    use tracktwin_parameters::TrackDesign;
     use tracktwin_surrogate::{FeatureColumns, TrainOptions, TrainingSet, train};
 
     fn compare(set: &TrainingSet) -> Compared {
@@ -292,11 +292,6 @@ mod tests {
         let experiment = Experiment::new(TrackDesign::v_track());
         let results = Results { experiment: &experiment, set, seed: models.split_seed() };
         compared_regressions(&results, &models).unwrap()
-    }
-
-    fn share(set: &ParameterSet, parameter: Parameter) -> f64 {
-        let [low, high] = parameter.range();
-        (set[parameter] - low) / (high - low)
     }
 
     /// A library in which railpads change all bins smoothly; ballast moves a few bins in steps.

@@ -60,20 +60,32 @@ fn sizes(entries: usize) -> Vec<usize> {
     SIZES.into_iter().filter(|&size| size < entries).chain([entries]).collect()
 }
 
+/// Best matches of each measured case among these entries, the nearest first.
+pub(crate) fn nearest<'a>(
+    entries: &[usize],
+    measured: &[usize],
+    of: impl Fn(usize) -> &'a [f64] + Sync,
+) -> Result<Vec<Vec<usize>>, Error> {
+    let table: Vec<f64> = entries.iter().flat_map(|&entry| of(entry)).copied().collect();
+    let selector = Selector::new(table, of(entries[0]).len())?;
+    let nearest = |&case: &usize| {
+        let nearest = selector.nearest(of(case), MATCHES)?;
+        Ok(nearest.iter().map(|match_| entries[match_.entry]).collect())
+    };
+    measured.par_iter().map(nearest).collect()
+}
+
 /// Mean error of the best matches of each measured case among these entries.
 fn errors<'a>(
     entries: &[usize],
     measured: &[usize],
     of: impl Fn(usize) -> &'a [f64] + Sync,
 ) -> Result<Vec<f64>, Error> {
-    let table: Vec<f64> = entries.iter().flat_map(|&entry| of(entry)).copied().collect();
-    let selector = Selector::new(table, of(entries[0]).len())?;
-    let error = |&case: &usize| {
-        let nearest = selector.nearest(of(case), MATCHES)?;
-        let all = nearest.iter().map(|match_| mape(of(case), selector.features(match_.entry)));
-        Ok(all.sum::<f64>() / nearest.len() as f64)
+    let error = |(&case, matches): (&usize, &Vec<usize>)| {
+        let all = matches.iter().map(|&entry| mape(of(case), of(entry)));
+        all.sum::<f64>() / matches.len() as f64
     };
-    measured.par_iter().map(error).collect()
+    Ok(measured.iter().zip(&nearest(entries, measured, &of)?).map(error).collect())
 }
 
 fn falls(compared: &mut Compared, curves: &[Curve], sizes: &[usize]) {

@@ -222,14 +222,9 @@ fn hardly(compared: &mut Compared, effects: &[Effect], damping: Parameter) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{library, verdicts};
+    use crate::testing::{library, share, verdicts};
     use ClaimVerdict::{Differs, Reproduced};
     use tracktwin_parameters::ParameterSet;
-
-    fn share(set: &ParameterSet, parameter: Parameter) -> f64 {
-        let [low, high] = parameter.range();
-        (set[parameter] - low) / (high - low)
-    }
 
     /// As the paper has it: railpads saturate, ballast below 1000 Hz, the level everywhere.
     fn paper(set: &ParameterSet, frequency_hz: f64) -> f64 {

@@ -27,6 +27,12 @@ pub(crate) fn parameters(case: usize) -> ParameterSet {
 
 const STEPS: [f64; 6] = [0.618_034, 0.754_878, 0.569_841, 0.819_173, 0.671_044, 0.549_701];
 
+/// Value of a parameter as a share of its range in Table D1, 0 to 1.
+pub(crate) fn share(set: &ParameterSet, parameter: Parameter) -> f64 {
+    let [low, high] = parameter.range();
+    (set[parameter] - low) / (high - low)
+}
+
 /// A library whose ln LWPS is a function of speed index, parameters and frequency, and a little
 /// noise.
 pub(crate) fn library(

@@ -3,7 +3,7 @@
 use super::{Evidence, FAILED_SHARE, names};
 use crate::behaviour::Behaviour;
 use crate::estimate::Estimate;
-use crate::outcome::{Hypothesis, UNKNOWN};
+use crate::outcome::{Hypothesis, UNKNOWN, meet};
 use crate::port_scan::UnknownElement;
 use crate::search::{Fitted, Probabilities, Round};
 use std::collections::BTreeMap;
@@ -53,22 +53,23 @@ impl Evidence<'_> {
             .collect();
         if let Some(port) = &round.port {
             let unknown = unknown * if alone { 1.0 } else { REMAINDER_PRIOR };
-            let nameless = self.without_name(port, unknown);
-            // What explains most of it is of its family, at its place.
-            let (family, location) = match taken_back.filter(|_| alone) {
-                Some(best) => (
-                    Some(best.candidate.kind.family.name().to_owned()),
-                    self.location_of(&best.candidate),
-                ),
-                None => (nameless.family.clone(), nameless.location.clone()),
-            };
-            hypotheses.push(Hypothesis {
-                accepted: is_port || unnamed,
-                look_alikes: if unnamed { nearest(round) } else { Vec::new() },
-                family,
-                location,
-                ..nameless
-            });
+            let mut nameless = self.without_name(port, unknown);
+            nameless.accepted = is_port || unnamed;
+            if unnamed {
+                nameless.look_alikes = nearest(round);
+            }
+            if let Some(best) = taken_back.filter(|_| alone) {
+                // What explains most of it is of its family, at its place.
+                nameless.family = Some(best.candidate.kind.family.name().to_owned());
+                let found = self.location_of_port(&port.place);
+                nameless.location = self.location_of(&best.candidate);
+                // The behaviour of an element elsewhere does not describe this place.
+                if found.is_none() || !meet(found.as_ref(), nameless.location.as_ref()) {
+                    nameless.behaviour = None;
+                    nameless.parameters.clear();
+                }
+            }
+            hypotheses.push(nameless);
         }
         if round.accepted {
             self.gather(&mut hypotheses);
