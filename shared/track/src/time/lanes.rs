@@ -3,7 +3,8 @@
 //! The fast solver uses the same scheme and the same matrices as the plain solver. If each sleeper is
 //! connected to one degree of freedom of the rail, the track is condensed to its rail. This is the case
 //! without extensions that connect sleepers. Any other track is eliminated as a whole. The wheel is at
-//! the same place in all cases, so its shape functions are scalars.
+//! the same place in all cases, so its shape functions are scalars. Further wheels run on condensed tracks
+//! only, at a distance at which no wheel moves the rail under another within a step.
 
 #![expect(
     clippy::inline_always,
@@ -21,7 +22,16 @@ use crate::model::{Surface, TrackModel};
 use block::{Block, LANES};
 use std::array;
 
-/// Runs the wheel over many tracks, each with its own surface. The records have the order of the tracks.
+/// Whether this solver can run a vehicle over a track in steps of `dt`.
+pub(super) fn can_run(model: &TrackModel, dt: f64) -> bool {
+    model.is_linear()
+        || model.force_laws().is_empty()
+            && model.vehicle().oscillators.is_empty()
+            && condensed::apart(model, dt)
+            && condensed::hanging(model, dt).is_some()
+}
+
+/// Runs the vehicle over many tracks, each with its own surface. The records have the order of the tracks.
 ///
 /// Each record equals that of [`super::pass`] up to rounding. Order and grouping of the cases do not
 /// change a single bit. Cases with the same design, mesh and kinds of extension are computed in groups
@@ -101,10 +111,18 @@ impl Solver {
 
     /// Contact forces of eight cases at the start and after every step.
     fn run(&self, cases: [&Case; LANES], pass: &Pass) -> Result<Vec<Block>, PassError> {
-        let heights = cases.map(|case| pass.heights_m(case.model, case.surface));
-        let heights: Vec<Block> =
-            (0..=pass.steps()).map(|step| Block::from_fn(|lane| heights[lane][step])).collect();
+        let side_by_side = |heights: [Vec<f64>; LANES]| -> Vec<Block> {
+            (0..=pass.steps()).map(|step| Block::from_fn(|lane| heights[lane][step])).collect()
+        };
         let models = cases.map(|case| case.model);
+        let further = models[0].vehicle().further_wheels_m.iter().map(|&ahead_m| {
+            side_by_side(cases.map(|case| {
+                let height = |step| pass.further_height_m(case.model, case.surface, step, ahead_m);
+                (0..=pass.steps()).map(height).collect()
+            }))
+        });
+        let first = side_by_side(cases.map(|case| pass.heights_m(case.model, case.surface)));
+        let heights: Vec<_> = [first].into_iter().chain(further).collect();
         match self {
             Self::Condensed(solver) => {
                 let hanging = cases.map(|case| {
@@ -112,7 +130,7 @@ impl Solver {
                 });
                 solver.run(models, hanging, pass, &heights)
             }
-            Self::General(solver) => solver.run(models, pass, &heights),
+            Self::General(solver) => solver.run(models, pass, &heights[0]),
         }
     }
 }
@@ -280,6 +298,33 @@ mod tests {
             let fast = &passes(&[model], &pass(), std::slice::from_ref(&surface)).unwrap()[0];
             assert_near(&plain, fast);
         }
+    }
+
+    #[test]
+    fn the_lanes_agree_with_the_plain_solver_on_wheels_ahead_and_behind() {
+        let (mesh, surface) = (Mesh::uniform(30, 4, 4), Surface::rough(1, 3.0, 1.0));
+        let supports = vec![Support::from(&ParameterSet::nominal()); 29];
+        let track = |further_wheels_m: &[f64]| {
+            let mut design = TrackDesign::v_track();
+            design.wheel.further_wheels_m = further_wheels_m.to_vec();
+            TrackModel::build(&design, &mesh, &supports, &[]).unwrap()
+        };
+        let pass = Pass { start_m: 14.0 * SPACING_M, end_m: 16.3 * SPACING_M, ..pass() };
+        let run = |further_wheels_m: &[f64]| {
+            let model = track(further_wheels_m);
+            assert!(can_run(&model, pass.time_step_s));
+            let plain = time::pass(&model, &pass, &surface).unwrap();
+            let fast = passes(&[model], &pass, std::slice::from_ref(&surface)).unwrap().remove(0);
+            assert_near(&plain, &fast);
+            fast
+        };
+        let alone = run(&[]);
+        for further in [&[-1.4, 1.5][..], &[-1.0], &[1.2]] {
+            let changes = run(further).acceleration_m_s2.into_iter().zip(&alone.acceleration_m_s2);
+            let change = rms(changes.map(|(with, without)| with - without));
+            assert!(change > 1e-3 * rms(alone.acceleration_m_s2.iter().copied()), "{further:?}");
+        }
+        assert!(!can_run(&track(&[-0.5]), pass.time_step_s));
     }
 
     #[test]

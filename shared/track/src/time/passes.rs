@@ -7,8 +7,9 @@ use crate::model::{Surface, TrackModel};
 /// tracks.
 ///
 /// Each record equals that of [`super::pass`] up to rounding. Order and grouping of the cases do not
-/// change a single bit. The fast solver computes linear tracks ([`TrackModel::is_linear`]) in groups.
-/// The plain solver computes tracks with force laws, a second wheel or parts that move on the wheel.
+/// change a single bit. The fast solver computes linear tracks ([`TrackModel::is_linear`]) in groups, also
+/// with distant further wheels. The plain solver computes tracks with force laws, near wheels or parts that
+/// move on the wheel.
 ///
 /// # Errors
 /// [`PassError`] of a case that fails.
@@ -17,19 +18,21 @@ pub fn passes(
     pass: &Pass,
     surfaces: &[Surface],
 ) -> Result<Vec<PassRecord>, PassError> {
-    if models.iter().all(TrackModel::is_linear) || models.len() != surfaces.len() {
+    let is_fast: Vec<bool> =
+        models.iter().map(|model| lanes::can_run(model, pass.time_step_s)).collect();
+    if is_fast.iter().all(|is_fast| *is_fast) || models.len() != surfaces.len() {
         return lanes::passes(models, pass, surfaces);
     }
-    let linear: Vec<_> = (0..models.len()).filter(|&case| models[case].is_linear()).collect();
-    let chosen = linear.iter().map(|&case| (models[case].clone(), surfaces[case].clone()));
-    let (linear_models, linear_surfaces): (Vec<_>, Vec<_>) = chosen.unzip();
-    let mut fast = lanes::passes(&linear_models, pass, &linear_surfaces)?.into_iter();
-    let record = |(model, surface): (&TrackModel, &Surface)| {
-        if model.is_linear() {
-            Ok(fast.next().expect("every linear track has been run"))
+    let chosen = (0..models.len()).filter(|&case| is_fast[case]);
+    let chosen = chosen.map(|case| (models[case].clone(), surfaces[case].clone()));
+    let (fast_models, fast_surfaces): (Vec<_>, Vec<_>) = chosen.unzip();
+    let mut fast = lanes::passes(&fast_models, pass, &fast_surfaces)?.into_iter();
+    let record = |((model, surface), is_fast): ((&TrackModel, &Surface), bool)| {
+        if is_fast {
+            Ok(fast.next().expect("every case of the fast solver has been run"))
         } else {
             newmark::pass(model, pass, surface)
         }
     };
-    models.iter().zip(surfaces).map(record).collect()
+    models.iter().zip(surfaces).zip(is_fast).map(record).collect()
 }

@@ -13,7 +13,7 @@ use super::block::{Block, LANES};
 use super::state::State;
 use crate::model::{HertzContact, Layout, TrackModel};
 use crate::time::{Pass, PassError};
-use motion::{CondensedState, NodeState, Station};
+use motion::{CondensedState, FurtherWheel, NodeState, Station};
 use rail::{Factor, Node, NodeRows, node_dofs, node_rows};
 use std::ops::Range;
 pub(in crate::time::lanes) use substructure::Hanging;
@@ -30,50 +30,84 @@ pub(super) fn hanging(model: &TrackModel, dt: f64) -> Option<Hanging> {
     }
 }
 
+/// Smallest distance of two wheels, in lengths over which the motion of the rail falls by `e` within a step:
+/// `exp(-25)` is 1e-11.
+const APART: f64 = 25.0;
+
+/// Whether the wheels of a vehicle are so far from each other that within a time step of `dt` no wheel moves
+/// the rail under another.
+///
+/// In a step a beam resists as one on a foundation of its own inertia, `4 m / dt²`. Its deflection under a
+/// load falls by `e` over the length `(EI dt² / m)^(1/4)`.
+pub(super) fn apart(model: &TrackModel, dt: f64) -> bool {
+    let (rail, vehicle) = (&model.design().rail, model.vehicle());
+    let bending = rail.bending_stiffness() / rail.mass_per_length();
+    let length_m = (bending * dt * dt).powf(0.25);
+    let mut places_m: Vec<f64> =
+        [0.0].into_iter().chain(vehicle.further_wheels_m.iter().copied()).collect();
+    places_m.sort_by(f64::total_cmp);
+    places_m.windows(2).all(|pair| pair[1] - pair[0] >= APART * length_m)
+}
+
 /// What cases on one pattern have in common.
 pub(super) struct Solver {
-    /// Where the wheel stands at the start and at the end of every step.
-    stations: Vec<Station>,
-    /// The elements it passes.
+    /// Where each wheel stands at the start and at the end of every step, the first wheel first.
+    stations: Vec<Vec<Station>>,
+    /// The elements they pass.
     elements: Range<usize>,
 }
 
 impl Solver {
     pub(super) fn new(model: &TrackModel, pass: &Pass) -> Self {
-        let station = |step| Station::new(model, pass, pass.position_m(step));
-        let stations: Vec<_> = (0..=pass.steps()).map(station).collect();
-        // The wheel goes forward.
-        let elements = stations[0].element..stations[stations.len() - 1].element + 1;
-        Self { stations, elements }
+        let stations = |ahead_m: f64| -> Vec<Station> {
+            let station = |step| Station::new(model, pass, pass.position_m(step) + ahead_m);
+            (0..=pass.steps()).map(station).collect()
+        };
+        let further = model.vehicle().further_wheels_m.iter().copied();
+        let stations: Vec<_> = [0.0].into_iter().chain(further).map(stations).collect();
+        // The wheels go forward.
+        let first = stations.iter().map(|of| of[0].element).fold(usize::MAX, usize::min);
+        let last = stations.iter().map(|of| of[of.len() - 1].element).fold(0, usize::max);
+        Self { stations, elements: first..last + 1 }
     }
 
-    /// Contact forces at the start and after every step, over surfaces of these heights in m.
+    /// Contact forces of the first wheel at the start and after every step. `heights_m` are those of the
+    /// surface under each wheel.
     pub(super) fn run(
         &self,
         models: [&TrackModel; LANES],
         hanging: [&Hanging; LANES],
         pass: &Pass,
-        heights_m: &[Block],
+        heights_m: &[Vec<Block>],
     ) -> Result<Vec<Block>, PassError> {
-        let motion = self.start(models, hanging, pass, heights_m[0])?;
-        Ok(motion.run(&self.stations[1..], &heights_m[1..]))
+        let motion = self.start(models, hanging, pass, heights_m)?;
+        Ok(motion.run(&self.stations[0][1..], &heights_m[0][1..]))
     }
 
-    /// The wheels at rest at the first station, over surfaces of these heights.
+    /// The wheels at rest at their first stations, over surfaces of these heights.
     fn start(
         &self,
         models: [&TrackModel; LANES],
         hanging: [&Hanging; LANES],
         pass: &Pass,
-        height_m: Block,
+        heights_m: &[Vec<Block>],
     ) -> Result<CondensedState, PassError> {
-        let (dt, station) = (pass.time_step_s, &self.stations[0]);
+        let dt = pass.time_step_s;
         let wheel = &models[0].vehicle().wheel;
         let contact = HertzContact::new(models[0].design());
         let condensed = Condensed { models, hanging };
-        let rest = condensed.at_rest(station, wheel.load_n)?;
-        let given = contact.approach(wheel.load_n) + station.local_flexibility * wheel.load_n;
-        let rail_m = station.deflection(&rest) + height_m;
+        let first: Vec<&Station> = self.stations.iter().map(|of| &of[0]).collect();
+        let rest = condensed.at_rest(&first, wheel.load_n)?;
+        let at_rest = |station: &Station, height_m: Block| {
+            let given = contact.approach(wheel.load_n) + station.local_flexibility * wheel.load_n;
+            State::at_rest(station.deflection(&rest) + height_m + Block::splat(given))
+        };
+        let further = self.stations.iter().zip(heights_m).skip(1);
+        let further = further.map(|(stations, heights_m)| FurtherWheel {
+            wheel: at_rest(&stations[0], heights_m[0]),
+            stations: stations.clone(),
+            heights_m: heights_m.clone(),
+        });
         let place = |dof| place(models[0].layout(), dof);
         let mut supports = Supports::at_rest(hanging, place, &rest);
         // At rest a step changes nothing; it says what the supports push with.
@@ -83,7 +117,8 @@ impl Solver {
             contact,
             load: Block::splat(wheel.load_n),
             wheel_compliance: Block::splat(dt * dt / (4.0 * wheel.mass_kg)),
-            wheel: State::at_rest(rail_m + Block::splat(given)),
+            wheel: at_rest(first[0], heights_m[0][0]),
+            further: further.collect(),
             inertia: condensed.inertia(dt),
             factor: condensed.step_stiffness(dt, self.elements.clone())?,
             rail: rest.iter().map(|&node| NodeState { inertial: node, viscous: node }).collect(),
@@ -134,15 +169,18 @@ impl Condensed<'_> {
         }
     }
 
-    /// Displacements of the rail under the standing wheel.
-    fn at_rest(&self, station: &Station, load_n: f64) -> Result<Vec<Node>, PassError> {
+    /// Displacements of the rail under the standing wheels.
+    fn at_rest(&self, stations: &[&Station], load_n: f64) -> Result<Vec<Node>, PassError> {
         let mut rows = self.rows([0.0, 0.0, 1.0], 1.0);
         self.relieve(&mut rows, |hanging, dof| hanging[&dof].static_relief);
         let mut loads = vec![Node::default(); rows.len()];
-        let shares = station.shape.map(|share| Block::splat(share * load_n));
-        loads[station.element] = [shares[0], shares[1]];
-        loads[station.element + 1] = [shares[2], shares[3]];
-        Factor::new(&rows, station.element..station.element + 1)?.solve(&mut loads);
+        for station in stations {
+            let [a, b, c, d] = station.shape.map(|share| Block::splat(share * load_n));
+            loads[station.element] = [a, b];
+            loads[station.element + 1] = [c, d];
+        }
+        let met = stations[0].element;
+        Factor::new(&rows, met..met + 1)?.solve(&mut loads);
         Ok(loads)
     }
 

@@ -65,6 +65,17 @@ pub(super) struct CondensedState {
     /// What the displacement of an eliminated node would be but for the next node's; after
     /// substitution the displacements.
     pub(super) solution: Vec<Node>,
+    pub(super) further: Vec<FurtherWheel>,
+}
+
+/// A further wheel, so far from the others that within a step no wheel moves the rail under another
+/// ([`super::apart`]). Its contact force therefore follows from the motion without contact forces.
+pub(super) struct FurtherWheel {
+    pub(super) wheel: State,
+    /// Its places at the start and at the end of every step.
+    pub(super) stations: Vec<Station>,
+    /// Heights of the surface in m under it, at the same times.
+    pub(super) heights_m: Vec<Block>,
 }
 
 impl CondensedState {
@@ -74,11 +85,14 @@ impl CondensedState {
         Arch::new().dispatch(Run { motion: self, stations, heights_m })
     }
 
-    /// One time step; the contact forces at its end.
+    /// The step `number`, counted from 1; the contact forces at its end.
     #[inline(always)]
-    fn advance(&mut self, station: &Station, height_m: Block) -> Block {
+    fn advance(&mut self, number: usize, station: &Station, height_m: Block) -> Block {
         let element = station.element;
-        let arrived = self.eliminate(element);
+        let mut arrived = self.eliminate(element);
+        for wheel in 0..self.further.len() {
+            self.roll_further(wheel, number, element, &mut arrived);
+        }
         let free = self.factor.meet(element, arrived);
         let shape = station.shape.map(Block::splat);
         let unit = self.factor.meet(element, [[shape[0], shape[1]], [shape[2], shape[3]]]);
@@ -91,6 +105,72 @@ impl CondensedState {
         self.supports.advance(&self.solution, &mut self.pushed);
         self.wheel.advance(self.wheel_compliance.subtracted_from(force, wheel_free));
         force
+    }
+
+    /// Moves a further wheel on, and adds its contact force to the loads that arrive at the element where
+    /// both eliminations meet.
+    #[inline(always)]
+    fn roll_further(&mut self, index: usize, step: usize, element: usize, arrived: &mut [Node; 2]) {
+        let FurtherWheel { stations, heights_m, .. } = &self.further[index];
+        let (station, height_m) = (stations[step], heights_m[step]);
+        let shape = station.shape.map(Block::splat);
+        let met = self.factor.meet(element, *arrived);
+        let free = self.displacements_at(station.element, element, met);
+        let unit = self.factor.meet(station.element, [[shape[0], shape[1]], [shape[2], shape[3]]]);
+        let wheel = &mut self.further[index].wheel;
+        let wheel_free = self.wheel_compliance.mul_add(self.load, wheel.inertial());
+        let overlap = wheel_free - under_wheel(shape, free) - height_m;
+        let compliance = under_wheel(shape, unit) + self.wheel_compliance;
+        let local = Block::splat(station.local_flexibility);
+        let force = contact::forces(self.contact, overlap, compliance + local);
+        wheel.advance(self.wheel_compliance.subtracted_from(force, wheel_free));
+        let load = shape.map(|share| share * force);
+        self.load([[load[0], load[1]], [load[2], load[3]]], station.element, element, arrived);
+    }
+
+    /// Displacements of the nodes of the element `at`, from those of the element where both eliminations
+    /// meet.
+    #[inline(always)]
+    fn displacements_at(&self, at: usize, element: usize, met: [Node; 2]) -> [Node; 2] {
+        let [mut left, mut right] = met;
+        for node in (at + 1..=element).rev() {
+            let passed = self.factor.from_left.at(node).passed;
+            right = left;
+            left = pair::subtract_transposed(passed, left, self.solution[node - 1]);
+        }
+        for node in element + 1..=at {
+            let passed = self.factor.from_right.at(node).passed;
+            left = right;
+            right = pair::subtract_transposed(passed, right, self.solution[node + 1]);
+        }
+        [left, right]
+    }
+
+    /// Adds loads on the nodes of the element `at`, which are already eliminated, to the elimination.
+    #[inline(always)]
+    fn load(&mut self, loads: [Node; 2], at: usize, element: usize, arrived: &mut [Node; 2]) {
+        let [left, right] = loads;
+        if at < element {
+            let mut load = left;
+            let mut next = right;
+            for node in at..element {
+                let inverse = self.factor.from_left.at(node).inverse;
+                self.solution[node] = pair::add_symmetric(inverse, load, self.solution[node]);
+                load = pair::subtract(self.factor.from_left.at(node + 1).passed, load, next);
+                next = Node::default();
+            }
+            arrived[0] = sum(arrived[0], load);
+        } else {
+            let mut load = right;
+            let mut next = left;
+            for node in (element + 2..=at + 1).rev() {
+                let inverse = self.factor.from_right.at(node).inverse;
+                self.solution[node] = pair::add_symmetric(inverse, load, self.solution[node]);
+                load = pair::subtract(self.factor.from_right.at(node - 1).passed, load, next);
+                next = Node::default();
+            }
+            arrived[1] = sum(arrived[1], load);
+        }
     }
 
     /// Elimination from both ends up to the wheel's element; the loads that arrive at its nodes.
@@ -196,6 +276,11 @@ fn under_wheel(shape: [Block; 4], [[a, b], [c, d]]: [Node; 2]) -> Block {
     shape[3].mul_add(d, shape[2].mul_add(c, left))
 }
 
+#[inline(always)]
+fn sum([a, b]: Node, [c, d]: Node) -> Node {
+    [a + c, b + d]
+}
+
 /// Displacements without contact and those of a unit force, put together.
 #[inline(always)]
 fn loaded(free: [Node; 2], unit: [Node; 2], force: Block) -> [Node; 2] {
@@ -216,8 +301,8 @@ impl WithSimd for Run<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Vec<Block> {
         let mut motion = self.motion;
         let mut forces = vec![motion.load];
-        for (station, &height_m) in self.stations.iter().zip(self.heights_m) {
-            forces.push(motion.advance(station, height_m));
+        for (before, (station, &height_m)) in self.stations.iter().zip(self.heights_m).enumerate() {
+            forces.push(motion.advance(before + 1, station, height_m));
         }
         forces
     }
