@@ -1,6 +1,6 @@
 //! The library's clock.
 
-use std::sync::Mutex;
+use parking_lot::Mutex;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Interval of reading the server's time again, because two clocks never run at the same rate.
@@ -33,7 +33,7 @@ impl Clock {
                 ms(since)
             }
             Self::Server(reading) => {
-                let reading = reading.lock().expect("nobody panics while holding it");
+                let reading = reading.lock();
                 reading.unix_ms.saturating_add(ms(reading.at.elapsed()))
             }
         }
@@ -44,7 +44,7 @@ impl Clock {
         match self {
             Self::Machine => false,
             Self::Server(reading) => {
-                let reading = reading.lock().expect("nobody panics while holding it");
+                let reading = reading.lock();
                 reading.at.elapsed() >= READ_EVERY
             }
         }
@@ -53,7 +53,7 @@ impl Clock {
     /// Stores a new reading of the server's clock.
     pub(super) fn set(&self, unix_ms: i64) {
         if let Self::Server(reading) = self {
-            let reading = &mut *reading.lock().expect("nobody panics while holding it");
+            let reading = &mut *reading.lock();
             *reading = Reading { unix_ms, at: Instant::now() };
         }
     }

@@ -1,12 +1,12 @@
 //! The lock of a library's file. The lock is on the file itself and does not depend on the file's name.
 
+use parking_lot::{Mutex, MutexGuard};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fs::{File, TryLockError};
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard};
 
 /// The files that this process has locked at least once, by device and inode.
 ///
@@ -107,7 +107,7 @@ fn beside(path: &Path) -> PathBuf {
 }
 
 fn files() -> MutexGuard<'static, BTreeMap<Identity, Locked>> {
-    FILES.lock().expect("nobody panics while holding it")
+    FILES.lock()
 }
 
 #[cfg(test)]

@@ -10,8 +10,9 @@ use super::retry_budget::RetryBudget;
 use super::writer_shards::{Slot, WriterShards};
 use super::{Connection, Target, postgres};
 use crate::LibraryError;
+use parking_lot::Mutex;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 use tokio::sync::{Notify, mpsc, oneshot};
 use tokio::task::JoinHandle;
@@ -112,7 +113,7 @@ impl Writer {
             task.closing.notify_one();
         }
         for task in &self.tasks {
-            let handle = task.handle.lock().expect("nobody panics while holding it").take();
+            let handle = task.handle.lock().take();
             if let Some(handle) = handle {
                 // A writer that panicked has already failed those who waited for it.
                 let _ = handle.await;
@@ -139,7 +140,7 @@ impl Task {
     }
 
     fn runs(&self) -> bool {
-        let handle = self.handle.lock().expect("nobody panics while holding it");
+        let handle = self.handle.lock();
         handle.as_ref().is_some_and(|handle| !handle.is_finished())
     }
 }

@@ -1,7 +1,8 @@
 //! Distribution of writes over parallel transactions.
 
+use parking_lot::{Mutex, MutexGuard};
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 
 /// Pending writes by shard.
 ///
@@ -43,7 +44,7 @@ impl WriterShards {
     }
 
     fn lock(&self) -> MutexGuard<'_, UnderWay> {
-        self.0.lock().expect("nobody panics while holding it")
+        self.0.lock()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Cursor of the lease queries: lowest index of the waiting cases.
 
+use parking_lot::Mutex;
 use std::collections::HashMap;
-use std::sync::Mutex;
 
 /// Number of full scans per lease duration.
 const LOOKS_PER_LEASE: i64 = 24;
@@ -24,7 +24,7 @@ struct CursorState {
 impl QueueCursor {
     /// Whether a full scan is due; the caller must then run it.
     pub(super) fn is_due(&self, now_unix_ms: i64, lease_ms: i64) -> bool {
-        let mut state = self.0.lock().expect("nobody panics while holding it");
+        let mut state = self.0.lock();
         let since_ms = state.looked_unix_ms.map(|looked| now_unix_ms.saturating_sub(looked));
         // A clock that was set back makes a full scan due.
         let is_due = since_ms.is_none_or(|since| since < 0 || since >= lease_ms / LOOKS_PER_LEASE);
@@ -37,14 +37,14 @@ impl QueueCursor {
 
     /// Invariant: no known case with a lower index is waiting.
     pub(super) fn first_waiting(&self, campaign: &str) -> u32 {
-        let state = self.0.lock().expect("nobody panics while holding it");
+        let state = self.0.lock();
         state.first_waiting.get(campaign).copied().unwrap_or(0)
     }
 
     /// Moves the cursor after a scan from `from` found no waiting case before `to`. The cursor is kept if
     /// another scan has moved it in the meantime.
     pub(super) fn advance(&self, campaign: &str, from: u32, to: u32) {
-        let mut state = self.0.lock().expect("nobody panics while holding it");
+        let mut state = self.0.lock();
         let first = state.first_waiting.entry(campaign.to_owned()).or_insert(0);
         if *first == from {
             *first = to;
@@ -53,7 +53,7 @@ impl QueueCursor {
 
     /// Makes a full scan due for the next lease.
     pub(super) fn forget(&self) {
-        *self.0.lock().expect("nobody panics while holding it") = CursorState::default();
+        *self.0.lock() = CursorState::default();
     }
 }
 

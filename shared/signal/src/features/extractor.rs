@@ -8,12 +8,9 @@ use super::{
     stretch::Stretch,
 };
 use crate::Signal;
+use parking_lot::Mutex;
 use rustfft::num_complex::Complex64;
-use std::{
-    collections::HashMap,
-    ops::Range,
-    sync::{Arc, Mutex, PoisonError},
-};
+use std::{collections::HashMap, ops::Range, sync::Arc};
 use tracktwin_number::rounded;
 
 /// Required ratio of the sample rate to the highest frequency: two by Nyquist, plus a margin for the
@@ -200,14 +197,14 @@ impl Extractor {
         read: impl FnOnce(&Squeezed) -> R,
     ) -> Result<R, FeatureError> {
         let instants = self.instants(signal, &window)?;
-        let mut squeezed = lock(&self.accumulators).pop().unwrap_or_default();
+        let mut squeezed = self.accumulators.lock().pop().unwrap_or_default();
         let halvings = self.bins_hz.iter().map(|&hz| definition.halvings(hz));
         squeezed.clear(halvings, instants.count);
         self.voices(signal, window, definition, |halvings, voice, weighted| {
             squeezed.add(&self.bins, halvings, voice, weighted);
         })?;
         let result = read(&squeezed);
-        lock(&self.accumulators).push(squeezed);
+        self.accumulators.lock().push(squeezed);
         Ok(result)
     }
 
@@ -223,9 +220,9 @@ impl Extractor {
         let stretch = self.stretch(signal, &window)?;
         let instants = self.instants(signal, &window)?;
         let plan = self.plan(signal.sample_rate_hz(), instants.planned(), definition);
-        let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
+        let mut buffers = self.buffers.lock().pop().unwrap_or_default();
         plan.run(&stretch, &mut buffers, take);
-        lock(&self.buffers).push(buffers);
+        self.buffers.lock().push(buffers);
         Ok(())
     }
 
@@ -278,25 +275,19 @@ impl Extractor {
         definition: &FeatureDefinition,
     ) -> Arc<Plan> {
         let key = (sample_rate_hz.to_bits(), instants, definition.thinned);
-        if let Some(plan) = lock(&self.plans).get(&key) {
+        if let Some(plan) = self.plans.lock().get(&key) {
             return Arc::clone(plan);
         }
         // Made outside the lock: two threads may make the same plan, none waits for it.
         let plan = Plan::new(definition, &self.voices_hz, sample_rate_hz, instants);
         let plan = Arc::new(plan);
-        let mut plans = lock(&self.plans);
+        let mut plans = self.plans.lock();
         if plans.len() >= PLANS_KEPT {
             plans.clear();
         }
         plans.insert(key, Arc::clone(&plan));
         plan
     }
-}
-
-/// Locks a mutex, also after a panic of another thread. Buffers and plans stay valid, because no later
-/// read depends on partly written data.
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
