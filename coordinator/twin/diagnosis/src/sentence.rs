@@ -89,7 +89,7 @@ fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     )
 }
 
-/// Description of unknown physics: its port and its behaviour.
+/// Description of unknown physics: its port, the family that it is most like, and its behaviour.
 fn unknown(hypothesis: &Hypothesis) -> String {
     let port = match hypothesis.port.as_deref() {
         Some("rail_seat") => " under the rail seat",
@@ -101,7 +101,11 @@ fn unknown(hypothesis: &Hypothesis) -> String {
     };
     let does = hypothesis.behaviour.and_then(|element| element.words(&hypothesis.parameters));
     let does = does.map_or(String::new(), |does| format!("; it {does}"));
-    format!("something{port} that no kind in the catalogue explains{does}")
+    // The families of unknown physics have no kinds, and the port already states them.
+    let is_family = |kind: &&Kind| hypothesis.family.as_deref() == Some(kind.family.name());
+    let like = Kind::all().find(is_family);
+    let like = like.map_or(String::new(), |kind| format!(", most like {}", kind.family.words()));
+    format!("something{port} that no kind in the catalogue explains{like}{does}")
 }
 
 /// The text with a capital first letter.
@@ -291,7 +295,13 @@ mod tests {
             "At SN24, 3.00 m: something under the rail seat that no kind in the catalogue explains; it \
              acts like a mass of 0.41 kg on a spring, at 900 Hz (unknown_physics, 99 %)."
         );
-        let everywhere = Hypothesis { location: None, behaviour: None, ..absorber };
+        let support = Hypothesis { family: Some("support".to_owned()), ..absorber.clone() };
+        assert!(named(&support, &track()).contains(
+            "explains, most like a support of sleepers that is lost, soft or layered; it acts"
+        ));
+        let structure = Hypothesis { family: Some("unknown_structure".to_owned()), ..absorber };
+        assert!(named(&structure, &track()).contains("explains; it acts"));
+        let everywhere = Hypothesis { location: None, behaviour: None, ..structure };
         assert_eq!(
             named(&everywhere, &track()),
             "at all sleepers: something under the rail seat that no kind in the catalogue explains \
