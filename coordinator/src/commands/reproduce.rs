@@ -100,7 +100,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None => None,
     };
     let material = Material::read(&library, &campaign, models).await?;
-    let reproduction = compute(|| compare(&figures, &experiment, &material)).or_input()?;
+    let reproduction = compare(&figures, &experiment, &material).await.or_input()?;
     write(&reproduction, out, arguments.force)?;
     if arguments.json {
         print_json(&reproduction);
@@ -207,7 +207,7 @@ impl Material {
     }
 }
 
-fn compare(
+async fn compare(
     figures: &[Figure],
     experiment: &Experiment,
     material: &Material,
@@ -215,9 +215,9 @@ fn compare(
     let set = material.set();
     let mut examples = if figures.iter().any(|figure| figure.needs_passes()) {
         let stages = Stages::default();
-        let recordings = tracktwin_reproduction::recordings(figures, experiment, &mut |share| {
-            stages.at("examples", share);
-        })?;
+        let mut at = |share| stages.at("examples", share);
+        let recordings =
+            compute(|| tracktwin_reproduction::recordings(figures, experiment, &mut at))?;
         stages.end();
         recordings
     } else {
@@ -234,7 +234,8 @@ fn compare(
     for (done, &figure) in figures.iter().enumerate() {
         progress.at(done as u64, figure.name());
         let recordings = examples.remove(&figure).unwrap_or_default();
-        all.extend(pipeline::reproduce::compared(figure, &results, evaluator, recordings)?);
+        let compared = pipeline::reproduce::compared(figure, &results, evaluator, recordings);
+        all.extend(compared.await?);
     }
     progress.end();
     let provenance = Provenance {

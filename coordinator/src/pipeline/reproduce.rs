@@ -1,9 +1,11 @@
 //! Computes the figures of the paper from a library and models.
 
+use crate::pipeline::compute::compute;
 use crate::pipeline::evaluate::Evaluator;
+use crate::pipeline::invert::{InvertingError, invert};
 use crate::pipeline::train;
 use tracktwin_experiment::Experiment;
-use tracktwin_parameters::TrackDesign;
+use tracktwin_parameters::{Preset, TrackDesign};
 use tracktwin_reproduction::{
     Compared, EXAMPLE_SPANS, Error, EvaluatedExample, Figure, Predictions, RecordedExample,
     Results, SPEED_KM_H, Source,
@@ -37,6 +39,9 @@ pub enum ReproducingError {
     /// The recording of an example cannot be evaluated.
     #[error(transparent)]
     Evaluation(#[from] tracktwin_evaluation::Error),
+    /// The recording of an example cannot be evaluated by inversion.
+    #[error(transparent)]
+    Inversion(#[from] InvertingError),
     /// The models do not belong to the library.
     #[error(transparent)]
     Surrogate(#[from] tracktwin_surrogate::Error),
@@ -62,23 +67,25 @@ pub fn check(experiment: &Experiment, figures: &[Figure]) -> Result<(), Reproduc
 ///
 /// # Errors
 /// Returns [`ReproducingError`] if data are missing or an example cannot be evaluated.
-pub fn compared(
+pub async fn compared(
     figure: Figure,
     results: &Results<'_>,
     evaluator: Option<&Evaluator>,
     recordings: Vec<RecordedExample>,
 ) -> Result<Option<Compared>, ReproducingError> {
     Ok(match (figure.source(), evaluator) {
-        (Source::Results(compare), _) => Some(compare(results)?),
-        (Source::Passes(compare), _) => Some(compare(results.experiment, &recordings)?),
+        (Source::Results(compare), _) => Some(compute(|| compare(results))?),
+        (Source::Passes(compare), _) => Some(compute(|| compare(results.experiment, &recordings))?),
         (Source::Models(_) | Source::Examples(_), None) => None,
         (Source::Models(compare), Some(evaluator)) => {
             let models = evaluator.models();
-            let tested = &tested(results.set, models)?;
-            Some(compare(&Predictions { results, models, tested })?)
+            Some(compute(|| {
+                let tested = &tested(results.set, models)?;
+                Ok::<_, ReproducingError>(compare(&Predictions { results, models, tested })?)
+            })?)
         }
         (Source::Examples(compare), Some(evaluator)) => {
-            Some(compare(&evaluated(evaluator, recordings)?))
+            Some(compare(&evaluated(figure, evaluator, recordings).await?))
         }
     })
 }
@@ -91,15 +98,26 @@ fn tested(set: &TrainingSet, models: &Trained) -> Result<Vec<Tested>, Reproducin
     Ok(tested.unwrap_or_default())
 }
 
-/// Evaluates the recordings of the examples.
-fn evaluated(
+/// Evaluates the recordings of the examples of a figure, with models and, for local changes, by inversion
+/// too.
+async fn evaluated(
+    figure: Figure,
     evaluator: &Evaluator,
     recordings: Vec<RecordedExample>,
 ) -> Result<Vec<EvaluatedExample>, ReproducingError> {
-    let told = |(example, recording)| {
-        Ok(EvaluatedExample::new(example, &evaluator.evaluate(&recording)?)?)
-    };
-    recordings.into_iter().map(told).collect()
+    let track = Preset::VTrack.track();
+    let mut all = Vec::with_capacity(recordings.len());
+    for (example, recording) in recordings {
+        let evaluation = compute(|| evaluator.evaluate(&recording))?;
+        let mut evaluated = EvaluatedExample::new(example, &evaluation)?;
+        if figure == Figure::Fig19 {
+            let inversion = invert(&recording, &track, None, &|_, _| ()).await?;
+            let found = inversion.sleepers.iter().map(|it| (&*it.id, &it.estimates));
+            evaluated = evaluated.with_inversion(found)?;
+        }
+        all.push(evaluated);
+    }
+    Ok(all)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use crate::{Error, Figure};
 use Parameter::{BallastStiffness, IrregularityLevel, RailpadStiffness, SleeperBendingStiffness};
-use tracktwin_evaluation::{Estimate, Evaluation};
+use tracktwin_evaluation::{Estimate, Estimates, Evaluation};
 use tracktwin_parameters::{Parameter, ParameterSet};
 
 /// Sleepers of a track section (paper, Fig. 15).
@@ -134,7 +134,9 @@ pub struct EvaluatedExample {
     /// The truth.
     pub example: Example,
     /// Estimates, one per sleeper.
-    pub sleepers: Vec<tracktwin_evaluation::Estimates>,
+    pub sleepers: Vec<Estimates>,
+    /// Estimates of the same recording by inversion; `None` if it was evaluated with models only.
+    pub inverted: Option<Vec<Estimates>>,
 }
 
 impl EvaluatedExample {
@@ -143,22 +145,27 @@ impl EvaluatedExample {
     /// # Errors
     /// [`Error::NotEstimated`] names the sleeper and the parameter without an estimate.
     pub fn new(example: Example, evaluation: &Evaluation) -> Result<Self, Error> {
-        let figure = example.figure;
-        let of = |number: usize| {
-            let id = Example::sleeper(number);
-            let sleeper = evaluation.sleepers.iter().find(|sleeper| sleeper.id == id);
-            let estimates = sleeper.map(|sleeper| sleeper.estimates.clone()).unwrap_or_default();
-            let varied =
-                [RailpadStiffness, BallastStiffness, SleeperBendingStiffness, IrregularityLevel];
-            match varied.iter().find(|parameter| !estimates.contains_key(parameter)) {
-                Some(missing) => {
-                    Err(Error::NotEstimated { figure, sleeper: number, symbol: missing.symbol() })
-                }
-                None => Ok(estimates),
-            }
-        };
-        let sleepers = (1..=SLEEPERS).map(of).collect::<Result<_, _>>()?;
-        Ok(Self { example, sleepers })
+        let found = evaluation.sleepers.iter().map(|sleeper| (&*sleeper.id, &sleeper.estimates));
+        let sleepers = complete(example.figure, found)?;
+        Ok(Self { example, sleepers, inverted: None })
+    }
+
+    /// Adds the estimates of an inversion of the example's recording: id and estimates of each sleeper.
+    ///
+    /// # Errors
+    /// [`Error::NotEstimated`] names the sleeper and the parameter without an estimate.
+    pub fn with_inversion<'a>(
+        mut self,
+        found: impl Iterator<Item = (&'a str, &'a Estimates)>,
+    ) -> Result<Self, Error> {
+        self.inverted = Some(complete(self.example.figure, found)?);
+        Ok(self)
+    }
+
+    /// The example with the estimates of its inversion instead of those of the models.
+    pub(crate) fn by_inversion(&self) -> Option<Self> {
+        let sleepers = self.inverted.clone()?;
+        Some(Self { example: self.example.clone(), sleepers, inverted: None })
     }
 
     /// What is true of a sleeper, counted from 1.
@@ -179,6 +186,28 @@ impl EvaluatedExample {
     ) -> Vec<Estimate> {
         sleepers.into_iter().map(|sleeper| self.estimate(sleeper, parameter)).collect()
     }
+}
+
+/// The estimates of all sleepers of an example, in their order.
+fn complete<'a>(
+    figure: Figure,
+    found: impl Iterator<Item = (&'a str, &'a Estimates)>,
+) -> Result<Vec<Estimates>, Error> {
+    let found: Vec<_> = found.collect();
+    let of = |number: usize| {
+        let name = Example::sleeper(number);
+        let sleeper = found.iter().find(|(id, _)| *id == name);
+        let estimates = sleeper.map(|(_, estimates)| (*estimates).clone()).unwrap_or_default();
+        let varied =
+            [RailpadStiffness, BallastStiffness, SleeperBendingStiffness, IrregularityLevel];
+        match varied.iter().find(|parameter| !estimates.contains_key(parameter)) {
+            Some(missing) => {
+                Err(Error::NotEstimated { figure, sleeper: number, symbol: missing.symbol() })
+            }
+            None => Ok(estimates),
+        }
+    };
+    (1..=SLEEPERS).map(of).collect()
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use crate::{ClaimVerdict, Compared, EvaluatedExample, Example, Figure, examples};
 use tracktwin_evaluation::Estimate;
-use tracktwin_parameters::{Parameter, ParameterSet};
+use tracktwin_parameters::{Parameter, ParameterSet, Scale};
 use tracktwin_surrogate::TrainingSet;
 
 /// Frequencies of the made-up bins: 24 an octave from 50 to 4000 Hz.
@@ -55,6 +55,7 @@ pub(crate) fn library(
         frequencies_hz: frequencies_hz.clone(),
         speeds_km_h: speeds_km_h.to_vec(),
         varied: Parameter::ALL.to_vec(),
+        scales: vec![Scale::Linear; Parameter::COUNT],
         parameters: sets.iter().flat_map(|set| *set.values()).collect(),
         campaign: "made up".to_owned(),
         library_digest: "0123".to_owned(),
@@ -92,7 +93,7 @@ pub(crate) fn told(
             all.map(|&parameter| (parameter, estimate(&example, at, parameter))).collect()
         };
         let sleepers = (1..=example.sleepers.len()).map(sleeper).collect();
-        EvaluatedExample { example, sleepers }
+        EvaluatedExample { example, sleepers, inverted: None }
     };
     examples(figure).into_iter().map(of).collect()
 }
