@@ -15,6 +15,7 @@ use crate::pipeline::lack::check_for_training;
 use crate::pipeline::models;
 use anyhow::anyhow;
 use clap::Args;
+use sample::Sample;
 use serde_json::{Value, json};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -34,9 +35,10 @@ const MODELS: &str = "models";
 #[command(after_help = "\
 Examples:
   tracktwin run --out out
+  tracktwin run --preset 60E1-concrete --out line
   tracktwin run mine.toml --cases 1000 --out mine
 
-In the output folder: library.sqlite, models/, sample/ (the bundled recording), report.html and the
+In the output folder: library.sqlite, models/, sample/ (a bundled recording), report.html and the
 files of `tracktwin evaluate`. Repeat the command to continue an interrupted run.
 
 Next: `tracktwin evaluate RIDE --models out/models --library sqlite:out/library.sqlite --out DIR`
@@ -68,7 +70,7 @@ pub(super) struct Arguments {
     /// Simulate only; do not train models.
     #[arg(long)]
     no_train: bool,
-    /// Recording to evaluate [default: a bundled sample].
+    /// Recording to evaluate [default: a bundled sample, of V-Track or of 60E1-concrete].
     #[arg(long, value_name = "DIR", conflicts_with = "no_train")]
     recording: Option<PathBuf>,
     /// Number of cores for the simulation [default: all].
@@ -143,7 +145,8 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let out = &arguments.out;
     if trains {
         models::check_files(&out.join(MODELS), arguments.force.force)?;
-        sample::check_files(&out.join("sample"), arguments.force)?;
+        let sample = Sample::nearest(&campaign.definition.experiment.design);
+        sample.check_files(&out.join("sample"), arguments.force)?;
         evaluate::check_files(out, arguments.force)?;
     }
     make_folder(out)?;
@@ -225,10 +228,11 @@ async fn chain(
     Ok(Made { models: Some(folder), evaluation })
 }
 
-/// The bundled recording, if models of the campaign can evaluate it; otherwise a line states that
-/// nothing will be evaluated.
+/// The bundled recording nearest to the campaign's track, if models of the campaign can evaluate it;
+/// otherwise a line states that nothing will be evaluated.
 fn sample_for(campaign: &Campaign, out: &Path, force: Force) -> Result<Option<Recording>, Stop> {
-    let recording = sample::open(&out.join("sample"), force)?;
+    let sample = Sample::nearest(&campaign.definition.experiment.design);
+    let recording = sample.open(&out.join("sample"), force)?;
     match check(&recording, campaign) {
         Ok(()) => Ok(Some(recording)),
         Err(other) => {
