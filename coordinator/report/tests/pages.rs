@@ -8,7 +8,7 @@ use tracktwin_evaluation::{
     BeyondEnd, Estimate, Estimates, Evaluation, FORMAT, Flag, Known, Measured, OutsideLibrary,
     Provenance, Selected, SleeperEvaluation, Unevenness,
 };
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, Scale};
 use tracktwin_report::{
     ReceptanceCurve, evaluation_chart, evaluation_page, models_page, receptance_chart,
 };
@@ -143,6 +143,7 @@ fn models() -> Trained {
         speeds_km_h: vec![10.0, 13.0],
         log_power: vec![table(0), table(1)],
         varied: vec![Parameter::RailpadStiffness, Parameter::IrregularityLevel],
+        scales: vec![Scale::Linear; 2],
         parameters,
         campaign: "synthetic".to_owned(),
         library_digest: "0123abcd".to_owned(),

@@ -252,6 +252,12 @@ pub(super) async fn evaluate(
     check_recording(&recording, evaluator.design(), &evaluator.set().speeds_km_h).or_input()?;
     make_folder(folder)?;
     let mut evaluation = evaluator.evaluate(&recording).or_input()?;
+    let outside = evaluation.outside_library.sentences();
+    evaluation
+        .notes
+        .iter()
+        .filter(|note| !outside.contains(note))
+        .for_each(|it| println_stderr(it));
     evaluation.notes.splice(0..0, notes);
     if let Some(lost) = chain::loss_of_contact(&recording) {
         flag(&mut evaluation, &lost, recording.passes.len());

@@ -2,7 +2,7 @@
 
 use crate::pipeline;
 use crate::pipeline::train::TrainingError;
-use tracktwin_evaluation::{Domains, Error, Evaluation, Stream, Twin};
+use tracktwin_evaluation::{BySpeeds, Error, Evaluation, Stream, Twin};
 use tracktwin_experiment::Experiment;
 use tracktwin_library::{Library, LibraryError};
 use tracktwin_parameters::{ParameterSet, TrackDesign};
@@ -16,7 +16,7 @@ pub struct Evaluator {
     pub extractor: Extractor,
     models: Trained,
     set: TrainingSet,
-    domains: Domains,
+    by_speeds: BySpeeds,
     experiment: Experiment,
     fixed: ParameterSet,
 }
@@ -50,7 +50,7 @@ impl Evaluator {
         let experiment = pipeline::train::experiment(&campaign)?;
         let extractor = Extractor::new(&experiment.features)?;
         let fixed = pipeline::train::fixed(&campaign)?;
-        Ok(Self { extractor, models, set, domains: Domains::default(), experiment, fixed })
+        Ok(Self { extractor, models, set, by_speeds: BySpeeds::default(), experiment, fixed })
     }
 
     /// The trained models.
@@ -99,7 +99,7 @@ impl Evaluator {
             extractor: &self.extractor,
             models: &self.models,
             library: &self.set,
-            domains: &self.domains,
+            by_speeds: &self.by_speeds,
         }
     }
 }

@@ -1,16 +1,21 @@
 //! Creates the training set of surrogates from a library.
 
+use std::f64::consts::TAU;
 use tracktwin_experiment::{Experiment, ExperimentError};
 use tracktwin_library::{CampaignRecord, Library, LibraryError};
-use tracktwin_parameters::{Parameter, ParameterSet};
+use tracktwin_parameters::{Axis, Parameter, ParameterSet, Scale};
 use tracktwin_signal::{FeatureDefinition, FeatureSet};
 use tracktwin_surrogate::ENTRIES_MIN;
 use tracktwin_surrogate::Tested;
 use tracktwin_surrogate::{FeatureColumns, ModelGroup, Split, TrainOptions, Trained, TrainingSet};
+use tracktwin_track::model::ContactPatch;
 
 /// The feature vectors that models are trained on (paper, eq. 9).
 pub(super) const TRAINED: [FeatureSet; 5] =
     [FeatureSet::Gf, FeatureSet::Lf1, FeatureSet::Lf2, FeatureSet::Lf3, FeatureSet::Lf4];
+
+/// Largest relative distance between the end of a range and its last bin: four bins an octave.
+const BIN: f64 = 0.19;
 
 /// Maximum number of test cases shown in a chart.
 const TESTED_SHOWN: usize = 1000;
@@ -88,7 +93,9 @@ pub async fn set(
     library: &Library,
     campaign: &CampaignRecord,
 ) -> Result<TrainingSet, TrainingError> {
-    let features = feature_definition(campaign)?;
+    let experiment = experiment(campaign)?;
+    let frequencies_hz = compared_hz(&experiment);
+    let bins = frequencies_hz.len();
     let speeds = campaign.speeds_km_h.len();
     let mut log_power = vec![Vec::new(); speeds];
     let mut values = Vec::new();
@@ -96,7 +103,7 @@ pub async fn set(
         .training_set(&campaign.id, |entry| {
             values.push(entry.case.parameters);
             for (table, features) in log_power.iter_mut().zip(&entry.features) {
-                table.extend_from_slice(&features.log_power);
+                table.extend_from_slice(&features.log_power[..bins]);
             }
         })
         .await?;
@@ -104,28 +111,53 @@ pub async fn set(
         values.windows(2).any(|pair| pair[0][*parameter] != pair[1][*parameter])
     };
     let varied: Vec<_> = Parameter::ALL.iter().copied().filter(varies).collect();
+    let axes = definition(campaign)?.space;
+    let scale = |parameter: &Parameter| {
+        let axis = axes.iter().find(|axis| axis.parameter == *parameter);
+        axis.map_or(Scale::Linear, |axis| axis.scale)
+    };
+    let scales = varied.iter().map(scale).collect();
     let parameters =
         values.iter().flat_map(|set| varied.iter().map(|&parameter| set[parameter])).collect();
     Ok(TrainingSet {
-        frequencies_hz: features.frequencies_hz(),
+        frequencies_hz,
         speeds_km_h: campaign.speeds_km_h.clone(),
         log_power,
         varied,
+        scales,
         parameters,
         campaign: campaign.id.clone(),
         library_digest: library.digest(&campaign.id).await?,
-        feature_definition: serde_json::to_value(&features).expect("settings become JSON"),
+        feature_definition: serde_json::to_value(&experiment.features)
+            .expect("settings become JSON"),
     })
 }
 
+/// Frequencies in Hz of the bins that models use: all bins of the features. If the contact patch filters the
+/// irregularity: the bins below the waves that it averages out at the lowest speed.
+fn compared_hz(experiment: &Experiment) -> Vec<f64> {
+    let mut frequencies_hz = experiment.features.frequencies_hz();
+    if experiment.design.contact_patch_filter {
+        let patch = ContactPatch::new(&experiment.design);
+        let slowest_m_s =
+            experiment.speeds_km_h.iter().copied().fold(f64::INFINITY, f64::min) / 3.6;
+        frequencies_hz.retain(|frequency_hz| !patch.averages_out(TAU * frequency_hz / slowest_m_s));
+    }
+    frequencies_hz
+}
+
 /// The models to train: the feature vectors of the paper at every speed, and the global feature of all
-/// speeds combined.
+/// speeds combined. Local features that the bins do not contain as a whole are left out.
 pub fn options(set: &TrainingSet) -> TrainOptions {
     let columns = |feature: FeatureSet| FeatureColumns {
         name: feature.name().to_owned(),
         columns: feature.bins(&set.frequencies_hz),
     };
-    TrainOptions::new(TRAINED.into_iter().map(columns).collect())
+    let highest_hz = set.frequencies_hz.last().copied().unwrap_or_default();
+    let is_whole = |feature: &FeatureSet| {
+        *feature == FeatureSet::Gf || feature.range_hz()[1] <= (1.0 + BIN) * highest_hz
+    };
+    TrainOptions::new(TRAINED.into_iter().filter(is_whole).map(columns).collect())
 }
 
 /// True and predicted values of cases that no model was trained on, for the models that combine the most
@@ -178,18 +210,24 @@ pub fn feature_definition(campaign: &CampaignRecord) -> Result<FeatureDefinition
     Ok(experiment(campaign)?.features)
 }
 
+/// Definition of a campaign, without its experiment.
+#[derive(serde::Deserialize)]
+struct Definition {
+    space: Vec<Axis>,
+    fixed: [f64; Parameter::COUNT],
+}
+
+fn definition(campaign: &CampaignRecord) -> Result<Definition, TrainingError> {
+    serde_json::from_str(&campaign.definition_json)
+        .map_err(|source| TrainingError::Definition { campaign: campaign.id.clone(), source })
+}
+
 /// Values of the parameters that a campaign does not vary.
 ///
 /// # Errors
 /// Returns [`TrainingError::Definition`] if the definition cannot be read.
 pub fn fixed(campaign: &CampaignRecord) -> Result<ParameterSet, TrainingError> {
-    #[derive(serde::Deserialize)]
-    struct Definition {
-        fixed: [f64; Parameter::COUNT],
-    }
-    serde_json::from_str::<Definition>(&campaign.definition_json)
-        .map(|definition| ParameterSet::new(definition.fixed))
-        .map_err(|source| TrainingError::Definition { campaign: campaign.id.clone(), source })
+    Ok(ParameterSet::new(definition(campaign)?.fixed))
 }
 
 /// Experiment of a campaign's cases.

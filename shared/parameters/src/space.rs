@@ -22,6 +22,22 @@ impl Scale {
             Self::Logarithmic => low * (high / low).powf(x),
         }
     }
+
+    /// Relative position of a value in a range, from 0 (lowest) to 1 (highest).
+    pub fn share(self, [low, high]: [f64; 2], value: f64) -> f64 {
+        match self {
+            Self::Linear => (value - low) / (high - low),
+            Self::Logarithmic => (value / low).ln() / (high / low).ln(),
+        }
+    }
+
+    /// Derivative of the value by its relative position in a range, at a value.
+    pub fn slope(self, [low, high]: [f64; 2], value: f64) -> f64 {
+        match self {
+            Self::Linear => high - low,
+            Self::Logarithmic => value * (high / low).ln(),
+        }
+    }
 }
 
 /// One varied parameter and its range, in the parameter's unit.
@@ -139,6 +155,20 @@ mod tests {
         assert_eq!(refused(vec![axis(p, f64::NAN, 1.0)]), SpaceError::NotFinite(p));
         assert_eq!(refused(vec![axis(p, -1.0, 1.0)]), SpaceError::NotPositive(p));
         assert_eq!(refused(vec![axis(p, 1.0, 2.0), axis(p, 1.0, 2.0)]), SpaceError::Twice(p));
+    }
+
+    #[test]
+    fn a_relative_position_leads_back_to_its_value() {
+        let range = [2.0, 50.0];
+        for scale in [Scale::Linear, Scale::Logarithmic] {
+            for x in [0.0, 0.3, 1.0] {
+                let value = scale.at(range, x);
+                assert!((scale.share(range, value) - x).abs() < 1e-14);
+                let step = 1e-6;
+                let slope = (scale.at(range, x + step) - scale.at(range, x - step)) / (2.0 * step);
+                assert!((scale.slope(range, value) / slope - 1.0).abs() < 1e-8);
+            }
+        }
     }
 
     proptest! {

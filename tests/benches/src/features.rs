@@ -1,7 +1,7 @@
 //! Signals and feature vectors from fixed seeds.
 
 use faer::Mat;
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, Scale};
 use tracktwin_signal::{FeatureDefinition, Signal};
 use tracktwin_surrogate::TrainingSet;
 
@@ -82,6 +82,7 @@ pub fn library(rows: usize, speeds_km_h: &[f64]) -> TrainingSet {
         speeds_km_h: speeds_km_h.to_vec(),
         log_power: (0..speeds_km_h.len()).map(table).collect(),
         varied: Parameter::ALL.to_vec(),
+        scales: vec![Scale::Linear; Parameter::COUNT],
         parameters: (0..rows).flat_map(|i| parameters.row(i).iter().copied()).collect(),
         campaign: "bench".to_owned(),
         library_digest: "bench".to_owned(),

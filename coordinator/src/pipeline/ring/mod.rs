@@ -19,7 +19,7 @@ use error::no_evaluation;
 use folder::{EVALUATIONS, PAGE, RECORDING, STATEMENTS, TABLE, TRUTH};
 use part::{Part, sections};
 use std::path::{Path, PathBuf};
-use tracktwin_evaluation::{check_recording, features};
+use tracktwin_evaluation::{ModelSpeeds, check_recording, features};
 use tracktwin_files::{FileName, FilesError, Kind, Output, read_text};
 use tracktwin_library::Library;
 use tracktwin_parameters::Preset;
@@ -196,6 +196,7 @@ fn spectra(recording: &Recording, study: &Study) -> Result<RailSpectra, RingStud
     let fastest = study.plan.speeds_km_h.iter().copied().fold(0.0, f64::max);
     let definition = FeatureDefinition::default();
     let extractor = Extractor::new(&definition)?;
-    let found = features(&Part::Speed(fastest).of(recording), &extractor, &[fastest])?;
+    let found =
+        features(&Part::Speed(fastest).of(recording), &extractor, &ModelSpeeds::only(&[fastest]))?;
     Ok(RailSpectra::new(&study.truth, fastest, definition.frequencies_hz(), &found))
 }

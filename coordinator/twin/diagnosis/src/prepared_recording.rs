@@ -30,10 +30,6 @@ const SAMPLE_RATE_SHARE: f64 = 0.35;
 /// Smallest number of bands for a diagnosis.
 const BANDS_MIN: usize = 12;
 
-/// Powers are not compared if the wave number times half the length of the contact patch exceeds this
-/// value.
-const PATCH_WAVE_NUMBER: f64 = 4.0;
-
 /// Smallest number of neighbouring sleepers that all passes must cover.
 const SLEEPERS_MIN: usize = 6;
 
@@ -304,19 +300,18 @@ impl PreparedRecording {
     }
 
     /// A sleeper's covariance, with infinite variance for log powers that are not compared: those of waves
-    /// shorter than the contact patch, because the contact-patch filter is the least accurate part of the
-    /// model.
+    /// that the contact patch averages out.
     pub(crate) fn of_compared(&self, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
         let forward = &self.forward;
         let design = &forward.section.track.design;
         if !design.contact_patch_filter {
             return covariance;
         }
-        let half_length_m = ContactPatch::new(design).half_length_m;
+        let patch = ContactPatch::new(design);
         for row in 0..covariance.nrows() {
             let (_, speed, band) = forward.place(row);
             let wave_number = TAU * forward.bands.centres_hz()[band] / forward.speeds_m_s[speed];
-            if wave_number * half_length_m > PATCH_WAVE_NUMBER {
+            if patch.averages_out(wave_number) {
                 covariance.row_mut(row).fill(0.0);
                 covariance.column_mut(row).fill(0.0);
                 covariance[(row, row)] = f64::INFINITY;

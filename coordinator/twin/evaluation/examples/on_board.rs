@@ -5,8 +5,8 @@
 
 use std::fmt::Write as _;
 use std::time::Instant;
-use tracktwin_evaluation::{Domains, Outcome, Stream, Twin};
-use tracktwin_parameters::Parameter;
+use tracktwin_evaluation::{BySpeeds, Outcome, Stream, Twin};
+use tracktwin_parameters::{Parameter, Scale};
 use tracktwin_signal::recording::{Recording, Sleeper};
 use tracktwin_signal::samples::{Framing, SampleReader};
 use tracktwin_signal::{Extractor, FeatureDefinition};
@@ -29,9 +29,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let options = TrainOptions { scalings, ..TrainOptions::new(vec![all]) };
         let models = train(&library, &options, &|_| ())?;
         let extractor = Extractor::new(&FeatureDefinition::default())?;
-        let domains = Domains::default();
-        let twin =
-            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
+        let by_speeds = BySpeeds::default();
+        let twin = Twin {
+            extractor: &extractor,
+            models: &models,
+            library: &library,
+            by_speeds: &by_speeds,
+        };
         let section = section(rate_hz, spacing_m);
         let begun = Instant::now();
         let mut stream = Stream::new(&section, twin)?;
@@ -102,6 +106,7 @@ fn library(entries: usize, speed_km_h: f64) -> TrainingSet {
         speeds_km_h: vec![speed_km_h],
         log_power: vec![log_power],
         varied: Parameter::ALL.to_vec(),
+        scales: vec![Scale::Linear; Parameter::COUNT],
         parameters,
         campaign: "made up".to_owned(),
         library_digest: "made up".to_owned(),

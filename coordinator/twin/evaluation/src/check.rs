@@ -1,7 +1,7 @@
 //! Check of a recording against the track and the speeds of the models.
 
 use crate::Error;
-use crate::windows::speed_index;
+use crate::speeds;
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 
@@ -10,8 +10,8 @@ use tracktwin_signal::recording::Recording;
 /// Quantities missing in `recording.json` are not compared.
 ///
 /// # Errors
-/// [`Error::GainUnknown`]; [`Error::UnknownSpeed`] with the first pass whose speed is none of
-/// `speeds_km_h`; [`Error::OtherTrack`] with the first quantity that differs by more than 2 %.
+/// [`Error::GainUnknown`]; [`Error::UnknownSpeed`] with the first pass that models for `speeds_km_h`
+/// cannot evaluate; [`Error::OtherTrack`] with the first quantity that differs by more than 2 %.
 pub fn check_recording(
     recording: &Recording,
     design: &TrackDesign,
@@ -22,7 +22,7 @@ pub fn check_recording(
     }
     recording.check_track(design)?;
     for pass in &recording.passes {
-        speed_index(recording, pass.speed_km_h, speeds_km_h)?;
+        speeds::check(recording, pass.speed_km_h, speeds_km_h)?;
     }
     Ok(())
 }

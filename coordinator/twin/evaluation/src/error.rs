@@ -1,5 +1,6 @@
 //! Errors of an evaluation.
 
+use crate::speeds::BETWEEN_MAX;
 use tracktwin_number::rounded;
 use tracktwin_signal::FeatureError;
 use tracktwin_signal::recording::OtherTrack;
@@ -10,9 +11,11 @@ pub enum Error {
     /// The passes have a speed for which there is no model.
     #[error(
         "the recording {recording} has passes at {} km/h; the models are for {} km/h \
-             (within 2 %)",
+             (within 2 %, or within {:.0} % of one of them and between two); evaluate by \
+             inversion, or train models on a campaign with this speed",
         rounded(*speed_km_h, 4),
-        join(known)
+        join(known),
+        100.0 * BETWEEN_MAX
     )]
     UnknownSpeed {
         /// The recording's name.

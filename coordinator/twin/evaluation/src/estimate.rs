@@ -5,12 +5,15 @@ use crate::evaluation::{
     Unevaluated,
 };
 use crate::matches::Matcher;
-use crate::{Domains, Error, OutsideLibrary, SleeperFeatures, Unevenness, features, outside};
+use crate::outside::by_speeds;
+use crate::{
+    BySpeeds, Error, ModelSpeeds, OutsideLibrary, SleeperFeatures, Unevenness, features, outside,
+};
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
 use tracktwin_signal::recording::Recording;
-use tracktwin_surrogate::{Trained, TrainingSet};
+use tracktwin_surrogate::{Prediction, Trained, TrainingSet};
 
 /// The feature set of the models in use: the global one (paper, eq. 9).
 pub const METHOD_FEATURE: &str = "GF";
@@ -20,7 +23,8 @@ pub const METHOD_FEATURE: &str = "GF";
 const EDGE: f64 = 0.02;
 
 const ALL_SPEEDS: &str = "one model of all speeds together";
-const SINGLE_SPEEDS: &str = "models of single speeds: means weighted by precision; variance their harmonic mean, as if errors were common to all";
+const SINGLE_SPEEDS: &str =
+    "models of single speeds, combined by linear regression on the library's test half";
 
 /// Surrogates, library and feature definition with which a recording is evaluated.
 #[derive(Clone, Copy)]
@@ -31,17 +35,16 @@ pub struct Twin<'a> {
     pub models: &'a Trained,
     /// The library on which the surrogates were trained; the model selector searches it.
     pub library: &'a TrainingSet,
-    /// Domain checks of that library.
-    pub domains: &'a Domains,
+    /// Domain checks of that library, and combinations of its models.
+    pub by_speeds: &'a BySpeeds,
 }
 
 /// Estimates the track parameters at every sleeper that a pass covers.
 ///
 /// Passes of one speed are averaged in the logarithm of the power. A sleeper with all speeds of the
-/// campaign is evaluated with the model of all speeds. Otherwise the single-speed models are combined: the
-/// mean is weighted by precision, and the variance is the harmonic mean of the variances. This rule treats
-/// the errors as common to all speeds, because all speeds share one surface; independent errors would give
-/// too small a variance.
+/// campaign is evaluated with the model of all speeds. Otherwise the single-speed models are combined by
+/// linear regression ([`tracktwin_surrogate::Stack`]). All speeds share one surface, so that their errors are
+/// partly common; the regression takes this from the library.
 ///
 /// # Errors
 /// [`Error::UnknownSpeed`], [`Error::OtherFeatures`], [`Error::NoModel`], [`Error::NothingToEvaluate`],
@@ -49,14 +52,15 @@ pub struct Twin<'a> {
 pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Error> {
     check_features(twin)?;
     twin.models.belongs_to(&twin.library.library_digest)?;
-    let known = features(recording, twin.extractor, twin.models.speeds_km_h())?;
+    let speeds = ModelSpeeds::of(twin.library);
+    let known = features(recording, twin.extractor, &speeds)?;
     let (seen, unseen): (Vec<_>, Vec<_>) =
         known.into_iter().partition(|sleeper| !sleeper.speeds.is_empty());
     if seen.is_empty() {
         return Err(Error::NothingToEvaluate { recording: recording.name.clone() });
     }
-    let mut estimates = estimates(&seen, twin.models)?;
-    let tests = outside::judge(&seen, twin.library, twin.domains)?;
+    let mut estimates = estimates(&seen, twin)?;
+    let tests = outside::judge(&seen, twin.library, twin.by_speeds)?;
     let outside_library = OutsideLibrary::of(&tests, twin.library);
     let told = estimates.iter().zip(&tests).filter(|(_, test)| !test.outside);
     let unevenness = Unevenness::of(&told.map(|(estimates, _)| estimates).collect::<Vec<_>>());
@@ -76,7 +80,7 @@ pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Er
         provenance: provenance(twin, &sleepers),
         sleepers,
         unevaluated: unseen.iter().map(|sleeper| unevaluated(recording, sleeper)).collect(),
-        notes: outside_library.sentences(),
+        notes: [outside_library.sentences(), speeds.note(recording).into_iter().collect()].concat(),
         outside_library,
         unevenness,
         frequencies_hz: twin.models.frequencies_hz().to_vec(),
@@ -92,66 +96,57 @@ pub(crate) fn check_features(twin: &Twin<'_>) -> Result<(), Error> {
     Err(Error::OtherFeatures { trained_on: trained_on.to_string(), offered: offered.to_string() })
 }
 
-/// Estimates for each of the sleepers, in the same order.
+/// Estimates for each of the sleepers, in the same order. Sleepers with the same speeds form one batch.
 pub(crate) fn estimates(
     sleepers: &[SleeperFeatures],
-    models: &Trained,
+    twin: &Twin<'_>,
 ) -> Result<Vec<Estimates>, Error> {
-    let speeds = models.speeds_km_h();
-    let mut out: Vec<BTreeMap<_, Vec<Estimate>>> = vec![BTreeMap::new(); sleepers.len()];
-    let complete = |sleeper: &SleeperFeatures| sleeper.speeds.len() == speeds.len();
-    let all: Vec<usize> = (0..speeds.len()).collect();
-    let together = (0..sleepers.len()).filter(|&index| complete(&sleepers[index])).collect();
-    predict(sleepers, models, &all, together, &mut out)?;
-    for &speed in &all {
-        let has = |index: &usize| sleepers[*index].speeds.iter().any(|known| known.speed == speed);
-        let apart = (0..sleepers.len()).filter(|&index| !complete(&sleepers[index])).filter(has);
-        predict(sleepers, models, &[speed], apart.collect(), &mut out)?;
+    let mut out = vec![Estimates::new(); sleepers.len()];
+    for (speeds, members) in by_speeds(sleepers) {
+        let chosen: Vec<_> = members.iter().map(|&index| &sleepers[index]).collect();
+        for (index, predictions) in members.into_iter().zip(predict(&chosen, twin, &speeds)?) {
+            let estimates = predictions.into_iter();
+            out[index] =
+                estimates.map(|it| (it.parameter, Estimate { mean: it.mean, sd: it.sd })).collect();
+        }
     }
-    let combined = |of: BTreeMap<_, Vec<Estimate>>| {
-        of.into_iter().map(|(parameter, estimates)| (parameter, combine(&estimates))).collect()
-    };
-    Ok(out.into_iter().map(combined).collect())
+    Ok(out)
 }
 
-/// Adds the estimates of the model for these speeds to the `chosen` sleepers, in one batch.
+/// Predictions for sleepers that all have these speeds: by the model of all speeds, by that of the only
+/// speed, or by the combination of the models of single speeds.
 fn predict(
-    sleepers: &[SleeperFeatures],
+    sleepers: &[&SleeperFeatures],
+    twin: &Twin<'_>,
+    speeds: &[usize],
+) -> Result<Vec<Vec<Prediction>>, Error> {
+    if speeds.len() == 1 || speeds.len() == twin.models.speeds_km_h().len() {
+        return predict_together(sleepers, twin.models, speeds);
+    }
+    let by_speed = speeds
+        .iter()
+        .map(|&speed| predict_together(sleepers, twin.models, &[speed]))
+        .collect::<Result<Vec<_>, _>>()?;
+    let stack = twin.by_speeds.stack(twin.models, twin.library, speeds)?;
+    let of = |index: usize| by_speed.iter().map(|speed| speed[index].clone()).collect::<Vec<_>>();
+    Ok((0..sleepers.len()).map(|index| stack.combine(&of(index))).collect())
+}
+
+/// Predictions by the model for these speeds, in one batch.
+fn predict_together(
+    sleepers: &[&SleeperFeatures],
     models: &Trained,
     speeds: &[usize],
-    chosen: Vec<usize>,
-    out: &mut [BTreeMap<Parameter, Vec<Estimate>>],
-) -> Result<(), Error> {
-    if chosen.is_empty() {
-        return Ok(());
-    }
+) -> Result<Vec<Vec<Prediction>>, Error> {
     let speeds_km_h: Vec<f64> = speeds.iter().map(|&speed| models.speeds_km_h()[speed]).collect();
     let group = models
         .group(&speeds_km_h, METHOD_FEATURE)
         .ok_or(Error::NoModel { speeds_km_h, feature: METHOD_FEATURE })?;
-    let observed = |&index: &usize| -> Vec<f64> {
-        let known = sleepers[index].speeds.iter().filter(|known| speeds.contains(&known.speed));
+    let observed = |sleeper: &&SleeperFeatures| -> Vec<f64> {
+        let known = sleeper.speeds.iter().filter(|known| speeds.contains(&known.speed));
         known.flat_map(|known| known.log_power.iter().copied()).collect()
     };
-    let observations: Vec<_> = chosen.iter().map(observed).collect();
-    for (index, predictions) in chosen.into_iter().zip(group.predict(&observations)?) {
-        for prediction in predictions {
-            let estimate = Estimate { mean: prediction.mean, sd: prediction.sd };
-            out[index].entry(prediction.parameter).or_default().push(estimate);
-        }
-    }
-    Ok(())
-}
-
-/// Combines several estimates of one quantity whose errors may be common.
-fn combine(estimates: &[Estimate]) -> Estimate {
-    if let [only] = estimates {
-        return *only;
-    }
-    let precision = |estimate: &Estimate| estimate.sd.powi(-2);
-    let total: f64 = estimates.iter().map(precision).sum();
-    let mean = estimates.iter().map(|estimate| estimate.mean * precision(estimate)).sum::<f64>();
-    Estimate { mean: mean / total, sd: (estimates.len() as f64 / total).sqrt() }
+    Ok(group.predict(&sleepers.iter().map(observed).collect::<Vec<_>>())?)
 }
 
 /// Makes the record of a sleeper from its features and estimates.
@@ -192,9 +187,9 @@ pub(crate) fn evaluated(
 /// Whether a mean lies at an end of its parameter's range in the library.
 fn is_at_edge(estimates: &Estimates, library: &TrainingSet) -> bool {
     library.varied.iter().enumerate().any(|(column, parameter)| {
-        let [low, high] = library.range(column);
-        let inside = low + EDGE * (high - low)..=high - EDGE * (high - low);
-        estimates.get(parameter).is_some_and(|estimate| !inside.contains(&estimate.mean))
+        let inside = EDGE..=1.0 - EDGE;
+        let unit = |estimate: &Estimate| library.unit(column, estimate.mean);
+        estimates.get(parameter).is_some_and(|estimate| !inside.contains(&unit(estimate)))
     })
 }
 
@@ -233,18 +228,17 @@ fn known(twin: &Twin<'_>, speeds_km_h: &[f64]) -> BTreeMap<Parameter, Known> {
         }
     };
     let of = |(column, &parameter): (usize, &Parameter)| {
-        let [low, high] = library.range(column);
         let scores = groups.iter().flat_map(|group| group.models());
         let errors = scores.filter(|it| it.parameter == parameter).map(|it| it.score.mase_test);
-        let mut values: Vec<f64> =
-            library.parameters.iter().skip(column).step_by(library.varied.len()).copied().collect();
+        let values = library.parameters.iter().skip(column).step_by(library.varied.len());
+        let mut values: Vec<f64> = values.map(|&value| library.unit(column, value)).collect();
         values.sort_unstable_by(f64::total_cmp);
         let median = values[values.len() / 2];
         let away: f64 = values.iter().map(|value| (value - median).abs()).sum();
         let known = Known {
-            range: [low, high],
+            range: library.range(column),
             mase_test: errors.fold(f64::INFINITY, f64::min),
-            mase_constant: away / values.len() as f64 / (high - low),
+            mase_constant: away / values.len() as f64,
         };
         (parameter, known)
     };
@@ -261,9 +255,13 @@ mod tests {
     fn the_level_of_an_unseen_recording_lies_within_three_standard_deviations() {
         let (extractor, library) = (testing::extractor(), testing::library());
         let models = testing::models(&library);
-        let domains = Domains::default();
-        let twin =
-            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
+        let by_speeds = BySpeeds::default();
+        let twin = Twin {
+            extractor: &extractor,
+            models: &models,
+            library: &library,
+            by_speeds: &by_speeds,
+        };
         for speeds in [&[10.0, 13.0][..], &[10.0]] {
             for truth in [2.0, 4.0] {
                 let recording = testing::recording(truth, speeds);
@@ -286,9 +284,13 @@ mod tests {
     fn a_mean_at_an_end_of_the_library_s_range_is_flagged() {
         let (extractor, library) = (testing::extractor(), testing::library());
         let models = testing::models(&library);
-        let domains = Domains::default();
-        let twin =
-            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
+        let by_speeds = BySpeeds::default();
+        let twin = Twin {
+            extractor: &extractor,
+            models: &models,
+            library: &library,
+            by_speeds: &by_speeds,
+        };
         let flagged = |level: f64| {
             let evaluation = evaluate(&testing::recording(level, &[10.0, 13.0]), &twin).unwrap();
             evaluation.sleepers[3].flags.contains(&Flag::AtEdgeOfRange)
@@ -301,9 +303,13 @@ mod tests {
     fn a_level_that_the_library_lacks_is_called_outside_with_the_range_to_widen() {
         let (extractor, library) = (testing::extractor(), testing::library());
         let models = testing::models(&library);
-        let domains = Domains::default();
-        let twin =
-            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
+        let by_speeds = BySpeeds::default();
+        let twin = Twin {
+            extractor: &extractor,
+            models: &models,
+            library: &library,
+            by_speeds: &by_speeds,
+        };
         let evaluated =
             |level: f64| evaluate(&testing::recording(level, &[10.0, 13.0]), &twin).unwrap();
         let inside = evaluated(3.0);
@@ -331,9 +337,13 @@ mod tests {
     fn json_and_csv_hold_every_sleeper_under_the_agreed_names() {
         let (extractor, library) = (testing::extractor(), testing::library());
         let models = testing::models(&library);
-        let domains = Domains::default();
-        let twin =
-            Twin { extractor: &extractor, models: &models, library: &library, domains: &domains };
+        let by_speeds = BySpeeds::default();
+        let twin = Twin {
+            extractor: &extractor,
+            models: &models,
+            library: &library,
+            by_speeds: &by_speeds,
+        };
         let evaluation = evaluate(&testing::recording(3.0, &[10.0, 13.0]), &twin).unwrap();
         let json: serde_json::Value = serde_json::from_str(&evaluation.to_json()).unwrap();
         assert_eq!(json["format"], "tracktwin-evaluation/1");
@@ -355,9 +365,9 @@ mod tests {
         let library = testing::library();
         let models = testing::models(&library);
         let other = Extractor::new(&tracktwin_signal::FeatureDefinition::default()).unwrap();
-        let domains = Domains::default();
+        let by_speeds = BySpeeds::default();
         let twin =
-            Twin { extractor: &other, models: &models, library: &library, domains: &domains };
+            Twin { extractor: &other, models: &models, library: &library, by_speeds: &by_speeds };
         let result = evaluate(&testing::recording(3.0, &[10.0]), &twin);
         assert!(matches!(result, Err(Error::OtherFeatures { .. })));
     }

@@ -39,7 +39,7 @@ pub struct Evaluation {
     pub outside_library: OutsideLibrary,
     /// Assumed unevenness of the track.
     pub unevenness: Unevenness,
-    /// Passes left out, with the reason.
+    /// Sentences on sleepers outside the library, and on passes at speeds without models.
     pub notes: Vec<String>,
     /// Frequencies of the bins in Hz, ascending; for charts, not written to files.
     #[serde(skip)]

@@ -4,10 +4,10 @@
 //! significant than a single one. The check therefore tests running windows of one, three, seven and all
 //! sleepers. A sleeper is outside if any window that contains it is outside.
 
-use crate::{Error, Flag, SleeperFeatures};
+use crate::{BySpeeds, Error, Flag, SleeperFeatures};
 use serde::Serialize;
-use std::collections::{BTreeMap, HashMap};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use tracktwin_parameters::Parameter;
 use tracktwin_surrogate::{Beyond, Domain, Judgement, Side, TrainingSet};
 
@@ -44,23 +44,6 @@ pub struct BeyondEnd {
     pub sleepers: usize,
 }
 
-/// Cache of the domains of one library, by set of speeds.
-#[derive(Default)]
-pub struct Domains(Mutex<HashMap<Vec<usize>, Arc<Domain>>>);
-
-impl Domains {
-    /// Domain of the library at these speeds; computed on first use.
-    fn of(&self, library: &TrainingSet, speeds: &[usize]) -> Result<Arc<Domain>, Error> {
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(domain) = known.get(speeds) {
-            return Ok(Arc::clone(domain));
-        }
-        let domain = Arc::new(Domain::of(library, speeds)?);
-        known.insert(speeds.to_vec(), Arc::clone(&domain));
-        Ok(domain)
-    }
-}
-
 /// Result of the domain check of a sleeper: whether it is outside, and the end that it exceeds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DomainTest {
@@ -93,13 +76,13 @@ impl DomainTest {
 pub(crate) fn judge(
     sleepers: &[SleeperFeatures],
     library: &TrainingSet,
-    domains: &Domains,
+    cache: &BySpeeds,
 ) -> Result<Vec<DomainTest>, Error> {
     let mut tests = vec![DomainTest::default(); sleepers.len()];
-    let by_speeds = by_speeds(sleepers);
-    let groups = by_speeds.len();
-    for (speeds, members) in by_speeds {
-        let windows = Windows::of(sleepers, members, domains.of(library, &speeds)?)?;
+    let grouped = by_speeds(sleepers);
+    let groups = grouped.len();
+    for (speeds, members) in grouped {
+        let windows = Windows::of(sleepers, members, cache.domain(library, &speeds)?)?;
         for size in windows.sizes() {
             for first in 0..=windows.whole.len() - size {
                 let judgement = windows.judge(first, size, groups)?;
@@ -119,17 +102,17 @@ pub(crate) fn judge(
 pub(crate) fn judge_last(
     sleepers: &[SleeperFeatures],
     library: &TrainingSet,
-    domains: &Domains,
+    cache: &BySpeeds,
 ) -> Result<DomainTest, Error> {
     let mut test = DomainTest::default();
-    let by_speeds = by_speeds(sleepers);
-    let groups = by_speeds.len();
+    let grouped = by_speeds(sleepers);
+    let groups = grouped.len();
     let last = sleepers.len().wrapping_sub(1);
-    for (speeds, members) in by_speeds {
+    for (speeds, members) in grouped {
         if members.last() != Some(&last) {
             continue;
         }
-        let windows = Windows::of(sleepers, members, domains.of(library, &speeds)?)?;
+        let windows = Windows::of(sleepers, members, cache.domain(library, &speeds)?)?;
         for size in windows.sizes() {
             let first = windows.whole.len() - size;
             if windows.held(first, size).last() == Some(&last) {
@@ -141,7 +124,7 @@ pub(crate) fn judge_last(
 }
 
 /// Indices of the sleepers, grouped by their speeds.
-fn by_speeds(sleepers: &[SleeperFeatures]) -> BTreeMap<Vec<usize>, Vec<usize>> {
+pub(crate) fn by_speeds(sleepers: &[SleeperFeatures]) -> BTreeMap<Vec<usize>, Vec<usize>> {
     let mut by_speeds: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
     for (index, sleeper) in sleepers.iter().enumerate() {
         let key = sleeper.speeds.iter().map(|known| known.speed).collect();

@@ -1,6 +1,6 @@
 //! A small library of noise whose power is the level and whose tilt is the railpad's, for tests.
 
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, Scale};
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_signal::{Extractor, FeatureDefinition, Signal};
 use tracktwin_surrogate::{FeatureColumns, TrainOptions, Trained, TrainingSet, train};
@@ -96,6 +96,7 @@ pub(crate) fn library() -> TrainingSet {
         speeds_km_h: SPEEDS_KM_H.to_vec(),
         log_power: SPEEDS_KM_H.iter().enumerate().map(table).collect(),
         varied: vec![Parameter::RailpadStiffness, Parameter::IrregularityLevel],
+        scales: vec![Scale::Linear; 2],
         parameters: (0..ENTRIES).flat_map(|entry| [1e8 * tilt(entry), level(entry)]).collect(),
         campaign: "noise".to_owned(),
         library_digest: "1234".to_owned(),

@@ -1,16 +1,12 @@
 //! Features of sleepers: the features of a window, averaged over the passes of one speed.
 
-use crate::{Error, Flag};
+use crate::speeds::PassSpeed;
+use crate::{Error, Flag, ModelSpeeds};
 use rayon::prelude::*;
 use std::ops::Range;
 use tracktwin_signal::recording::Recording;
 use tracktwin_signal::{Extractor, FeatureError, Signal};
 
-/// Relative difference between the speeds of a pass and of a model below which the speeds count as equal.
-///
-/// A drive holds its speed within about 2 %. This difference moves the features of a track by a third of a
-/// bin at most, because the positions do not change.
-pub(crate) const SPEED_TOLERANCE: f64 = 0.02;
 /// A window counts as complete from this share on: odometers drift by a few millimetres.
 const COMPLETE_SHARE: f64 = 0.98;
 /// A margin counts as short below this share. The signal fades out in the last quarter of a margin. Three
@@ -35,24 +31,25 @@ pub struct SpeedFeatures {
     pub speed: usize,
     /// Number of averaged passes.
     pub passes: usize,
-    /// Mean over the passes of the natural logarithm of the LWPS, one value per bin.
+    /// Mean over the passes of the natural logarithm of the LWPS, one value per bin. Passes between two
+    /// speeds of the models are moved to this speed.
     pub log_power: Vec<f64>,
 }
 
 /// Computes the features of every sleeper of the recording; a sleeper that no pass covers has no speeds.
 ///
 /// # Errors
-/// [`Error::UnknownSpeed`] if the speed of a pass is none of `speeds_km_h`; [`Error::Features`] if the
+/// [`Error::UnknownSpeed`] if models for these speeds cannot evaluate a pass; [`Error::Features`] if the
 /// features of a window cannot be computed.
 pub fn features(
     recording: &Recording,
     extractor: &Extractor,
-    speeds_km_h: &[f64],
+    speeds: &ModelSpeeds,
 ) -> Result<Vec<SleeperFeatures>, Error> {
     let speed_of_pass = recording
         .passes
         .iter()
-        .map(|pass| speed_index(recording, pass.speed_km_h, speeds_km_h))
+        .map(|pass| speeds.of_pass_of(recording, pass.speed_km_h))
         .collect::<Result<Vec<_>, _>>()?;
     (0..recording.sleepers.len())
         .into_par_iter()
@@ -60,33 +57,15 @@ pub fn features(
         .collect()
 }
 
-/// Index, among the `known` speeds in km/h, of the speed of a pass of the recording.
-pub(crate) fn speed_index(
-    recording: &Recording,
-    speed_km_h: f64,
-    known: &[f64],
-) -> Result<usize, Error> {
-    speed_among(speed_km_h, known).ok_or_else(|| Error::UnknownSpeed {
-        recording: recording.name.clone(),
-        speed_km_h,
-        known: known.to_vec(),
-    })
-}
-
-/// Index, among the `known` speeds in km/h, of the speed that equals this one within the tolerance, if any.
-pub(crate) fn speed_among(speed_km_h: f64, known: &[f64]) -> Option<usize> {
-    known.iter().position(|speed| (speed_km_h / speed - 1.0).abs() <= SPEED_TOLERANCE)
-}
-
 fn sleeper_features(
     recording: &Recording,
     extractor: &Extractor,
-    speed_of_pass: &[usize],
+    speed_of_pass: &[PassSpeed],
     sleeper: usize,
 ) -> Result<SleeperFeatures, Error> {
     let mut features = SleeperFeatures::none(sleeper);
     let window = recording.sleeper_window(sleeper);
-    for (pass, &speed) in recording.passes.iter().zip(speed_of_pass) {
+    for (pass, speed) in recording.passes.iter().zip(speed_of_pass) {
         let Some(samples) = window.samples(&pass.position_m) else { continue };
         let share = window.share(&pass.position_m);
         let taken = features.take(extractor, share, samples, &pass.signal, speed);
@@ -105,8 +84,8 @@ impl SleeperFeatures {
         Self { sleeper, speeds: Vec::new(), flags: Vec::new() }
     }
 
-    /// Adds the window of a pass. `share` is the covered share of the window, `samples` its range in the
-    /// signal, and `speed` the index among the speeds of the models.
+    /// Adds the window of a pass. `share` is the covered share of the window, and `samples` its range in
+    /// the signal.
     ///
     /// # Errors
     /// [`FeatureError`] if the features cannot be computed.
@@ -116,7 +95,7 @@ impl SleeperFeatures {
         share: f64,
         samples: Range<usize>,
         signal: &Signal,
-        speed: usize,
+        PassSpeed { speed, bins, shift }: &PassSpeed,
     ) -> Result<(), FeatureError> {
         let margin_s = MARGIN_SHARE * extractor.definition().margin_s;
         let margin = (margin_s * signal.sample_rate_hz()) as usize;
@@ -128,10 +107,12 @@ impl SleeperFeatures {
         }
         self.flags.sort_unstable();
         self.flags.dedup();
-        let log_power = extractor.extract(signal, samples)?.log_power;
-        match self.speeds.iter_mut().find(|known| known.speed == speed) {
+        let mut log_power = extractor.extract(signal, samples)?.log_power;
+        log_power.truncate(bins.unwrap_or(log_power.len()));
+        log_power.iter_mut().zip(shift).for_each(|(value, shift)| *value += shift);
+        match self.speeds.iter_mut().find(|known| known.speed == *speed) {
             Some(known) => known.add(&log_power),
-            None => self.speeds.push(SpeedFeatures { speed, passes: 1, log_power }),
+            None => self.speeds.push(SpeedFeatures { speed: *speed, passes: 1, log_power }),
         }
         self.speeds.sort_by_key(|known| known.speed);
         Ok(())
@@ -158,11 +139,14 @@ mod tests {
     fn passes_of_one_speed_are_averaged_in_the_logarithm() {
         let recording = testing::recording(3.0, &[10.0, 10.1, 13.0]);
         let extractor = testing::extractor();
-        let all = features(&recording, &extractor, &testing::SPEEDS_KM_H).unwrap();
+        let all =
+            features(&recording, &extractor, &ModelSpeeds::only(&testing::SPEEDS_KM_H)).unwrap();
         let alone = |pass: usize| {
             let mut single = recording.clone();
             single.passes = vec![recording.passes[pass].clone()];
-            features(&single, &extractor, &testing::SPEEDS_KM_H).unwrap()[3].speeds[0].clone()
+            features(&single, &extractor, &ModelSpeeds::only(&testing::SPEEDS_KM_H)).unwrap()[3]
+                .speeds[0]
+                .clone()
         };
         let (first, second) = (alone(0), alone(1));
         let mean = &all[3].speeds[0];
@@ -176,7 +160,8 @@ mod tests {
     #[test]
     fn a_speed_without_a_model_is_named_with_those_known() {
         let recording = testing::recording(3.0, &[11.0]);
-        let result = features(&recording, &testing::extractor(), &testing::SPEEDS_KM_H);
+        let result =
+            features(&recording, &testing::extractor(), &ModelSpeeds::only(&testing::SPEEDS_KM_H));
         let message = result.unwrap_err().to_string();
         assert!(message.contains("11 km/h") && message.contains("10, 13 km/h"), "{message}");
     }
@@ -184,7 +169,9 @@ mod tests {
     #[test]
     fn sleepers_near_the_ends_are_flagged_and_those_inside_are_not() {
         let recording = testing::recording(3.0, &[10.0]);
-        let all = features(&recording, &testing::extractor(), &testing::SPEEDS_KM_H).unwrap();
+        let all =
+            features(&recording, &testing::extractor(), &ModelSpeeds::only(&testing::SPEEDS_KM_H))
+                .unwrap();
         assert_eq!(all[0].flags, [Flag::IncompleteWindow, Flag::ShortMargin]);
         assert_eq!(all[3].flags, []);
     }
@@ -194,7 +181,7 @@ mod tests {
         let folder = test_needs::reference().join("recordings/dev-01");
         let recording = Recording::open(folder).unwrap();
         let extractor = Extractor::new(&tracktwin_signal::FeatureDefinition::default()).unwrap();
-        let all = features(&recording, &extractor, &[7.0, 10.0, 13.0]).unwrap();
+        let all = features(&recording, &extractor, &ModelSpeeds::only(&[7.0, 10.0, 13.0])).unwrap();
         let of = |id: &str| {
             let place = recording.sleepers.iter().position(|sleeper| sleeper.id == id).unwrap();
             &all[place]

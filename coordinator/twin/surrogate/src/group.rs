@@ -7,7 +7,7 @@ use faer::{Mat, MatRef};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::OnceLock;
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, Scale};
 
 /// Pairs (true value, predicted value) of a parameter, in the unit of the parameter.
 pub type Tested = (Parameter, Vec<(f64, f64)>);
@@ -38,13 +38,16 @@ pub struct ModelScore {
 
 /// A Gaussian process for one parameter.
 ///
-/// The parameter is mapped internally onto [0, 1] by its range in the library.
+/// The parameter is mapped internally onto [0, 1] by its range in the library and its scale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterModel {
     /// The predicted parameter.
     pub parameter: Parameter,
     /// Lowest and highest value in the library, in the parameter's unit.
     pub range: [f64; 2],
+    /// Scale on which the parameter is mapped onto [0, 1].
+    #[serde(default)]
+    pub scale: Scale,
     /// Length and noise ratio of the kernel.
     pub hyperparameters: Hyperparameters,
     /// Signal variance `s²`, of the parameter mapped onto [0, 1].
@@ -191,12 +194,9 @@ impl ModelGroup {
         let models = self.models.iter().enumerate();
         models
             .map(|(j, model)| {
-                let [low, high] = model.range;
-                Prediction {
-                    parameter: model.parameter,
-                    mean: low + means[(t, j)] * (high - low),
-                    sd: sds[(t, j)] * (high - low),
-                }
+                let mean = model.scale.at(model.range, means[(t, j)]);
+                let sd = sds[(t, j)] * model.scale.slope(model.range, mean);
+                Prediction { parameter: model.parameter, mean, sd }
             })
             .collect()
     }

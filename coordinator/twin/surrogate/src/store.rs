@@ -16,7 +16,7 @@
 //! h = np.r_[1.0, z] if group["mean"] == "linear" else np.ones(1)
 //! unit = h @ t["coefficients"][:, j] + k @ t["weights"][:, j]
 //! low, high = model["range"]
-//! value = low + np.clip(unit, 0, 1) * (high - low)
+//! value = low + np.clip(unit, 0, 1) * (high - low)  # `scale` is "linear"; else low * (high / low) ** clipped
 //! ```
 
 use crate::group::different;

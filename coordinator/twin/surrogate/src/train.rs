@@ -137,12 +137,12 @@ fn train_group(
     Ok(group)
 }
 
-/// Parameters mapped onto [0, 1] by their ranges in the library.
+/// Parameters mapped onto [0, 1] by their ranges in the library and their scales.
 fn unit_targets(set: &TrainingSet, entries: &[usize]) -> Mat<f64> {
     let mut values = set.values(entries);
     for (j, column) in values.col_iter_mut().enumerate() {
-        let [low, high] = set.range(j);
-        column.iter_mut().for_each(|value| *value = (*value - low) / (high - low));
+        let (range, scale) = (set.range(j), set.scales[j]);
+        column.iter_mut().for_each(|value| *value = scale.share(range, *value));
     }
     values
 }
@@ -198,6 +198,7 @@ fn weigh(
             models[j] = Some(ParameterModel {
                 parameter: set.varied[j],
                 range: set.range(j),
+                scale: set.scales[j],
                 hyperparameters: at,
                 signal_variance: all.signal_variances[j],
                 log_likelihood: all.log_likelihoods[j],

@@ -5,7 +5,7 @@ use faer::Mat;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::ops::Range;
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, Scale};
 
 /// Finished cases of a library: parameters and simulated ln-powers.
 #[derive(Clone, Debug)]
@@ -18,6 +18,8 @@ pub struct TrainingSet {
     pub log_power: Vec<Vec<f64>>,
     /// The parameters that vary.
     pub varied: Vec<Parameter>,
+    /// Scale of each varied parameter, on which it is mapped onto [0, 1].
+    pub scales: Vec<Scale>,
     /// Values of the varied parameters in SI units, entries x varied, row-major.
     pub parameters: Vec<f64>,
     /// Name of the campaign.
@@ -51,6 +53,10 @@ impl TrainingSet {
             if expected == found { Ok(()) } else { Err(Error::Shape { what, expected, found }) }
         };
         size("parameters", &self.parameters, self.varied.len())?;
+        if self.scales.len() != self.varied.len() {
+            let (expected, found) = (self.varied.len(), self.scales.len());
+            return Err(Error::Shape { what: "scales", expected, found });
+        }
         finite("parameters", &self.parameters, self.varied.len())?;
         if self.log_power.len() != self.speeds_km_h.len() {
             let (expected, found) = (self.speeds_km_h.len(), self.log_power.len());
@@ -73,6 +79,11 @@ impl TrainingSet {
     pub fn range(&self, column: usize) -> [f64; 2] {
         let values = self.parameters.iter().skip(column).step_by(self.varied.len());
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
+    }
+
+    /// Value of a varied parameter mapped onto [0, 1] by range and scale; `column` is its index in `varied`.
+    pub fn unit(&self, column: usize, value: f64) -> f64 {
+        self.scales[column].share(self.range(column), value)
     }
 
     /// Given columns of given entries, with the speeds (indices) one after the other: entries x (speeds *
@@ -140,6 +151,7 @@ mod tests {
             speeds_km_h: vec![13.0],
             log_power: vec![vec![0.0; 6]],
             varied: vec![Parameter::BallastStiffness],
+            scales: vec![Scale::Linear],
             parameters: vec![1.0, 2.0, 3.0],
             campaign: String::new(),
             library_digest: String::new(),

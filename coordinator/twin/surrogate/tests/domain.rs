@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, Scale};
 use tracktwin_surrogate::{Beyond, Domain, Judgement, Side, TrainingSet};
 
 const BINS: usize = 32;
@@ -35,6 +35,7 @@ fn library() -> TrainingSet {
         speeds_km_h: vec![10.0],
         log_power: vec![log_power.collect()],
         varied: vec![Parameter::BallastStiffness, Parameter::IrregularityLevel],
+        scales: vec![Scale::Linear; 2],
         parameters: cases.iter().flat_map(|&(stiffness, level)| [stiffness, level]).collect(),
         campaign: "resonance".to_owned(),
         library_digest: "1".to_owned(),

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use std::sync::OnceLock;
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, Scale};
 use tracktwin_surrogate::{
     ENTRIES_MIN, Error, FeatureColumns, InputScaling, ModelGroup, TrainOptions, Trained,
     TrainingSet, train,
@@ -44,6 +44,7 @@ fn spectra() -> TrainingSet {
         speeds_km_h: vec![7.0, 13.0],
         log_power: vec![table(0), table(1)],
         varied: vec![Parameter::BallastStiffness, Parameter::IrregularityLevel],
+        scales: vec![Scale::Linear; 2],
         parameters: unit.iter().flat_map(|u| [4e6 + 18e6 * u[0], 1.0 + 4.0 * u[1]]).collect(),
         campaign: "made-up".to_owned(),
         library_digest: "0123".to_owned(),

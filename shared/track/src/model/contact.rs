@@ -71,6 +71,10 @@ impl HertzContact {
     }
 }
 
+/// Wave number times half the length of the patch beyond which waves are averaged out: the filter then takes
+/// 17 dB.
+const AVERAGED: f64 = 4.0;
+
 /// The patch over which wheel and rail touch, which averages the irregularity over its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactPatch {
@@ -92,6 +96,13 @@ impl ContactPatch {
         let radius_m = 2.0 / (1.0 / wheel_m + 1.0 / rail_m);
         let mean_m = (0.75 * design.wheel.load_n * radius_m / modulus_pa).cbrt();
         Self { half_length_m: mean_m * (wheel_m / rail_m).powf(0.5 * ELLIPSE_EXPONENT) }
+    }
+
+    /// Whether the patch averages out waves of this wave number in rad/m: its filter is the least accurate
+    /// part of the model there, and noise may exceed what is left. Such waves are not compared with
+    /// recordings.
+    pub fn averages_out(&self, wave_number_rad_m: f64) -> bool {
+        wave_number_rad_m * self.half_length_m > AVERAGED
     }
 
     /// Factor on the spectral density of the irregularity at a wave number in rad/m:

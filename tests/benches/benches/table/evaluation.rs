@@ -2,7 +2,7 @@
 
 use super::{ENTRIES, Error, Line};
 use tracktwin_benches::{axle_box, cost, feature_vectors, library, once};
-use tracktwin_evaluation::{Domains, Twin, evaluate};
+use tracktwin_evaluation::{BySpeeds, Twin, evaluate};
 use tracktwin_signal::recording::{Pass, Recording, Sleeper};
 use tracktwin_signal::{Extractor, FeatureDefinition};
 use tracktwin_surrogate::{
@@ -93,8 +93,9 @@ fn sorted(selector: &Selector, observed: &[f64]) -> Vec<Neighbour> {
 pub(crate) fn lap() -> Result<Vec<Line>, Error> {
     let set = library(2 * ENTRIES, &[13.0]);
     let (models, extractor) = (models(&set)?, Extractor::new(&FeatureDefinition::default())?);
-    let domains = Domains::default();
-    let twin = Twin { extractor: &extractor, models: &models, library: &set, domains: &domains };
+    let by_speeds = BySpeeds::default();
+    let twin =
+        Twin { extractor: &extractor, models: &models, library: &set, by_speeds: &by_speeds };
     let folder = tempfile::tempdir()?;
     let recording = recording();
     recording.write(folder.path())?;

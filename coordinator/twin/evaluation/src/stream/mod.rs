@@ -14,8 +14,8 @@ mod tests;
 pub use row::{Evaluated, Outcome, Reason, Row};
 
 use crate::estimate::check_features;
-use crate::windows::{SPEED_TOLERANCE, speed_among};
-use crate::{Error, SleeperFeatures, Twin};
+use crate::speeds::{PassSpeed, SPEED_TOLERANCE};
+use crate::{Error, ModelSpeeds, SleeperFeatures, Twin};
 use recent::Recent;
 use segment::Segment;
 use std::collections::BTreeMap;
@@ -35,6 +35,7 @@ const SLOWEST: f64 = 0.9;
 pub struct Stream<'a> {
     section: &'a Recording,
     twin: Twin<'a>,
+    speeds: ModelSpeeds,
     /// Number of samples of a margin.
     margin: usize,
     /// Largest number of samples of a window with its margins.
@@ -77,6 +78,7 @@ impl<'a> Stream<'a> {
         Ok(Self {
             section,
             twin,
+            speeds: ModelSpeeds::of(twin.library),
             margin,
             capacity: window + 2 * (margin + 1),
             segment: Segment::new(rate_hz, fastest_m_s),
@@ -185,12 +187,11 @@ impl<'a> Stream<'a> {
             return Ok(());
         };
         check_rate(segment.observed_rate_hz(), self.section.sample_rate_hz)?;
-        let known = twin.models.speeds_km_h();
-        match speed(segment, &samples, self.margin, known) {
+        match speed(segment, &samples, self.margin, &self.speeds) {
             Err(reason) => open.reason = Some(reason),
             Ok(speed) => {
                 let (share, signal) = (window.share(segment.position_m()), segment.signal());
-                let taken = open.features.take(twin.extractor, share, samples, &signal, speed);
+                let taken = open.features.take(twin.extractor, share, samples, &signal, &speed);
                 taken.map_err(|source| Error::Features {
                     file: "of the stream".to_owned(),
                     sleeper: self.section.sleepers[sleeper].id.clone(),
@@ -252,14 +253,13 @@ impl Open {
     }
 }
 
-/// Index, among the `known` speeds in km/h, of the speed over window and margins; an error if the speed
-/// changes or is none of them.
+/// The speed of the models for window and margins; an error if the speed changes or no model is for it.
 fn speed(
     segment: &Segment,
     samples: &Range<usize>,
     margin: usize,
-    known: &[f64],
-) -> Result<usize, Reason> {
+    known: &ModelSpeeds,
+) -> Result<PassSpeed, Reason> {
     let before = samples.start.saturating_sub(margin)..samples.start;
     let after = samples.end..(samples.end + margin).min(segment.len());
     let whole = before.start..after.end;
@@ -272,7 +272,7 @@ fn speed(
         return Err(Reason::SpeedChanges { speeds_km_h: [low, high] });
     }
     let speed_km_h = segment.speed_km_h(whole);
-    let speed = speed_among(speed_km_h, known).ok_or(Reason::OtherSpeed { speed_km_h })?;
+    let speed = known.of_pass(speed_km_h).ok_or(Reason::OtherSpeed { speed_km_h })?;
     if segment.is_coarse(samples.clone()) { Err(Reason::CoarsePosition) } else { Ok(speed) }
 }
 

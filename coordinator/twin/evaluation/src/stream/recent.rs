@@ -69,16 +69,16 @@ impl<'a> Recent<'a> {
         section: &Recording,
         features: SleeperFeatures,
     ) -> Result<Evaluated, Error> {
-        let Twin { models, library, domains, .. } = self.twin;
+        let Twin { library, by_speeds, .. } = self.twin;
         if self.features.len() == RECENT_MAX {
             self.features.remove(0);
             self.estimates.remove(0);
             self.outside.remove(0);
         }
-        let mut estimate = estimates(std::slice::from_ref(&features), models)?.remove(0);
+        let mut estimate = estimates(std::slice::from_ref(&features), &self.twin)?.remove(0);
         self.features.push(features.clone());
         self.estimates.push(estimate.clone());
-        let is_outside = judge_last(&self.features, library, domains)?.outside;
+        let is_outside = judge_last(&self.features, library, by_speeds)?.outside;
         self.outside.push(is_outside);
         let told = self.estimates.iter().zip(&self.outside).filter(|(_, outside)| !**outside);
         let unevenness = Unevenness::of(&told.map(|(estimate, _)| estimate).collect::<Vec<_>>());

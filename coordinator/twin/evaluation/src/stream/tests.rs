@@ -3,7 +3,7 @@
 use super::recent::RECENT_MAX;
 use super::*;
 use crate::testing;
-use crate::{Domains, Estimates, Evaluation, SleeperEvaluation, evaluate};
+use crate::{BySpeeds, Estimates, Evaluation, SleeperEvaluation, evaluate};
 use tracktwin_signal::recording::Pass;
 use tracktwin_signal::{Extractor, Signal};
 use tracktwin_surrogate::{Trained, TrainingSet};
@@ -15,19 +15,19 @@ struct Models {
     extractor: Extractor,
     library: TrainingSet,
     trained: Trained,
-    domains: Domains,
+    by_speeds: BySpeeds,
 }
 
 impl Models {
     fn new() -> Self {
         let library = testing::library();
         let trained = testing::models(&library);
-        Self { extractor: testing::extractor(), library, trained, domains: Domains::default() }
+        Self { extractor: testing::extractor(), library, trained, by_speeds: BySpeeds::default() }
     }
 
     fn twin(&self) -> Twin<'_> {
-        let Self { extractor, library, trained, domains } = self;
-        Twin { extractor, models: trained, library, domains }
+        let Self { extractor, library, trained, by_speeds } = self;
+        Twin { extractor, models: trained, library, by_speeds }
     }
 
     fn rows(&self, section: &Recording, samples: &[Sample]) -> Vec<Row> {

@@ -17,10 +17,10 @@ use coordinates::Coordinates;
 use faer::{Mat, MatRef};
 use fit::{BoundedFit, Bounds, Problem};
 use null::Null;
+use parking_lot::Mutex;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
 use tracktwin_parameters::Parameter;
 
 /// An end of a parameter's range that the fit exceeds, and the fit beyond this end.
@@ -156,7 +156,7 @@ impl Domain {
     }
 
     fn limit(&self, windows: usize, probability: f64) -> f64 {
-        let mut limits = self.limits.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut limits = self.limits.lock();
         let key = (windows, probability.to_bits());
         *limits.entry(key).or_insert_with(|| self.null.limit(windows, probability))
     }

@@ -1,0 +1,53 @@
+//! What is computed from library and models for a set of speeds, at its first use.
+
+use crate::{Error, METHOD_FEATURE};
+use parking_lot::Mutex;
+use std::collections::HashMap;
+use std::sync::Arc;
+use tracktwin_surrogate::{Domain, Stack, Trained, TrainingSet};
+
+/// One value for each set of speeds, given by their indices among the speeds of the models.
+type Cache<T> = Mutex<HashMap<Vec<usize>, Arc<T>>>;
+
+/// Cache of the domains and of the combinations of models of one library.
+#[derive(Default)]
+pub struct BySpeeds {
+    domains: Cache<Domain>,
+    stacks: Cache<Stack>,
+}
+
+impl BySpeeds {
+    /// Domain of the library at these speeds.
+    pub(crate) fn domain(
+        &self,
+        library: &TrainingSet,
+        speeds: &[usize],
+    ) -> Result<Arc<Domain>, Error> {
+        kept(&self.domains, speeds, || Domain::of(library, speeds))
+    }
+
+    /// Combination of the models of these single speeds.
+    pub(crate) fn stack(
+        &self,
+        models: &Trained,
+        library: &TrainingSet,
+        speeds: &[usize],
+    ) -> Result<Arc<Stack>, Error> {
+        kept(&self.stacks, speeds, || Stack::fit(models, library, speeds, METHOD_FEATURE))
+    }
+}
+
+/// The value for these speeds; computed if the cache lacks it.
+fn kept<T>(
+    cache: &Cache<T>,
+    speeds: &[usize],
+    compute: impl FnOnce() -> Result<T, tracktwin_surrogate::Error>,
+) -> Result<Arc<T>, Error> {
+    let mut known = cache.lock();
+    if let Some(value) = known.get(speeds) {
+        return Ok(Arc::clone(value));
+    }
+    let value = Arc::new(compute()?);
+    known.insert(speeds.to_vec(), Arc::clone(&value));
+    Ok(value)
+}
