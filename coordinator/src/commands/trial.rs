@@ -8,6 +8,7 @@ use crate::pipeline::evaluate::Evaluator;
 use crate::pipeline::trial::{Trial, TrialError, check_folder};
 use anyhow::anyhow;
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use tracktwin_library::Library;
 use tracktwin_parameters::Preset;
@@ -25,6 +26,9 @@ to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 
 )]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub(super) struct Arguments {
+    /// Track of the recordings: the test rig, or a line.
+    #[arg(long, value_name = "NAME", default_value = Preset::VTrack.name(), value_parser = track_parser())]
+    preset: Preset,
     /// Number of recordings.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=9999))]
     cases: u32,
@@ -62,6 +66,7 @@ pub(super) struct Arguments {
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments {
+        preset,
         cases,
         seed,
         out,
@@ -80,9 +85,10 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     check_folder(&out, force.force)?;
     make_folder(&out)?;
     let library = open_or_create(&url).await?;
-    let paper = paper(models, &library).await?;
+    let paper = paper(models, preset, &library).await?;
     let node = tracktwin_worker::agent::unique_name();
     let trial = Trial {
+        preset,
         seed,
         cases,
         folder: out,
@@ -115,6 +121,13 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     if missed { Err(Stop::Negative) } else { Ok(()) }
 }
 
+/// Parses the name of a track that trials have: V-Track or a line.
+fn track_parser() -> impl TypedValueParser<Value = Preset> {
+    let tracks = Preset::ALL.iter().filter(|preset| **preset != Preset::RealScale);
+    PossibleValuesParser::new(tracks.map(|preset| preset.name()))
+        .map(|name| Preset::from_name(&name).expect("only names of presets are possible"))
+}
+
 /// Prints one line per measure, and the path of the tables.
 fn print(summary: &Summary, folder: &Path) {
     for row in &summary.rows {
@@ -123,20 +136,28 @@ fn print(summary: &Summary, folder: &Path) {
     println_stdout(&format!("tables: {}", folder.join("trial.md").display()));
 }
 
-/// Evaluator for the paper's method; checks that the models are of V-Track.
-async fn paper(models: Option<Trained>, library: &Library) -> Result<Option<Evaluator>, Stop> {
+/// Evaluator for the paper's method; checks that the models are of the trial's track.
+async fn paper(
+    models: Option<Trained>,
+    preset: Preset,
+    library: &Library,
+) -> Result<Option<Evaluator>, Stop> {
     let Some(models) = models else { return Ok(None) };
     let evaluator = Evaluator::new(models, library).await.or_input()?;
-    check_models(&evaluator).or_input()?;
+    check_models(&evaluator, preset).or_input()?;
     Ok(Some(evaluator))
 }
 
-/// Checks that the models are of V-Track.
-fn check_models(evaluator: &Evaluator) -> anyhow::Result<()> {
-    compare_designs(evaluator.design(), &Preset::VTrack.design()).map_err(|other| {
+/// Checks that the models are of the trial's track.
+fn check_models(evaluator: &Evaluator, preset: Preset) -> anyhow::Result<()> {
+    let name = match preset {
+        Preset::VTrack => "V-Track",
+        line => line.name(),
+    };
+    compare_designs(evaluator.design(), &preset.design()).map_err(|other| {
         anyhow!(
-            "--models: their track is another than the trial's, which is V-Track ({} {}, V-Track's {}); \
-             train models of V-Track",
+            "--models: their track is another than the trial's, which is {name} ({} {}, that of {name} {}); \
+             train models of {name}",
             other.quantity,
             other.found(),
             other.known()
@@ -146,9 +167,10 @@ fn check_models(evaluator: &Evaluator) -> anyhow::Result<()> {
 
 fn stop(error: TrialError) -> Stop {
     match error {
-        TrialError::Other { .. } | TrialError::OtherFormat { .. } | TrialError::Seal(_) => {
-            Stop::Input(error.into())
-        }
+        TrialError::Other { .. }
+        | TrialError::OtherPreset { .. }
+        | TrialError::OtherFormat { .. }
+        | TrialError::Seal(_) => Stop::Input(error.into()),
         TrialError::Files(ref reason) if reason.is_wrong_input() => Stop::Input(error.into()),
         TrialError::Library(ref reason) if reason.is_wrong_input() => Stop::Input(error.into()),
         _ => Stop::Failure(error.into()),

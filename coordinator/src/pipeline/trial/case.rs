@@ -11,7 +11,6 @@ use tracktwin_diagnosis::{Diagnosis, Verdict};
 use tracktwin_evaluation::check_recording;
 use tracktwin_files::replace;
 use tracktwin_library::{DiagnosisRecord, Question};
-use tracktwin_parameters::Preset;
 use tracktwin_signal::recording::Recording;
 use tracktwin_trial::{KnockedOut, Paper, Plan, Seals, detectability, score};
 
@@ -25,7 +24,7 @@ impl Trial {
     }
 
     async fn answer_case(&self, number: u32) -> Result<(), TrialError> {
-        let track = Preset::VTrack.track();
+        let track = self.preset.track();
         let setting =
             Setting { track: &track, library: Some(&self.library), without: &[], shuffle: None };
         while let Some(question) = self.next_question(number).await? {
@@ -123,7 +122,7 @@ impl Trial {
             // Whoever is stopped meanwhile leaves no half recording under its name.
             let unfinished = folder.with_extension("unfinished");
             let _ = std::fs::remove_dir_all(&unfinished);
-            let plan = tracktwin_trial::plan(self.seed, number);
+            let plan = self.plan(number);
             compute(|| plan.making.record(&plan.scene, &unfinished))?;
             std::fs::rename(&unfinished, &folder).map_err(|source| file(&folder, source))?;
         }
@@ -162,7 +161,7 @@ impl Trial {
         let path = self.folder.join(SEALS);
         let seals = std::fs::read_to_string(&path).map_err(|source| file(&path, source))?;
         Seals::from_text(&seals)?.open(&sealed(number), &content)?;
-        Ok(tracktwin_trial::plan(self.seed, number))
+        Ok(self.plan(number))
     }
 
     fn recording(&self, number: u32) -> PathBuf {

@@ -6,27 +6,25 @@
 //! be continued.
 
 mod case;
+mod error;
 mod folder;
 mod lease;
 mod scores;
 
+pub use error::TrialError;
 pub use folder::check_folder;
 
-use crate::pipeline::diagnose::DiagnosingError;
 use crate::pipeline::evaluate::Evaluator;
-use crate::pipeline::null_models::NullModelError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use tracktwin_diagnosis::CalibrationError;
 use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
-use tracktwin_files::{FileName, FilesError, Kind, Output, replace};
-use tracktwin_library::{Library, LibraryError, TrialRecord};
-use tracktwin_reference_simulator::TruthError;
-use tracktwin_signal::recording::RecordingError;
-use tracktwin_trial::{CaseScore, FORMAT, Making, SealError, Seals, Summary, plan};
+use tracktwin_files::{FileName, Kind, Output, replace};
+use tracktwin_library::{Library, TrialRecord};
+use tracktwin_parameters::Preset;
+use tracktwin_trial::{CaseScore, FORMAT, Making, Plan, Seals, Summary, plan_on};
 
 /// File that identifies the trial of the folder.
 const TERMS: &str = "trial.json";
@@ -39,6 +37,10 @@ const TABLES: &str = "trial.md";
 const SCORES: &str = "scores.jsonl";
 const SUMMARY: &str = "summary.json";
 
+/// What the page of a trial of a line says about its makings.
+const ONE_SIMULATOR: &str =
+    " All cases have the making `second`: no other simulator has this track.";
+
 /// Pause before the next check for open cases, if other machines hold all of them.
 const WAIT: Duration = Duration::from_secs(2);
 
@@ -48,6 +50,8 @@ const PATIENCE: Duration = Duration::from_mins(10);
 /// A trial with the settings of this machine.
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub struct Trial {
+    /// Track of all cases.
+    pub preset: Preset,
     /// Seed that determines the hidden extensions.
     pub seed: u64,
     /// Number of cases.
@@ -76,124 +80,20 @@ struct Terms {
     /// Format of the cases; files of the first format do not contain this field.
     #[serde(default = "first_format")]
     format: u32,
+    /// Track of the cases; not in files of trials of V-Track.
+    #[serde(default, skip_serializing_if = "is_v_track")]
+    preset: Preset,
     seed: u64,
     code_version: String,
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_v_track(preset: &Preset) -> bool {
+    *preset == Preset::VTrack
+}
+
 const fn first_format() -> u32 {
     1
-}
-
-/// Errors that end a trial.
-#[derive(Debug, thiserror::Error)]
-pub enum TrialError {
-    /// The folder contains another trial.
-    #[error(
-        "{folder}: contains a trial of seed {seed} by version {version}; use another --out, \
-             or the same seed"
-    )]
-    Other {
-        /// Path of the folder.
-        folder: String,
-        /// Seed of the existing trial.
-        seed: u64,
-        /// Version of the program that started the existing trial.
-        version: String,
-    },
-    /// The folder contains a trial with cases of another format.
-    #[error(
-        "{folder}: contains a trial of format {format}, whose cases are others than those of this \
-             program (format {}); use another --out, or the program that began it",
-        FORMAT
-    )]
-    OtherFormat {
-        /// Path of the folder.
-        folder: String,
-        /// Format of the existing trial.
-        format: u32,
-    },
-    /// The library returned an error.
-    #[error(transparent)]
-    Library(#[from] LibraryError),
-    /// A truth was changed after sealing.
-    #[error(transparent)]
-    Seal(#[from] SealError),
-    /// A recording cannot be simulated.
-    #[error(transparent)]
-    Truth(#[from] TruthError),
-    /// A recording cannot be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// Some diagnoses failed. All other cases were answered and scored.
-    #[error(
-        "{} of {of} diagnoses failed; all others are scored; repeat the command to try these again\n{}",
-        .cases.len(),
-        .cases.iter().map(|(number, reason)| format!("case {number}: {reason}")).collect::<Vec<_>>().join("\n")
-    )]
-    BrokenDown {
-        /// Reason of each failure, by number of the case.
-        cases: BTreeMap<u32, String>,
-        /// Number of cases of the trial.
-        of: u32,
-    },
-    /// A diagnosis failed.
-    #[error("case {number}: {source}")]
-    Diagnosis {
-        /// Number of the case.
-        number: u32,
-        /// Cause.
-        source: DiagnosingError,
-    },
-    /// The recording was not compared with a track model.
-    #[error("case {number}: the recording has no track to compare with")]
-    NoTrack {
-        /// Number of the case.
-        number: u32,
-    },
-    /// The paper's method cannot evaluate the recording.
-    #[error("case {number}: {source}")]
-    Paper {
-        /// Number of the case.
-        number: u32,
-        /// Cause.
-        source: tracktwin_evaluation::Error,
-    },
-    /// The track model of a truth cannot be built.
-    #[error(transparent)]
-    Model(#[from] CalibrationError),
-    /// A file has invalid content.
-    #[error("{path}: {source}")]
-    Json {
-        /// Path of the file.
-        path: String,
-        /// Cause.
-        source: serde_json::Error,
-    },
-    /// A file cannot be written, or exists already.
-    #[error(transparent)]
-    Files(#[from] FilesError),
-    /// A file cannot be read.
-    #[error("{path}: {source}")]
-    File {
-        /// Path of the file.
-        path: String,
-        /// Cause.
-        source: std::io::Error,
-    },
-}
-
-impl TrialError {
-    /// Whether the same call may succeed later, when the library is available again.
-    fn is_temporary(&self) -> bool {
-        match self {
-            Self::Library(error) => error.is_temporary(),
-            Self::Diagnosis {
-                source: DiagnosingError::NullModel(NullModelError::Library(error)),
-                ..
-            } => error.is_temporary(),
-            _ => false,
-        }
-    }
 }
 
 impl Trial {
@@ -213,7 +113,7 @@ impl Trial {
         self.begin_folder()?;
         let mut seals = Seals::default();
         for number in 0..self.cases {
-            let content = text(&plan(self.seed, number));
+            let content = text(&self.plan(number));
             seals.seal(&sealed(number), content.as_bytes());
             let truth = self.folder.join(sealed(number));
             if !truth.try_exists().map_err(|source| file(&truth, source))? {
@@ -300,13 +200,16 @@ impl Trial {
     }
 
     fn sum_up(&self, scores: &[CaseScore]) -> Result<Summary, TrialError> {
-        let makings: Vec<Making> =
-            (0..self.cases).map(|number| plan(self.seed, number).making).collect();
+        let makings: Vec<Making> = (0..self.cases).map(|number| self.plan(number).making).collect();
         let summary = Summary::new(&makings, scores);
         let line = |score| serde_json::to_string(score).expect("plain data is plain JSON") + "\n";
         let lines: String = scores.iter().map(line).collect();
+        let (track, remark) = match self.preset {
+            Preset::VTrack => (String::new(), ""),
+            line => (format!(" {},", line.name()), ONE_SIMULATOR),
+        };
         let tables = format!(
-            "Trial of seed {}, {} cases, version {CODE_VERSION}.\n\n{}",
+            "Trial of{track} seed {}, {} cases, version {CODE_VERSION}.{remark}\n\n{}",
             self.seed,
             self.cases,
             summary.to_markdown(scores)
@@ -324,7 +227,8 @@ impl Trial {
     fn begin_folder(&self) -> Result<(), TrialError> {
         let path = self.folder.join(TERMS);
         let code_version = CODE_VERSION.to_owned();
-        let terms = Terms { format: FORMAT, seed: self.seed, code_version };
+        let preset = self.preset;
+        let terms = Terms { format: FORMAT, preset, seed: self.seed, code_version };
         let Some(content) = read_if_there(&path)? else { return write(&path, &terms) };
         let known: Terms = serde_json::from_slice(&content)
             .map_err(|source| TrialError::Json { path: path.display().to_string(), source })?;
@@ -334,6 +238,9 @@ impl Trial {
         let folder = self.folder.display().to_string();
         if known.format != FORMAT {
             return Err(TrialError::OtherFormat { folder, format: known.format });
+        }
+        if known.preset != preset {
+            return Err(TrialError::OtherPreset { folder, preset: known.preset });
         }
         Err(TrialError::Other { folder, seed: known.seed, version: known.code_version })
     }
@@ -356,12 +263,18 @@ impl Trial {
     }
 
     fn record(&self, seals: Vec<String>) -> TrialRecord {
-        TrialRecord {
-            seed: self.seed,
-            code_version: CODE_VERSION.to_owned(),
-            model_hash: MODEL_HASH.to_owned(),
-            seals,
-        }
+        // Part of the id: machines with another track do not share the trial.
+        let model_hash = match self.preset {
+            Preset::VTrack => MODEL_HASH.to_owned(),
+            line => format!("{MODEL_HASH} {}", line.name()),
+        };
+        let code_version = CODE_VERSION.to_owned();
+        TrialRecord { seed: self.seed, code_version, model_hash, seals }
+    }
+
+    /// The plan of a case.
+    fn plan(&self, number: u32) -> Plan {
+        plan_on(self.preset, self.seed, number)
     }
 }
 
@@ -390,4 +303,21 @@ fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, TrialError> {
 
 fn file(path: &Path, source: std::io::Error) -> TrialError {
     TrialError::File { path: path.display().to_string(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terms_of_v_track_are_those_of_earlier_programs_and_a_line_states_its_track() {
+        let terms = |preset| Terms { format: 2, preset, seed: 1, code_version: "0.2.0".to_owned() };
+        let written = |preset| serde_json::to_string(&terms(preset)).unwrap();
+        let earlier = r#"{"format":2,"seed":1,"code_version":"0.2.0"}"#;
+        assert_eq!(written(Preset::VTrack), earlier);
+        let line = written(Preset::Concrete60E1);
+        assert!(line.contains(r#""preset":"60E1-concrete""#), "{line}");
+        let read: Terms = serde_json::from_str(&line).unwrap();
+        assert_eq!(read, terms(Preset::Concrete60E1));
+    }
 }

@@ -48,6 +48,12 @@ pub enum TruthError {
         /// Length of the track in m.
         length_m: f64,
     },
+    /// The scene is of a track that this simulator does not have.
+    #[error("the reference simulator has no track but v-track; {preset} is of the second one")]
+    NoTrack {
+        /// Name of the preset.
+        preset: &'static str,
+    },
     /// The scene has no passes.
     #[error("the scene has no passes; add one")]
     NoPasses,

@@ -3,7 +3,6 @@
 //! This module contains the list of effects. Other modules apply each effect to track, vehicle, surface
 //! or recording.
 
-use crate::vtrack::SPACING_M;
 use serde::{Deserialize, Serialize};
 
 /// One hidden effect.
@@ -277,9 +276,9 @@ impl Hidden {
         }
     }
 
-    /// Start and end of the effect along the track in m, if it has a place: the stretch of rail, or the
-    /// distance from its first to its last sleeper.
-    pub fn place(&self) -> Option<[f64; 2]> {
+    /// Start and end of the effect along a track of this sleeper spacing, in m, if it has a place: the
+    /// stretch of rail, or the distance from its first to its last sleeper.
+    pub fn place(&self, spacing_m: f64) -> Option<[f64; 2]> {
         match self {
             Self::RailJoint { x_m, .. }
             | Self::Squat { x_m, .. }
@@ -287,7 +286,7 @@ impl Hidden {
             | Self::RailAbsorber { x_m, .. } => Some(*x_m),
             _ => {
                 let sleepers = self.sleepers()?;
-                let x_m = |number: &usize| (number + 1) as f64 * SPACING_M;
+                let x_m = |number: &usize| (number + 1) as f64 * spacing_m;
                 Some([x_m(sleepers.iter().min()?), x_m(sleepers.iter().max()?)])
             }
         }
@@ -305,7 +304,7 @@ mod tests {
         let hidden: Hidden = serde_json::from_str(text).unwrap();
         assert_eq!(hidden.physics(), "fastening_clamp");
         assert_eq!(hidden.sleepers(), Some(&[10, 14][..]));
-        assert_eq!(hidden.place(), Some([1.375, 1.875]));
+        assert_eq!(hidden.place(0.125), Some([1.375, 1.875]));
         let back: serde_json::Value = serde_json::to_value(&hidden).unwrap();
         assert_eq!(back["physics"], hidden.physics());
         assert_eq!(back["rotational_N_m_per_rad"], 3e5);

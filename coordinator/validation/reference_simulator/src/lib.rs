@@ -29,6 +29,7 @@ mod surface;
 mod system;
 mod track;
 mod typical;
+mod typical_line;
 mod vehicle;
 mod vtrack;
 

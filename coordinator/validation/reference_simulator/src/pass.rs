@@ -5,6 +5,7 @@ use crate::pass_state::PassState;
 use crate::scene::Scene;
 use crate::surface::{WheelAngle, shapes};
 use crate::track::Track;
+use crate::vtrack;
 use std::f64::consts::PI;
 
 /// Time in s over which the surface grows from nothing, so that the wheel begins without a jump.
@@ -46,7 +47,7 @@ pub fn drive(
     drive: &Drive,
     height_m: impl Fn(f64) -> f64,
 ) -> Result<Driven, TruthError> {
-    scene.check()?;
+    vtrack::check(scene)?;
     run(&Track::new(scene), scene, drive, height_m)
 }
 

@@ -4,6 +4,7 @@ use crate::hidden::Hidden;
 use crate::rail::RailModes;
 use crate::sleeper::SleeperModes;
 use crate::track::{STEP_S, bed, railpad, seat_m};
+use crate::vtrack;
 use crate::{Scene, TruthError};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::BTreeMap;
@@ -24,7 +25,7 @@ pub fn receptance(
     places_m: &[f64],
     frequencies_hz: &[f64],
 ) -> Result<Vec<Vec<Complex<f64>>>, TruthError> {
-    scene.check()?;
+    vtrack::check(scene)?;
     let length_m = scene.length_m();
     if let Some(&x_m) = places_m.iter().find(|x_m| !(0.0..=length_m).contains(*x_m)) {
         return Err(TruthError::OffTrack { x_m, length_m });

@@ -40,7 +40,7 @@ pub fn record(scene: &Scene, folder: &Path) -> Result<(), TruthError> {
 /// # Errors
 /// [`TruthError`] if the scene is invalid.
 pub fn simulate(scene: &Scene) -> Result<Recording, TruthError> {
-    scene.check()?;
+    vtrack::check(scene)?;
     let track = Track::new(scene);
     let shared = irregularity(scene, 0);
     let pass = |number: usize| one_pass(scene, &track, &shared, number);

@@ -7,11 +7,11 @@ use crate::TruthError;
 use crate::assumptions::Assumptions;
 use crate::hidden::Hidden;
 use crate::nuisances::Nuisances;
-use crate::vtrack::SPACING_M;
 use serde::{Deserialize, Serialize};
+use tracktwin_parameters::{Preset, TrackDesign};
 
-/// Least distance in m of what is recorded from the track's ends: room for the run-in.
-const END_M: f64 = 4.0 * SPACING_M;
+/// Least distance in spans of what is recorded from the track's ends: room for the run-in.
+const END_SPANS: f64 = 4.0;
 
 /// A track with its passes and hidden effects.
 ///
@@ -19,7 +19,10 @@ const END_M: f64 = 4.0 * SPACING_M;
 #[derive(Serialize, Deserialize, Clone, Debug, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// Number of spans of the track, 0.125 m each.
+    /// Rail, sleepers and vehicle.
+    #[serde(default, skip_serializing_if = "is_v_track")]
+    pub preset: Preset,
+    /// Number of spans of the track; one is as long as the sleeper spacing of the preset.
     pub spans: usize,
     /// Seed of the surface, of the differences between passes and of the noise.
     pub seed: u64,
@@ -51,6 +54,11 @@ pub struct Scene {
     /// Nuisances, which are not hidden effects.
     #[serde(default, skip_serializing_if = "Nuisances::are_none")]
     pub nuisances: Nuisances,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_v_track(preset: &Preset) -> bool {
+    *preset == Preset::VTrack
 }
 
 /// One sleeper with its railpad and its ballast.
@@ -133,10 +141,13 @@ impl Chain {
 }
 
 impl Scene {
-    /// A track with equal sleepers, without hidden effects, and with an ideal measuring chain.
+    /// V-Track with equal sleepers, without hidden effects, and with an ideal measuring chain.
     pub fn uniform(spans: usize, sleeper: SleeperTruth) -> Self {
-        let length_m = spans as f64 * SPACING_M;
+        let preset = Preset::VTrack;
+        let spacing_m = preset.design().sleeper.spacing_m;
+        let length_m = spans as f64 * spacing_m;
         Self {
+            preset,
             spans,
             seed: 1,
             irregularity_level: 3.0,
@@ -145,7 +156,7 @@ impl Scene {
             railpad_damping_n_s_m: 6e3,
             ballast_damping_n_s_m: 900.0,
             passes: vec![PassPlan { speed_km_h: 13.0 }],
-            recorded_m: [6.0 * SPACING_M, length_m - 6.0 * SPACING_M],
+            recorded_m: [6.0 * spacing_m, length_m - 6.0 * spacing_m],
             left_out: Vec::new(),
             chain: Chain::ideal(),
             assumptions: Assumptions::default(),
@@ -153,9 +164,19 @@ impl Scene {
         }
     }
 
+    /// Sections, masses, spacing and load.
+    pub fn design(&self) -> TrackDesign {
+        self.preset.design()
+    }
+
+    /// Distance of the sleepers in m.
+    pub fn spacing_m(&self) -> f64 {
+        self.design().sleeper.spacing_m
+    }
+
     /// Length of the track in m.
     pub fn length_m(&self) -> f64 {
-        self.spans as f64 * SPACING_M
+        self.spans as f64 * self.spacing_m()
     }
 
     /// Checks that all numbers are in their ranges and all places are on the track.
@@ -168,8 +189,10 @@ impl Scene {
             return Err(TruthError::Sleepers { given: self.sleepers.len(), spans: self.spans });
         }
         let [from_m, to_m] = self.recorded_m;
-        if !(END_M <= from_m && from_m + SPACING_M <= to_m && to_m <= length_m - END_M) {
-            return Err(TruthError::Recorded { from_m, to_m, end_m: END_M, length_m });
+        let spacing_m = self.spacing_m();
+        let end_m = END_SPANS * spacing_m;
+        if !(end_m <= from_m && from_m + spacing_m <= to_m && to_m <= length_m - end_m) {
+            return Err(TruthError::Recorded { from_m, to_m, end_m, length_m });
         }
         if self.passes.is_empty() {
             return Err(TruthError::NoPasses);
@@ -200,7 +223,7 @@ impl Scene {
         let on_track = |number: &usize| *number < self.sleepers.len();
         let sleepers = hidden.sleepers().is_none_or(|sleepers| sleepers.iter().all(on_track));
         let place = hidden
-            .place()
+            .place(self.spacing_m())
             .is_none_or(|[from_m, to_m]| 0.0 < from_m && from_m <= to_m && to_m < self.length_m());
         if sleepers && place {
             return Ok(());
@@ -269,7 +292,9 @@ mod tests {
         let text = serde_json::to_string(&scene).unwrap();
         assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), scene);
         // A scene of an earlier program is the same file.
-        assert!(!text.contains("assumptions") && !text.contains("nuisances"), "{text}");
+        for later in ["preset", "assumptions", "nuisances"] {
+            assert!(!text.contains(later), "{text}");
+        }
         let assumptions = Assumptions { modes_per_span: 8, ..Assumptions::default() };
         let nuisances = Nuisances { contact_factor: 1.01, ..Nuisances::default() };
         let other = Scene { assumptions, nuisances, ..scene };

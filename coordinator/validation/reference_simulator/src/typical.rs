@@ -1,4 +1,4 @@
-//! Typical random tracks: means inside the ranges of Table D1, unevenness, and sometimes a trend or a
+//! Typical random test rigs: means inside the ranges of Table D1, unevenness, and sometimes a trend or a
 //! step.
 
 use crate::assumptions::Assumptions;
@@ -7,6 +7,7 @@ use crate::scene::{Chain, PassPlan, Scene, SleeperTruth};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
+use tracktwin_parameters::Preset;
 
 /// Spans of a typical track, and what is recorded of it in m.
 const SPANS: usize = 40;
@@ -29,15 +30,24 @@ const VARIATION: f64 = 0.3;
 
 /// How the ballast stiffness runs along the track.
 #[derive(Clone, Copy)]
-enum Run {
+pub(crate) enum Run {
     Level,
     Trend(f64),
     Step { change: f64, at: f64 },
 }
 
 impl Run {
+    pub(crate) fn draw(random: &mut ChaCha12Rng) -> Self {
+        let change = VARIATION * within([-1.0, 1.0], random);
+        match within([0.0, 5.0], random) {
+            draw if draw < 3.0 => Self::Level,
+            draw if draw < 4.0 => Self::Trend(change),
+            _ => Self::Step { change, at: within([0.35, 0.65], random) },
+        }
+    }
+
     /// Factor on the mean at a share of the way, 0 to 1.
-    fn factor(self, way: f64) -> f64 {
+    pub(crate) fn factor(self, way: f64) -> f64 {
         match self {
             Self::Level => 1.0,
             Self::Trend(change) => 1.0 + change * (way - 0.5),
@@ -47,7 +57,7 @@ impl Run {
 }
 
 impl Scene {
-    /// A random track without hidden effects, drawn from a seed: 40 spans, two passes at each of 13, 10
+    /// A random V-Track without hidden effects, drawn from a seed: 40 spans, two passes at each of 13, 10
     /// and 7 km/h, and a usual measuring chain.
     ///
     /// Means are inside the ranges of Table D1 (Shen et al. 2023). The unevenness of the stiffnesses is
@@ -57,12 +67,7 @@ impl Scene {
         let random = &mut ChaCha12Rng::seed_from_u64(seed);
         let [railpad, ballast, bending] =
             [RAILPAD_N_M, BALLAST_N_M, BENDING_N_M2].map(|range| within(range, random));
-        let change = VARIATION * within([-1.0, 1.0], random);
-        let run = match within([0.0, 5.0], random) {
-            draw if draw < 3.0 => Run::Level,
-            draw if draw < 4.0 => Run::Trend(change),
-            _ => Run::Step { change, at: within([0.35, 0.65], random) },
-        };
+        let run = Run::draw(random);
         let sleeper = |number: usize| SleeperTruth {
             railpad_stiffness_n_m: railpad * scattered(SCATTER, random),
             ballast_stiffness_n_m: ballast
@@ -72,6 +77,7 @@ impl Scene {
         };
         let sleepers = (0..SPANS - 1).map(sleeper).collect();
         Self {
+            preset: Preset::VTrack,
             spans: SPANS,
             seed,
             irregularity_level: within(LEVEL, random),
@@ -107,12 +113,12 @@ impl Scene {
     }
 }
 
-fn within([low, high]: [f64; 2], random: &mut ChaCha12Rng) -> f64 {
+pub(crate) fn within([low, high]: [f64; 2], random: &mut ChaCha12Rng) -> f64 {
     Uniform::new(low, high).expect("low is below high").sample(random)
 }
 
 /// A factor about one that stays positive.
-fn scattered(deviation: f64, random: &mut ChaCha12Rng) -> f64 {
+pub(crate) fn scattered(deviation: f64, random: &mut ChaCha12Rng) -> f64 {
     let draw: f64 = StandardNormal.sample(random);
     (deviation * draw).exp()
 }

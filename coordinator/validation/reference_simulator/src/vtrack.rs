@@ -3,6 +3,9 @@
 //! Copied from their sources, not from the twin: Shen et al. 2023 (Mech. Syst. Signal Process. 204,
 //! 110730), section 2.4.1, appendix B.3 to B.5 and Table D1. One rail, half sleepers.
 
+use crate::{Scene, TruthError};
+use tracktwin_parameters::Preset;
+
 /// Distance of the sleepers in m.
 pub const SPACING_M: f64 = 0.125;
 
@@ -42,4 +45,12 @@ pub(crate) const WHEEL_RADIUS_M: f64 = 0.065;
 /// Shear modulus of steel in Pa.
 pub(crate) const fn shear_modulus_pa() -> f64 {
     YOUNG_PA / (2.0 * (1.0 + POISSON))
+}
+
+/// Checks a scene, and that it is of V-Track.
+pub(crate) fn check(scene: &Scene) -> Result<(), TruthError> {
+    if scene.preset != Preset::VTrack {
+        return Err(TruthError::NoTrack { preset: scene.preset.name() });
+    }
+    scene.check()
 }

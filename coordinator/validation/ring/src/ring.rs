@@ -7,7 +7,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use tracktwin_parameters::Parameter;
+use tracktwin_parameters::{Parameter, Preset};
 use tracktwin_reference_simulator::{
     Assumptions, Chain, Hidden, Nuisances, PassPlan, RoughRail, SPACING_M, Scene,
     SleeperTruth as SceneSleeper, TruthError, simulate,
@@ -273,6 +273,7 @@ impl Ring {
         left_out.push(Hidden::SleeperBolt { sleepers, stiffness_n_per_m: BOLT_N_M });
         left_out.retain(|hidden| hidden.sleepers().is_none_or(|sleepers| !sleepers.is_empty()));
         Scene {
+            preset: Preset::VTrack,
             spans,
             seed: self.plan.seed,
             irregularity_level: LEVEL,

@@ -1,12 +1,14 @@
 //! The measuring chain: sensor, channel, recorder, odometer, with their hidden faults.
 //!
-//! Order: mounting of the sensor, shelf of the channel, noise and hum, gain, steps, limit.
+//! Order: mounting of the sensor, shelf of the channel, samples, noise and hum, gain, steps, limit.
 
 use crate::biquad::Biquad;
 use crate::defect::smooth;
 use crate::nuisance::Nuisances;
 use crate::pass::Ride;
 use crate::random::{Random, Topic};
+use crate::recorder::sampled;
+use crate::scale::Scale;
 use crate::scheme::STEP_S;
 use std::f64::consts::TAU;
 use tracktwin_reference_simulator::{Hidden, Scene};
@@ -15,8 +17,6 @@ use tracktwin_reference_simulator::{Hidden, Scene};
 const DRIFT_NOISE: [f64; 2] = [0.5, 5.0];
 /// Amplitude of the third harmonic of hum over that of the first.
 const THIRD_HARMONIC: f64 = 0.15;
-/// Way in m between places where the odometer's error is drawn anew.
-const WANDER_M: f64 = 0.7;
 
 /// What is recorded of a pass.
 #[derive(Clone, Debug)]
@@ -26,7 +26,13 @@ pub(crate) struct Recorded {
 }
 
 /// Records pass `pass`.
-pub(crate) fn recorded(scene: &Scene, nuisances: &Nuisances, ride: &Ride, pass: usize) -> Recorded {
+pub(crate) fn recorded(
+    scene: &Scene,
+    scale: &Scale,
+    nuisances: &Nuisances,
+    ride: &Ride,
+    pass: usize,
+) -> Recorded {
     let mut random = Random::new(scene.seed, Topic::Noise, pass);
     let mut values = ride.acceleration_m_s2.clone();
     for hidden in &scene.left_out {
@@ -44,13 +50,18 @@ pub(crate) fn recorded(scene: &Scene, nuisances: &Nuisances, ride: &Ride, pass: 
         low += follow * (*value - low);
         *value += gain * low;
     }
-    let mut values = values.split_off(ride.first);
-    add_noise(&mut values, scene.chain.noise_m_s2, &mut random);
+    let [mut values, true_m] = if scale.is_sample_step() {
+        [values.split_off(ride.first), ride.position_m[ride.first..].to_vec()]
+    } else {
+        sampled(scale.sample_rate_hz, ride.first, &values, &ride.position_m)
+    };
+    let sample_s = 1.0 / scale.sample_rate_hz;
+    add_noise(&mut values, scene.chain.noise_m_s2, sample_s, &mut random);
     for hidden in &scene.left_out {
         if let Hidden::ElectricalHum { frequency_hz, amplitude_m_s2 } = *hidden {
             let phase = random.angle();
             for (step, value) in values.iter_mut().enumerate() {
-                let angle = TAU * frequency_hz * STEP_S * step as f64 + phase;
+                let angle = TAU * frequency_hz * sample_s * step as f64 + phase;
                 *value += amplitude_m_s2 * (angle.sin() + THIRD_HARMONIC * (3.0 * angle).sin());
             }
         }
@@ -77,14 +88,14 @@ pub(crate) fn recorded(scene: &Scene, nuisances: &Nuisances, ride: &Ride, pass: 
             }
         }
     }
-    let position_m = positions(scene, &ride.position_m[ride.first..], pass, &mut random);
+    let position_m = positions(scene, scale.wander_m, &true_m, pass, &mut random);
     Recorded { position_m, acceleration_m_s2: values }
 }
 
 /// White noise, and slower noise of half its size.
-fn add_noise(values: &mut [f64], deviation: f64, random: &mut Random) {
+fn add_noise(values: &mut [f64], deviation: f64, sample_s: f64, random: &mut Random) {
     let [share, corner_hz] = DRIFT_NOISE;
-    let keep = (-TAU * corner_hz * STEP_S).exp();
+    let keep = (-TAU * corner_hz * sample_s).exp();
     let fresh = (1.0 - keep * keep).sqrt();
     let mut slow = random.normal();
     for value in values {
@@ -93,14 +104,20 @@ fn add_noise(values: &mut [f64], deviation: f64, random: &mut Random) {
     }
 }
 
-/// Positions recorded by the odometer.
-fn positions(scene: &Scene, true_m: &[f64], pass: usize, random: &mut Random) -> Vec<f64> {
+/// Positions recorded by the odometer, whose error is drawn anew every `apart_m`.
+fn positions(
+    scene: &Scene,
+    apart_m: f64,
+    true_m: &[f64],
+    pass: usize,
+    random: &mut Random,
+) -> Vec<f64> {
     let Some(&first_m) = true_m.first() else {
         return Vec::new();
     };
     let length_m = true_m.last().map_or(0.0, |last_m| last_m - first_m);
     let wander_m = scene.chain.wander_m;
-    let knots: Vec<f64> = (0..(length_m / WANDER_M) as usize + 2)
+    let knots: Vec<f64> = (0..(length_m / apart_m) as usize + 2)
         .map(|_| random.between(-wander_m, wander_m))
         .collect();
     let faults: Vec<[f64; 2]> = scene
@@ -117,7 +134,7 @@ fn positions(scene: &Scene, true_m: &[f64], pass: usize, random: &mut Random) ->
         .collect();
     let says = |&x_m: &f64| {
         let way_m = x_m - first_m;
-        let place = way_m / WANDER_M;
+        let place = way_m / apart_m;
         let knot = (place as usize).min(knots.len() - 2);
         let [from, to] = [knots[knot], knots[knot + 1]];
         let fault: f64 = faults.iter().map(|[offset, scale]| offset + scale * way_m).sum();

@@ -2,7 +2,6 @@
 //!
 //! This module computes the depth of the surface below its ideal in m, positive downwards.
 
-use crate::nuisance::Nuisances;
 use crate::random::{Random, Topic};
 use std::f64::consts::{PI, TAU};
 use tracktwin_reference_simulator::{Hidden, Scene};
@@ -68,13 +67,13 @@ pub(crate) struct Tread {
 }
 
 impl Tread {
-    /// Of a scene's wheel.
-    pub(crate) fn new(scene: &Scene, nuisances: &Nuisances, radius_m: f64) -> Self {
-        let small = (1..).zip(&nuisances.orders);
+    /// Of a wheel with small waves `orders`, from the first order up, and hidden defects.
+    pub(crate) fn new(left_out: &[Hidden], orders: &[[f64; 2]], radius_m: f64) -> Self {
+        let small = (1..).zip(orders);
         let mut orders: Vec<_> =
             small.map(|(n, &[amplitude, phase])| (f64::from(n), amplitude, phase)).collect();
         let mut flats = Vec::new();
-        for hidden in &scene.left_out {
+        for hidden in left_out {
             match *hidden {
                 Hidden::WheelOutOfRound { order, amplitude_m } => {
                     let order = f64::from(order);

@@ -33,22 +33,23 @@ pub(crate) struct Void {
     pub(crate) gap_m: f64,
     /// N/m and N s/m of the ballast under full contact.
     pub(crate) ballast: [f64; 2],
+    /// Way in m over which the ballast comes to its full stiffness.
+    pub(crate) closing_m: f64,
 }
 
 /// Share of the ballast's damping that stays while the gap is open.
 const OPEN_DAMPING: f64 = 0.2;
-/// Way in m over which the ballast comes to its full stiffness.
-const CLOSING_M: f64 = 2e-5;
 
 impl Void {
     fn force(self, approach: f64, speed: f64) -> f64 {
         let [stiffness, damping] = self.ballast;
         let way = approach - self.gap_m;
-        let closed = (way / CLOSING_M).clamp(0.0, 1.0);
-        let push = if way < CLOSING_M {
-            stiffness * CLOSING_M * closed * closed / 2.0
+        let closing_m = self.closing_m;
+        let closed = (way / closing_m).clamp(0.0, 1.0);
+        let push = if way < closing_m {
+            stiffness * closing_m * closed * closed / 2.0
         } else {
-            stiffness * (way - CLOSING_M / 2.0)
+            stiffness * (way - closing_m / 2.0)
         };
         let rub = damping * OPEN_DAMPING * speed;
         // Nothing pulls beyond what rubs.
@@ -130,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_void_pushes_only_and_grows_stiffer() {
-        let void = Void { gap_m: 1e-4, ballast: [3e6, 200.0] };
+        let void = Void { gap_m: 1e-4, ballast: [3e6, 200.0], closing_m: 2e-5 };
         assert_eq!(void.force(0.5e-4, 0.0), 0.0);
         assert_eq!(void.force(0.5e-4, 1.0), 40.0);
         assert_eq!(void.force(1.1e-4, -100.0), -4000.0);

@@ -1,4 +1,4 @@
-//! A second simulator of axle-box acceleration over V-Track, with hidden physics.
+//! A second simulator of axle-box acceleration, over V-Track or a line, with hidden physics.
 //!
 //! A blind trial is meaningful only if its simulator is independent of the track model. This simulator
 //! uses the data types of scenes, effects and errors of `tracktwin_reference_simulator`, and its own
@@ -40,6 +40,23 @@
 //! | `linked_sleepers` | 5 % loss at 1 kHz; 400 MN/m at most |
 //! | `wheel_mode` | mode of the free wheel: the hub moves against the rim by the ratio of modal mass to wheel |
 
+//! On a line, which a scene names by its preset, sections, masses and loads are those of the preset. Further
+//! assumptions differ from those above:
+//!
+//! | Part | Assumption |
+//! |---|---|
+//! | rail | 16 cells a span; damping of bending alone, by the preset |
+//! | half sleeper | 8 bars, the rail seat at the end of one of them; no slope in the middle of the sleeper; ballast at all ends of bars, 50 to 100 % as stiff under the middle quarter; loss factor 0.7 % at 700 Hz |
+//! | vehicle | all wheels of the preset on the same rail; hidden effects are in the recorded one |
+//! | irregularity | falls with a power of the wave number of 2.6 to 3.4 above 8 rad/m; waves beyond 3 m fade; the contact patch filters it and all defects (Remington), with a half length within 10 % of Hertz's |
+//! | defects of the rail | the wheel does not reach the bottom of narrow hollows |
+//! | vehicle and track | rail seats off by 5 mm (12 at most), wheel by 2 %, contact by 5 % at most, wheel orders 1 to 4 of up to 80 um / order^2 |
+//! | pass | speed drifts by up to 3 % |
+//! | recorder | 25.6 kHz, filter without phase up to 10 kHz |
+//! | odometer | error drawn every 6 spans |
+//! | `hanging_sleeper` | full stiffness 0.1 mm after closing |
+//! | `cracked_sleeper` | 50 mm of the sleeper, at the rail seat |
+
 mod band;
 mod biquad;
 mod body;
@@ -53,11 +70,14 @@ mod pass;
 mod rail;
 mod random;
 mod record;
+mod recorder;
+mod scale;
 mod scheme;
 mod seat;
 mod sleeper;
 mod surface;
 mod system;
+mod texture;
 mod track;
 mod vehicle;
 

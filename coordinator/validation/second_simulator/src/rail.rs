@@ -8,9 +8,6 @@ use crate::band::Band;
 use crate::scheme::{Motion, Weights};
 use tracktwin_parameters::BeamSection;
 
-/// Viscous damping of bending in s: 0.06 % of critical damping at 1 kHz.
-const BENDING_DAMPING_S: f64 = 2e-7;
-
 /// A joint, a crack: a stretch of rail that bends more easily.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SoftRail {
@@ -42,8 +39,13 @@ impl Place {
         terms.map(|(row, weight)| weight * value(self.row + row)).sum()
     }
 
+    /// The row halfway to another place.
+    pub(crate) fn middle(&self, other: &Self) -> usize {
+        usize::midpoint(self.row, other.row) + 2
+    }
+
     /// The rows with their weights.
-    pub(crate) fn rows(&self) -> impl Iterator<Item = (usize, f64)> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
         let row = self.row;
         Self::ROWS.iter().zip(self.weights).map(move |(offset, weight)| (row + offset, weight))
     }
@@ -58,6 +60,8 @@ pub(crate) struct Rail {
     cells_m: Vec<f64>,
     /// `kappa G A` in N.
     shear: f64,
+    /// Viscous damping of bending in s.
+    damping_s: f64,
     /// Stiffness in N m/rad of every node's hinge; none at the ends.
     hinges: Vec<f64>,
     /// Springs between ground and rotation at nodes, in N m/rad and N m s/rad.
@@ -76,6 +80,7 @@ impl Rail {
     /// A beam with these nodes; `absorber` gives the decay rate in 1/s at a place.
     pub(crate) fn new(
         section: &BeamSection,
+        damping_s: f64,
         nodes_m: Vec<f64>,
         soft: &[SoftRail],
         absorber: impl Fn(f64) -> f64,
@@ -101,6 +106,7 @@ impl Rail {
         };
         Self {
             shear: section.shear_stiffness(),
+            damping_s,
             hinges: (0..=last).map(|n| if n == 0 || n == last { 0.0 } else { hinge(n) }).collect(),
             clamps: Vec::new(),
             mass: (0..size).map(mass_by_row).collect(),
@@ -169,7 +175,7 @@ impl Rail {
             let strain = [-1.0 / length, -1.0, 1.0 / length];
             band.add_square(2 * cell, strain, weights.stiffness * self.shear * length);
         }
-        let bending = weights.stiffness + weights.damping * BENDING_DAMPING_S;
+        let bending = weights.stiffness + weights.damping * self.damping_s;
         for node in 1..self.nodes_m.len() - 1 {
             band.add_square(2 * node - 1, [-1.0, 0.0, 1.0], bending * self.hinges[node]);
         }
@@ -196,7 +202,7 @@ impl Rail {
         }
         for node in 1..self.nodes_m.len() - 1 {
             let [before, after] = [self.known[2 * node - 1], self.known[2 * node + 1]];
-            let bend = after[0] - before[0] + BENDING_DAMPING_S * (after[1] - before[1]);
+            let bend = after[0] - before[0] + self.damping_s * (after[1] - before[1]);
             let moment = self.hinges[node] * bend;
             sides[2 * node - 1][0] += moment;
             sides[2 * node + 1][0] -= moment;

@@ -4,7 +4,7 @@
 //! equations.
 
 use crate::nuisance::Nuisances;
-use tracktwin_reference_simulator::{Hidden, SPACING_M, Scene};
+use tracktwin_reference_simulator::{Hidden, Scene};
 
 /// Sleepers beyond either end of the scene, where waves die out.
 pub(crate) const BEYOND: usize = 3;
@@ -44,6 +44,7 @@ pub(crate) struct Seat {
 /// All seats along the track, [`BEYOND`] the ends of the scene too.
 pub(crate) fn seats(scene: &Scene, nuisances: &Nuisances) -> Vec<Seat> {
     let last = scene.sleepers.len() - 1;
+    let spacing_m = scene.spacing_m();
     let count = scene.spans + 1 + 2 * BEYOND;
     let seat = |index: usize| {
         // The scene's sleeper 0 stands one spacing behind the scene's begin.
@@ -53,7 +54,7 @@ pub(crate) fn seats(scene: &Scene, nuisances: &Nuisances) -> Vec<Seat> {
         let shift_m = number.map_or(0.0, |number| nuisances.seat_m[number]);
         let damping = number.map_or(1.0, |number| nuisances.pad_damping[number]);
         let mut seat = Seat {
-            x_m: (index as f64 - BEYOND as f64) * SPACING_M + shift_m,
+            x_m: (index as f64 - BEYOND as f64) * spacing_m + shift_m,
             ei: truth.sleeper_ei_n_m2,
             pad: [truth.railpad_stiffness_n_m, scene.railpad_damping_n_s_m * damping],
             branches: Vec::new(),

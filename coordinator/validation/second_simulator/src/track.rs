@@ -7,16 +7,15 @@ use crate::band::Factor;
 use crate::body::Body;
 use crate::element::{Element, Law, Point, Stiffening, Void};
 use crate::rail::{Place, Rail, SoftRail};
+use crate::scale::Scale;
 use crate::scheme::{REACH, Weights};
 use crate::seat::{BEYOND, Seat, index_of};
-use crate::sleeper::{self, BALLAST_NODES, FASTENER_DAMPING_S, LAYER, SEAT};
+use crate::sleeper::{self, FASTENER_DAMPING_S, LAYER, Layout};
 use crate::system::Matrices;
 use std::f64::consts::TAU;
 use tracktwin_parameters::TrackDesign;
-use tracktwin_reference_simulator::{Hidden, SPACING_M, Scene};
+use tracktwin_reference_simulator::{Hidden, Scene};
 
-/// Cells of the rail's grid in a span.
-const CELLS: usize = 12;
 /// Decay rate in 1/s at the rail's very ends, from none where the scene ends: about half of a wave comes back.
 const END_DECAY: f64 = 3e3;
 /// Share of a layer's stiffness and damping between neighbouring sleepers.
@@ -44,21 +43,29 @@ pub(crate) struct UnderWheel {
 
 impl Track {
     /// The track of a scene at rest without a wheel.
-    pub(crate) fn new(scene: &Scene, design: &TrackDesign, seats: &[Seat]) -> Self {
+    pub(crate) fn new(
+        scene: &Scene,
+        design: &TrackDesign,
+        scale: &Scale,
+        layout: &Layout,
+        seats: &[Seat],
+    ) -> Self {
+        let cells = scale.cells;
         let length_m = scene.length_m();
-        let beyond_m = BEYOND as f64 * SPACING_M;
+        let beyond_m = BEYOND as f64 * scale.spacing_m;
         let decay = |x_m: f64| {
             let outside_m = (-x_m).max(x_m - length_m).max(0.0);
             END_DECAY * (outside_m / beyond_m).powi(2)
         };
         let soft: Vec<SoftRail> = scene.left_out.iter().filter_map(soft_rail).collect();
-        let mut rail = Rail::new(&design.rail, nodes_m(seats), &soft, decay);
+        let nodes_m = nodes_m(seats, cells);
+        let mut rail = Rail::new(&design.rail, scale.rail_damping_s, nodes_m, &soft, decay);
         let at_seat = |(index, seat): (usize, &Seat)| {
-            Body::new(CELLS * index, &sleeper::matrices(seat, &design.sleeper))
+            Body::new(cells * index, &sleeper::matrices(seat, &design.sleeper, layout))
         };
         let mut bodies: Vec<Body> = seats.iter().enumerate().map(at_seat).collect();
         for (index, seat) in seats.iter().enumerate().filter(|(_, seat)| seat.clamp[1] > 0.0) {
-            rail.clamp(CELLS * index, seat.clamp[1], FASTENER_DAMPING_S * seat.clamp[1]);
+            rail.clamp(cells * index, seat.clamp[1], FASTENER_DAMPING_S * seat.clamp[1]);
         }
         bodies.extend(scene.left_out.iter().filter_map(|hidden| absorber(hidden, &rail)));
         let mut band = rail.matrix(Weights::STEP);
@@ -68,22 +75,21 @@ impl Track {
         Self {
             factor: band.factor(),
             sides: vec![[0.0; 2]; rail.size()],
-            elements: elements(scene, seats),
+            elements: elements(scene, scale, layout, seats),
             rail,
             bodies,
         }
     }
 
-    /// Moves to rest under a force in N at `x_m`, voids open; returns the displacement there in m.
-    pub(crate) fn rest_under(&mut self, x_m: f64, force_n: f64) -> f64 {
-        let place = self.rail.place(x_m);
+    /// Moves to rest under a force in N at each place, voids open; returns the displacements there in m.
+    pub(crate) fn rest_under(&mut self, places: &[Place], force_n: f64) -> Vec<f64> {
         let mut band = self.rail.matrix(Weights::REST);
         for body in &self.bodies {
             band.add(Rail::row(body.node), body.on_rail()[1]);
         }
         self.sides.fill([0.0; 2]);
-        for (row, weight) in place.rows() {
-            self.sides[row][0] = weight * force_n;
+        for (row, weight) in places.iter().flat_map(Place::rows) {
+            self.sides[row][0] += weight * force_n;
         }
         band.factor().solve(&mut self.sides);
         for (displacement, side) in self.rail.motion.displacement.iter_mut().zip(&self.sides) {
@@ -92,22 +98,23 @@ impl Track {
         for body in &mut self.bodies {
             body.rest_under(self.sides[Rail::row(body.node)][0]);
         }
-        place.of(|row| self.sides[row][0])
+        places.iter().map(|place| place.of(|row| self.sides[row][0])).collect()
     }
 
-    /// The rail's place under the wheel.
+    /// The rail's place under a wheel.
     pub(crate) fn place(&self, x_m: f64) -> Place {
         self.rail.place(x_m)
     }
 
-    /// Begins a step that ends with the wheel at `place`.
-    pub(crate) fn begin(&mut self, place: &Place) -> UnderWheel {
+    /// Begins a step that ends with the wheels at `places`. The unit forces of all wheels share a right-hand
+    /// side: within a step a force reaches some tenths of a metre, not the next wheel.
+    pub(crate) fn begin(&mut self, places: &[Place]) {
         self.rail.begin(&mut self.sides);
         for side in &mut self.sides {
             side[1] = 0.0;
         }
-        for (row, weight) in place.rows() {
-            self.sides[row][1] = weight;
+        for (row, weight) in places.iter().flat_map(Place::rows) {
+            self.sides[row][1] += weight;
         }
         for body in &mut self.bodies {
             body.system.begin();
@@ -130,6 +137,10 @@ impl Track {
             self.sides[Rail::row(body.node)][0] += body.release();
         }
         self.factor.solve(&mut self.sides);
+    }
+
+    /// The rail under a wheel of the step that has begun.
+    pub(crate) fn under(&self, place: &Place) -> UnderWheel {
         let motion = &self.rail.motion;
         UnderWheel {
             free_m: place.of(|row| motion.predicted(row) + REACH * self.sides[row][0]),
@@ -137,10 +148,16 @@ impl Track {
         }
     }
 
-    /// Ends the step under its contact force in N.
-    pub(crate) fn end(&mut self, force_n: f64) {
-        for (row, [free, per_force]) in self.sides.iter().enumerate() {
-            self.rail.motion.advance(row, free + per_force * force_n);
+    /// Ends the step under its contact forces in N at `places`, which ascend.
+    pub(crate) fn end(&mut self, places: &[Place], forces_n: &[f64]) {
+        let mut first = 0;
+        for (index, force_n) in forces_n.iter().enumerate() {
+            let next = places.get(index + 1);
+            let last = next.map_or(self.sides.len(), |next| places[index].middle(next));
+            for (row, [free, per_force]) in (first..last).zip(&self.sides[first..last]) {
+                self.rail.motion.advance(row, free + per_force * force_n);
+            }
+            first = last;
         }
         for body in &mut self.bodies {
             body.advance(self.rail.motion.acceleration[Rail::row(body.node)]);
@@ -149,10 +166,10 @@ impl Track {
 }
 
 /// Nodes in m: every seat, and between two the others evenly.
-fn nodes_m(seats: &[Seat]) -> Vec<f64> {
+fn nodes_m(seats: &[Seat], cells: usize) -> Vec<f64> {
     let between = |pair: &[Seat]| {
         let [from, to] = [pair[0].x_m, pair[1].x_m];
-        (0..CELLS).map(move |cell| from + (to - from) * cell as f64 / CELLS as f64)
+        (0..cells).map(move |cell| from + (to - from) * cell as f64 / cells as f64)
     };
     let inner = seats.windows(2).flat_map(between);
     inner.chain(seats.last().map(|seat| seat.x_m)).collect()
@@ -181,21 +198,24 @@ fn absorber(hidden: &Hidden, rail: &Rail) -> Option<Body> {
     Some(Body::new(rail.nearest(x_m), &matrices))
 }
 
-fn elements(scene: &Scene, seats: &[Seat]) -> Vec<Element> {
+fn elements(scene: &Scene, scale: &Scale, layout: &Layout, seats: &[Seat]) -> Vec<Element> {
     let mut elements = Vec::new();
+    let under = layout.seat;
     for (index, seat) in seats.iter().enumerate() {
         if let Some([exponent, reference_n, toe_n]) = seat.stiffening {
             let reference_n = reference_n + toe_n;
             let law = Stiffening { pad: seat.pad, exponent, reference_n, toe_n };
-            let (from, to) = (Point::Rail(CELLS * index), Point::Body(index, SEAT));
+            let (from, to) = (Point::Rail(scale.cells * index), Point::Body(index, under));
             elements.push(Element::new(from, Some(to), Law::Stiffening(law)));
         }
         let layer = seat.layer.map(|_| Point::Body(index, LAYER));
         if let Some(gap_m) = seat.gap_m {
-            let ballast = seat.ballast.map(|whole| whole / BALLAST_NODES.len() as f64);
-            let void = Law::Void(Void { gap_m, ballast });
-            let at = |node| Element::new(Point::Body(index, node), layer, void);
-            elements.extend(BALLAST_NODES.map(at));
+            let at = |&(node, share): &(usize, f64)| {
+                let ballast = seat.ballast.map(|whole| whole * share);
+                let void = Law::Void(Void { gap_m, ballast, closing_m: scale.closing_m });
+                Element::new(Point::Body(index, node), layer, void)
+            };
+            elements.extend(layout.ballast.iter().map(at));
         }
         let next = seats.get(index + 1).and_then(|next| next.layer);
         if let (Some(from), Some([_, stiffness, damping]), Some(_)) = (layer, seat.layer, next) {
@@ -205,7 +225,7 @@ fn elements(scene: &Scene, seats: &[Seat]) -> Vec<Element> {
     }
     for hidden in &scene.left_out {
         if let Hidden::LinkedSleepers { sleepers, stiffness_n_per_m } = *hidden {
-            let [from, to] = sleepers.map(|number| Point::Body(index_of(number), SEAT));
+            let [from, to] = sleepers.map(|number| Point::Body(index_of(number), under));
             let law = Law::Linear([stiffness_n_per_m, FASTENER_DAMPING_S * stiffness_n_per_m]);
             elements.push(Element::new(from, Some(to), law));
         }
@@ -214,87 +234,4 @@ fn elements(scene: &Scene, seats: &[Seat]) -> Vec<Element> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scheme::STEP_S;
-    use crate::seat::testing::seat;
-    use tracktwin_reference_simulator::SleeperTruth;
-
-    fn scene(spans: usize) -> Scene {
-        let sleeper = SleeperTruth {
-            railpad_stiffness_n_m: 1.5e8,
-            ballast_stiffness_n_m: 1.2e7,
-            sleeper_ei_n_m2: 5000.0,
-        };
-        Scene::uniform(spans, sleeper)
-    }
-
-    fn seats_of(spans: usize, base: &Seat) -> Vec<Seat> {
-        let at =
-            |index: usize| Seat { x_m: (index as f64 - BEYOND as f64) * SPACING_M, ..base.clone() };
-        (0..spans + 1 + 2 * BEYOND).map(at).collect()
-    }
-
-    #[test]
-    fn the_deflection_at_rest_is_that_of_a_beam_on_an_elastic_foundation() {
-        let design = TrackDesign::v_track();
-        // Supports so soft that they act as one foundation, under stiff sleepers.
-        let base = Seat { ballast: [1.2e6, 90.0], ei: 5e7, ..seat() };
-        let mut track = Track::new(&scene(80), &design, &seats_of(80, &base));
-        let deflection = track.rest_under(5.0, 4500.0);
-        // Winkler's foundation under a beam that shears too: Fourier integral in closed form.
-        let foundation = 1.0 / (1.0 / 1.2e6 + 1.0 / 1.5e8) / SPACING_M;
-        let ei = design.rail.bending_stiffness();
-        let shear = ei / design.rail.shear_stiffness();
-        let root = (foundation * shear + 2.0 * (ei * foundation).sqrt()).sqrt();
-        let winkler = 4500.0 / (2.0 * root) * (foundation.powf(-0.5) + shear * ei.powf(-0.5));
-        assert!((deflection / winkler - 1.0).abs() < 0.01, "{deflection} and {winkler}");
-    }
-
-    /// Acceleration of the rail at `x_m` after a blow of one step there.
-    fn ring(track: &mut Track, x_m: f64, steps: usize) -> Vec<f64> {
-        let place = track.place(x_m);
-        let mut heard = Vec::with_capacity(steps);
-        for step in 0..steps {
-            track.begin(&place);
-            track.end(if step == 0 { 1000.0 } else { 0.0 });
-            heard.push(place.of(|row| track.rail.motion.acceleration[row]));
-        }
-        heard
-    }
-
-    /// Power at a frequency in Hz.
-    fn power(heard: &[f64], frequency_hz: f64) -> f64 {
-        let turn = TAU * frequency_hz * STEP_S;
-        let (mut re, mut im) = (0.0, 0.0);
-        for (step, value) in heard.iter().enumerate() {
-            re += value * (turn * step as f64).cos();
-            im += value * (turn * step as f64).sin();
-        }
-        re * re + im * im
-    }
-
-    #[test]
-    fn the_pinned_pinned_resonance_is_that_of_a_timoshenko_beam() {
-        let design = TrackDesign::v_track();
-        let base = Seat { pad: [6e8, 100.0], ..seat() };
-        let mut track = Track::new(&scene(30), &design, &seats_of(30, &base));
-        let heard = ring(&mut track, 15.5 * SPACING_M, 6000);
-        let (_, found) = (4000..9000)
-            .step_by(10)
-            .map(|hz| (power(&heard[100..], f64::from(hz)), f64::from(hz)))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .unwrap();
-        // A pinned beam of one span: the lower root of Timoshenko's equation.
-        let rail = &design.rail;
-        let wave = std::f64::consts::PI / SPACING_M;
-        let (ei, ga) = (rail.bending_stiffness(), rail.shear_stiffness());
-        let (mass, inertia) = (rail.mass_per_length(), rail.rotary_inertia_per_length());
-        let b = ei * mass * wave * wave + ga * (mass + inertia * wave * wave);
-        let square = (b - (b * b - 4.0 * mass * inertia * ei * ga * wave.powi(4)).sqrt())
-            / (2.0 * mass * inertia);
-        let closed = square.sqrt() / TAU;
-        // The scheme's period at this frequency is a few per cent long.
-        assert!((found / closed - 1.0).abs() < 0.05, "{found} and {closed}");
-    }
-}
+mod tests;

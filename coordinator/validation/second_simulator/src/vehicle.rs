@@ -8,7 +8,7 @@ use crate::system::{Matrices, System};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 use tracktwin_parameters::Wheel;
-use tracktwin_reference_simulator::{Hidden, Scene, TruthError};
+use tracktwin_reference_simulator::{Hidden, TruthError};
 
 /// Frequencies of the rail's section over the first, and their shares of its compliance.
 const SECTION_MODES: [[f64; 2]; 2] = [[1.0, 0.85], [1.7, 0.15]];
@@ -43,14 +43,14 @@ struct Coordinate {
 }
 
 impl Vehicle {
-    /// The vehicle of a scene.
+    /// A wheel with what is hidden in it.
     ///
     /// # Errors
     /// [`TruthError`] if the wheel has no remaining mass, or if there are two axle boxes.
-    pub(crate) fn new(scene: &Scene, wheel: &Wheel) -> Result<Self, TruthError> {
+    pub(crate) fn new(left_out: &[Hidden], wheel: &Wheel) -> Result<Self, TruthError> {
         let whole = wheel.mass_kg;
         let parts: Vec<Coordinate> =
-            scene.left_out.iter().flat_map(|hidden| coordinates(hidden, whole)).collect();
+            left_out.iter().flat_map(|hidden| coordinates(hidden, whole)).collect();
         let boxes = || parts.iter().filter(|part| part.is_axle_box);
         if boxes().count() > 1 {
             let (field, form) = ("flexible_axle_box", "one axle box at most");

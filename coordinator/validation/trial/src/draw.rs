@@ -1,15 +1,17 @@
 //! Hidden physics of the cases of a trial, drawn from the seed alone.
 //!
-//! This module draws classes, places and strengths. The reference simulator draws the tracks.
+//! This module draws classes, places and strengths. The crate of the reference simulator draws the tracks.
 
 use crate::class::Class;
 use crate::effect::{self, Draw};
 use crate::making::Making;
+use crate::site::Site;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::Distribution;
 use rand_distr::uniform::Uniform;
 use serde::Serialize;
+use tracktwin_parameters::Preset;
 use tracktwin_reference_simulator::Scene;
 
 /// Version of the plans and scores. Trials with different versions are not comparable. Version 2 added
@@ -46,24 +48,36 @@ const BLOCK: u32 = 40;
 const MAKINGS: u64 = 1 << 16;
 const NUISANCES: u64 = 1 << 17;
 
-/// The plan of case `number` in the trial with this seed.
+/// The plan of case `number` in the trial of V-Track with this seed.
 pub fn plan(seed: u64, number: u32) -> Plan {
+    plan_on(Preset::VTrack, seed, number)
+}
+
+/// The plan of case `number` in the trial of a track with this seed.
+pub fn plan_on(preset: Preset, seed: u64, number: u32) -> Plan {
     // Streams of their own: a block's order, and each case.
     let mut rng = stream(seed, number / BLOCK, 0);
     let classes = shuffled(blocks(), &mut rng);
     let class = classes[(number % BLOCK) as usize];
     let before = classes[..(number % BLOCK) as usize].iter().filter(|&&c| c == class).count();
-    let effects = shuffled(effect::of(class), &mut rng);
+    let effects = shuffled(effect::of(preset, class), &mut rng);
     rng.set_stream((u64::from(number / BLOCK) << 32) + 1 + u64::from(number % BLOCK));
     let scene_seed = Uniform::new(0, u64::MAX).expect("the range is not empty").sample(&mut rng);
-    let mut scene = Scene::typical(scene_seed);
+    let mut scene = match preset {
+        Preset::VTrack => Scene::typical(scene_seed),
+        _ => Scene::typical_line(preset, scene_seed),
+    };
     let wanted = effects.into_iter().cycle().skip(before * class.effects()).take(class.effects());
-    let level = scene.irregularity_level;
-    let mut draw = Draw { level, rng: &mut rng };
+    let (level, site) = (scene.irregularity_level, Site::of(&scene));
+    let mut draw = Draw { level, site, rng: &mut rng };
     scene.left_out = wanted.map(|effect| effect(&mut draw)).collect();
+    if preset != Preset::VTrack {
+        // The only simulator that has lines; a typical line has its scatter and odometer already.
+        return Plan { number, class, making: Making::Second, scene };
+    }
     let making = makings(seed, number / BLOCK, class)[before];
     let rng = &mut stream(seed, number / BLOCK, NUISANCES + u64::from(number % BLOCK));
-    making.complete(&mut scene, &mut Draw { level, rng });
+    making.complete(&mut scene, &mut Draw { level, site, rng });
     Plan { number, class, making, scene }
 }
 
@@ -192,13 +206,39 @@ mod tests {
 
     #[test]
     fn every_effect_has_its_turn_in_a_block() {
-        let names = |class: Class| {
-            let plans = (0..BLOCK).map(|number| plan(2, number)).filter(|plan| plan.class == class);
+        let names = |preset, class: Class| {
+            let plans = (0..BLOCK).map(|number| plan_on(preset, 2, number));
+            let plans = plans.filter(|plan| plan.class == class);
             let names = plans.flat_map(|plan| plan.scene.left_out).map(|hidden| hidden.physics());
-            names.collect::<std::collections::BTreeSet<_>>()
+            names.collect::<std::collections::BTreeSet<_>>().len()
         };
-        assert_eq!(names(Class::Single).len(), 13);
-        assert_eq!(names(Class::Artefact).len(), 5);
-        assert_eq!(names(Class::Unknown).len(), 4);
+        for (preset, counts) in [(Preset::VTrack, [13, 5, 4]), (Preset::Concrete60E1, [10, 5, 3])] {
+            let classes = [Class::Single, Class::Artefact, Class::Unknown];
+            assert_eq!(classes.map(|class| names(preset, class)), counts, "{preset:?}");
+        }
+    }
+
+    #[test]
+    fn a_line_hides_what_is_of_its_class_inside_what_is_recorded() {
+        for (number, preset) in
+            (0..2 * BLOCK).zip([Preset::Concrete60E1, Preset::Wood54E1].into_iter().cycle())
+        {
+            let Plan { class, making, scene, .. } = plan_on(preset, 5, number);
+            scene.check().unwrap();
+            assert_eq!((scene.preset, making), (preset, Making::Second));
+            assert_eq!(scene.left_out.len(), class.effects());
+            let spacing_m = scene.spacing_m();
+            let inner =
+                [scene.recorded_m[0] + 1.9 * spacing_m, scene.recorded_m[1] - 1.9 * spacing_m];
+            for hidden in &scene.left_out {
+                assert_eq!(is_artefact(hidden), class == Class::Artefact);
+                assert_eq!(kind(hidden).is_some(), class != Class::Unknown);
+                let place = hidden.place(spacing_m);
+                assert!(
+                    place.is_none_or(|[from, to]| inner[0] <= from && to <= inner[1]),
+                    "{hidden:?}"
+                );
+            }
+        }
     }
 }

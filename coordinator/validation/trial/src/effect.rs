@@ -1,26 +1,23 @@
-//! Kind, place and strength of hidden effects, in the ranges of the catalogue at V-Track scale.
+//! Kind, place and strength of hidden effects on V-Track, in the ranges of the catalogue at its scale.
 //!
 //! Strengths have a log-uniform distribution (ranges: docs/extensions.md). Some effects are therefore
 //! too weak to be detected. The scores state the strength of each effect.
 
 use crate::class::Class;
 use crate::known::kind;
+use crate::line_effect;
+use crate::site::Site;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::Distribution;
 use rand_distr::uniform::{SampleUniform, Uniform};
-use tracktwin_reference_simulator::Hidden;
-
-/// Spacing of the sleepers in m.
-const SPACING_M: f64 = 0.125;
-
-/// Sleepers at which something may be hidden: inside what is recorded by two spans or more.
-const SLEEPERS: [usize; 2] = [8, 30];
+use tracktwin_parameters::Preset;
+use tracktwin_reference_simulator::{Hidden, Scene};
 
 /// One effect, with a place and a strength that are drawn.
 pub(crate) type Effect = fn(&mut Draw<'_>) -> Hidden;
 
-/// Every effect that a trial hides.
+/// Every effect that a trial of V-Track hides.
 const EFFECTS: [Effect; 22] = [
     rail_joint,
     squat,
@@ -46,10 +43,14 @@ const EFFECTS: [Effect; 22] = [
     wheel_mode,
 ];
 
-/// The effects that a class can hide. The catalogue of the diagnosis determines which effects it
+/// The effects that a class can hide on a track. The catalogue of the diagnosis determines which effects it
 /// contains, and which of them are faults of the measuring chain.
-pub(crate) fn of(class: Class) -> Vec<Effect> {
-    EFFECTS.into_iter().filter(|effect| belongs(&any(*effect), class)).collect()
+pub(crate) fn of(preset: Preset, class: Class) -> Vec<Effect> {
+    let all: &[Effect] = match preset {
+        Preset::VTrack => &EFFECTS,
+        _ => &line_effect::EFFECTS,
+    };
+    all.iter().copied().filter(|effect| belongs(&any(preset, *effect), class)).collect()
 }
 
 fn belongs(hidden: &Hidden, class: Class) -> bool {
@@ -62,15 +63,20 @@ fn belongs(hidden: &Hidden, class: Class) -> bool {
     }
 }
 
-/// The effect somewhere, of some strength.
-pub(crate) fn any(effect: Effect) -> Hidden {
-    effect(&mut Draw { level: 1.0, rng: &mut ChaCha8Rng::seed_from_u64(0) })
+/// The effect somewhere on a track, of some strength.
+pub(crate) fn any(preset: Preset, effect: Effect) -> Hidden {
+    let site = match preset {
+        Preset::VTrack => Site::RIG,
+        _ => Site::of(&Scene::typical_line(preset, 0)),
+    };
+    effect(&mut Draw { level: 1.0, site, rng: &mut ChaCha8Rng::seed_from_u64(0) })
 }
 
 /// What a place and a strength are drawn with.
 pub(crate) struct Draw<'a> {
     /// Irregularity level of the surface.
     pub(crate) level: f64,
+    pub(crate) site: Site,
     pub(crate) rng: &'a mut ChaCha8Rng,
 }
 
@@ -96,15 +102,16 @@ impl Draw<'_> {
     }
 
     /// A point of the rail.
-    fn point(&mut self) -> [f64; 2] {
-        let x_m = |sleeper: usize| (sleeper + 1) as f64 * SPACING_M;
-        [self.uniform(x_m(SLEEPERS[0]), x_m(SLEEPERS[1])); 2]
+    pub(crate) fn point(&mut self) -> [f64; 2] {
+        let range_m = self.site.range_m();
+        [self.within(range_m); 2]
     }
 
     /// Up to so many neighbouring sleepers.
-    fn some(&mut self, most: usize) -> Vec<usize> {
+    pub(crate) fn some(&mut self, most: usize) -> Vec<usize> {
+        let [from, to] = self.site.sleepers;
         let count = self.uniform(1, most + 1);
-        let first = self.uniform(SLEEPERS[0], SLEEPERS[1] + 2 - count);
+        let first = self.uniform(from, to + 2 - count);
         (first..first + count).collect()
     }
 }
@@ -153,10 +160,11 @@ fn wheel_out_of_round(draw: &mut Draw<'_>) -> Hidden {
 }
 
 fn fastening_clamp(draw: &mut Draw<'_>) -> Hidden {
+    let [from, to] = draw.site.sleepers;
     let every = draw.uniform(3, 5);
-    let first = draw.uniform(SLEEPERS[0], SLEEPERS[0] + every);
+    let first = draw.uniform(from, from + every);
     Hidden::FasteningClamp {
-        sleepers: (first..=SLEEPERS[1]).step_by(every).collect(),
+        sleepers: (first..=to).step_by(every).collect(),
         vertical_n_per_m: draw.log_uniform(3e7, 1.5e8),
         rotational_n_m_per_rad: draw.log_uniform(3e4, 3e5),
     }
@@ -255,7 +263,8 @@ fn cracked_sleeper(draw: &mut Draw<'_>) -> Hidden {
 }
 
 fn linked_sleepers(draw: &mut Draw<'_>) -> Hidden {
-    let first = draw.uniform(SLEEPERS[0], SLEEPERS[1]);
+    let [from, to] = draw.site.sleepers;
+    let first = draw.uniform(from, to);
     Hidden::LinkedSleepers {
         sleepers: [first, first + 1],
         stiffness_n_per_m: draw.log_uniform(1e7, 2e8),
@@ -285,7 +294,8 @@ mod tests {
 
     #[test]
     fn every_kind_of_the_catalogue_is_hidden_or_listed_as_never_hidden() {
-        let hidden: BTreeSet<_> = EFFECTS.into_iter().map(|it| any(it).physics()).collect();
+        let any = |effect| any(Preset::VTrack, effect).physics();
+        let hidden: BTreeSet<_> = EFFECTS.into_iter().map(any).collect();
         assert_eq!(hidden.len(), EFFECTS.len(), "an effect stands twice");
         for kind in Kind::all() {
             let is_listed = NEVER_HIDDEN.iter().chain(&NOT_ASKED).any(|it| *it == kind.physics);

@@ -4,7 +4,7 @@ use crate::place::near;
 use crate::rate::median;
 use serde::{Deserialize, Serialize};
 use tracktwin_evaluation::{Evaluation, SleeperEvaluation};
-use tracktwin_parameters::{Axis, Preset};
+use tracktwin_parameters::Track;
 use tracktwin_reference_simulator::Scene;
 
 /// Share of the controls on which an error is usual, and how many it takes to say.
@@ -21,7 +21,8 @@ pub struct Paper {
     /// Mean absolute percentage error of the best match of each sleeper (paper, eq. 10; 0.05 is 5 %),
     /// ascending. There is at least one value.
     pub mape: Vec<f64>,
-    /// Whether all six parameters of every sleeper are inside the ranges of Table D1 of the paper.
+    /// Whether all six parameters of every sleeper are inside the usual ranges of the track: of V-Track, Table
+    /// D1 of the paper.
     pub inside: bool,
 }
 
@@ -33,7 +34,9 @@ impl Paper {
         let best = near.iter().filter_map(|sleeper| sleeper.selector.mape.first().copied());
         let mut mape: Vec<f64> = best.collect();
         mape.sort_by(f64::total_cmp);
-        (!mape.is_empty()).then(|| Self { mape, inside: near.into_iter().all(is_inside) })
+        let track = scene.preset.track();
+        let inside = near.into_iter().all(|sleeper| is_inside(sleeper, &track));
+        (!mape.is_empty()).then_some(Self { mape, inside })
     }
 
     /// Median of the errors.
@@ -74,9 +77,9 @@ fn most(mut values: Vec<f64>, least: usize) -> Option<f64> {
     (values.len() >= least).then(|| values[last - 1])
 }
 
-fn is_inside(sleeper: &SleeperEvaluation) -> bool {
+fn is_inside(sleeper: &SleeperEvaluation, track: &Track) -> bool {
     sleeper.estimates.iter().all(|(&parameter, estimate)| {
-        let Axis { low, high, .. } = Preset::VTrack.axis(parameter);
+        let [low, high] = track.ranges[parameter.index()];
         (low..=high).contains(&estimate.mean)
     })
 }

@@ -5,10 +5,10 @@ use crate::draw::Plan;
 use crate::known::{is_artefact, kind};
 use crate::making::Making;
 use crate::paper::Paper;
-use crate::place::{SPACING_M, is_placed, local, near};
+use crate::place::{is_placed, local, near};
 use serde::{Deserialize, Serialize};
 use tracktwin_diagnosis::{Diagnosis, Hypothesis, UNKNOWN, Verdict};
-use tracktwin_parameters::{Axis, Parameter, Preset};
+use tracktwin_parameters::{Parameter, Preset};
 use tracktwin_reference_simulator::{Hidden, Scene};
 
 /// Total probability of the set of names.
@@ -44,7 +44,8 @@ pub struct CaseScore {
     pub held_out_gain_nats: Option<f64>,
     /// Errors of the stiffnesses next to the effect. `None` if nothing was hidden.
     pub bias: Option<Bias>,
-    /// Whether the parameters of the fitted baseline are inside the ranges of Table D1.
+    /// Whether the stiffnesses of the fitted baseline are inside the usual ranges of the track: of V-Track,
+    /// Table D1.
     pub parameters_inside: bool,
     /// Whether no cell of the residual of the fitted baseline is far beyond the random variation.
     pub cells_inside: bool,
@@ -154,6 +155,7 @@ pub fn score(
 ) -> CaseScore {
     let accepted: Vec<&Hypothesis> = diagnosis.hypotheses.iter().filter(|h| h.accepted).collect();
     let left_out = &plan.scene.left_out;
+    let spacing_m = plan.scene.spacing_m();
     let named = left_out.iter().zip(detectability);
     let gains = diagnosis.fit.held_out_gain_nats.values();
     CaseScore {
@@ -162,12 +164,14 @@ pub fn score(
         making: plan.making,
         verdict: diagnosis.verdict,
         accepted: accepted.iter().map(|hypothesis| hypothesis.physics.clone()).collect(),
-        hidden: named.map(|(hidden, &d)| becomes(hidden, d, diagnosis, &accepted)).collect(),
-        probabilities: probabilities(plan.class, left_out, diagnosis),
-        wrong_member: is_member_wrong(left_out, &diagnosis.hypotheses),
+        hidden: named
+            .map(|(hidden, &d)| becomes(hidden, d, diagnosis, &accepted, spacing_m))
+            .collect(),
+        probabilities: probabilities(plan.class, left_out, diagnosis, spacing_m),
+        wrong_member: is_member_wrong(left_out, &diagnosis.hypotheses, spacing_m),
         held_out_gain_nats: (gains.len() > 0).then(|| gains.sum()),
         bias: bias(&plan.scene, diagnosis),
-        parameters_inside: parameters_inside(diagnosis),
+        parameters_inside: parameters_inside(plan.scene.preset, diagnosis),
         cells_inside: cells_inside(diagnosis),
         cpu_s,
         knocked_out: None,
@@ -178,20 +182,22 @@ pub fn score(
 
 /// Accuracy with which a diagnosis places the first hidden effect that has a place.
 pub fn placed(scene: &Scene, diagnosis: &Diagnosis) -> Option<Placed> {
-    let place = scene.left_out.iter().find_map(local)?;
+    let spacing_m = scene.spacing_m();
+    let place = scene.left_out.iter().find_map(|hidden| local(hidden, spacing_m))?;
     let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
-    Some(Placed { error_spacings: nearest(place, accepted) })
+    Some(Placed { error_spacings: nearest(place, accepted, spacing_m) })
 }
 
 /// Distance in sleeper spacings from the middle of a place to the nearest of these.
 fn nearest<'h>(
     place: [f64; 2],
     hypotheses: impl IntoIterator<Item = &'h Hypothesis>,
+    spacing_m: f64,
 ) -> Option<f64> {
     let middle = |[from_m, to_m]: [f64; 2]| 0.5 * (from_m + to_m);
     let error = |hypothesis: &Hypothesis| {
         let said = hypothesis.location.as_ref()?.x_m;
-        Some((middle(said) - middle(place)).abs() / SPACING_M)
+        Some((middle(said) - middle(place)).abs() / spacing_m)
     };
     hypotheses.into_iter().filter_map(error).min_by(f64::total_cmp)
 }
@@ -201,10 +207,11 @@ fn becomes(
     detectability: Option<f64>,
     diagnosis: &Diagnosis,
     accepted: &[&Hypothesis],
+    spacing_m: f64,
 ) -> Named {
     let is_it = |hypothesis: &Hypothesis| is_it(hidden, &hypothesis.physics);
-    let place = local(hidden)
-        .map(|place| Placed { error_spacings: nearest(place, accepted.iter().copied()) });
+    let nearest = |place| nearest(place, accepted.iter().copied(), spacing_m);
+    let place = local(hidden, spacing_m).map(|place| Placed { error_spacings: nearest(place) });
     Named {
         physics: hidden.physics().to_owned(),
         detectability,
@@ -231,18 +238,19 @@ fn is_family(hidden: &Hidden, hypothesis: &Hypothesis) -> bool {
 }
 
 /// Whether a hidden effect has the name and place of the hypothesis.
-fn is_there(left_out: &[Hidden], hypothesis: &Hypothesis) -> bool {
-    let is_so =
-        |hidden: &Hidden| is_it(hidden, &hypothesis.physics) && is_placed(hidden, hypothesis);
+fn is_there(left_out: &[Hidden], hypothesis: &Hypothesis, spacing_m: f64) -> bool {
+    let is_so = |hidden: &Hidden| {
+        is_it(hidden, &hypothesis.physics) && is_placed(hidden, hypothesis, spacing_m)
+    };
     left_out.iter().any(is_so)
 }
 
 /// Whether a kind has more than 90 % probability at a place where this kind is not hidden.
-fn is_member_wrong(left_out: &[Hidden], hypotheses: &[Hypothesis]) -> bool {
+fn is_member_wrong(left_out: &[Hidden], hypotheses: &[Hypothesis], spacing_m: f64) -> bool {
     hypotheses.iter().any(|hypothesis| {
         hypothesis.physics != UNKNOWN
             && hypothesis.probability > CERTAIN
-            && !is_there(left_out, hypothesis)
+            && !is_there(left_out, hypothesis, spacing_m)
     })
 }
 
@@ -258,10 +266,16 @@ fn set(hypotheses: &[Hypothesis]) -> &[Hypothesis] {
 }
 
 /// Every probability given, with whether it was so; that of nothing where nothing is said.
-fn probabilities(class: Class, left_out: &[Hidden], diagnosis: &Diagnosis) -> Vec<(f64, bool)> {
+fn probabilities(
+    class: Class,
+    left_out: &[Hidden],
+    diagnosis: &Diagnosis,
+    spacing_m: f64,
+) -> Vec<(f64, bool)> {
     let given = diagnosis.hypotheses.iter();
+    let is_there = |hypothesis| is_there(left_out, hypothesis, spacing_m);
     let mut all: Vec<_> =
-        given.map(|hypothesis| (hypothesis.probability, is_there(left_out, hypothesis))).collect();
+        given.map(|hypothesis| (hypothesis.probability, is_there(hypothesis))).collect();
     if diagnosis.verdict == Verdict::Consistent {
         all.push((diagnosis.nothing_left_out.unwrap_or(1.0), class == Class::Control));
     }
@@ -273,9 +287,10 @@ fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
     if scene.left_out.iter().all(is_artefact) {
         return None;
     }
+    let spacing_m = scene.spacing_m();
     let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
     for sleeper in diagnosis.track.iter().filter(|sleeper| near(scene, sleeper.x_m)) {
-        let number = (sleeper.x_m / SPACING_M).round() as usize;
+        let number = (sleeper.x_m / spacing_m).round() as usize;
         let Some(truth) = number.checked_sub(1).and_then(|n| scene.sleepers.get(n)) else {
             continue;
         };
@@ -290,10 +305,12 @@ fn bias(scene: &Scene, diagnosis: &Diagnosis) -> Option<Bias> {
     (count > 0.0).then(|| Bias { before: before / count, after: after / count })
 }
 
-/// Whether the baseline of every sleeper lies inside Table D1 of the paper.
-fn parameters_inside(diagnosis: &Diagnosis) -> bool {
+/// Whether the baseline of every sleeper lies inside the usual ranges of the track: of V-Track, Table D1 of
+/// the paper.
+fn parameters_inside(preset: Preset, diagnosis: &Diagnosis) -> bool {
+    let track = preset.track();
     let inside = |parameter: Parameter, value: f64| {
-        let Axis { low, high, .. } = Preset::VTrack.axis(parameter);
+        let [low, high] = track.ranges[parameter.index()];
         (low..=high).contains(&value)
     };
     diagnosis.track.iter().all(|sleeper| {
@@ -334,7 +351,7 @@ mod tests {
             probability,
             ..hypothesis(Some(x_m))
         };
-        let wrong = |it: Hypothesis| is_member_wrong(&joint, &[it]);
+        let wrong = |it: Hypothesis| is_member_wrong(&joint, &[it], 0.125);
         assert!(wrong(said("squat", 0.95, 2.5)) && !wrong(said("squat", 0.85, 2.5)));
         assert!(wrong(said("rail_joint", 0.95, 1.0)) && !wrong(said("rail_joint", 0.95, 2.5)));
         assert!(!wrong(said(UNKNOWN, 0.95, 2.5)));

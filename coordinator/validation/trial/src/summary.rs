@@ -56,8 +56,8 @@ pub struct KindRow {
     pub placed: Rate,
     /// Median of `d'`.
     pub detectability: Option<f64>,
-    /// Rate of cases in which the fitted baseline does not show the effect: parameters inside Table D1,
-    /// and no cell far beyond the random variation.
+    /// Rate of cases in which the fitted baseline does not show the effect: parameters inside their usual
+    /// ranges, and no cell far beyond the random variation.
     pub concealed: Rate,
     /// Rate of cases in which the method of the paper does not show the effect: parameters inside Table
     /// D1, and an error of the model selector as usual for controls. Without observations if the method

@@ -110,11 +110,13 @@ fn scatter(sleepers: usize, draw: &mut Draw<'_>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::site::Site;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
 
     fn with_draw<T>(seed: u64, make: impl FnOnce(&mut Draw<'_>) -> T) -> T {
-        make(&mut Draw { level: 1.0, rng: &mut ChaCha8Rng::seed_from_u64(seed) })
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        make(&mut Draw { level: 1.0, site: Site::RIG, rng })
     }
 
     fn is_in([low, high]: [f64; 2], value: f64) -> bool {
