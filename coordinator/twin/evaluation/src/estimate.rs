@@ -371,14 +371,4 @@ mod tests {
         let result = evaluate(&testing::recording(3.0, &[10.0]), &twin);
         assert!(matches!(result, Err(Error::OtherFeatures { .. })));
     }
-
-    #[test]
-    fn equal_estimates_of_one_quantity_grow_no_surer() {
-        let same = Estimate { mean: 2.0, sd: 0.5 };
-        let both = combine(&[same, same]);
-        assert!((both.mean - 2.0).abs() < 1e-12 && (both.sd - 0.5).abs() < 1e-12);
-        let unlike = combine(&[same, Estimate { mean: 4.0, sd: 1.0 }]);
-        // Weights 4 and 1: (4 * 2 + 1 * 4) / 5; variance 2 / 5.
-        assert!((unlike.mean - 2.4).abs() < 1e-12 && (unlike.sd - 0.4f64.sqrt()).abs() < 1e-12);
-    }
 }
