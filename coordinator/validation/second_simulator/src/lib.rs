@@ -46,7 +46,7 @@
 //! | Part | Assumption |
 //! |---|---|
 //! | rail | 16 cells a span; damping of bending alone, by the preset |
-//! | half sleeper | 8 bars, the rail seat at the end of one of them; no slope in the middle of the sleeper; ballast at all ends of bars, 50 to 100 % as stiff under the middle quarter; loss factor 0.7 % at 700 Hz |
+//! | half sleeper | 8 bars, the rail seat at the end of one of them; no slope in the middle of the sleeper; bars that turn with their ends; ballast at all ends, 50 to 100 % as stiff under the middle quarter; loss factor 0.7 % at 700 Hz |
 //! | vehicle | all wheels of the preset on the same rail; hidden effects are in the recorded one |
 //! | irregularity | falls with a power of the wave number of 2.6 to 3.4 above 8 rad/m; waves beyond 3 m fade; the contact patch filters it and all defects (Remington), with a half length within 10 % of Hertz's |
 //! | defects of the rail | the wheel does not reach the bottom of narrow hollows |
