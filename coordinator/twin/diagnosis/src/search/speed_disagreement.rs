@@ -6,12 +6,21 @@ use super::probability::EVIDENCE_TEMPERING;
 use super::round::Setting;
 use super::{Round, SearchOutcome};
 use crate::calibration::{CalibrationError, Problem};
+use nalgebra::DVector;
+use std::ops::Range;
 use tracktwin_inspection::median;
 use tracktwin_number::probability;
+
+/// Mean correlation of the ballast along the track, between speeds fitted alone, from which on all speeds
+/// have the same track. Sleepers in another order have none.
+const SAME_TRACK: f64 = 0.5;
 
 impl SearchOutcome {
     /// Compares the result with a model that has a separate track for each speed, and rejects all
     /// candidates if this model is significantly better: all speeds must pass a fixed cause.
+    ///
+    /// Separate tracks also absorb errors of the model that depend on the speed. So they do not count if the
+    /// speeds, each for itself, find the same ballast along the track.
     pub(super) fn compare_speeds(&mut self, setting: &Setting<'_>) -> Result<(), CalibrationError> {
         let forward = &setting.prepared.forward;
         if forward.speeds_m_s.len() < 2 {
@@ -24,6 +33,11 @@ impl SearchOutcome {
             let deviation = observation.log_deviation() - observation.held_out_log_deviation();
             Ok((alone, deviation))
         })?;
+        let ballast = forward.unknowns.ballast();
+        let found: Vec<&DVector<f64>> = each.iter().map(|(alone, _)| &alone.values).collect();
+        if mean_correlation(&found, &ballast) >= SAME_TRACK {
+            return Ok(());
+        }
         let alone: f64 = each.iter().map(|(alone, deviation)| alone.log_evidence - deviation).sum();
         // What is left without a name explains as well.
         let left = self.rounds.last().filter(|last| !last.accepted).map_or(0.0, Round::most);
@@ -57,11 +71,43 @@ impl SearchOutcome {
     }
 }
 
+/// Mean correlation, over all pairs, of the values with these indices.
+fn mean_correlation(all: &[&DVector<f64>], indices: &Range<usize>) -> f64 {
+    let deviations = all.iter().map(|values| {
+        let own = values.rows(indices.start, indices.len());
+        own.add_scalar(-own.mean())
+    });
+    let deviations: Vec<DVector<f64>> = deviations.collect();
+    let pairs = (0..all.len()).flat_map(|first| (0..first).map(move |second| [first, second]));
+    let correlations = pairs.map(|pair| {
+        let [a, b] = pair.map(|index| &deviations[index]);
+        a.dot(b) / (a.norm() * b.norm()).max(f64::MIN_POSITIVE)
+    });
+    let correlations: Vec<f64> = correlations.collect();
+    correlations.iter().sum::<f64>() / correlations.len() as f64
+}
+
 impl Round {
     /// The greatest log evidence in nats of all candidates and ports, at least zero.
     fn most(&self) -> f64 {
         let named = self.fitted.first().map(|fitted| fitted.log_evidence);
         let unknown = self.port.as_ref().map(|port| port.log_evidence);
         named.into_iter().chain(unknown).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tracks_that_differ_by_a_factor_correlate_and_shuffled_ones_do_not() {
+        let track = DVector::from_fn(20, |index, _| (index as f64 * 2.4).sin());
+        let stiffer = track.add_scalar(0.7);
+        let shuffled = DVector::from_fn(20, |index, _| track[7 * index % 20]);
+        let mean = |all: &[&DVector<f64>]| mean_correlation(all, &(2..18));
+        assert!((mean(&[&track, &stiffer]) - 1.0).abs() < 1e-12);
+        assert!(mean(&[&track, &shuffled]).abs() < SAME_TRACK);
+        assert!(mean(&[&track, &stiffer, &shuffled]) < SAME_TRACK);
     }
 }
