@@ -344,6 +344,7 @@ mod tests {
     fn models_without_one_of_the_four_parameters_are_refused() {
         let mut set = library(&[13.0], 300, |_, set, _| set[IrregularityLevel]);
         set.varied = vec![IrregularityLevel];
+        set.scales.truncate(1);
         set.parameters = set.parameters.into_iter().skip(5).step_by(6).collect();
         let features = vec![FeatureColumns::new("GF", 0..10)];
         let models = train(&set, &TrainOptions::new(features), &|_| ()).unwrap();

@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 /// Largest probability by chance of the evidence for an unknown stiffness that is reported.
 const PORT_ALARM: f64 = 0.01;
 
-/// If the probability of nothing is below this, physics is left out even if no kind predicts a withheld
-/// speed better.
+/// If the probability of nothing is below this, physics is left out even if neither a kind nor something
+/// unknown predicts a speed that was held out.
 const NOTHING_LEFT: f64 = 0.02;
 
 /// Probability that a residual in addition to an accepted extension is new physics.
@@ -39,7 +39,8 @@ impl Evidence<'_> {
         // which predicted them, leaves too much at its place.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
         let taken_back = round.fitted.first().filter(|_| round.remainder.is_some());
-        let unnamed = is_there && !is_port && (taken_back.is_some() || nothing < NOTHING_LEFT);
+        let is_certain = alone && nothing < NOTHING_LEFT;
+        let unnamed = !is_port && (is_certain || is_there && taken_back.is_some());
         let (kept, unknown) =
             if unnamed { (FAILED_SHARE, unknown + failed) } else { (is_new, unknown) };
         let mut hypotheses: Vec<Hypothesis> = round
