@@ -174,7 +174,7 @@ async fn campaign(
 
 /// The results of a library, and the models trained on them.
 enum Material {
-    Results(TrainingSet),
+    Results(Box<TrainingSet>),
     Models(Box<Evaluator>),
 }
 
@@ -185,7 +185,8 @@ impl Material {
         models: Option<Trained>,
     ) -> Result<Self, Stop> {
         let Some(models) = models else {
-            return Ok(Self::Results(pipeline::train::set(library, campaign).await?));
+            let set = pipeline::train::set(library, campaign).await?;
+            return Ok(Self::Results(Box::new(set)));
         };
         let evaluator = Evaluator::new(models, library).await.map_err(evaluate::stop)?;
         evaluator.models().belongs_to(&evaluator.set().library_digest).or_input()?;

@@ -148,7 +148,7 @@ mod tests {
         let sum: f64 = found.weights.iter().sum();
         assert!((1.8..2.0).contains(&sum), "{sum}");
         let errors =
-            known.iter().zip(&of).map(|(value, of)| found.of(of.into_iter().copied()).mean - value);
+            known.iter().zip(&of).map(|(value, of)| found.of(of.iter().copied()).mean - value);
         let rms = (errors.map(|error| error * error).sum::<f64>() / 400.0).sqrt();
         assert!((found.spread * 0.2 / rms - 1.0).abs() < 1e-9, "{} {rms}", found.spread);
         assert!(rms < 0.3, "{rms}");
