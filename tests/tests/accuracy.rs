@@ -225,7 +225,7 @@ fn levels_of_a_line_with_one_wheel_agree_with_the_reference() {
 }
 
 #[test]
-#[ignore = "takes more than nine minutes: two wheels are not simulated in lanes"]
+#[ignore = "two of 63 levels miss the tolerance at 500 Hz; see docs/accuracy.md"]
 fn levels_of_a_line_with_a_bogie_agree_with_the_reference() {
     agrees(&Reference::line("B"), 10);
 }

@@ -13,8 +13,11 @@ const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 pub fn models_page(models: &Trained, tested: &[Tested]) -> String {
     let charts: Vec<String> =
         parameters(models).into_iter().map(|parameter| mase_chart(models, parameter)).collect();
-    let scatters: Vec<String> =
-        tested.iter().map(|(parameter, pairs)| scatter_chart(*parameter, pairs)).collect();
+    let scatter = |(parameter, pairs): &Tested| {
+        let range = models.groups().last().and_then(|group| of(group, *parameter))?.range;
+        Some(scatter_chart(*parameter, range, pairs))
+    };
+    let scatters: Vec<String> = tested.iter().filter_map(scatter).collect();
     let body = html! {
         (figure(&charts, "Mean absolute scaled error on the test half of the library (paper, eq. 11 and Fig. \
              14); one bar per feature set, one group of bars per speed. Lower is better; a \
@@ -78,13 +81,17 @@ fn mase_chart(models: &Trained, parameter: Parameter) -> String {
     chart.into_svg()
 }
 
-/// Predicted against true values of a parameter in SI units (paper, Fig. 14, second row), as an inline SVG
-/// element.
-fn scatter_chart(parameter: Parameter, true_and_predicted: &[(f64, f64)]) -> String {
+/// Predicted against true values of a parameter in SI units (paper, Fig. 14, second row), with the diagonal
+/// over its range in the library, as an inline SVG element.
+fn scatter_chart(
+    parameter: Parameter,
+    range: [f64; 2],
+    true_and_predicted: &[(f64, f64)],
+) -> String {
     let shown = Shown::of(parameter);
     let points: Vec<_> =
         true_and_predicted.iter().map(|(x, y)| (x / shown.divisor, y / shown.divisor)).collect();
-    let [low, high] = parameter.range().map(|end| end / shown.divisor);
+    let [low, high] = range.map(|end| end / shown.divisor);
     let values = || points.iter().flat_map(|&(x, y)| [x, y]).chain([low, high]);
     let axis = |what: &str| {
         Axis::around(&format!("{what} {} in {}", parameter.symbol(), shown.unit), values())

@@ -50,8 +50,15 @@ impl TrackChoice {
 
 /// Parses the name of a preset.
 pub(super) fn preset_parser() -> impl TypedValueParser<Value = Preset> {
-    let names = Preset::ALL.iter().map(|preset| preset.name());
-    PossibleValuesParser::new(names)
+    parser_of(|_| true)
+}
+
+/// Parses the name of one of the presets that `is_possible` selects.
+pub(super) fn parser_of(
+    is_possible: impl Fn(Preset) -> bool,
+) -> impl TypedValueParser<Value = Preset> {
+    let possible = Preset::ALL.iter().filter(|preset| is_possible(**preset));
+    PossibleValuesParser::new(possible.map(|preset| preset.name()))
         .map(|name| Preset::from_name(&name).expect("only names of presets are possible"))
 }
 

@@ -3,12 +3,12 @@
 use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::progress::Progress;
+use super::track::parser_of;
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline::evaluate::Evaluator;
 use crate::pipeline::trial::{Trial, TrialError, check_folder};
 use anyhow::anyhow;
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use tracktwin_library::Library;
 use tracktwin_parameters::Preset;
@@ -27,7 +27,7 @@ to another within a minute.\n\nExit codes: 0 all goals reached, 1 some are not, 
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub(super) struct Arguments {
     /// Track of the recordings: the test rig, or a line.
-    #[arg(long, value_name = "NAME", default_value = Preset::VTrack.name(), value_parser = track_parser())]
+    #[arg(long, value_name = "NAME", default_value = Preset::VTrack.name(), value_parser = parser_of(|preset| preset != Preset::RealScale))]
     preset: Preset,
     /// Number of recordings.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=9999))]
@@ -119,13 +119,6 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     let missed = summary.rows.iter().any(|row| row.reached == Some(false));
     if missed { Err(Stop::Negative) } else { Ok(()) }
-}
-
-/// Parses the name of a track that trials have: V-Track or a line.
-fn track_parser() -> impl TypedValueParser<Value = Preset> {
-    let tracks = Preset::ALL.iter().filter(|preset| **preset != Preset::RealScale);
-    PossibleValuesParser::new(tracks.map(|preset| preset.name()))
-        .map(|name| Preset::from_name(&name).expect("only names of presets are possible"))
 }
 
 /// Prints one line per measure, and the path of the tables.

@@ -1,22 +1,28 @@
-//! What is computed from library and models for a set of speeds, at its first use.
+//! What is computed from library and models for its speeds, or for a set of them, at its first use.
 
-use crate::{Error, METHOD_FEATURE};
+use crate::{Error, METHOD_FEATURE, ModelSpeeds};
 use parking_lot::Mutex;
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use tracktwin_surrogate::{Domain, Stack, Trained, TrainingSet};
 
 /// One value for each set of speeds, given by their indices among the speeds of the models.
 type Cache<T> = Mutex<HashMap<Vec<usize>, Arc<T>>>;
 
-/// Cache of the domains and of the combinations of models of one library.
+/// Cache of what is computed once for one library: its mean features, domains and combinations of models.
 #[derive(Default)]
 pub struct BySpeeds {
+    speeds: OnceLock<ModelSpeeds>,
     domains: Cache<Domain>,
     stacks: Cache<Stack>,
 }
 
 impl BySpeeds {
+    /// Speeds of the library, with its mean ln-powers.
+    pub(crate) fn speeds(&self, library: &TrainingSet) -> &ModelSpeeds {
+        self.speeds.get_or_init(|| ModelSpeeds::of(library))
+    }
+
     /// Domain of the library at these speeds.
     pub(crate) fn domain(
         &self,

@@ -6,9 +6,7 @@ use crate::evaluation::{
 };
 use crate::matches::Matcher;
 use crate::outside::by_speeds;
-use crate::{
-    BySpeeds, Error, ModelSpeeds, OutsideLibrary, SleeperFeatures, Unevenness, features, outside,
-};
+use crate::{BySpeeds, Error, OutsideLibrary, SleeperFeatures, Unevenness, features, outside};
 use std::collections::BTreeMap;
 use tracktwin_parameters::Parameter;
 use tracktwin_signal::Extractor;
@@ -52,8 +50,8 @@ pub struct Twin<'a> {
 pub fn evaluate(recording: &Recording, twin: &Twin<'_>) -> Result<Evaluation, Error> {
     check_features(twin)?;
     twin.models.belongs_to(&twin.library.library_digest)?;
-    let speeds = ModelSpeeds::of(twin.library);
-    let known = features(recording, twin.extractor, &speeds)?;
+    let speeds = twin.by_speeds.speeds(twin.library);
+    let known = features(recording, twin.extractor, speeds)?;
     let (seen, unseen): (Vec<_>, Vec<_>) =
         known.into_iter().partition(|sleeper| !sleeper.speeds.is_empty());
     if seen.is_empty() {

@@ -35,21 +35,7 @@ pub(crate) fn recorded(
 ) -> Recorded {
     let mut random = Random::new(scene.seed, Topic::Noise, pass);
     let mut values = ride.acceleration_m_s2.clone();
-    for hidden in &scene.left_out {
-        if let Hidden::SensorMountResonance { frequency_hz, damping_ratio } = *hidden {
-            let mut filter = Biquad::shaken(frequency_hz * STEP_S, damping_ratio);
-            for value in &mut values {
-                *value = filter.next(*value);
-            }
-        }
-    }
-    let [gain, corner_hz] = nuisances.shelf;
-    let follow = 1.0 - (-TAU * corner_hz * STEP_S).exp();
-    let mut low = 0.0;
-    for value in &mut values {
-        low += follow * (*value - low);
-        *value += gain * low;
-    }
+    pass_channel(&mut values, scene, nuisances);
     let [mut values, true_m] = if scale.is_sample_step() {
         [values.split_off(ride.first), ride.position_m[ride.first..].to_vec()]
     } else {
@@ -90,6 +76,25 @@ pub(crate) fn recorded(
     }
     let position_m = positions(scene, scale.wander_m, &true_m, pass, &mut random);
     Recorded { position_m, acceleration_m_s2: values }
+}
+
+/// Mounting of the sensor and shelf of the channel.
+fn pass_channel(values: &mut [f64], scene: &Scene, nuisances: &Nuisances) {
+    for hidden in &scene.left_out {
+        if let Hidden::SensorMountResonance { frequency_hz, damping_ratio } = *hidden {
+            let mut filter = Biquad::shaken(frequency_hz * STEP_S, damping_ratio);
+            for value in values.iter_mut() {
+                *value = filter.next(*value);
+            }
+        }
+    }
+    let [gain, corner_hz] = nuisances.shelf;
+    let follow = 1.0 - (-TAU * corner_hz * STEP_S).exp();
+    let mut low = 0.0;
+    for value in values {
+        low += follow * (*value - low);
+        *value += gain * low;
+    }
 }
 
 /// White noise, and slower noise of half its size.

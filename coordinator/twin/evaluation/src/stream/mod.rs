@@ -35,7 +35,7 @@ const SLOWEST: f64 = 0.9;
 pub struct Stream<'a> {
     section: &'a Recording,
     twin: Twin<'a>,
-    speeds: ModelSpeeds,
+    speeds: &'a ModelSpeeds,
     /// Number of samples of a margin.
     margin: usize,
     /// Largest number of samples of a window with its margins.
@@ -78,7 +78,7 @@ impl<'a> Stream<'a> {
         Ok(Self {
             section,
             twin,
-            speeds: ModelSpeeds::of(twin.library),
+            speeds: twin.by_speeds.speeds(twin.library),
             margin,
             capacity: window + 2 * (margin + 1),
             segment: Segment::new(rate_hz, fastest_m_s),
@@ -187,7 +187,7 @@ impl<'a> Stream<'a> {
             return Ok(());
         };
         check_rate(segment.observed_rate_hz(), self.section.sample_rate_hz)?;
-        match speed(segment, &samples, self.margin, &self.speeds) {
+        match speed(segment, &samples, self.margin, self.speeds) {
             Err(reason) => open.reason = Some(reason),
             Ok(speed) => {
                 let (share, signal) = (window.share(segment.position_m()), segment.signal());
