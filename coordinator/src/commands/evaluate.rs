@@ -1,7 +1,8 @@
 //! `tracktwin evaluate`: estimates of the track parameters from a recording.
 
+use super::accepted::{diagnosis_of, with_physics};
 use super::files::{Force, check, make_folder};
-use super::library_url::open_whole;
+use super::library_url::{open_or_create, open_whole};
 use super::progress::Stages;
 use super::track::TrackOption;
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
@@ -12,7 +13,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use tracktwin_diagnosis::check_track;
+use tracktwin_diagnosis::{Diagnosis, check_track};
 use tracktwin_evaluation::{Evaluation, Flag, check_recording};
 use tracktwin_files::{FileName, FilesError, Kind, Output};
 use tracktwin_inspection::chain::{self, LossOfContact};
@@ -65,7 +66,9 @@ pub(super) struct Arguments {
         conflicts_with = "track"
     )]
     models: Option<PathBuf>,
-    /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`.
+    /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`. Without --models it
+    /// stores the null simulations of the inversion, which a later evaluation of a similar track then
+    /// reads, and is created if missing.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
     /// Output folder for evaluation.json, evaluation.csv, report.html and track.svg (the charts along
@@ -74,6 +77,10 @@ pub(super) struct Arguments {
     out: PathBuf,
     #[command(flatten)]
     track: TrackOption,
+    /// Diagnosis of this recording (diagnosis.json): the physics that it accepted becomes part of the track
+    /// model of the inversion.
+    #[arg(long, value_name = "FILE", conflicts_with = "models")]
+    from: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
     /// Print JSON.
@@ -82,16 +89,22 @@ pub(super) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
-    let Arguments { recording, method, models, library, track, out, force, json } = arguments;
+    let Arguments { recording, method, models, library, track, from, out, force, json } = arguments;
     // Read the recording first: it is the most frequent cause of errors and the quickest to check.
     let recording = open(&recording)?;
     check_files(&out, force)?;
     let (Some(models), Some(library)) =
-        (models.filter(|_| method != Some(Method::Inversion)), library)
+        (models.filter(|_| method != Some(Method::Inversion)), library.as_deref())
     else {
-        return by_inversion(&recording, &track, &out, force, json).await;
+        let library = match library {
+            Some(url) => Some(open_or_create(&url).await?),
+            None => None,
+        };
+        let diagnosis = from.map(|from| diagnosis_of(&recording, &from)).transpose()?;
+        let setting = Setting { diagnosis: diagnosis.as_ref(), library: library.as_ref() };
+        return by_inversion(&recording, &track, setting, &out, force, json).await;
     };
-    let library = open_whole(&library).await?;
+    let library = open_whole(library).await?;
     let models = load_models(&models)?;
     let beside = method.is_none();
     let evaluation = evaluate(&recording, &library, models, &out, force, beside).await?;
@@ -110,10 +123,20 @@ pub(super) fn report(folder: &Path) -> String {
     folder.join(PAGE).display().to_string()
 }
 
+/// What an inversion takes besides the recording and the track.
+#[derive(Clone, Copy)]
+struct Setting<'a> {
+    /// Diagnosis whose accepted physics is part of the model.
+    diagnosis: Option<&'a Diagnosis>,
+    /// Library that stores null simulations.
+    library: Option<&'a Library>,
+}
+
 /// Evaluates a recording by inversion only.
 async fn by_inversion(
     recording: &Recording,
     track: &TrackOption,
+    setting: Setting<'_>,
     folder: &Path,
     force: Force,
     json: bool,
@@ -126,10 +149,11 @@ async fn by_inversion(
     notes.extend(assumed);
     check_track(&recording, &track.design).or_input()?;
     make_folder(folder)?;
-    let mut inversion = invert(&recording, &track, None).await.map_err(|error| match error {
+    let mut inversion = invert(&recording, &track, setting).await.map_err(|error| match error {
         InvertingError::Recording(error) => Stop::Input(error.into()),
         failed => Stop::Failure(failed.into()),
     })?;
+    notes.extend(setting.diagnosis.map(with_physics));
     let said = inversion.notes.clone();
     inversion.notes.splice(0..0, notes);
     let extractor = Extractor::new(&FeatureDefinition::default()).context("the usual features")?;
@@ -156,11 +180,11 @@ async fn by_inversion(
 async fn invert(
     recording: &Recording,
     track: &Track,
-    library: Option<&Library>,
+    Setting { diagnosis, library }: Setting<'_>,
 ) -> Result<Inversion, InvertingError> {
     let stages = Stages::default();
     let watch = |stage, share| stages.at(stage, share);
-    let inverted = pipeline::invert::invert(recording, track, library, &watch).await;
+    let inverted = pipeline::invert::invert(recording, track, diagnosis, library, &watch).await;
     stages.end();
     inverted
 }
@@ -285,7 +309,8 @@ async fn invert_beside(
     library: &Library,
     evaluation: &mut Evaluation,
 ) -> Option<Inversion> {
-    match invert(recording, &Track::of(evaluator.design().clone()), Some(library)).await {
+    let setting = Setting { diagnosis: None, library: Some(library) };
+    match invert(recording, &Track::of(evaluator.design().clone()), setting).await {
         Ok(inversion) => Some(inversion),
         Err(error) => {
             let line = format!("no inversion: {error}");

@@ -3,6 +3,7 @@
 //! Commands read and write files synchronously, even in asynchronous functions, because nothing else runs
 //! at that time. Long computations go through `pipeline::compute`.
 
+mod accepted;
 mod campaign;
 mod certs;
 mod check;

@@ -124,7 +124,7 @@ pub async fn diagnose(
 
 /// Fits the baseline, and prepares the variation of parameters beyond the section.
 fn baseline(prepared: &mut PreparedRecording) -> Result<DVector<f64>, CalibrationError> {
-    let start = first_calibration(prepared)?;
+    let start = first_calibration(prepared, &[])?;
     prepared.forward.allow_beyond(&start)?;
     Ok(start)
 }

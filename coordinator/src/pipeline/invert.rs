@@ -6,11 +6,12 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_diagnosis::{
-    CalibrationError, Common, NullModel, PreparationError, PreparedRecording, first_calibration,
+    CalibrationError, Candidate, Common, Diagnosis, NullModel, PreparationError, PreparedRecording,
+    first_calibration,
 };
 use tracktwin_evaluation::Flag;
 use tracktwin_inspection::chain;
-use tracktwin_inversion::{Fitted, Inversion, fit, sections};
+use tracktwin_inversion::{Fitted, Inversion, accepted, fit, sections};
 use tracktwin_library::Library;
 use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
@@ -29,21 +30,28 @@ pub enum InvertingError {
     NullModel(#[from] NullModelError),
 }
 
-/// Evaluates a recording by inversion. `library` stores null simulations. `watch` is called with the
-/// current stage and its completed share (0 to 1).
+/// Evaluates a recording by inversion. The physics that `diagnosis`, a diagnosis of the recording, accepted
+/// is part of the model. `library` stores null simulations. `watch` is called with the current stage and its
+/// completed share (0 to 1).
 ///
 /// # Errors
 /// Returns [`InvertingError::Recording`] if the recording is unsuitable. All other errors are failures.
 pub async fn invert(
     recording: &Recording,
     track: &Track,
+    diagnosis: Option<&Diagnosis>,
     library: Option<&Library>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Inversion, InvertingError> {
     watch("spectra", 0.0);
     let prepared = compute(|| sections(recording, track))?;
+    let with_physics = |prepared: PreparedRecording| {
+        let known = diagnosis.map(|diagnosis| accepted(diagnosis, recording, &prepared));
+        (prepared, known.unwrap_or_default())
+    };
+    let prepared = prepared.into_iter().map(with_physics).collect();
     let started = compute(|| start(prepared, watch))?;
-    let (prepared, values) = &started[started.len() / 2];
+    let Started { prepared, values, .. } = &started[started.len() / 2];
     watch("null model", 0.0);
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
@@ -59,17 +67,26 @@ pub async fn invert(
     Ok(inversion)
 }
 
+/// A section after its first fit.
+struct Started {
+    prepared: PreparedRecording,
+    /// Known physics that acts on the section.
+    known: Vec<Candidate>,
+    /// Values of the first fit.
+    values: DVector<f64>,
+}
+
 /// First fit of every section, and the variation of parameters beyond each section.
 fn start(
-    prepared: Vec<PreparedRecording>,
+    prepared: Vec<(PreparedRecording, Vec<Candidate>)>,
     watch: &(dyn Fn(&'static str, f64) + Sync),
-) -> Result<Vec<(PreparedRecording, DVector<f64>)>, CalibrationError> {
+) -> Result<Vec<Started>, CalibrationError> {
     let (done, all) = (AtomicUsize::new(0), prepared.len() as f64);
-    let one = |mut prepared: PreparedRecording| -> Result<_, CalibrationError> {
-        let values = first_calibration(&prepared)?;
+    let one = |(mut prepared, known): (PreparedRecording, Vec<Candidate>)| -> Result<_, CalibrationError> {
+        let values = first_calibration(&prepared, &known)?;
         prepared.forward.allow_beyond(&values)?;
         watch("first fit", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
-        Ok((prepared, values))
+        Ok(Started { prepared, known, values })
     };
     let started = prepared.into_par_iter().map(one).collect::<Result<_, CalibrationError>>()?;
     Ok(alike(started))
@@ -77,17 +94,13 @@ fn start(
 
 /// Sets the common parameters of all sections to their median, because sleepers and railpads are of one
 /// type along the track. No section then starts near another local minimum.
-fn alike(
-    mut started: Vec<(PreparedRecording, DVector<f64>)>,
-) -> Vec<(PreparedRecording, DVector<f64>)> {
+fn alike(mut started: Vec<Started>) -> Vec<Started> {
     for common in Common::ALL {
-        let found = |(prepared, values): &(PreparedRecording, DVector<f64>)| {
-            values[prepared.forward.unknowns.common(common)]
-        };
+        let found = |it: &Started| it.values[it.prepared.forward.unknowns.common(common)];
         let mut all: Vec<f64> = started.iter().map(found).collect();
         all.sort_by(f64::total_cmp);
         let median = all[all.len() / 2];
-        for (prepared, values) in &mut started {
+        for Started { prepared, values, .. } in &mut started {
             values[prepared.forward.unknowns.common(common)] = median;
         }
     }
@@ -95,13 +108,13 @@ fn alike(
 }
 
 fn fit_all(
-    started: Vec<(PreparedRecording, DVector<f64>)>,
+    started: Vec<Started>,
     null: &NullModel,
     watch: &(dyn Fn(&'static str, f64) + Sync),
 ) -> Result<Vec<(PreparedRecording, Fitted)>, CalibrationError> {
     let (done, all) = (AtomicUsize::new(0), started.len() as f64);
-    let one = |(prepared, values): (PreparedRecording, DVector<f64>)| {
-        let fitted = fit(&prepared, null, values)?;
+    let one = |Started { prepared, known, values }: Started| {
+        let fitted = fit(&prepared, null, &known, values)?;
         watch("fit", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
         Ok((prepared, fitted))
     };

@@ -111,7 +111,7 @@ async fn evaluated(
         let evaluation = compute(|| evaluator.evaluate(&recording))?;
         let mut evaluated = EvaluatedExample::new(example, &evaluation)?;
         if figure == Figure::Fig19 {
-            let inversion = invert(&recording, &track, None, &|_, _| ()).await?;
+            let inversion = invert(&recording, &track, None, None, &|_, _| ()).await?;
             let found = inversion.sleepers.iter().map(|it| (&*it.id, &it.estimates));
             evaluated = evaluated.with_inversion(found)?;
         }

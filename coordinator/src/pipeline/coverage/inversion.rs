@@ -85,7 +85,7 @@ pub async fn inversion_rows(
             let mut recording = compute(|| simulate(&scene))?;
             recording.name = format!("track {number}");
             let track = Preset::VTrack.track();
-            let inversion = invert(&recording, &track, library, &|_, _| ()).await?;
+            let inversion = invert(&recording, &track, None, library, &|_, _| ()).await?;
             scores.add(&scene, &inversion);
             done += 1;
             progress(done, total);

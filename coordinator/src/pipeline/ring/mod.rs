@@ -151,7 +151,7 @@ impl RingStudy<'_> {
             let shown = |stage: &'static str, share: f64| {
                 watch(done, &format!("{part}: {stage} {:.0} %", 100.0 * share));
             };
-            let inverted = invert(&some, &Preset::VTrack.track(), self.library, &shown).await;
+            let inverted = invert(&some, &Preset::VTrack.track(), None, self.library, &shown).await;
             let inversion = inverted
                 .map_err(|source| RingStudyError::Inversion { part: part.to_string(), source })?;
             let mut output = Output::begin(&folder, Kind::Results, self.force)?;

@@ -1,8 +1,10 @@
 //! Fit of the baseline, alone or with extensions, to a recording, with its posterior.
 
+mod descent;
 mod ranges;
 
-use self::ranges::Ranges;
+pub(crate) use descent::Descent;
+
 use crate::candidate::Candidate;
 use crate::forward::{Forward, Linearised};
 use crate::observation::Observation;
@@ -12,21 +14,6 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use tracktwin_track::extension::{Extension, InstanceError};
 use tracktwin_track::model::ModelError;
-
-/// Largest number of Gauss-Newton steps; five suffice if the track is similar to that of the catalogue.
-const STEPS_MAX: usize = 10;
-
-/// Number of steps after which the linearisation predicts the minimum.
-const FIRST_STEPS: usize = 3;
-
-/// Largest change of a logarithm in one step; the linearisation is not valid beyond it.
-const STEP_MAX: f64 = 0.7;
-
-/// A step shorter than this is not halved again.
-const STEP_MIN: f64 = 1e-3;
-
-/// The search ends when a step reduces the objective by less than this, in nats.
-const TOLERANCE: f64 = 0.2;
 
 /// Step of the logarithms of extension parameters for numerical derivatives.
 const VARIATION: f64 = 1e-3;
@@ -78,22 +65,6 @@ pub struct Calibration {
     pub log_evidence: f64,
 }
 
-/// State of an interrupted search.
-#[derive(Clone, Debug)]
-pub(crate) struct Descent {
-    /// Current state.
-    pub(crate) state: Calibration,
-    /// Whether the search has ended.
-    has_ended: bool,
-}
-
-impl Calibration {
-    /// Prediction of the smallest objective, from the derivatives at the current values, in nats.
-    pub(crate) fn predicted_objective(&self) -> f64 {
-        self.objective - 0.5 * self.precision.solve(&self.gradient).dot(&self.gradient)
-    }
-}
-
 struct Prior {
     mean: DVector<f64>,
     precision: DMatrix<f64>,
@@ -101,103 +72,15 @@ struct Prior {
     half_log_determinant: f64,
 }
 
+impl Prior {
+    /// Half the sum of squares of a whitened residual and of the distance from the prior, in nats.
+    fn objective(&self, residual: &DVector<f64>, values: &DVector<f64>) -> f64 {
+        let from_prior = values - &self.mean;
+        0.5 * (residual.norm_squared() + from_prior.dot(&(&self.precision * &from_prior)))
+    }
+}
+
 impl Problem<'_> {
-    /// Finds the values of greatest posterior probability. `start` holds the unknowns of the baseline, then
-    /// the candidates' parameters.
-    ///
-    /// The method is Gauss-Newton on the whitened log powers; a step that increases the objective is
-    /// halved.
-    ///
-    /// # Errors
-    /// [`CalibrationError`] if no track or extension exists for `start`, or a derivative is not finite.
-    pub fn calibrate(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
-        self.calibrate_among(start, &Ranges::default())
-    }
-
-    /// As [`Problem::calibrate`], with the last candidate's parameters restricted to their ranges.
-    ///
-    /// # Errors
-    /// The errors of [`Problem::calibrate`].
-    pub fn calibrate_in_range(&self, start: DVector<f64>) -> Result<Calibration, CalibrationError> {
-        let ranges = |candidate: &Candidate| {
-            candidate.free.iter().map(|parameter| candidate.range(parameter)).collect()
-        };
-        let each: Vec<[f64; 2]> = self.candidates.last().map_or(Vec::new(), ranges);
-        let first = start.len() - each.len();
-        self.calibrate_among(start, &Ranges { first, each })
-    }
-
-    /// The first steps of [`Problem::calibrate`].
-    ///
-    /// # Errors
-    /// The errors of [`Problem::calibrate`].
-    pub(crate) fn begin(&self, start: &DVector<f64>) -> Result<Descent, CalibrationError> {
-        let prior = self.prior();
-        let state = self.linearise(&prior, start)?;
-        self.descend(&prior, &Ranges::default(), state, FIRST_STEPS)
-    }
-
-    /// The remaining steps of [`Problem::calibrate`].
-    ///
-    /// # Errors
-    /// The errors of [`Problem::calibrate`].
-    pub(crate) fn go_on(&self, begun: Descent) -> Result<Calibration, CalibrationError> {
-        if begun.has_ended {
-            return Ok(begun.state);
-        }
-        let steps = STEPS_MAX - FIRST_STEPS;
-        Ok(self.descend(&self.prior(), &Ranges::default(), begun.state, steps)?.state)
-    }
-
-    fn calibrate_among(
-        &self,
-        start: DVector<f64>,
-        ranges: &Ranges,
-    ) -> Result<Calibration, CalibrationError> {
-        let prior = self.prior();
-        let mut values = start;
-        ranges.confine(&mut values);
-        let state = self.linearise(&prior, &values)?;
-        Ok(self.descend(&prior, ranges, state, STEPS_MAX)?.state)
-    }
-
-    /// Continues from a state with at most `steps` steps.
-    fn descend(
-        &self,
-        prior: &Prior,
-        ranges: &Ranges,
-        mut state: Calibration,
-        steps: usize,
-    ) -> Result<Descent, CalibrationError> {
-        for _ in 0..steps {
-            let mut step = ranges.step(&state).ok_or(CalibrationError::NotFinite)?;
-            let longest = step.amax();
-            if longest > STEP_MAX {
-                step *= STEP_MAX / longest;
-            }
-            let objective_after =
-                |step: &DVector<f64>| self.objective_or_infinity(prior, &(&state.values + step));
-            let mut objective = objective_after(&step);
-            while objective > state.objective && step.amax() > STEP_MIN {
-                step *= 0.5;
-                objective = objective_after(&step);
-            }
-            let gain = state.objective - objective;
-            if gain <= 0.0 {
-                return Ok(Descent { state, has_ended: true });
-            }
-            // At the edge of what makes a track there are no derivatives.
-            let Ok(next) = self.linearise(prior, &(&state.values + step)) else {
-                return Ok(Descent { state, has_ended: true });
-            };
-            state = next;
-            if gain < TOLERANCE {
-                return Ok(Descent { state, has_ended: true });
-            }
-        }
-        Ok(Descent { state, has_ended: false })
-    }
-
     /// Start values: the unknowns of a baseline, then one trial of each candidate.
     pub fn start(&self, baseline: &DVector<f64>, trials: &[&[f64]]) -> DVector<f64> {
         let count = self.forward.unknowns.count();
@@ -254,19 +137,6 @@ impl Problem<'_> {
         }
         let factor = Cholesky::new(precision.clone()).expect("a prior is positive definite");
         Prior { mean, precision, half_log_determinant: 0.5 * factor.ln_determinant() }
-    }
-
-    fn objective(&self, prior: &Prior, values: &DVector<f64>) -> Result<f64, CalibrationError> {
-        let residual = self.observation.residual(&self.predict(values)?);
-        let objective = self.observation.fitted(&residual).norm_squared();
-        let from_prior = values - &prior.mean;
-        Ok(0.5 * (objective + from_prior.dot(&(&prior.precision * &from_prior))))
-    }
-
-    /// The objective, or infinity if no track exists for the values (for example, an axle box heavier than
-    /// the wheel), so that a step ends before such values.
-    fn objective_or_infinity(&self, prior: &Prior, values: &DVector<f64>) -> f64 {
-        self.objective(prior, values).unwrap_or(f64::INFINITY)
     }
 
     /// Whitened residual and derivatives at given values, including held-out rows.

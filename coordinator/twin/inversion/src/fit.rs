@@ -3,8 +3,8 @@
 use crate::variation::{Quadratic, learn};
 use nalgebra::{DMatrix, DVector};
 use tracktwin_diagnosis::{
-    Calibration, CalibrationError, Forward, Mean, NullModel, Observation, Own, PreparationError,
-    PreparedRecording, Problem, Unknowns, Variation,
+    Calibration, CalibrationError, Candidate, Forward, Mean, NullModel, Observation, Own,
+    PreparationError, PreparedRecording, Problem, Unknowns, Variation,
 };
 use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
@@ -70,14 +70,15 @@ pub fn sections(
     PreparedRecording::sections(recording, track, LENGTH, OVERLAP)
 }
 
-/// Fits a section. `start` must be the result of [`tracktwin_diagnosis::first_calibration`], and the
-/// forward model of `prepared` must include the track beyond the section ([`Forward::allow_beyond`]).
+/// Fits a section whose model contains `known` physics without free parameters ([`crate::accepted`]).
+/// `start` must be the result of [`tracktwin_diagnosis::first_calibration`], and the forward model of `prepared` must include the track beyond the section ([`Forward::allow_beyond`]).
 ///
 /// # Errors
 /// [`CalibrationError`] if the fit fails or a number is not finite.
 pub fn fit(
     prepared: &PreparedRecording,
     null: &NullModel,
+    known: &[Candidate],
     start: DVector<f64>,
 ) -> Result<Fitted, CalibrationError> {
     let plain =
@@ -88,9 +89,10 @@ pub fn fit(
     let mut factors = vec![1.0; forward.section.sleepers];
     let fit = |forward: &_, factors: &[f64], start| {
         let observation = &plain.clone().with_factors(factors);
-        Problem { forward, observation, candidates: &[] }.calibrate(start)
+        Problem { forward, observation, candidates: known }.calibrate(start)
     };
-    let mut calibration = fit(&forward, &factors, start)?;
+    let problem = Problem { forward: &forward, observation: &plain, candidates: known };
+    let mut calibration = problem.calibrate_widely(start)?;
     for _ in 0..ROUNDS {
         let found = misfit(&calibration, &factors, plain.compared());
         factors = found.into_iter().map(factor).collect();

@@ -23,11 +23,11 @@
 //! let recording = Recording::open(&folder)?;
 //! let track = recording.stated_track().track;
 //! let mut section = sections(&recording, &track)?.remove(0);
-//! let start = first_calibration(&section)?;
+//! let start = first_calibration(&section, &[])?;
 //! section.forward.allow_beyond(&start)?;
 //! let grid = NullModel::grid_values(&section.forward, &start);
 //! let null = NullModel::simulate(&section.forward, &grid, 8, 1, &|_| ())?;
-//! let fitted = fit(&section, &null, start)?;
+//! let fitted = fit(&section, &null, &[], start)?;
 //!
 //! for (id, expected) in [("SN11", 14e6), ("SN15", 8e6)] {
 //!     let number = recording.sleepers.iter().position(|sleeper| sleeper.id == id).unwrap();
@@ -38,6 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod accepted;
 mod along;
 mod beside;
 mod files;
@@ -45,6 +46,7 @@ mod fit;
 mod record;
 mod variation;
 
+pub use accepted::{accepted, modelled};
 pub use beside::{Beside, beside};
 pub use fit::{Fitted, fit, sections};
 pub use record::{

@@ -1,7 +1,6 @@
 //! Ranges that restrict some of the searched values.
 
-use super::Calibration;
-use nalgebra::{Cholesky, DVector};
+use nalgebra::{Cholesky, DVector, Dyn};
 
 /// A logarithm is at the end of its range if its distance from the end is smaller.
 const AT_END: f64 = 1e-9;
@@ -24,14 +23,22 @@ impl Ranges {
         }
     }
 
-    /// The Gauss-Newton step of a state, limited to the ranges. A value at the end of its range that would
-    /// leave the range is held, and the step of the other values is computed without it.
-    pub(super) fn step(&self, state: &Calibration) -> Option<DVector<f64>> {
-        let mut step = state.precision.solve(&state.gradient);
-        let factor = state.precision.l();
-        let mut precision = &factor * factor.transpose();
-        let mut gradient = state.gradient.clone();
-        while let Some(kept) = self.leaving(&state.values, &step) {
+    /// The Gauss-Newton step from some values, limited to the ranges, with the precision and the gradient
+    /// of the log posterior. A value at the end of its range that would leave the range is held, and the
+    /// step of the other values is computed without it.
+    pub(super) fn step(
+        &self,
+        values: &DVector<f64>,
+        precision: &Cholesky<f64, Dyn>,
+        mut gradient: DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let mut step = precision.solve(&gradient);
+        let mut held = None;
+        while let Some(kept) = self.leaving(values, &step) {
+            let precision = held.get_or_insert_with(|| {
+                let factor = precision.l();
+                &factor * factor.transpose()
+            });
             precision.row_mut(kept).fill(0.0);
             precision.column_mut(kept).fill(0.0);
             precision[(kept, kept)] = 1.0;
@@ -40,7 +47,7 @@ impl Ranges {
         }
         let inside = self.each.iter().enumerate().map(|(offset, range)| {
             let index = self.first + offset;
-            part_inside(*range, state.values[index], step[index])
+            part_inside(*range, values[index], step[index])
         });
         Some(&step * inside.fold(1.0, f64::min))
     }

@@ -150,18 +150,21 @@ fn rough_covariance(prepared: &PreparedRecording) -> DMatrix<f64> {
     })
 }
 
-/// Calibrates the baseline with a rough covariance; the result serves as parameters of the null
-/// simulations.
+/// Calibrates the baseline, with known physics without free parameters, by a rough covariance; the result
+/// serves as parameters of the null simulations.
 ///
 /// # Errors
 /// [`CalibrationError`] if the calibration fails.
-pub fn first_calibration(prepared: &PreparedRecording) -> Result<DVector<f64>, CalibrationError> {
+pub fn first_calibration(
+    prepared: &PreparedRecording,
+    known: &[Candidate],
+) -> Result<DVector<f64>, CalibrationError> {
     let covariance = prepared.of_compared(rough_covariance(prepared));
     let observation = Observation::new(prepared.log_power.clone(), &covariance, |_| false)
         .ok_or(CalibrationError::NotFinite)?;
     let problem =
-        Problem { forward: &prepared.forward, observation: &observation, candidates: &[] };
-    Ok(problem.calibrate(prepared.forward.unknowns.typical())?.values)
+        Problem { forward: &prepared.forward, observation: &observation, candidates: known };
+    Ok(problem.calibrate_widely(prepared.forward.unknowns.typical())?.values)
 }
 
 /// Searches for left-out physics.
@@ -182,7 +185,7 @@ pub fn search(
     let setting = Setting::new(prepared, null);
     let observation = setting.observe(|_| false)?;
     let plain = Problem { forward: &prepared.forward, observation: &observation, candidates: &[] };
-    let baseline = plain.calibrate(start)?;
+    let baseline = plain.calibrate_widely(start)?;
     let mut search = SearchOutcome {
         last: baseline.clone(),
         baseline,

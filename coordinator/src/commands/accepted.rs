@@ -1,0 +1,45 @@
+//! The physics that a diagnosis accepted, as a part of an evaluation.
+
+use super::extend::diagnosis;
+use super::{OrInput, Stop};
+use anyhow::anyhow;
+use std::path::Path;
+use tracktwin_diagnosis::{Diagnosis, Hypothesis};
+use tracktwin_inversion::modelled;
+use tracktwin_signal::recording::Recording;
+
+/// Reads a diagnosis, which must be of this recording.
+pub(super) fn diagnosis_of(recording: &Recording, path: &Path) -> Result<Diagnosis, Stop> {
+    let found = diagnosis(path).or_input()?;
+    let ids: Vec<&String> = recording.sleepers.iter().map(|sleeper| &sleeper.id).collect();
+    if found.track.is_empty() || found.track.iter().any(|sleeper| !ids.contains(&&sleeper.id)) {
+        return Err(Stop::Input(anyhow!(
+            "{}: track: not a diagnosis of this recording, which has other sleepers",
+            path.display()
+        )));
+    }
+    Ok(found)
+}
+
+/// Text on the physics of a diagnosis that is part of the model.
+pub(super) fn with_physics(diagnosis: &Diagnosis) -> String {
+    let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
+    let (known, others): (Vec<&Hypothesis>, Vec<&Hypothesis>) =
+        accepted.partition(|hypothesis| modelled(hypothesis).is_some());
+    let names = |of: &[&Hypothesis]| {
+        of.iter().map(|hypothesis| hypothesis.physics.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    let mut text = if known.is_empty() {
+        "Nothing that the diagnosis accepted can be added to the track model.".to_owned()
+    } else {
+        format!(
+            "The track model contains what the diagnosis accepted: {}. Its values are those of the diagnosis; \
+             standard deviations do not include their uncertainty.",
+            names(&known)
+        )
+    };
+    if !others.is_empty() {
+        text += &format!(" Left out: {}.", names(&others));
+    }
+    text
+}
