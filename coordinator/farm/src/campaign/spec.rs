@@ -1,5 +1,7 @@
 //! The campaign file (TOML) and the checked [`Campaign`] that is built from it.
 
+mod surface;
+
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -364,6 +366,9 @@ impl File {
         experiment.speeds_km_h.clone_from(speeds.unwrap_or(&track.speeds_km_h));
         experiment.features = self.features.clone();
         experiment.extensions.clone_from(&self.extension);
+        if !experiment.extensions.iter().any(|extension| extension.physics == surface::SPECTRUM) {
+            experiment.extensions.extend(surface::slope(track, &experiment.speeds_km_h));
+        }
         replace(&mut experiment.spans, simulation.spans);
         replace(&mut experiment.rail_elements_per_span, simulation.rail_elements_per_span);
         replace(&mut experiment.sleeper_elements, simulation.sleeper_elements);

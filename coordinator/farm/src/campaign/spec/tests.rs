@@ -1,6 +1,7 @@
 //! Tests of campaign files: valid files are parsed, invalid files are refused.
 
 use super::*;
+use tracktwin_track::extension::SampledValue;
 
 fn refusal(change: impl Fn(&str) -> String) -> String {
     Campaign::parse(&change(DEFAULT), "c.toml", None).unwrap_err().to_string()
@@ -61,6 +62,24 @@ fn an_extension_joins_the_experiment_or_is_refused_with_the_reason() {
         message,
         "c.toml: extension: hanging_sleeper: has no parameter `gap`; it has gap_m, damping_share"
     );
+}
+
+#[test]
+fn a_line_has_surfaces_of_different_slope_unless_the_file_states_a_spectrum() {
+    let extensions = |text: &str| {
+        let campaign = Campaign::parse(text, "c.toml", None).unwrap();
+        campaign.definition.experiment.extensions
+    };
+    assert_eq!(extensions(DEFAULT), []);
+    let line = DEFAULT.replace("cases = 800", "cases = 800\npreset = \"60E1-concrete\"");
+    let [slope] = <[_; 1]>::try_from(extensions(&line)).unwrap();
+    let between = slope.parameters["slope_dB_per_octave"];
+    // An exponent that differs by 1.645 changes the power by 4.95 dB an octave.
+    let SampledValue::Between([low, high]) = between else { panic!("{between:?}") };
+    assert!((high - 4.95).abs() < 0.01 && low == -high, "{low} {high}");
+    let own = "\n[[extension]]\nphysics = \"roughness_spectrum\"\nlevel_dB = 1.0\n";
+    let [own] = <[_; 1]>::try_from(extensions(&format!("{line}{own}"))).unwrap();
+    assert!(!own.parameters.contains_key("slope_dB_per_octave"));
 }
 
 #[test]
