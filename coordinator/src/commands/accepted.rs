@@ -4,7 +4,7 @@ use super::extend::diagnosis;
 use super::{OrInput, Stop};
 use anyhow::anyhow;
 use std::path::Path;
-use tracktwin_diagnosis::{Diagnosis, Hypothesis};
+use tracktwin_diagnosis::Diagnosis;
 use tracktwin_inversion::modelled;
 use tracktwin_signal::recording::Recording;
 
@@ -24,22 +24,25 @@ pub(super) fn diagnosis_of(recording: &Recording, path: &Path) -> Result<Diagnos
 /// Text on the physics of a diagnosis that is part of the model.
 pub(super) fn with_physics(diagnosis: &Diagnosis) -> String {
     let accepted = diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
-    let (known, others): (Vec<&Hypothesis>, Vec<&Hypothesis>) =
-        accepted.partition(|hypothesis| modelled(hypothesis).is_some());
-    let names = |of: &[&Hypothesis]| {
-        of.iter().map(|hypothesis| hypothesis.physics.as_str()).collect::<Vec<_>>().join(", ")
-    };
+    let (mut known, mut others) = (Vec::new(), Vec::new());
+    for hypothesis in accepted {
+        match modelled(hypothesis) {
+            Some(kind) => known.push(format!("{} ({})", kind.summary, kind.physics)),
+            None => others.push(hypothesis.physics.as_str()),
+        }
+    }
+    known.dedup();
     let mut text = if known.is_empty() {
         "Nothing that the diagnosis accepted can be added to the track model.".to_owned()
     } else {
         format!(
             "The track model contains what the diagnosis accepted: {}. Its values are those of the diagnosis; \
              standard deviations do not include their uncertainty.",
-            names(&known)
+            known.join("; ")
         )
     };
     if !others.is_empty() {
-        text += &format!(" Left out: {}.", names(&others));
+        text += &format!(" Left out: {}.", others.join(", "));
     }
     text
 }

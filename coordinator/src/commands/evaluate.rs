@@ -68,7 +68,8 @@ pub(super) struct Arguments {
     models: Option<PathBuf>,
     /// Library of the models: `sqlite:PATH` or `postgres://USER@HOST/DATABASE`. Without --models it
     /// stores the null simulations of the inversion, which a later evaluation of a similar track then
-    /// reads, and is created if missing.
+    /// reads, and the fitted sections, so that an interrupted evaluation continues; it is created if
+    /// missing.
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
     /// Output folder for evaluation.json, evaluation.csv, report.html and track.svg (the charts along

@@ -1,18 +1,19 @@
 //! Inversion of a recording: sections, null model, fits.
 
 use crate::pipeline::compute::compute;
+use crate::pipeline::fitted_sections;
 use crate::pipeline::null_models::{self, NullModelError};
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracktwin_diagnosis::{
-    CalibrationError, Candidate, Common, Diagnosis, NullModel, PreparationError, PreparedRecording,
+    CalibrationError, Candidate, Common, Diagnosis, PreparationError, PreparedRecording,
     first_calibration,
 };
 use tracktwin_evaluation::Flag;
 use tracktwin_inspection::chain;
-use tracktwin_inversion::{Fitted, Inversion, accepted, fit, sections};
-use tracktwin_library::Library;
+use tracktwin_inversion::{Inversion, accepted, sections};
+use tracktwin_library::{Library, LibraryError};
 use tracktwin_parameters::Track;
 use tracktwin_signal::recording::Recording;
 
@@ -28,10 +29,13 @@ pub enum InvertingError {
     /// The null simulations failed.
     #[error(transparent)]
     NullModel(#[from] NullModelError),
+    /// The library cannot be read or written.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
 }
 
 /// Evaluates a recording by inversion. The physics that `diagnosis`, a diagnosis of the recording, accepted
-/// is part of the model. `library` stores null simulations. `watch` is called with the current stage and its
+/// is part of the model. `library` stores null simulations and fitted sections. `watch` is called with the current stage and its
 /// completed share (0 to 1).
 ///
 /// # Errors
@@ -56,7 +60,10 @@ pub async fn invert(
     let surfaces = f64::from(null_models::SURFACES);
     let share = |done| watch("null model", done as f64 / surfaces);
     let null = null_models::of(prepared, values, library, share).await?;
-    let fitted = compute(|| fit_all(started, &null, watch))?;
+    watch("fit", 0.0);
+    let count = started.len() as f64;
+    let progress = |done| watch("fit", done as f64 / count);
+    let fitted = fitted_sections::of(started, &null, library, &progress).await?;
     let mut inversion = Inversion::of(recording, &fitted);
     if let Some(lost) = chain::loss_of_contact(recording) {
         let there = inversion.sleepers.iter_mut().filter(|it| lost.sleepers.contains(&it.id));
@@ -68,12 +75,12 @@ pub async fn invert(
 }
 
 /// A section after its first fit.
-struct Started {
-    prepared: PreparedRecording,
+pub(super) struct Started {
+    pub(super) prepared: PreparedRecording,
     /// Known physics that acts on the section.
-    known: Vec<Candidate>,
+    pub(super) known: Vec<Candidate>,
     /// Values of the first fit.
-    values: DVector<f64>,
+    pub(super) values: DVector<f64>,
 }
 
 /// First fit of every section, and the variation of parameters beyond each section.
@@ -105,18 +112,4 @@ fn alike(mut started: Vec<Started>) -> Vec<Started> {
         }
     }
     started
-}
-
-fn fit_all(
-    started: Vec<Started>,
-    null: &NullModel,
-    watch: &(dyn Fn(&'static str, f64) + Sync),
-) -> Result<Vec<(PreparedRecording, Fitted)>, CalibrationError> {
-    let (done, all) = (AtomicUsize::new(0), started.len() as f64);
-    let one = |Started { prepared, known, values }: Started| {
-        let fitted = fit(&prepared, null, &known, values)?;
-        watch("fit", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
-        Ok((prepared, fitted))
-    };
-    started.into_par_iter().map(one).collect()
 }

@@ -9,6 +9,7 @@ pub mod confirm;
 pub mod coverage;
 pub mod diagnose;
 pub mod evaluate;
+mod fitted_sections;
 pub mod invert;
 pub mod lack;
 pub mod models;

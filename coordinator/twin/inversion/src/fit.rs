@@ -40,7 +40,7 @@ const NEGLIGIBLE: f64 = 3.0;
 const HELD: f64 = 0.02;
 
 /// Number of sleepers of a section, and number of sleepers that two neighbouring sections share.
-const LENGTH: usize = 24;
+const LENGTH: usize = 26;
 const OVERLAP: usize = 8;
 
 /// Fitted unknowns of one section of a recording.
@@ -85,7 +85,7 @@ pub fn fit(
         Observation::new(prepared.expected_log_power(null), &prepared.covariance(null), |_| false)
             .ok_or(CalibrationError::NotFinite)?;
     let mut forward = prepared.forward.clone();
-    forward.unknowns.response_deviation = RESPONSE;
+    forward.unknowns = unknowns_of(&forward);
     let mut factors = vec![1.0; forward.section.sleepers];
     let fit = |forward: &_, factors: &[f64], start| {
         let observation = &plain.clone().with_factors(factors);
@@ -107,6 +107,13 @@ pub fn fit(
     let posterior = Posterior::mixture(&valley);
     let misfit = misfit(&calibration, &factors, plain.compared());
     Ok(Fitted::of(forward.unknowns, posterior, misfit))
+}
+
+/// The unknowns of a fit, before the variation along the track is estimated.
+pub(crate) fn unknowns_of(forward: &Forward) -> Unknowns {
+    let mut unknowns = forward.unknowns.clone();
+    unknowns.response_deviation = RESPONSE;
+    unknowns
 }
 
 /// A fit with fixed mean railpad stiffness, and the logarithm of its weight in nats.

@@ -44,6 +44,7 @@ mod beside;
 mod files;
 mod fit;
 mod record;
+mod stored;
 mod variation;
 
 pub use accepted::{accepted, modelled};
