@@ -110,9 +110,9 @@ impl Problem<'_> {
         self.calibrate_among(start, &Ranges::default())
     }
 
-    /// As [`Problem::calibrate`], but from softer and from stiffer sleepers too; the best of the three
-    /// minima. Another bending mode of the sleepers can explain the same peak of the levels, so that one
-    /// start leads to a minimum with sleepers twice as stiff.
+    /// As [`Problem::calibrate`]. If the sleepers come out far from their nominal bending stiffness, the
+    /// search is repeated from softer and from stiffer sleepers, and the best of the three minima is taken:
+    /// another bending mode of the sleepers can explain the same peak of the levels.
     ///
     /// # Errors
     /// The errors of [`Problem::calibrate`].
@@ -120,8 +120,12 @@ impl Problem<'_> {
         let unknowns = &self.forward.unknowns;
         let stiffness = unknowns.common(Common::SleeperBendingStiffness);
         let middle = unknowns.typical()[stiffness];
-        let reach = APART * unknowns.prior_deviations()[stiffness];
+        let deviation = unknowns.prior_deviations()[stiffness];
+        let reach = APART * deviation;
         let mut best = self.calibrate(start)?;
+        if (best.values[stiffness] - middle).abs() <= deviation {
+            return Ok(best);
+        }
         let starts = [middle - reach, middle + reach].map(|log| {
             let mut start = best.values.clone();
             start[stiffness] = log;
