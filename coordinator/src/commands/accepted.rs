@@ -32,7 +32,7 @@ pub(super) fn with_physics(diagnosis: &Diagnosis) -> String {
         }
     }
     known.dedup();
-    let mut text = if known.is_empty() {
+    let text = if known.is_empty() {
         "Nothing that the diagnosis accepted can be added to the track model.".to_owned()
     } else {
         format!(
@@ -41,8 +41,5 @@ pub(super) fn with_physics(diagnosis: &Diagnosis) -> String {
             known.join("; ")
         )
     };
-    if !others.is_empty() {
-        text += &format!(" Left out: {}.", others.join(", "));
-    }
-    text
+    if others.is_empty() { text } else { format!("{text} Left out: {}.", others.join(", ")) }
 }
