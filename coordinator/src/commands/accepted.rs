@@ -8,13 +8,13 @@ use tracktwin_diagnosis::Diagnosis;
 use tracktwin_inversion::modelled;
 use tracktwin_signal::recording::Recording;
 
-/// Reads a diagnosis, which must be of this recording.
+/// Reads a diagnosis, which must be of sleepers of this recording.
 pub(super) fn diagnosis_of(recording: &Recording, path: &Path) -> Result<Diagnosis, Stop> {
     let found = diagnosis(path).or_input()?;
     let ids: Vec<&String> = recording.sleepers.iter().map(|sleeper| &sleeper.id).collect();
     if found.track.is_empty() || found.track.iter().any(|sleeper| !ids.contains(&&sleeper.id)) {
         return Err(Stop::Input(anyhow!(
-            "{}: track: not a diagnosis of this recording, which has other sleepers",
+            "{}: track: the diagnosed sleepers are not those of the recording; give a diagnosis of this recording",
             path.display()
         )));
     }
@@ -36,8 +36,9 @@ pub(super) fn with_physics(diagnosis: &Diagnosis) -> String {
         "Nothing that the diagnosis accepted can be added to the track model.".to_owned()
     } else {
         format!(
-            "The track model contains what the diagnosis accepted: {}. Its values are those of the diagnosis; \
+            "The track model contains what the diagnosis of {} accepted: {}. Its values are those of the diagnosis; \
              standard deviations do not include their uncertainty.",
+            diagnosis.recording,
             known.join("; ")
         )
     };

@@ -129,7 +129,7 @@ pub(super) fn report(folder: &Path) -> String {
 struct Setting<'a> {
     /// Diagnosis whose accepted physics is part of the model.
     diagnosis: Option<&'a Diagnosis>,
-    /// Library that stores null simulations.
+    /// Library that stores null simulations and fitted sections.
     library: Option<&'a Library>,
 }
 

@@ -19,7 +19,7 @@ struct Key<'a> {
     known: String,
     speeds_m_s: &'a [f64],
     bands_hz: &'a [f64],
-    /// Hash of log powers, covariance and start values.
+    /// Hash of log powers, covariance, sensor noise and start values.
     numbers: String,
 }
 
@@ -30,7 +30,8 @@ impl Key<'_> {
         let mut numbers = blake3::Hasher::new();
         let expected = prepared.expected_log_power(null);
         let covariance = prepared.covariance(null);
-        for number in expected.iter().chain(covariance.iter()).chain(values) {
+        let data = expected.iter().chain(covariance.iter()).chain(&forward.noise_density);
+        for number in data.chain(values) {
             numbers.update(&number.to_le_bytes());
         }
         let key = Key {

@@ -298,7 +298,7 @@ impl Experiment {
 }
 
 /// A speed in m/s.
-pub(crate) fn metres_per_second(speed_km_h: f64) -> f64 {
+pub fn metres_per_second(speed_km_h: f64) -> f64 {
     speed_km_h / KM_H
 }
 

@@ -24,7 +24,8 @@ pub fn accepted(
     found
         .filter_map(|hypothesis| {
             let kind = modelled(hypothesis)?;
-            let extension = with_values(hypothesis, kind);
+            let length_ratio = prepared.forward.section.track.design.length_ratio();
+            let extension = with_values(hypothesis, kind, length_ratio);
             let extension = match &hypothesis.location {
                 Some(location) if kind.place != PlaceKind::Nowhere => {
                     let is_everywhere = location.sleepers.len() == diagnosis.track.len();
@@ -32,15 +33,14 @@ pub fn accepted(
                 }
                 _ => extension,
             };
-            let length_ratio = prepared.forward.section.track.design.length_ratio();
             Some(Candidate { kind, extension, free: vec![], trials: vec![], length_ratio })
         })
         .collect()
 }
 
-/// The extension with the fitted and the assumed values of a hypothesis, and typical values of what else it
-/// requires.
-fn with_values(hypothesis: &Hypothesis, kind: &Kind) -> ExtensionInstance {
+/// The extension with the fitted and the assumed values of a hypothesis, and values that are typical of the
+/// track's scale for what else it requires.
+fn with_values(hypothesis: &Hypothesis, kind: &Kind, length_ratio: f64) -> ExtensionInstance {
     let fitted =
         hypothesis.parameters.iter().map(|(name, estimate)| (name.as_str(), estimate.mean));
     let assumed = hypothesis.assumed.iter().map(|(name, &value)| (name.as_str(), value));
@@ -49,7 +49,7 @@ fn with_values(hypothesis: &Hypothesis, kind: &Kind) -> ExtensionInstance {
     let required = kind.parameters.iter().filter(|parameter| parameter.default.is_none());
     let typical = required
         .filter(|parameter| is_missing(parameter.name))
-        .map(|parameter| (parameter.name, parameter.typical));
+        .map(|parameter| (parameter.name, parameter.scaled(parameter.typical, length_ratio)));
     let is_known = |name: &str| kind.parameter(name).is_some();
     let all = given.iter().copied().filter(|(name, _)| is_known(name)).chain(typical);
     all.fold(ExtensionInstance::new(kind.physics), |extension, (name, value)| {

@@ -71,7 +71,8 @@ pub fn sections(
 }
 
 /// Fits a section whose model contains `known` physics without free parameters ([`crate::accepted`]).
-/// `start` must be the result of [`tracktwin_diagnosis::first_calibration`], and the forward model of `prepared` must include the track beyond the section ([`Forward::allow_beyond`]).
+/// `start` must be the result of [`tracktwin_diagnosis::first_calibration`], and the forward model of
+/// `prepared` must include the track beyond the section ([`Forward::allow_beyond`]).
 ///
 /// # Errors
 /// [`CalibrationError`] if the fit fails or a number is not finite.

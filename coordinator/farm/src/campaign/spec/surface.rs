@@ -1,5 +1,6 @@
 //! The surface spectrum of a campaign on a track whose slope is uncertain.
 
+use tracktwin_experiment::metres_per_second;
 use tracktwin_parameters::Track;
 use tracktwin_track::extension::{SampledExtension, SampledValue};
 
@@ -8,9 +9,6 @@ pub(super) const SPECTRUM: &str = "roughness_spectrum";
 
 /// Geometric mean of the range of the features in Hz (50 to 4000 Hz).
 const MIDDLE_HZ: f64 = 447.0;
-
-/// Km/h in a m/s.
-const KM_H: f64 = 3.6;
 
 /// Distance of the ends of the uniform distribution from its middle, in standard deviations of the slope:
 /// 90 % of a normal distribution lie between them.
@@ -27,7 +25,7 @@ pub(super) fn slope(track: &Track, speeds_km_h: &[f64]) -> Option<SampledExtensi
     }
     // One more in the exponent of the wave number is a factor of two in power per octave.
     let slope_db = 10.0 * 2.0_f64.log10() * ENDS * deviation;
-    let pivot_m = (slowest * fastest).sqrt() / KM_H / MIDDLE_HZ;
+    let pivot_m = metres_per_second((slowest * fastest).sqrt()) / MIDDLE_HZ;
     let parameters = [
         ("slope_dB_per_octave", SampledValue::Between([-slope_db, slope_db])),
         ("pivot_wavelength_m", SampledValue::Fixed(pivot_m)),

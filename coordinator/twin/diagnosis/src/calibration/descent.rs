@@ -48,13 +48,6 @@ pub(crate) struct Descent {
     has_ended: bool,
 }
 
-impl Calibration {
-    /// Prediction of the smallest objective, from the derivatives at the current values, in nats.
-    pub(crate) fn predicted_objective(&self) -> f64 {
-        self.objective - 0.5 * self.precision.solve(&self.gradient).dot(&self.gradient)
-    }
-}
-
 /// Values of the search with their residual.
 struct Point {
     values: DVector<f64>,
@@ -65,6 +58,11 @@ struct Point {
 }
 
 impl Calibration {
+    /// Prediction of the smallest objective, from the derivatives at the current values, in nats.
+    pub(crate) fn predicted_objective(&self) -> f64 {
+        self.objective - 0.5 * self.precision.solve(&self.gradient).dot(&self.gradient)
+    }
+
     fn point(&self) -> Point {
         let Self { values, residual, objective, .. } = self;
         Point { values: values.clone(), residual: residual.clone(), objective: *objective }
@@ -132,13 +130,14 @@ impl Problem<'_> {
             start
         });
         for start in starts {
-            // Beyond what makes a track there is no start.
+            // A start for which no track exists leaves the others as they are.
             let Ok(begun) = self.begin(&start) else { continue };
-            if begun.state.predicted_objective() < best.objective + HOPE {
-                let fitted = self.go_on(begun)?;
-                if fitted.objective < best.objective {
-                    best = fitted;
-                }
+            if begun.state.predicted_objective() >= best.objective + HOPE {
+                continue;
+            }
+            match self.go_on(begun) {
+                Ok(fitted) if fitted.objective < best.objective => best = fitted,
+                _ => {}
             }
         }
         Ok(best)
