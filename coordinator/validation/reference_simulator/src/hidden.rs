@@ -199,7 +199,7 @@ pub enum Hidden {
         damping_ratio: f64,
     },
     /// Sleepers that are cracked under the rail: 20 mm of them keep a share of their bending
-    /// stiffness. Not in the catalogue.
+    /// stiffness.
     CrackedSleeper {
         /// Indices of the sleepers, from 0.
         sleepers: Vec<usize>,

@@ -212,7 +212,7 @@ mod tests {
             let names = plans.flat_map(|plan| plan.scene.left_out).map(|hidden| hidden.physics());
             names.collect::<std::collections::BTreeSet<_>>().len()
         };
-        for (preset, counts) in [(Preset::VTrack, [13, 5, 4]), (Preset::Concrete60E1, [10, 5, 3])] {
+        for (preset, counts) in [(Preset::VTrack, [14, 5, 3]), (Preset::Concrete60E1, [11, 5, 2])] {
             let classes = [Class::Single, Class::Artefact, Class::Unknown];
             assert_eq!(classes.map(|class| names(preset, class)), counts, "{preset:?}");
         }

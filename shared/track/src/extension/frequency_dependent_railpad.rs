@@ -1,8 +1,8 @@
 //! Railpads that are stiffer the faster they are loaded.
 
 use super::{
-    Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
-    Screening, Trials,
+    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
+    Places, Screening, Trials,
 };
 use crate::element::SpringDamper;
 use crate::model::Assembly;
@@ -24,6 +24,13 @@ pub(super) const KIND: Kind = Kind {
             [1e-4, 5e-3],
             1e-4,
         ),
+        KindParameter::new("second_stiffness_ratio", "1", "the same of a second branch")
+            .ranges([0.2, 3.0], [0.2, 3.0], 0.5)
+            .bound(Bound::NotNegative)
+            .or(0.0),
+        KindParameter::new("second_relaxation_time_s", "s", "relaxation time of a second branch")
+            .ranges([2e-5, 1e-3], [1e-4, 5e-3], 5e-4)
+            .or(1e-3),
     ],
     look_alikes: &["rail_cross_section", "load_dependent_railpad"],
     would_separate: "a hundred spans, or recordings at two temperatures",
@@ -35,17 +42,30 @@ pub(super) const KIND: Kind = Kind {
     build: |inputs| {
         Ok(Arc::new(FrequencyDependentRailpad {
             sleepers: inputs.sleepers(),
-            stiffness_ratio: inputs.value("stiffness_ratio"),
-            relaxation_time_s: inputs.value("relaxation_time_s"),
+            branches: [
+                ["stiffness_ratio", "relaxation_time_s"],
+                ["second_stiffness_ratio", "second_relaxation_time_s"],
+            ]
+            .map(|[ratio, time]| Branch {
+                stiffness_ratio: inputs.value(ratio),
+                relaxation_time_s: inputs.value(time),
+            }),
         }))
     },
 };
 
-/// A Maxwell branch beside spring and damper of the railpad: `k_0 + k_1 i w tau / (1 + i w tau)`
-/// with `k_1` a multiple of `k_0` (standard linear solid).
+/// One or two Maxwell branches beside spring and damper of the railpad:
+/// `k_0 + sum k_n i w tau_n / (1 + i w tau_n)` with `k_n` a multiple of `k_0` (standard linear solid;
+/// generalised Maxwell model).
 #[derive(Debug)]
 struct FrequencyDependentRailpad {
     sleepers: Vec<usize>,
+    branches: [Branch; 2],
+}
+
+/// A spring and a damper in series.
+#[derive(Debug)]
+struct Branch {
     stiffness_ratio: f64,
     relaxation_time_s: f64,
 }
@@ -53,13 +73,16 @@ struct FrequencyDependentRailpad {
 impl Extension for FrequencyDependentRailpad {
     fn assemble(&self, assembly: &mut Assembly) {
         for &index in &self.sleepers {
-            let stiffness = self.stiffness_ratio * assembly.supports()[index].railpad_stiffness;
-            let damping = self.relaxation_time_s * stiffness;
-            // How far the damper of the branch is pressed together; the spring takes the rest.
-            let dashpot = assembly.append_dof();
-            let spring = assembly.layout().railpad_port(index).minus(&dashpot);
-            assembly.add_spring_damper(&spring, SpringDamper { stiffness, damping: 0.0 });
-            assembly.add_spring_damper(&dashpot, SpringDamper { stiffness: 0.0, damping });
+            for branch in self.branches.iter().filter(|branch| branch.stiffness_ratio > 0.0) {
+                let railpad = assembly.supports()[index].railpad_stiffness;
+                let stiffness = branch.stiffness_ratio * railpad;
+                let damping = branch.relaxation_time_s * stiffness;
+                // How far the damper of the branch is pressed together; the spring takes the rest.
+                let dashpot = assembly.append_dof();
+                let spring = assembly.layout().railpad_port(index).minus(&dashpot);
+                assembly.add_spring_damper(&spring, SpringDamper { stiffness, damping: 0.0 });
+                assembly.add_spring_damper(&dashpot, SpringDamper { stiffness: 0.0, damping });
+            }
         }
     }
 }
@@ -101,6 +124,18 @@ mod tests {
         let error = relative_distance(&relaxing(1e3)[1..], &stiffer[1..]);
         assert!(error < 1e-5, "{error}");
         assert_eq!(FREQUENCIES_HZ[0], 0.0);
+    }
+
+    #[test]
+    fn two_equal_branches_are_one_of_both_stiffnesses() {
+        let pads = |ratio: f64| {
+            let pads = instance("frequency_dependent_railpad").with("relaxation_time_s", 2e-4);
+            pads.with("stiffness_ratio", ratio)
+        };
+        let two = pads(0.5).with("second_stiffness_ratio", 0.3);
+        let two = track(&[two.with("second_relaxation_time_s", 2e-4)]);
+        let of = |model| direct_receptance(model, ReceptancePoint::Rail(0.75));
+        assert!(relative_distance(&of(&two), &of(&track(&[pads(0.8)]))) < 1e-9);
     }
 
     #[test]

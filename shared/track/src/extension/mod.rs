@@ -16,6 +16,7 @@ mod text;
 mod clipping;
 mod contact_patch_filter;
 mod corrugation;
+mod cracked_sleeper;
 mod electrical_hum;
 mod fastening_clamp;
 mod flexible_axle_box;

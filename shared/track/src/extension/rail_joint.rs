@@ -16,13 +16,23 @@ pub(super) const KIND: Kind = Kind {
     place: PlaceKind::Point,
     measuring_chain: false,
     parameters: &[
-        KindParameter::new("dip_m", "m", "depth of the dip")
+        KindParameter::new("dip_m", "m", "depth of the dip; negative: a hump")
             .ranges([2e-5, 3e-4], [5e-4, 2e-3], 8e-5)
-            .bound(Bound::NotNegative)
+            .bound(Bound::Any)
             .or(0.0),
         KindParameter::new("length_m", "m", "distance over which the dip falls to 1/e")
             .ranges([5e-3, 4e-2], [0.1, 0.5], 2e-2)
             .or(2e-2),
+        KindParameter::new("dip_exponent", "1", "1: the dip is a kink; 2: it is rounded")
+            .ranges([0.7, 3.0], [0.7, 3.0], 1.0)
+            .or(1.0),
+        KindParameter::new(
+            "dip_length_ratio",
+            "1",
+            "length of the dip after the joint over its length before the joint",
+        )
+        .ranges([0.1, 10.0], [0.1, 10.0], 1.0)
+        .or(1.0),
         KindParameter::new("bending_factor", "1", "what remains of the bending stiffness")
             .ranges([0.1, 0.6], [0.2, 0.5], 0.3)
             .or(1.0),
@@ -34,34 +44,40 @@ pub(super) const KIND: Kind = Kind {
     would_separate: "a slower pass: the dip's part moves with the speed, the bending's does not",
     screening: Screening::tried(&[Family::new(
         Places::Points,
-        &["bending_factor", "dip_m", "length_m"],
+        &["bending_factor", "dip_m", "length_m", "dip_exponent"],
         Trials::List(&[
-            &[0.15, 0.0, 2e-2],
-            &[0.4, 0.0, 2e-2],
-            &[1.0, 6e-5, 2e-2],
-            &[0.3, 6e-5, 2e-2],
+            &[0.15, 0.0, 2e-2, 1.0],
+            &[0.4, 0.0, 2e-2, 1.0],
+            &[1.0, 6e-5, 2e-2, 1.0],
+            &[0.3, 6e-5, 2e-2, 1.0],
         ]),
     )])
-    .suggested(&["dip_m", "length_m", "bending_factor"]),
+    .suggested(&["dip_m", "length_m", "dip_exponent", "bending_factor"]),
     build: |inputs| {
         let (centre_m, length_m) = (inputs.point_m(), inputs.value("bending_length_m"));
         Ok(Arc::new(RailJoint {
             centre_m,
             dip_m: inputs.value("dip_m"),
-            dip_length_m: inputs.value("length_m"),
+            dip_lengths_m: [-0.5, 0.5].map(|power| {
+                inputs.value("length_m") * inputs.value("dip_length_ratio").powf(power)
+            }),
+            dip_exponent: inputs.value("dip_exponent"),
             softened_m: [centre_m - 0.5 * length_m, centre_m + 0.5 * length_m],
             bending_factor: inputs.value("bending_factor"),
         }))
     },
 };
 
-/// Dip `d exp(-|x - x0| / l)`, a kink of angle `2 d / l`, over a rail whose bending stiffness is
-/// `beta EI` on a short length (Jenkins 1974).
+/// Dip `d exp(-(|x - x0| / l)^p)` over a rail whose bending stiffness is `beta EI` on a short length. With
+/// `p = 1` it is a kink of angle `2 d / l` (Jenkins 1974). With a length ratio `r`, `l` is `l / sqrt(r)` before
+/// the joint and `l sqrt(r)` after it.
 #[derive(Debug)]
 struct RailJoint {
     centre_m: f64,
     dip_m: f64,
-    dip_length_m: f64,
+    /// Before and after the joint.
+    dip_lengths_m: [f64; 2],
+    dip_exponent: f64,
     softened_m: [f64; 2],
     bending_factor: f64,
 }
@@ -75,12 +91,15 @@ impl Extension for RailJoint {
     }
 
     fn profile_m(&self, x_m: f64) -> f64 {
-        self.dip_m * (-(x_m - self.centre_m).abs() / self.dip_length_m).exp()
+        let distance_m = x_m - self.centre_m;
+        let length_m = self.dip_lengths_m[usize::from(distance_m > 0.0)];
+        self.dip_m * (-(distance_m.abs() / length_m).powf(self.dip_exponent)).exp()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use crate::extension::Extension;
     use crate::extension::testing::{
         assert_felt_alike_in_both_solvers, extension, instance, track,
     };
@@ -144,6 +163,22 @@ mod tests {
         // A hundred-thousandth of the length away: as far from the tangent, and rounding.
         let kink = slope(1e-7) - slope(-1e-7);
         assert!((kink / -2e-2 - 1.0).abs() < 1e-4, "{kink}");
+    }
+
+    #[test]
+    fn a_rounded_dip_has_no_kink_and_one_side_may_be_longer() {
+        let joint =
+            instance("rail_joint").at([0.8, 0.8]).with("dip_m", 1e-4).with("length_m", 0.01);
+        let rounded = extension(&joint.clone().with("dip_exponent", 2.0));
+        let slope = |side: f64| (rounded.profile_m(0.8 + side) - rounded.profile_m(0.8)) / side;
+        assert!(slope(1e-6).abs() < 1e-5, "{}", slope(1e-6));
+        // At the length from the joint a dip of any exponent has 1/e of its depth.
+        let depth = |x_m: f64, extension: &dyn Extension| extension.profile_m(x_m) / 1e-4;
+        assert!((depth(0.81, &*rounded) - (-1.0_f64).exp()).abs() < 1e-9);
+        let uneven = extension(&joint.with("dip_length_ratio", 4.0));
+        for x_m in [0.8 - 0.005, 0.8 + 0.02] {
+            assert!((depth(x_m, &*uneven) - (-1.0_f64).exp()).abs() < 1e-9, "{x_m}");
+        }
     }
 
     #[test]

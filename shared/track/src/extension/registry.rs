@@ -20,6 +20,7 @@ pub(super) static KINDS: &[Kind] = &[
     super::frequency_dependent_railpad::KIND,
     super::sleeper_bolt::KIND,
     super::hanging_sleeper::KIND,
+    super::cracked_sleeper::KIND,
     super::subgrade_layer::KIND,
     super::support_variation::KIND,
     super::rail_cross_section::KIND,

@@ -21,6 +21,13 @@ pub(super) const KIND: Kind = Kind {
             [2e-2, 8e-2],
             3.5e-3,
         ),
+        KindParameter::new(
+            "depth_factor",
+            "1",
+            "depth of the flat over that of a worn flat of its length",
+        )
+        .ranges([0.5, 8.0], [0.5, 8.0], 1.0)
+        .or(1.0),
         KindParameter::new("phase_m", "m", "where the flat first meets the rail, from x = 0")
             .ranges([0.0, 0.41], [0.0, 2.05], 0.0)
             .bound(Bound::Any)
@@ -28,12 +35,12 @@ pub(super) const KIND: Kind = Kind {
     ],
     look_alikes: &["wheel_out_of_round", "squat"],
     would_separate: "more laps: the flat's places walk along the track, a squat's stay",
-    screening: Screening::tried(&[]).suggested(&["length_m"]),
+    screening: Screening::tried(&[]).suggested(&["length_m", "depth_factor"]),
     build: |inputs| {
         let (length_m, radius_m) = (inputs.value("length_m"), inputs.design.wheel.radius_m);
         Ok(Arc::new(WheelFlat {
             length_m,
-            depth_m: length_m * length_m / (16.0 * radius_m),
+            depth_m: inputs.value("depth_factor") * length_m * length_m / (16.0 * radius_m),
             circumference_m: TAU * radius_m,
             phase_m: inputs.value("phase_m"),
         }))
@@ -41,7 +48,8 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// A worn flat of length `l` on a wheel of radius `R`: `d/2 (1 + cos 2 pi s / l)` deep at a
-/// distance `s` along the tread from its middle, with `d = l² / (16 R)`.
+/// distance `s` along the tread from its middle, with `d` a multiple of `l² / (16 R)`. New flats are
+/// twice as deep, pits several times (measured profiles: `docs/extensions.md`).
 #[derive(Debug)]
 #[expect(clippy::struct_field_names, reason = "the unit belongs to the name")]
 struct WheelFlat {
@@ -80,6 +88,16 @@ mod tests {
             assert_eq!(flat.wheel_profile_m(met_m + 1.8e-3), 0.0);
         }
         assert_eq!(flat.profile_m(0.1), 0.0);
+    }
+
+    #[test]
+    fn a_pit_is_deeper_by_its_factor() {
+        let flat = instance("wheel_flat").with("length_m", 3.5e-3).with("phase_m", 0.1);
+        let (worn, pit) = (extension(&flat), extension(&flat.with("depth_factor", 5.0)));
+        for met_m in [0.0995, 0.1, 0.101] {
+            let ratio = pit.wheel_profile_m(met_m) / worn.wheel_profile_m(met_m);
+            assert!((ratio - 5.0).abs() < 1e-9, "{met_m}");
+        }
     }
 
     #[test]

@@ -316,6 +316,10 @@ mod tests {
                 .with("dip_m", 1e-5)
                 .with("length_m", 0.02)
                 .with("bending_factor", 0.2),
+            at("cracked_sleeper")
+                .on([4])
+                .with("bending_factor", 0.05)
+                .with("bending_length_m", 0.02),
             at("hanging_sleeper").on([4]).with("gap_m", 1.2e-4),
             at("hanging_sleeper").on([4]).with("gap_m", 4e-3),
             at("squat").at([0.5, 0.5]).with("length_m", 0.02).with("depth_m", 1e-5),

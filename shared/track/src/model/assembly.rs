@@ -3,6 +3,7 @@
 use super::matrices::{Matrices, Term};
 use super::{ForceLaw, Layout, Support};
 use crate::element::{BeamElement, ElementMatrix, SpringDamper};
+use std::collections::BTreeMap;
 use tracktwin_parameters::TrackDesign;
 
 /// A relative motion `bᵀ u` on which an element acts, stored as the entries of the sparse vector `b`.
@@ -44,6 +45,8 @@ pub struct Assembly {
     design: TrackDesign,
     layout: Layout,
     supports: Vec<Support>,
+    /// Bending flexibility of softened sleeper elements over that of their sleeper, by sleeper and element.
+    softened: BTreeMap<(usize, usize), f64>,
     terms: Vec<Term>,
     dofs: usize,
     force_laws: Vec<ForceLaw>,
@@ -64,13 +67,16 @@ impl Assembly {
             design: design.clone(),
             layout,
             supports: supports.to_vec(),
+            softened: BTreeMap::new(),
             terms: Vec::new(),
             dofs,
             force_laws: Vec::new(),
         };
         assembly.add_rail();
         for (index, support) in supports.iter().enumerate() {
-            assembly.add_sleeper(index, support);
+            for element in 0..assembly.layout.sleepers()[index].tip_node() {
+                assembly.add_sleeper_element(index, element, 1.0);
+            }
             assembly.add_support(index, support, 1.0);
         }
         assembly
@@ -134,6 +140,29 @@ impl Assembly {
         }
     }
 
+    /// Multiplies the bending stiffness of sleeper `index` (from 0) by `factor` between two distances from the
+    /// symmetry plane in m.
+    ///
+    /// An element that lies partly in this range gets the bending stiffness whose flexibility is the
+    /// weighted mean of both parts. The shear stiffness does not change. Several calls add their
+    /// flexibilities.
+    ///
+    /// # Panics
+    /// When the track has no such sleeper.
+    pub fn soften_sleeper(&mut self, index: usize, [from_m, to_m]: [f64; 2], factor: f64) {
+        for element in 0..self.layout.sleepers()[index].tip_node() {
+            let nodes_m = &self.layout.sleepers()[index].nodes_m;
+            let (start, end) = (nodes_m[element], nodes_m[element + 1]);
+            let share = (end.min(to_m) - start.max(from_m)) / (end - start);
+            if share > 0.0 {
+                self.add_sleeper_element(index, element, -1.0);
+                let flexibility = self.softened.entry((index, element)).or_insert(1.0);
+                *flexibility += share * (1.0 / factor - 1.0);
+                self.add_sleeper_element(index, element, 1.0);
+            }
+        }
+    }
+
     /// Adds a force law. Its field `linear` is the part that the matrices contain for it.
     pub fn add_force_law(&mut self, law: ForceLaw) {
         self.force_laws.push(law);
@@ -189,13 +218,14 @@ impl Assembly {
         self.add_beam(&beam, dofs, self.design.rail_damping_s, factor);
     }
 
-    fn add_sleeper(&mut self, index: usize, support: &Support) {
-        let sleeper = self.layout.sleepers()[index].clone();
-        for node in 0..sleeper.tip_node() {
-            let length = sleeper.nodes_m[node + 1] - sleeper.nodes_m[node];
-            let beam = sleeper_element(&self.design, support, length);
-            self.add_beam(&beam, Layout::sleeper_element_dofs(&sleeper, node), 0.0, 1.0);
-        }
+    /// Adds an element of a sleeper with its present stiffness, multiplied by `factor`.
+    fn add_sleeper_element(&mut self, index: usize, element: usize, factor: f64) {
+        let sleeper = &self.layout.sleepers()[index];
+        let length = sleeper.nodes_m[element + 1] - sleeper.nodes_m[element];
+        let dofs = Layout::sleeper_element_dofs(sleeper, element);
+        let mut beam = sleeper_element(&self.design, &self.supports[index], length);
+        beam.bending_stiffness /= self.softened.get(&(index, element)).unwrap_or(&1.0);
+        self.add_beam(&beam, dofs, 0.0, factor);
     }
 
     /// Adds railpad and ballast, `factor` times.
