@@ -3,13 +3,13 @@
 use crate::along::by_speed;
 use crate::chain::{Clipping, Gain, Hum, Offsets, Scale};
 use crate::finding::{Finding, Place};
-use crate::impact::{Corrugation, Form, Impact};
+use crate::impact::{Corrugation, Form, Impact, Shape};
 use crate::wheel::{Comb, Flat, Order};
 use std::collections::BTreeMap;
 use tracktwin_number::{self as number, ratio, rounded};
 use tracktwin_signal::recording::Pass;
 use tracktwin_track::extension::{
-    CLIPPING, CORRUGATION, ELECTRICAL_HUM, GAIN_ERROR, POSITION_ERROR, RAIL_JOINT, SQUAT,
+    CLIPPING, CORRUGATION, ELECTRICAL_HUM, GAIN_ERROR, Kind, POSITION_ERROR, RAIL_JOINT, SQUAT,
     WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
 };
 
@@ -203,32 +203,74 @@ fn who(passes: &[Pass]) -> &'static str {
     }
 }
 
-pub(super) fn impact_finding(impact: &Impact, passes: &[Pass]) -> Finding {
+/// Length over which the dip of a joint with the exponent 2 falls to 1/e, over that of the hollow that has
+/// the same depth at the same distance.
+const ROUNDED_DIP: f64 = 0.2925;
+
+/// Exponent of a rounded dip.
+const ROUNDED: f64 = 2.0;
+
+/// Half the square of a length's distance from the middle of a kind's range, in half widths of the range and
+/// in logarithms, and the logarithm of the half width: minus its log prior density.
+fn surprise(kind: &Kind, length_m: f64, length_ratio: f64) -> f64 {
+    let Some(parameter) = kind.parameter("length_m") else { return f64::INFINITY };
+    let [low, high] = parameter.range(length_ratio).map(f64::ln);
+    let half_width = 0.5 * (high - low);
+    0.5 * ((length_m.ln() - 0.5 * (low + high)) / half_width).powi(2) + half_width.ln()
+}
+
+/// Kind of the shape at an impact, and its parameters. A kink is a joint. A hollow is a squat or the rounded
+/// dip of a joint: the kind in whose range its length lies, or which it is nearer to.
+fn impact_kind(
+    shape: &Shape,
+    length_ratio: f64,
+) -> (&'static Kind, BTreeMap<&'static str, (f64, f64)>) {
+    let (length, deviation) = shape.length_m;
+    if shape.form == Form::Dip {
+        let dip = [("length_m", shape.length_m), ("dip_m", shape.depth_m)];
+        return (RAIL_JOINT, BTreeMap::from(dip));
+    }
+    let as_dip_m = ROUNDED_DIP * length;
+    if surprise(SQUAT, length, length_ratio) <= surprise(RAIL_JOINT, as_dip_m, length_ratio) {
+        let hollow = [("length_m", shape.length_m), ("depth_m", shape.depth_m)];
+        return (SQUAT, BTreeMap::from(hollow));
+    }
+    let dip = [
+        ("length_m", (as_dip_m, ROUNDED_DIP * deviation)),
+        ("dip_m", shape.depth_m),
+        ("dip_exponent", (ROUNDED, 0.0)),
+    ];
+    (RAIL_JOINT, BTreeMap::from(dip))
+}
+
+/// Finding of an impact on a track whose lengths are `length_ratio` times those of V-Track.
+pub(super) fn impact_finding(impact: &Impact, passes: &[Pass], length_ratio: f64) -> Finding {
     let (x, deviation) = impact.x_m;
-    let physics = match &impact.shape {
-        Some(shape) if shape.form == Form::Hollow => SQUAT.physics,
-        _ => RAIL_JOINT.physics,
-    };
-    let mut parameters = BTreeMap::new();
-    let mut form = String::new();
-    if let Some(shape) = &impact.shape {
-        let depth = if shape.form == Form::Hollow { "depth_m" } else { "dip_m" };
-        parameters.insert("length_m", shape.length_m);
-        parameters.insert(depth, shape.depth_m);
+    let shape = impact.shape.as_ref();
+    let (kind, parameters) =
+        shape.map_or((RAIL_JOINT, BTreeMap::new()), |shape| impact_kind(shape, length_ratio));
+    let form = shape.map_or_else(String::new, |shape| {
         let (mine, other) = match shape.form {
             Form::Hollow => ("a hollow", "a kink"),
             Form::Dip => ("a kink", "a hollow"),
         };
         let sure = if shape.lead < FORM_LEAD { "hardly " } else { "" };
-        form = format!(
-            "; its spectrum is {sure}more like {mine} than {other} (by {:.1} nats)",
+        let is_long = shape.form == Form::Hollow && kind.physics == RAIL_JOINT.physics;
+        let length_mm = 1e3 * shape.length_m.0;
+        let long = if is_long {
+            format!(", {length_mm:.0} mm long: too long for a squat")
+        } else {
+            String::new()
+        };
+        format!(
+            "; its spectrum is {sure}more like {mine} than {other} (by {:.1} nats){long}",
             shape.lead
-        );
-    }
+        )
+    });
     // Three standard deviations, and 10 mm for the length of the defect itself.
     let reach = 3.0 * deviation.max(3e-3);
     Finding {
-        physics,
+        physics: kind.physics,
         p_value: number::probability(impact.ln_p),
         place: Place::Stretch { from_m: x - reach, to_m: x + reach },
         parameters,
@@ -256,5 +298,43 @@ pub(super) fn corrugation_finding(waves: &Corrugation) -> Finding {
             1e3 * waves.wavelength_m.0,
             ratio(waves.ratio)
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hollow(length_m: f64) -> Shape {
+        Shape {
+            form: Form::Hollow,
+            length_m: (length_m, 1e-3),
+            depth_m: (5e-5, 1e-5),
+            slope_rad: 0.0,
+            lead: 10.0,
+        }
+    }
+
+    #[test]
+    fn a_hollow_as_long_as_the_dip_of_a_joint_is_one_at_either_scale() {
+        for (length_m, length_ratio, physics) in [
+            (5e-3, 1.0, "squat"),
+            (1e-2, 1.0, "squat"),
+            (3e-2, 1.0, "rail_joint"),
+            (3e-2, 4.8, "squat"),
+            (6e-2, 4.8, "squat"),
+            (0.4, 4.8, "rail_joint"),
+        ] {
+            let (kind, parameters) = impact_kind(&hollow(length_m), length_ratio);
+            assert_eq!(kind.physics, physics, "{length_m} m, {length_ratio}");
+            assert!(parameters.keys().all(|name| kind.parameter(name).is_some()));
+        }
+    }
+
+    #[test]
+    fn a_rounded_dip_has_the_flanks_of_its_hollow() {
+        // Where the hollow has 1/e of its depth.
+        let share = 0.5 * (1.0 + (std::f64::consts::TAU * ROUNDED_DIP).cos());
+        assert!((share - (-1.0_f64).exp()).abs() < 1e-3, "{share}");
     }
 }

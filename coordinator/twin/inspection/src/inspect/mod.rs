@@ -13,6 +13,7 @@ use crate::chain::{Gain, LossOfContact, Offsets, PassDefect};
 use crate::finding::{Finding, Place};
 use crate::wheel::{Comb, Flat, Order};
 use crate::{chain, impact, wheel};
+use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::POSITION_ERROR;
 
@@ -167,10 +168,11 @@ fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     }
     let mut findings: Vec<Finding> = flat.iter().map(flat_finding).collect();
     findings.extend(order_finding(&orders));
+    let length_ratio = recording.spacing_m / TrackDesign::v_track().sleeper.spacing_m;
     findings.extend(
         impact::impacts(recording, EACH_TEST, &blows)
             .iter()
-            .map(|impact| impact_finding(impact, &recording.passes)),
+            .map(|impact| impact_finding(impact, &recording.passes, length_ratio)),
     );
     // Lines of an uneven wheel are not the rail's.
     let known = turn.or(circumference.filter(|_| !orders.is_empty()));
