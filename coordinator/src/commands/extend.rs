@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Diagnosis, Estimate, FORMAT, Hypothesis};
 use tracktwin_farm::campaign::Campaign;
 use tracktwin_files::Kind as FileKind;
+use tracktwin_parameters::TrackDesign;
 use tracktwin_track::extension::{Kind, KindParameter, PlaceKind};
 
 /// Share of the cases with the extension. It is below 1, so that models are also valid without the
@@ -76,8 +77,7 @@ pub(super) fn run(arguments: Arguments) -> Result<(), Stop> {
     let mut extended = text.trim_end().to_owned() + "\n";
     for (hypothesis, kind) in &accepted {
         let middle = experiment.spans / 2 - 1;
-        extended +=
-            &table(&diagnosis, hypothesis, kind, middle, experiment.design.sleeper.spacing_m);
+        extended += &table(&diagnosis, hypothesis, kind, middle, &experiment.design);
     }
     let out = out.unwrap_or_else(|| beside(&path));
     Campaign::parse(&extended, &out.display().to_string(), None).or_input()?;
@@ -147,7 +147,7 @@ fn table(
     hypothesis: &Hypothesis,
     kind: &Kind,
     middle: usize,
-    spacing_m: f64,
+    design: &TrackDesign,
 ) -> String {
     let mut table = format!(
         "\n# Found in {} with a probability of {:.0} %.\n[[extension]]\nphysics = \"{}\"\nshare = {SHARE:?}\n",
@@ -156,14 +156,13 @@ fn table(
         100.0 * hypothesis.probability,
         kind.physics
     );
-    let place = place(diagnosis, hypothesis, kind, middle, spacing_m);
-    table += &place;
-    table + &values(hypothesis, kind)
+    table += &place(diagnosis, hypothesis, kind, middle, design.sleeper.spacing_m);
+    table + &values(hypothesis, kind, design.length_ratio())
 }
 
 /// Parameters of the extension in TOML: ranges for fitted parameters, values for assumed ones, and typical
-/// values for all other required ones.
-fn values(hypothesis: &Hypothesis, kind: &Kind) -> String {
+/// values of a track with these lengths over V-Track's for all other required ones.
+fn values(hypothesis: &Hypothesis, kind: &Kind, length_ratio: f64) -> String {
     let mut lines = String::new();
     for (name, estimate) in &hypothesis.parameters {
         let Some(parameter) = kind.parameters.iter().find(|known| known.name == name) else {
@@ -187,7 +186,8 @@ fn values(hypothesis: &Hypothesis, kind: &Kind) -> String {
         let given = hypothesis.parameters.contains_key(parameter.name)
             || hypothesis.assumed.contains_key(parameter.name);
         if !given && parameter.default.is_none() {
-            let _ = writeln!(lines, "{} = {:e}", parameter.name, parameter.typical);
+            let typical = parameter.scaled(parameter.typical, length_ratio);
+            let _ = writeln!(lines, "{} = {typical:e}", parameter.name);
         }
     }
     lines
@@ -245,8 +245,13 @@ mod tests {
         });
         let found: Hypothesis = serde_json::from_value(found).unwrap();
         let kind = Kind::from_name(&found.physics).unwrap();
-        let lines = values(&found, kind);
+        let lines = values(&found, kind, 1.0);
         assert!(lines.contains("sensor_on_wheel = 1.0\n"), "{lines}");
         assert!(lines.contains("mass_kg = { low") && lines.contains("stiffness_N_per_m = 4e8"));
+        // What was not fitted is typical of the campaign's track.
+        let on_a_line: toml::Table = values(&found, kind, 4.8).parse().unwrap();
+        let stiffness = on_a_line["stiffness_N_per_m"].as_float().unwrap();
+        let [low, high] = kind.parameter("stiffness_N_per_m").unwrap().real_scale;
+        assert!((low..=high).contains(&stiffness), "{stiffness}");
     }
 }
