@@ -54,7 +54,8 @@ pub(super) struct Arguments {
     /// Library of the models, which also stores null simulations [default: sqlite:DIR/library.sqlite].
     #[arg(long, value_name = "URL", env = "TRACKTWIN_LIBRARY", hide_env_values = true)]
     library: Option<String>,
-    /// Also diagnose each lap, which takes several minutes per lap and 30 sleepers.
+    /// Also diagnose each lap, and evaluate all passes again with what the first lap's diagnosis found;
+    /// this takes several minutes per lap and 30 sleepers.
     #[arg(long)]
     diagnose: bool,
     /// Print JSON.

@@ -2,7 +2,7 @@
 
 use super::error::json;
 use super::folder::DIAGNOSES;
-use super::part::{Part, cut, sections};
+use super::part::{Part, cut, place, sections};
 use super::{RingStudy, RingStudyError, Watch};
 use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
 use tracktwin_diagnosis::Diagnosis;
@@ -25,10 +25,7 @@ impl RingStudy<'_> {
         let lap = Part::Lap(lap);
         let mut all = Vec::new();
         for range in sections(recording.sleepers.len()) {
-            let sleepers = &recording.sleepers[range.clone()];
-            let [first, last] = [sleepers.first(), sleepers.last()]
-                .map(|it| it.map(|sleeper| sleeper.id.clone()).unwrap_or_default());
-            let place = format!("{first}-{last}");
+            let place = place(&recording.sleepers[range.clone()]);
             let folder = self.folder.join(DIAGNOSES).join(lap.name()).join(&place);
             let path = folder.join(DIAGNOSIS);
             if !path.exists() {

@@ -17,8 +17,9 @@ use crate::pipeline::evaluate::Evaluator;
 use crate::pipeline::invert::invert;
 use error::no_evaluation;
 use folder::{EVALUATIONS, PAGE, RECORDING, STATEMENTS, TABLE, TRUTH};
-use part::{Part, sections};
+use part::{Part, cut, place, sections};
 use std::path::{Path, PathBuf};
+use tracktwin_diagnosis::Diagnosis;
 use tracktwin_evaluation::{ModelSpeeds, check_recording, features};
 use tracktwin_files::{FileName, FilesError, Kind, Output, read_text};
 use tracktwin_library::Library;
@@ -49,6 +50,16 @@ pub struct RingStudy<'a> {
     pub force: bool,
 }
 
+/// A recording to evaluate.
+struct Evaluated<'a> {
+    /// Passes and sleepers.
+    recording: &'a Recording,
+    /// Name of the folder of the evaluation.
+    name: String,
+    /// Diagnosis whose accepted physics is part of the model.
+    diagnosis: Option<&'a Diagnosis>,
+}
+
 /// Receives the progress of a study: number of completed steps, and name of the current step.
 pub type Watch<'a> = dyn Fn(u64, &str) + Sync + 'a;
 
@@ -56,8 +67,12 @@ impl RingStudy<'_> {
     /// Number of steps of the study.
     pub fn steps(&self) -> u64 {
         let plan = self.ring.plan();
-        let diagnoses =
-            if self.diagnose { plan.laps * sections(plan.stretch.sleepers()).len() } else { 0 };
+        // Every lap is diagnosed; then all passes are evaluated once more.
+        let diagnoses = if self.diagnose {
+            (plan.laps + 1) * sections(plan.stretch.sleepers()).len()
+        } else {
+            0
+        };
         let evaluations = self.parts().len() + usize::from(self.models.is_some());
         (1 + evaluations + diagnoses) as u64
     }
@@ -74,7 +89,9 @@ impl RingStudy<'_> {
         study.spectra = Some(compute(|| spectra(&recording, &study))?);
         let mut done = 1;
         for part in self.parts() {
-            let estimated = self.inversion(&recording, &part, done, watch).await?;
+            let evaluated =
+                Evaluated { recording: &part.of(&recording), name: part.name(), diagnosis: None };
+            let estimated = self.inversion(evaluated, &part.to_string(), done, watch).await?;
             match part {
                 Part::All => study.methods.push((Method::Inversion, estimated)),
                 Part::Lap(_) => study.laps.push(estimated),
@@ -88,9 +105,13 @@ impl RingStudy<'_> {
             done += 1;
         }
         if self.diagnose {
-            for lap in 1..=self.ring.plan().laps {
+            let first = self.diagnoses(&recording, 1, &mut done, watch).await?;
+            study.diagnoses.add_lap(&first);
+            for lap in 2..=self.ring.plan().laps {
                 study.diagnoses.add_lap(&self.diagnoses(&recording, lap, &mut done, watch).await?);
             }
+            let estimated = self.with_diagnoses(&recording, &first, &mut done, watch).await?;
+            study.methods.push((Method::InversionWithDiagnosis, estimated));
         }
         Ok(study)
     }
@@ -137,29 +158,58 @@ impl RingStudy<'_> {
         Ok(Recording::open(&folder)?)
     }
 
+    /// Estimates of a part of the recording, evaluated if its file is missing. `shown` is its name for people.
     async fn inversion(
         &self,
-        recording: &Recording,
-        part: &Part,
+        evaluated: Evaluated<'_>,
+        shown: &str,
         done: u64,
         watch: &Watch<'_>,
     ) -> Result<Estimated, RingStudyError> {
-        let folder = self.folder.join(EVALUATIONS).join(part.name());
+        let Evaluated { recording, name, diagnosis } = evaluated;
+        let folder = self.folder.join(EVALUATIONS).join(name);
         let path = folder.join(EVALUATION);
         if !path.exists() {
-            let some = part.of(recording);
-            let shown = |stage: &'static str, share: f64| {
-                watch(done, &format!("{part}: {stage} {:.0} %", 100.0 * share));
+            let progress = |stage: &'static str, share: f64| {
+                watch(done, &format!("{shown}: {stage} {:.0} %", 100.0 * share));
             };
-            let inverted = invert(&some, &Preset::VTrack.track(), None, self.library, &shown).await;
+            let track = Preset::VTrack.track();
+            let inverted = invert(recording, &track, diagnosis, self.library, &progress).await;
             let inversion = inverted
-                .map_err(|source| RingStudyError::Inversion { part: part.to_string(), source })?;
+                .map_err(|source| RingStudyError::Inversion { part: shown.to_owned(), source })?;
             let mut output = Output::begin(&folder, Kind::Results, self.force)?;
             inversion.add_to(&mut output, "evaluation")?;
             output.commit()?;
         }
         let text = read_text(&path)?;
         Estimated::read(&text).map_err(no_evaluation(&path))
+    }
+
+    /// Estimates from all passes, section by section, with the physics that a lap's diagnosis of the section
+    /// accepted.
+    async fn with_diagnoses(
+        &self,
+        recording: &Recording,
+        diagnoses: &[Diagnosis],
+        done: &mut u64,
+        watch: &Watch<'_>,
+    ) -> Result<Estimated, RingStudyError> {
+        let mut all = Vec::new();
+        for (range, diagnosis) in sections(recording.sleepers.len()).into_iter().zip(diagnoses) {
+            let section = cut(recording, Part::All, range.clone());
+            let place = place(&section.sleepers);
+            let evaluated = Evaluated {
+                recording: &section,
+                name: format!("with-diagnosis-{place}"),
+                diagnosis: Some(diagnosis),
+            };
+            let shown = format!("{place}, with the diagnosis");
+            all.push((range, self.inversion(evaluated, &shown, *done, watch).await?));
+            *done += 1;
+        }
+        let ids: Vec<String> =
+            recording.sleepers.iter().map(|sleeper| sleeper.id.clone()).collect();
+        Ok(Estimated::joined(&ids, &all))
     }
 
     /// Adds the estimates of models and model selector for the whole recording.

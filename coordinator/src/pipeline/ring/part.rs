@@ -89,6 +89,13 @@ pub(super) fn sections(sleepers: usize) -> Vec<Range<usize>> {
     (0..count).map(|number| first(number)..first(number) + length).collect()
 }
 
+/// Name of a stretch of sleepers: the first and the last of them.
+pub(super) fn place(sleepers: &[Sleeper]) -> String {
+    let [first, last] = [sleepers.first(), sleepers.last()]
+        .map(|it| it.map(|sleeper| sleeper.id.as_str()).unwrap_or_default());
+    format!("{first}-{last}")
+}
+
 /// The recording of a part, cut to a range of sleepers. The passes end a few spans beyond these sleepers.
 pub(super) fn cut(recording: &Recording, part: Part, sleepers: Range<usize>) -> Recording {
     let kept = recording.sleepers[sleepers].to_vec();

@@ -17,12 +17,15 @@ const STEP_ERROR: f64 = 0.5;
 const RAISED: f64 = 2.0;
 
 pub(crate) fn statements(study: &Study, method: Method, estimated: &Estimated) -> Vec<Statement> {
-    let shift = usize::from(method != Method::Inversion);
+    let is_inversion = matches!(method, Method::Inversion | Method::InversionWithDiagnosis);
+    let shift = usize::from(!is_inversion);
     let place = if shift == 0 { "at the sleeper itself" } else { "within one sleeper" };
     let alike = if shift == 0 { "" } else { ", all shifted alike" };
     let clamps = "Clamps are local peaks of the railpad stiffness";
-    let mut all = vec![
-        Statement::of(
+    let mut all = Vec::new();
+    // With bolts in the model nothing is to raise it.
+    if method != Method::InversionWithDiagnosis {
+        all.push(Statement::of(
             ("Fig. 20", method),
             [
                 "Bolts raise the sleeper bending stiffness",
@@ -30,7 +33,9 @@ pub(crate) fn statements(study: &Study, method: Method, estimated: &Estimated) -
                 "median at least twice the truth",
             ],
             bending(study, estimated),
-        ),
+        ));
+    }
+    all.extend([
         Statement::of(
             ("Fig. 22", method),
             [
@@ -49,7 +54,7 @@ pub(crate) fn statements(study: &Study, method: Method, estimated: &Estimated) -
             ],
             missing(study, estimated, shift),
         ),
-    ];
+    ]);
     all.push(Statement::of(
         ("Fig. 22", method),
         [

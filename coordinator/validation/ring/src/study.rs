@@ -17,6 +17,8 @@ const FORMAT: &str = "tracktwin-ring/1";
 pub enum Method {
     /// Fit of the track model to all passes.
     Inversion,
+    /// The same fit with the physics that the diagnosis of the first lap accepted.
+    InversionWithDiagnosis,
     /// Gaussian processes of a library.
     GaussianProcesses,
     /// Model selector of the same library.
@@ -32,6 +34,7 @@ impl Method {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Inversion => "inversion",
+            Self::InversionWithDiagnosis => "inversion_with_diagnosis",
             Self::GaussianProcesses => "gp",
             Self::Selector => "selector",
             Self::Diagnosis => "diagnosis",
@@ -43,6 +46,7 @@ impl Method {
     pub const fn label(self) -> &'static str {
         match self {
             Self::Inversion => "inversion",
+            Self::InversionWithDiagnosis => "inversion with diagnosis",
             Self::GaussianProcesses => "Gaussian processes",
             Self::Selector => "model selector",
             Self::Diagnosis => "diagnosis",
@@ -103,7 +107,9 @@ impl Study {
     pub fn statements(&self) -> Vec<Statement> {
         let mut all = Vec::new();
         for (method, estimated) in &self.methods {
-            all.extend(surface_statements::statements(self, *method, estimated));
+            if *method != Method::InversionWithDiagnosis {
+                all.extend(surface_statements::statements(self, *method, estimated));
+            }
             all.extend(structures::statements(self, *method, estimated));
             all.extend(compared::statements(self, *method, estimated));
         }
