@@ -1,5 +1,7 @@
 //! Kinds of the catalogue beside measured wheels and railpads of others.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::path::{Path, PathBuf};
 use tracktwin_parameters::{ParameterSet, TrackDesign};
 use tracktwin_track::extension::ExtensionInstance;
