@@ -50,12 +50,14 @@ fn candidate(finding: &Finding, length_ratio: f64) -> Option<Candidate> {
         Place::Stretch { from_m, to_m } => new.at([0.5 * (from_m + to_m); 2]),
         Place::Everywhere => new,
     };
-    let extension = match finding.parameters.get("order") {
-        Some(&(order, _)) => extension.with("order", order),
-        None => extension,
-    };
     let suggested = kind.screening.suggested.iter();
     let free: Vec<&KindParameter> = suggested.map(|name| parameter(kind, name)).collect();
+    // What the finding knows exactly is not fitted, such as the order of a wheel.
+    let is_exact = |name: &str, sd: f64| {
+        sd == 0.0 && kind.parameter(name).is_some() && free.iter().all(|it| it.name != name)
+    };
+    let exact = finding.parameters.iter().filter(|(name, (_, sd))| is_exact(name, *sd));
+    let extension = exact.fold(extension, |it, (name, (value, _))| it.with(name, *value));
     let found = |parameter: &&KindParameter| {
         let found = finding.parameters.get(parameter.name);
         found.map_or(parameter.scaled(parameter.typical, length_ratio), |&(mean, _)| mean)

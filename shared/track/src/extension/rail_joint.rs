@@ -44,15 +44,15 @@ pub(super) const KIND: Kind = Kind {
     would_separate: "a slower pass: the dip's part moves with the speed, the bending's does not",
     screening: Screening::tried(&[Family::new(
         Places::Points,
-        &["bending_factor", "dip_m", "length_m", "dip_exponent"],
+        &["bending_factor", "dip_m", "length_m"],
         Trials::List(&[
-            &[0.15, 0.0, 2e-2, 1.0],
-            &[0.4, 0.0, 2e-2, 1.0],
-            &[1.0, 6e-5, 2e-2, 1.0],
-            &[0.3, 6e-5, 2e-2, 1.0],
+            &[0.15, 0.0, 2e-2],
+            &[0.4, 0.0, 2e-2],
+            &[1.0, 6e-5, 2e-2],
+            &[0.3, 6e-5, 2e-2],
         ]),
     )])
-    .suggested(&["dip_m", "length_m", "dip_exponent", "bending_factor"]),
+    .suggested(&["dip_m", "length_m", "bending_factor"]),
     build: |inputs| {
         let (centre_m, length_m) = (inputs.point_m(), inputs.value("bending_length_m"));
         Ok(Arc::new(RailJoint {
