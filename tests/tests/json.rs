@@ -30,7 +30,14 @@ fn a_simulation_tells_its_passes_and_the_catalogue_its_kinds() {
     let names = joint.unwrap()["parameters"].as_array().unwrap().iter().map(|it| &it["name"]);
     assert_eq!(
         names.collect::<Vec<_>>(),
-        ["dip_m", "length_m", "bending_factor", "bending_length_m"]
+        [
+            "dip_m",
+            "length_m",
+            "dip_exponent",
+            "dip_length_ratio",
+            "bending_factor",
+            "bending_length_m"
+        ]
     );
 }
 

@@ -25,7 +25,7 @@ pub(super) const KIND: Kind = Kind {
             1e-4,
         ),
         KindParameter::new("second_stiffness_ratio", "1", "the same of a second branch")
-            .ranges([0.2, 3.0], [0.2, 3.0], 0.5)
+            .ranges([0.0, 3.0], [0.0, 3.0], 0.0)
             .bound(Bound::NotNegative)
             .or(0.0),
         KindParameter::new("second_relaxation_time_s", "s", "relaxation time of a second branch")
