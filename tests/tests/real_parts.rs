@@ -8,7 +8,7 @@ use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::frequency::{ReceptancePoint, receptance};
 use tracktwin_track::model::{Mesh, Support, TrackModel};
 
-/// Diameter of the measured wheel over pi: its circumference is 2.88 m.
+/// Radius of the measured wheel, whose circumference is 2.88 m.
 const RADIUS_M: f64 = 0.4585;
 
 /// Rows of numbers in a text file; commas inside a number are decimal.

@@ -50,10 +50,10 @@ pub struct RingStudy<'a> {
     pub force: bool,
 }
 
-/// A recording to evaluate.
+/// A part of the recording to evaluate.
 struct Evaluated<'a> {
-    /// Passes and sleepers.
-    recording: &'a Recording,
+    /// Copies the part; called only if its evaluation is missing.
+    recording: &'a (dyn Fn() -> Recording + Sync),
     /// Name of the folder of the evaluation.
     name: String,
     /// Diagnosis whose accepted physics is part of the model.
@@ -89,8 +89,11 @@ impl RingStudy<'_> {
         study.spectra = Some(compute(|| spectra(&recording, &study))?);
         let mut done = 1;
         for part in self.parts() {
-            let evaluated =
-                Evaluated { recording: &part.of(&recording), name: part.name(), diagnosis: None };
+            let evaluated = Evaluated {
+                recording: &|| part.of(&recording),
+                name: part.name(),
+                diagnosis: None,
+            };
             let estimated = self.inversion(evaluated, &part.to_string(), done, watch).await?;
             match part {
                 Part::All => study.methods.push((Method::Inversion, estimated)),
@@ -174,7 +177,7 @@ impl RingStudy<'_> {
                 watch(done, &format!("{shown}: {stage} {:.0} %", 100.0 * share));
             };
             let track = Preset::VTrack.track();
-            let inverted = invert(recording, &track, diagnosis, self.library, &progress).await;
+            let inverted = invert(&recording(), &track, diagnosis, self.library, &progress).await;
             let inversion = inverted
                 .map_err(|source| RingStudyError::Inversion { part: shown.to_owned(), source })?;
             let mut output = Output::begin(&folder, Kind::Results, self.force)?;
@@ -196,15 +199,15 @@ impl RingStudy<'_> {
     ) -> Result<Estimated, RingStudyError> {
         let mut all = Vec::new();
         for (range, diagnosis) in sections(recording.sleepers.len()).into_iter().zip(diagnoses) {
-            let section = cut(recording, Part::All, range.clone());
-            let place = place(&section.sleepers);
+            let place = place(&recording.sleepers[range.clone()]);
             let evaluated = Evaluated {
-                recording: &section,
+                recording: &|| cut(recording, Part::All, range.clone()),
                 name: format!("with-diagnosis-{place}"),
                 diagnosis: Some(diagnosis),
             };
             let shown = format!("{place}, with the diagnosis");
-            all.push((range, self.inversion(evaluated, &shown, *done, watch).await?));
+            let estimated = self.inversion(evaluated, &shown, *done, watch).await?;
+            all.push((range, estimated));
             *done += 1;
         }
         let ids: Vec<String> =

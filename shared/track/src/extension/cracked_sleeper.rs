@@ -1,8 +1,8 @@
 //! Sleepers that are cracked through at the rail seat.
 
 use super::{
-    Bound, Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind,
-    Places, Screening, Trials,
+    Class, EffectFamily, Extension, Family, Kind, KindParameter, LookAlikeGroup, PlaceKind, Places,
+    Screening, Trials,
 };
 use crate::model::Assembly;
 use std::sync::Arc;
@@ -16,11 +16,16 @@ pub(super) const KIND: Kind = Kind {
     place: PlaceKind::Sleepers,
     measuring_chain: false,
     parameters: &[
-        KindParameter::new("bending_factor", "1", "what remains of the bending stiffness")
-            .ranges([1e-2, 0.2], [1e-2, 0.2], 5e-2)
-            .bound(Bound::Share),
-        KindParameter::new("bending_length_m", "m", "length of the sleeper that is softened")
-            .ranges([1e-2, 4e-2], [5e-2, 0.2], 2e-2),
+        KindParameter::new("bending_factor", "1", "remaining share of EI_s").ranges(
+            [1e-2, 0.2],
+            [1e-2, 0.2],
+            5e-2,
+        ),
+        KindParameter::new("bending_length_m", "m", "length of the softened part").ranges(
+            [1e-2, 4e-2],
+            [5e-2, 0.2],
+            2e-2,
+        ),
     ],
     look_alikes: &["missing_railpad", "sleeper_bolt", "support_variation"],
     would_separate: "a hammer test of the sleeper's end: a crack lowers its bending resonances",
@@ -73,8 +78,8 @@ mod tests {
     const CRACKED: f64 = 0.25;
     const FACTOR: f64 = 0.2;
 
-    /// Static deflection in m/N of a sleeper's seat on ballast under a load there. The rail has no bending
-    /// stiffness to speak of.
+    /// Static deflection in m/N of a sleeper's seat on ballast under a load there. The rail does not
+    /// rest on it.
     fn deflection(bending_stiffness: f64, sleeper_elements: usize, cracked: bool) -> f64 {
         let design = TrackDesign::v_track();
         let support = Support {

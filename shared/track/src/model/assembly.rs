@@ -125,15 +125,13 @@ impl Assembly {
     ///
     /// An element that lies partly in this range gets the bending stiffness whose flexibility is the
     /// weighted mean of both parts. The shear stiffness does not change.
-    pub fn soften_rail(&mut self, [from_m, to_m]: [f64; 2], factor: f64) {
+    pub fn soften_rail(&mut self, softened_m: [f64; 2], factor: f64) {
         for element in 0..self.layout.rail_elements().len() {
-            let [start, end] = [0, 1].map(|side| self.layout.rail_nodes_m()[element + side]);
-            let share = (end.min(to_m) - start.max(from_m)) / (end - start);
-            if share > 0.0 {
-                let flexibility = 1.0 + share * (1.0 / factor - 1.0);
+            let element_m = [0, 1].map(|side| self.layout.rail_nodes_m()[element + side]);
+            if let Some(added) = added_flexibility(element_m, softened_m, factor) {
                 let before = self.layout.rail_elements()[element];
                 self.add_rail_element(element, -1.0);
-                let bending_stiffness = before.bending_stiffness / flexibility;
+                let bending_stiffness = before.bending_stiffness / (1.0 + added);
                 self.layout.set_rail_element(element, BeamElement { bending_stiffness, ..before });
                 self.add_rail_element(element, 1.0);
             }
@@ -149,15 +147,13 @@ impl Assembly {
     ///
     /// # Panics
     /// When the track has no such sleeper.
-    pub fn soften_sleeper(&mut self, index: usize, [from_m, to_m]: [f64; 2], factor: f64) {
+    pub fn soften_sleeper(&mut self, index: usize, softened_m: [f64; 2], factor: f64) {
         for element in 0..self.layout.sleepers()[index].tip_node() {
             let nodes_m = &self.layout.sleepers()[index].nodes_m;
-            let (start, end) = (nodes_m[element], nodes_m[element + 1]);
-            let share = (end.min(to_m) - start.max(from_m)) / (end - start);
-            if share > 0.0 {
+            let element_m = [nodes_m[element], nodes_m[element + 1]];
+            if let Some(added) = added_flexibility(element_m, softened_m, factor) {
                 self.add_sleeper_element(index, element, -1.0);
-                let flexibility = self.softened.entry((index, element)).or_insert(1.0);
-                *flexibility += share * (1.0 / factor - 1.0);
+                *self.softened.entry((index, element)).or_insert(1.0) += added;
                 self.add_sleeper_element(index, element, 1.0);
             }
         }
@@ -258,6 +254,13 @@ impl Assembly {
             }
         }
     }
+}
+
+/// Flexibility that an element gains, over its own, if the bending stiffness in a range has this factor: the
+/// weighted mean of both parts. `None` if the element lies outside. Positions in m.
+fn added_flexibility([start, end]: [f64; 2], [from, to]: [f64; 2], factor: f64) -> Option<f64> {
+    let share = (end.min(to) - start.max(from)) / (end - start);
+    (share > 0.0).then(|| share * (1.0 / factor - 1.0))
 }
 
 /// The parameter `EI_s` scales bending and shear stiffness alike; inertia stays nominal.

@@ -13,7 +13,6 @@ use crate::chain::{Gain, LossOfContact, Offsets, PassDefect};
 use crate::finding::{Finding, Place};
 use crate::wheel::{Comb, Flat, Order};
 use crate::{chain, impact, wheel};
-use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::POSITION_ERROR;
 
@@ -168,7 +167,7 @@ fn surface(recording: &Recording) -> (Option<Flat>, Vec<Finding>) {
     }
     let mut findings: Vec<Finding> = flat.iter().map(flat_finding).collect();
     findings.extend(order_finding(&orders));
-    let length_ratio = recording.spacing_m / TrackDesign::v_track().sleeper.spacing_m;
+    let length_ratio = recording.stated_track().track.design.length_ratio();
     findings.extend(
         impact::impacts(recording, EACH_TEST, &blows)
             .iter()
