@@ -2,12 +2,12 @@
 
 use super::files::{Force, check, make_folder};
 use super::library_url::{open_or_create, open_whole};
-use super::progress::Stages;
+use super::progress::SectionStages;
 use super::track::TrackOption;
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline;
-use crate::pipeline::confirm::{ConfirmingError, diagnose_and_confirm};
-use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
+use crate::pipeline::diagnose::Setting;
+use crate::pipeline::diagnose_sections::{At, SectionOutput, SectionsError, diagnose_sections};
 use crate::pipeline::provenance;
 use anyhow::Context;
 use clap::Args;
@@ -32,6 +32,9 @@ Example:
 
 Without --models the recording is compared with the track of --track, or with the one that
 recording.json states under `nominal`. With --library, null simulations are stored and used again.
+
+A recording of more than 48 sleepers is diagnosed in overlapping sections of 30, each with its
+own page in DIR/sections. The same command continues an interrupted diagnosis.
 
 Next: `tracktwin extend CAMPAIGN.toml --from diagnosis/diagnosis.json`
 
@@ -118,16 +121,13 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
     check_track(&recording, &track.design).or_input()?;
     make_folder(&out)?;
-    let shown = Stages::default();
     let setting =
         Setting { track: &track, library: library.as_ref(), without: &without, shuffle: None };
-    let watch = |stage, share| shown.at(stage, share);
-    let diagnosed = if confirm {
-        diagnose_and_confirm(&recording, setting, &watch).await
-    } else {
-        let diagnosed = diagnose(&recording, setting, &watch).await;
-        diagnosed.map(|it| it.diagnosis).map_err(ConfirmingError::from)
-    };
+    let page = |section: &Diagnosis| tracktwin_report::diagnosis_page(section, &origin);
+    let output = SectionOutput { folder: &out, force: force.force, page: &page };
+    let shown = SectionStages::default();
+    let watch = |at: At<'_>| shown.at(at);
+    let diagnosed = diagnose_sections(&recording, setting, confirm, &output, &watch).await;
     shown.end();
     let mut diagnosis = diagnosed.map_err(stop)?;
     diagnosis.notes.splice(..0, recording.doubts.iter().cloned().chain(assumed));
@@ -205,12 +205,8 @@ fn confirmed(confirmation: Option<&Confirmation>) -> String {
 }
 
 /// Converts an error: an unsuitable recording is wrong input, everything else is a failure.
-fn stop(error: ConfirmingError) -> Stop {
-    match error {
-        ConfirmingError::Diagnosis(DiagnosingError::Recording(error)) => Stop::Input(error.into()),
-        ConfirmingError::NoPass => Stop::Input(error.into()),
-        failed => Stop::Failure(failed.into()),
-    }
+fn stop(error: SectionsError) -> Stop {
+    if error.is_wrong_input() { Stop::Input(error.into()) } else { Stop::Failure(error.into()) }
 }
 
 /// Provenance of the diagnosis, with the command that repeats it.

@@ -1,6 +1,7 @@
 //! Progress of long work: a bar in a terminal, otherwise periodic lines.
 
 use super::println_stderr;
+use crate::pipeline::diagnose_sections::At;
 use crate::pipeline::models::group_name;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use parking_lot::Mutex;
@@ -93,12 +94,56 @@ impl Stages {
         }
     }
 
-    /// Ends the current stage.
-    pub(super) fn end(self) {
-        let shown = self.0.into_inner();
-        if let Some((_, progress)) = shown {
+    /// Ends the current stage; another may begin.
+    fn end_stage(&self) {
+        if let Some((_, progress)) = self.0.lock().take() {
             progress.end();
         }
+    }
+
+    /// Ends the current stage.
+    pub(super) fn end(self) {
+        self.end_stage();
+    }
+}
+
+/// Progress of a diagnosis: a line for each section of a long track, and the stages of a section.
+#[derive(Default)]
+pub(super) struct SectionStages {
+    stages: Stages,
+    /// Number of the current section, and the time at which the first one began.
+    section: Mutex<Option<(usize, Instant)>>,
+}
+
+impl SectionStages {
+    /// Shows the section and the share of its stage that is done.
+    pub(super) fn at(&self, At { section, sections, place, stage, share }: At<'_>) {
+        if sections > 1 {
+            let mut known = self.section.lock();
+            let begun = known.map_or_else(Instant::now, |(_, begun)| begun);
+            if known.is_none_or(|(number, _)| number != section) {
+                self.stages.end_stage();
+                let done = section - 1;
+                let left = match done {
+                    0 => String::new(),
+                    done => {
+                        let each = begun.elapsed().as_secs_f64() / done as f64;
+                        let minutes = each * (sections - done) as f64 / 60.0;
+                        format!(", about {} min left", minutes.ceil())
+                    }
+                };
+                println_stderr(&format!("section {section} of {sections}, {place}{left}"));
+            }
+            *known = Some((section, begun));
+        }
+        if !stage.is_empty() {
+            self.stages.at(stage, share);
+        }
+    }
+
+    /// Ends the current stage.
+    pub(super) fn end(self) {
+        self.stages.end();
     }
 }
 

@@ -10,6 +10,8 @@ use clap::Args;
 use parking_lot::Mutex;
 use serde_json::json;
 use std::path::PathBuf;
+use tracktwin_experiment::CODE_VERSION;
+use tracktwin_report::Origin;
 use tracktwin_reproduction::ClaimVerdict;
 use tracktwin_ring::{Plan, Ring, Statement, Stretch, Study};
 use tracktwin_surrogate::Trained;
@@ -86,12 +88,18 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         None => None,
     };
     let ring = Ring::new(plan);
+    let origin = Origin {
+        command: command.clone(),
+        version: format!("tracktwin {CODE_VERSION}"),
+        library: String::new(),
+    };
     let study = RingStudy {
         ring: &ring,
         folder: &out,
         library: Some(&library),
         models: models.as_ref(),
         diagnose,
+        page: &|diagnosis| tracktwin_report::diagnosis_page(diagnosis, &origin),
         force: force.force,
     };
     let progress = Mutex::new(Progress::begin("ring", 0, study.steps()));

@@ -22,6 +22,13 @@ pub enum ConfirmingError {
     Simulation(#[from] ConfirmationError),
 }
 
+impl ConfirmingError {
+    /// Whether the recording is unsuitable.
+    pub const fn is_wrong_input(&self) -> bool {
+        matches!(self, Self::NoPass | Self::Diagnosis(DiagnosingError::Recording(_)))
+    }
+}
+
 /// Diagnoses a recording without the last pass of each speed that has two or more passes. Then compares the
 /// withheld passes with simulations of the accepted hypotheses. `watch` is called with the current stage
 /// and the completed share (0 to 1).

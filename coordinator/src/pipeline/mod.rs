@@ -8,6 +8,7 @@ pub mod compute;
 pub mod confirm;
 pub mod coverage;
 pub mod diagnose;
+pub mod diagnose_sections;
 pub mod evaluate;
 mod fitted_sections;
 pub mod invert;

@@ -5,7 +5,7 @@ use super::place::Site;
 use super::quantity::{digits, per_cent, signed};
 use super::words::{accepted, addition, chance, is_chain, physics, place, speeds};
 use maud::{Markup, html};
-use tracktwin_diagnosis::{Diagnosis, Mismatch, Verdict};
+use tracktwin_diagnosis::{Diagnosis, Mismatch, Verdict, section_folder};
 
 /// The verdict as a tag, key figures and notes.
 pub(super) fn headline(diagnosis: &Diagnosis) -> Markup {
@@ -15,6 +15,37 @@ pub(super) fn headline(diagnosis: &Diagnosis) -> Markup {
         dl.facts { @for (figure, what) in facts(diagnosis) { div { dt { (what) } dd { (figure) } } } }
         @if !diagnosis.notes.is_empty() {
             ul.notes { @for note in &diagnosis.notes { li { (note) } } }
+        }
+    }
+}
+
+/// Verdicts on the sections of a long track, with links to their pages.
+pub(super) fn sections(diagnosis: &Diagnosis) -> Markup {
+    html! {
+        @if !diagnosis.sections.is_empty() {
+            h2 { "Sections" }
+            p {
+                "The track was diagnosed in overlapping sections. Each has its own page with all \
+                 hypotheses and levels."
+            }
+            table {
+                thead { tr {
+                    th { "sleepers" } th { "verdict" } th { "nothing left out" } th { "diagnosis" }
+                } }
+                tbody {
+                    @for section in &diagnosis.sections {
+                        @let (class, name, _) = verdict(section.verdict);
+                        tr {
+                            td { a href=(format!("{}/report.html", section_folder(section.number))) {
+                                (section.sleepers[0]) " to " (section.sleepers[1])
+                            } }
+                            td { span class=(format!("tag {class}")) { (name) } }
+                            td { (section.nothing_left_out.map(per_cent).unwrap_or_default()) }
+                            td { (section.sentence) }
+                        }
+                    }
+                }
+            }
         }
     }
 }

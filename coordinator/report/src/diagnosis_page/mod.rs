@@ -37,6 +37,7 @@ pub fn diagnosis_page(diagnosis: &Diagnosis, origin: &Origin) -> String {
     let head = html! { style { (PreEscaped(style::STYLE)) } };
     let body = html! {
         (headline::headline(diagnosis))
+        (headline::sections(diagnosis))
         (mismatch_map::section(diagnosis))
         (place::section(diagnosis))
         (hypotheses::section(diagnosis))

@@ -129,6 +129,7 @@ pub(crate) fn consistent() -> Diagnosis {
         confirmation: None,
         loss_of_contact: None,
         notes: vec!["Below 150 Hz a level scatters by 4 dB: what acts only there may stay unseen.".to_owned()],
+        sections: Vec::new(),
     }
 }
 

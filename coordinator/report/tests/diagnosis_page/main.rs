@@ -8,7 +8,7 @@ use self::examples::{SLEEPERS, chain, consistent, estimates, hypothesis, left_ou
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
-use tracktwin_diagnosis::{Diagnosis, Levels, SleeperValues, Verdict};
+use tracktwin_diagnosis::{Diagnosis, Levels, SectionVerdict, SleeperValues, Verdict};
 use tracktwin_report::{Origin, diagnosis_page};
 
 /// The page, after a check for external resources. It is also written to the target folder.
@@ -67,6 +67,25 @@ fn left_out_physics_is_named_placed_measured_and_its_bias_shown() {
     assert!(!page.contains("sleeper bolt"), "what is improbable is counted, not listed");
     assert_reads(&page, &["1 further hypothesis is"]);
     assert_reads(&page, &["pass-2.parquet", "They confirm it", "by 42 nats", "3.4 dB", "2.1 dB"]);
+}
+
+#[test]
+fn the_sections_of_a_long_track_have_their_verdicts_and_pages() {
+    let section = |number: usize, sleepers: [&str; 2], diagnosis: &Diagnosis| SectionVerdict {
+        number,
+        sleepers: sleepers.map(str::to_owned),
+        verdict: diagnosis.verdict,
+        sentence: diagnosis.sentence.clone(),
+        nothing_left_out: diagnosis.nothing_left_out,
+    };
+    let mut diagnosis = left_out();
+    assert!(!page("left-out", &diagnosis).contains("Sections"));
+    diagnosis.sections =
+        vec![section(1, ["SN1", "SN30"], &consistent()), section(2, ["SN25", "SN54"], &left_out())];
+    let page = page("sections", &diagnosis);
+    assert_reads(&page, &["Sections", "sections/02/report.html", "SN25 to SN54", "SN1 to SN30"]);
+    assert_eq!(page.matches("tag consistent").count(), 1);
+    assert_eq!(page.matches("tag left-out").count(), 2);
 }
 
 #[test]

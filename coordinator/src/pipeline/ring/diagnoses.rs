@@ -1,10 +1,11 @@
-//! Diagnoses of the laps, one per section of sleepers.
+//! Diagnoses of the laps.
 
 use super::error::json;
 use super::folder::DIAGNOSES;
-use super::part::{Part, cut, place, sections};
+use super::part::Part;
 use super::{RingStudy, RingStudyError, Watch};
-use crate::pipeline::diagnose::{DiagnosingError, Setting, diagnose};
+use crate::pipeline::diagnose::Setting;
+use crate::pipeline::diagnose_sections::{At, SectionOutput, diagnose_sections};
 use tracktwin_diagnosis::Diagnosis;
 use tracktwin_files::{FileName, Kind, Output, read_text};
 use tracktwin_parameters::Preset;
@@ -14,49 +15,37 @@ use tracktwin_signal::recording::Recording;
 const DIAGNOSIS: &str = "diagnosis.json";
 
 impl RingStudy<'_> {
-    /// Returns the diagnoses of a lap, one per section.
-    pub(super) async fn diagnoses(
+    /// Returns the diagnosis of a lap, computed if its file is missing.
+    pub(super) async fn diagnosis(
         &self,
         recording: &Recording,
         lap: usize,
-        done: &mut u64,
+        done: u64,
         watch: &Watch<'_>,
-    ) -> Result<Vec<Diagnosis>, RingStudyError> {
+    ) -> Result<Diagnosis, RingStudyError> {
         let lap = Part::Lap(lap);
-        let mut all = Vec::new();
-        for range in sections(recording.sleepers.len()) {
-            let place = place(&recording.sleepers[range.clone()]);
-            let folder = self.folder.join(DIAGNOSES).join(lap.name()).join(&place);
-            let path = folder.join(DIAGNOSIS);
-            if !path.exists() {
-                let shown = |stage: &'static str, share: f64| {
-                    let share = 100.0 * share;
-                    watch(*done, &format!("{lap}, {place}: diagnosis, {stage} {share:.0} %"));
-                };
-                let diagnosis = self.diagnosis(&cut(recording, lap, range), &shown).await;
-                let diagnosis = diagnosis.map_err(|source| RingStudyError::Diagnosis {
-                    part: format!("{lap}, {place}"),
-                    source,
-                })?;
-                let text = serde_json::to_string_pretty(&diagnosis);
-                let text = text.expect("a diagnosis is plain JSON");
-                let mut output = Output::begin(&folder, Kind::Results, self.force)?;
-                output.add(&FileName::new(DIAGNOSIS)?, text.as_bytes())?;
-                output.commit()?;
-            }
-            all.push(serde_json::from_str(&read_text(&path)?).map_err(json(&path))?);
-            *done += 1;
+        let folder = self.folder.join(DIAGNOSES).join(lap.name());
+        let path = folder.join(DIAGNOSIS);
+        if path.exists() {
+            return serde_json::from_str(&read_text(&path)?).map_err(json(&path));
         }
-        Ok(all)
-    }
-
-    async fn diagnosis(
-        &self,
-        section: &Recording,
-        watch: &(dyn Fn(&'static str, f64) + Sync),
-    ) -> Result<Diagnosis, DiagnosingError> {
         let track = Preset::VTrack.track();
         let setting = Setting { track: &track, library: self.library, without: &[], shuffle: None };
-        Ok(diagnose(section, setting, watch).await?.diagnosis)
+        let shown = |At { place, stage, share, .. }: At<'_>| {
+            let share = 100.0 * share;
+            watch(done, &format!("{lap}, {place}: diagnosis, {stage} {share:.0} %"));
+        };
+        let page = |diagnosis: &Diagnosis| (self.page)(diagnosis);
+        let output = SectionOutput { folder: &folder, force: self.force, page: &page };
+        let diagnosed =
+            diagnose_sections(&lap.of(recording), setting, false, &output, &shown).await;
+        let diagnosis = diagnosed
+            .map_err(|source| RingStudyError::Diagnosis { part: lap.to_string(), source })?;
+        let text = serde_json::to_string_pretty(&diagnosis).expect("a diagnosis is plain JSON");
+        let mut output = Output::begin(&folder, Kind::Results, self.force)?;
+        output.add(&FileName::new("report.html")?, page(&diagnosis).as_bytes())?;
+        output.add(&FileName::new(DIAGNOSIS)?, text.as_bytes())?;
+        output.commit()?;
+        Ok(diagnosis)
     }
 }

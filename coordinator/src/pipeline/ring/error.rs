@@ -1,6 +1,6 @@
 //! Errors of a ring study.
 
-use crate::pipeline::diagnose::DiagnosingError;
+use crate::pipeline::diagnose_sections::SectionsError;
 use crate::pipeline::invert::InvertingError;
 use std::path::Path;
 use tracktwin_files::FilesError;
@@ -49,7 +49,7 @@ pub enum RingStudyError {
         /// Name of the part.
         part: String,
         /// Cause.
-        source: DiagnosingError,
+        source: SectionsError,
     },
     /// An evaluation file in the folder is invalid.
     #[error("{path}: {source}; remove it, and it is made again")]
@@ -90,8 +90,8 @@ impl RingStudyError {
             | Self::Json { .. }
             | Self::Terms { .. } => true,
             Self::Files(error) => error.is_wrong_input(),
-            Self::Inversion { source: InvertingError::Recording(_), .. }
-            | Self::Diagnosis { source: DiagnosingError::Recording(_), .. } => true,
+            Self::Diagnosis { source, .. } => source.is_wrong_input(),
+            Self::Inversion { source: InvertingError::Recording(_), .. } => true,
             _ => false,
         }
     }

@@ -17,7 +17,7 @@ use crate::pipeline::evaluate::Evaluator;
 use crate::pipeline::invert::invert;
 use error::no_evaluation;
 use folder::{EVALUATIONS, PAGE, RECORDING, STATEMENTS, TABLE, TRUTH};
-use part::{Part, cut, place, sections};
+use part::Part;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::Diagnosis;
 use tracktwin_evaluation::{ModelSpeeds, check_recording, features};
@@ -46,6 +46,8 @@ pub struct RingStudy<'a> {
     pub models: Option<&'a Evaluator>,
     /// Whether every lap is diagnosed.
     pub diagnose: bool,
+    /// Makes the page of a diagnosis.
+    pub page: &'a (dyn Fn(&Diagnosis) -> String + Sync),
     /// Whether files that the program did not write may be replaced.
     pub force: bool,
 }
@@ -66,13 +68,8 @@ pub type Watch<'a> = dyn Fn(u64, &str) + Sync + 'a;
 impl RingStudy<'_> {
     /// Number of steps of the study.
     pub fn steps(&self) -> u64 {
-        let plan = self.ring.plan();
         // Every lap is diagnosed; then all passes are evaluated once more.
-        let diagnoses = if self.diagnose {
-            (plan.laps + 1) * sections(plan.stretch.sleepers()).len()
-        } else {
-            0
-        };
+        let diagnoses = if self.diagnose { self.ring.plan().laps + 1 } else { 0 };
         let evaluations = self.parts().len() + usize::from(self.models.is_some());
         (1 + evaluations + diagnoses) as u64
     }
@@ -108,12 +105,20 @@ impl RingStudy<'_> {
             done += 1;
         }
         if self.diagnose {
-            let first = self.diagnoses(&recording, 1, &mut done, watch).await?;
+            let first = self.diagnosis(&recording, 1, done, watch).await?;
             study.diagnoses.add_lap(&first);
             for lap in 2..=self.ring.plan().laps {
-                study.diagnoses.add_lap(&self.diagnoses(&recording, lap, &mut done, watch).await?);
+                done += 1;
+                let diagnosis = self.diagnosis(&recording, lap, done, watch).await?;
+                study.diagnoses.add_lap(&diagnosis);
             }
-            let estimated = self.with_diagnoses(&recording, &first, &mut done, watch).await?;
+            done += 1;
+            let evaluated = Evaluated {
+                recording: &|| recording.clone(),
+                name: "with-diagnosis".to_owned(),
+                diagnosis: Some(&first),
+            };
+            let estimated = self.inversion(evaluated, "with the diagnosis", done, watch).await?;
             study.methods.push((Method::InversionWithDiagnosis, estimated));
         }
         Ok(study)
@@ -186,33 +191,6 @@ impl RingStudy<'_> {
         }
         let text = read_text(&path)?;
         Estimated::read(&text).map_err(no_evaluation(&path))
-    }
-
-    /// Estimates from all passes, section by section, with the physics that a lap's diagnosis of the section
-    /// accepted.
-    async fn with_diagnoses(
-        &self,
-        recording: &Recording,
-        diagnoses: &[Diagnosis],
-        done: &mut u64,
-        watch: &Watch<'_>,
-    ) -> Result<Estimated, RingStudyError> {
-        let mut all = Vec::new();
-        for (range, diagnosis) in sections(recording.sleepers.len()).into_iter().zip(diagnoses) {
-            let place = place(&recording.sleepers[range.clone()]);
-            let evaluated = Evaluated {
-                recording: &|| cut(recording, Part::All, range.clone()),
-                name: format!("with-diagnosis-{place}"),
-                diagnosis: Some(diagnosis),
-            };
-            let shown = format!("{place}, with the diagnosis");
-            let estimated = self.inversion(evaluated, &shown, *done, watch).await?;
-            all.push((range, estimated));
-            *done += 1;
-        }
-        let ids: Vec<String> =
-            recording.sleepers.iter().map(|sleeper| sleeper.id.clone()).collect();
-        Ok(Estimated::joined(&ids, &all))
     }
 
     /// Adds the estimates of models and model selector for the whole recording.

@@ -17,6 +17,7 @@ mod estimate;
 mod forward;
 mod further_wheels;
 mod held_out;
+mod joined;
 mod null_model;
 mod observation;
 mod outcome;
@@ -43,11 +44,13 @@ pub use conclusion::{Evidence, passes_alone};
 pub use confirmation::{ConfirmationError, Confirming};
 pub use estimate::Estimate;
 pub use forward::{Forward, Linearised};
+pub use joined::{DiagnosedSection, diagnosed_sections, joined};
 pub use null_model::{NullError, NullModel};
 pub use observation::Observation;
 pub use outcome::{
     BeforeAfter, Confirmation, ConfirmedSpeed, Diagnosis, FORMAT, FitScores, Hypothesis, Levels,
-    Location, Mismatch, Score, Scores, SleeperValues, UNKNOWN, Verdict,
+    Location, Mismatch, Score, Scores, SectionVerdict, SleeperValues, UNKNOWN, Verdict,
+    section_folder,
 };
 pub use patch_scan::{Fixed, Patch};
 pub use port_scan::{PortPlace, PortScan, UnknownElement};

@@ -73,6 +73,30 @@ pub struct Diagnosis {
     pub loss_of_contact: Option<LossOfContact>,
     /// Notes.
     pub notes: Vec<String>,
+    /// Verdicts on the sections of a long track; empty if it was diagnosed as a whole.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub sections: Vec<SectionVerdict>,
+}
+
+/// Verdict on a section of a long track.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SectionVerdict {
+    /// Number of the section along the track, from 1.
+    pub number: usize,
+    /// Ids of the first and the last sleeper.
+    pub sleepers: [String; 2],
+    /// Verdict on the section.
+    pub verdict: Verdict,
+    /// The verdict as a sentence.
+    pub sentence: String,
+    /// Probability that nothing is left out; `None` if no track model was compared.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub nothing_left_out: Option<f64>,
+}
+
+/// Folder of a section's own diagnosis and page, beside those of the whole track.
+pub fn section_folder(number: usize) -> String {
+    format!("sections/{number:02}")
 }
 
 /// Comparison of time-domain simulations with passes that were withheld from the search.

@@ -2,7 +2,9 @@
 
 mod sleepers;
 
-use self::sleepers::{covered, overlapping};
+pub(crate) use self::sleepers::overlapping;
+
+use self::sleepers::covered;
 use crate::bands::Bands;
 use crate::forward::Forward;
 use crate::null_model::NullModel;

@@ -7,8 +7,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use tracktwin_diagnosis::{
-    Bands, Evidence, Fixed, Forward, NullModel, PortPlace, PreparedRecording, SearchOutcome,
-    Section, Verdict, candidates, search,
+    Bands, Common, Evidence, Fixed, Forward, NullModel, PortPlace, PreparedRecording,
+    SearchOutcome, Section, Verdict, candidates, search,
 };
 use tracktwin_inspection::Inspection;
 use tracktwin_parameters::TrackDesign;
@@ -68,6 +68,16 @@ fn searched_for(
 
 /// The log powers of this track as a prepared recording, with its null model.
 fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (PreparedRecording, NullModel) {
+    let values = forward().unknowns.typical();
+    recorded_with(seed, extension, &values)
+}
+
+/// The same for a track with these values.
+fn recorded_with(
+    seed: u64,
+    extension: Option<ExtensionInstance>,
+    values: &DVector<f64>,
+) -> (PreparedRecording, NullModel) {
     let forward = forward();
     let mut random = Normal(ChaCha8Rng::seed_from_u64(seed));
     let numbers: Vec<f64> =
@@ -77,8 +87,7 @@ fn recorded(seed: u64, extension: Option<ExtensionInstance>) -> (PreparedRecordi
     let built = extension.map(|extension| {
         section.in_model(&extension).build(&section.track.design, section.spans()).unwrap()
     });
-    let values = forward.unknowns.typical();
-    let expected = forward.log_power(&values, built.as_slice()).unwrap();
+    let expected = forward.log_power(values, built.as_slice()).unwrap();
     let log_power = expected + random.scatter(&forward);
     let pass_variance = DVector::from_element(forward.per_sleeper(), 1e-3);
     let pass_numbers = vec![vec![0], vec![1]];
@@ -278,4 +287,21 @@ fn bolts_under_a_run_of_sleepers_are_named_under_that_run() {
     assert_eq!(named.kind.physics, "sleeper_bolt");
     let sleepers = named.extension.sleepers.clone().unwrap();
     assert!(sleepers.len() >= 3 && sleepers.iter().all(|it| (1..=4).contains(it)), "{sleepers:?}");
+}
+
+#[test]
+fn bolts_under_all_sleepers_are_as_stiff_as_they_are_and_so_are_soft_sleepers() {
+    let bolts = ExtensionInstance::new("sleeper_bolt").with("stiffness_N_per_m", 3e7);
+    let unknowns = forward().unknowns;
+    let bending = unknowns.common(Common::SleeperBendingStiffness);
+    let mut values = unknowns.typical();
+    values[bending] -= 0.75;
+    let (prepared, null) = recorded_with(3, Some(bolts), &values);
+    let found = search_for(&prepared, &null, |_| true);
+    assert_eq!(found.accepted.len(), 1, "{:?}", found.rounds);
+    assert_eq!(found.accepted[0].extension.physics, "sleeper_bolt");
+    // The other minimum has stiffer sleepers on bolts of a third.
+    let stiffness = found.last.values[found.last.values.len() - 1].exp();
+    assert!((2e7..4.5e7).contains(&stiffness), "{stiffness}");
+    assert!((found.last.values[bending] - values[bending]).abs() < 0.2);
 }

@@ -26,9 +26,9 @@ pub struct Diagnoses {
 }
 
 impl Diagnoses {
-    /// Adds the diagnoses of all sections of a lap.
-    pub fn add_lap(&mut self, sections: &[Diagnosis]) {
-        let accepted = sections.iter().flat_map(|of| &of.hypotheses).filter(|it| it.accepted);
+    /// Adds the diagnosis of a lap.
+    pub fn add_lap(&mut self, diagnosis: &Diagnosis) {
+        let accepted = diagnosis.hypotheses.iter().filter(|it| it.accepted);
         let named = accepted.map(|it| Accepted {
             physics: it.physics.clone(),
             sleepers: it.location.iter().flat_map(|place| place.sleepers.clone()).collect(),

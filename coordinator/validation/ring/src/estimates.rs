@@ -3,7 +3,6 @@
 use crate::RingError;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::ops::Range;
 use tracktwin_evaluation::{Estimate, Estimates};
 use tracktwin_parameters::Parameter;
 
@@ -32,20 +31,6 @@ impl Estimated {
     /// [`RingError`] if the text is not an evaluation.
     pub fn read(text: &str) -> Result<Self, RingError> {
         Self::from_sleepers(text, |sleeper| Some(sleeper))
-    }
-
-    /// Joins the estimates of overlapping sections of the sleepers `ids`. A sleeper has the estimates of the
-    /// section in which it lies farthest from the ends.
-    pub fn joined(ids: &[String], sections: &[(Range<usize>, Self)]) -> Self {
-        let inside = |index: usize| {
-            let depth = move |of: &Range<usize>| (index - of.start).min(of.end - index - 1);
-            let there = sections.iter().filter(move |(of, _)| of.contains(&index));
-            there.max_by_key(|(of, _)| depth(of)).map(|(_, estimated)| estimated)
-        };
-        let of = |(index, id): (usize, &String)| {
-            Some((id.clone(), inside(index)?.sleepers.get(id)?.clone()))
-        };
-        Self { sleepers: ids.iter().enumerate().filter_map(of).collect() }
     }
 
     /// Reads the estimates of the model selector. `None` if the method has no selector.
@@ -154,26 +139,6 @@ mod tests {
         {"id": "SN2", "x_m": 0.1, "railpad_stiffness_N_m": {"mean": 9e7, "sd": 1e7},
          "flags": ["outside_library"],
          "selector": {"railpad_stiffness_N_m": {"mean": 7e7, "sd": 2e7}, "mape": [0.1]}}]}"#;
-
-    #[test]
-    fn a_sleeper_of_two_sections_has_the_estimates_of_the_one_it_lies_deeper_in() {
-        let ids: Vec<String> = (0..9).map(|index| format!("SN{index}")).collect();
-        let section = |range: Range<usize>, mean: f64| {
-            let sleeper = |id: &String| {
-                let railpad = serde_json::json!({"mean": mean, "sd": 1.0});
-                serde_json::json!({"id": id, "railpad_stiffness_N_m": railpad, "flags": []})
-            };
-            let sleepers: Vec<_> = ids[range.clone()].iter().map(sleeper).collect();
-            let text = serde_json::json!({ "sleepers": sleepers }).to_string();
-            (range, Estimated::read(&text).unwrap())
-        };
-        let joined = Estimated::joined(&ids, &[section(0..6, 1.0), section(3..8, 2.0)]);
-        let means = ids.iter().map(|id| joined.any(id, Parameter::RailpadStiffness));
-        let means: Vec<Option<f64>> = means.map(|it| it.map(|it| it.mean)).collect();
-        let expected = [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0].map(Some);
-        assert_eq!(means[..8], expected);
-        assert_eq!(means[8], None);
-    }
 
     #[test]
     fn an_evaluation_is_read_with_what_is_not_valid() {

@@ -16,6 +16,7 @@ mod limits;
 mod manifest;
 mod odometer;
 mod parquet_file;
+mod part;
 mod quiet;
 mod sleeper;
 #[cfg(test)]

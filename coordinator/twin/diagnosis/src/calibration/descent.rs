@@ -119,16 +119,34 @@ impl Problem<'_> {
         let stiffness = unknowns.common(Common::SleeperBendingStiffness);
         let middle = unknowns.typical()[stiffness];
         let deviation = unknowns.prior_deviations()[stiffness];
-        let reach = APART * deviation;
-        let mut best = self.calibrate(start)?;
+        let best = self.calibrate(start)?;
         if (best.values[stiffness] - middle).abs() <= deviation {
             return Ok(best);
         }
-        let starts = [middle - reach, middle + reach].map(|log| {
-            let mut start = best.values.clone();
-            start[stiffness] = log;
-            start
-        });
+        let starts = self.with_other_sleepers(&best.values);
+        Ok(self.best_from(best, starts))
+    }
+
+    /// These values with softer and with stiffer sleepers.
+    pub(crate) fn with_other_sleepers(&self, values: &DVector<f64>) -> [DVector<f64>; 2] {
+        let unknowns = &self.forward.unknowns;
+        let stiffness = unknowns.common(Common::SleeperBendingStiffness);
+        let middle = unknowns.typical()[stiffness];
+        let reach = APART * unknowns.prior_deviations()[stiffness];
+        [middle - reach, middle + reach].map(|log| {
+            let mut other = values.clone();
+            other[stiffness] = log;
+            other
+        })
+    }
+
+    /// The best of a known minimum and those that further starts lead to.
+    pub(crate) fn best_from(
+        &self,
+        known: Calibration,
+        starts: impl IntoIterator<Item = DVector<f64>>,
+    ) -> Calibration {
+        let mut best = known;
         for start in starts {
             // A start for which no track exists leaves the others as they are.
             let Ok(begun) = self.begin(&start) else { continue };
@@ -140,7 +158,14 @@ impl Problem<'_> {
                 _ => {}
             }
         }
-        Ok(best)
+        best
+    }
+
+    /// Minus the log posterior at given values, in nats; infinite if no track exists there.
+    pub(crate) fn objective(&self, values: &DVector<f64>) -> f64 {
+        let here = Point { values: values.clone(), residual: DVector::zeros(0), objective: 0.0 };
+        let stay = DVector::zeros(values.len());
+        self.reached(&self.prior(), &here, &stay).map_or(f64::INFINITY, |point| point.objective)
     }
 
     /// As [`Problem::calibrate`], with the last candidate's parameters restricted to their ranges.

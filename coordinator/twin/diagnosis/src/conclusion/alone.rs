@@ -68,6 +68,7 @@ pub fn passes_alone(
         confirmation: None,
         loss_of_contact: inspection.loss_of_contact.clone(),
         notes,
+        sections: Vec::new(),
     })
 }
 

@@ -17,7 +17,7 @@ use crate::search::SearchOutcome;
 use crate::sentence::sentence;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Inspection;
-use tracktwin_inspection::chain::PassDefect;
+use tracktwin_inspection::chain::{LossOfContact, PassDefect};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{Kind, LookAlikeGroup};
@@ -91,7 +91,7 @@ impl Evidence<'_> {
         let sleepers: Vec<String> = (0..count).map(|sleeper| self.id(sleeper)).collect();
         let nothing_left_out = self.nothing(&hypotheses).min(most);
         let said = sentence(verdict, &hypotheses, nothing_left_out, &sleepers, &fit, &bias_removed);
-        let sentence = said + &airborne(self.inspection);
+        let sentence = said + &airborne(self.inspection.loss_of_contact.as_ref());
         let notes = self.notes(&hypotheses);
         Ok(Diagnosis {
             format: FORMAT.to_owned(),
@@ -108,6 +108,7 @@ impl Evidence<'_> {
             confirmation: None,
             loss_of_contact: self.inspection.loss_of_contact.clone(),
             notes,
+            sections: Vec::new(),
         })
     }
 
@@ -245,7 +246,8 @@ fn add_families(hypotheses: &mut [Hypothesis], most: f64) {
     }
 }
 
-fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
+/// The verdict that follows from the most probable accepted hypothesis.
+pub(crate) fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
     let Some(first) = hypotheses.iter().find(|hypothesis| hypothesis.accepted) else {
         return Verdict::Consistent;
     };
@@ -257,8 +259,8 @@ fn verdict(hypotheses: &[Hypothesis]) -> Verdict {
 }
 
 /// Sentence on contact loss, which no fit includes.
-fn airborne(inspection: &Inspection) -> String {
-    let Some(lost) = &inspection.loss_of_contact else { return String::new() };
+pub(crate) fn airborne(lost: Option<&LossOfContact>) -> String {
+    let Some(lost) = lost else { return String::new() };
     let [from_m, to_m] = lost.reach_m();
     format!(
         " The wheel loses contact with the rail from {from_m:.2} to {to_m:.2} m, where no linear fit holds."

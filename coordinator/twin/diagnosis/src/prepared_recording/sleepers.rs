@@ -26,7 +26,7 @@ pub(super) fn covered(recording: &Recording) -> Range<usize> {
 }
 
 /// Ranges of at most `length` that cover a range; each shares at least `overlap` with the next.
-pub(super) fn overlapping(whole: Range<usize>, length: usize, overlap: usize) -> Vec<Range<usize>> {
+pub(crate) fn overlapping(whole: Range<usize>, length: usize, overlap: usize) -> Vec<Range<usize>> {
     let rest = whole.len().saturating_sub(length);
     let steps = rest.div_ceil(length - overlap);
     let length = length.min(whole.len());

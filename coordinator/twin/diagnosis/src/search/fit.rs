@@ -7,6 +7,7 @@ use crate::screen::Template;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use tracktwin_track::extension::PlaceKind;
 
 /// Share of the best log evidence from which a candidate of another kind is fitted further; `RIVAL_FITS` is
 /// the largest number of such fits.
@@ -75,7 +76,40 @@ pub(super) fn fit(
         })
         .collect();
     fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-    to_the_end(problem, current, once_each(fitted))
+    to_the_end(problem, current, all_along(problem, current, once_each(fitted)))
+}
+
+/// Repeats the fits of the best candidate and of its competitors, as far as they act on all sleepers, from
+/// softer and from stiffer sleepers: bending stiffness of the sleepers and what holds all of them can
+/// replace each other, and the fits have two minima.
+fn all_along(problem: &Problem<'_>, current: &Calibration, fitted: Vec<Fitted>) -> Vec<Fitted> {
+    let Some(best) = fitted.first() else { return fitted };
+    let least = RIVAL_SHARE * best.log_evidence;
+    let again = |mut fitted: Fitted| {
+        let candidate = &fitted.candidate;
+        let acts_on_all = candidate.is_everywhere() && candidate.kind.place == PlaceKind::Sleepers;
+        if acts_on_all && fitted.log_evidence >= least {
+            let candidates = [problem.candidates, std::slice::from_ref(candidate)].concat();
+            let with = Problem { candidates: &candidates, ..*problem };
+            let count = current.values.len();
+            let baseline = fitted.calibration.values.rows(0, count).into_owned();
+            let with_trial = |baseline: &DVector<f64>, trial: &[f64]| {
+                let trial = candidate.logarithms(trial);
+                DVector::from_iterator(count + trial.len(), baseline.iter().copied().chain(trial))
+            };
+            let starts = problem.with_other_sleepers(&baseline).map(|baseline| {
+                let trials = candidate.trials.iter().map(|trial| with_trial(&baseline, trial));
+                trials.min_by(|a, b| with.objective(a).total_cmp(&with.objective(b)))
+            });
+            let known = fitted.calibration.clone();
+            fitted.calibration = with.best_from(known, starts.into_iter().flatten());
+            fitted.log_evidence = fitted.calibration.log_evidence - current.log_evidence;
+        }
+        fitted
+    };
+    let mut fitted: Vec<Fitted> = fitted.into_par_iter().map(again).collect();
+    fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    fitted
 }
 
 /// Continues the fits of the best candidate and of its competitors, if one of these is of another kind: the

@@ -35,7 +35,7 @@ use crate::section::Section;
 use nalgebra::{DMatrix, DVector};
 
 /// Largest number of successive searches.
-const EFFECTS_MAX: usize = 3;
+const EFFECTS_MAX: usize = 6;
 
 /// Share of the best candidate's log evidence from which another candidate may predict a held-out speed;
 /// `NESTED_MAX` is the largest number of these candidates.

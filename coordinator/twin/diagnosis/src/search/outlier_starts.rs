@@ -70,11 +70,12 @@ impl Far {
         far
     }
 
-    /// Candidates on each run, one of each kind that acts at single sleepers without a force law.
+    /// Candidates on each run, one of each kind that acts at single sleepers and does not depend on the wheel
+    /// load: gaps under this many sleepers close under the wheel.
     pub(super) fn on_runs(&self, all: &[Candidate]) -> Vec<Candidate> {
         let at_first = |candidate: &&Candidate| {
             let acts = candidate.extension.sleepers.as_deref() == Some(&[0]);
-            acts && (!candidate.is_under_load() || candidate.free.is_empty())
+            acts && !candidate.is_under_load()
         };
         let on = |run: &Range<usize>, candidate: &Candidate| {
             let mut candidate = candidate.clone();

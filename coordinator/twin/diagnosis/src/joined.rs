@@ -1,0 +1,401 @@
+//! One diagnosis of a long track, from the diagnoses of its overlapping sections.
+
+use crate::conclusion::{airborne, verdict};
+use crate::estimate::Estimate;
+use crate::outcome::{
+    BeforeAfter, Confirmation, Diagnosis, FORMAT, FitScores, Hypothesis, Levels, Location,
+    Mismatch, Score, Scores, SectionVerdict, Verdict, meet,
+};
+use crate::prepared_recording::overlapping;
+use crate::sentence::sentence;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use tracktwin_inspection::chain::LossOfContact;
+use tracktwin_track::extension::{Kind, PlaceKind};
+
+/// Largest number of sleepers that are diagnosed as a whole.
+const WHOLE_MAX: usize = 48;
+
+/// Number of sleepers in a section of a longer track, and number of sleepers that two neighbouring sections
+/// share. An effect at the end of one section is thus inside the next.
+const LENGTH: usize = 30;
+const OVERLAP: usize = 6;
+
+/// The sections in which a recording of this number of sleepers is diagnosed.
+pub fn diagnosed_sections(sleepers: usize) -> Vec<Range<usize>> {
+    let length = if sleepers <= WHOLE_MAX { WHOLE_MAX } else { LENGTH };
+    overlapping(0..sleepers, length, OVERLAP)
+}
+
+/// Diagnosis of a section of a track.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiagnosedSection {
+    /// Number of the section along the track, from 1.
+    pub number: usize,
+    /// Indices of its sleepers in the whole recording.
+    pub sleepers: Range<usize>,
+    /// The diagnosis.
+    pub diagnosis: Diagnosis,
+}
+
+/// Joins the diagnoses of sections. `ids` and `x_m` are names and positions of all sleepers of the
+/// recording; `loss_of_contact` is that of the whole recording. A single section is returned as it is;
+/// `None` without any section.
+///
+/// A sleeper has the values of the section in which it lies farthest from the ends. Of two findings at one
+/// place in two sections, the one farther from the ends is kept. A finding that continues in the next
+/// section is one finding.
+pub fn joined(
+    ids: &[String],
+    x_m: &[f64],
+    sections: Vec<DiagnosedSection>,
+    loss_of_contact: Option<LossOfContact>,
+) -> Option<Diagnosis> {
+    if sections.len() < 2 {
+        return sections.into_iter().next().map(|only| only.diagnosis);
+    }
+    let whole = Whole { ids, x_m, sections: &sections };
+    let mut hypotheses = whole.hypotheses();
+    hypotheses
+        .sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted)));
+    let verdict = verdict(&hypotheses);
+    if verdict == Verdict::Consistent {
+        hypotheses.clear();
+    }
+    let all = || sections.iter().map(|section| &section.diagnosis);
+    let nothing = all().filter_map(|it| it.nothing_left_out).reduce(f64::min);
+    let (fit, bias_removed) = (whole.fit(), whole.bias_removed());
+    let said =
+        sentence(verdict, &hypotheses, nothing.unwrap_or_default(), ids, &fit, &bias_removed);
+    Some(Diagnosis {
+        format: FORMAT.to_owned(),
+        recording: sections[0].diagnosis.recording.clone(),
+        verdict,
+        sentence: said + &airborne(loss_of_contact.as_ref()),
+        nothing_left_out: nothing,
+        mismatches: whole.mismatches(),
+        hypotheses,
+        fit,
+        bias_removed,
+        track: whole.own_entries(|it| &it.track),
+        levels: whole.levels(),
+        confirmation: whole.confirmation(),
+        loss_of_contact,
+        notes: whole.notes(),
+        sections: sections.iter().map(|section| whole.verdict_of(section)).collect(),
+    })
+}
+
+/// All sections of a recording.
+struct Whole<'a> {
+    ids: &'a [String],
+    x_m: &'a [f64],
+    sections: &'a [DiagnosedSection],
+}
+
+/// A hypothesis of a section.
+#[derive(Clone)]
+struct Found {
+    section: usize,
+    hypothesis: Hypothesis,
+}
+
+impl Whole<'_> {
+    /// Index of a sleeper in the whole recording.
+    fn index(&self, id: &String) -> Option<usize> {
+        self.ids.iter().position(|known| known == id)
+    }
+
+    /// The section in which a sleeper lies farthest from the ends; of two equal ones the first.
+    fn owner(&self, sleeper: usize) -> Option<usize> {
+        let depth = |section: usize| {
+            let Range { start, end } = self.sections[section].sleepers;
+            (sleeper - start).min(end - sleeper - 1)
+        };
+        let there = (0..self.sections.len())
+            .filter(|&section| self.sections[section].sleepers.contains(&sleeper));
+        there.reduce(|best, other| if depth(other) > depth(best) { other } else { best })
+    }
+
+    /// Indices of the sleepers that belong to a section.
+    fn own(&self, section: usize) -> Vec<usize> {
+        let all = self.sections[section].sleepers.clone();
+        all.filter(|&sleeper| self.owner(sleeper) == Some(section)).collect()
+    }
+
+    /// Values of each section's own sleepers, in the order of the track. `of` are the values of all compared
+    /// sleepers of a section.
+    fn own_entries<T: Clone>(&self, of: impl Fn(&Diagnosis) -> &Vec<T>) -> Vec<T> {
+        let mut all = Vec::new();
+        for (number, section) in self.sections.iter().enumerate() {
+            let own = self.own(number);
+            let compared = section.diagnosis.track.iter().map(|it| self.index(&it.id));
+            let values = compared.zip(of(&section.diagnosis));
+            let is_own = |sleeper: Option<usize>| sleeper.is_some_and(|it| own.contains(&it));
+            all.extend(values.filter(|(sleeper, _)| is_own(*sleeper)).map(|(_, it)| it.clone()));
+        }
+        all
+    }
+
+    fn hypotheses(&self) -> Vec<Hypothesis> {
+        let mut found: Vec<Found> = Vec::new();
+        for (section, diagnosed) in self.sections.iter().enumerate() {
+            let placed = |hypothesis: &Hypothesis| self.placed(section, hypothesis.clone());
+            let all = diagnosed.diagnosis.hypotheses.iter().map(placed);
+            found.extend(all.map(|hypothesis| Found { section, hypothesis }));
+        }
+        let kept = found.iter().filter(|one| !found.iter().any(|other| self.replaces(other, one)));
+        let mut joined: Vec<Hypothesis> = Vec::new();
+        for Found { hypothesis, .. } in kept {
+            match joined.iter_mut().find(|known| self.continues(known, hypothesis)) {
+                Some(known) => self.extend(known, hypothesis),
+                None => joined.push(hypothesis.clone()),
+            }
+        }
+        joined
+    }
+
+    /// A hypothesis on all sleepers of a section refers to the section's own sleepers.
+    fn placed(&self, section: usize, mut hypothesis: Hypothesis) -> Hypothesis {
+        let compared = self.sections[section].diagnosis.track.len();
+        let is_placed = match Kind::from_name(&hypothesis.physics) {
+            Some(kind) => kind.place == PlaceKind::Sleepers,
+            None => hypothesis.port.as_deref() == Some("rail_seat"),
+        };
+        let is_everywhere =
+            hypothesis.location.as_ref().is_none_or(|it| it.sleepers.len() == compared);
+        let own = self.own(section);
+        if let [first, .., last] = own[..]
+            && is_placed
+            && is_everywhere
+        {
+            hypothesis.location = Some(Location {
+                x_m: [self.x_m[first], self.x_m[last]],
+                sleepers: own.iter().map(|&sleeper| self.ids[sleeper].clone()).collect(),
+            });
+        }
+        hypothesis
+    }
+
+    /// Whether the finding of another section replaces a hypothesis: both sections contain its place, and
+    /// the other section contains it farther from the ends.
+    fn replaces(&self, other: &Found, one: &Found) -> bool {
+        let (Some(place), Some(elsewhere)) = (&one.hypothesis.location, &other.hypothesis.location)
+        else {
+            return false;
+        };
+        let is_inside = |place: &Location, section: usize| {
+            let contains =
+                |id| self.index(id).is_some_and(|it| self.sections[section].sleepers.contains(&it));
+            place.sleepers.iter().all(contains)
+        };
+        let owned = |section: usize| {
+            let owners = place.sleepers.iter().map(|id| self.owner(self.index(id)?));
+            owners.filter(|owner| *owner == Some(section)).count()
+        };
+        other.section != one.section
+            && other.hypothesis.accepted
+            && is_inside(place, other.section)
+            && is_inside(elsewhere, one.section)
+            && meet(Some(place), Some(elsewhere))
+            && owned(other.section) > owned(one.section)
+    }
+
+    /// Whether two accepted hypotheses are one finding that continues in the next section.
+    fn continues(&self, known: &Hypothesis, other: &Hypothesis) -> bool {
+        if known.physics != other.physics || known.port != other.port || !known.accepted {
+            return false;
+        }
+        let (Some(place), Some(further)) = (&known.location, &other.location) else {
+            return known.location.is_none() && other.location.is_none();
+        };
+        let indices = |it: &Location| -> Vec<usize> {
+            it.sleepers.iter().filter_map(|id| self.index(id)).collect()
+        };
+        let (place, further) = (indices(place), indices(further));
+        let (Some(&last), Some(&first)) = (place.last(), further.first()) else { return false };
+        let step = |of: &[usize]| of.windows(2).map(|pair| pair[1] - pair[0]).max();
+        let step = step(&place).max(step(&further)).unwrap_or(0);
+        other.accepted && first <= last + step
+    }
+
+    /// Adds a hypothesis of the next section to a known one.
+    fn extend(&self, known: &mut Hypothesis, other: &Hypothesis) {
+        known.probability = known.probability.max(other.probability);
+        known.family_probability = known.family_probability.max(other.family_probability);
+        known.detectability = known.detectability.hypot(other.detectability);
+        known.log_evidence += other.log_evidence;
+        for (name, estimate) in &mut known.parameters {
+            if let Some(further) = other.parameters.get(name) {
+                *estimate = mean(*estimate, *further);
+            }
+        }
+        let (Some(place), Some(further)) = (&mut known.location, &other.location) else { return };
+        place.x_m = [place.x_m[0].min(further.x_m[0]), place.x_m[1].max(further.x_m[1])];
+        let is_there = |id: &&String| place.sleepers.contains(id) || further.sleepers.contains(id);
+        place.sleepers = self.ids.iter().filter(is_there).cloned().collect();
+    }
+
+    /// Mismatches whose middle is a section's own. The probability is that of such a patch anywhere in all
+    /// sections.
+    fn mismatches(&self) -> Vec<Mismatch> {
+        let mut all = Vec::new();
+        for (number, section) in self.sections.iter().enumerate() {
+            for mismatch in &section.diagnosis.mismatches {
+                let middle = &mismatch.sleepers[mismatch.sleepers.len() / 2..];
+                let middle = middle.first().and_then(|id| self.index(id));
+                if middle.and_then(|sleeper| self.owner(sleeper)) == Some(number) {
+                    let p_value = (self.sections.len() as f64 * mismatch.p_value).min(1.0);
+                    all.push(Mismatch { p_value, ..mismatch.clone() });
+                }
+            }
+        }
+        all
+    }
+
+    /// Mean scores over all sleepers, and sums of the gains.
+    fn fit(&self) -> FitScores {
+        let all: Vec<(f64, &FitScores)> = self
+            .sections
+            .iter()
+            .map(|it| (it.diagnosis.track.len().max(1) as f64, &it.diagnosis.fit))
+            .collect();
+        let weights: f64 = all.iter().map(|(weight, _)| weight).sum();
+        let mean = |of: &dyn Fn(&FitScores) -> Option<Score>| {
+            let scores: Option<Vec<f64>> =
+                all.iter().map(|(weight, fit)| Some(weight * of(fit)?.score)).collect();
+            scores.map(|scores| Score { score: scores.iter().sum::<f64>() / weights })
+        };
+        let scores = |of: fn(&FitScores) -> Scores| Scores {
+            in_sample: mean(&|fit| Some(of(fit).in_sample)).unwrap_or(Score { score: 0.0 }),
+            held_out: mean(&|fit| of(fit).held_out),
+        };
+        let mut held_out_gain_nats = BTreeMap::new();
+        for (speed, gain) in all.iter().flat_map(|(_, fit)| &fit.held_out_gain_nats) {
+            *held_out_gain_nats.entry(speed.clone()).or_insert(0.0) += gain;
+        }
+        FitScores {
+            score: all[0].1.score.clone(),
+            before: scores(|fit| fit.before),
+            after: scores(|fit| fit.after),
+            held_out_gain_nats,
+        }
+    }
+
+    /// Means over the sections that have a parameter, weighted by their numbers of sleepers.
+    fn bias_removed(&self) -> BTreeMap<String, BeforeAfter<f64>> {
+        let mut sums: BTreeMap<String, (f64, BeforeAfter<f64>)> = BTreeMap::new();
+        for DiagnosedSection { diagnosis, .. } in self.sections {
+            let weight = diagnosis.track.len() as f64;
+            for (name, pair) in &diagnosis.bias_removed {
+                let none = BeforeAfter { before: 0.0, after: 0.0 };
+                let (weights, sum) = sums.entry(name.clone()).or_insert((0.0, none));
+                *weights += weight;
+                sum.before += weight * pair.before;
+                sum.after += weight * pair.after;
+            }
+        }
+        let mean = |(weight, sum): (f64, BeforeAfter<f64>)| BeforeAfter {
+            before: sum.before / weight,
+            after: sum.after / weight,
+        };
+        sums.into_iter().map(|(name, sum)| (name, mean(sum))).collect()
+    }
+
+    /// Levels of all sleepers; none if the sections were compared in different bands.
+    fn levels(&self) -> Levels {
+        let all: Vec<&Levels> = self.sections.iter().map(|it| &it.diagnosis.levels).collect();
+        let first = all[0];
+        let is_alike = |levels: &&Levels| {
+            levels.frequency_hz == first.frequency_hz
+                && levels.speeds_km_h.len() == first.speeds_km_h.len()
+        };
+        if !all.iter().all(is_alike) {
+            return Levels::default();
+        }
+        let speeds = 0..first.speeds_km_h.len();
+        let of = |levels: fn(&Levels) -> &Vec<Vec<Vec<f64>>>| -> Vec<Vec<Vec<f64>>> {
+            let at = |speed: usize| self.own_entries(|it| &levels(&it.levels)[speed]);
+            speeds.clone().map(at).collect()
+        };
+        let scatter = |speed: usize, band: usize| {
+            let known: Vec<f64> =
+                all.iter().filter_map(|levels| levels.scatter_db[speed][band]).collect();
+            (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+        };
+        let bands = 0..first.frequency_hz.len();
+        Levels {
+            frequency_hz: first.frequency_hz.clone(),
+            speeds_km_h: first.speeds_km_h.clone(),
+            measured_db: of(|levels| &levels.measured_db),
+            before_db: of(|levels| &levels.before_db),
+            after_db: of(|levels| &levels.after_db),
+            scatter_db: speeds
+                .map(|speed| bands.clone().map(|band| scatter(speed, band)).collect())
+                .collect(),
+        }
+    }
+
+    /// Comparison with withheld passes over all sections that have one.
+    fn confirmation(&self) -> Option<Confirmation> {
+        let mut all = self.sections.iter().filter_map(|it| it.diagnosis.confirmation.as_ref());
+        let mut whole = all.next()?.clone();
+        for other in all {
+            let [a, b] = [whole.sleepers, other.sleepers].map(|sleepers| sleepers as f64);
+            let mean = |one: f64, two: f64| ((a * one * one + b * two * two) / (a + b)).sqrt();
+            for (speed, further) in whole.speeds.iter_mut().zip(&other.speeds) {
+                speed.before_db = mean(speed.before_db, further.before_db);
+                speed.after_db = mean(speed.after_db, further.after_db);
+            }
+            whole.sleepers += other.sleepers;
+            whole.gain_nats += other.gain_nats;
+            whole.is_confirmed &= other.is_confirmed;
+        }
+        Some(whole)
+    }
+
+    /// Notes of all sections; those that not every section has begin with the section's sleepers.
+    fn notes(&self) -> Vec<String> {
+        let all = || self.sections.iter().map(|section| &section.diagnosis.notes);
+        let is_common = |note: &&String| all().all(|notes| notes.contains(note));
+        let mut notes: Vec<String> =
+            self.sections[0].diagnosis.notes.iter().filter(is_common).cloned().collect();
+        for section in self.sections {
+            let [first, last] = self.ends(section);
+            let own = section.diagnosis.notes.iter().filter(|note| !is_common(note));
+            notes.extend(own.map(|note| format!("{first} to {last}: {note}")));
+        }
+        notes
+    }
+
+    /// Ids of the first and the last sleeper of a section.
+    fn ends(&self, section: &DiagnosedSection) -> [String; 2] {
+        let Range { start, end } = section.sleepers;
+        [start, end - 1].map(|sleeper| self.ids[sleeper].clone())
+    }
+
+    fn verdict_of(&self, section: &DiagnosedSection) -> SectionVerdict {
+        let DiagnosedSection { diagnosis, .. } = section;
+        SectionVerdict {
+            number: section.number,
+            sleepers: self.ends(section),
+            verdict: diagnosis.verdict,
+            sentence: diagnosis.sentence.clone(),
+            nothing_left_out: diagnosis.nothing_left_out,
+        }
+    }
+}
+
+/// Mean of two estimates, weighted by their variances; its standard deviation includes their difference.
+fn mean(one: Estimate, other: Estimate) -> Estimate {
+    let [a, b] = [one, other].map(|it| it.sd.max(f64::MIN_POSITIVE).powi(-2));
+    if !(a + b).is_finite() {
+        return if a > b { one } else { other };
+    }
+    let mean = (a * one.mean + b * other.mean) / (a + b);
+    let spread = (a * (one.mean - mean).powi(2) + b * (other.mean - mean).powi(2)) / (a + b);
+    Estimate { mean, sd: (1.0 / (a + b) + spread).sqrt() }
+}
+
+#[cfg(test)]
+mod tests;
