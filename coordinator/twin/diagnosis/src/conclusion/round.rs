@@ -7,6 +7,7 @@ use crate::outcome::{Hypothesis, UNKNOWN, meet};
 use crate::port_scan::UnknownElement;
 use crate::search::{Fitted, Probabilities, Round};
 use std::collections::BTreeMap;
+use tracktwin_track::extension::EffectFamily;
 
 /// Largest probability by chance of the evidence for an unknown stiffness that is reported.
 const PORT_ALARM: f64 = 0.01;
@@ -17,6 +18,9 @@ const NOTHING_LEFT: f64 = 0.02;
 
 /// Probability that a residual in addition to an accepted extension is new physics.
 const REMAINDER_PRIOR: f64 = 0.2;
+
+/// Share of the log evidence for an unknown stiffness from which a kind at its location explains most of it.
+const LIKE_SHARE: f64 = 0.5;
 
 /// Largest number of similar kinds that are listed for unknown physics.
 const NEAREST_MAX: usize = 3;
@@ -59,6 +63,9 @@ impl Evidence<'_> {
             if unnamed {
                 nameless.look_alikes = nearest(round);
             }
+            if let Some(family) = self.family_like(round, port).filter(|_| nameless.accepted) {
+                nameless.family = Some(family.name().to_owned());
+            }
             if let Some(best) = taken_back.filter(|_| alone) {
                 // What explains most of it is of its family, at its place.
                 nameless.family = Some(best.candidate.kind.family.name().to_owned());
@@ -76,6 +83,21 @@ impl Evidence<'_> {
             self.gather(&mut hypotheses);
         }
         hypotheses
+    }
+
+    /// Family of all kinds that explain most of what an unknown stiffness explains, at its location; `None` if
+    /// there is no such kind, or if they are of several families.
+    fn family_like(&self, round: &Round, port: &UnknownElement) -> Option<EffectFamily> {
+        let location = self.location_of_port(&port.place)?;
+        let comes_near = |fitted: &&Fitted| {
+            let place = self.location_of(&fitted.candidate);
+            let is_there = place.is_some_and(|place| meet(Some(&place), Some(&location)));
+            is_there && fitted.log_evidence >= LIKE_SHARE * port.log_evidence
+        };
+        let mut families =
+            round.fitted.iter().filter(comes_near).map(|it| it.candidate.kind.family);
+        let first = families.next()?;
+        families.all(|family| family == first).then_some(first)
     }
 
     /// Hypothesis of unknown physics.
