@@ -98,19 +98,11 @@ pub async fn diagnose_sections(
         let place = place(&recording.sleepers[sleepers.clone()]);
         let shown = |stage, share| watch(At { section, sections, place: &place, stage, share });
         shown("", 0.0);
-        let part;
-        let of = if sections == 1 {
-            recording
-        } else {
-            part = recording.part(sleepers.clone(), BESIDE_SPANS);
-            &part
-        };
-        let diagnosis = if sections == 1 {
-            diagnosis(of, setting, confirm, &shown).await
-        } else {
-            output.section(of, (section, &place), (setting, confirm), &shown).await
-        };
-        match diagnosis {
+        if sections == 1 {
+            return diagnosis(recording, setting, confirm, &shown).await;
+        }
+        let part = recording.part(sleepers.clone(), BESIDE_SPANS);
+        match output.section(&part, (section, &place), (setting, confirm), &shown).await {
             Ok(diagnosis) => {
                 diagnosed.push(DiagnosedSection { number: section, sleepers, diagnosis });
             }
@@ -122,21 +114,15 @@ pub async fn diagnose_sections(
     }
     let ids: Vec<String> = recording.sleepers.iter().map(|sleeper| sleeper.id.clone()).collect();
     let x_m: Vec<f64> = recording.sleepers.iter().map(|sleeper| sleeper.x_m).collect();
-    let lost = if sections == 1 { None } else { chain::loss_of_contact(recording) };
-    match joined(&ids, &x_m, diagnosed, lost) {
-        Some(mut diagnosis) => {
-            diagnosis.recording.clone_from(&recording.name);
-            let skipped = unsuitable.iter();
-            let skipped =
-                skipped.map(|(place, error)| format!("{place} was not diagnosed: {error}."));
-            diagnosis.notes.extend(skipped);
-            Ok(diagnosis)
-        }
-        None => {
-            let (_, error) = unsuitable.swap_remove(0);
-            Err(error.into())
-        }
-    }
+    let lost = chain::loss_of_contact(recording);
+    let Some(mut diagnosis) = joined(&ids, &x_m, &diagnosed, lost) else {
+        return Err(unsuitable.swap_remove(0).1.into());
+    };
+    diagnosis.recording.clone_from(&recording.name);
+    let skipped = unsuitable.iter();
+    let skipped = skipped.map(|(place, error)| format!("{place} was not diagnosed: {error}."));
+    diagnosis.notes.extend(skipped);
+    Ok(diagnosis)
 }
 
 /// Diagnosis of a recording as a whole.
@@ -272,7 +258,7 @@ mod tests {
     #[test]
     fn a_stored_section_is_used_again_for_the_same_inputs_only() {
         let folder = tempfile::tempdir().unwrap();
-        let [v_track, line] = [Preset::VTrack, Preset::Concrete60E1].map(|preset| preset.track());
+        let [v_track, line] = [Preset::VTrack, Preset::Concrete60E1].map(Preset::track);
         let same = inputs(1.0, &v_track, &[]);
         assert!(stored(folder.path(), &same).unwrap().is_none());
         let scores = json!({"in_sample": {"score": 0.0}, "held_out": null});

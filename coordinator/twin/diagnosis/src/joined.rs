@@ -39,8 +39,7 @@ pub struct DiagnosedSection {
 }
 
 /// Joins the diagnoses of sections. `ids` and `x_m` are names and positions of all sleepers of the
-/// recording; `loss_of_contact` is that of the whole recording. A single section is returned as it is;
-/// `None` without any section.
+/// recording; `loss_of_contact` is that of the whole recording. `None` without any section.
 ///
 /// A sleeper has the values of the section in which it lies farthest from the ends. Of two findings at one
 /// place in two sections, the one farther from the ends is kept. A finding that continues in the next
@@ -48,13 +47,13 @@ pub struct DiagnosedSection {
 pub fn joined(
     ids: &[String],
     x_m: &[f64],
-    sections: Vec<DiagnosedSection>,
+    sections: &[DiagnosedSection],
     loss_of_contact: Option<LossOfContact>,
 ) -> Option<Diagnosis> {
-    if sections.len() < 2 {
-        return sections.into_iter().next().map(|only| only.diagnosis);
+    if sections.is_empty() {
+        return None;
     }
-    let whole = Whole { ids, x_m, sections: &sections };
+    let whole = Whole { ids, x_m, sections };
     let mut hypotheses = whole.hypotheses();
     hypotheses
         .sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted)));
