@@ -211,10 +211,12 @@ fn place(
             let places: Vec<usize> = location.sleepers.iter().filter_map(place).collect();
             let centre = places.get(places.len() / 2).copied().unwrap_or(0);
             let moved = places.iter().filter_map(|place| (middle + place).checked_sub(centre));
+            // The campaign's track may be shorter than what was found.
+            let moved = moved.filter(|sleeper| *sleeper <= 2 * middle);
             format!("sleepers = {:?}\n", moved.collect::<Vec<_>>())
         }
         PlaceKind::Point => {
-            let x_m = location.x_m[0];
+            let x_m = 0.5 * (location.x_m[0] + location.x_m[1]);
             let nearest = diagnosis.track.iter().map(|sleeper| x_m - sleeper.x_m);
             let offset = nearest.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
             let x_m = (middle + 1) as f64 * spacing_m + offset;

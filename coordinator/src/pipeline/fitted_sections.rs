@@ -4,10 +4,11 @@ use super::compute::compute;
 use super::invert::{InvertingError, Started};
 use rayon::prelude::*;
 use serde::Serialize;
-use tracktwin_diagnosis::{CalibrationError, NullModel, PreparedRecording};
+use tracktwin_diagnosis::{CalibrationError, Candidate, NullModel, PreparedRecording};
 use tracktwin_experiment::MODEL_HASH;
 use tracktwin_inversion::{Fitted, fit};
 use tracktwin_library::{Library, StoredArray};
+use tracktwin_track::extension::ExtensionInstance;
 
 /// All inputs that determine the fit of a section.
 #[derive(Serialize)]
@@ -21,6 +22,12 @@ struct Key<'a> {
     bands_hz: &'a [f64],
     /// Hash of log powers, covariance, sensor noise and start values.
     numbers: String,
+}
+
+/// What identifies known physics: the extension, and names of its free parameters. Their start values are
+/// among the values of the first fit.
+fn named(known: &Candidate) -> (&ExtensionInstance, Vec<&'static str>) {
+    (&known.extension, known.free.iter().map(|parameter| parameter.name).collect())
 }
 
 impl Key<'_> {
@@ -38,7 +45,7 @@ impl Key<'_> {
             model_hash: MODEL_HASH,
             version: Fitted::VERSION,
             track: format!("{:?}", forward.section),
-            known: format!("{:?}", known.iter().map(|it| &it.extension).collect::<Vec<_>>()),
+            known: format!("{:?}", known.iter().map(named).collect::<Vec<_>>()),
             speeds_m_s: &forward.speeds_m_s,
             bands_hz: forward.bands.centres_hz(),
             numbers: numbers.finalize().to_hex().to_string(),

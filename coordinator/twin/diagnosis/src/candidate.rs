@@ -48,6 +48,17 @@ impl Candidate {
         })
     }
 
+    /// The first trial; empty if nothing is free.
+    pub(crate) fn first_trial(&self) -> &[f64] {
+        self.trials.first().map_or(&[], Vec::as_slice)
+    }
+
+    /// The same with the values of its first trial and no free parameter.
+    pub(crate) fn held(&self) -> Self {
+        let extension = self.with(self.first_trial());
+        Self { extension, free: Vec::new(), trials: Vec::new(), ..self.clone() }
+    }
+
     /// Logarithms of values of the free parameters; zero counts as a hundredth of the greatest value.
     pub fn logarithms(&self, values: &[f64]) -> Vec<f64> {
         let logarithm = |(parameter, &value): (&&KindParameter, &f64)| {

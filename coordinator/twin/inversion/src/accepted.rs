@@ -2,10 +2,15 @@
 
 use tracktwin_diagnosis::{Candidate, Diagnosis, Hypothesis, Location, PreparedRecording};
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::extension::{EffectFamily, ExtensionInstance, Kind, PlaceKind};
+use tracktwin_track::extension::{
+    Class, EffectFamily, ExtensionInstance, Kind, KindParameter, PlaceKind,
+};
 
 /// Distance in sleepers from which a point of the track has no effect on a section.
 const REACH: f64 = 2.0;
+
+/// Relative standard deviation from which a parameter counts as not determined.
+const UNDETERMINED: f64 = 0.5;
 
 /// Kind of a hypothesis that can be a part of the track model: it is in the catalogue, and it is no shape of
 /// the wheel, whose angle in each pass is unknown.
@@ -13,8 +18,10 @@ pub fn modelled(hypothesis: &Hypothesis) -> Option<&'static Kind> {
     Kind::from_name(&hypothesis.physics).filter(|kind| kind.family != EffectFamily::Wheel)
 }
 
-/// Extensions that a diagnosis of the recording accepted, with their estimated values, as far as they act on
-/// a section ([`modelled`]). They have no free parameters.
+/// Extensions that a diagnosis of the recording accepted, as far as they act on a section ([`modelled`]).
+/// They keep the values of the diagnosis. Only what it could not determine is fitted again, from its value (the
+/// only trial) and with the prior of the catalogue: bolts that are free in every section, for example, lead
+/// some of the sections to another minimum.
 pub fn accepted(
     diagnosis: &Diagnosis,
     recording: &Recording,
@@ -33,9 +40,22 @@ pub fn accepted(
                 }
                 _ => extension,
             };
-            Some(Candidate { kind, extension, free: vec![], trials: vec![], length_ratio })
+            let free = free(hypothesis, kind);
+            let values = free.iter().map(|it| hypothesis.parameters[it.name].mean).collect();
+            Some(Candidate { kind, extension, free, trials: vec![values], length_ratio })
         })
         .collect()
+}
+
+/// Parameters of a hypothesis that the inversion fits again; none of a force law.
+fn free(hypothesis: &Hypothesis, kind: &'static Kind) -> Vec<&'static KindParameter> {
+    if kind.classes.contains(&Class::Load) {
+        return Vec::new();
+    }
+    let is_open = |parameter: &&KindParameter| {
+        hypothesis.parameters.get(parameter.name).is_some_and(|it| it.sd > UNDETERMINED * it.mean)
+    };
+    kind.parameters.iter().filter(is_open).collect()
 }
 
 /// The extension with the fitted and the assumed values of a hypothesis, and values that are typical of the
@@ -72,7 +92,9 @@ fn placed(
         let reach_m = REACH * section.track.design.sleeper.spacing_m;
         let ends = [section.x_m(0) - reach_m, section.x_m(section.sleepers - 1) + reach_m];
         let is_inside = location.x_m[0] <= ends[1] && location.x_m[1] >= ends[0];
-        return is_inside.then(|| extension.at(location.x_m));
+        let middle_m = 0.5 * (location.x_m[0] + location.x_m[1]);
+        let x_m = if kind.place == PlaceKind::Point { [middle_m; 2] } else { location.x_m };
+        return is_inside.then(|| extension.at(x_m));
     }
     if is_everywhere {
         return Some(extension);
@@ -135,22 +157,40 @@ mod tests {
             "location": {"x_m": x_m, "sleepers": [ids[0], ids[first + 2]]}});
         let far = json!({"physics": "rail_joint",
             "location": {"x_m": [900.0, 900.0], "sleepers": []}});
+        // The passes alone state a stretch in which a joint lies.
+        let between_m = [recording.sleepers[first + 3].x_m, recording.sleepers[first + 4].x_m];
+        let joint = json!({"physics": "rail_joint",
+            "parameters": {"dip_m": {"mean": 1e-4, "sd": 1e-5}, "length_m": {"mean": 0.02, "sd": 0.02}},
+            "location": {"x_m": between_m, "sleepers": [ids[first + 3], ids[first + 4]]}});
         let everywhere =
             json!({"physics": "subgrade_layer", "location": {"x_m": x_m, "sleepers": ids}});
         let nameless = json!({"physics": "unknown_physics"});
         let flat = json!({"physics": "wheel_flat"});
-        let diagnosis = diagnosis(&recording, &[bolts, some, far, everywhere, nameless, flat]);
+        let diagnosis =
+            diagnosis(&recording, &[bolts, some, far, everywhere, nameless, flat, joint]);
         let known = accepted(&diagnosis, &recording, &section);
         let found: Vec<_> =
             known.iter().map(|it| (it.kind.physics, it.extension.sleepers.clone())).collect();
-        let expected =
-            [("sleeper_bolt", None), ("missing_railpad", Some(vec![2])), ("subgrade_layer", None)];
+        let expected = [
+            ("sleeper_bolt", None),
+            ("missing_railpad", Some(vec![2])),
+            ("subgrade_layer", None),
+            ("rail_joint", None),
+        ];
         assert_eq!(found, expected);
+        let middle_m = 0.5 * (between_m[0] + between_m[1]);
+        assert_eq!(known[3].extension.x_m, Some([middle_m; 2]));
         let design = &section.forward.section.track.design;
         for candidate in &known {
             let placed = section.forward.section.in_model(&candidate.extension);
             placed.build(design, section.forward.section.spans()).unwrap();
         }
         assert_eq!(known[0].extension.parameters["stiffness_N_per_m"], 3e7);
+        let free =
+            |candidate: &Candidate| candidate.free.iter().map(|it| it.name).collect::<Vec<_>>();
+        // The dip is known to a tenth, its length to a half and less.
+        assert_eq!(free(&known[3]), ["length_m"]);
+        assert_eq!(known[3].trials, [[0.02]]);
+        assert!(known[..3].iter().all(|candidate| free(candidate).is_empty()));
     }
 }

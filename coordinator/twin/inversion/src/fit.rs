@@ -70,7 +70,8 @@ pub fn sections(
     PreparedRecording::sections(recording, track, LENGTH, OVERLAP)
 }
 
-/// Fits a section whose model contains `known` physics without free parameters ([`crate::accepted`]).
+/// Fits a section whose model contains `known` physics ([`crate::accepted`]); its free parameters are fitted
+/// too.
 /// `start` must be the result of [`tracktwin_diagnosis::first_calibration`], and the forward model of
 /// `prepared` must include the track beyond the section ([`Forward::allow_beyond`]).
 ///
@@ -98,9 +99,12 @@ pub fn fit(
         let found = misfit(&calibration, &factors, plain.compared());
         factors = found.into_iter().map(factor).collect();
         calibration = fit(&forward, &factors, calibration.values)?;
-        let data = Quadratic::new(&calibration, forward.unknowns.typical());
+        let data = Quadratic::new(&calibration, forward.unknowns.typical(), known)
+            .ok_or(CalibrationError::NotFinite)?;
         learn(&mut forward.unknowns, &data);
-        let start = data.best(&forward.unknowns).ok_or(CalibrationError::NotFinite)?;
+        let best = data.best(&forward.unknowns).ok_or(CalibrationError::NotFinite)?;
+        let mut start = calibration.values;
+        start.rows_mut(0, best.len()).copy_from(&best);
         calibration = fit(&forward, &factors, start)?;
     }
     let valley =
@@ -233,7 +237,9 @@ impl Fitted {
             range.for_each(|index| deviations[index] += misplaced);
         }
         unknowns.global().for_each(|index| deviations[index] += COMMON_ERROR.powi(2));
-        let deviations = deviations.map(f64::sqrt);
-        Self { unknowns, values, deviations, misfit }
+        // What follows the unknowns are parameters of known physics.
+        let count = unknowns.count();
+        let deviations = deviations.rows(0, count).map(f64::sqrt);
+        Self { values: values.rows(0, count).into_owned(), unknowns, deviations, misfit }
     }
 }

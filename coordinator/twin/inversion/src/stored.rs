@@ -6,7 +6,7 @@ use tracktwin_diagnosis::{Exception, Own, PreparedRecording, Variation};
 
 impl Fitted {
     /// Version of the fit. Stored sections of another version are fitted again.
-    pub const VERSION: u32 = 1;
+    pub const VERSION: u32 = 2;
 
     /// The fit as numbers: values, deviations, misfits, variations, and a pair for each exception.
     pub fn numbers(&self) -> Vec<f64> {

@@ -4,7 +4,7 @@
 //! Gaussian prior then has a closed form (Laplace), and no forward model is needed to compare two priors.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use tracktwin_diagnosis::{Calibration, Exception, Own, Unknowns, Variation};
+use tracktwin_diagnosis::{Calibration, Candidate, Exception, Own, Unknowns, Variation};
 
 /// Factors on a deviation or a length that the search tries.
 const FACTORS: [f64; 4] = [0.5, 0.75, 1.35, 2.0];
@@ -30,7 +30,8 @@ const EXCEPTION_NATS: f64 = 5.0;
 /// Largest number of exceptions in one quantity, as a share of all sleepers.
 const EXCEPTIONS_MAX: f64 = 0.2;
 
-/// Quadratic log likelihood near a fitted track: `-0.5 x' H x + b' x` plus a constant.
+/// Quadratic log likelihood near a fitted track, integrated over the parameters of known physics:
+/// `-0.5 x' H x + b' x` plus a constant.
 pub(super) struct Quadratic {
     information: DMatrix<f64>,
     slope: DVector<f64>,
@@ -38,13 +39,41 @@ pub(super) struct Quadratic {
 }
 
 impl Quadratic {
-    /// Makes it from the whitened residual and derivatives of a fit; `x` is the distance from the prior's
-    /// mean.
-    pub(super) fn new(calibration: &Calibration, mean: DVector<f64>) -> Self {
+    /// Makes it from the whitened residual and derivatives of a fit with `known` physics; `x` is the distance
+    /// from the prior's mean. `None` if a number is not finite.
+    pub(super) fn new(
+        calibration: &Calibration,
+        mean: DVector<f64>,
+        known: &[Candidate],
+    ) -> Option<Self> {
         let jacobian = &calibration.jacobian;
-        let at_mean = &calibration.residual + jacobian * (&calibration.values - &mean);
+        let priors = |candidate: &Candidate| -> Vec<(f64, f64)> {
+            candidate.free.iter().map(|parameter| candidate.prior(parameter)).collect()
+        };
+        let priors: Vec<(f64, f64)> = known.iter().flat_map(priors).collect();
+        let (count, further) = (mean.len(), priors.len());
+        let means = priors.iter().map(|(mean, _)| *mean);
+        let all = DVector::from_iterator(count + further, mean.iter().copied().chain(means));
+        let at_mean = &calibration.residual + jacobian * (&calibration.values - all);
         let information = jacobian.transpose() * jacobian;
-        Self { information, slope: jacobian.tr_mul(&at_mean), mean }
+        let slope = jacobian.tr_mul(&at_mean);
+        if further == 0 {
+            return Some(Self { information, slope, mean });
+        }
+        // A Gaussian integral over the last parameters with their prior: the Schur complement.
+        let mut own = information.view((count, count), (further, further)).into_owned();
+        for (index, (_, deviation)) in priors.iter().enumerate() {
+            own[(index, index)] += deviation.powi(-2);
+        }
+        let own = Cholesky::new(own)?;
+        let both = information.view((0, count), (count, further)).into_owned();
+        let rest = slope.rows(count, further).into_owned();
+        Some(Self {
+            information: information.view((0, 0), (count, count))
+                - &both * own.solve(&both.transpose()),
+            slope: slope.rows(0, count) - both * own.solve(&rest),
+            mean,
+        })
     }
 
     /// Log evidence of a prior in nats, up to a constant of the data.
@@ -157,6 +186,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use tracktwin_diagnosis::{Bands, Forward, Section};
     use tracktwin_parameters::TrackDesign;
+    use tracktwin_track::extension::{ExtensionInstance, Kind};
 
     const SLEEPERS: usize = 24;
 
@@ -204,5 +234,47 @@ mod tests {
         let best = data.best(&unknowns).unwrap() - &data.mean;
         assert!((best[9] + 0.9).abs() < 0.12, "{}", best[9]);
         assert!(best[8].abs() < 0.15 && best[10].abs() < 0.15);
+    }
+
+    #[test]
+    fn parameters_of_known_physics_are_integrated_out() {
+        let unknowns = unknowns();
+        let (count, rows) = (unknowns.count(), 3 * unknowns.count());
+        let kind = Kind::from_name("sleeper_bolt").unwrap();
+        let candidate = Candidate {
+            kind,
+            extension: ExtensionInstance::new("sleeper_bolt"),
+            free: vec![kind.parameter("stiffness_N_per_m").unwrap()],
+            trials: vec![vec![3e7]],
+            length_ratio: 1.0,
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        let mut normal = || StandardNormal.sample(&mut random);
+        let jacobian = DMatrix::from_fn(rows, count + 1, |_, _| normal());
+        let residual = DVector::from_fn(rows, |_, _| normal());
+        let (mean, deviation) = candidate.prior(candidate.free[0]);
+        let mut precision = DMatrix::zeros(count + 1, count + 1);
+        precision.view_mut((0, 0), (count, count)).copy_from(&unknowns.precision());
+        precision[(count, count)] = deviation.powi(-2);
+        let mut at = DVector::from_fn(count + 1, |_, _| 0.0);
+        at.rows_mut(0, count).copy_from(&unknowns.typical());
+        at[count] = mean;
+        // The fit is somewhere near.
+        let values = &at + DVector::from_fn(count + 1, |_, _| 0.1);
+        let posterior = Cholesky::new(precision + jacobian.transpose() * &jacobian).unwrap();
+        let right = jacobian.tr_mul(&(&residual + &jacobian * (&values - &at)));
+        let expected = &at + posterior.solve(&right);
+        let calibration = Calibration {
+            gradient: DVector::zeros(count + 1),
+            values,
+            residual,
+            jacobian,
+            precision: posterior,
+            objective: 0.0,
+            log_evidence: 0.0,
+        };
+        let data = Quadratic::new(&calibration, unknowns.typical(), &[candidate]).unwrap();
+        let best = data.best(&unknowns).unwrap();
+        assert!((best - expected.rows(0, count)).amax() < 1e-8);
     }
 }

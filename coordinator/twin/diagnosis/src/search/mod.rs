@@ -150,8 +150,8 @@ fn rough_covariance(prepared: &PreparedRecording) -> DMatrix<f64> {
     })
 }
 
-/// Calibrates the baseline, with known physics without free parameters, by a rough covariance; the result
-/// serves as parameters of the null simulations.
+/// Calibrates the baseline by a rough covariance; the result serves as parameters of the null simulations.
+/// Known physics keeps the values of its first trial, and these follow the baseline in the result.
 ///
 /// # Errors
 /// [`CalibrationError`] if the calibration fails.
@@ -162,9 +162,12 @@ pub fn first_calibration(
     let covariance = prepared.of_compared(rough_covariance(prepared));
     let observation = Observation::new(prepared.log_power.clone(), &covariance, |_| false)
         .ok_or(CalibrationError::NotFinite)?;
+    let held: Vec<Candidate> = known.iter().map(Candidate::held).collect();
     let problem =
-        Problem { forward: &prepared.forward, observation: &observation, candidates: known };
-    Ok(problem.calibrate_widely(prepared.forward.unknowns.typical())?.values)
+        Problem { forward: &prepared.forward, observation: &observation, candidates: &held };
+    let baseline = problem.calibrate_widely(prepared.forward.unknowns.typical())?.values;
+    let trials: Vec<&[f64]> = known.iter().map(Candidate::first_trial).collect();
+    Ok(Problem { candidates: known, ..problem }.start(&baseline, &trials))
 }
 
 /// Searches for left-out physics.
