@@ -30,7 +30,7 @@ pub(super) fn sections(diagnosis: &Diagnosis) -> Markup {
             }
             table {
                 thead { tr {
-                    th { "sleepers" } th { "verdict" } th { "nothing left out" } th { "diagnosis" }
+                    th { "sleepers" } th { "verdict" } th { "nothing left out" } th.words { "diagnosis" }
                 } }
                 tbody {
                     @for section in &diagnosis.sections {
@@ -41,7 +41,7 @@ pub(super) fn sections(diagnosis: &Diagnosis) -> Markup {
                             } }
                             td { span class=(format!("tag {class}")) { (name) } }
                             td { (section.nothing_left_out.map(per_cent).unwrap_or_default()) }
-                            td { (section.sentence) }
+                            td.words { (section.sentence) }
                         }
                     }
                 }

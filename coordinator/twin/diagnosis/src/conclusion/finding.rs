@@ -5,7 +5,7 @@ use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, Location, UNKNOWN};
 use std::collections::BTreeMap;
 use tracktwin_inspection::Finding;
-use tracktwin_track::extension::{Class, Kind};
+use tracktwin_track::extension::{Class, Kind, LookAlikeGroup, PlaceKind};
 
 /// Distance in sleeper spacings within which the signature of an accepted extension may resemble a finding.
 const REACH_SPANS: f64 = 3.0;
@@ -16,18 +16,26 @@ impl Evidence<'_> {
     pub(super) fn add_finding(&self, finding: &Finding, all: &mut Vec<Hypothesis>) {
         let Some(kind) = Kind::from_name(finding.physics) else { return };
         let probability = probability(finding);
-        let same = all.iter_mut().filter(|known| known.physics == finding.physics);
+        let location = self.location_of_finding(finding);
+        let reach_m = REACH_SPANS * self.prepared.forward.section.track.design.sleeper.spacing_m;
+        let is_same = |known: &Hypothesis| {
+            let place = known.location.as_ref();
+            known.physics == finding.physics && are_near(place, location.as_ref(), reach_m)
+        };
+        let same = all.iter_mut().filter(|known| is_same(known));
         if let Some(known) = same.max_by_key(|known| known.accepted) {
             known.probability = known.probability.max(probability);
             if known.accepted {
                 return;
             }
         }
-        let location = self.location_of_finding(finding);
-        let reach_m = REACH_SPANS * self.prepared.forward.section.track.design.sleeper.spacing_m;
+        let sleepers = self.prepared.forward.section.sleepers;
         let explained = !kind.measuring_chain
-            && all.iter().any(|known| explains(known, kind, location.as_ref(), reach_m));
-        all.retain(|known| known.accepted || known.physics != finding.physics);
+            && all.iter().any(|known| {
+                explains(known, kind, location.as_ref(), reach_m)
+                    && !(kind.group == LookAlikeGroup::RailDefect && is_even(known, sleepers))
+            });
+        all.retain(|known| known.accepted || !is_same(known));
         if !explained {
             // The name that came near it is right after all.
             let is_it = |known: &&mut Hypothesis| {
@@ -46,16 +54,29 @@ impl Evidence<'_> {
     }
 }
 
+/// Whether a hypothesis is the same under all sleepers of a section. It explains no shape at one place.
+fn is_even(known: &Hypothesis, sleepers: usize) -> bool {
+    let acts_on_sleepers =
+        Kind::from_name(&known.physics).is_some_and(|kind| kind.place == PlaceKind::Sleepers);
+    let is_everywhere = known.location.as_ref().is_none_or(|it| it.sleepers.len() == sleepers);
+    acts_on_sleepers && is_everywhere
+}
+
 /// Whether an accepted extension explains a finding of this kind at a location. It explains neither a
 /// finding beyond the reach of its signature nor one that repeats with every turn of the wheel.
 fn explains(known: &Hypothesis, kind: &Kind, place: Option<&Location>, reach_m: f64) -> bool {
     let at_wheel = |kind: &Kind| kind.classes.contains(&Class::WheelAngle);
     let known_at_wheel = Kind::from_name(&known.physics).is_some_and(at_wheel);
-    let is_near = || {
-        let (Some(known), Some(place)) = (&known.location, place) else { return true };
-        known.x_m[0] - reach_m <= place.x_m[1] && place.x_m[0] <= known.x_m[1] + reach_m
-    };
-    known.accepted && known.physics != UNKNOWN && (known_at_wheel || !at_wheel(kind)) && is_near()
+    known.accepted
+        && known.physics != UNKNOWN
+        && (known_at_wheel || !at_wheel(kind))
+        && are_near(known.location.as_ref(), place, reach_m)
+}
+
+/// Whether two locations are at most `reach_m` apart; `None` is everywhere.
+fn are_near(one: Option<&Location>, other: Option<&Location>, reach_m: f64) -> bool {
+    let (Some(one), Some(other)) = (one, other) else { return true };
+    one.x_m[0] - reach_m <= other.x_m[1] && other.x_m[0] <= one.x_m[1] + reach_m
 }
 
 /// A finding as an accepted hypothesis with its probability.
@@ -116,5 +137,18 @@ mod tests {
         assert!(explains(&void, joint, Some(&at(1.81)), 0.375));
         void.accepted = false;
         assert!(!explains(&void, joint, Some(&at(1.81)), 0.375));
+        // Bolts under all of three sleepers are even, under one of them not; a flat has no sleepers.
+        void.physics = "sleeper_bolt".to_owned();
+        assert!(is_even(&void, 3));
+        let under = |sleepers: &[&str]| Location {
+            x_m: [0.0, 1.0],
+            sleepers: sleepers.iter().map(|&id| id.to_owned()).collect(),
+        };
+        void.location = Some(under(&["SN1", "SN2", "SN3"]));
+        assert!(is_even(&void, 3));
+        void.location = Some(under(&["SN2"]));
+        assert!(!is_even(&void, 3));
+        (void.location, void.physics) = (None, "wheel_flat".to_owned());
+        assert!(!is_even(&void, 3));
     }
 }
