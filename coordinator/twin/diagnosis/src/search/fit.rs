@@ -101,9 +101,13 @@ fn all_along(problem: &Problem<'_>, current: &Calibration, fitted: Vec<Fitted>) 
                 let trials = candidate.trials.iter().map(|trial| with_trial(&baseline, trial));
                 trials.min_by(|a, b| with.objective(a).total_cmp(&with.objective(b)))
             });
-            let known = fitted.calibration.clone();
-            fitted.calibration = with.best_from(known, starts.into_iter().flatten());
-            fitted.log_evidence = fitted.calibration.log_evidence - current.log_evidence;
+            let known = fitted.calibration.objective;
+            let best = with.best_from(fitted.calibration.clone(), starts.into_iter().flatten());
+            // Of two minima that are about as good, the one nearer to the nominal track stays.
+            if best.objective < known - BETTER {
+                fitted.log_evidence = best.log_evidence - current.log_evidence;
+                fitted.calibration = best;
+            }
         }
         fitted
     };
