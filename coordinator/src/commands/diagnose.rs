@@ -7,7 +7,9 @@ use super::track::TrackOption;
 use super::{OrInput, Stop, print_json, println_stderr, println_stdout};
 use crate::pipeline;
 use crate::pipeline::diagnose::Setting;
-use crate::pipeline::diagnose_sections::{At, SectionOutput, SectionsError, diagnose_sections};
+use crate::pipeline::diagnose_sections::{
+    At, DIAGNOSIS, PAGE, SectionOutput, SectionsError, add_to, diagnose_sections,
+};
 use crate::pipeline::provenance;
 use anyhow::Context;
 use clap::Args;
@@ -16,7 +18,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Confirmation, ConfirmedSpeed, Diagnosis, Verdict, check_track};
 use tracktwin_experiment::CODE_VERSION;
-use tracktwin_files::{FileName, Kind, Output};
+use tracktwin_files::{Kind, Output};
 use tracktwin_library::{Library, without_password};
 use tracktwin_parameters::{Track, TrackDesign};
 use tracktwin_report::Origin;
@@ -103,7 +105,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let Arguments { recording, models, library, track, out, force, confirm, without, json } =
         arguments;
     let recording = Recording::open(&recording).or_input()?;
-    check(&out, Kind::Results, force, &["report.html", "diagnosis.json"])?;
+    check(&out, Kind::Results, force, &[PAGE, DIAGNOSIS])?;
     recording.doubts.iter().for_each(|doubt| println_stderr(doubt));
     let library = match library {
         // The library of models must exist.
@@ -156,11 +158,9 @@ async fn write(
     force: Force,
     library: Option<&Library>,
 ) -> Result<(), Stop> {
-    let document = serde_json::to_string_pretty(diagnosis).context("a diagnosis is plain JSON")?;
     let page = tracktwin_report::diagnosis_page(diagnosis, origin);
     let mut output = Output::begin(out, Kind::Results, force.force)?;
-    output.add(&FileName::new("report.html")?, page.as_bytes())?;
-    output.add(&FileName::new("diagnosis.json")?, document.as_bytes())?;
+    let document = add_to(&mut output, diagnosis, &page)?;
     output.commit()?;
     if let Some(library) = library {
         let record = provenance::diagnosis(diagnosis, document);

@@ -95,15 +95,10 @@ impl Stages {
     }
 
     /// Ends the current stage; another may begin.
-    fn end_stage(&self) {
+    pub(super) fn end(&self) {
         if let Some((_, progress)) = self.0.lock().take() {
             progress.end();
         }
-    }
-
-    /// Ends the current stage.
-    pub(super) fn end(self) {
-        self.end_stage();
     }
 }
 
@@ -122,7 +117,7 @@ impl SectionStages {
             let mut known = self.section.lock();
             let begun = known.map_or_else(Instant::now, |(_, begun)| begun);
             if known.is_none_or(|(number, _)| number != section) {
-                self.stages.end_stage();
+                self.stages.end();
                 let done = section - 1;
                 let left = match done {
                     0 => String::new(),
@@ -142,7 +137,7 @@ impl SectionStages {
     }
 
     /// Ends the current stage.
-    pub(super) fn end(self) {
+    pub(super) fn end(&self) {
         self.stages.end();
     }
 }

@@ -8,16 +8,18 @@ use tracktwin_diagnosis::{
     DiagnosedSection, Diagnosis, diagnosed_sections, joined, section_folder,
 };
 use tracktwin_experiment::{CODE_VERSION, MODEL_HASH};
-use tracktwin_files::{FileName, FilesError, Kind, Output, is_own, read_text};
+use tracktwin_files::{FileName, FilesError, Kind, Output, check, is_own, read_text};
 use tracktwin_inspection::chain;
 use tracktwin_signal::recording::{Recording, Sleeper};
 
 /// Length of the passes beyond the first and the last sleeper of a section, in spans.
 const BESIDE_SPANS: f64 = 3.5;
 
-/// Names of a section's files: the diagnosis, its page, and the hash of its inputs.
-const DIAGNOSIS: &str = "diagnosis.json";
-const PAGE: &str = "report.html";
+/// Name of the file with a diagnosis.
+pub const DIAGNOSIS: &str = "diagnosis.json";
+/// Name of its page.
+pub const PAGE: &str = "report.html";
+/// Name of the file with the identity of a section's diagnosis.
 const INPUTS: &str = "inputs.json";
 
 /// Output of the sections of a long track, each to a folder of its own. A section whose folder holds the
@@ -164,17 +166,32 @@ impl SectionOutput<'_> {
         if let Some(known) = stored(&folder, &inputs)? {
             return Ok(known);
         }
+        // Before the computation, which takes minutes.
+        check(&folder, Kind::Results, self.force, &[DIAGNOSIS, PAGE, INPUTS])?;
         let mut diagnosis = diagnosis(section, setting, confirm, watch).await?;
         diagnosis.recording = format!("{}, {place}", section.name);
-        let text = serde_json::to_string_pretty(&diagnosis).expect("a diagnosis is plain JSON");
         let inputs = serde_json::to_string_pretty(&inputs).expect("inputs are plain JSON");
         let mut output = Output::begin(&folder, Kind::Results, self.force)?;
-        output.add(&FileName::new(PAGE)?, (self.page)(&diagnosis).as_bytes())?;
         output.add(&FileName::new(INPUTS)?, inputs.as_bytes())?;
-        output.add(&FileName::new(DIAGNOSIS)?, text.as_bytes())?;
+        add_to(&mut output, &diagnosis, &(self.page)(&diagnosis))?;
         output.commit()?;
         Ok(diagnosis)
     }
+}
+
+/// Adds a diagnosis and its page to the files of a folder. Returns the text of the diagnosis.
+///
+/// # Errors
+/// [`FilesError`] if a file cannot be written.
+pub fn add_to(
+    output: &mut Output,
+    diagnosis: &Diagnosis,
+    page: &str,
+) -> Result<String, FilesError> {
+    let text = serde_json::to_string_pretty(diagnosis).expect("a diagnosis is plain JSON");
+    output.add(&FileName::new(PAGE)?, page.as_bytes())?;
+    output.add(&FileName::new(DIAGNOSIS)?, text.as_bytes())?;
+    Ok(text)
 }
 
 /// The diagnosis in a folder, if it has these inputs.

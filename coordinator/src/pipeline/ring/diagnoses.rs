@@ -5,14 +5,11 @@ use super::folder::DIAGNOSES;
 use super::part::Part;
 use super::{RingStudy, RingStudyError, Watch};
 use crate::pipeline::diagnose::Setting;
-use crate::pipeline::diagnose_sections::{At, SectionOutput, diagnose_sections};
+use crate::pipeline::diagnose_sections::{At, DIAGNOSIS, SectionOutput, add_to, diagnose_sections};
 use tracktwin_diagnosis::Diagnosis;
-use tracktwin_files::{FileName, Kind, Output, read_text};
+use tracktwin_files::{Kind, Output, read_text};
 use tracktwin_parameters::Preset;
 use tracktwin_signal::recording::Recording;
-
-/// Name of the file with a diagnosis.
-const DIAGNOSIS: &str = "diagnosis.json";
 
 impl RingStudy<'_> {
     /// Returns the diagnosis of a lap, computed if its file is missing.
@@ -35,16 +32,13 @@ impl RingStudy<'_> {
             let share = 100.0 * share;
             watch(done, &format!("{lap}, {place}: diagnosis, {stage} {share:.0} %"));
         };
-        let page = |diagnosis: &Diagnosis| (self.page)(diagnosis);
-        let output = SectionOutput { folder: &folder, force: self.force, page: &page };
+        let output = SectionOutput { folder: &folder, force: self.force, page: self.page };
         let diagnosed =
             diagnose_sections(&lap.of(recording), setting, false, &output, &shown).await;
         let diagnosis = diagnosed
             .map_err(|source| RingStudyError::Diagnosis { part: lap.to_string(), source })?;
-        let text = serde_json::to_string_pretty(&diagnosis).expect("a diagnosis is plain JSON");
         let mut output = Output::begin(&folder, Kind::Results, self.force)?;
-        output.add(&FileName::new("report.html")?, page(&diagnosis).as_bytes())?;
-        output.add(&FileName::new(DIAGNOSIS)?, text.as_bytes())?;
+        add_to(&mut output, &diagnosis, &(self.page)(&diagnosis))?;
         output.commit()?;
         Ok(diagnosis)
     }

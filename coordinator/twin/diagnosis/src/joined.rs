@@ -1,17 +1,17 @@
 //! One diagnosis of a long track, from the diagnoses of its overlapping sections.
 
+mod hypotheses;
+
 use crate::conclusion::{airborne, verdict};
-use crate::estimate::Estimate;
 use crate::outcome::{
-    BeforeAfter, Confirmation, Diagnosis, FORMAT, FitScores, Hypothesis, Levels, Location,
-    Mismatch, Score, Scores, SectionVerdict, Verdict, meet,
+    BeforeAfter, Confirmation, Diagnosis, FORMAT, FitScores, Levels, Mismatch, Score, Scores,
+    SectionVerdict, Verdict,
 };
 use crate::prepared_recording::overlapping;
 use crate::sentence::sentence;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use tracktwin_inspection::chain::LossOfContact;
-use tracktwin_track::extension::{Kind, PlaceKind};
 
 /// Largest number of sleepers that are diagnosed as a whole.
 const WHOLE_MAX: usize = 48;
@@ -92,13 +92,6 @@ struct Whole<'a> {
     sections: &'a [DiagnosedSection],
 }
 
-/// A hypothesis of a section.
-#[derive(Clone)]
-struct Found {
-    section: usize,
-    hypothesis: Hypothesis,
-}
-
 impl Whole<'_> {
     /// Index of a sleeper in the whole recording.
     fn index(&self, id: &String) -> Option<usize> {
@@ -134,105 +127,6 @@ impl Whole<'_> {
             all.extend(values.filter(|(sleeper, _)| is_own(*sleeper)).map(|(_, it)| it.clone()));
         }
         all
-    }
-
-    fn hypotheses(&self) -> Vec<Hypothesis> {
-        let mut found: Vec<Found> = Vec::new();
-        for (section, diagnosed) in self.sections.iter().enumerate() {
-            let placed = |hypothesis: &Hypothesis| self.placed(section, hypothesis.clone());
-            let all = diagnosed.diagnosis.hypotheses.iter().map(placed);
-            found.extend(all.map(|hypothesis| Found { section, hypothesis }));
-        }
-        let kept = found.iter().filter(|one| !found.iter().any(|other| self.replaces(other, one)));
-        let mut joined: Vec<Hypothesis> = Vec::new();
-        for Found { hypothesis, .. } in kept {
-            match joined.iter_mut().find(|known| self.continues(known, hypothesis)) {
-                Some(known) => self.extend(known, hypothesis),
-                None => joined.push(hypothesis.clone()),
-            }
-        }
-        joined
-    }
-
-    /// A hypothesis on all sleepers of a section refers to the section's own sleepers.
-    fn placed(&self, section: usize, mut hypothesis: Hypothesis) -> Hypothesis {
-        let compared = self.sections[section].diagnosis.track.len();
-        let is_placed = match Kind::from_name(&hypothesis.physics) {
-            Some(kind) => kind.place == PlaceKind::Sleepers,
-            None => hypothesis.port.as_deref() == Some("rail_seat"),
-        };
-        let is_everywhere =
-            hypothesis.location.as_ref().is_none_or(|it| it.sleepers.len() == compared);
-        let own = self.own(section);
-        if let [first, .., last] = own[..]
-            && is_placed
-            && is_everywhere
-        {
-            hypothesis.location = Some(Location {
-                x_m: [self.x_m[first], self.x_m[last]],
-                sleepers: own.iter().map(|&sleeper| self.ids[sleeper].clone()).collect(),
-            });
-        }
-        hypothesis
-    }
-
-    /// Whether the finding of another section replaces a hypothesis: both sections contain its place, and
-    /// the other section contains it farther from the ends.
-    fn replaces(&self, other: &Found, one: &Found) -> bool {
-        let (Some(place), Some(elsewhere)) = (&one.hypothesis.location, &other.hypothesis.location)
-        else {
-            return false;
-        };
-        let is_inside = |place: &Location, section: usize| {
-            let contains =
-                |id| self.index(id).is_some_and(|it| self.sections[section].sleepers.contains(&it));
-            place.sleepers.iter().all(contains)
-        };
-        let owned = |section: usize| {
-            let owners = place.sleepers.iter().map(|id| self.owner(self.index(id)?));
-            owners.filter(|owner| *owner == Some(section)).count()
-        };
-        other.section != one.section
-            && other.hypothesis.accepted
-            && is_inside(place, other.section)
-            && is_inside(elsewhere, one.section)
-            && meet(Some(place), Some(elsewhere))
-            && owned(other.section) > owned(one.section)
-    }
-
-    /// Whether two accepted hypotheses are one finding that continues in the next section.
-    fn continues(&self, known: &Hypothesis, other: &Hypothesis) -> bool {
-        if known.physics != other.physics || known.port != other.port || !known.accepted {
-            return false;
-        }
-        let (Some(place), Some(further)) = (&known.location, &other.location) else {
-            return known.location.is_none() && other.location.is_none();
-        };
-        let indices = |it: &Location| -> Vec<usize> {
-            it.sleepers.iter().filter_map(|id| self.index(id)).collect()
-        };
-        let (place, further) = (indices(place), indices(further));
-        let (Some(&last), Some(&first)) = (place.last(), further.first()) else { return false };
-        let step = |of: &[usize]| of.windows(2).map(|pair| pair[1] - pair[0]).max();
-        let step = step(&place).max(step(&further)).unwrap_or(0);
-        other.accepted && first <= last + step
-    }
-
-    /// Adds a hypothesis of the next section to a known one.
-    fn extend(&self, known: &mut Hypothesis, other: &Hypothesis) {
-        known.probability = known.probability.max(other.probability);
-        known.family_probability = known.family_probability.max(other.family_probability);
-        known.detectability = known.detectability.hypot(other.detectability);
-        known.log_evidence += other.log_evidence;
-        for (name, estimate) in &mut known.parameters {
-            if let Some(further) = other.parameters.get(name) {
-                *estimate = mean(*estimate, *further);
-            }
-        }
-        let (Some(place), Some(further)) = (&mut known.location, &other.location) else { return };
-        place.x_m = [place.x_m[0].min(further.x_m[0]), place.x_m[1].max(further.x_m[1])];
-        let is_there = |id: &&String| place.sleepers.contains(id) || further.sleepers.contains(id);
-        place.sleepers = self.ids.iter().filter(is_there).cloned().collect();
     }
 
     /// Mismatches whose middle is a section's own. The probability is that of such a patch anywhere in all
@@ -383,17 +277,6 @@ impl Whole<'_> {
             nothing_left_out: diagnosis.nothing_left_out,
         }
     }
-}
-
-/// Mean of two estimates, weighted by their variances; its standard deviation includes their difference.
-fn mean(one: Estimate, other: Estimate) -> Estimate {
-    let [a, b] = [one, other].map(|it| it.sd.max(f64::MIN_POSITIVE).powi(-2));
-    if !(a + b).is_finite() {
-        return if a > b { one } else { other };
-    }
-    let mean = (a * one.mean + b * other.mean) / (a + b);
-    let spread = (a * (one.mean - mean).powi(2) + b * (other.mean - mean).powi(2)) / (a + b);
-    Estimate { mean, sd: (1.0 / (a + b) + spread).sqrt() }
 }
 
 #[cfg(test)]

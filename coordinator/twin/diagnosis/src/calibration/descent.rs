@@ -163,9 +163,8 @@ impl Problem<'_> {
 
     /// Minus the log posterior at given values, in nats; infinite if no track exists there.
     pub(crate) fn objective(&self, values: &DVector<f64>) -> f64 {
-        let here = Point { values: values.clone(), residual: DVector::zeros(0), objective: 0.0 };
-        let stay = DVector::zeros(values.len());
-        self.reached(&self.prior(), &here, &stay).map_or(f64::INFINITY, |point| point.objective)
+        let point = self.point(&self.prior(), values.clone());
+        point.map_or(f64::INFINITY, |point| point.objective)
     }
 
     /// As [`Problem::calibrate`], with the last candidate's parameters restricted to their ranges.
@@ -273,10 +272,14 @@ impl Problem<'_> {
         }
     }
 
-    /// The point that a step reaches; `None` if no track exists there (for example, an axle box heavier
-    /// than the wheel).
+    /// The point that a step reaches; `None` if no track exists there.
     fn reached(&self, prior: &Prior, from: &Point, step: &DVector<f64>) -> Option<Point> {
-        let values = &from.values + step;
+        self.point(prior, &from.values + step)
+    }
+
+    /// Values with their residual; `None` if no track exists for them (for example, an axle box heavier than
+    /// the wheel).
+    fn point(&self, prior: &Prior, values: DVector<f64>) -> Option<Point> {
         let residual = self.observation.residual(&self.predict(&values).ok()?);
         let residual = self.observation.fitted(&residual);
         let objective = prior.objective(&residual, &values);

@@ -1,4 +1,6 @@
+use super::hypotheses::mean;
 use super::*;
+use crate::estimate::Estimate;
 use serde_json::{Value, json};
 
 fn ids() -> Vec<String> {

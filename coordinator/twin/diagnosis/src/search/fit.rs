@@ -85,35 +85,43 @@ pub(super) fn fit(
 fn all_along(problem: &Problem<'_>, current: &Calibration, fitted: Vec<Fitted>) -> Vec<Fitted> {
     let Some(best) = fitted.first() else { return fitted };
     let least = RIVAL_SHARE * best.log_evidence;
-    let again = |mut fitted: Fitted| {
+    let again = |fitted: Fitted| {
         let candidate = &fitted.candidate;
         let acts_on_all = candidate.is_everywhere() && candidate.kind.place == PlaceKind::Sleepers;
         if acts_on_all && fitted.log_evidence >= least {
-            let candidates = [problem.candidates, std::slice::from_ref(candidate)].concat();
-            let with = Problem { candidates: &candidates, ..*problem };
-            let count = current.values.len();
-            let baseline = fitted.calibration.values.rows(0, count).into_owned();
-            let with_trial = |baseline: &DVector<f64>, trial: &[f64]| {
-                let trial = candidate.logarithms(trial);
-                DVector::from_iterator(count + trial.len(), baseline.iter().copied().chain(trial))
-            };
-            let starts = problem.with_other_sleepers(&baseline).map(|baseline| {
-                let trials = candidate.trials.iter().map(|trial| with_trial(&baseline, trial));
-                trials.min_by(|a, b| with.objective(a).total_cmp(&with.objective(b)))
-            });
-            let known = fitted.calibration.objective;
-            let best = with.best_from(fitted.calibration.clone(), starts.into_iter().flatten());
-            // Of two minima that are about as good, the one nearer to the nominal track stays.
-            if best.objective < known - BETTER {
-                fitted.log_evidence = best.log_evidence - current.log_evidence;
-                fitted.calibration = best;
-            }
+            on_other_sleepers(problem, current, fitted)
+        } else {
+            fitted
         }
-        fitted
     };
     let mut fitted: Vec<Fitted> = fitted.into_par_iter().map(again).collect();
     fitted.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     fitted
+}
+
+/// Fits a candidate from softer and from stiffer sleepers, each time from the trial that is best there. Of
+/// two minima that are about as good, the known one stays.
+fn on_other_sleepers(problem: &Problem<'_>, current: &Calibration, mut fitted: Fitted) -> Fitted {
+    let candidate = &fitted.candidate;
+    let candidates = [problem.candidates, std::slice::from_ref(candidate)].concat();
+    let with = Problem { candidates: &candidates, ..*problem };
+    let track = fitted.calibration.values.rows(0, current.values.len()).into_owned();
+    let starts = problem.with_other_sleepers(&track).map(|track| {
+        let trials = candidate.trials.iter().map(|trial| with_trial(&track, candidate, trial));
+        trials.min_by(|a, b| with.objective(a).total_cmp(&with.objective(b)))
+    });
+    let best = with.best_from(fitted.calibration.clone(), starts.into_iter().flatten());
+    if best.objective < fitted.calibration.objective - BETTER {
+        fitted.log_evidence = best.log_evidence - current.log_evidence;
+        fitted.calibration = best;
+    }
+    fitted
+}
+
+/// Values of the model without a candidate, and then those of one of its trials.
+fn with_trial(values: &DVector<f64>, candidate: &Candidate, trial: &[f64]) -> DVector<f64> {
+    let all: Vec<f64> = values.iter().copied().chain(candidate.logarithms(trial)).collect();
+    DVector::from_vec(all)
 }
 
 /// Continues the fits of the best candidate and of its competitors, if one of these is of another kind: the
@@ -170,9 +178,7 @@ impl<'t> Begun<'t> {
     ) -> Result<Self, CalibrationError> {
         let candidates: Vec<Candidate> =
             problem.candidates.iter().chain([candidate]).cloned().collect();
-        let mut start: Vec<f64> = start.iter().copied().collect();
-        start.extend(candidate.logarithms(&candidate.trials[template.trial]));
-        let start = DVector::from_vec(start);
+        let start = with_trial(start, candidate, &candidate.trials[template.trial]);
         let descent = Problem { candidates: &candidates, ..*problem }.begin(&start)?;
         Ok(Self { template, candidates, start, descent })
     }
