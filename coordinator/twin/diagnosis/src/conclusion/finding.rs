@@ -23,7 +23,13 @@ impl Evidence<'_> {
             known.physics == finding.physics && are_near(place, location.as_ref(), reach_m)
         };
         let same = all.iter_mut().filter(|known| is_same(known));
-        if let Some(known) = same.max_by_key(|known| known.accepted) {
+        // Of several accepted ones the finding is of the nearest.
+        let distance_m =
+            |known: &Hypothesis| distance_m(known.location.as_ref(), location.as_ref());
+        let nearest = same.min_by(|a, b| {
+            b.accepted.cmp(&a.accepted).then(distance_m(a).total_cmp(&distance_m(b)))
+        });
+        if let Some(known) = nearest {
             known.probability = known.probability.max(probability);
             if known.accepted {
                 return;
@@ -73,10 +79,15 @@ fn explains(known: &Hypothesis, kind: &Kind, place: Option<&Location>, reach_m: 
         && are_near(known.location.as_ref(), place, reach_m)
 }
 
-/// Whether two locations are at most `reach_m` apart; `None` is everywhere.
+/// Whether two locations are at most `reach_m` apart.
 fn are_near(one: Option<&Location>, other: Option<&Location>, reach_m: f64) -> bool {
-    let (Some(one), Some(other)) = (one, other) else { return true };
-    one.x_m[0] - reach_m <= other.x_m[1] && other.x_m[0] <= one.x_m[1] + reach_m
+    distance_m(one, other) <= reach_m
+}
+
+/// Distance of two locations in m, zero if they overlap; `None` is everywhere.
+fn distance_m(one: Option<&Location>, other: Option<&Location>) -> f64 {
+    let (Some(one), Some(other)) = (one, other) else { return 0.0 };
+    (one.x_m[0] - other.x_m[1]).max(other.x_m[0] - one.x_m[1]).max(0.0)
 }
 
 /// A finding as an accepted hypothesis with its probability.

@@ -6,8 +6,9 @@ use crate::estimate::Estimate;
 use crate::outcome::{Hypothesis, UNKNOWN, meet};
 use crate::port_scan::UnknownElement;
 use crate::search::{Fitted, Probabilities, Round};
+use crate::section::Section;
 use std::collections::BTreeMap;
-use tracktwin_track::extension::EffectFamily;
+use tracktwin_track::extension::{EffectFamily, Kind, LookAlikeGroup};
 
 /// Largest probability by chance of the evidence for an unknown stiffness that is reported.
 const PORT_ALARM: f64 = 0.01;
@@ -135,15 +136,7 @@ impl Evidence<'_> {
 
     /// Whether two hypotheses are the same: the same kind at the same location, or next to an accepted one.
     pub(super) fn is_same(&self, known: &Hypothesis, other: &Hypothesis) -> bool {
-        let is_fit = known.accepted && !other.accepted;
-        let are_beside = match (&known.location, &other.location) {
-            (Some(one), Some(another)) => {
-                self.prepared.forward.section.are_beside(one.x_m, another.x_m)
-            }
-            // Everywhere is beside all.
-            _ => true,
-        };
-        known.physics == other.physics && (known.location == other.location || is_fit && are_beside)
+        are_same(known, other, &self.prepared.forward.section)
     }
 
     fn hypothesis(&self, fitted: &Fitted, probability: f64, accepted: bool) -> Hypothesis {
@@ -178,6 +171,21 @@ impl Evidence<'_> {
     }
 }
 
+/// Whether two hypotheses are the same: the same kind at the same location, or a fit of it next to an
+/// accepted one. A second accepted shape of the rail next to the first is the first one's model error;
+/// neighbouring sleepers each have an effect of their own.
+fn are_same(known: &Hypothesis, other: &Hypothesis, section: &Section) -> bool {
+    let are_beside = match (&known.location, &other.location) {
+        (Some(one), Some(another)) => section.are_beside(one.x_m, another.x_m),
+        // Everywhere is beside all.
+        _ => true,
+    };
+    let is_shape = Kind::from_name(&known.physics)
+        .is_some_and(|kind| kind.group == LookAlikeGroup::RailDefect && known.location.is_some());
+    let is_one = known.accepted && (!other.accepted || is_shape) && are_beside;
+    known.physics == other.physics && (known.location == other.location || is_one)
+}
+
 /// Kinds that are similar to unknown physics, although none of them predicts withheld speeds better.
 fn nearest(round: &Round) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
@@ -188,4 +196,43 @@ fn nearest(round: &Round) -> Vec<String> {
         }
     }
     names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::Location;
+    use tracktwin_parameters::TrackDesign;
+
+    #[test]
+    fn two_joints_within_a_spacing_are_one_and_two_hanging_sleepers_are_not() {
+        let section = Section::new(TrackDesign::v_track(), 24, 1.0);
+        let accepted = |physics: &str, x_m: f64| Hypothesis {
+            physics: physics.to_owned(),
+            family: None,
+            family_probability: 0.9,
+            probability: 0.9,
+            accepted: true,
+            location: Some(Location { x_m: [x_m, x_m], sleepers: Vec::new() }),
+            port: None,
+            behaviour: None,
+            parameters: BTreeMap::new(),
+            assumed: BTreeMap::new(),
+            look_alikes: Vec::new(),
+            would_separate: String::new(),
+            detectability: 9.0,
+            log_evidence: 50.0,
+        };
+        let are = |physics: &str, one: f64, other: f64| {
+            are_same(&accepted(physics, one), &accepted(physics, other), &section)
+        };
+        assert!(are("rail_joint", 2.4375, 2.375));
+        assert!(!are("rail_joint", 2.4375, 2.0));
+        assert!(are("hanging_sleeper", 2.375, 2.375));
+        assert!(!are("hanging_sleeper", 2.5, 2.375));
+        let fit = Hypothesis { accepted: false, ..accepted("hanging_sleeper", 2.375) };
+        assert!(are_same(&accepted("hanging_sleeper", 2.5), &fit, &section));
+        let bolts = Hypothesis { location: None, ..accepted("sleeper_bolt", 0.0) };
+        assert!(!are_same(&bolts, &accepted("sleeper_bolt", 2.5), &section));
+    }
 }
