@@ -1,9 +1,11 @@
 //! Fit of the baseline, alone or with extensions, to a recording, with its posterior.
 
 mod descent;
+mod minima;
 mod ranges;
 
 pub(crate) use descent::Descent;
+pub use minima::Minimum;
 
 use crate::candidate::Candidate;
 use crate::forward::{Forward, Linearised};
@@ -63,6 +65,8 @@ pub struct Calibration {
     pub objective: f64,
     /// Log evidence in nats, up to a constant of the observation.
     pub log_evidence: f64,
+    /// Other minima that fits of the same model ended in.
+    pub others: Vec<Minimum>,
 }
 
 struct Prior {
@@ -225,7 +229,15 @@ impl Problem<'_> {
         // Laplace: the constants of the prior's and the posterior's Gaussian cancel.
         let log_evidence =
             -objective + prior.half_log_determinant - 0.5 * precision.ln_determinant();
-        let values = values.clone();
-        Ok(Calibration { values, residual, jacobian, gradient, precision, objective, log_evidence })
+        Ok(Calibration {
+            values: values.clone(),
+            residual,
+            jacobian,
+            gradient,
+            precision,
+            objective,
+            log_evidence,
+            others: Vec::new(),
+        })
     }
 }

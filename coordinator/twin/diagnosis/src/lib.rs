@@ -38,7 +38,7 @@ mod transfer;
 pub use bands::Bands;
 pub use baseline::{Exception, Mean, Unknowns, Variation};
 pub use behaviour::{Behaviour, Element};
-pub use calibration::{Calibration, CalibrationError, Problem};
+pub use calibration::{Calibration, CalibrationError, Minimum, Problem};
 pub use candidate::{Candidate, candidates};
 pub use conclusion::{Evidence, passes_alone};
 pub use confirmation::{ConfirmationError, Confirming};

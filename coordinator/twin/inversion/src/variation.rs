@@ -272,6 +272,7 @@ mod tests {
             precision: posterior,
             objective: 0.0,
             log_evidence: 0.0,
+            others: Vec::new(),
         };
         let data = Quadratic::new(&calibration, unknowns.typical(), &[candidate]).unwrap();
         let best = data.best(&unknowns).unwrap();

@@ -140,7 +140,7 @@ impl Problem<'_> {
         })
     }
 
-    /// The best of a known minimum and those that further starts lead to.
+    /// The best of a known minimum and those that further starts lead to, beside the others.
     pub(crate) fn best_from(
         &self,
         known: Calibration,
@@ -153,10 +153,12 @@ impl Problem<'_> {
             if begun.state.predicted_objective() >= best.objective + HOPE {
                 continue;
             }
-            match self.go_on(begun) {
-                Ok(fitted) if fitted.objective < best.objective => best = fitted,
-                _ => {}
-            }
+            let Ok(fitted) = self.go_on(begun) else { continue };
+            best = if fitted.objective < best.objective {
+                fitted.beside(&best)
+            } else {
+                best.beside(&fitted)
+            };
         }
         best
     }

@@ -138,21 +138,14 @@ impl Evidence<'_> {
 
     pub(super) fn track(&self) -> Vec<SleeperValues> {
         let unknowns = &self.prepared.forward.unknowns;
-        let (before, after) = (&self.search.baseline, &self.search.last);
-        let deviations = [before, after].map(|calibration| {
-            let covariance = calibration.precision.inverse();
-            covariance.diagonal().map(f64::sqrt)
-        });
-        let estimate = |calibration: &Calibration, deviation: &DVector<f64>, index: usize| {
-            let mean = calibration.values[index].exp();
-            Estimate { mean, sd: mean * deviation[index] }
+        let [before, after] = [&self.search.baseline, &self.search.last].map(Calibration::moments);
+        let estimate = |[logarithms, deviations]: &[DVector<f64>; 2], index: usize| {
+            let mean = logarithms[index].exp();
+            Estimate { mean, sd: mean * deviations[index] }
         };
         let both = |quantity, sleeper| {
             let index = unknowns.at(quantity, sleeper);
-            BeforeAfter {
-                before: estimate(before, &deviations[0], index),
-                after: estimate(after, &deviations[1], index),
-            }
+            BeforeAfter { before: estimate(&before, index), after: estimate(&after, index) }
         };
         (0..self.prepared.forward.section.sleepers)
             .map(|sleeper| SleeperValues {

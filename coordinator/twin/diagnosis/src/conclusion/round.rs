@@ -142,11 +142,10 @@ impl Evidence<'_> {
     fn hypothesis(&self, fitted: &Fitted, probability: f64, accepted: bool) -> Hypothesis {
         let Fitted { candidate, calibration, log_evidence, detectability, .. } = fitted;
         let first = calibration.values.len() - candidate.free.len();
-        let covariance = calibration.precision.inverse();
+        let [logarithms, deviations] = calibration.moments();
         let parameters = candidate.free.iter().enumerate().map(|(index, parameter)| {
-            let mean = calibration.values[first + index].exp();
-            let deviation = covariance[(first + index, first + index)].sqrt();
-            (parameter.name.to_owned(), Estimate { mean, sd: mean * deviation })
+            let mean = logarithms[first + index].exp();
+            (parameter.name.to_owned(), Estimate { mean, sd: mean * deviations[first + index] })
         });
         // Of whole numbers each is a candidate of its own.
         let mut assumed = candidate.extension.parameters.clone();

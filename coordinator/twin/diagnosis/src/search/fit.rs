@@ -114,6 +114,8 @@ fn on_other_sleepers(problem: &Problem<'_>, current: &Calibration, mut fitted: F
     if best.objective < fitted.calibration.objective - BETTER {
         fitted.log_evidence = best.log_evidence - current.log_evidence;
         fitted.calibration = best;
+    } else {
+        fitted.calibration = fitted.calibration.beside(&best);
     }
     fitted
 }
@@ -151,7 +153,7 @@ fn further(problem: &Problem<'_>, current: &Calibration, mut fitted: Fitted) -> 
         let gain = fitted.calibration.objective - again.objective;
         if gain > 0.0 {
             fitted.log_evidence = again.log_evidence - current.log_evidence;
-            fitted.calibration = again;
+            fitted.calibration = again.beside(&fitted.calibration);
         }
         if gain < BETTER {
             break;

@@ -17,7 +17,7 @@ mod threshold;
 
 pub(crate) use extent::Extent;
 pub(crate) use limits::HELD_OUT_MIN;
-pub(crate) use probability::Probabilities;
+pub(crate) use probability::{EVIDENCE_TEMPERING, Probabilities};
 
 use self::fit::retuned;
 use self::limits::FALSE_ALARM;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use tracktwin_track::extension::{Kind, LookAlikeGroup};
 
 /// Divisor of log evidence (tempering): the model is not exact, and its errors are correlated.
-pub(super) const EVIDENCE_TEMPERING: f64 = 3.0;
+pub(crate) const EVIDENCE_TEMPERING: f64 = 3.0;
 
 /// Increase of the tempering per nat of the greatest evidence: the error of an extension's model grows with
 /// the extension.
