@@ -20,6 +20,8 @@ pub struct Improvement {
     pub recording: String,
     /// Kinds of physics that were added.
     pub physics: Vec<String>,
+    /// Method of the evaluations, `inversion` or `gp`.
+    pub method: String,
     /// Result of the comparison with withheld passes, if a pass was withheld.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirmation: Option<Confirmation>,
@@ -45,8 +47,8 @@ pub struct ImprovedSleeper {
 }
 
 impl Improvement {
-    /// Creates the comparison from a diagnosis and the documents of two evaluations (`evaluation.json`).
-    /// Returns `None` if the evaluations have no sleeper in common.
+    /// Creates the comparison from a diagnosis and the documents of two evaluations by one method
+    /// (`inversion.json` or `evaluation.json`). Returns `None` if they have no sleeper in common.
     pub fn new(diagnosis: &Diagnosis, before: &Value, after: &Value) -> Option<Self> {
         let accepted = || diagnosis.hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
         let is_at_place = |id: &str| {
@@ -68,11 +70,13 @@ impl Improvement {
                 ballast_stiffness: both("ballast_stiffness_N_m")?,
             })
         };
+        let method = after["method"].as_str()?.to_owned();
         let sleepers: Vec<_> = before["sleepers"].as_array()?.iter().filter_map(sleeper).collect();
         (!sleepers.is_empty()).then(|| Self {
             format: FORMAT,
             recording: diagnosis.recording.clone(),
             physics: accepted().map(|hypothesis| hypothesis.physics.clone()).collect(),
+            method,
             confirmation: diagnosis.confirmation.clone(),
             sleepers,
         })
@@ -93,11 +97,21 @@ pub fn improvement_page(improvement: &Improvement, diagnosis: &Diagnosis) -> Str
         }
         (confirmation::section(diagnosis))
         h2 { "Stiffness before and after" }
-        p { "Estimates of Gaussian processes, mean ± standard deviation in MN/m: trained on a campaign without \
-             what was found, and on one with it in half of the cases. Sleepers at its place are in bold." }
+        p { (estimates(&improvement.method)) " Mean ± standard deviation in MN/m. Sleepers at its place are in bold." }
         div.scroll { (table(&improvement.sleepers)) }
     };
     page(&format!("Improvement of {}", improvement.recording), &diagnosis.sentence, &body)
+}
+
+/// Which estimates the table compares.
+fn estimates(method: &str) -> &'static str {
+    if method == "inversion" {
+        "Estimates of the inversion, with the track model without what was found, and with it. Those of \
+         Gaussian processes are on the pages before and after."
+    } else {
+        "Estimates of Gaussian processes, trained on a campaign without what was found, and on one with it \
+         in half of the cases."
+    }
 }
 
 fn table(sleepers: &[ImprovedSleeper]) -> Markup {

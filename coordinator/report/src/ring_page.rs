@@ -30,10 +30,13 @@ pub fn ring_page(study: &Study, command: &str) -> String {
 /// Summary in one sentence.
 fn summary(study: &Study, statements: &[Statement]) -> String {
     let count = |verdict| Study::count(statements, verdict);
+    let laps = match study.plan.laps {
+        1 => "one lap".to_owned(),
+        laps => format!("{laps} laps"),
+    };
     format!(
-        "{} sleepers, {} laps: of {} statements, {} hold, {} do not, and {} cannot be decided.",
+        "{} sleepers, {laps}: of {} statements, {} hold, {} do not, and {} cannot be decided.",
         study.truth.sleepers.len(),
-        study.plan.laps,
         statements.len(),
         count(ClaimVerdict::Reproduced),
         count(ClaimVerdict::Differs),

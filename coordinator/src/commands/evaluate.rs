@@ -108,7 +108,7 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     let library = open_whole(library).await?;
     let models = load_models(&models)?;
     let beside = method.is_none();
-    let evaluation = evaluate(&recording, &library, models, &out, force, beside).await?;
+    let evaluation = evaluate(&recording, &library, models, &out, force, beside, None).await?;
     if json {
         print_json(&summary(&evaluation, &out));
     } else {
@@ -262,8 +262,8 @@ pub(super) fn check_files(folder: &Path, force: Force) -> Result<(), FilesError>
     check(folder, Kind::Results, force, &names)
 }
 
-/// Evaluates a recording with models of this library and, if `beside` is set, also by inversion. Writes
-/// files and report to `folder`.
+/// Evaluates a recording with models of this library and, if `beside` is set, also by inversion, whose
+/// model contains what `diagnosis` accepted. Writes files and report to `folder`.
 pub(super) async fn evaluate(
     recording: &Recording,
     library: &Library,
@@ -271,6 +271,7 @@ pub(super) async fn evaluate(
     folder: &Path,
     force: Force,
     beside: bool,
+    diagnosis: Option<&Diagnosis>,
 ) -> Result<Evaluation, Stop> {
     let evaluator = Evaluator::new(models, library).await.map_err(stop)?;
     let (recording, notes) = usable_with_notes(recording)?;
@@ -289,7 +290,8 @@ pub(super) async fn evaluate(
     }
     let mut inversion = None;
     if beside {
-        inversion = invert_beside(&recording, &evaluator, library, &mut evaluation).await;
+        let setting = Setting { diagnosis, library: Some(library) };
+        inversion = invert_beside(&recording, &evaluator, setting, &mut evaluation).await;
     }
     let page = tracktwin_report::evaluation_page(
         &evaluation,
@@ -307,12 +309,14 @@ pub(super) async fn evaluate(
 async fn invert_beside(
     recording: &Recording,
     evaluator: &Evaluator,
-    library: &Library,
+    setting: Setting<'_>,
     evaluation: &mut Evaluation,
 ) -> Option<Inversion> {
-    let setting = Setting { diagnosis: None, library: Some(library) };
     match invert(recording, &Track::of(evaluator.design().clone()), setting).await {
-        Ok(inversion) => Some(inversion),
+        Ok(mut inversion) => {
+            inversion.notes.splice(0..0, setting.diagnosis.map(with_physics));
+            Some(inversion)
+        }
         Err(error) => {
             let line = format!("no inversion: {error}");
             println_stderr(&line);

@@ -86,16 +86,16 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
     }
 
     println_stderr("2 of 4: campaign of the track without what was found");
-    let evaluated = |campaign: PathBuf, out: PathBuf| {
-        campaign::Arguments::of(campaign, &path, &library, out, cores, force)
+    let evaluated = |campaign: PathBuf, out: PathBuf, diagnosis: Option<PathBuf>| {
+        campaign::Arguments::of(campaign, &path, &library, out, cores, force, diagnosis)
     };
-    simulate(evaluated(plain.clone(), out.join("before"))).await?;
+    simulate(evaluated(plain.clone(), out.join("before"), None)).await?;
 
     println_stderr("3 of 4: campaign with what was found in half of the cases");
     let extended = plain.with_file_name("campaign-extended.toml");
     let found = folder.join("diagnosis.json");
-    extend::run(extend::Arguments::of(plain, found, extended.clone(), force))?;
-    simulate(evaluated(extended, out.join("after"))).await?;
+    extend::run(extend::Arguments::of(plain, found.clone(), extended.clone(), force))?;
+    simulate(evaluated(extended, out.join("after"), Some(found))).await?;
 
     println_stderr("4 of 4: report");
     write(&diagnosis, &out, force)?;
@@ -137,15 +137,20 @@ fn write_campaign(
     Ok(campaign)
 }
 
-/// Writes the page and the document, from the evaluations before and after.
+/// Writes the page and the document, from the evaluations before and after: those by inversion, or those of
+/// models if an inversion failed.
 fn write(diagnosis: &Diagnosis, out: &Path, force: Force) -> Result<(), Stop> {
+    let folders = ["before", "after"];
+    let is_inverted = folders.iter().all(|name| out.join(name).join("inversion.json").exists());
+    let file = if is_inverted { "inversion.json" } else { "evaluation.json" };
     let evaluation = |name: &str| {
-        let path = out.join(name).join("evaluation.json");
+        let path = out.join(name).join(file);
         let text = read(&path)?;
         serde_json::from_slice(&text)
             .with_context(|| format!("{}: not an evaluation", path.display()))
     };
-    let [before, after] = [evaluation("before")?, evaluation("after")?];
+    let [before, after] = folders.map(evaluation);
+    let [before, after] = [before?, after?];
     let improvement = Improvement::new(diagnosis, &before, &after).ok_or_else(|| {
         anyhow!("{}: the two evaluations have no sleepers in common", out.display())
     })?;

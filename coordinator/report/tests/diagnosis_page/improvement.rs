@@ -13,7 +13,7 @@ fn evaluation(sleepers: &[(&str, f64)]) -> Value {
             "ballast_stiffness_N_m": {"mean": 1.1e7, "sd": 6e5},
         })
     };
-    json!({"sleepers": sleepers.iter().map(sleeper).collect::<Vec<_>>()})
+    json!({"method": "inversion", "sleepers": sleepers.iter().map(sleeper).collect::<Vec<_>>()})
 }
 
 #[test]
@@ -26,11 +26,13 @@ fn estimates_stand_before_and_after_and_the_place_in_bold() {
         improvement.sleepers.iter().map(|it| (it.id.as_str(), it.is_at_place)).collect();
     assert_eq!(places, [("SN17", false), ("SN18", true)]);
     assert_eq!(improvement.physics, ["rail_joint"]);
+    assert_eq!(improvement.method, "inversion");
     let page = improvement_page(&improvement, &diagnosis);
     assert_reads(
         &page,
         &["<b>SN18</b>", "84.0 ± 12", "153 ± 12", "11.0 ± 0.60", "They confirm it"],
     );
+    assert_reads(&page, &["Estimates of the inversion"]);
     assert_reads(&page, &["href=\"before/report.html\"", "href=\"after/report.html\""]);
     let document = serde_json::to_value(&improvement).unwrap();
     assert_eq!(document["format"], "tracktwin-improvement/1");

@@ -3,6 +3,7 @@
 mod room;
 mod sample;
 
+use super::accepted::diagnosis_of;
 use super::files::{Force, make_folder};
 use super::library_url::open_or_create;
 use super::numbers::{cores, count};
@@ -82,10 +83,14 @@ pub(super) struct Arguments {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+    /// Diagnosis of the recording, whose accepted physics is part of the inversion's model.
+    #[arg(skip)]
+    diagnosis: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// Arguments for a campaign file whose models evaluate a recording.
+    /// Arguments for a campaign file whose models evaluate a recording, beside an inversion with what a
+    /// diagnosis accepted.
     pub(super) fn of(
         campaign: PathBuf,
         recording: &Path,
@@ -93,6 +98,7 @@ impl Arguments {
         out: PathBuf,
         cores: Option<NonZeroUsize>,
         force: Force,
+        diagnosis: Option<PathBuf>,
     ) -> Self {
         Self {
             campaign: Some(campaign),
@@ -107,6 +113,7 @@ impl Arguments {
             cores,
             print_campaign: false,
             json: false,
+            diagnosis,
         }
     }
 
@@ -222,7 +229,12 @@ async fn chain(
     let trained = models::train_into(&folder, force.force, library, &record, 0, &watch).await?;
     bar.end();
     let evaluation = match recording {
-        Some(it) => Some(evaluate::evaluate(&it, library, trained, out, *force, true).await?),
+        Some(it) => {
+            let path = arguments.diagnosis.as_deref();
+            let found = path.map(|path| diagnosis_of(&it, path)).transpose()?;
+            let found = found.as_ref();
+            Some(evaluate::evaluate(&it, library, trained, out, *force, true, found).await?)
+        }
         None => None,
     };
     Ok(Made { models: Some(folder), evaluation })
