@@ -219,6 +219,12 @@ fn surprise(kind: &Kind, length_m: f64, length_ratio: f64) -> f64 {
     0.5 * ((length_m.ln() - 0.5 * (low + high)) / half_width).powi(2) + half_width.ln()
 }
 
+/// Depth of the dip of a joint and its standard deviation in m. A joint also bends more easily, which adds
+/// power as a dip does, and passes alone do not separate the two: the dip has any share of the depth.
+fn dip_m((depth_m, deviation_m): (f64, f64)) -> (f64, f64) {
+    (depth_m, deviation_m.max(depth_m))
+}
+
 /// Kind of the shape at an impact, and its parameters. A kink is a joint. A hollow is a squat or the rounded
 /// dip of a joint: the kind in whose range its length lies, or which it is nearer to.
 fn impact_kind(
@@ -227,7 +233,7 @@ fn impact_kind(
 ) -> (&'static Kind, BTreeMap<&'static str, (f64, f64)>) {
     let (length, deviation) = shape.length_m;
     if shape.form == Form::Dip {
-        let dip = [("length_m", shape.length_m), ("dip_m", shape.depth_m)];
+        let dip = [("length_m", shape.length_m), ("dip_m", dip_m(shape.depth_m))];
         return (RAIL_JOINT, BTreeMap::from(dip));
     }
     let as_dip_m = ROUNDED_DIP * length;
@@ -237,7 +243,7 @@ fn impact_kind(
     }
     let dip = [
         ("length_m", (as_dip_m, ROUNDED_DIP * deviation)),
-        ("dip_m", shape.depth_m),
+        ("dip_m", dip_m(shape.depth_m)),
         ("dip_exponent", (ROUNDED, 0.0)),
     ];
     (RAIL_JOINT, BTreeMap::from(dip))
@@ -328,6 +334,10 @@ mod tests {
             let (kind, parameters) = impact_kind(&hollow(length_m), length_ratio);
             assert_eq!(kind.physics, physics, "{length_m} m, {length_ratio}");
             assert!(parameters.keys().all(|name| kind.parameter(name).is_some()));
+            // The power of a joint is that of its dip and of its bending.
+            let depth = parameters.get("dip_m").or(parameters.get("depth_m")).unwrap();
+            let expected = if physics == "rail_joint" { 5e-5 } else { 1e-5 };
+            assert_eq!(depth.1, expected, "{physics}");
         }
     }
 
