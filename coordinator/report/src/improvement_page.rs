@@ -1,21 +1,17 @@
 //! The page of an improvement: estimates without and with the left-out physics.
 
+use crate::along_track::AlongTrack;
 use crate::diagnosis_page::confirmation;
 use maud::{Markup, html};
 use serde::Serialize;
 use serde_json::Value;
 use tracktwin_diagnosis::{BeforeAfter, Confirmation, Diagnosis, Estimate};
-use tracktwin_drawing::{Axis, Chart, Shown, figure, page};
+use tracktwin_drawing::{figure, page};
 use tracktwin_number::significant;
 use tracktwin_parameters::Parameter;
 
 /// Name and version of the format.
 const FORMAT: &str = "tracktwin-improvement/1";
-
-const SIZE: [f64; 2] = [1104.0, 240.0];
-
-/// Largest number of sleeper names that fit below a chart.
-const NAMES: usize = 20;
 
 /// Estimates from a recording, without and with the physics that a diagnosis found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -113,32 +109,16 @@ pub fn improvement_page(improvement: &Improvement, diagnosis: &Diagnosis) -> Str
 
 /// Charts of railpad and ballast stiffness along the track.
 fn charts(sleepers: &[ImprovedSleeper]) -> [String; 2] {
-    let chart = |parameter: Parameter, pick: fn(&ImprovedSleeper) -> &BeforeAfter<Estimate>| {
-        let shown = Shown::of(parameter);
-        let points = |side: fn(&BeforeAfter<Estimate>) -> Estimate| -> Vec<(f64, f64, f64)> {
-            let point = |sleeper: &ImprovedSleeper| {
-                let Estimate { mean, sd } = side(pick(sleeper));
-                (sleeper.x_m, mean / shown.divisor, 2.0 * sd / shown.divisor)
-            };
-            sleepers.iter().map(point).collect()
-        };
-        let (before, after) = (points(|both| both.before), points(|both| both.after));
-        let ends = before.iter().chain(&after).flat_map(|p| [(p.1 - p.2).max(0.0), p.1 + p.2]);
-        let y = Axis::around(&format!("in {}", shown.unit), ends);
-        let x = Axis::around("sleeper", sleepers.iter().map(|sleeper| sleeper.x_m));
-        let label = parameter.label();
-        let title = format!("{}{}", label[..1].to_uppercase(), &label[1..]);
-        let mut chart = Chart::new(&title, SIZE, x, y);
-        for sleeper in sleepers.iter().filter(|sleeper| sleeper.is_at_place) {
-            chart.vertical(sleeper.x_m);
+    let chart = |parameter, pick: fn(&ImprovedSleeper) -> &BeforeAfter<Estimate>| {
+        let at_place = sleepers.iter().filter(|sleeper| sleeper.is_at_place);
+        AlongTrack {
+            parameter,
+            sleepers: sleepers.iter().map(|it| (it.x_m, it.id.as_str())).collect(),
+            before: sleepers.iter().map(|sleeper| pick(sleeper).before).collect(),
+            after: Some(sleepers.iter().map(|sleeper| pick(sleeper).after).collect()),
+            places_m: at_place.map(|sleeper| sleeper.x_m).collect(),
         }
-        chart.curve("was", &before);
-        chart.explain("was", "before");
-        chart.curve("a", &after);
-        chart.explain("a", "after");
-        let step = sleepers.len().div_ceil(NAMES);
-        chart.name_x(sleepers.iter().step_by(step).map(|it| (it.x_m, it.id.clone())).collect());
-        chart.into_svg()
+        .chart()
     };
     [
         chart(Parameter::RailpadStiffness, |sleeper| &sleeper.railpad_stiffness),

@@ -3,6 +3,7 @@
 //! This crate defines the appearance of results. Every function converts data to text. The caller supplies
 //! the data and writes the text to a file.
 
+mod along_track;
 mod diagnosis_page;
 mod evaluation_page;
 mod hammer_page;

@@ -3,15 +3,11 @@
 use super::quantity::{Unit, rounded_pair, signed};
 use super::words::{accepted, addition, is_chain, numbers, physics};
 use crate::UNDER_LOAD;
+use crate::along_track::AlongTrack;
 use maud::{Markup, html};
 use tracktwin_diagnosis::{BeforeAfter, Diagnosis, Estimate, SleeperValues};
-use tracktwin_drawing::{Axis, Chart, Shown, figure};
+use tracktwin_drawing::figure;
 use tracktwin_parameters::Parameter;
-
-const SIZE: [f64; 2] = [1104.0, 240.0];
-
-/// Maximum number of sleeper names that fit below a chart.
-const NAMES: usize = 20;
 
 /// A parameter, and the access to its values at a sleeper.
 type Column = (Parameter, fn(&SleeperValues) -> &BeforeAfter<Estimate>);
@@ -38,49 +34,32 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
 }
 
 fn chart(diagnosis: &Diagnosis, (parameter, pick): &Column) -> String {
-    let shown = Shown::of(*parameter);
-    let points = |side: fn(&BeforeAfter<Estimate>) -> Estimate| -> Vec<(f64, f64, f64)> {
-        let point = |sleeper: &SleeperValues| {
-            let Estimate { mean, sd } = side(pick(sleeper));
-            (sleeper.x_m, mean / shown.divisor, 2.0 * sd / shown.divisor)
-        };
-        let finite = |(_, mean, two): &(f64, f64, f64)| mean.is_finite() && two.is_finite();
-        diagnosis.track.iter().map(point).filter(finite).collect()
+    let estimates = |side: fn(&BeforeAfter<Estimate>) -> Estimate| -> Vec<Estimate> {
+        diagnosis.track.iter().map(|sleeper| side(pick(sleeper))).collect()
     };
-    let (before, after) = (points(|both| both.before), points(|both| both.after));
-    let both = addition(diagnosis).is_some();
-    let drawn = if both { [&before[..], &after] } else { [&before[..], &before] };
-    let ends = drawn.iter().flat_map(|side| side.iter()).flat_map(|p| [p.1 - p.2, p.1 + p.2]);
-    let y = Axis::around(&format!("in {}", shown.unit), ends.map(|end| end.max(0.0)));
-    let x = Axis::around("sleeper", diagnosis.track.iter().map(|sleeper| sleeper.x_m));
-    let label = parameter.label();
-    let title = format!("{}{}", label[..1].to_uppercase(), &label[1..]);
-    let mut chart = Chart::new(&title, SIZE, x, y);
-    mark_places(&mut chart, diagnosis);
-    if both {
-        chart.curve("was", &before);
-        chart.explain("was", "before");
-        chart.explain("a", "after");
+    AlongTrack {
+        parameter: *parameter,
+        sleepers: diagnosis.track.iter().map(|it| (it.x_m, it.id.as_str())).collect(),
+        before: estimates(|both| both.before),
+        after: addition(diagnosis).map(|_| estimates(|both| both.after)),
+        places_m: places_m(diagnosis),
     }
-    chart.curve("a", if both { &after } else { &before });
-    let step = diagnosis.track.len().div_ceil(NAMES);
-    chart.name_x(diagnosis.track.iter().step_by(step).map(|s| (s.x_m, s.id.clone())).collect());
-    chart.into_svg()
+    .chart()
 }
 
-/// Draws thin lines at the positions of accepted physics, unless they cover nearly the whole track.
-fn mark_places(chart: &mut Chart, diagnosis: &Diagnosis) {
+/// Positions in m of accepted physics, unless it covers nearly the whole track.
+fn places_m(diagnosis: &Diagnosis) -> Vec<f64> {
+    let mut places_m = Vec::new();
     for location in accepted(diagnosis).filter_map(|hypothesis| hypothesis.location.as_ref()) {
         let places = numbers(diagnosis, &location.sleepers);
         let [from, to] = location.x_m;
         if to - from < 1e-3 {
-            chart.vertical(from);
+            places_m.push(from);
         } else if 2 * places.len() < diagnosis.track.len() {
-            for place in places {
-                chart.vertical(diagnosis.track[place].x_m);
-            }
+            places_m.extend(places.into_iter().map(|place| diagnosis.track[place].x_m));
         }
     }
+    places_m
 }
 
 fn caption(diagnosis: &Diagnosis) -> String {

@@ -281,3 +281,26 @@ pub struct Levels {
     #[serde(rename = "scatter_dB")]
     pub scatter_db: Vec<Vec<Option<f64>>>,
 }
+
+#[cfg(test)]
+impl Hypothesis {
+    /// An accepted hypothesis, for tests.
+    pub(crate) fn accepted(physics: &str, location: Option<Location>) -> Self {
+        Self {
+            physics: physics.to_owned(),
+            family: None,
+            family_probability: 0.987,
+            probability: 0.987,
+            accepted: true,
+            location,
+            port: None,
+            behaviour: None,
+            parameters: BTreeMap::new(),
+            assumed: BTreeMap::new(),
+            look_alikes: Vec::new(),
+            would_separate: String::new(),
+            detectability: 9.0,
+            log_evidence: 40.0,
+        }
+    }
+}

@@ -183,25 +183,6 @@ mod tests {
     use crate::estimate::Estimate;
     use crate::outcome::{Location, Score, Scores};
 
-    fn hypothesis(physics: &str, location: Option<Location>) -> Hypothesis {
-        Hypothesis {
-            physics: physics.to_owned(),
-            family: None,
-            family_probability: 0.987,
-            probability: 0.987,
-            accepted: true,
-            location,
-            port: None,
-            behaviour: None,
-            parameters: BTreeMap::new(),
-            assumed: BTreeMap::new(),
-            look_alikes: Vec::new(),
-            would_separate: String::new(),
-            detectability: 9.0,
-            log_evidence: 40.0,
-        }
-    }
-
     #[test]
     fn where_nothing_is_named_agreement_is_not_said_of_what_seems_left_out() {
         let held_out = Some(Score { score: -1.0 });
@@ -234,7 +215,10 @@ mod tests {
     #[test]
     fn all_that_was_accepted_is_said_with_its_place() {
         let at = Location { x_m: [1.125, 1.125], sleepers: vec!["SN9".to_owned()] };
-        let two = [hypothesis("wheel_flat", None), hypothesis("missing_railpad", Some(at))];
+        let two = [
+            Hypothesis::accepted("wheel_flat", None),
+            Hypothesis::accepted("missing_railpad", Some(at)),
+        ];
         let scores = Scores { in_sample: Score { score: -1.0 }, held_out: None };
         let fit = FitScores {
             score: String::new(),
@@ -258,7 +242,7 @@ mod tests {
             probability: 0.8,
             family_probability: 0.95,
             would_separate: "passes with another wheel load".to_owned(),
-            ..hypothesis("hanging_sleeper", Some(at))
+            ..Hypothesis::accepted("hanging_sleeper", Some(at))
         };
         assert_eq!(
             named(&first, &track()),
@@ -266,7 +250,7 @@ mod tests {
              probably a sleeper hangs on the rail over a gap and meets its ballast only when it closes \
              (hanging_sleeper, 80 %)."
         );
-        let mut second = hypothesis("subgrade_layer", None);
+        let mut second = Hypothesis::accepted("subgrade_layer", None);
         (second.accepted, second.probability) = (false, 0.15);
         let sure = Hypothesis { probability: 0.97, ..first.clone() };
         assert_eq!(rival(&sure, &[sure.clone(), second.clone()]), "");
@@ -288,7 +272,7 @@ mod tests {
                 ("mass_kg".to_owned(), estimate(0.41)),
                 ("frequency_Hz".to_owned(), estimate(900.0)),
             ]),
-            ..hypothesis("unknown_physics", Some(at))
+            ..Hypothesis::accepted("unknown_physics", Some(at))
         };
         assert_eq!(
             capital(&named(&absorber, &track())),

@@ -4,7 +4,7 @@ use super::Calibration;
 use crate::search::EVIDENCE_TEMPERING;
 use nalgebra::DVector;
 
-/// Squared distance of two minima, in standard deviations of either, from which they are separate.
+/// Squared distance of two minima, in standard deviations of the narrower one, from which they are separate.
 const APART: f64 = 9.0;
 
 /// Another minimum of a fit's objective.

@@ -123,22 +123,7 @@ mod tests {
     #[test]
     fn an_effect_explains_what_is_found_beside_it_and_not_what_is_found_far_away() {
         let at = |x_m: f64| Location { x_m: [x_m, x_m], sleepers: Vec::new() };
-        let mut void = Hypothesis {
-            physics: "hanging_sleeper".to_owned(),
-            family: None,
-            family_probability: 0.97,
-            probability: 0.97,
-            accepted: true,
-            location: Some(at(3.375)),
-            port: None,
-            behaviour: None,
-            parameters: BTreeMap::new(),
-            assumed: BTreeMap::new(),
-            look_alikes: Vec::new(),
-            would_separate: String::new(),
-            detectability: 18.0,
-            log_evidence: 400.0,
-        };
+        let mut void = Hypothesis::accepted("hanging_sleeper", Some(at(3.375)));
         let joint = Kind::from_name("rail_joint").unwrap();
         let flat = Kind::from_name("wheel_flat").unwrap();
         assert!(explains(&void, joint, Some(&at(3.2)), 0.375));

@@ -206,21 +206,9 @@ mod tests {
     #[test]
     fn two_joints_within_a_spacing_are_one_and_two_hanging_sleepers_are_not() {
         let section = Section::new(TrackDesign::v_track(), 24, 1.0);
-        let accepted = |physics: &str, x_m: f64| Hypothesis {
-            physics: physics.to_owned(),
-            family: None,
-            family_probability: 0.9,
-            probability: 0.9,
-            accepted: true,
-            location: Some(Location { x_m: [x_m, x_m], sleepers: Vec::new() }),
-            port: None,
-            behaviour: None,
-            parameters: BTreeMap::new(),
-            assumed: BTreeMap::new(),
-            look_alikes: Vec::new(),
-            would_separate: String::new(),
-            detectability: 9.0,
-            log_evidence: 50.0,
+        let accepted = |physics: &str, x_m: f64| {
+            let location = Location { x_m: [x_m, x_m], sleepers: Vec::new() };
+            Hypothesis::accepted(physics, Some(location))
         };
         let are = |physics: &str, one: f64, other: f64| {
             are_same(&accepted(physics, one), &accepted(physics, other), &section)
