@@ -3,11 +3,14 @@
 use super::files::{Force, check, make_folder, read, write_file};
 use super::numbers::{cores, count};
 use super::track::TrackOption;
-use super::{OrInput, Stop, diagnose, extend, println_stderr, println_stdout, run as campaign};
+use super::{
+    OrInput, Stop, diagnose, evaluate, extend, println_stderr, println_stdout, run as campaign,
+};
 use crate::pipeline::confirm::has_pass_to_withhold;
 use crate::pipeline::lack::check_for_training;
 use anyhow::{Context, anyhow};
 use clap::Args;
+use std::io::ErrorKind;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use tracktwin_diagnosis::{Confirmation, Diagnosis};
@@ -16,6 +19,9 @@ use tracktwin_files::{FileName, Kind, Output};
 use tracktwin_parameters::quantity::CASES;
 use tracktwin_report::{Improvement, improvement_page};
 use tracktwin_signal::recording::Recording;
+
+/// Folders of the evaluations without and with what was found.
+const FOLDERS: [&str; 2] = ["before", "after"];
 
 /// Number of cases of each of the two campaigns.
 const CASES_EACH: &str = "400";
@@ -85,17 +91,20 @@ pub(super) async fn run(arguments: Arguments) -> Result<(), Stop> {
         return Err(Stop::Negative);
     }
 
+    for name in FOLDERS {
+        remove_inversion(&out.join(name), force)?;
+    }
     println_stderr("2 of 4: campaign of the track without what was found");
     let evaluated = |campaign: PathBuf, out: PathBuf, diagnosis: Option<PathBuf>| {
         campaign::Arguments::of(campaign, &path, &library, out, cores, force, diagnosis)
     };
-    simulate(evaluated(plain.clone(), out.join("before"), None)).await?;
+    simulate(evaluated(plain.clone(), out.join(FOLDERS[0]), None)).await?;
 
     println_stderr("3 of 4: campaign with what was found in half of the cases");
     let extended = plain.with_file_name("campaign-extended.toml");
     let found = folder.join("diagnosis.json");
     extend::run(extend::Arguments::of(plain, found.clone(), extended.clone(), force))?;
-    simulate(evaluated(extended, out.join("after"), Some(found))).await?;
+    simulate(evaluated(extended, out.join(FOLDERS[1]), Some(found))).await?;
 
     println_stderr("4 of 4: report");
     write(&diagnosis, &out, force)?;
@@ -112,6 +121,21 @@ async fn simulate(arguments: campaign::Arguments) -> Result<(), Stop> {
         Err(Stop::Negative) => Ok(()),
         other => other,
     }
+}
+
+/// Removes the inversion of an earlier run, which would be shown if the inversion of this run fails.
+fn remove_inversion(folder: &Path, force: Force) -> Result<(), Stop> {
+    evaluate::check_files(folder, force)?;
+    for name in ["inversion.json", "inversion.csv"] {
+        let path = folder.join(name);
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(anyhow!("{}: {error}", path.display()).into());
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Writes a campaign of the recording's track at the recording's speeds, and the description of this track.
@@ -140,8 +164,7 @@ fn write_campaign(
 /// Writes the page and the document, from the evaluations before and after: those by inversion, or those of
 /// models if an inversion failed.
 fn write(diagnosis: &Diagnosis, out: &Path, force: Force) -> Result<(), Stop> {
-    let folders = ["before", "after"];
-    let is_inverted = folders.iter().all(|name| out.join(name).join("inversion.json").exists());
+    let is_inverted = FOLDERS.iter().all(|name| out.join(name).join("inversion.json").exists());
     let file = if is_inverted { "inversion.json" } else { "evaluation.json" };
     let evaluation = |name: &str| {
         let path = out.join(name).join(file);
@@ -149,7 +172,7 @@ fn write(diagnosis: &Diagnosis, out: &Path, force: Force) -> Result<(), Stop> {
         serde_json::from_slice(&text)
             .with_context(|| format!("{}: not an evaluation", path.display()))
     };
-    let [before, after] = folders.map(evaluation);
+    let [before, after] = FOLDERS.map(evaluation);
     let [before, after] = [before?, after?];
     let improvement = Improvement::new(diagnosis, &before, &after).ok_or_else(|| {
         anyhow!("{}: the two evaluations have no sleepers in common", out.display())

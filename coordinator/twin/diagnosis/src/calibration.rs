@@ -20,6 +20,10 @@ use tracktwin_track::model::ModelError;
 /// Step of the logarithms of extension parameters for numerical derivatives.
 const VARIATION: f64 = 1e-3;
 
+/// Error of a local candidate's effect as a share of the effect: of hanging sleepers of two other simulators
+/// (docs/decisions/0038-evaluation-by-inversion.md).
+const INEXACT: f64 = 0.6;
+
 /// Number of sleepers on either side of a force law from which the wheel load affects the law.
 const LOADED: usize = 2;
 
@@ -118,6 +122,38 @@ impl Problem<'_> {
     /// [`CalibrationError`] if no track or extension exists for the values.
     pub(crate) fn at(&self, values: &DVector<f64>) -> Result<Calibration, CalibrationError> {
         self.linearise(&self.prior(), values)
+    }
+
+    /// Factor on the covariance of every sleeper for the error of the local candidates' models, which grows
+    /// with their effect: the values common to all sleepers are then not fitted to it.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if no track or extension exists for the values.
+    pub fn inexactness(&self, values: &DVector<f64>) -> Result<Vec<f64>, CalibrationError> {
+        let sleepers = self.forward.section.sleepers;
+        let is_local = |candidate: &Candidate| {
+            let acting = candidate.extension.sleepers.as_ref().map(Vec::len);
+            !candidate.is_everywhere() && acting.is_none_or(|acting| 2 * acting <= sleepers)
+        };
+        if !self.candidates.iter().any(is_local) {
+            return Ok(vec![1.0; sleepers]);
+        }
+        let all = self.extensions(values)?;
+        let even: Vec<_> = all
+            .iter()
+            .zip(self.candidates)
+            .filter(|(_, candidate)| !is_local(candidate))
+            .map(|(extension, _)| Arc::clone(extension))
+            .collect();
+        let change =
+            self.forward.log_power(values, &all)? - self.forward.log_power(values, &even)?;
+        let change = self.observation.fitted(&self.observation.whiten(&change));
+        let each = change.len() / sleepers;
+        let factor = |sleeper: usize| {
+            let square = change.rows(sleeper * each, each).norm_squared();
+            1.0 + INEXACT.powi(2) * square / self.observation.compared() as f64
+        };
+        Ok((0..sleepers).map(factor).collect())
     }
 
     fn predict(&self, values: &DVector<f64>) -> Result<DVector<f64>, CalibrationError> {

@@ -1,6 +1,6 @@
 //! Summary of a diagnosis in one or two sentences.
 
-use crate::outcome::{BeforeAfter, FitScores, Hypothesis, Verdict, meet};
+use crate::outcome::{BeforeAfter, FitScores, Hypothesis, UNKNOWN, Verdict, meet};
 use std::collections::BTreeMap;
 use tracktwin_track::extension::{Kind, PlaceKind};
 
@@ -83,9 +83,11 @@ fn rival(first: &Hypothesis, hypotheses: &[Hypothesis]) -> String {
     };
     let Some(other) = hypotheses.iter().find(is_rival) else { return String::new() };
     let percent = 100.0 * other.probability;
+    let is_unknown = other.physics == UNKNOWN;
+    let name = if is_unknown { unknown(other) } else { other.physics.clone() };
     format!(
-        " It could also be {} ({percent:.0} %). To tell them apart: {}.",
-        other.physics, first.would_separate
+        " It could also be {name} ({percent:.0} %). To tell them apart: {}.",
+        first.would_separate
     )
 }
 

@@ -95,9 +95,11 @@ pub fn fit(
     };
     let problem = Problem { forward: &forward, observation: &plain, candidates: known };
     let mut calibration = problem.calibrate_widely(start)?;
+    let inexact = problem.inexactness(&calibration.values)?;
     for _ in 0..ROUNDS {
         let found = misfit(&calibration, &factors, plain.compared());
-        factors = found.into_iter().map(factor).collect();
+        let found = found.into_iter().map(factor);
+        factors = found.zip(&inexact).map(|(factor, inexact)| factor.max(*inexact)).collect();
         calibration = fit(&forward, &factors, calibration.values)?;
         let data = Quadratic::new(&calibration, forward.unknowns.typical(), known)
             .ok_or(CalibrationError::NotFinite)?;

@@ -5,9 +5,14 @@
 use crate::known::kind;
 use nalgebra::DVector;
 use tracktwin_diagnosis::{CalibrationError, PreparedRecording, SearchOutcome, signature};
+use tracktwin_parameters::Preset;
 use tracktwin_reference_simulator::{Hidden, Scene};
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::ExtensionInstance;
+
+/// Length in m of a crack in the simulators, which a scene does not state.
+const CRACK_V_TRACK_M: f64 = 0.02;
+const CRACK_LINE_M: f64 = 0.05;
 
 /// `d'` of a hidden effect. `None` if the forward model does not contain the effect.
 ///
@@ -20,7 +25,7 @@ pub fn detectability(
     scene: &Scene,
     hidden: &Hidden,
 ) -> Result<Option<f64>, CalibrationError> {
-    let Some(extension) = in_recording(recording, prepared, hidden) else { return Ok(None) };
+    let Some(extension) = in_recording(recording, prepared, scene, hidden) else { return Ok(None) };
     let values = values(recording, prepared, scene);
     let length = signature(prepared, &search.observation, &values, extension)?;
     Ok((length > 0.0).then_some(length))
@@ -30,12 +35,17 @@ pub fn detectability(
 fn in_recording(
     recording: &Recording,
     prepared: &PreparedRecording,
+    scene: &Scene,
     hidden: &Hidden,
 ) -> Option<ExtensionInstance> {
     // Faults of the measuring chain are in the model where it is searched for them.
     kind(hidden).filter(|kind| !kind.measuring_chain || !kind.screening.families.is_empty())?;
     let json = serde_json::to_value(hidden).ok()?;
     let mut extension: ExtensionInstance = serde_json::from_value(json).ok()?;
+    if let Hidden::CrackedSleeper { .. } = hidden {
+        let crack_m = if scene.preset == Preset::VTrack { CRACK_V_TRACK_M } else { CRACK_LINE_M };
+        extension = extension.with("bending_length_m", crack_m);
+    }
     let compared: Vec<Option<usize>> =
         (0..prepared.forward.section.sleepers).map(|s| number(recording, prepared, s)).collect();
     if let Some(sleepers) = &mut extension.sleepers {

@@ -34,7 +34,8 @@ pub(super) static KINDS: &[Kind] = &[
 /// A kind that a test adds.
 pub(super) static ADDED: OnceLock<&'static Kind> = OnceLock::new();
 
-// Kinds that the passes of a recording show by themselves: who looks for one names it here.
+// Kinds that code names: those that the passes of a recording show by themselves, and one that a mode of the
+// wheel imitates.
 /// Clipping.
 pub static CLIPPING: &Kind = &super::clipping::KIND;
 /// Position error.
@@ -47,6 +48,8 @@ pub static ELECTRICAL_HUM: &Kind = &super::electrical_hum::KIND;
 pub static WHEEL_FLAT: &Kind = &super::wheel_flat::KIND;
 /// Wheel out of round.
 pub static WHEEL_OUT_OF_ROUND: &Kind = &super::wheel_out_of_round::KIND;
+/// Flexible axle box.
+pub static FLEXIBLE_AXLE_BOX: &Kind = &super::flexible_axle_box::KIND;
 /// Corrugation.
 pub static CORRUGATION: &Kind = &super::corrugation::KIND;
 /// Squat.

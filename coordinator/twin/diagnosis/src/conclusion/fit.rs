@@ -7,6 +7,7 @@ use crate::estimate::Estimate;
 use crate::outcome::{BeforeAfter, FitScores, Hypothesis, Levels, Score, Scores, SleeperValues};
 use crate::port_scan::UnknownElement;
 use crate::quantity::{Common, Own};
+use crate::search::Fitted;
 use crate::spectra::DECIBEL;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -69,11 +70,14 @@ impl Evidence<'_> {
             let port = Some(unknown.place.name());
             hypotheses.iter().any(|it| it.accepted && it.port.as_deref() == port)
         };
+        let is_named = |best: &Fitted| {
+            hypotheses.iter().any(|it| it.accepted && it.physics == best.candidate.kind.physics)
+        };
         for round in &search.rounds {
             let gain = match round.accepted {
-                true => &round.held_out_gain[..],
+                true if round.fitted.first().is_some_and(is_named) => &round.held_out_gain[..],
                 false if round.port.as_ref().is_some_and(is_accepted) => &round.unknown_gain[..],
-                false => &[],
+                _ => &[],
             };
             for (speed, gain) in speeds.iter().zip(gain) {
                 *gains.entry(format!("{:.0}", 3.6 * speed)).or_insert(0.0) += gain;
@@ -109,7 +113,7 @@ impl Evidence<'_> {
         let unknowns = &self.prepared.forward.unknowns;
         let of = |value: &dyn Fn(&DVector<f64>) -> f64| BeforeAfter {
             before: value(&self.search.baseline.values),
-            after: value(&self.search.last.values),
+            after: value(&self.search.estimates.values),
         };
         let common = |quantity| of(&|values| values[unknowns.common(quantity)].exp());
         let mean = |quantity| {
@@ -138,7 +142,8 @@ impl Evidence<'_> {
 
     pub(super) fn track(&self) -> Vec<SleeperValues> {
         let unknowns = &self.prepared.forward.unknowns;
-        let [before, after] = [&self.search.baseline, &self.search.last].map(Calibration::moments);
+        let [before, after] =
+            [&self.search.baseline, &self.search.estimates].map(Calibration::moments);
         let estimate = |[logarithms, deviations]: &[DVector<f64>; 2], index: usize| {
             let mean = logarithms[index].exp();
             Estimate { mean, sd: mean * deviations[index] }

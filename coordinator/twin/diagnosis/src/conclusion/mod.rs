@@ -12,6 +12,7 @@ mod speed_disagreement;
 pub use self::alone::passes_alone;
 use crate::calibration::CalibrationError;
 use crate::outcome::{Diagnosis, FORMAT, Hypothesis, Location, UNKNOWN, Verdict, meet};
+use crate::port_scan::PortPlace;
 use crate::prepared_recording::PreparedRecording;
 use crate::search::SearchOutcome;
 use crate::sentence::sentence;
@@ -20,7 +21,7 @@ use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::{LossOfContact, PassDefect};
 use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
-use tracktwin_track::extension::{Kind, LookAlikeGroup};
+use tracktwin_track::extension::{EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup};
 
 /// Largest probability if no held-out speed could be tested: at a single speed, structure and geometry have
 /// the same effect.
@@ -38,6 +39,9 @@ const UNMEASURED_UNKNOWN_MAX: f64 = 0.5;
 
 /// Share of a group's probability that belongs to the kind which the inspection suggests.
 const NAMED_SHARE: f64 = 0.65;
+
+/// Probability from which physics is accepted beside a fault of the measuring chain.
+const LIKELY: f64 = 0.5;
 
 /// Factor on the probability of a hypothesis that does not predict withheld speeds better, or that lacks a
 /// detected shape.
@@ -76,6 +80,7 @@ impl Evidence<'_> {
         let fitted: Vec<&str> =
             self.search.accepted.iter().map(|candidate| candidate.kind.physics).collect();
         add_siblings(&mut hypotheses, &fitted);
+        add_wheel_mode(&mut hypotheses);
         add_families(&mut hypotheses, most);
         hypotheses.sort_by(|a, b| {
             b.probability.total_cmp(&a.probability).then(b.accepted.cmp(&a.accepted))
@@ -167,8 +172,8 @@ impl Evidence<'_> {
         for finding in &self.inspection.nameless {
             self.add_nameless(finding, &mut all);
         }
-        // What a faulty chain makes of the recording is not unknown physics, and what is left of a
-        // saturated one no physics at all.
+        // What a faulty chain makes of the recording is not unknown physics, nor physics that is less likely
+        // than not, and what is left of a saturated one no physics at all.
         let is_chain = |known: &Hypothesis| {
             Kind::from_name(&known.physics).is_some_and(|kind| kind.measuring_chain)
         };
@@ -176,7 +181,8 @@ impl Evidence<'_> {
             let saturated = |defect: &PassDefect| matches!(defect, PassDefect::Saturated { .. });
             let is_saturated = self.inspection.pass_defects.iter().any(saturated);
             let made_by_chain = |known: &&mut Hypothesis| {
-                !is_chain(known) && (known.physics == UNKNOWN || is_saturated)
+                let is_unlikely = known.probability < LIKELY;
+                !is_chain(known) && (known.physics == UNKNOWN || is_saturated || is_unlikely)
             };
             for known in all.iter_mut().filter(made_by_chain) {
                 known.accepted = false;
@@ -227,6 +233,26 @@ fn add_siblings(hypotheses: &mut Vec<Hypothesis>, fitted: &[&str]) {
         }
     }
     hypotheses.extend(siblings);
+}
+
+/// Divides the probability of an accepted flexible axle box between it and a mode of the wheel's disc. Both
+/// are a mass that is held to the wheel by a spring, and the catalogue has no mode of the disc.
+fn add_wheel_mode(hypotheses: &mut Vec<Hypothesis>) {
+    let is_box = |it: &&mut Hypothesis| it.accepted && it.physics == FLEXIBLE_AXLE_BOX.physics;
+    let Some(axle_box) = hypotheses.iter_mut().find(is_box) else { return };
+    let mode = Hypothesis {
+        physics: UNKNOWN.to_owned(),
+        family: Some(EffectFamily::UnknownWheel.name().to_owned()),
+        probability: (1.0 - NAMED_SHARE) * axle_box.probability,
+        accepted: false,
+        port: Some(PortPlace::Wheel.name().to_owned()),
+        parameters: BTreeMap::new(),
+        assumed: BTreeMap::new(),
+        look_alikes: vec![axle_box.physics.clone()],
+        ..axle_box.clone()
+    };
+    axle_box.probability *= NAMED_SHARE;
+    hypotheses.push(mode);
 }
 
 /// Sets the probability of each hypothesis's family at its location; its members exclude each other there.

@@ -25,6 +25,7 @@ use self::round::{Setting, accepted_candidate, is_predicted, unknown_is_predicte
 use self::threshold::EvidenceThreshold;
 use crate::calibration::{Calibration, CalibrationError, Problem};
 use crate::candidate::Candidate;
+use crate::forward::Forward;
 use crate::held_out::HeldOutScore;
 use crate::null_model::NullModel;
 use crate::observation::Observation;
@@ -120,6 +121,8 @@ pub struct SearchOutcome {
     pub baseline: Calibration,
     /// The baseline with all accepted extensions.
     pub last: Calibration,
+    /// The baseline with all accepted extensions, less fitted to the sleepers at which local ones act.
+    pub estimates: Calibration,
     /// The accepted candidates.
     pub accepted: Vec<Candidate>,
     /// Each search, in order.
@@ -191,6 +194,7 @@ pub fn search(
     let baseline = plain.calibrate_widely(start)?;
     let mut search = SearchOutcome {
         last: baseline.clone(),
+        estimates: baseline.clone(),
         baseline,
         accepted: Vec::new(),
         rounds: Vec::new(),
@@ -208,6 +212,7 @@ pub fn search(
         && search.search_round(&setting, all, &mut densities, progress)?
     {}
     search.retract_names(&prepared.forward.section);
+    search.estimates = search.estimates(&prepared.forward)?;
     search.compare_speeds(&setting)?;
     let with = Problem {
         forward: &prepared.forward,
@@ -239,6 +244,22 @@ impl Round {
 }
 
 impl SearchOutcome {
+    /// The last fit again, from the baseline: the covariance of each sleeper contains the error of local
+    /// extensions, to which the values that all sleepers share would otherwise be fitted.
+    fn estimates(&self, forward: &Forward) -> Result<Calibration, CalibrationError> {
+        let (observation, candidates) = (&self.observation, &self.accepted[..]);
+        let plain = Problem { forward, observation, candidates };
+        let factors = plain.inexactness(&self.last.values)?;
+        if factors.iter().all(|factor| *factor == 1.0) {
+            return Ok(self.last.clone());
+        }
+        let observation = &observation.clone().with_factors(&factors);
+        let mut start = self.last.values.clone();
+        let unknowns = forward.unknowns.count();
+        start.rows_mut(0, unknowns).copy_from(&self.baseline.values.rows(0, unknowns));
+        Problem { observation, ..plain }.calibrate_in_range(start)
+    }
+
     /// Corrugation candidates from patches of the baseline's residual.
     fn waves(&self, setting: &Setting<'_>) -> Vec<Candidate> {
         let forward = &setting.prepared.forward;
