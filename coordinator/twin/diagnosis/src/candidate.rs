@@ -6,6 +6,9 @@ use tracktwin_track::extension::{Class, ExtensionInstance, Family, Kind, KindPar
 /// Smallest value of a parameter that may be zero, as a share of its greatest value.
 const LEAST: f64 = 1e-2;
 
+/// Kind of sleepers that are cracked through.
+const CRACKED: &str = "cracked_sleeper";
+
 /// An extension at one location of the recording, with free parameters.
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -31,6 +34,11 @@ impl Candidate {
     /// Whether it acts by force laws that depend on the wheel load.
     pub(crate) fn is_under_load(&self) -> bool {
         self.kind.classes.contains(&Class::Load)
+    }
+
+    /// Whether its kind affects few sleepers: one or two, or a short run.
+    pub(crate) fn is_of_few(&self) -> bool {
+        self.is_under_load() || self.kind.physics == CRACKED
     }
 
     /// Whether it only adds to the dynamic stiffness of track, vehicle or sensor. Its linear model is then

@@ -43,9 +43,12 @@ impl Evidence<'_> {
             });
         all.retain(|known| known.accepted || !is_same(known));
         if !explained {
-            // The name that came near it is right after all.
+            // The name that came near it is right after all, and what the wheel does everywhere, which was not
+            // fitted, is nothing else that acts everywhere.
+            let at_wheel = kind.classes.contains(&Class::WheelAngle);
             let is_it = |known: &&mut Hypothesis| {
-                known.physics == UNKNOWN && known.look_alikes.iter().any(|it| it == finding.physics)
+                let comes_near = known.look_alikes.iter().any(|it| it == finding.physics);
+                known.physics == UNKNOWN && (comes_near || at_wheel && known.location.is_none())
             };
             for unknown in all.iter_mut().filter(is_it) {
                 unknown.accepted = false;

@@ -70,12 +70,10 @@ impl Evidence<'_> {
     pub fn conclude(&self) -> Result<Diagnosis, CalibrationError> {
         let mut hypotheses = self.hypotheses();
         self.add_patch(&mut hypotheses);
-        let most = self.probability_max();
+        let (most, unknown_max) = (self.probability_max(), self.unknown_max());
         for hypothesis in &mut hypotheses {
+            let most = if hypothesis.physics == UNKNOWN { unknown_max } else { most };
             hypothesis.probability = hypothesis.probability.min(most);
-            if hypothesis.physics == UNKNOWN && !self.has_measured_rates() {
-                hypothesis.probability = hypothesis.probability.min(UNMEASURED_UNKNOWN_MAX);
-            }
         }
         let fitted: Vec<&str> =
             self.search.accepted.iter().map(|candidate| candidate.kind.physics).collect();
@@ -137,7 +135,17 @@ impl Evidence<'_> {
     fn nothing(&self, hypotheses: &[Hypothesis]) -> f64 {
         let first = self.search.rounds.first().map_or(1.0, |round| round.probabilities().nothing);
         let accepted = hypotheses.iter().filter(|hypothesis| hypothesis.accepted);
+        if accepted.clone().next().is_none() {
+            // Something without a name is no more certain than unknown physics.
+            return first.max(1.0 - self.unknown_max());
+        }
         first * accepted.map(|hypothesis| 1.0 - hypothesis.probability).product::<f64>()
+    }
+
+    /// Largest probability of unknown physics.
+    fn unknown_max(&self) -> f64 {
+        let most = self.probability_max();
+        if self.has_measured_rates() { most } else { most.min(UNMEASURED_UNKNOWN_MAX) }
     }
 
     fn speeds(&self) -> usize {

@@ -14,7 +14,7 @@ use tracktwin_track::extension::{EffectFamily, Kind, LookAlikeGroup};
 const PORT_ALARM: f64 = 0.01;
 
 /// If the probability of nothing is below this, physics is left out even if neither a kind nor something
-/// unknown predicts a speed that was held out.
+/// unknown predicts a speed that was held out. On a line the errors of the track model reach it, too.
 const NOTHING_LEFT: f64 = 0.02;
 
 /// Probability that a residual in addition to an accepted extension is new physics.
@@ -44,7 +44,7 @@ impl Evidence<'_> {
         // which predicted them, leaves too much at its place.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
         let taken_back = round.fitted.first().filter(|_| round.remainder.is_some());
-        let is_certain = alone && nothing < NOTHING_LEFT;
+        let is_certain = alone && nothing < NOTHING_LEFT && self.has_measured_rates();
         let unnamed = !is_port && (is_certain || is_there && taken_back.is_some());
         let (kept, unknown) =
             if unnamed { (FAILED_SHARE, unknown + failed) } else { (is_new, unknown) };

@@ -16,6 +16,10 @@ const LEFT: f64 = 0.1;
 /// errors, which grow with the effect.
 const LEFT_UNDER_LOAD: f64 = 1.0 / 3.0;
 
+/// Smallest evidence in nats for unknown physics in a residual that leads to rejection: on recordings with
+/// nothing left out, 12 nats were found (docs/decisions/0015-what-was-tried-in-the-diagnosis.md).
+const LEFT_MIN: f64 = 16.0;
+
 impl SearchOutcome {
     /// Rejects the last accepted candidates while the residual at their location is too large.
     pub(super) fn retract_names(&mut self, section: &Section) {
@@ -74,7 +78,7 @@ fn retraction_threshold(explained: &[(&Candidate, f64)]) -> Option<f64> {
     let is_kind = |(known, _): &&(&Candidate, f64)| known.kind.physics == last.kind.physics;
     let evidence: f64 = explained.iter().take_while(is_kind).map(|(_, evidence)| evidence).sum();
     let share = if last.is_under_load() { LEFT_UNDER_LOAD } else { LEFT };
-    (!is_local_shape(last)).then_some(share * evidence)
+    (!is_local_shape(last)).then_some((share * evidence).max(LEFT_MIN))
 }
 
 #[cfg(test)]

@@ -11,9 +11,9 @@ use std::ops::Range;
 /// Number of sleepers of the shortest run; pairs are candidates of their own.
 const SHORTEST: usize = 3;
 
-/// Number of sleepers of the longest run for a kind that depends on the wheel load; over a longer run the
-/// rail deflects until gaps close.
-const LONGEST_UNDER_LOAD: usize = 5;
+/// Number of sleepers of the longest run for a kind that affects few sleepers: over a longer run the rail
+/// deflects until gaps close, and many cracked sleepers are softer sleepers.
+const LONGEST_OF_FEW: usize = 5;
 
 /// Smallest ratio of the gain of a run to that of the kind at a single location.
 const BETTER: f64 = 1.2;
@@ -84,8 +84,7 @@ impl Singles<'_> {
     fn best_run(&self, current: &Calibration) -> Option<(f64, Range<usize>)> {
         let sleepers: Vec<usize> = self.templates.keys().copied().collect();
         let mut best: Option<(f64, Range<usize>)> = None;
-        let longest =
-            if self.candidate.is_under_load() { LONGEST_UNDER_LOAD } else { sleepers.len() };
+        let longest = if self.candidate.is_of_few() { LONGEST_OF_FEW } else { sleepers.len() };
         for (index, &first) in sleepers.iter().enumerate() {
             let mut sum = Sum::none(current);
             for (length, &sleeper) in (1..=longest).zip(&sleepers[index..]) {

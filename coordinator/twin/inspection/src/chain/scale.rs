@@ -1,12 +1,17 @@
 //! Scale errors: positions that deviate from the stated speeds by the same factor at every speed.
 
 use crate::along::{by_speed, ln_normal_bound, speed_m_s};
-use tracktwin_signal::recording::Recording;
+use crate::median;
+use tracktwin_signal::recording::{Pass, Recording};
 
 /// Usual error of an odometer over a pass, as a share of the sleeper spacing: 3 mm on V-Track.
 const WANDER: f64 = 0.024;
-/// Usual relative difference between odometer and stated speed; drives are calibrated to this accuracy.
-const USUAL: f64 = 3e-3;
+/// Smallest usual relative difference between odometer and stated speed; drives are calibrated to this
+/// accuracy.
+const USUAL_MIN: f64 = 3e-3;
+/// Usual difference as a multiple of the change of the speed within a pass: the speed of a train is stated
+/// no more exactly than its driver keeps it.
+const DRIFTS: f64 = 2.0;
 /// Largest difference of the factors at single speeds from their mean, in standard deviations; rounded
 /// speeds exceed it.
 const AGREE: f64 = 3.0;
@@ -16,6 +21,8 @@ const AGREE: f64 = 3.0;
 pub struct Scale {
     /// Recorded distance over true distance, minus one, and its standard deviation.
     pub scale: (f64, f64),
+    /// Usual difference between odometer and stated speed, as a share of the speed.
+    pub usual: f64,
     /// Number of speeds with this scale.
     pub speeds: usize,
     /// Natural logarithm of the probability of such a scale with a usual odometer and usual speeds.
@@ -47,6 +54,15 @@ pub fn scale(recording: &Recording) -> Option<Scale> {
         return None;
     }
     let deviation = deviation / count.sqrt();
-    let ln_p = ln_normal_bound((mean.abs() - USUAL) / deviation);
-    Some(Scale { scale: (mean, deviation), speeds: each.len(), ln_p })
+    let usual = USUAL_MIN.max(DRIFTS * median(passes.iter().map(drift).collect()));
+    let ln_p = ln_normal_bound((mean.abs() - usual) / deviation);
+    Some(Scale { scale: (mean, deviation), usual, speeds: each.len(), ln_p })
+}
+
+/// Relative difference of the mean speeds in the two halves of a pass.
+fn drift(pass: &Pass) -> f64 {
+    let positions = &pass.position_m;
+    let half = positions.len() / 2;
+    let [first, second] = [0, half].map(|from| positions[from + half - 1] - positions[from]);
+    2.0 * (second - first).abs() / (second + first).abs()
 }

@@ -180,6 +180,20 @@ fn an_odometer_that_stretches_every_pass_alike_is_told_from_rounded_speeds() {
 }
 
 #[test]
+fn a_train_that_slows_down_does_not_keep_its_stated_speed() {
+    // 1 % slower in its second half: 2 % from the stated speed are usual.
+    let slowing = measured(7, &|_, _, positions| {
+        let (first, last) = (positions[0], positions[positions.len() - 1]);
+        for position in positions {
+            let share = (*position - first) / (last - first);
+            *position = first + (*position - first) * (1.018 - 0.01 * share);
+        }
+    });
+    let found = scale(&slowing).unwrap();
+    assert!(found.usual > 0.015 && found.ln_p == 0.0, "{found:?}");
+}
+
+#[test]
 fn odometers_that_wander_as_usual_are_no_error() {
     let recording = measured(5, &|pass, _, positions| {
         for position in positions {

@@ -121,10 +121,11 @@ pub(super) fn scale_finding(scale: &Scale) -> Finding {
         place: Place::Everywhere,
         parameters: BTreeMap::from([("scale", scale.scale)]),
         evidence: format!(
-            "at {} speeds alike, positions advance {:+.2} % (sd {:.2}) from the stated speeds; 0.3 % are usual",
+            "at {} speeds alike, positions advance {:+.2} % (sd {:.2}) from the stated speeds; {:.1} % are usual",
             scale.speeds,
             1e2 * factor,
-            1e2 * deviation
+            1e2 * deviation,
+            1e2 * scale.usual
         ),
     }
 }
