@@ -1,13 +1,12 @@
 //! Candidates: kinds of physics with locations and trial values for the screening.
 
 use crate::section::Section;
-use tracktwin_track::extension::{Class, ExtensionInstance, Family, Kind, KindParameter, Places};
+use tracktwin_track::extension::{
+    CRACKED_SLEEPER, Class, ExtensionInstance, Family, Kind, KindParameter, Places,
+};
 
 /// Smallest value of a parameter that may be zero, as a share of its greatest value.
 const LEAST: f64 = 1e-2;
-
-/// Kind of sleepers that are cracked through.
-const CRACKED: &str = "cracked_sleeper";
 
 /// An extension at one location of the recording, with free parameters.
 #[derive(Clone, Debug)]
@@ -38,7 +37,7 @@ impl Candidate {
 
     /// Whether its kind affects few sleepers: one or two, or a short run.
     pub(crate) fn is_of_few(&self) -> bool {
-        self.is_under_load() || self.kind.physics == CRACKED
+        self.is_under_load() || self.kind.physics == CRACKED_SLEEPER.physics
     }
 
     /// Whether it only adds to the dynamic stiffness of track, vehicle or sensor. Its linear model is then

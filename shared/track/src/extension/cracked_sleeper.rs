@@ -32,7 +32,7 @@ pub(super) const KIND: Kind = Kind {
     screening: Screening::tried(&[Family::new(
         Places::SleepersAndPairs,
         &["bending_factor"],
-        Trials::Grid(&[&[4e-2]]),
+        Trials::Grid(&[&[4e-2, 0.2]]),
     )
     .held(&[("bending_length_m", 2e-2)])]),
     build: |inputs| {

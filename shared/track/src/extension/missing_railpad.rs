@@ -19,7 +19,7 @@ pub(super) const KIND: Kind = Kind {
         .ranges([5e6, 2e7], [2e7, 6e7], 1e7)
         // What carries more is a soft railpad, not a missing one.
         .slack(0.4)],
-    look_alikes: &["support_variation", "load_dependent_railpad"],
+    look_alikes: &["support_variation", "load_dependent_railpad", "cracked_sleeper"],
     would_separate: "a second speed, or a hammer test of the sleeper",
     screening: Screening::tried(&[Family::new(
         Places::Sleepers,

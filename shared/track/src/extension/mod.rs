@@ -44,8 +44,8 @@ pub use instance::{ExtensionInstance, Inputs, InstanceError};
 pub use kind::{Bound, Class, EffectFamily, Kind, KindParameter, LookAlikeGroup, PlaceKind};
 pub use measured::Measured;
 pub use registry::{
-    CLIPPING, CORRUGATION, ELECTRICAL_HUM, FLEXIBLE_AXLE_BOX, GAIN_ERROR, POSITION_ERROR,
-    RAIL_JOINT, SQUAT, WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
+    CLIPPING, CORRUGATION, CRACKED_SLEEPER, ELECTRICAL_HUM, FLEXIBLE_AXLE_BOX, GAIN_ERROR,
+    POSITION_ERROR, RAIL_JOINT, SQUAT, WHEEL_FLAT, WHEEL_OUT_OF_ROUND,
 };
 pub use sampled::{SampledExtension, SampledValue};
 pub use screening::{Family, Places, Screening, Trials};

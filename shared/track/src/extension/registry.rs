@@ -34,8 +34,8 @@ pub(super) static KINDS: &[Kind] = &[
 /// A kind that a test adds.
 pub(super) static ADDED: OnceLock<&'static Kind> = OnceLock::new();
 
-// Kinds that code names: those that the passes of a recording show by themselves, and one that a mode of the
-// wheel imitates.
+// Kinds that code names: those that the passes of a recording show by themselves, and those that need a rule
+// of their own.
 /// Clipping.
 pub static CLIPPING: &Kind = &super::clipping::KIND;
 /// Position error.
@@ -48,6 +48,8 @@ pub static ELECTRICAL_HUM: &Kind = &super::electrical_hum::KIND;
 pub static WHEEL_FLAT: &Kind = &super::wheel_flat::KIND;
 /// Wheel out of round.
 pub static WHEEL_OUT_OF_ROUND: &Kind = &super::wheel_out_of_round::KIND;
+/// Cracked sleeper.
+pub static CRACKED_SLEEPER: &Kind = &super::cracked_sleeper::KIND;
 /// Flexible axle box.
 pub static FLEXIBLE_AXLE_BOX: &Kind = &super::flexible_axle_box::KIND;
 /// Corrugation.
