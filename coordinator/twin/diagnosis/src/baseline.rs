@@ -9,7 +9,7 @@ use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
-use tracktwin_parameters::{Parameter, Prior};
+use tracktwin_parameters::{Parameter, Prior, TrackDesign};
 use tracktwin_track::model::Support;
 
 /// The free parameters of a baseline, as logarithms, and their indices.
@@ -91,6 +91,9 @@ mod prior {
     /// Power response of the sensor at a frequency, 0.2 dB: accelerometers are flat to 2 % in amplitude,
     /// and a finite-element model has the same accuracy.
     pub(super) const RESPONSE: f64 = 0.046;
+    /// The same on a line, 0.5 dB: models of lines differ by up to 1 dB at single bands (docs/accuracy.md), and
+    /// sleepers do not stand at exactly equal distances.
+    pub(super) const RESPONSE_OF_LINE: f64 = 0.115;
 }
 
 /// Possible distances of the end of the track in spans; their effects are free in the fit.
@@ -122,6 +125,7 @@ impl Unknowns {
     ) -> Self {
         let (knots, response_knots) = (knots(wave_numbers), knots(frequencies_hz));
         let known = &section.track.prior;
+        let is_rig = section.track.design == TrackDesign::v_track();
         Self {
             sleepers: section.sleepers,
             speeds,
@@ -132,7 +136,7 @@ impl Unknowns {
             slope_deviation: known.slope_deviation,
             variation: prior::VARIATION,
             exceptions: Vec::new(),
-            response_deviation: prior::RESPONSE,
+            response_deviation: if is_rig { prior::RESPONSE } else { prior::RESPONSE_OF_LINE },
         }
     }
 

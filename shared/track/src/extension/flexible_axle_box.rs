@@ -17,11 +17,11 @@ pub(super) const KIND: Kind = Kind {
     measuring_chain: false,
     parameters: &[
         KindParameter::new("mass_kg", "kg", "mass of the axle box, part of the unsprung mass")
-            .ranges([2.0, 40.0], [100.0, 500.0], 10.0),
+            .ranges([2.0, 40.0], [50.0, 500.0], 10.0),
         KindParameter::new("stiffness_N_per_m", "N/m", "stiffness between wheel and axle box")
-            .ranges([5e7, 1e9], [2.5e8, 5e9], 4e8),
+            .ranges([1e7, 1e9], [2.5e7, 5e9], 4e8),
         KindParameter::new("damping_N_s_per_m", "N s/m", "damping between wheel and axle box")
-            .ranges([5e2, 2e4], [1e4, 5e5], 3e3)
+            .ranges([5e2, 2e4], [1e3, 5e5], 3e3)
             .bound(Bound::NotNegative),
         KindParameter::new(
             SENSOR_ON_WHEEL,
@@ -65,8 +65,8 @@ const FREE: &[&str] = &["mass_kg", "stiffness_N_per_m", "damping_N_s_per_m"];
 const TRIALS: Trials = Trials::Grid(&[
     &[2.0, 6.0, 15.0],
     &[
-        5e7, 6.2e7, 7.6e7, 9.4e7, 1.2e8, 1.4e8, 1.8e8, 2.2e8, 2.7e8, 3.3e8, 4.1e8, 5e8, 6.2e8,
-        7.6e8, 9.4e8,
+        1e7, 1.2e7, 1.5e7, 1.9e7, 2.3e7, 2.8e7, 3.5e7, 4.2e7, 5e7, 6.2e7, 7.6e7, 9.4e7, 1.2e8,
+        1.4e8, 1.8e8, 2.2e8, 2.7e8, 3.3e8, 4.1e8, 5e8, 6.2e8, 7.6e8, 9.4e8,
     ],
     &[2e3],
 ]);
