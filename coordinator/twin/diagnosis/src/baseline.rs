@@ -9,7 +9,7 @@ use crate::quantity::{Common, Own, Quantity};
 use crate::section::Section;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
-use tracktwin_parameters::{Parameter, Prior, TrackDesign};
+use tracktwin_parameters::{Parameter, Prior};
 use tracktwin_track::model::Support;
 
 /// The free parameters of a baseline, as logarithms, and their indices.
@@ -125,7 +125,6 @@ impl Unknowns {
     ) -> Self {
         let (knots, response_knots) = (knots(wave_numbers), knots(frequencies_hz));
         let known = &section.track.prior;
-        let is_rig = section.track.design == TrackDesign::v_track();
         Self {
             sleepers: section.sleepers,
             speeds,
@@ -136,7 +135,11 @@ impl Unknowns {
             slope_deviation: known.slope_deviation,
             variation: prior::VARIATION,
             exceptions: Vec::new(),
-            response_deviation: if is_rig { prior::RESPONSE } else { prior::RESPONSE_OF_LINE },
+            response_deviation: if section.is_v_track() {
+                prior::RESPONSE
+            } else {
+                prior::RESPONSE_OF_LINE
+            },
         }
     }
 

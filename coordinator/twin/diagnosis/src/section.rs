@@ -3,7 +3,7 @@
 use crate::bands::{Bands, CENTRE_RAD};
 use std::f64::consts::{SQRT_2, TAU};
 use std::ops::Range;
-use tracktwin_parameters::Track;
+use tracktwin_parameters::{Track, TrackDesign};
 use tracktwin_track::extension::ExtensionInstance;
 use tracktwin_track::model::Mesh;
 
@@ -56,6 +56,11 @@ impl Section {
     /// A section of `sleepers` sleepers with the default length of track around it; `first_x_m` in m.
     pub fn new(track: impl Into<Track>, sleepers: usize, first_x_m: f64) -> Self {
         Self { track: track.into(), sleepers, first_x_m, spans_beyond: SPANS_BEYOND }
+    }
+
+    /// Whether the track is V-Track, on which error rates of diagnoses were measured (docs/trial.md).
+    pub fn is_v_track(&self) -> bool {
+        self.track.design == TrackDesign::v_track()
     }
 
     /// Mesh of the whole track: the compared sleepers and the spans beyond them.
@@ -156,8 +161,7 @@ impl Section {
 
 #[cfg(test)]
 mod tests {
-    use super::Section;
-    use tracktwin_parameters::TrackDesign;
+    use super::{Section, TrackDesign};
 
     #[test]
     fn stretches_are_beside_each_other_up_to_a_spacing_apart() {

@@ -19,7 +19,6 @@ use crate::sentence::sentence;
 use std::collections::BTreeMap;
 use tracktwin_inspection::Inspection;
 use tracktwin_inspection::chain::{LossOfContact, PassDefect};
-use tracktwin_parameters::TrackDesign;
 use tracktwin_signal::recording::Recording;
 use tracktwin_track::extension::{EffectFamily, FLEXIBLE_AXLE_BOX, Kind, LookAlikeGroup};
 
@@ -115,11 +114,6 @@ impl Evidence<'_> {
         })
     }
 
-    /// Whether error rates of diagnoses were measured on this track (docs/trial.md).
-    fn has_measured_rates(&self) -> bool {
-        self.prepared.forward.section.track.design == TrackDesign::v_track()
-    }
-
     /// Largest probability that the recording permits.
     fn probability_max(&self) -> f64 {
         if self.speeds() == 1 {
@@ -145,7 +139,11 @@ impl Evidence<'_> {
     /// Largest probability of unknown physics.
     fn unknown_max(&self) -> f64 {
         let most = self.probability_max();
-        if self.has_measured_rates() { most } else { most.min(UNMEASURED_UNKNOWN_MAX) }
+        if self.prepared.forward.section.is_v_track() {
+            most
+        } else {
+            most.min(UNMEASURED_UNKNOWN_MAX)
+        }
     }
 
     fn speeds(&self) -> usize {

@@ -44,7 +44,8 @@ impl Evidence<'_> {
         // which predicted them, leaves too much at its place.
         let failed: f64 = named.iter().map(|probability| (1.0 - FAILED_SHARE) * probability).sum();
         let taken_back = round.fitted.first().filter(|_| round.remainder.is_some());
-        let is_certain = alone && nothing < NOTHING_LEFT && self.has_measured_rates();
+        let is_certain =
+            alone && nothing < NOTHING_LEFT && self.prepared.forward.section.is_v_track();
         let unnamed = !is_port && (is_certain || is_there && taken_back.is_some());
         let (kept, unknown) =
             if unnamed { (FAILED_SHARE, unknown + failed) } else { (is_new, unknown) };
