@@ -187,7 +187,8 @@ impl Evidence<'_> {
             let saturated = |defect: &PassDefect| matches!(defect, PassDefect::Saturated { .. });
             let is_saturated = self.inspection.pass_defects.iter().any(saturated);
             let made_by_chain = |known: &&mut Hypothesis| {
-                let is_unlikely = known.probability < LIKELY;
+                // An alternative to the fault itself keeps its probability.
+                let is_unlikely = known.accepted && known.probability < LIKELY;
                 !is_chain(known) && (known.physics == UNKNOWN || is_saturated || is_unlikely)
             };
             for known in all.iter_mut().filter(made_by_chain) {
